@@ -115,11 +115,13 @@ class Around(Model):
 
 
 class Traction(Model):
-    """A force per initial area, Pa, on the exposed faces whose three nodes start inside the box ``low``..``high`` and
-    the ``cylinder`` (all of the parts when both are absent), turning with nothing, until erosion takes the tet of the
-    face. Nodes no further outside than a hundredth of the shortest edge of their part are in. Either ``stress`` or
-    ``pressure`` is given. ``conoid validate`` says about how large the faces are together; a run whose faces are not
-    warns.
+    """A force per area, Pa, on the exposed faces whose three nodes start inside the box ``low``..``high`` and the
+    ``cylinder`` (all of the parts when both are absent). By default it is per initial area and turns with nothing; a
+    pressure that ``follows`` acts on the surface as it is. A face has its load until erosion takes its tet, or, of a
+    pressure that ``follows``, until its tet has come off alone, all four faces of it being surface; faces that come to
+    the surface later have none. Nodes no further outside than a hundredth of the shortest edge of their part are in.
+    Either ``stress`` or ``pressure`` is given. ``conoid validate`` says about how large the faces are together; a run
+    whose faces are not warns.
     """
 
     kind: Literal["traction"]
@@ -127,7 +129,12 @@ class Traction(Model):
     stress: tuple[Stress, Stress, Stress] | None = None
     """Force per area along x, y, z; not zero."""
     pressure: Stress | None = None
-    """Force per area against the initial outward normal of each face; not zero."""
+    """Force per area against the outward normal of each face; not zero. Of the initial area and normal, but for a
+    pressure that ``follows``."""
+    follows: bool = False
+    """Whether ``pressure`` follows the surface: it acts on the present area of each face, against its present normal,
+    as that of a gas or a liquid does. Its work is that of the forces along the way of the nodes. On a closed surface it
+    is no force and no moment in sum, but for rounding."""
     course: Course = ()
     """Pairs of a time and a factor of the force: linear in between, constant before the first and after the last.
     Without them the force is constant from the first moment on."""

@@ -137,6 +137,8 @@ def _traction(boundary: Traction, location: Location) -> Iterator[Problem]:
         yield problem((*location, "stress"), "0, 0, 0", "must not be zero")
     elif boundary.pressure == 0.0:
         yield problem((*location, "pressure"), 0, "must not be zero")
+    if boundary.follows and boundary.pressure is None:
+        yield problem((*location, "follows"), True, "a pressure follows the surface, a stress does not; give pressure")
     if (round_ := boundary.cylinder) is not None and round_.inner_radius > round_.radius:
         message = f"must not be above radius, {round_.radius:g} m"
         yield problem((*location, "cylinder", "inner_radius"), f"{round_.inner_radius:g} m", message)

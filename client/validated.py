@@ -105,7 +105,9 @@ def loads_table(case: Case, acted_on: Sequence[Load]) -> Table:
 
 def _acts(spec: Boundary) -> str:
     if isinstance(spec, Traction):
-        return f"pressure of {si(spec.pressure, 'Pa')}" if spec.pressure is not None else "stress"
+        if spec.pressure is None:
+            return "stress"
+        return f"pressure of {si(spec.pressure, 'Pa')}{', following the surface' if spec.follows else ''}"
     return spec.kind
 
 

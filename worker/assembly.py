@@ -13,7 +13,7 @@ from conoid.cases.bodies import Mesh, MeshFile, Symmetric
 from conoid.cases.library import material as find_material
 from conoid.cases.survey import Survey
 
-from . import selection
+from . import selection, surface_pressure
 from .contact import overlap, pairing
 from .errors import InputError, MeshError
 from .facts import Facts
@@ -25,7 +25,7 @@ from .mesh.sharing import Placed, shared_nodes
 from .pieces import UNSEEN, pieces
 from .selection import Nearness, Selected
 from .setting import turned, velocities
-from .state import Flags, Floats, Indices, Ints, Load
+from .state import Flags, Floats, Indices, Ints, Load, LoadedFaces
 
 log = logging.getLogger("conoid.worker")
 
@@ -49,7 +49,7 @@ class Whole:
     node_volume: Floats
     mass: Floats
     velocity: Floats
-    loads: list[Load]
+    loads: list[Load | LoadedFaces]
     """Of the tractions of the case."""
     near: Nearness
     warnings: list[str]
@@ -219,19 +219,19 @@ def _velocities(case: schema.Case, x: Floats, part: Indices) -> Floats:
 
 def _loads(
     case: schema.Case, x: Floats, part: Indices, tets: Indices, near: Nearness, known: list[bool]
-) -> tuple[list[Load], list[Selected], list[str]]:
-    """The tractions of the case: a third of the force on each face for each of its nodes, in the order of the tets;
-    what they act on, and warnings. Those that are not ``known`` act on nothing. Raises InputError for another one that
-    acts on no face.
+) -> tuple[list[Load | LoadedFaces], list[Selected], list[str]]:
+    """The tractions of the case: a third of the force on each face for each of its nodes, in the order of the tets, or
+    the faces that a pressure follows; what they act on, and warnings. Those that are not ``known`` act on nothing.
+    Raises InputError for another one that acts on no face.
     """
     tractions = case.boundaries_of(schema.Traction)
-    loads, found, told = list[Load](), list[Selected](), list[str]()
+    loads, found, told = list[Load | LoadedFaces](), list[Selected](), list[str]()
     tet, face = np.nonzero(across(tets) < 0) if tractions else (np.zeros(0, np.int64), np.zeros(0, np.int64))
     faces = tets[tet[:, None], FACES[face]]
     for index, spec in tractions:
         if not known[index]:
             none = np.zeros(0, np.int64)
-            loads.append(Load(none, none, none, np.zeros((0, 3))))
+            loads.append(_load(spec, none, np.zeros((0, 3), np.int64), np.zeros((0, 3))))
             continue
         selected, chosen = selection.counted(case, index, x, part, faces, near)
         loaded = faces[chosen]
@@ -240,14 +240,20 @@ def _loads(
             raise InputError(f"boundaries[{index}]: acts on no face; check {where}")
         found.append(selected)
         told += selection.missed(case, index, x, part, near, np.isin(np.arange(len(case.parts)), part[loaded[:, 0]]))
-        outward = 0.5 * normals(x, loaded)
-        if spec.stress is not None:
-            force = np.linalg.norm(outward, axis=1)[:, None] / 3.0 * np.array(spec.stress)
-        else:
-            force = -(spec.pressure or 0.0) / 3.0 * outward
-        of, nodes = np.repeat(tet[chosen], 3).astype(np.int64), loaded.reshape(-1).astype(np.int64)
-        loads.append(Load(np.arange(len(of)), of, nodes, np.repeat(force, 3, axis=0)))
+        loads.append(_load(spec, tet[chosen].astype(np.int64), loaded.astype(np.int64), 0.5 * normals(x, loaded)))
     return loads, found, told
+
+
+def _load(spec: schema.Traction, tets: Ints, faces: Ints, outward: Floats) -> Load | LoadedFaces:
+    """That of a traction on ``faces`` (m, 3) of ``tets`` (m,) with areas along their normals, ``outward`` (m, 3)."""
+    if spec.follows:
+        return LoadedFaces(tets, faces, surface_pressure.scale(spec, outward))
+    if spec.stress is not None:
+        force = np.linalg.norm(outward, axis=1)[:, None] / 3.0 * np.array(spec.stress)
+    else:
+        force = -(spec.pressure or 0.0) / 3.0 * outward
+    of = np.repeat(tets, 3)
+    return Load(np.arange(len(of)), of, faces.reshape(-1), np.repeat(force, 3, axis=0))
 
 
 def _driven(

@@ -17,6 +17,6 @@ def begun(case: Case, meshes: Mapping[int, TetMesh], compiled: bool) -> list[str
     """
     whole, comm = assembled(case, meshes.items(), compiled), SerialComm()
     model, piece = domain.alone(case, whole)
-    scene = conditions.build(case, model, piece.loads, comm)
+    scene = conditions.build(case, model, piece.loads, piece.neighbours, comm)
     known = selection.settled(case, meshes)
     return [*whole.warnings, *conditions.start(case, model, scene, comm, known)]

@@ -120,6 +120,9 @@ class Boundary(ABC):
             setattr(self, key, parcel.nodes[f"{name}.{key}"][self.nodes])
         self._before = np.zeros((len(self.nodes), 3))
 
+    def free(self) -> None:  # noqa: B027 (most boundaries send no messages)
+        """Gives all standing messages back to MPI."""
+
     def _inherit(self, at: Ints) -> None:  # noqa: B027 (a boundary of its own may keep more by node)
         """Takes up copies of the nodes at the places ``at``; they stand behind all nodes."""
 

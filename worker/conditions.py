@@ -14,7 +14,9 @@ from .drivers import Course, Gravity, PrescribedRotation, PrescribedVelocity, Tr
 from .errors import InputError
 from .migration.parcel import Parcel
 from .parallel.comm import Comm
-from .state import Flags, Floats, Indices, Load, Model, Nodes
+from .parallel.ownership import Neighbour
+from .state import Flags, Floats, Indices, Load, LoadedFaces, Model, Nodes
+from .surface_pressure import SurfacePressure
 from .walls import RigidWalls
 
 AXES = {"x": 0, "y": 1, "z": 2}
@@ -22,14 +24,20 @@ _ASIDE = 1e-9
 """Of the largest speed: less across a symmetry plane is rounding."""
 
 
-def loads(parcel: Parcel) -> list[Load]:
+def loads(parcel: Parcel) -> list[Load | LoadedFaces]:
     """The loads of the tractions that a parcel has, in their order."""
-    names = (f"boundary{index}.load" for index in range(len(parcel.known["last_push"])))
-    tables = [parcel.rows[name] for name in names if name in parcel.rows]
-    return [Load(table["key"], table["tets"], table["of"], table["force"]) for table in tables]
+    found: list[Load | LoadedFaces] = []
+    for name in (f"boundary{index}" for index in range(len(parcel.known["last_push"]))):
+        if (table := parcel.rows.get(f"{name}.load")) is not None:
+            found.append(Load(table["key"], table["tets"], table["of"], table["force"]))
+        elif (table := parcel.rows.get(f"{name}.faces")) is not None:
+            found.append(LoadedFaces(table["tet"], table["corners"], parcel.known[f"{name}.scale"]))
+    return found
 
 
-def build(case: schema.Case, model: Model, loads: list[Load], comm: Comm) -> list[Boundary]:
+def build(
+    case: schema.Case, model: Model, loads: list[Load | LoadedFaces], neighbours: list[Neighbour], comm: Comm
+) -> list[Boundary]:  # fmt: skip
     """The boundaries of a case on this rank's nodes: gravity and tractions first, so that what is held stays held;
     walls last, and they leave alone what has a prescribed motion. ``loads``: of the tractions. All ranks take part.
     """
@@ -41,6 +49,8 @@ def build(case: schema.Case, model: Model, loads: list[Load], comm: Comm) -> lis
     ]
     boundaries += [
         Traction(nodes.places(load.nodes), load, Course(spec.course))
+        if isinstance(load, Load)
+        else SurfacePressure(model, load, spec.pressure or 0.0, Course(spec.course), neighbours, comm)
         for (_, spec), load in zip(case.boundaries_of(schema.Traction), loads, strict=True)
     ]
     for i, plane in case.boundaries_of(schema.Symmetry):

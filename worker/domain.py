@@ -34,6 +34,7 @@ from .state import (
     Indices,
     Ints,
     Load,
+    LoadedFaces,
     Model,
     Nodes,
     Tets,
@@ -56,8 +57,9 @@ class Piece:
     velocity: Floats
     mass: Floats
     node_volume: Floats
-    loads: list[Load]
-    """Of the tractions of the case, on all nodes that this rank holds."""
+    loads: list[Load | LoadedFaces]
+    """Of the tractions of the case, on all nodes that this rank holds; of those that follow the surface the faces of
+    its tets."""
     tet_ids: Ints
     tet_part: Indices
     tets: Indices
@@ -142,7 +144,7 @@ def _piece(
     return Piece(
         nodes.astype(np.int64), whole.node_part[nodes], home[nodes], home[nodes] == rank, whole.points[nodes],
         whole.velocity[nodes], whole.mass[nodes], whole.node_volume[nodes],
-        [load.take(np.isin(load.nodes, nodes)) for load in whole.loads],
+        [load.here(nodes, ids) for load in whole.loads],
         ids.astype(np.int64),
         whole.tet_part[ids], local[tets], whole.volumes[ids],
         whole.across[ids] if len(whole.across) else whole.across, np.any(shared[tets], axis=1),

@@ -143,6 +143,8 @@ class Simulation:
             self.fracture.free()
         if self.contact is not None:
             self.contact.free()
+        for bound in self.boundaries:
+            bound.free()
 
     def next_scale(self) -> float:
         """The scale for the next sum of forces."""
@@ -156,7 +158,7 @@ def build(case: Case, folder: Path, comm: Comm, say: Say = quiet) -> Simulation:
     """
     model, piece = domain.build(case, folder, comm, say)
     say("setting up the first step")
-    scene = conditions.build(case, model, piece.loads, comm)
+    scene = conditions.build(case, model, piece.loads, piece.neighbours, comm)
     told = conditions.start(case, model, scene, comm)
     sim = _assemble(case, model, piece.neighbours, scene, piece.node_volume, comm, Timers(comm, team(case.run.threads)))
     sim.warnings = *piece.warnings, *told
@@ -232,7 +234,7 @@ def resume(case: Case, arrived: Arrived, comm: Comm, timers: Timers) -> Simulati
     """Goes on with what has arrived; all ranks take part."""
     parcel, known = arrived.parcel, arrived.parcel.known
     model = model_of.resume(case, arrived, comm)
-    scene = conditions.build(case, model, conditions.loads(parcel), comm)
+    scene = conditions.build(case, model, conditions.loads(parcel), arrived.neighbours, comm)
     sim = _assemble(case, model, arrived.neighbours, scene, np.ones(model.nodes.n), comm, timers)
     sim.reduction.resume(known["reduction"])
     sim.clock.resume(known["clock"])

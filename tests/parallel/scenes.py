@@ -17,6 +17,7 @@ SCENES = {
     "no_edges": ["contact.edges=false"],
     "nodes": ["parts[0].fracture.traction=nodes", "parts[1].fracture.traction=nodes"],
     "traction": [],
+    "pressure": [],
 }
 FAST = "nodal"
 """The scene that is compared in seconds, on two ranks."""
@@ -28,10 +29,20 @@ low = ["-1 mm", "2.9 mm", "-1 mm"]
 high = ["9 mm", "3.1 mm", "9 mm"]
 stress = ["20 MPa", "150 MPa", "0 Pa"]
 """
+PRESSURE = """
+[[boundaries]]
+kind = "traction"
+parts = ["plate"]
+low = ["-1 mm", "2.9 mm", "-1 mm"]
+high = ["9 mm", "3.1 mm", "9 mm"]
+pressure = "150 MPa"
+follows = true
+"""
+_LOADS = {"traction": TRACTION, "pressure": PRESSURE}
 
 
 def arguments(name: str, root: Path, folder: Path) -> list[str]:
     """The worker's; the case of the scene lies in ``root``."""
     case = root / f"{name}.toml"
-    case.write_text(CASE.read_text(encoding="utf-8") + (TRACTION if name == "traction" else ""), encoding="utf-8")
+    case.write_text(CASE.read_text(encoding="utf-8") + _LOADS.get(name, ""), encoding="utf-8")
     return [str(case), *(word for change in SCENES[name] for word in ("--set", change)), "--out", str(folder / name)]

@@ -15,7 +15,7 @@ from conoid.worker.errors import InputError
 from conoid.worker.mesh.faces import boundary_faces
 from conoid.worker.parallel.comm import SerialComm
 from conoid.worker.simulation import Simulation
-from conoid.worker.state import PRESSURE, S_ZZ, WORK, Flags
+from conoid.worker.state import PRESSURE, S_ZZ, WORK, Flags, Load
 from conoid.worker.walls import RigidWalls
 
 from ..contact.bodies import meeting_of, moved
@@ -451,6 +451,8 @@ def test_every_rank_has_the_whole_load_of_its_nodes(ranks: int) -> None:
     assert len(whole.loads) == 2
     for piece in domain.cut(whole, ranks):
         for mine, load in zip(piece.loads, whole.loads, strict=True):
+            assert isinstance(mine, Load)
+            assert isinstance(load, Load)
             here = np.isin(load.nodes, piece.node_ids)
             assert (mine.nodes == load.nodes[here]).all()
             assert (mine.tets == load.tets[here]).all()

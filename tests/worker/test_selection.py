@@ -19,6 +19,7 @@ from conoid.worker.errors import InputError
 from conoid.worker.mesh.model import TetMesh
 from conoid.worker.mesh.scale import scaled
 from conoid.worker.mesh.structured import structured
+from conoid.worker.state import Load
 
 from .kernels import build
 
@@ -179,7 +180,9 @@ def test_a_turned_bar_is_pressed_on_its_whole_end() -> None:
     bar = {"shape": "box", "low": ["-1 mm", "-1 mm", 0], "high": ["1 mm", "1 mm", "4 mm"], "element_size": "0.5 mm"}
     end = {"low": ["4 mm", "-1 mm", "-1 mm"], "high": ["4 mm", "1 mm", "1 mm"]}
     case = case_of({**bar, "generator": "structured"}, {**PRESSURE, **end}, turn={"axis": "y", "angle": "90 deg"})
-    force = whole_of(case).loads[0].force.sum(axis=0)
+    load = whole_of(case).loads[0]
+    assert isinstance(load, Load)
+    force = load.force.sum(axis=0)
     assert force == pytest.approx([-400.0, 0.0, 0.0], abs=1e-9)
 
 

@@ -39,6 +39,8 @@ class Tag(IntEnum):
     RELEASE = 20
     """Changes of the forces of cohesive facets that let go, in every step once facets have broken
     (fracture/release.py)."""
+    LOAD = 21
+    """Sums of the forces of a pressure that follows the surface, in every step (surface_pressure.py)."""
     SWAP = 90
     """Words of which the receiver learns the number first (parallel/mpi.py)."""
     TRADE = 91
