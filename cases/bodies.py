@@ -4,6 +4,18 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from .forms import (
+    BoxForm,
+    ConeForm,
+    CylinderForm,
+    HemisphereForm,
+    OgiveForm,
+    PlateForm,
+    RingSectorForm,
+    SphereForm,
+    SphericalCapForm,
+    TubeForm,
+)
 from .tables import Axis, Count, Model, Point, Positive, Sha256
 from .units import Angle, Length, Ratio
 
@@ -68,15 +80,9 @@ class Slit(Model):
     """Highest corner."""
 
 
-class Box(Primitive):
+class Box(BoxForm, Primitive):
     """A rectangular block between two corners. The sector is cut at the origin of the coordinates."""
 
-    shape: Literal["box"]
-    """The kind of body."""
-    low: Point
-    """Lowest corner."""
-    high: Point
-    """Highest corner, above ``low`` in every direction."""
     axis: Axis = "z"
     """The direction across which a sector is cut."""
     slit: Slit | None = None
@@ -92,71 +98,57 @@ class Symmetric(Primitive):
     rod is as deep in a whole as in a quarter (docs/numerics.md)."""
 
 
-class Plate(Symmetric):
+class Plate(PlateForm, Symmetric):
     """A rectangular plate: ``thickness`` along ``axis``, ``width`` x ``height`` across it, centred on ``base``'s axis.
 
     ``base`` is the centre of the face from which the thickness is measured in the positive direction.
     """
 
-    shape: Literal["plate"]
-    """The kind of body."""
-    base: Point = (0.0, 0.0, 0.0)
-    """Centre of the face at the low end of ``axis``: the plate lies between it and ``base`` plus ``thickness``."""
-    axis: Axis = "z"
-    """Direction of the thickness."""
-    width: Annotated[Length, Positive]
-    """Extent in the first direction across ``axis``, half of it to each side: x for z, y for x, z for y."""
-    height: Annotated[Length, Positive]
-    """Extent in the second direction across ``axis``: y for z, z for x, x for y."""
-    thickness: Annotated[Length, Positive]
-    """Extent along ``axis``."""
     slit: Slit | None = None
     """A crack that is there from the start, with ``generator = "structured"``."""
 
 
-class Cylinder(Symmetric):
+class Cylinder(CylinderForm, Symmetric):
     """A solid cylinder; ``base`` is the centre of its lower end face."""
 
-    shape: Literal["cylinder"]
-    """The kind of body."""
-    base: Point = (0.0, 0.0, 0.0)
-    """Centre of the end face at the low end of ``axis``: the cylinder lies between it and ``base`` plus ``length``."""
-    axis: Axis = "z"
-    """Direction of the cylinder's axis."""
-    radius: Annotated[Length, Positive]
-    """Of the cylinder."""
-    length: Annotated[Length, Positive]
-    """Extent along ``axis``."""
 
-
-class Tube(Symmetric):
+class Tube(TubeForm, Symmetric):
     """A hollow cylinder."""
 
-    shape: Literal["tube"]
-    """The kind of body."""
-    base: Point = (0.0, 0.0, 0.0)
-    """Centre of the end face at the low end of ``axis``: the tube lies between it and ``base`` plus ``length``."""
-    axis: Axis = "z"
-    """Direction of the tube's axis."""
-    inner_radius: Annotated[Length, Positive]
-    """Of the hole; below ``radius``."""
-    radius: Annotated[Length, Positive]
-    """Of the outside."""
-    length: Annotated[Length, Positive]
-    """Extent along ``axis``."""
 
-
-class Sphere(Symmetric):
+class Sphere(SphereForm, Symmetric):
     """A ball."""
 
-    shape: Literal["sphere"]
-    """The kind of body."""
-    centre: Point = (0.0, 0.0, 0.0)
-    """Of the ball."""
-    axis: Axis = "z"
-    """The direction across which a sector is cut."""
-    radius: Annotated[Length, Positive]
-    """Of the ball."""
+
+class Drawn(Primitive):
+    """A primitive that only gmsh meshes."""
+
+    generator: Literal["gmsh"] = "gmsh"
+    """gmsh alone makes these."""
+
+
+class Cone(ConeForm, Drawn):
+    """A cone or a frustum of one: ``radius`` at ``base``, ``top_radius`` at the high end of ``axis``."""
+
+
+class Ogive(OgiveForm, Drawn):
+    """A shank with an ogive on it, as bullets and projectiles have: the outline of the nose is an arc of a circle.
+
+    The nose is a tangent ogive, whose arc goes on smoothly from the shank, of the length D sqrt(crh - 1/4) for the
+    diameter D, where one of ``crh`` and ``nose`` is given; a secant ogive, which has an edge there, where both are.
+    """
+
+
+class Hemisphere(HemisphereForm, Drawn):
+    """Half of a ball."""
+
+
+class SphericalCap(SphericalCapForm, Drawn):
+    """What a plane cuts off a ball."""
+
+
+class RingSector(RingSectorForm, Drawn):
+    """A piece of a tube between two half-planes through its axis; of a solid cylinder with ``inner_radius = 0``."""
 
 
 class Loose(Primitive):
@@ -225,4 +217,19 @@ class MeshFile(Model):
     """Of the file, 64 hexadecimal digits; a file with another one is refused. Not checked when absent."""
 
 
-Mesh = Annotated[Box | Plate | Cylinder | Tube | Sphere | TwoTets | Shards | MeshFile, Field(discriminator="shape")]
+Mesh = Annotated[
+    Box
+    | Plate
+    | Cylinder
+    | Tube
+    | Sphere
+    | Cone
+    | Ogive
+    | Hemisphere
+    | SphericalCap
+    | RingSector
+    | TwoTets
+    | Shards
+    | MeshFile,
+    Field(discriminator="shape"),
+]

@@ -3,11 +3,13 @@
 import math
 from collections.abc import Callable
 
-from .bodies import Box, Cylinder, Mesh, MeshFile, Plate, Primitive, Shards, Sphere, Tube, TwoTets
+from . import ring
+from .bodies import Box, Cylinder, Mesh, MeshFile, Plate, Primitive, RingSector, Shards, Sphere, Tube, TwoTets
+from .profile import Revolved, profile
 from .tables import Axis
 
 Vector = tuple[float, float, float]
-Generated = Box | Plate | Cylinder | Tube | Sphere | TwoTets | Shards
+Generated = Box | Plate | Cylinder | Tube | Sphere | Revolved | RingSector | TwoTets | Shards
 
 AXES: tuple[Axis, Axis, Axis] = ("x", "y", "z")
 
@@ -45,13 +47,28 @@ def whole_bounds(mesh: Generated) -> tuple[Vector, Vector]:
     i, j = across(mesh.axis)
     if isinstance(mesh, TwoTets):
         return _two_tets(mesh, i, j)
-    half = (mesh.width / 2, mesh.height / 2) if isinstance(mesh, Plate) else (mesh.radius, mesh.radius)
-    along = mesh.thickness if isinstance(mesh, Plate) else mesh.length
     low, high = list(mesh.base), list(mesh.base)
-    low[i], high[i] = low[i] - half[0], high[i] + half[0]
-    low[j], high[j] = low[j] - half[1], high[j] + half[1]
-    high[index(mesh.axis)] += along
+    for direction, (least, most) in zip((i, j), _reach(mesh), strict=True):
+        low[direction], high[direction] = low[direction] + least, high[direction] + most
+    high[index(mesh.axis)] += height(mesh)
     return _vector(low), _vector(high)
+
+
+def height(mesh: Plate | Cylinder | Tube | Revolved | RingSector) -> float:
+    """Extent along the axis, m."""
+    if isinstance(mesh, Revolved):
+        return profile(mesh).height
+    return mesh.thickness if isinstance(mesh, Plate) else mesh.length
+
+
+def _reach(mesh: Plate | Cylinder | Tube | Revolved | RingSector) -> tuple[tuple[float, float], tuple[float, float]]:
+    """How far the whole body goes from its base in the two directions across its axis, m."""
+    if isinstance(mesh, RingSector):
+        return ring.extremes(mesh, whole=True)
+    if isinstance(mesh, Plate):
+        return (-mesh.width / 2, mesh.width / 2), (-mesh.height / 2, mesh.height / 2)
+    radius = profile(mesh).widest() if isinstance(mesh, Revolved) else mesh.radius
+    return (-radius, radius), (-radius, radius)
 
 
 def _two_tets(mesh: TwoTets, i: int, j: int) -> tuple[Vector, Vector]:
@@ -92,6 +109,9 @@ def bounds(mesh: Mesh) -> tuple[Vector, Vector] | None:
     if isinstance(mesh, MeshFile):
         return None
     low, high = map(list, whole_bounds(mesh))
+    if isinstance(mesh, RingSector):
+        for direction, (least, most) in zip(across(mesh.axis), ring.extremes(mesh), strict=True):
+            low[direction], high[direction] = mesh.base[direction] + least, mesh.base[direction] + most
     for direction in cut_directions(mesh, mesh.axis):
         low[direction] = max(low[direction], centre(mesh)[direction])
     return _vector(low), _vector(high)
@@ -109,6 +129,10 @@ def volume(mesh: Generated) -> float:
         return share * mesh.width * mesh.height * mesh.thickness
     if isinstance(mesh, Sphere):
         return share * 4.0 / 3.0 * math.pi * mesh.radius**3
+    if isinstance(mesh, Revolved):
+        return share * profile(mesh).volume()
+    if isinstance(mesh, RingSector):
+        return 0.5 * ring.angle(mesh) * (mesh.radius**2 - mesh.inner_radius**2) * mesh.length
     inner = mesh.inner_radius if isinstance(mesh, Tube) else 0.0
     return share * math.pi * (mesh.radius**2 - inner**2) * mesh.length
 
@@ -128,10 +152,20 @@ def surface(mesh: Generated) -> float:
     cut = 0.0 if mesh.sector == "full" else 1.0
     if isinstance(mesh, Sphere):
         return share * 4.0 * math.pi * mesh.radius**2 + cut * math.pi * mesh.radius**2
+    if isinstance(mesh, Revolved):
+        return share * profile(mesh).surface() + cut * 2.0 * profile(mesh).section()
+    if isinstance(mesh, RingSector):
+        return _ring_surface(mesh)
     inner = mesh.inner_radius if isinstance(mesh, Tube) else 0.0
     ends = 2.0 * math.pi * (mesh.radius**2 - inner**2)
     sides = 2.0 * math.pi * (mesh.radius + inner) * mesh.length
     return share * (ends + sides) + cut * 2.0 * (mesh.radius - inner) * mesh.length
+
+
+def _ring_surface(mesh: RingSector) -> float:
+    turn, ends = ring.angle(mesh), 2.0 * len(ring.angles(mesh))
+    wall = mesh.radius - mesh.inner_radius
+    return (mesh.radius + mesh.inner_radius) * (turn * wall + turn * mesh.length) + ends * wall * mesh.length
 
 
 def slit_extents(mesh: Box | Plate) -> tuple[float, float]:
@@ -162,23 +196,32 @@ def round_part(mesh: Generated) -> Callable[[Vector], bool]:
         return lambda point: math.dist(point, mesh.centre) <= mesh.radius
     i, j = across(mesh.axis)
     x, y = centre(mesh)[i], centre(mesh)[j]
+    if isinstance(mesh, Revolved):
+        outline, k, start = profile(mesh), index(mesh.axis), centre(mesh)[index(mesh.axis)]
+        return lambda point: math.hypot(point[i] - x, point[j] - y) <= outline.at(point[k] - start)
+    if isinstance(mesh, RingSector):
+        return lambda point: _in_ring(mesh, point[i] - x, point[j] - y)
     inner, outer = mesh.inner_radius if isinstance(mesh, Tube) else 0.0, mesh.radius
     return lambda point: inner <= math.hypot(point[i] - x, point[j] - y) <= outer
 
 
+def _in_ring(mesh: RingSector, x: float, y: float) -> bool:
+    return mesh.inner_radius <= math.hypot(x, y) <= mesh.radius and ring.holds_angle(mesh, x, y)
+
+
 def thinnest(mesh: Generated) -> float:
-    """The smallest extent of the body, m: the wall of a tube, the diameter of a ball."""
+    """The smallest extent of the body, m: the wall of a tube, the diameter of a ball, the larger end of a cone."""
     low, high = bounds(mesh) or ((0.0,) * 3, (0.0,) * 3)
     extents = [b - a for a, b in zip(low, high, strict=True)]
-    if isinstance(mesh, Tube):
+    if isinstance(mesh, Tube | RingSector):
         return min(*extents, mesh.radius - mesh.inner_radius)
     return min(extents)
 
 
 def lowest_along(mesh: Generated, normal: Vector) -> float:
     """The smallest value of ``normal . x`` over the whole body, m, for a unit normal; over its bounds where it is given
-    tet by tet."""
-    if isinstance(mesh, Box | TwoTets | Shards):
+    tet by tet, and of a ring sector."""
+    if isinstance(mesh, Box | RingSector | TwoTets | Shards):
         return sum(min(n * a, n * b) for n, a, b in zip(normal, *whole_bounds(mesh), strict=True))
     start = _dot(normal, centre(mesh))
     if isinstance(mesh, Sphere):
@@ -188,6 +231,8 @@ def lowest_along(mesh: Generated, normal: Vector) -> float:
     if isinstance(mesh, Plate):
         side = (abs(normal[i]) * mesh.width + abs(normal[j]) * mesh.height) / 2
         return start + min(0.0, along * mesh.thickness) - side
+    if isinstance(mesh, Revolved):
+        return start + profile(mesh).lowest(along, math.hypot(normal[i], normal[j]))
     return start + min(0.0, along * mesh.length) - mesh.radius * math.hypot(normal[i], normal[j])
 
 

@@ -5,11 +5,12 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from .bodies import Box, Cylinder, Loose, MeshFile, Plate, Sphere, Tube
+from .bodies import Box, Cylinder, Loose, MeshFile, Plate, RingSector, Sphere, Tube
 from .boundaries import Prescribed, Traction
 from .geometry import Generated, Vector, surface, volume
 from .mesh_size import FACES_PER_SURFACE, grid, mesh_size, surface_faces
 from .placed import Placed, lattice
+from .profile import Revolved, profile
 from .region import Region, slack
 from .schema import Case, Part
 from .sheets import sheets
@@ -211,9 +212,10 @@ def _regular(mesh: Generated) -> bool:
 
 def _facets(mesh: Generated) -> float:
     """Of the area of a body, what facets may have less or more than it."""
-    if not isinstance(mesh, Cylinder | Tube | Sphere):
+    if not isinstance(mesh, Cylinder | Tube | Sphere | Revolved | RingSector):
         return _FLAT
-    radius = mesh.inner_radius if isinstance(mesh, Tube) else mesh.radius
+    radius = profile(mesh).widest() if isinstance(mesh, Revolved) else mesh.radius
+    radius = mesh.inner_radius or radius if isinstance(mesh, Tube | RingSector) else radius
     return _CURVED + _FACETS * (mesh.element_size / radius) ** 2
 
 

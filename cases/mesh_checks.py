@@ -3,8 +3,9 @@
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-from .bodies import Box, Loose, Mesh, MeshFile, Plate, Primitive, Tube
+from .bodies import Box, Loose, Mesh, MeshFile, Plate, Primitive
 from .files import located
+from .form_checks import check_form
 from .geometry import AXES, across, cut_directions, index, thinnest
 from .mesh_size import Row, grid, slit_lines
 from .problems import Location, Problem, problem
@@ -18,15 +19,11 @@ def check_mesh(mesh: Mesh, location: Location) -> Iterator[Problem]:
             yield problem((*location, "path"), mesh.path, "expected the path of a .msh or .inp file")
         return
     yield from _grading(mesh, location)
-    if isinstance(mesh, Tube) and mesh.inner_radius >= mesh.radius:
-        yield problem((*location, "inner_radius"), mesh.inner_radius, f"must be below the radius, {mesh.radius} m")
+    wrong = list(check_form(mesh, location))
+    yield from wrong
+    if wrong:
         return
     if isinstance(mesh, Box):
-        empty = [d for d in range(3) if mesh.low[d] >= mesh.high[d]]
-        for d in empty:
-            yield problem((*location, "high", d), mesh.high[d], f"must be above low[{d}], {mesh.low[d]} m")
-        if empty:
-            return
         away = [d for d in cut_directions(mesh, mesh.axis) if mesh.high[d] <= 0]
         for d in away:
             yield problem((*location, "high", d), mesh.high[d], f"a {mesh.sector} box keeps the side {AXES[d]} > 0")

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 
-from .bodies import Box, Cylinder, Grading, Plate, Shards, Sphere, Tube, TwoTets
+from .bodies import Box, Cylinder, Grading, Plate, RingSector, Shards, Sphere, Tube, TwoTets
 from .geometry import (
     Generated,
     Vector,
@@ -19,6 +19,7 @@ from .geometry import (
     tets,
     volume,
 )
+from .profile import Revolved, tips
 
 TETS_PER_VOLUME, TETS_PER_SURFACE = 5.55, 1.42
 NODES_PER_VOLUME, NODES_PER_SURFACE = 0.87, 1.23
@@ -31,6 +32,10 @@ REGULAR = 6**-0.5
 """Step length 1 / sqrt(sum |grad N|^2) of the regular tet, and of the tets of a cut cube, over the edge h."""
 WORST_UNSTRUCTURED = 0.68
 """Step length of the worst tet of gmsh over that of a regular tet: 0.64 to 0.74 for the bodies of the fit."""
+SHARP, BLUNT = 1.3, 0.9
+"""The same at the tip of a cone or an ogive, at most: the first times the tangent of half its angle; where the tip is
+cut off, or round, the second times its radius over h. Cones of half an angle of 9 and 27 degrees had 0.16 to 0.25 and
+0.40 to 0.68, tips of a radius of h/4 and h/2 0.20 to 0.24 and 0.20 to 0.64, wholes and sectors."""
 WORST_CYLINDER, WORST_TUBE = 0.81, 0.78
 """The same for structured cylinders cut into 6, and tubes."""
 WORST_FIVE = 0.54
@@ -53,13 +58,21 @@ class MeshSize:
 
 def mesh_size(mesh: Generated) -> MeshSize:
     """The size of the mesh of a primitive: exact counts for the structured generator, estimates for gmsh."""
-    if mesh.generator == "structured" and not isinstance(mesh, Sphere):
+    if not isinstance(mesh, Sphere | Revolved | RingSector) and mesh.generator == "structured":
         return _structured(mesh)
     per_volume, per_surface = _mean_powers(mesh)
     filling, covering = volume(mesh) * per_volume, surface(mesh) * per_surface
     elements = TETS_PER_VOLUME * filling + TETS_PER_SURFACE * covering
     nodes = NODES_PER_VOLUME * filling + NODES_PER_SURFACE * covering
-    return MeshSize(max(6, round(elements)), max(8, round(nodes)), WORST_UNSTRUCTURED * REGULAR * mesh.element_size)
+    return MeshSize(max(6, round(elements)), max(8, round(nodes)), _worst(mesh) * REGULAR * mesh.element_size)
+
+
+def _worst(mesh: Generated) -> float:
+    """Step length of the worst tet of gmsh over that of a regular tet."""
+    if not isinstance(mesh, Revolved):
+        return WORST_UNSTRUCTURED
+    at_tips = [SHARP * slope if radius == 0.0 else BLUNT * radius / mesh.element_size for radius, slope in tips(mesh)]
+    return min(WORST_UNSTRUCTURED, *at_tips)
 
 
 def surface_faces(mesh: Generated) -> int:

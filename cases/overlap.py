@@ -4,10 +4,11 @@ import math
 from collections.abc import Iterable, Iterator
 from itertools import combinations, islice, permutations
 
-from .bodies import Cylinder, Loose, MeshFile, Sphere, Tube
+from .bodies import Cylinder, Loose, MeshFile, RingSector, Sphere, Tube
 from .geometry import Generated, Vector
 from .placed import Placed, lattice
 from .problems import Problem, problem
+from .profile import Revolved, profile
 from .schema import Contact, Part
 
 _POINTS = 12
@@ -76,6 +77,13 @@ def _core(mesh: Generated) -> Generated:
     return mesh.model_copy(update={"radius": left})
 
 
+def _rim(mesh: Generated) -> float:
+    """What facets may cut off a body whose curved surface is no cylinder or ball, m."""
+    if isinstance(mesh, RingSector):
+        return _cut_off(mesh.radius, mesh.element_size)
+    return _cut_off(profile(mesh).widest(), mesh.element_size) if isinstance(mesh, Revolved) else 0.0
+
+
 def _cut_off(radius: float, size: float) -> float:
     """What a chord of this ``size`` cuts off a circle, m: h^2 / 8 R, the height of the arc."""
     return size**2 / (8.0 * radius)
@@ -100,6 +108,7 @@ def _depth(one: Placed, other: Placed, low: Vector, high: Vector) -> float:
     """The thinnest extent, m, of what both hold of a box; 0 when that is nothing."""
     both = [point for point in lattice(low, high, _POINTS) if one.holds(point) and other.holds(point)]
     margin = _TOUCH * max(b - a for body in (one, other) for a, b in zip(*body.bounds(), strict=True))
+    margin = max(margin, _rim(one.mesh), _rim(other.mesh))
     both = [point for point in both if all(one.holds(each) and other.holds(each) for each in _round(point, margin))]
     if not both:
         return 0.0

@@ -3,8 +3,10 @@
 import math
 from collections.abc import Callable, Iterator, Sequence
 
-from .bodies import Box, Cylinder, Plate, Shards, Sphere, Tube, TwoTets
+from . import ring
+from .bodies import Box, Cylinder, Plate, RingSector, Shards, Sphere, Tube, TwoTets
 from .geometry import Generated, Vector, across, bounds, centre, index
+from .profile import Revolved, Segment, profile
 
 Point = Callable[[float, float], Vector]
 """The point of a surface at two numbers from 0 to 1."""
@@ -18,8 +20,15 @@ def sheets(mesh: Generated) -> Iterator[Sheet]:
     if isinstance(mesh, Box | Plate):
         yield from _block(mesh)
         return
+    if isinstance(mesh, RingSector):
+        for low, top in ring.angles(mesh):
+            yield from _barrel(mesh, low / math.pi, top / math.pi)
+        return
     begin, end = {"full": (0.0, 2.0), "half": (-0.5, 0.5), "quarter": (0.0, 0.5)}[mesh.sector]
-    yield from _ball(mesh, begin, end) if isinstance(mesh, Sphere) else _barrel(mesh, begin, end)
+    if isinstance(mesh, Revolved):
+        yield from _revolved(mesh, begin, end)
+    else:
+        yield from _ball(mesh, begin, end) if isinstance(mesh, Sphere) else _barrel(mesh, begin, end)
 
 
 def _block(mesh: Box | Plate) -> Iterator[Sheet]:
@@ -47,9 +56,35 @@ def _flat(d: int, at: float, low: Sequence[float], high: Sequence[float]) -> She
     return point, high[i] - low[i], high[j] - low[j]
 
 
-def _barrel(mesh: Cylinder | Tube, begin: float, end: float) -> Iterator[Sheet]:
-    """A cylinder or a tube, of angles from ``begin`` to ``end``, in pi."""
-    inner, outer, length = mesh.inner_radius if isinstance(mesh, Tube) else 0.0, mesh.radius, mesh.length
+def _revolved(mesh: Revolved, begin: float, end: float) -> Iterator[Sheet]:
+    """A body of revolution, of angles from ``begin`` to ``end``, in pi."""
+    outline, turn, arc = profile(mesh), _turning(mesh, begin, end), (end - begin) * math.pi
+
+    def along(each: Segment) -> Point:
+        return lambda u, v: turn(each.at(each.z0 + v * (each.z1 - each.z0)), u, each.z0 + v * (each.z1 - each.z0))
+
+    def at_end(radius: float, height: float) -> Point:
+        return lambda u, v: turn(radius * v, u, height)
+
+    def cut(each: Segment, side: float) -> Point:
+        def point(u: float, v: float) -> Vector:
+            height = each.z0 + v * (each.z1 - each.z0)
+            return turn(each.at(height) * u, side, height)
+
+        return point
+
+    for each in outline.segments:
+        yield along(each), arc * each.widest(), each.length()
+        for side in _cut(begin, end):
+            yield cut(each, side), each.widest(), each.length()
+    for radius, height in zip(outline.ends, (0.0, outline.height), strict=True):
+        if radius > 0.0:
+            yield at_end(radius, height), arc * radius, radius
+
+
+def _barrel(mesh: Cylinder | Tube | RingSector, begin: float, end: float) -> Iterator[Sheet]:
+    """A cylinder, a tube or a piece of one, of angles from ``begin`` to ``end``, in pi."""
+    inner, outer, length = 0.0 if isinstance(mesh, Cylinder) else mesh.inner_radius, mesh.radius, mesh.length
     turn, arc, wall = _turning(mesh, begin, end), (end - begin) * math.pi, outer - inner
 
     def along(radius: float) -> Point:
@@ -88,7 +123,9 @@ def _cut(begin: float, end: float) -> tuple[float, ...]:
     return () if end - begin == 2.0 else (0.0, 1.0)
 
 
-def _turning(mesh: Cylinder | Tube | Sphere, begin: float, end: float) -> Callable[[float, float, float], Vector]:
+def _turning(
+    mesh: Cylinder | Tube | Sphere | Revolved | RingSector, begin: float, end: float
+) -> Callable[[float, float, float], Vector]:
     """The point at a radius, a share of the way round and a height."""
     start, k, (i, j) = centre(mesh), index(mesh.axis), across(mesh.axis)
 

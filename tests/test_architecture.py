@@ -327,7 +327,7 @@ TELLS = {
 }  # fmt: skip
 """They report, refuse and balance; what they compute is in no answer, but for parts that are pushed apart at the start
 (docs/numerics.md)."""
-POWERS_OF_TWO, REFUSES = "worker/mesh/unstructured.py", "worker/mesh/frame.py"
+POWERS_OF_TWO, REFUSES = "worker/mesh/occ/frame.py", "worker/mesh/frame.py"
 """A scale that is rounded; a size in a message."""
 
 

@@ -79,7 +79,11 @@ def test_all_errors_at_once() -> None:
 @pytest.mark.parametrize(
     ("override", "key", "message"),
     [
-        ("parts[0].mesh.shape=cilinder", "parts[0].mesh.shape", "'plate', 'cylinder', 'tube', 'sphere', 'two_tets'"),
+        (
+            "parts[0].mesh.shape=cilinder",
+            "parts[0].mesh.shape",
+            "'plate', 'cylinder', 'tube', 'sphere', 'cone', 'ogive'",
+        ),
         ("boundaries[0].kind=wal", "boundaries[0].kind", "'symmetry', 'wall', 'velocity', 'rotation'"),
         ("probes[0].field=stress", "probes[0].field", "'stress_xx'"),
         ("reference[0].quantity=length", "reference[0].quantity", "'extent'"),

@@ -8,10 +8,25 @@ import numpy as np
 
 from ..errors import MeshError
 from .model import TetMesh
-from .named import gathered
+from .named import NamedMesh, gathered
 
 _TET = 4
 """gmsh's element type of the 4-node tet."""
+
+
+OPTIONS = {
+    "Geometry.OCCUnionUnify": 0,
+    "General.NumThreads": 1,
+    "Mesh.Algorithm": 6,
+    "Mesh.Algorithm3D": 10,
+    "Mesh.MeshSizeExtendFromBoundary": 0,
+    "Mesh.MeshSizeFromCurvature": 0,
+    "Mesh.MeshSizeFromPoints": 0,
+    "Mesh.Optimize": 1,
+    "Mesh.OptimizeThreshold": 0.45,
+    "Mesh.RandomSeed": 1,
+}
+"""Of every mesh that is made; ``mesh/unstructured.py`` has why."""
 
 
 @contextmanager
@@ -37,10 +52,15 @@ def session(options: Mapping[str, float]) -> Iterator[Any]:
 
 def tet_mesh(gmsh: Any) -> TetMesh:
     """The tets of the current model, and the nodes that they use."""
+    return named_mesh(gmsh).mesh
+
+
+def named_mesh(gmsh: Any) -> NamedMesh:
+    """The same with gmsh's names of the nodes and tets; the nodes in the order of their names."""
     tags, corners = gmsh.model.mesh.getElementsByType(_TET)
     node_tags, coordinates, _ = gmsh.model.mesh.getNodes()
     nodes, points = np.asarray(node_tags, np.int64), coordinates.reshape(-1, 3)
-    return gathered(nodes, points, np.asarray(tags, np.int64), np.asarray(corners, np.int64).reshape(-1, 4)).mesh
+    return gathered(nodes, points, np.asarray(tags, np.int64), np.asarray(corners, np.int64).reshape(-1, 4))
 
 
 def first_error(gmsh: Any) -> str | None:

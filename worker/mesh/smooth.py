@@ -6,11 +6,11 @@ Nodes on the boundary slide along it, so the body keeps its shape.
 """
 
 import heapq
+from typing import Protocol
 
 import numpy as np
 
 from .model import Floats, Ids, TetMesh, step_lengths
-from .skin import Skin
 
 _MOVES = np.array([0.6, 0.3, 0.15, 0.07, 0.03])
 """Tried moves, in step lengths of the worst tet."""
@@ -26,7 +26,17 @@ _AHEAD = 1.25
 """Tets that are this much better than one that cannot be helped are left alone: the time step is lost already."""
 
 
-def smoothed(mesh: TetMesh, skin: Skin, wanted: float) -> TetMesh:
+class Slides(Protocol):
+    """Where the nodes of a body may go without changing its shape."""
+
+    def movable(self, node: int) -> bool:
+        """Whether ``node`` can go anywhere at all."""
+
+    def allowed(self, node: int, start: Floats, places: Floats) -> Floats:
+        """The places (k, 3) nearest to ``places`` that ``node``, now at ``start``, may take."""
+
+
+def smoothed(mesh: TetMesh, skin: Slides, wanted: float) -> TetMesh:
     """The mesh with step lengths below ``wanted``, m, raised where possible within a bounded number of moves."""
     work = _Smoothing(mesh, skin, wanted)
     waiting = [(length, tet) for tet, length in enumerate(work.lengths.tolist()) if length < wanted]
@@ -47,7 +57,7 @@ def smoothed(mesh: TetMesh, skin: Skin, wanted: float) -> TetMesh:
 class _Smoothing:
     """Points that move, and the step lengths that follow."""
 
-    def __init__(self, mesh: TetMesh, skin: Skin, wanted: float) -> None:
+    def __init__(self, mesh: TetMesh, skin: Slides, wanted: float) -> None:
         self.points = mesh.points.copy()
         self.tets = mesh.tets
         self.wanted = wanted

@@ -8,51 +8,39 @@ request gives the same bits.
 import math
 from typing import Any
 
-from conoid.cases.bodies import Box, Cylinder, Grading, Plate, Sphere, Tube
-from conoid.cases.geometry import AXES, Generated
+from conoid.cases.bodies import Box, Cylinder, Plate, RingSector, Sphere, Tube
+from conoid.cases.geometry import Generated, centre
+from conoid.cases.profile import Revolved
 
 from ..errors import MeshError
-from .frame import block, directions, refuse_impossible, to_frame, to_space
-from .gmsh_session import session, tet_mesh
+from .frame import block, refuse_impossible, to_space
+from .gmsh_session import OPTIONS, session, tet_mesh
 from .model import REGULAR_STEP, TetMesh
+from .occ.body import primitive
+from .occ.frame import Frame, scale_of
+from .occ.meshing import WANTED
+from .occ.sizes import set_size
 from .skin import Skin
 from .smooth import smoothed
-
-_GMSH_SIZE = 0.87
-"""gmsh's size over ``element_size``. HXT leaves 4 tets in its size cubed; this makes 6 in element_size^3, as the
-structured generator has, and a mean edge of 1.15 element_size."""
-
-_WANTED = 0.75
-"""Step lengths below this share of a regular tet's with edge ``element_size`` are raised where possible."""
-
-_OPTIONS = {
-    "General.NumThreads": 1,
-    "Mesh.Algorithm": 6,
-    "Mesh.Algorithm3D": 10,
-    "Mesh.MeshSizeExtendFromBoundary": 0,
-    "Mesh.MeshSizeFromCurvature": 0,
-    "Mesh.MeshSizeFromPoints": 0,
-    "Mesh.Optimize": 1,
-    "Mesh.OptimizeThreshold": 0.45,
-    "Mesh.RandomSeed": 1,
-}
 
 
 def unstructured(body: Generated, key: str = "mesh") -> TetMesh:
     """The gmsh mesh of a body. MeshError, naming ``key``, when gmsh cannot make it."""
+    if isinstance(body, Revolved | RingSector):
+        return primitive(body, key)
     refuse_impossible(body, key)
     low, high = block(body)
-    scale = 2.0 ** round(math.log2(max(b - a for a, b in zip(low, high, strict=True))))
-    with session(_OPTIONS) as gmsh:
+    scale = scale_of(max(b - a for a, b in zip(low, high, strict=True)))
+    with session(OPTIONS) as gmsh:
         _draw(gmsh, body, scale)
         gmsh.model.occ.synchronize()
-        _size(gmsh, body, scale)
+        set_size(gmsh, body.element_size, body.grading, Frame(centre(body), body.axis, scale))
         gmsh.model.mesh.generate(3)
         mesh = tet_mesh(gmsh)
     if mesh.volumes().sum() < 0:
         mesh = TetMesh(mesh.points, mesh.tets[:, [0, 2, 1, 3]])
     skin, points = Skin.of(body, mesh, scale)
-    mesh = smoothed(TetMesh(points, mesh.tets), skin, _WANTED * REGULAR_STEP * body.element_size / scale)
+    mesh = smoothed(TetMesh(points, mesh.tets), skin, WANTED * REGULAR_STEP * body.element_size / scale)
     return TetMesh(to_space(body, mesh.points * scale), mesh.tets)
 
 
@@ -103,29 +91,3 @@ def _draw_cylinder(occ: Any, body: Cylinder | Tube, scale: float) -> None:
         made, _ = occ.cut(made, [(3, hole)])
     if body.sector == "half":
         occ.rotate(made, 0, 0, 0, 0, 0, 1, -math.pi / 2)
-
-
-def _size(gmsh: Any, body: Generated, scale: float) -> None:
-    size = _GMSH_SIZE * body.element_size / scale
-    largest = size
-    if body.grading is not None:
-        largest = _GMSH_SIZE * body.grading.far_size / scale
-        _grade(gmsh, body, body.grading, scale)
-    gmsh.option.setNumber("Mesh.MeshSizeMin", min(size, largest))
-    gmsh.option.setNumber("Mesh.MeshSizeMax", max(size, largest))
-
-
-def _grade(gmsh: Any, body: Generated, grading: Grading, scale: float) -> None:
-    """The size as a linear function of the distance from a point, a line along an axis, or a sphere or cylinder."""
-    origin = to_frame(body, grading.origin)
-    along = None if grading.axis is None else directions(body).index(AXES.index(grading.axis))
-    squares = [f"({'xyz'[i]}-({origin[i] / scale!r}))^2" for i in range(3) if i != along]
-    field = gmsh.model.mesh.field
-    distance, size = field.add("MathEval"), field.add("Threshold")
-    field.setString(distance, "F", f"Abs(Sqrt({'+'.join(squares)})-{grading.radius / scale!r})")
-    for name, value in (("DistMin", grading.near), ("DistMax", grading.far)):
-        field.setNumber(size, name, value / scale)
-    for name, value in (("SizeMin", body.element_size), ("SizeMax", grading.far_size)):
-        field.setNumber(size, name, _GMSH_SIZE * value / scale)
-    field.setNumber(size, "InField", distance)
-    field.setAsBackgroundMesh(size)

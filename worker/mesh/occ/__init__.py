@@ -1,0 +1,1 @@
+"""Bodies drawn with gmsh's OpenCASCADE kernel and meshed there. Only the child process gets here."""

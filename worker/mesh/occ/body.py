@@ -1,0 +1,35 @@
+"""Primitives that are drawn as they are: cones, ogives, caps, ring sectors."""
+
+import math
+from typing import Any
+
+from conoid.cases import ring
+from conoid.cases.bodies import RingSector
+from conoid.cases.geometry import bounds, cut_directions
+from conoid.cases.profile import Revolved
+
+from ..frame import refuse_impossible
+from ..gmsh_session import OPTIONS, session
+from ..model import TetMesh
+from .draw import ROUND, Angles, drawn
+from .frame import Frame, scale_of
+from .meshing import meshed
+from .sizes import set_size
+
+_SECTORS: dict[str, Angles] = {"full": ROUND, "half": (-0.5 * math.pi, 0.5 * math.pi), "quarter": (0.0, 0.5 * math.pi)}
+
+
+def primitive(body: Revolved | RingSector, key: str) -> TetMesh:
+    """The mesh of a body. MeshError, naming ``key``, when gmsh cannot make it."""
+    refuse_impossible(body, key)
+    low, high = bounds(body) or ((0.0,) * 3, (0.0,) * 3)
+    frame = Frame(body.base, body.axis, scale_of(max(b - a for a, b in zip(low, high, strict=True))))
+    with session(OPTIONS) as gmsh:
+        _draw(gmsh.model.occ, body, frame)
+        gmsh.model.occ.synchronize()
+        set_size(gmsh, body.element_size, body.grading, frame)
+        return meshed(gmsh, frame, body.element_size, len(cut_directions(body, body.axis)))
+
+
+def _draw(occ: Any, body: Revolved | RingSector, frame: Frame) -> None:
+    drawn(occ, body, frame, ring.angles(body) if isinstance(body, RingSector) else [_SECTORS[body.sector]])

@@ -1,0 +1,54 @@
+"""The coordinates in which a model is drawn: origin where sectors are cut, third direction along an axis, lengths of
+order one, since the tolerances of gmsh and OpenCASCADE are absolute.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from conoid.cases.geometry import AXES, across, index
+from conoid.cases.tables import Axis
+
+from ..model import Floats
+
+Vector = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Frame:
+    """(a, b, c): the cyclic order of ``across(axis)`` and ``axis``, from ``origin``, m, in lengths of ``scale``, m."""
+
+    origin: Vector
+    axis: Axis
+    scale: float
+
+    @property
+    def directions(self) -> list[int]:
+        """Which of x, y, z the directions a, b, c are."""
+        return [*across(self.axis), index(self.axis)]
+
+    def place(self, point: Vector) -> Vector:
+        """A point of space, m, in the frame."""
+        a, b, c = ((point[d] - self.origin[d]) / self.scale for d in self.directions)
+        return a, b, c
+
+    def length(self, length: float) -> float:
+        """m, in lengths of the frame."""
+        return length / self.scale
+
+    def direction(self, axis: Axis) -> int:
+        """Which of a, b, c runs along ``axis``."""
+        return self.directions.index(AXES.index(axis))
+
+    def to_space(self, points: Floats) -> Floats:
+        """Points (n, 3) of the frame in x, y, z; m. A zero becomes exactly the coordinate of the origin."""
+        turned = np.empty_like(points)
+        turned[:, self.directions] = points * self.scale
+        moved: Floats = turned + np.array(self.origin)
+        return moved
+
+
+def scale_of(extent: float) -> float:
+    """A power of two near a length, m: lengths over it are of order one, and no bit of them is lost."""
+    return 2.0 ** round(math.log2(extent))

@@ -1,0 +1,83 @@
+"""Where the nodes of a drawn body may go without changing its shape: along the faces and edges of its model."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..model import Floats, Ids
+
+NEAR = 1e-9
+"""Nodes this near to a plane on which a body is cut are on it, in lengths of order one."""
+
+Nearest = Callable[[Floats], Floats]
+"""The points (k, 3) of an entity nearest to others."""
+
+
+@dataclass(frozen=True)
+class Sliding:
+    """``entity``: (n,) number of what each node is on in ``nearest``, -1 within the body, -2 at a corner.
+
+    ``held``: (n, 3) coordinates that a node keeps besides: 0 on the planes on which the body is cut.
+    """
+
+    entity: NDArray[np.int32]
+    nearest: tuple[Nearest, ...]
+    held: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, gmsh: Any, tags: Ids, points: Floats, cuts: int) -> tuple[Self, Floats]:
+        """That of the current model with its mesh, for nodes called ``tags`` at ``points``; the first ``cuts``
+        directions are those across which the body is cut at 0. And the points, put exactly there.
+        """
+        entity, nearest = np.full(len(tags), -1, np.int32), list[Nearest]()
+        for dimension, tag in gmsh.model.getEntities():
+            if dimension == 3:
+                continue
+            nodes = np.asarray(gmsh.model.mesh.getNodes(dimension, tag)[0], np.int64)
+            place = np.searchsorted(tags, nodes[np.isin(nodes, tags)])
+            entity[place] = -2 if dimension == 0 else len(nearest)
+            if dimension:
+                nearest.append(_nearest(gmsh, dimension, tag))
+        points, held = points.copy(), np.zeros(points.shape, bool)
+        for direction in range(cuts):
+            on = np.abs(points[:, direction]) < NEAR
+            points[on, direction], held[on, direction] = 0.0, True
+        return cls(entity, tuple(nearest), held), points
+
+    def movable(self, node: int) -> bool:
+        """Whether ``node`` can go anywhere at all."""
+        return bool(self.entity[node] != -2)
+
+    def allowed(self, node: int, start: Floats, places: Floats) -> Floats:
+        """The places (k, 3) nearest to ``places`` that ``node``, now at ``start``, may take."""
+        on = self.entity[node]
+        if on >= 0:
+            places = self.nearest[on](places)
+        return np.where(self.held[node], start, places)
+
+
+def _nearest(gmsh: Any, dimension: int, tag: int) -> Nearest:
+    kind = gmsh.model.getType(dimension, tag)
+    if kind == "Plane":
+        return _flat(gmsh, tag)
+    return lambda places: np.asarray(gmsh.model.getClosestPoint(dimension, tag, places.ravel())[0], np.float64).reshape(
+        -1, 3
+    )
+
+
+def _flat(gmsh: Any, tag: int) -> Nearest:
+    """A plane needs no search: the point at the middle of its parameters, and its normal."""
+    low, high = gmsh.model.getParametrizationBounds(2, tag)
+    middle = 0.5 * (np.asarray(low) + np.asarray(high))
+    origin = np.asarray(gmsh.model.getValue(2, tag, middle), np.float64)
+    normal = np.asarray(gmsh.model.getNormal(tag, middle), np.float64)
+
+    def nearest(places: Floats) -> Floats:
+        away = ((places - origin) * normal).sum(axis=1)
+        moved: Floats = places - away[:, None] * normal
+        return moved
+
+    return nearest
