@@ -90,6 +90,7 @@ class Site(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True
     caps: policy.RunCaps = policy.RunCaps()
     retention: policy.Retention = policy.Retention()
     http: policy.Http = policy.Http()
+    files: policy.Files = policy.Files()
 
 
 _Name = Annotated[str, msgspec.Meta(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,127}\Z")]
@@ -158,7 +159,7 @@ def read_site(path: Path) -> Site:
         site = msgspec.convert(tomllib.loads(whole.read_text(path)), Site)
         if site.slurm is not None:
             _check(site.slurm)
-        policy.check(site.queue, site.quota, site.caps, site.retention, site.http)
+        policy.check(site.queue, site.quota, site.caps, site.retention, site.http, site.files)
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else str(error)
         raise SiteError(f"{path}: {reason}") from None

@@ -205,16 +205,16 @@ class MeshFile(Model):
     shape: Literal["file"]
     """The kind of body."""
     path: str
-    """Of the file; a relative one begins in the folder of the case. ``conoid validate``, ``conoid batch``
-    and ``python -m conoid.worker`` read mesh files; a server refuses them, and so do ``conoid run``, ``converge`` and
-    ``sweep``, which use one."""
+    """Of the file; a relative one begins in the folder of the case. Commands that hand the case to a server send the
+    file with it: there the path is a name, and ``sha256`` says which file is meant (docs/meshes.md)."""
     unit: Annotated[Length, Positive]
     """Length of 1 in the file: ``"1 mm"``."""
     group: str | None = None
     """Of tets: a physical group of gmsh by its name or number; of Abaqus an element set, ``Bar-1.Set-1`` (a set of an
     instance or a part), an instance or a part. All tets when absent. docs/meshes.md has what is read of a file."""
     sha256: Sha256 | None = None
-    """Of the file, 64 hexadecimal digits; a file with another one is refused. Not checked when absent."""
+    """Of the file, 64 hexadecimal digits; a file with another one is refused. Commands that send the file fill it in;
+    a server needs it. Not checked when absent."""
 
 
 Mesh = Annotated[

@@ -1,8 +1,8 @@
 """The files that a case names: where it names them, by which path and hash, and where a run finds them.
 
-Every table below ``parts[].mesh`` that has a ``path`` names a file; ``sha256`` beside it says which bytes are meant. The
-path leads to the file on the machine of who has written the case. A run of a server, or of ``conoid batch``, has copies
-of its own in its folder, under their hashes: there the path is a name and nothing more.
+Every table below ``parts[].mesh`` that has a ``path`` names a file; ``sha256`` beside it says which bytes are meant.
+The path leads to the file on the machine of who has written the case. A run of a server, or of ``conoid batch``, has
+copies of its own in its folder, under their hashes: there the path is a name and nothing more.
 """
 
 import re

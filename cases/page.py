@@ -157,7 +157,9 @@ def _scalar(schema: Schema) -> str:
         return _noun(schema["unit"]) + _range(schema)
     if schema.get("type") == "string":
         most = f", at most {schema['maxLength']} characters" if "maxLength" in schema else ""
-        return "a name" if "pattern" in schema else f"text{most}"
+        if "pattern" in schema:
+            return "64 hexadecimal digits" if "{64}" in schema["pattern"] else "a name"
+        return f"text{most}"
     nouns = {"integer": "a whole number", "number": "a number", "boolean": "`true` or `false`"}
     return nouns[schema["type"]] + _range(schema)
 

@@ -19,6 +19,11 @@ Tables of a site's settings file::
     [retention]                       # of runs that have ended
     age = "2160 h"
     bytes = 4_000_000_000_000
+    [files]                           # that a user sends beside his cases
+    size = 4_000_000_000
+    bytes = 20_000_000_000
+    number = 1000
+    age = "24 h"
     [http]                            # of each user, and of each address that sends no token
     requests = 16
     streams = 100
@@ -108,6 +113,25 @@ class Retention(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields
         return parse_quantity(self.every, "s")
 
 
+class Files(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
+    """What one user may send of files that his cases name."""
+
+    size: int = 4 << 30
+    """Bytes of one file; a larger one is refused with 413. Chosen: ten million tets as text."""
+    bytes: int = 16 << 30
+    """Of all of them, what is on its way included; beyond it 429. Chosen."""
+    number: int = 1000
+    """Of all of them; beyond it 429. Chosen: a look at so many takes some 10 ms."""
+    age: str = "24 h"
+    """For which a file is kept that no run has and that nobody asks for. Chosen: a case follows its files in seconds,
+    and a transfer that broke off goes on the next morning."""
+
+    @property
+    def oldest(self) -> float:
+        """The age, s."""
+        return parse_quantity(self.age, "s")
+
+
 class Http(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
     """What one user may hold of the server at a time; so may an address whose requests have no valid token."""
 
@@ -128,14 +152,17 @@ class Http(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True
         return parse_quantity(self.patience, "s")
 
 
-def check(queue: Queue, quota: Quota, caps: RunCaps, retention: Retention, http: Http) -> None:
+def check(queue: Queue, quota: Quota, caps: RunCaps, retention: Retention, http: Http, files: Files) -> None:
     """Raises ValueError: the key, the value, what is allowed."""
     for key, text in (
         ("queue.half_life", queue.half_life), ("retention.every", retention.every), ("http.patience", http.patience),
+        ("files.age", files.age),
     ):  # fmt: skip
         _time(key, text)
     for name in ("requests", "waiting", "streams", "threads"):
         _positive("http", name, getattr(http, name))
+    for name in ("size", "bytes", "number"):
+        _positive("files", name, getattr(files, name))
     if retention.age:
         _time("retention.age", retention.age)
     for name, user in queue.users.items():

@@ -1,5 +1,6 @@
 """What the mesh files of a case hold: read by a program of the worker, told to whoever checks the case."""
 
+import importlib.util
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,14 @@ from .geometry import Vector
 from .loaded import Load
 from .placed import Bulk
 from .touching import Touch
+
+PROGRAM = "conoid.worker.survey"
+"""The program that reads mesh files, one case a process."""
+
+
+def installed() -> bool:
+    """Whether it can be started here."""
+    return all(importlib.util.find_spec(name) is not None for name in ("conoid.worker", "numpy"))
 
 
 class Question(msgspec.Struct, kw_only=True, frozen=True):

@@ -23,8 +23,9 @@ from .console import echo, echo_json
 from .errors import ClientError
 from .examination import examine
 from .folders import LocalFolder
+from .local_files import Hashes, keep_copies, with_hashes
 from .options import CaseArgument, Json, Overrides, Ranks, Threads, aloud, on_cores, warn
-from .submission import data_of, locate
+from .submission import data_of, folder_of
 
 _CASE = "case.json"
 """What is asked for, as it is handed to the worker."""
@@ -61,7 +62,7 @@ def batch_run(
     """
     words = [*(overrides or ()), *on_cores(ranks, threads)]
     with aloud("reading mesh files"):
-        found = examine(data_of(case, words), locate(case).parent)
+        found = examine(data_of(case, words), folder_of(case))
     warn(found.odd)
     handed = hand_over(case, words, out, profile, slurm_of(site))
     if as_json:
@@ -91,7 +92,9 @@ def job_of(folder: Path) -> Job | None:
 
 def hand_over(case: str, overrides: Iterable[str], out: Path | None, profile: str, site: Slurm) -> Handed:
     """One job for the run in a folder, whatever happened before. Raises CaseError, ClientError."""
-    data = _with_paths(data_of(case, overrides), locate(case).parent)
+    data = data_of(case, overrides)
+    files = Hashes().of(data, folder_of(case))
+    data = with_hashes(data, files)
     checked = parse_case(data)
     resolved = resolved_json(checked)
     folder = (out or Path("runs") / checked.name).resolve()
@@ -101,6 +104,7 @@ def hand_over(case: str, overrides: Iterable[str], out: Path | None, profile: st
             raise ClientError("sbatch: there is none; Slurm's commands are in PATH, or [slurm] bin names their folder")
         job = _known(folder, resolved, profile, site) if folder.exists() else None
         if job is None:
+            keep_copies(files, folder)
             job = _prepared(folder, data, resolved, checked.run, chosen, site.bin)
         number = slurm.submit(site.bin, folder, job, batch.profile_of(site, job.profile)[1])
         noted = batch.Job(**{**{name: getattr(job, name) for name in job.__struct_fields__}, "job": number})
@@ -168,15 +172,6 @@ def _written(folder: Path, job: Job, profile: batch.Profile) -> Job:
     whole.write(folder / layout.JOB_SCRIPT, batch.script(profile, sys.executable).encode(), 0o755)
     whole.write(folder / layout.JOB, batch.to_json(job))
     return job
-
-
-def _with_paths(data: dict[str, Any], base: Path) -> dict[str, Any]:
-    """Mesh files by their full path: the case is copied into the run's folder."""
-    for part in data.get("parts", []):
-        mesh = part.get("mesh", {})
-        if isinstance(mesh.get("path"), str):
-            mesh["path"] = str((base / mesh["path"]).resolve())
-    return data
 
 
 def _mpiexec() -> list[str]:

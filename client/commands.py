@@ -75,7 +75,8 @@ def submit(
     changes = [*(overrides or ()), *on_cores(ranks, threads)]
     warn_of(case, changes)
     with connect(url, token) as session:
-        run = session.submit(case, changes, key, labels_of(label), profile, priority)
+        with aloud("handing the case in") as session.outbox.say:
+            run = session.submit(case, changes, key, labels_of(label), profile, priority)
         if as_json:
             echo_json(run.status())
         else:

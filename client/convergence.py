@@ -5,6 +5,7 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib import metadata
+from pathlib import Path
 from typing import Any
 
 from conoid.cases.load import apply_overrides, parse_case
@@ -58,17 +59,18 @@ class Series:
     limits: Mapping[str, Limit]
 
 
-def run_all(session: Session, data: Mapping[str, Any], plan: Plan) -> Iterator[Done]:
+def run_all(session: Session, data: Mapping[str, Any], plan: Plan, folder: Path) -> Iterator[Done]:
     """Hands in every point and yields each when it has ended, in the order of the points.
 
-    A point that has been run by the same server before is not run again. Raises CaseError for a point that is no valid
-    case, before any is handed in.
+    A point that has been run by the same server before is not run again. Relative paths of files begin in ``folder``.
+    Raises CaseError for a point that is no valid case, before any is handed in.
     """
     points = plan.points(parse_case(data))
     cases = [apply_overrides(data, point.changes) for point in points]
     for each in cases:
         parse_case(each)
-    runs = [session.submit(each, key=_key(each)) for each in cases]
+    ready = [session.outbox.ready(each, folder) for each in cases]
+    runs = [session.submit(each, key=_key(each), folder=folder) for each in ready]
     try:
         for point, each, run in zip(points, cases, runs, strict=True):
             yield _ended(point, parse_case(each), run)

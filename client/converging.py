@@ -27,7 +27,7 @@ from .reports import drawing
 from .saving import save_text
 from .scaling import CORES
 from .session import Session, connect
-from .submission import data_of
+from .submission import data_of, folder_of
 from .variants import FORMS, SEEDS, STEPS, Plan, Variant, chaotic, sizes
 
 _ENSEMBLE = 5
@@ -73,7 +73,7 @@ def converge(
         aloud(f"0 of {many} runs have ended") as name,
         _session(out or Path(passing), ranks * threads, on_server, url, token) as at,
     ):
-        for each in run_all(at, data, plan):
+        for each in run_all(at, data, plan, folder_of(case)):
             done.append(each)
             name(f"{len(done)} of {many} runs have ended")
             complain(f"{len(done)} of {many}: {_told(each)}")

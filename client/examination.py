@@ -3,7 +3,6 @@
 Mesh files are read by a program of the worker, where that is installed: a process of its own.
 """
 
-import importlib.util
 import subprocess
 import sys
 from collections.abc import Mapping
@@ -27,8 +26,6 @@ from conoid.cases.touching import touching as touches
 from conoid.cases.warned import warned
 
 from .errors import ClientError
-
-_PROGRAM = "conoid.worker.survey"
 
 
 @dataclass(frozen=True)
@@ -69,11 +66,11 @@ def _survey(case: Case, folder: Path) -> tuple[Survey, list[Problem]]:
     files = [(i, part.mesh) for i, part in enumerate(case.parts) if isinstance(part.mesh, MeshFile)]
     if not files:
         return Survey(), []
-    if not _installed():
+    if not survey.installed():
         cure = "was not read: the solver is not installed here (pip install 'conoid[worker]')"
         return Survey(), [problem(("parts", i, "mesh", "path"), mesh.path, cure) for i, mesh in files]
     asked = survey.question(case.model_dump(mode="json"), folder)
-    ended = subprocess.run([sys.executable, "-m", _PROGRAM], input=asked, capture_output=True, check=False)
+    ended = subprocess.run([sys.executable, "-m", survey.PROGRAM], input=asked, capture_output=True, check=False)
     try:
         if ended.returncode:
             raise ValueError
@@ -82,8 +79,3 @@ def _survey(case: Case, folder: Path) -> tuple[Survey, list[Problem]]:
         said = ended.stderr.decode("utf-8", "replace").strip().splitlines()
         why = said[-1] if said else f"it ended with code {ended.returncode}"
         raise ClientError(f"the program that reads mesh files has failed: {why}") from None
-
-
-def _installed() -> bool:
-    """Whether the worker can be started here."""
-    return all(importlib.util.find_spec(name) is not None for name in ("conoid.worker", "numpy"))

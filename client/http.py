@@ -126,6 +126,11 @@ class Http:
         response = self._request("POST", path, content=body, headers=headers, repeat=key is not None, timeout=timeout)
         return self._decoded(kind, response)
 
+    def put(self, kind: type[T], path: str, body: bytes, headers: Mapping[str, str], more: float = 0.0) -> T:
+        """The answer to a PUT, which is sent once. ``more``: as for ``post``."""
+        timeout = httpx2.Timeout(_ANSWER + more, connect=_CONNECTION)
+        return self._decoded(kind, self._request("PUT", path, content=body, headers=headers, timeout=timeout))
+
     def delete(self, path: str) -> None:
         """Removes what is at ``path``. Raises ServiceError, UnreachableError."""
         self._request("DELETE", path)

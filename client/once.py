@@ -25,7 +25,7 @@ from .options import complain
 from .pictures import FIELDS, Drawn
 from .result import Result
 from .run import Run
-from .submission import data_of
+from .submission import data_of, folder_of
 from .told import RunInfo
 from .view import view
 from .watch import explained, show, tell
@@ -63,7 +63,7 @@ def run_once(
     with ExitStack() as up:
         with silence.broken(out.print, lambda: "the server is starting"):
             up.enter_context(server)
-            run = server.session.submit(data)
+            run = server.session.submit(data, folder=folder_of(case))
         info, told = _follow(run, checked, out, plain)
     result = Result.open(server.runs / run.id)
     drawn = None

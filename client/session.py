@@ -4,9 +4,11 @@ import re
 import uuid
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import islice, takewhile
+from pathlib import Path
 from typing import Any, Protocol
 from urllib.parse import urlencode
 
+import httpx2
 import msgspec
 
 from conoid.cases.load import CaseError, Overrides, Problem
@@ -15,9 +17,10 @@ from conoid.cases.problems import shown
 from .config import target
 from .errors import MissingError, NotFoundError, ServiceError, UsageError
 from .http import NOT_FOUND, Http
+from .outbox import SURVEY, Outbox
 from .places import quoted
 from .run import Run
-from .submission import CaseSource, body_of, data_of, to_json
+from .submission import CaseSource, to_json
 from .sweep import Point, Sweep, SweepInfo, SweepPage, listed, points_along
 from .told import ID, RunInfo
 
@@ -59,10 +62,16 @@ class Page(msgspec.Struct, kw_only=True, frozen=True):
 class Session(Http):
     """A server, and the right to ask it. Use it as a context manager, or close it."""
 
-    def validate(self, case: CaseSource, overrides: Overrides = ()) -> dict[str, Any]:
-        """The server's estimate of a case. Raises CaseError with every problem at once."""
-        kind, body = body_of(case, overrides)
-        answer = self.post(Verdict, "/v1/cases:validate", body, kind)
+    def __init__(self, url: str, token: str | None = None, transport: httpx2.BaseTransport | None = None) -> None:
+        """As an ``Http``."""
+        super().__init__(url, token, transport)
+        self.outbox = Outbox(self)
+        """Sends the files that cases name."""
+
+    def validate(self, case: CaseSource, overrides: Overrides = (), folder: Path | str | None = None) -> dict[str, Any]:
+        """The server's estimate of a case; ``folder`` as for ``submit``. Raises CaseError with every problem."""
+        kind, body, more = self.outbox.body(case, overrides, folder)
+        answer = self.post(Verdict, "/v1/cases:validate", body, kind, more=more)
         if not answer.valid:
             raise CaseError(Problem(one["key"], one["value"], one["message"]) for one in answer.problems)
         return answer.estimate
@@ -75,20 +84,23 @@ class Session(Http):
         labels: Mapping[str, str] | None = None,
         profile: str = "",
         priority: int = 0,
+        folder: Path | str | None = None,
     ) -> Run:
-        """Hands a case in: a file, the name of a shipped case, or plain data.
+        """Hands a case in: a file, the name of a shipped case, or plain data. The files that it names are sent first,
+        where the server lacks them; relative paths begin in the ``folder`` of the case, for plain data in the working
+        one, where none is given.
 
         ``overrides`` change keys: ``["run.ranks=2"]``, ``{"run.ranks": 2}``. ``key`` is the Idempotency-Key; one is
         made up when it is None, so that a retry never makes a second run. ``labels`` are words of your own by which
         runs are found again, ``profile`` is one of the site's batch system; of two of your runs the one with the
         higher ``priority`` comes first. Raises CaseError, ServiceError, UnreachableError.
         """
-        kind, body = body_of(case, overrides)
+        kind, body, more = self.outbox.body(case, overrides, folder)
         words = [("label", word) for word in _words(labels)]
         words += [("profile", profile)] if profile else []
         words += [("priority", str(priority))] if priority else []
         path = f"/v1/runs?{urlencode(words)}" if words else "/v1/runs"
-        return Run(self, self.post(RunInfo, path, body, kind, key or str(uuid.uuid4())).id)
+        return Run(self, self.post(RunInfo, path, body, kind, key or str(uuid.uuid4()), more).id)
 
     def restart(
         self, run: str, ranks: int | None = None, key: str | None = None, profile: str = "", priority: int = 0,
@@ -103,22 +115,23 @@ class Session(Http):
         words = {name: str(number) for name, number in cores.items() if number is not None}
         words |= {name: str(value) for name, value in (("profile", profile), ("priority", priority)) if value}
         path = f"/v1/runs/{quoted(run)}:restart?{urlencode(words)}"
-        return Run(self, self.post(RunInfo, path, key=key or str(uuid.uuid4())).id)
+        return Run(self, self.post(RunInfo, path, key=key or str(uuid.uuid4()), more=SURVEY).id)
 
     def sweep(
         self, case: CaseSource, points: Sequence[Point] | Mapping[str, Iterable[Any]], at_once: int | None = None,
-        key: str | None = None, *, grid: bool = False,
+        key: str | None = None, *, grid: bool = False, folder: Path | str | None = None,
     ) -> Sweep:  # fmt: skip
         """Hands a case in at many points, each a mapping of keys to values: all become runs, or none.
 
         A mapping of keys to as many values each is one point after the other, or each with each for a ``grid``.
-        ``at_once`` of them run at a time; ``key`` as for ``submit``. Raises CaseError, ServiceError.
+        ``at_once`` of them run at a time; ``key`` and ``folder`` as for ``submit``. Raises CaseError, ServiceError.
         """
         chosen = listed(points_along(points, grid=grid) if isinstance(points, Mapping) else points)
-        wish = {"case": data_of(case), "points": chosen, "at_once": at_once}
-        body = to_json(wish)
-        more = _POINT * len(chosen)
-        made = self.post(SweepInfo, "/v1/sweeps", body, "application/json", key or str(uuid.uuid4()), more)
+        data, told, more = self.outbox.sweep(case, chosen, folder)
+        body = to_json({"case": data, "points": told, "at_once": at_once})
+        made = self.post(
+            SweepInfo, "/v1/sweeps", body, "application/json", key or str(uuid.uuid4()), more + _POINT * len(chosen)
+        )
         return Sweep(self, made.id)
 
     def sweeps(self) -> list[SweepInfo]:

@@ -27,6 +27,11 @@ def locate(source: str | Path) -> Path:
     raise CaseError([Problem("case", shown(str(source)), f"neither a .toml or .json file nor a shipped case; {hint}")])
 
 
+def folder_of(source: CaseSource) -> Path:
+    """Where relative paths of files begin: the folder of the case, for plain data the working one. Raises CaseError."""
+    return locate(source).parent if isinstance(source, str | Path) else Path()
+
+
 def data_of(source: CaseSource, overrides: Overrides = ()) -> dict[str, Any]:
     """The plain data of a case with the overrides made, not checked yet. Raises CaseError."""
     if isinstance(source, Case):

@@ -13,7 +13,7 @@ from .errors import UsageError
 from .options import CaseArgument, Json, Ranks, Threads, Token, Url, aloud, complain, on_cores, sweep_named
 from .saving import save_text
 from .session import connect
-from .submission import data_of
+from .submission import data_of, folder_of
 from .sweep import SweepInfo, SweepPoint, points_in, points_of
 
 SweepArgument = Annotated[
@@ -45,8 +45,9 @@ def sweep(
     points = points_in(listed) if listed is not None else points_of(sets or (), grid=grid)
     with connect(url, token) as session:
         try:
-            with aloud(f"handing {counted(len(points), 'point')} in"):
-                made = session.sweep(data_of(case, on_cores(ranks, threads)), points, at_once=at_once)
+            with aloud(f"handing {counted(len(points), 'point')} in") as session.outbox.say:
+                data = data_of(case, on_cores(ranks, threads))
+                made = session.sweep(data, points, at_once=at_once, folder=folder_of(case))
         except KeyboardInterrupt:
             complain(
                 "the server may have the points already; conoid sweep-cancel last stops them once it has taken all in"

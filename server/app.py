@@ -24,8 +24,10 @@ from .launch.slurm import SlurmLauncher
 from .metrics import Metrics, Timed
 from .present import Present
 from .readiness import Readiness
-from .routes import cases, events, files, health, history, logs, me, runs, snapshots
+from .receiving import Receiver
+from .routes import cases, events, files, health, history, logs, me, runs, sent, snapshots
 from .routes import sweeps as sweep_routes
+from .sent import SentFiles
 from .service import Service
 from .settings import Settings
 from .store import Store
@@ -43,6 +45,7 @@ ROUTERS = (
     sweep_routes.router,
     logs.router,
     files.router,
+    sent.router,
     me.router,
     health.router,
 )
@@ -77,7 +80,8 @@ def opened(settings: Settings) -> Iterator[Service]:
         lines = Farewells(settings.runs)
         keeper.restore(store, lines)
         supervisor = Supervisor(settings, store, launcher_of(settings), telemetry, bell.ring)
-        desk = Desk(settings, store, supervisor)
+        files_sent = SentFiles(settings.runs, settings.site.files, settings.caps.free_disk)
+        desk = Desk(settings, store, supervisor, files_sent)
         sweeps = Sweeps(settings, desk)
         supervisor.held_back = sweeps.held
         supervisor.start()
@@ -85,8 +89,11 @@ def opened(settings: Settings) -> Iterator[Service]:
         stack.callback(supervisor.close)
         if settings.end_runs:
             stack.callback(supervisor.end_all)
-        watchman = Keeper(settings, store, lines, lambda run_id: supervisor.current(run_id) is not None)
+        watchman = Keeper(settings, store, lines, lambda run_id: supervisor.current(run_id) is not None, files_sent)
+        watchman.needed = sweeps.needed
         desk.kept = watchman.kept
+        if (most := settings.site.quota.output_bytes) is not None:
+            files_sent.left = lambda owner: most - watchman.kept(owner)
         watchman.start()
         stack.callback(watchman.close)
         http = settings.site.http
@@ -104,8 +111,11 @@ def opened(settings: Settings) -> Iterator[Service]:
             downloads=Downloads(lanes),
             lanes=lanes,
             readers=reader.lanes(reader.CASE),
+            surveyors=reader.surveyors(),
             sweepers=reader.lanes(reader.SWEEP),
             sweeps=sweeps,
+            sent=files_sent,
+            receiver=Receiver(files_sent, lanes),
             keeper=watchman,
             farewells=lines,
             present=Present(settings.runs),

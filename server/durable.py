@@ -1,6 +1,7 @@
 """Writing that survives a power cut: data first, then its name, then the folder that holds the name."""
 
 import os
+import shutil
 from pathlib import Path
 
 from conoid.cases import whole
@@ -36,6 +37,15 @@ def write_new(path: Path, content: bytes) -> None:
         file.write(content)
         file.flush()
         os.fsync(file.fileno())
+
+
+def copy(source: Path, target: Path) -> None:
+    """A new file with the bytes of a regular one; the caller syncs the folder. Raises OSError."""
+    flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL
+    with whole.named(target), whole.opened(source) as file, open(os.open(target, flags, 0o400), "wb") as made:
+        shutil.copyfileobj(file, made, 1 << 20)
+        made.flush()
+        os.fsync(made.fileno())
 
 
 def sync_folder(folder: Path) -> None:

@@ -15,7 +15,7 @@ from conoid.cases import whole
 from conoid.cases.outcome import known
 from conoid.cases.run import Cause, State
 
-from . import durable, folder
+from . import durable, folder, weights
 from .events import Run
 
 FILE = "purged.jsonl"
@@ -67,7 +67,7 @@ def of(run: Run, path: Path, why: str) -> Farewell:
         id=run.id, owner=run.owner, name=run.name, ranks=run.ranks, threads=run.threads, submitted=run.submitted,
         started=run.started, finished=run.finished, state=run.state.value,
         cause=run.cause.value if run.cause else None, message=run.message, removed=time.time(), why=why,
-        bytes=folder.size(path), **results,
+        bytes=weights.size(path), **results,
     )  # fmt: skip
 
 

@@ -8,7 +8,6 @@ import shutil
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import suppress
 from dataclasses import replace
 from functools import reduce
 from pathlib import Path
@@ -28,12 +27,22 @@ from .events import Run
 _ID = re.compile(r"[0-9a-z]{22}")
 _LETTERS = "0123456789abcdefghjkmnpqrstvwxyz"
 _NEW, _GONE = ".new-", ".gone-"
+APART = f"{_NEW}files-"
+"""What the names of folders begin with that are there for a moment; a server removes them when it starts."""
 _TELLING = (layout.SUBMISSION, layout.JOURNAL, layout.WORKER)
 """One of these is left where a run has been, whatever was damaged."""
 _UNREADABLE = "outcome.unreadable.json"
 DAMAGED = (FileNotFoundError, IsADirectoryError, NotADirectoryError, PermissionError)
 """What the system says of a file that is gone, or is none any more (``whole.opened``), or not for this user."""
 _NO_FILE = (FileNotFoundError, IsADirectoryError, NotADirectoryError)
+
+
+class Copy(msgspec.Struct, kw_only=True, frozen=True):
+    """A file that the case names, of which the run has its own copy: ``files/<sha256>`` and how its name ends."""
+
+    path: str
+    """As the case has it: a name."""
+    sha256: str
 
 
 class Submission(msgspec.Struct, kw_only=True, frozen=True):
@@ -61,6 +70,7 @@ class Submission(msgspec.Struct, kw_only=True, frozen=True):
     """Of labels, profile and priority as they were asked for; empty in what earlier servers wrote."""
     threads: int = 1
     """Of each rank."""
+    files: list[Copy] = []
 
     @property
     def cores(self) -> int:
@@ -170,16 +180,6 @@ def there(path: Path) -> bool:
     except PermissionError:
         return True
     return True
-
-
-def size(folder: Path) -> int:
-    """Bytes of all files; one that goes away meanwhile has none."""
-    total = 0
-    for place, _, names in os.walk(folder):
-        for name in names:
-            with suppress(OSError):
-                total += os.lstat(os.path.join(place, name)).st_size
-    return total
 
 
 def submission(folder: Path) -> Submission:

@@ -1,23 +1,25 @@
-"""Looks after the folders of runs: how large they are, and which of those that have ended are removed, and when."""
+"""Looks after the folders of runs and what users have sent: how large they are, what is removed, and when."""
 
 import logging
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Set
 from contextlib import suppress
 from pathlib import Path
 
 from sqlalchemy.exc import SQLAlchemyError
 
-from conoid.cases.figures import size
+from conoid.cases import figures
 
 from . import farewells, folder, pins
 from .events import Run
 from .farewells import Farewells
 from .holds import words
+from .sent import SentFiles
 from .settings import Settings
 from .store import Store
+from .weights import Weights, copies, size
 
 _log = logging.getLogger("conoid.server")
 _PATIENCE = 5.0
@@ -26,15 +28,23 @@ who asks. Chosen."""
 
 
 class Keeper:
-    """A thread where a site asks for it by [retention] or quota.output_bytes; its methods may be called from any."""
+    """A thread; its methods may be called from any. Runs are looked at where a site asks for it by [retention] or
+    quota.output_bytes.
+    """
 
-    def __init__(self, settings: Settings, store: Store, lines: Farewells, is_open: Callable[[str], bool]) -> None:
+    def __init__(
+        self, settings: Settings, store: Store, lines: Farewells, is_open: Callable[[str], bool], sent: SentFiles
+    ) -> None:
         """``is_open`` says whether a run has not ended for good."""
-        self._settings, self._store, self._lines, self._is_open = settings, store, lines, is_open
+        self._settings, self._store, self._lines, self._is_open, self._sent = settings, store, lines, is_open, sent
         self._rules = settings.site.retention
+        asked = self._rules.oldest is not None or self._rules.bytes is not None
+        self._weighs = asked or settings.site.quota.output_bytes is not None
+        self.needed: Callable[[], Set[str]] = frozenset
+        """Hashes of files that nobody removes now."""
         self._lock, self._asking = threading.Lock(), threading.Lock()
         self._asked_again = 0.0
-        self._sizes: dict[str, int] = {}
+        self._weights = Weights()
         self._settled: set[str] = set()
         """Runs whose size was read after their end."""
         self._kept: Counter[str] = Counter()
@@ -42,9 +52,8 @@ class Keeper:
         self._thread = threading.Thread(target=self._work, name="keeper", daemon=True)
 
     def start(self) -> None:
-        """Begins to look; does nothing where nobody has asked for it."""
-        if self._rules.oldest is not None or self._rules.bytes is not None or self._settings.site.quota.output_bytes:
-            self._thread.start()
+        """Begins to look."""
+        self._thread.start()
 
     def close(self) -> None:
         """Looks no more."""
@@ -53,7 +62,7 @@ class Keeper:
             self._thread.join(_PATIENCE)
 
     def kept(self, owner: str) -> int:
-        """Bytes of the folders of an owner's runs, at the last look."""
+        """Bytes of the folders of an owner's runs and of his files, at the last look."""
         return self._kept[owner]
 
     def kept_now(self, owner: str) -> int:
@@ -62,7 +71,7 @@ class Keeper:
         Raises SQLAlchemyError.
         """
         with self._asking:
-            if not self._thread.is_alive() and time.monotonic() >= self._asked_again:
+            if not self._weighs and time.monotonic() >= self._asked_again:
                 with suppress(OSError):
                     self._weigh(*self._all())
                 self._asked_again = time.monotonic() + _PATIENCE
@@ -76,10 +85,15 @@ class Keeper:
         self._lines.add(farewells.of(run, path, why))
         folder.purge(self._settings.runs, run.id)
         with self._lock:
-            self._kept[run.owner] -= self._sizes.pop(run.id, 0)
+            self._weights.drop(run.id)
+            self._kept[run.owner] = self._weights.of(run.owner)
 
     def look(self) -> None:
-        """One look at all folders. Raises OSError, SQLAlchemyError."""
+        """One look at what users have sent, and at all folders. Raises OSError, SQLAlchemyError."""
+        for line in self._sent.purge(time.time(), self.needed()):
+            _log.info("%s is removed: no run has it, and nobody has asked for it lately", line)
+        if not self._weighs:
+            return
         paths, known = self._all()
         self._weigh(paths, known)
         for run, why in self._due([known[path.name] for path in paths], time.time()):
@@ -93,34 +107,34 @@ class Keeper:
         return [path for path in folder.runs_in(self._settings.runs) if path.name in known], known
 
     def _weigh(self, paths: list[Path], known: dict[str, Run]) -> None:
-        """Reads the sizes of all folders but those that change no more."""
+        """Reads the sizes of all folders but those that change no more, and of what users have sent."""
         for path in paths:
             if path.name not in self._settled:
-                size = folder.size(path)
+                weighed = size(path), copies(path)
                 with self._lock:
-                    self._sizes[path.name] = size
+                    self._weights.note(path.name, known[path.name].owner, *weighed)
                 if known[path.name].state.final and not self._is_open(path.name):
                     self._settled.add(path.name)
         there = {path.name for path in paths}
         self._settled &= there
+        sent = {owner: self._sent.weigh(owner) for owner in self._sent.owners()}
         with self._lock:
-            self._sizes = {run_id: size for run_id, size in self._sizes.items() if run_id in there}
-            self._kept = Counter()
-            for run_id, size in self._sizes.items():
-                self._kept[known[run_id].owner] += size
+            self._weights.keep(there, sent)
+            owners = {run.owner for run in known.values()} | sent.keys()
+            self._kept = Counter({owner: self._weights.of(owner) for owner in owners})
 
     def _due(self, runs: list[Run], now: float) -> Iterator[tuple[Run, str]]:
         """The runs to be removed, oldest first, and why."""
-        total, most, oldest = sum(self._sizes.values()), self._rules.bytes, self._rules.oldest
+        left, most, oldest = self._weights.copy(), self._rules.bytes, self._rules.oldest
         for run in sorted(runs, key=lambda run: run.finished):
             old = oldest is not None and now - run.finished > oldest
-            large = most is not None and total > most
+            large = most is not None and left.total() > most
             if not run.state.final or not (old or large) or self._is_open(run.id):
                 continue
             if pins.pinned(self._settings.runs / run.id):
                 continue
-            total -= self._sizes.get(run.id, 0)
-            yield run, f"older than {self._rules.age}" if old else f"all runs had more than {size(most)}"
+            left.drop(run.id)
+            yield run, f"older than {self._rules.age}" if old else f"all runs had more than {figures.size(most)}"
 
     def _work(self) -> None:
         rest = min(_PATIENCE, self._rules.rest)

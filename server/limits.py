@@ -15,11 +15,11 @@ from fastapi.dependencies.models import Dependant
 from fastapi.routing import APIRoute
 from starlette.requests import ClientDisconnect
 
-from conoid.cases.bodies import MeshFile
 from conoid.cases.estimate import Estimate
 from conoid.cases.figures import count, crew, number, size
+from conoid.cases.files import files_of
 from conoid.cases.policy import Quota
-from conoid.cases.problems import Problem, shown
+from conoid.cases.problems import Problem, problem, shown
 from conoid.cases.schema import Case
 from conoid.cases.similar import allowed
 
@@ -69,11 +69,7 @@ async def read_body(request: Request) -> bytes:
     """The body, never more than ``BODY`` of it in memory. Raises ServiceError 415 for one that is encoded, 413, 408,
     and 400 where it breaks off.
     """
-    encoding = request.headers.get("content-encoding", "identity").strip().lower()
-    if encoding not in {"", "identity"}:
-        detail = f"Content-Encoding {encoding[:80]!r}: a body is sent as it is"
-        headers = {"Accept-Encoding": "identity"}
-        raise ServiceError(415, "unsupported_encoding", detail, pointer="Content-Encoding", headers=headers)
+    check_encoding(request)
     length = request.headers.get("content-length", "0")
     if length.isdigit() and int(length) > BODY:
         raise _too_large(int(length))
@@ -83,6 +79,15 @@ async def read_body(request: Request) -> bytes:
         raise ServiceError(408, "timeout", "the body did not arrive in time", retryable=True) from None
     except ClientDisconnect:
         raise ServiceError(400, "incomplete", "the body broke off", retryable=True) from None
+
+
+def check_encoding(request: Request) -> None:
+    """Raises ServiceError 415 for a body that is encoded: nobody knows how large it will be."""
+    encoding = request.headers.get("content-encoding", "identity").strip().lower()
+    if encoding not in {"", "identity"}:
+        detail = f"Content-Encoding {encoding[:80]!r}: a body is sent as it is"
+        headers = {"Accept-Encoding": "identity"}
+        raise ServiceError(415, "unsupported_encoding", detail, pointer="Content-Encoding", headers=headers)
 
 
 async def _collect(request: Request) -> bytes:
@@ -146,13 +151,11 @@ def _cores(case: Case, settings: Limits) -> Iterator[Problem]:
 
 
 def _files(case: Case) -> Iterator[Problem]:
-    for index, part in enumerate(case.parts):
-        if isinstance(part.mesh, MeshFile):
-            message = (
-                "a server does not read mesh files, python -m conoid.worker and conoid batch do; "
-                "allowed: box, plate, cylinder, tube, sphere"
-            )
-            yield Problem(f"parts[{index}].mesh.path", repr(part.mesh.path), message)
+    """Files are found by their hash: a path is one of the machine on which the case was written."""
+    for file in files_of(case.model_dump(include={"parts"})):
+        if file.sha256 is None:
+            message = "this key is missing: a server finds a file by its hash; conoid submit and its like fill it in"
+            yield problem((*file.table, "sha256"), ..., message)
 
 
 def _time(case: Case, caps: Limits) -> Iterator[Problem]:
@@ -186,7 +189,8 @@ def wall_time(case: Case, caps: Limits) -> float | None:
     return min(asked) if asked else None
 
 
-def _later(code: str, detail: str) -> ServiceError:
+def later(code: str, detail: str) -> ServiceError:
+    """429: the user has as much as he may have; less, later."""
     return ServiceError(429, code, detail, retryable=True, headers={"Retry-After": "60"})
 
 
@@ -194,7 +198,7 @@ def check_output(kept: int, quota: Quota) -> None:
     """Raises ServiceError 429 when the folders of the owner's runs, ``kept`` bytes, are as large as they may be."""
     if quota.output_bytes is not None and kept >= quota.output_bytes:
         detail = f"your runs have {size(kept)} on disk; this server allows {size(quota.output_bytes)}: remove some"
-        raise _later("output_quota", detail)
+        raise later("output_quota", detail)
 
 
 def check_room(runs: Path, open_runs: int, caps: Caps, more: int = 1) -> None:
@@ -206,7 +210,7 @@ def check_room(runs: Path, open_runs: int, caps: Caps, more: int = 1) -> None:
     if open_runs + more > caps.queued:
         new = f", and the sweep has {more}" if more > 1 else ""
         detail = f"{open_runs} of your runs have not ended{new}; this server allows {caps.queued}"
-        raise _later("queue_full", detail)
+        raise later("queue_full", detail)
     free = shutil.disk_usage(runs).free
     if free < caps.free_disk:
         detail = f"{size(free)} are free on the server's disk; it keeps {size(caps.free_disk)}"

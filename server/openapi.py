@@ -31,6 +31,19 @@ SWEEP_BODY: dict[str, Any] = {
     }
 }
 """For the route that takes a sweep."""
+FILE_BODY: dict[str, Any] = {
+    "parameters": [
+        {
+            "name": "Content-Range", "in": "header", "required": False, "schema": {"type": "string"},
+            "description": "bytes FIRST-LAST/SIZE: a piece, which begins at Upload-Offset; without it the whole file",
+        }
+    ],
+    "requestBody": {
+        "required": True,
+        "content": {"application/octet-stream": {"schema": {"type": "string", "format": "binary"}}},
+    },
+}  # fmt: skip
+"""For the route that takes a file."""
 _JSON, _PROBLEM, _BYTES = "application/json", "application/problem+json", "application/octet-stream"
 _TEXT, _FILE = "text/plain", "*/*"
 ANSWERS: dict[tuple[str, str], dict[int, tuple[str, str]]] = {
@@ -56,6 +69,10 @@ ANSWERS: dict[tuple[str, str], dict[int, tuple[str, str]]] = {
     ("get", "/v1/runs/{run_id}/logs/{rank}"): {200: (_TEXT, ""), 206: (_TEXT, ""), 304: ("", "")},
     ("get", "/v1/runs/{run_id}/files"): {200: (_JSON, "Files")},
     ("get", "/v1/runs/{run_id}/files/{path}"): {200: (_FILE, ""), 206: (_FILE, ""), 304: ("", "")},
+    ("get", "/v1/files"): {200: (_JSON, "SentFiles")},
+    ("get", "/v1/files/{sha256}"): {200: (_JSON, "SentFile")},
+    ("put", "/v1/files/{sha256}"): {200: (_JSON, "SentFile"), 201: (_JSON, "SentFile")},
+    ("delete", "/v1/files/{sha256}"): {204: ("", "")},
     ("post", "/v1/sweeps"): {202: (_JSON, "Sweep")},
     ("get", "/v1/sweeps"): {200: (_JSON, "SweepPage")},
     ("get", "/v1/sweeps/{sweep_id}"): {200: (_JSON, "Sweep")},
@@ -71,7 +88,8 @@ _OPEN = {"/v1/case.schema.json", "/healthz", "/readyz"}
 _REFUSALS = {
     400: "a parameter is wrong", 401: "no valid token", 403: "the token lacks the scope", 404: "there is none",
     408: "the body did not arrive in time", 409: "not in this state", 410: "the run's folder has been removed",
-    413: "the body is too large", 415: "not a type of a case", 416: "no such range", 422: "the case is wrong",
+    411: "the length is missing", 413: "the body is too large", 415: "not a type of a case",
+    416: "no such range", 422: "the case is wrong",
     429: "too many requests of the user are in progress or wait", 500: "the server failed", 503: "not now",
     507: "the disk is full",
 }  # fmt: skip
@@ -86,7 +104,9 @@ def refusals(method: str, path: str) -> set[int]:
         found |= {410}
     if method == "post" and "{" not in path:
         found |= {408, 410, 413, 415, 422, 429, 507}
-    if path.endswith((":checkpoint", ":snapshot")) or method == "delete":
+    if method == "put":
+        found |= {408, 409, 411, 413, 415, 422, 507}
+    if path.endswith((":checkpoint", ":snapshot")) or (method == "delete" and "{run_id}" in path):
         found |= {409}
     if path.endswith(":restart"):
         found |= {409, 415, 422, 429, 507}

@@ -29,14 +29,20 @@ _REST = 5.0
 """s that a case may take beyond ``WALL`` before its process is killed from here. Chosen."""
 _WAITING = 100
 """Bodies of one owner that wait to be read. Chosen: each may have 1 MiB."""
-CASE, SWEEP = 120.0, 900.0
-"""s in which a case, and all cases of a sweep, must be read and taken, the waiting for a turn included. Chosen."""
+CASE, SWEEP, FILES = 120.0, 900.0, 300.0
+"""s in which a case, all cases of a sweep, and a case with files must be read and taken, the waiting for a turn
+included. Chosen."""
 
 
 def lanes(patience: float) -> Lanes:
     """As many cases are read at a time as there are cores; one owner alone never takes the last of the places."""
     places = max(2, usable_cores())
     return Lanes(each=places - 1, waiting=_WAITING, patience=patience, most=places)
+
+
+def surveyors() -> Lanes:
+    """One case with files of an owner at a time, and of all owners as many as there are cores."""
+    return Lanes(each=1, waiting=_WAITING, patience=FILES, most=max(2, usable_cores()))
 
 
 class Reader:

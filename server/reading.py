@@ -12,16 +12,20 @@ import signal
 import socket
 import sys
 import traceback
+from collections.abc import Mapping
 from contextlib import suppress
+from pathlib import Path
 from typing import Any
 
 import msgspec
 
 from conoid.cases.estimate import Estimate, estimate
+from conoid.cases.files import files_of
 from conoid.cases.load import CaseError, Problem, json_data, parse_case, resolved_json, shipped_path, toml_data
 from conoid.cases.plausible import bare_numbers
+from conoid.cases.problems import dotted, problem
 from conoid.cases.schema import Case
-from conoid.cases.survey import Survey
+from conoid.cases.survey import Survey, from_json
 from conoid.cases.warned import warned
 
 from . import limits
@@ -34,6 +38,7 @@ _NICE = 5
 """Steps of priority below the server, which goes on answering. Chosen."""
 _SHIPPED = "demo"
 """Read once before all others. Chosen: small, with a material of the library."""
+_UNREAD = "was not read yet: its run reads it"
 PID = 4
 """Bytes of the number of a process, which it sends first."""
 
@@ -44,6 +49,19 @@ class Question(msgspec.Struct, frozen=True, kw_only=True):
     body: bytes
     json: bool
     limits: Limits
+    survey: bytes | None = None
+    """What a program of the worker has read of the files that the case names (conoid.cases.survey); empty: nothing.
+    None: it has not been asked yet. Then a case with files is read and checked, and not estimated."""
+    folder: str = ""
+    """Where these files are."""
+
+
+class FileName(msgspec.Struct, frozen=True, kw_only=True):
+    """A file that the case names, and the key of the table that does."""
+
+    key: str
+    path: str
+    sha256: str
 
 
 class Reading(msgspec.Struct, frozen=True, kw_only=True):
@@ -62,6 +80,9 @@ class Reading(msgspec.Struct, frozen=True, kw_only=True):
     case: bytes
     """The case with every default, as JSON."""
     doubts: list[Problem]
+    files: list[FileName] = []
+    survey: bytes = b""
+    """What these hold, as JSON; empty where nothing has read them."""
 
 
 class Answer(msgspec.Struct, frozen=True, kw_only=True):
@@ -88,23 +109,42 @@ def _read(question: Question) -> Reading:
     text = _text(question.body)
     data = json_data(text) if question.json else toml_data(text)
     case = parse_case(data)
-    expected = _estimate(case, question.limits)
-    odd = [*bare_numbers(data), *warned(case, expected, Survey(), ())]  # without parts that touch: it takes seconds
+    if problems := limits.check(case, question.limits):
+        raise CaseError(problems)
+    files = _files(case)
+    known = not files or question.survey is not None
+    told, odd = _weighed(case, data, question) if known else ({}, [])
     return Reading(
         name=case.name, title=case.title, ranks=case.run.ranks, threads=case.run.threads, profile=case.run.profile,
-        wall_time=limits.wall_time(case, question.limits), estimate=limits.figures(expected),
-        resolved=resolved_json(case), case=case.model_dump_json().encode(), doubts=odd,
+        wall_time=limits.wall_time(case, question.limits), estimate=told,
+        resolved=resolved_json(case), case=case.model_dump_json().encode(), doubts=odd, files=files,
+        survey=question.survey or b"",
     )  # fmt: skip
 
 
-def _estimate(case: Case, allowed: Limits) -> Estimate:
-    if problems := limits.check(case, allowed):
-        raise CaseError(problems)
+def _files(case: Case) -> list[FileName]:
+    found = files_of(case.model_dump(include={"parts"}))
+    return [FileName(key=dotted(file.table), path=file.path, sha256=file.sha256 or "") for file in found]
+
+
+def _weighed(case: Case, data: Mapping[str, Any], question: Question) -> tuple[dict[str, int | float], list[Problem]]:
+    """What the case needs, and what is odd about it. Raises CaseError where it cannot be run here."""
+    told = from_json(question.survey) if question.survey else Survey()
+    if told.refused:
+        raise CaseError(Problem("", "", line) for line in told.refused)
+    expected = _estimate(case, question, told)
+    # Parts that touch are told of files alone: the others take seconds to find.
+    unread = [problem((file.key, "path"), file.path, _UNREAD) for file in _files(case) if question.survey == b""]
+    odd = [*unread, *bare_numbers(data), *warned(case, expected, told, told.touching)]
+    return limits.figures(expected), odd
+
+
+def _estimate(case: Case, question: Question, told: Survey) -> Estimate:
     try:
-        expected = estimate(case)
+        expected = estimate(case, Path(question.folder) if question.folder else None, told)
     except (ArithmeticError, ValueError):
         raise CaseError([Problem("parts", "", "the elements are too many or too small to be counted")]) from None
-    if problems := limits.check_size(expected, allowed):
+    if problems := limits.check_size(expected, question.limits):
         raise CaseError(problems)
     return expected
 

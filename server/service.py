@@ -14,6 +14,8 @@ from .keeper import Keeper
 from .lanes import Lanes
 from .present import Present
 from .readiness import Readiness
+from .receiving import Receiver
+from .sent import SentFiles
 from .settings import Settings
 from .store import Store
 from .submission import Desk
@@ -40,9 +42,13 @@ class Service:
     """For the disk and the database."""
     readers: Lanes
     """For cases that are read."""
+    surveyors: Lanes
+    """For cases that may name files, which are read for seconds; and for restarts, whose case may."""
     sweepers: Lanes
     """For sweeps, each of which is read for seconds: nobody who hands in a run waits for them."""
     sweeps: Sweeps
+    sent: SentFiles
+    receiver: Receiver
     keeper: Keeper
     farewells: Farewells
     present: Present

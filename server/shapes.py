@@ -37,6 +37,13 @@ class Problem(msgspec.Struct, kw_only=True, omit_defaults=True):
     """What is kept of a run that has been removed."""
 
 
+class NamedFile(msgspec.Struct, kw_only=True):
+    """A file that a case names: ``path`` is a name, ``sha256`` says which."""
+
+    path: str
+    sha256: str
+
+
 class Receipt(msgspec.Struct, kw_only=True):
     """What a submitter is told; estimate: elements, nodes, dt, steps, memory_bytes, core_seconds, seconds by the clock
     where known.
@@ -51,6 +58,8 @@ class Receipt(msgspec.Struct, kw_only=True):
     threads: int
     submitted: float
     estimate: dict[str, float]
+    files: list[NamedFile]
+    """That the case names: the run has its own copy of each."""
     url: str
 
 
@@ -91,13 +100,16 @@ class RunPage(msgspec.Struct, kw_only=True):
 
 
 class Validation(msgspec.Struct, kw_only=True):
-    """Whether a case could be submitted; with warnings, estimate and every default where it could."""
+    """Whether a case could be submitted; with warnings, estimate and every default where it could, and what its files
+    hold (``survey``: by part, with loads, and bodies that touch).
+    """
 
     valid: bool
     problems: list[ProblemEntry]
     warnings: list[ProblemEntry] = []
     estimate: dict[str, float] = {}
     case: dict[str, Any] = {}
+    survey: dict[str, Any] = {}
 
 
 class GalleryEntry(msgspec.Struct, kw_only=True):
@@ -136,6 +148,24 @@ class Files(msgspec.Struct, kw_only=True):
     """Every file of a run."""
 
     files: list[FileEntry]
+
+
+class SentFile(msgspec.Struct, kw_only=True):
+    """A file that a user has sent: ``offset`` of ``size`` bytes are there; it was last wanted at ``asked``, Unix s."""
+
+    sha256: str
+    size: int
+    offset: int
+    whole: bool
+    asked: float
+    url: str
+
+
+class SentFiles(msgspec.Struct, kw_only=True):
+    """The files that a user has sent, and their bytes together."""
+
+    files: list[SentFile]
+    bytes: int
 
 
 class Snapshots(msgspec.Struct, kw_only=True):
@@ -238,6 +268,7 @@ class Health(msgspec.Struct, kw_only=True):
 
 
 ALL = (
-    Problem, Receipt, RunPage, RunStatus, Validation, Gallery, EventPage, Files, Snapshots, History, Me, Health, Wish,
+    Problem, Receipt, RunPage, RunStatus, Validation, Gallery, EventPage, Files, SentFile, SentFiles,
+    Snapshots, History, Me, Health, Wish,
     SweepPage, Sweep,
 )  # fmt: skip

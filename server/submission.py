@@ -6,24 +6,28 @@ import re
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
+from pathlib import Path
 from typing import Any
 
 import msgspec
+from msgspec import structs
 from sqlalchemy.exc import SQLAlchemyError
 
 from conoid.cases.batch import profile_of
 from conoid.cases.load import CaseError
 
-from . import folder, limits, restarts
+from . import copies, folder, limits, restarts
+from .copies import Source, apart, of_owner, of_run
 from .errors import ServiceError, database_away, invalid_case
-from .folder import Submission
+from .folder import Copy, Submission
 from .holds import words
 from .reader import the_reader
 from .reading import Question, Reading
+from .sent import SentFiles
 from .settings import Settings
 from .store import Store
 from .supervisor import Supervisor
+from .surveys import surveyed
 
 _log = logging.getLogger("conoid.server")
 KINDS = {"application/toml": "case.toml", "application/json": "case.json"}
@@ -55,18 +59,33 @@ class Wishes:
 class Desk:
     """Where cases are handed in. Methods may be called from any thread."""
 
-    def __init__(self, settings: Settings, store: Store, supervisor: Supervisor) -> None:
-        """One desk a server: its lock is what makes two requests with one key one run."""
-        self._settings, self._store, self._supervisor = settings, store, supervisor
+    def __init__(self, settings: Settings, store: Store, supervisor: Supervisor, sent: SentFiles) -> None:
+        """One desk a server: its lock is what makes two requests with one key one run. ``sent`` has users' files."""
+        self._settings, self._store, self._supervisor, self._sent = settings, store, supervisor, sent
         self._reader, self._limits = the_reader(), limits.of(settings)
         self._lock = threading.Lock()
         self.kept: Callable[[str], int] = lambda owner: 0
         """Bytes of the folders of an owner's runs."""
 
-    def read(self, body: bytes, content_type: str) -> Reading:
-        """The case in ``body``. Raises CaseError with every problem, ServiceError 415, 422, 503."""
+    def read(
+        self, body: bytes, content_type: str, source: Source, surveys: dict[bytes, bytes] | None = None
+    ) -> Reading:
+        """The case in ``body``, the files that it names included: they come from ``source``. ``surveys``: what files
+        hold that were read before, by the bodies that are made of them. Raises CaseError with every problem,
+        ServiceError 415, 422, 503.
+        """
         kind = _file_name(content_type)
-        return self._reader.read(Question(body=body, json=kind == "case.json", limits=self._limits))
+        question = Question(body=body, json=kind == "case.json", limits=self._limits)
+        reading = self._reader.read(question)
+        if not reading.files:
+            return reading
+        with apart(self._settings.runs, reading.files, source) as place:
+            told = _surveyed(reading, place, {} if surveys is None else surveys)
+            return self._reader.read(structs.replace(question, survey=told, folder=str(place)))
+
+    def source(self, owner: str, restart: str = "") -> Source:
+        """Where the files that a case of an owner names come from: what he has sent, or the run that goes on."""
+        return of_run(self._settings.runs / restart) if restart else of_owner(self._sent, owner)
 
     def submit(
         self, owner: str, body: bytes, content_type: str, key: str | None, wishes: Wishes | None = None,
@@ -89,7 +108,7 @@ class Desk:
         if earlier := self._earlier(owner, key, digest, wishes):
             return earlier
         try:
-            reading = reading or self.read(body, content_type)
+            reading = reading or self.read(body, content_type, self.source(owner, wishes.restart))
         except CaseError as error:
             raise invalid_case(error.problems) from None
         with self._lock:
@@ -169,16 +188,25 @@ class Desk:
             case_file=_file_name(content_type), body_sha256=digest, idempotency_key=key,
             wall_time=reading.wall_time, estimate=reading.estimate, labels=dict(wishes.labels),
             profile=wishes.profile, priority=wishes.priority, wishes_sha256=asked,
+            files=[Copy(path=file.path, sha256=file.sha256) for file in reading.files],
         )  # fmt: skip
         run = folder.first(made)
         try:
-            runs = self._settings.runs
-            fill = partial(restarts.fill, runs / wishes.restart) if wishes.restart else None
+            runs, source = self._settings.runs, self.source(owner, wishes.restart)
+
+            def fill(beside: Path) -> None:
+                copies.fill(reading.files, source, beside)
+                if wishes.restart:
+                    restarts.fill(runs / wishes.restart, beside)
+
             folder.create(runs, made, body, reading.resolved, fill)
             self._store.add(run, key, made.labels)
         except OSError as error:
             folder.discard(self._settings.runs, run_id)
             raise ServiceError(507, "storage", f"the run cannot be kept: {error.strerror}", retryable=True) from error
+        except CaseError as error:
+            folder.discard(self._settings.runs, run_id)
+            raise invalid_case(error.problems) from None
         except ServiceError:
             folder.discard(self._settings.runs, run_id)
             raise
@@ -187,6 +215,15 @@ class Desk:
             raise database_away(error) from error
         self._supervisor.admit(run)
         return receipt(made)
+
+
+def _surveyed(reading: Reading, place: Path, known: dict[bytes, bytes]) -> bytes:
+    """What the files of a case hold. They are read once for all cases that make the same bodies of them."""
+    case = msgspec.json.decode(reading.case)
+    bodies = msgspec.json.encode([(part["mesh"], part["turn"]) for part in case["parts"]])
+    if bodies not in known:
+        known[bodies] = surveyed(case, place)
+    return known[bodies]
 
 
 def labels_of(texts: Sequence[str]) -> dict[str, str]:
@@ -211,6 +248,7 @@ def receipt(made: Submission) -> dict[str, Any]:
     return {
         "id": made.id, "owner": made.owner, "name": made.name, "title": made.title, "state": "accepted",
         "ranks": made.ranks, "threads": made.threads, "submitted": made.submitted, "estimate": made.estimate,
+        "files": [{"path": file.path, "sha256": file.sha256} for file in made.files],
         "url": f"/v1/runs/{made.id}",
     }  # fmt: skip
 

@@ -9,6 +9,7 @@ starts.
 import hashlib
 import json
 import logging
+import re
 import threading
 import time
 from collections.abc import Iterable, Sequence
@@ -35,6 +36,7 @@ _AGAIN = 2.0
 _MOST_BYTES = 16 << 20
 """Of all cases of a sweep together. Chosen: what is expanded in a second."""
 _JSON = "application/json"
+_HASHES = re.compile(r"[0-9a-f]{64}")
 
 
 class Plan(msgspec.Struct, kw_only=True, frozen=True):
@@ -116,7 +118,7 @@ class Sweeps:
             try:
                 if plan.case is None or plan.key is None:
                     raise ServiceError(409, "no_key", "its request broke off, and has no Idempotency-Key")
-                self._fill(plan, self._cases(plan.case, plan.points))
+                self._fill(plan, self._cases(plan.owner, plan.case, plan.points))
             except ServiceError as error:
                 if error.body["retryable"] and plan.id not in self._cancelled:
                     return False
@@ -152,7 +154,7 @@ class Sweeps:
             if plan is not None and plan.whole:
                 return plan
             wish = _wish(body)
-            cases = self._cases(wish.case, wish.points)
+            cases = self._cases(owner, wish.case, wish.points)
             fresh = plan or self._new(owner, wish, key, digest)
             self._desk.check_room(owner, fresh.keys)
             if plan is None:
@@ -184,6 +186,13 @@ class Sweeps:
         own = sum(one.sweep == need.sweep and one.owner == need.owner for one in active)
         return f"{own} runs of its sweep are running, as many as may at a time" if own >= plan.at_once else ""
 
+    def needed(self) -> set[str]:
+        """The hashes that stand in sweeps which are being handed in: what may be the files of runs to come."""
+        plans = [plan for plan in tuple(self._plans.values()) if not plan.whole]
+        return {
+            word for plan in plans for word in _HASHES.findall(msgspec.json.encode([plan.case, plan.points]).decode())
+        }
+
     def _earlier(self, owner: str, key: str | None, digest: str) -> Plan | None:
         found = [plan for plan in self.of(owner) if key is not None and plan.key == key]
         if found and found[0].digest != digest:
@@ -191,15 +200,15 @@ class Sweeps:
             raise ServiceError(422, "key_reused", detail, pointer="Idempotency-Key", hint="use a new key")
         return found[0] if found else None
 
-    def _cases(self, case: dict[str, Any], points: Sequence[dict[str, Any]]) -> list[tuple[bytes, Reading]]:
+    def _cases(self, owner: str, case: dict[str, Any], points: Sequence[dict[str, Any]]) -> list[tuple[bytes, Reading]]:
         """The case of each point, each of which can be run. Raises ServiceError with what is wrong."""
         made = [_changed(case, point, n) for n, point in enumerate(points)]
         if sum(map(len, made)) > _MOST_BYTES:
             raise ServiceError(413, "too_large", f"the cases have more than {size(_MOST_BYTES)} together")
-        cases = []
+        cases, source, surveys = [], self._desk.source(owner), dict[bytes, bytes]()
         for n, text in enumerate(made):
             try:
-                cases.append((text, self._desk.read(text, _JSON)))
+                cases.append((text, self._desk.read(text, _JSON, source, surveys)))
             except CaseError as error:
                 raise _at(n, error) from None
         return cases

@@ -11,7 +11,7 @@ from conoid.cases import layout
 from conoid.cases.messages import Progress, Status
 from conoid.cases.run import State
 
-from . import ends, farewell, folder, journal
+from . import ends, farewell, folder, journal, weights
 from .events import Event, GraceOver, OutputOver, WallTimeOver, WorkerExited, WorkerRuns, WorkerStarts, WorkerWaits
 from .launch import Phase, Worker
 
@@ -73,7 +73,7 @@ class Watch:
             yield WallTimeOver()
         elif self._most is not None and now >= self._weigh_at:
             self._weigh_at = now + _WEIGHED
-            if folder.size(self._folder) > self._most:
+            if weights.size(self._folder) > self._most:
                 self._most = None
                 yield OutputOver()
 

@@ -11,6 +11,7 @@ from conoid.cases.load import CaseError, read_case, shipped
 
 from .. import openapi
 from ..auth import Reader, Submitter
+from ..copies import names_files
 from ..errors import entry, not_found
 from ..lanes import blocking
 from ..service import ServiceOf
@@ -26,14 +27,18 @@ async def validate(
     body: Body,
     content_type: Annotated[str, Header(include_in_schema=False)] = "",
 ) -> dict[str, Any]:
-    """Whether the case could be submitted: every problem at once, or warnings, estimate, the case with all defaults."""
+    """Whether the case could be submitted: every problem at once, or warnings, estimate, the case with all defaults, and
+    what the files that it names hold.
+    """
     try:
-        reading = await service.readers.run(service.desk.read, body, content_type)
+        lanes, desk = service.surveyors if names_files(body) else service.readers, service.desk
+        reading = await lanes.run(desk.read, body, content_type, desk.source(identity.owner))
     except CaseError as error:
         return {"valid": False, "problems": [entry(problem) for problem in error.problems]}
     odd = [entry(doubt) for doubt in reading.doubts]
     case = json.loads(reading.case)
-    return {"valid": True, "problems": [], "warnings": odd, "estimate": reading.estimate, "case": case}
+    told = {"survey": json.loads(reading.survey)} if reading.survey else {}
+    return {"valid": True, "problems": [], "warnings": odd, "estimate": reading.estimate, "case": case, **told}
 
 
 @router.get("/v1/case.schema.json")

@@ -17,6 +17,7 @@ from conoid.cases.run import State
 
 from .. import download, folder, openapi, pins, restarts, view
 from ..auth import Identity, Pass, Reader, Submitter, unauthorized
+from ..copies import names_files
 from ..crowd import place_of
 from ..errors import ServiceError, invalid_case, not_found
 from ..events import Run
@@ -48,9 +49,8 @@ async def submit(
 ) -> Response:
     """Takes a case as TOML or JSON. The same Idempotency-Key and body give the same run and the same answer."""
     wishes = Wishes(labels_of(label or ()), profile, priority)
-    receipt = await service.readers.run(
-        service.desk.submit, identity.owner, body, content_type, idempotency_key, wishes
-    )
+    lanes = service.surveyors if names_files(body) else service.readers
+    receipt = await lanes.run(service.desk.submit, identity.owner, body, content_type, idempotency_key, wishes)
     return JSONResponse(receipt, 202, {"Location": receipt["url"]})
 
 
@@ -231,7 +231,7 @@ async def restart(
     This one stays as it is."""
     run = await service.lanes.run(find, service, identity, run_id)
     wishes = Wishes({restarts.LABEL: run.id}, profile, priority, run.id)
-    receipt = await service.readers.run(_restarted, service, run, (ranks, threads), idempotency_key, wishes)
+    receipt = await service.surveyors.run(_restarted, service, run, (ranks, threads), idempotency_key, wishes)
     return JSONResponse(receipt, 202, {"Location": receipt["url"]})
 
 

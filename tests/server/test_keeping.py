@@ -27,7 +27,8 @@ def keeper_of(server: Running, **rules: Any) -> Keeper:
     """One with rules of its own, looked with by hand."""
     service = server.service
     settings = replace(service.settings, site=Site(retention=Retention(**rules)))
-    return Keeper(settings, service.store, service.farewells, lambda run: service.supervisor.current(run) is not None)
+    return Keeper(settings, service.store, service.farewells, lambda run: service.supervisor.current(run) is not None,
+                  service.sent)  # fmt: skip
 
 
 def ended(user: User, label: str = "") -> str:

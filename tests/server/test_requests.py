@@ -240,8 +240,8 @@ def test_a_mesh_file_is_refused_before_anything_is_read(server: Running) -> None
     head, tail = text.split("[parts.mesh]")[0], text.split('generator = "structured"')[1]
     text = f'{head}[parts.mesh]\nshape = "file"\npath = "/etc/passwd"\nunit = "1 mm"\n{tail}'
     problem = refusal(server.ann.http.post("/v1/runs", content=text, headers=TOML), 422, "invalid_case")
-    assert [entry["key"] for entry in problem["errors"]] == ["parts[0].mesh.path"]
-    assert "does not read mesh files, python -m conoid.worker and conoid batch do; allowed: box" in problem["detail"]
+    assert [entry["key"] for entry in problem["errors"]] == ["parts[0].mesh.sha256"]
+    assert "this key is missing: a server finds a file by its hash; conoid submit" in problem["detail"]
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,123 @@
+"""The files that a case names, on this machine: found, hashed, copied."""
+
+import copy
+import hashlib
+import os
+import shutil
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from conoid.cases import layout, whole
+from conoid.cases.files import Named, files_of, located
+from conoid.cases.load import CaseError, Problem
+from conoid.cases.problems import problem
+
+from .errors import ClientError
+from .saving import whole as whole_file
+
+_CHUNK = 1 << 20
+State = tuple[int, int, int, int]
+"""Device, inode, size in bytes, and time of the last change in ns."""
+
+
+@dataclass(frozen=True)
+class LocalFile:
+    """A file that a case names, as it was when it was hashed."""
+
+    named: Named
+    path: Path
+    sha256: str
+    state: State
+
+    @property
+    def size(self) -> int:
+        """Bytes."""
+        return self.state[2]
+
+    def check(self, file: int) -> None:
+        """Raises ClientError where the open file is another one than that which was hashed."""
+        if state_of(file) != self.state:
+            raise self.changed()
+
+    def changed(self) -> ClientError:
+        """The line that says so."""
+        return ClientError(f"{self.path}: has changed since it was hashed; nothing is handed in: try again")
+
+
+class Hashes:
+    """The hashes of files, each computed once for every state of a file."""
+
+    def __init__(self) -> None:
+        """None is known yet."""
+        self._known: dict[State, str] = {}
+
+    def of(self, case: Mapping[str, Any], folder: Path) -> list[LocalFile]:
+        """The files that a case in plain data names, from its ``folder`` on; one that is not here and whose hash stands
+        in the case is left out: who runs the case may have it. Raises CaseError with every one that cannot be used.
+        """
+        found, problems = [], list[Problem]()
+        for named in files_of(case):
+            path = located(named.path, named.sha256, folder)
+            try:
+                found.append(self._hashed(named, path))
+            except FileNotFoundError:
+                if named.sha256 is None:
+                    problems.append(_wrong(named, "path", named.path, f"no such file ({path.absolute()})"))
+            except (OSError, ValueError) as error:  # a name with a null byte
+                said = error.strerror if isinstance(error, OSError) else str(error)
+                problems.append(_wrong(named, "path", named.path, f"{said} ({path.absolute()})"))
+            else:
+                if named.sha256 not in {None, found[-1].sha256}:
+                    told = f"{named.path!r} has {found[-1].sha256}"
+                    problems.append(_wrong(named, "sha256", named.sha256, told))
+        if problems:
+            raise CaseError(problems)
+        return found
+
+    def _hashed(self, named: Named, path: Path) -> LocalFile:
+        """Raises OSError; IsADirectoryError for what is no regular file, be it behind a link."""
+        with whole.opened(path) as file:
+            state = state_of(file.fileno())
+            if state not in self._known:
+                self._known[state] = hashlib.file_digest(file, "sha256").hexdigest()
+            made = LocalFile(named, path, self._known[state], state)
+            made.check(file.fileno())
+        return made
+
+
+def _wrong(named: Named, key: str, value: object, said: str) -> Problem:
+    return problem((*named.table, key), value, said)
+
+
+def state_of(file: int) -> State:
+    """Of an open file, by its descriptor."""
+    status = os.fstat(file)
+    return status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns
+
+
+def with_hashes(case: Mapping[str, Any], files: Iterable[LocalFile]) -> dict[str, Any]:
+    """The case with the hash of each file in the table that names it."""
+    made: dict[str, Any] = copy.deepcopy(dict(case))
+    for file in files:
+        table: Any = made
+        for item in file.named.table:
+            table = table[item]
+        table["sha256"] = file.sha256
+    return made
+
+
+def keep_copies(files: Iterable[LocalFile], folder: Path) -> None:
+    """Copies files into the folder of a run, under their hashes. Raises ClientError for one that has changed since it
+    was hashed, OSError.
+    """
+    for file in files:
+        target = folder / layout.FILES / Named(file.named.table, file.named.path, file.sha256).copy
+        target.parent.mkdir(parents=True, exist_ok=True)
+        with whole_file(target) as part:
+            with whole.opened(file.path) as source, part.open("wb") as made:
+                shutil.copyfileobj(source, made, _CHUNK)
+            with part.open("rb") as made:
+                if hashlib.file_digest(made, "sha256").hexdigest() != file.sha256:
+                    raise file.changed()

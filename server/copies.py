@@ -1,0 +1,81 @@
+"""A run's own copies of the files that its case names: second names of files that never change."""
+
+import secrets
+import shutil
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+from conoid.cases import layout
+from conoid.cases.files import copy_of
+from conoid.cases.load import CaseError, Problem
+from conoid.cases.problems import shown
+
+from . import durable
+from .errors import ServiceError
+from .folder import APART
+from .reading import FileName
+from .sent import SentFiles, give
+
+_LACKING = "you have sent no such file, or it has been removed since; send it first (PUT /v1/files/{sha256})"
+Source = Callable[[FileName, Path], None]
+"""Puts a file that a case names where it is told. Raises FileNotFoundError, OSError."""
+
+
+def of_owner(sent: SentFiles, owner: str) -> Source:
+    """From what a user has sent."""
+    return lambda file, target: sent.give(owner, file.sha256, target)
+
+
+def of_run(folder: Path) -> Source:
+    """From what another run of the same user has; the source raises ServiceError 409 for what it has lost."""
+
+    def put(file: FileName, target: Path) -> None:
+        try:
+            give(folder / layout.FILES / copy_of(file.path, file.sha256), target)
+        except FileNotFoundError:
+            detail = f"run {folder.name}: its copy of {shown(file.path)} is gone"
+            raise ServiceError(409, "no_file", detail) from None
+
+    return put
+
+
+def fill(files: Sequence[FileName], source: Source, folder: Path) -> None:
+    """Gives a folder a copy of each file; they are on disk when this returns. Raises CaseError for those that are
+    not there, OSError.
+    """
+    place = folder / layout.FILES
+    if files:
+        place.mkdir(0o700)
+    lacking = []
+    for file in files:
+        target = place / copy_of(file.path, file.sha256)
+        try:
+            if not target.exists():
+                source(file, target)
+        except FileNotFoundError:
+            lacking.append(Problem(f"{file.key}.sha256", shown(file.sha256), _LACKING))
+    if lacking:
+        raise CaseError(lacking)
+    if files:
+        durable.sync_folder(place)
+
+
+@contextmanager
+def apart(runs: Path, files: Sequence[FileName], source: Source) -> Iterator[Path]:
+    """A folder with the files, as that of a run has them, for the time in which they are read. What a server that is
+    killed leaves of it is removed by the next one. Raises as ``fill``.
+    """
+    place = runs / f"{APART}{secrets.token_hex(8)}"
+    place.mkdir(0o700)
+    try:
+        (place / layout.SUBMISSION).touch()
+        fill(files, source, place)
+        yield place
+    finally:
+        shutil.rmtree(place, ignore_errors=True)
+
+
+def names_files(body: bytes) -> bool:
+    """Whether a case may name files, by its text alone: a key ``path``, or letters that are written in another way."""
+    return b"path" in body or b"\\" in body

@@ -1,0 +1,60 @@
+"""Has the files of a case read before it is accepted, by a program of the worker, in a process with limits."""
+
+import logging
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Mapping
+from contextlib import suppress
+from pathlib import Path
+
+import msgspec
+
+from conoid.cases import survey
+
+_log = logging.getLogger("conoid.server")
+CPU, WALL, MEMORY, FILE = 100, 120, 8 << 30, 4 << 30
+"""s of CPU time and on the clock, bytes of memory, and of a file that is written, of each process that reads files.
+Chosen: 200 MB of text take some 30 s and 3 GB; what takes longer is read by its run alone."""
+_BOUND = """
+import os, resource, runpy, sys
+memory, cpu, file = map(int, sys.argv[1:4])
+for which, most in ((resource.RLIMIT_AS, memory), (resource.RLIMIT_CPU, cpu), (resource.RLIMIT_FSIZE, file)):
+    resource.setrlimit(which, (most, most))
+os.nice(5)
+del sys.argv[1:]
+runpy.run_module(%r, run_name="__main__", alter_sys=True)
+"""
+_SECRET = ("CONOID_DATABASE", "CONOID_TOKEN")
+
+
+def surveyed(case: Mapping[str, object], folder: Path) -> bytes:
+    """What the files of a case in ``folder`` hold, as JSON (conoid.cases.survey); empty where they cannot be read here,
+    or not within the limits: that is no reason to refuse a run, which has limits of its own. Waits for it.
+    """
+    if not survey.installed():
+        return b""
+    limits = [str(most) for most in (MEMORY, CPU, FILE)]
+    command = [sys.executable, "-c", _BOUND % survey.PROGRAM, *limits]
+    env = {name: value for name, value in os.environ.items() if name not in _SECRET}
+    pipe = subprocess.PIPE
+    with subprocess.Popen(
+        command, stdin=pipe, stdout=pipe, stderr=pipe, env=env, cwd=folder, start_new_session=True
+    ) as child:
+        try:
+            told, said = child.communicate(survey.question(dict(case), folder), timeout=WALL)
+        except subprocess.TimeoutExpired:
+            os.killpg(child.pid, signal.SIGKILL)
+            told, said = b"", f"not ready after {WALL} s".encode()
+    return _checked(told, said, child.returncode)
+
+
+def _checked(told: bytes, said: bytes, code: int) -> bytes:
+    with suppress(ValueError, msgspec.MsgspecError):
+        if code == 0:
+            survey.from_json(told)
+            return told
+    last = said.decode("utf-8", "replace").strip().splitlines()[-1:]
+    _log.warning("the files of a case have not been read: %s", last[0] if last else f"code {code}")
+    return b""

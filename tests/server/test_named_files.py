@@ -1,0 +1,240 @@
+"""Cases that name files, handed in: who may use a file, and what a run has of it."""
+
+import hashlib
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from conoid.cases import layout, survey
+from conoid.cases.survey import Survey, Surveyed
+from conoid.server import sent, submission, weights
+from conoid.server.settings import Caps, Settings
+
+from .running import Running, User, case_text
+from .test_goes_on import with_checkpoint
+
+MESH = b"""*NODE
+1, 0, 0, 0
+2, 10, 0, 0
+3, 0, 10, 0
+4, 0, 0, 10
+*ELEMENT, TYPE=C3D4, ELSET=All
+1, 1, 2, 3, 4
+"""
+HASH = hashlib.sha256(MESH).hexdigest()
+JSON = {"Content-Type": "application/json"}
+
+
+@pytest.fixture
+def quick(monkeypatch: pytest.MonkeyPatch) -> list[Path]:
+    """Nobody reads the files; the folders in which somebody would have."""
+    asked = []
+
+    def surveyed(case: Any, folder: Path) -> bytes:
+        assert all(path.stat().st_size for path in (folder / layout.FILES).iterdir())
+        asked.append(folder)
+        return b""
+
+    monkeypatch.setattr(submission, "surveyed", surveyed)
+    return asked
+
+
+def case(path: str = "/etc/passwd", sha256: str | None = HASH, **mesh: Any) -> dict[str, Any]:
+    """A case whose rod is from a file."""
+    import tomllib
+
+    data = tomllib.loads(case_text())
+    named = {} if sha256 is None else {"sha256": sha256}
+    data["parts"][0]["mesh"] = {"shape": "file", "path": path, "unit": "1 mm", **named, **mesh}
+    return data
+
+
+def send(user: User, data: bytes = MESH) -> str:
+    sha256 = hashlib.sha256(data).hexdigest()
+    assert user.http.put(f"/v1/files/{sha256}", content=data).status_code in {200, 201}
+    return sha256
+
+
+def hand_in(user: User, data: dict[str, Any], status: int = 202, **headers: str) -> dict[str, Any]:
+    answer = user.http.post("/v1/runs", content=json.dumps(data), headers={**JSON, **headers})
+    assert answer.status_code == status, answer.text
+    told: dict[str, Any] = answer.json()
+    return told
+
+
+def test_a_run_has_its_own_copy_and_reads_no_path(server: Running, quick: list[Path]) -> None:
+    send(server.ann)
+    told = hand_in(server.ann, case("/etc/rod.INP"))
+    assert told["files"] == [{"path": "/etc/rod.INP", "sha256": HASH}]
+    folder = server.ann.runs / told["id"]
+    copy = folder / layout.FILES / f"{HASH}.inp"
+    assert copy.read_bytes() == MESH
+    assert copy.stat().st_ino == (server.ann.runs / sent.FOLDER / "ann" / HASH).stat().st_ino, "it takes no room"
+    assert json.loads((folder / layout.SUBMISSION).read_bytes())["files"] == told["files"]
+    assert HASH in (folder / layout.RESOLVED_CASE).read_text()
+    assert not list(server.ann.runs.glob(".new*")), "the folder in which it was read is gone"
+    assert server.ann.wait_for(told["id"])["state"] == "succeeded"
+    assert server.ann.http.get(f"/v1/runs/{told['id']}/files/files/{HASH}.inp").content == MESH
+    assert server.ann.http.delete(f"/v1/files/{HASH}").status_code == 204
+    assert copy.read_bytes() == MESH, "the run keeps its own"
+
+
+def test_a_file_is_used_by_those_who_have_sent_it(server: Running, quick: list[Path]) -> None:
+    """For a stranger there is no difference between a file of somebody else and one that nobody has."""
+    send(server.ann)
+    nobodys = hashlib.sha256(b"nobody's").hexdigest()
+    for hand in (hand_in, validated):
+        told = [hand(server.bob, case(sha256=each), 422) for each in (HASH, nobodys)]
+        assert json.dumps(told[0]).replace(HASH, "?") == json.dumps(told[1]).replace(nobodys, "?")
+        (entry,) = told[0]["errors"] if "errors" in told[0] else told[0]["problems"]
+        assert (entry["key"], entry["message"][:25]) == ("parts[0].mesh.sha256", "you have sent no such fil")
+    assert not quick, "nothing was read"
+    assert not list(server.ann.runs.glob(".new*"))
+    send(server.bob)
+    hand_in(server.bob, case())
+    for user in (server.ann, server.bob):
+        assert (user.runs / sent.FOLDER / user.name / HASH).exists(), "each has his own"
+
+
+def validated(user: User, data: dict[str, Any], status: int) -> dict[str, Any]:
+    told: dict[str, Any] = user.http.post("/v1/cases:validate", content=json.dumps(data), headers=JSON).json()
+    return told
+
+
+def test_the_hash_is_of_the_run_and_of_its_key(server: Running, quick: list[Path]) -> None:
+    """The same key with another file is another case."""
+    other = send(server.ann, MESH + b"** another\n")
+    send(server.ann)
+    first = hand_in(server.ann, case(), **{"Idempotency-Key": "k"})
+    assert hand_in(server.ann, case(), **{"Idempotency-Key": "k"}) == first
+    assert hand_in(server.ann, case(sha256=other), 422, **{"Idempotency-Key": "k"})["code"] == "key_reused"
+
+
+def test_a_file_that_is_removed_at_the_last_moment_makes_no_run(
+    server: Running, quick: list[Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    send(server.ann)
+    real = server.service.desk._check_room
+
+    def removed(owner: str, more: int = 1) -> None:
+        server.service.sent.remove("ann", HASH)
+        real(owner, more)
+
+    monkeypatch.setattr(server.service.desk, "_check_room", removed)
+    assert "you have sent no such file" in hand_in(server.ann, case(), 422)["detail"]
+    assert server.ann.http.get("/v1/runs").json()["runs"] == []
+    assert not list(server.ann.runs.glob(".new*"))
+
+
+def test_where_the_disk_has_no_second_names_a_run_gets_a_copy(
+    server: Running, quick: list[Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def none(*_: Any, **__: Any) -> None:
+        raise OSError(1, "Operation not permitted")
+
+    send(server.ann)
+    monkeypatch.setattr(os, "link", none)
+    told = hand_in(server.ann, case("rod.inp"))
+    copy = server.ann.runs / told["id"] / layout.FILES / f"{HASH}.inp"
+    assert (copy.read_bytes(), copy.stat().st_nlink) == (MESH, 1)
+
+
+def test_a_restart_takes_the_copy_of_its_run(server: Running, quick: list[Path], tmp_path: Path) -> None:
+    send(server.ann)
+    plan = {"description": json.dumps({"end": "crash"})}
+    run = hand_in(server.ann, {**case("rod.inp"), **plan})["id"]
+    server.ann.wait_for(run)
+    with_checkpoint(server, run, 7)
+    server.ann.http.delete(f"/v1/files/{HASH}")
+    fresh = server.ann.http.post(f"/v1/runs/{run}:restart").json()
+    assert (server.ann.runs / fresh["id"] / layout.FILES / f"{HASH}.inp").read_bytes() == MESH
+    (server.ann.runs / run / layout.FILES / f"{HASH}.inp").unlink()
+    told = server.ann.http.post(f"/v1/runs/{run}:restart")
+    assert (told.status_code, told.json()["detail"]) == (409, f"run {run}: its copy of 'rod.inp' is gone")
+
+
+def test_points_of_a_sweep_have_files_of_their_own(server: Running, quick: list[Path]) -> None:
+    """The files are read once for all points with the same bodies."""
+    other = send(server.ann, MESH + b"** another\n")
+    send(server.ann)
+    speeds = [{"parts[0].velocity[2]": v} for v in (1.0, 2.0)]
+    points = [*speeds, {"parts[0].mesh.path": "b.inp", "parts[0].mesh.sha256": other}]
+    wish = {"case": {**case("a.inp")}, "points": points}
+    wish["case"]["parts"][0]["velocity"] = [0.0, 0.0, 0.0]
+    answer = server.ann.http.post("/v1/sweeps", content=json.dumps(wish), headers=JSON)
+    assert answer.status_code == 202, answer.text
+    runs = [point["run"]["id"] for point in answer.json()["points"]]
+    names = [[path.name for path in (server.ann.runs / run / layout.FILES).iterdir()] for run in runs]
+    assert names == [[f"{HASH}.inp"], [f"{HASH}.inp"], [f"{other}.inp"]]
+    assert len(quick) == 2
+    points[1]["parts[0].mesh.sha256"] = "0" * 64
+    told = server.ann.http.post("/v1/sweeps", content=json.dumps(wish), headers=JSON).json()
+    assert "you have sent no such file" in told["detail"]
+    assert told["detail"].endswith("(point 1)")
+
+
+def test_a_sweep_that_is_being_handed_in_needs_its_files(server: Running, quick: list[Path]) -> None:
+    plan = server.service.sweeps._new("ann", submission_wish(), None, "")
+    server.service.sweeps._keep(plan)
+    assert server.service.sweeps.needed() == {HASH, "0" * 64}
+    server.service.sweeps._plans.clear()
+
+
+def submission_wish() -> Any:
+    from conoid.server.sweeps import Wish
+
+    return Wish(case=case(), points=[{"parts[0].mesh.sha256": "0" * 64}])
+
+
+def test_a_file_counts_once_for_each_user(server: Running, quick: list[Path]) -> None:
+    """However many runs have it; and what a run may write does not include it."""
+    data = MESH + b"**" + b" " * 100_000
+    sha256 = send(server.ann, data)
+    runs = [hand_in(server.ann, case(sha256=sha256))["id"] for _ in range(3)]
+    for run in runs:
+        server.ann.wait_for(run)
+        assert weights.size(server.ann.runs / run) < 50_000
+    kept = server.service.keeper.kept_now("ann")
+    assert len(data) < kept < 2 * len(data)
+    assert server.ann.http.get("/v1/me").json()["used"]["output_bytes"] == kept
+    assert server.service.keeper.kept_now("bob") == 0
+
+
+@pytest.mark.parametrize("read", [True, False])
+def test_what_files_hold_is_measured_by_the_caps(
+    settings: Settings, server: Running, monkeypatch: pytest.MonkeyPatch, read: bool
+) -> None:
+    """As the worker has read them; where it has not, as their size tells."""
+    part = Surveyed(
+        part=0, elements=5000, nodes=2000, faces=100, step_length=1e-3, altitude=1e-3, mass=1.0, low=(0.0, 0.0, 0.0),
+        high=(1.0, 1.0, 1.0), momentum=(0.0, 0.0, 0.0), energy=0.0, speed=0.0, notes=[],
+    )  # fmt: skip
+    told = survey.to_json(Survey(parts=[part])) if read else b""
+    monkeypatch.setattr(submission, "surveyed", lambda case, folder: told)
+    server.service.desk._limits = submission.limits.of(
+        Settings(runs=settings.runs, slots=2, caps=Caps(elements=1000, free_disk=0))
+    )
+    sha256 = send(server.ann, MESH + b"**" + b" " * 200_000)
+    line = hand_in(server.ann, case("rod.inp", sha256), 422)["detail"]
+    assert line.startswith("parts: the case needs about ")
+    assert line.endswith("elements; this server allows 1 000")
+    assert ("5 000" in line) is read
+
+
+def test_the_worker_reads_files_before_a_run_is_accepted(
+    server: Running, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The real one, in its process: what it finds is estimated, and what it would refuse is refused in its words."""
+    monkeypatch.setenv("CONOID_CACHE_DIR", str(tmp_path / "cache"))
+    send(server.ann)
+    told = server.ann.http.post("/v1/cases:validate", content=json.dumps(case("rod.inp", group="All")), headers=JSON)
+    assert told.json()["estimate"]["elements"] == 1
+    (part,) = told.json()["survey"]["parts"]
+    assert part["mass"] == pytest.approx(7800.0 * 1e-6 / 6.0)
+    line = hand_in(server.ann, case("rod.inp", group="ice"), 422)["detail"]
+    assert line == "parts[0].mesh.group = 'ice': no such element set, instance or part; known: All"
+    line = hand_in(server.ann, case("rod.txt"), 422)["detail"]
+    assert line.startswith("parts[0].mesh.path = 'rod.txt': expected a file name that ends in ")
