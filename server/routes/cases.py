@@ -27,8 +27,8 @@ async def validate(
     body: Body,
     content_type: Annotated[str, Header(include_in_schema=False)] = "",
 ) -> dict[str, Any]:
-    """Whether the case could be submitted: every problem at once, or warnings, estimate, the case with all defaults, and
-    what the files that it names hold.
+    """Whether the case could be submitted: every problem at once, or warnings, estimate, the case with all defaults,
+    and what the files that it names hold.
     """
     try:
         lanes, desk = service.surveyors if names_files(body) else service.readers, service.desk

@@ -1,6 +1,5 @@
 """``:restart``: a new run goes on from a checkpoint of another one."""
 
-import hashlib
 import os
 import shutil
 from pathlib import Path
@@ -8,30 +7,14 @@ from pathlib import Path
 import pytest
 
 from conoid.cases import layout
-from conoid.cases.checkpoints import FORMAT, MANIFEST, SEAL, File, Manifest, sealed
+from conoid.cases.checkpoints import MANIFEST, SEAL
 from conoid.cases.run import State
 from conoid.server import restarts
 from conoid.server.errors import ServiceError
 from conoid.worker.migration.checkpoint import latest
 
+from .checkpointed import made, with_checkpoint, with_checkpoint_in
 from .running import Running
-
-
-def with_checkpoint(server: Running, run: str, step: int) -> Path:
-    """Puts what a worker would have left into the folder of a run."""
-    return with_checkpoint_in(made(server.ann.runs / run, step))
-
-
-def with_checkpoint_in(path: Path) -> Path:
-    """Frames, fragments and a history beside the checkpoints."""
-    for place, name in (
-        (path / layout.FRAMES, "000000.vtkhdf"),
-        (path / layout.FRAMES, layout.FRAME_SERIES), (path / "fragments", "000000.csv"),
-    ):  # fmt: skip
-        place.mkdir(parents=True, exist_ok=True)
-        (place / name).write_text(name)
-    (path / layout.HISTORY).write_text("step\n1\n")
-    return path
 
 
 def test_a_new_run_takes_over_the_checkpoints(server: Running, tmp_path: Path) -> None:
@@ -79,18 +62,6 @@ def test_a_run_that_has_none_yet_says_how_it_gets_some(server: Running) -> None:
         f"run {run} has no checkpoint: it has written none; one is written every run.checkpoint_every"
     )
     assert "(60 s in its case)" in said
-
-
-def made(folder: Path, *steps: int) -> Path:
-    """A run's folder with checkpoints."""
-    for step in steps:
-        place = layout.checkpoint(folder, step)
-        place.mkdir(parents=True)
-        (place / "rank-0.h5").write_bytes(b"state")
-        file = File("rank-0.h5", 5, hashlib.sha256(b"state").hexdigest())
-        for name, content in zip((MANIFEST, SEAL), sealed(Manifest(FORMAT, step, 0.0, {}, [file], {})), strict=True):
-            (place / name).write_bytes(content)
-    return folder
 
 
 def remade(path: Path, kind: str) -> None:

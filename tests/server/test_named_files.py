@@ -10,11 +10,11 @@ import pytest
 
 from conoid.cases import layout, survey
 from conoid.cases.survey import Survey, Surveyed
-from conoid.server import sent, submission, weights
+from conoid.server import limits, sent, submission, weights
 from conoid.server.settings import Caps, Settings
 
+from .checkpointed import with_checkpoint
 from .running import Running, User, case_text
-from .test_goes_on import with_checkpoint
 
 MESH = b"""*NODE
 1, 0, 0, 0
@@ -58,8 +58,10 @@ def send(user: User, data: bytes = MESH) -> str:
     return sha256
 
 
-def hand_in(user: User, data: dict[str, Any], status: int = 202, **headers: str) -> dict[str, Any]:
-    answer = user.http.post("/v1/runs", content=json.dumps(data), headers={**JSON, **headers})
+def hand_in(user: User, data: dict[str, Any], status: int = 202, key: str = "") -> dict[str, Any]:
+    answer = user.http.post(
+        "/v1/runs", content=json.dumps(data), headers={**JSON, **({"Idempotency-Key": key} if key else {})}
+    )
     assert answer.status_code == status, answer.text
     told: dict[str, Any] = answer.json()
     return told
@@ -108,9 +110,9 @@ def test_the_hash_is_of_the_run_and_of_its_key(server: Running, quick: list[Path
     """The same key with another file is another case."""
     other = send(server.ann, MESH + b"** another\n")
     send(server.ann)
-    first = hand_in(server.ann, case(), **{"Idempotency-Key": "k"})
-    assert hand_in(server.ann, case(), **{"Idempotency-Key": "k"}) == first
-    assert hand_in(server.ann, case(sha256=other), 422, **{"Idempotency-Key": "k"})["code"] == "key_reused"
+    first = hand_in(server.ann, case(), key="k")
+    assert hand_in(server.ann, case(), key="k") == first
+    assert hand_in(server.ann, case(sha256=other), 422, key="k")["code"] == "key_reused"
 
 
 def test_a_file_that_is_removed_at_the_last_moment_makes_no_run(
@@ -160,10 +162,11 @@ def test_points_of_a_sweep_have_files_of_their_own(server: Running, quick: list[
     """The files are read once for all points with the same bodies."""
     other = send(server.ann, MESH + b"** another\n")
     send(server.ann)
-    speeds = [{"parts[0].velocity[2]": v} for v in (1.0, 2.0)]
+    speeds: list[dict[str, Any]] = [{"parts[0].velocity[2]": v} for v in (1.0, 2.0)]
     points = [*speeds, {"parts[0].mesh.path": "b.inp", "parts[0].mesh.sha256": other}]
-    wish = {"case": {**case("a.inp")}, "points": points}
-    wish["case"]["parts"][0]["velocity"] = [0.0, 0.0, 0.0]
+    swept = case("a.inp")
+    swept["parts"][0]["velocity"] = [0.0, 0.0, 0.0]
+    wish = {"case": swept, "points": points}
     answer = server.ann.http.post("/v1/sweeps", content=json.dumps(wish), headers=JSON)
     assert answer.status_code == 202, answer.text
     runs = [point["run"]["id"] for point in answer.json()["points"]]
@@ -214,7 +217,7 @@ def test_what_files_hold_is_measured_by_the_caps(
     )  # fmt: skip
     told = survey.to_json(Survey(parts=[part])) if read else b""
     monkeypatch.setattr(submission, "surveyed", lambda case, folder: told)
-    server.service.desk._limits = submission.limits.of(
+    server.service.desk._limits = limits.of(
         Settings(runs=settings.runs, slots=2, caps=Caps(elements=1000, free_disk=0))
     )
     sha256 = send(server.ann, MESH + b"**" + b" " * 200_000)
