@@ -25,15 +25,21 @@ from .elements.work import ElementWork
 from .erosion import Erosion
 from .errors import EnergyError
 from .fracture.stage import Fracture
-from .jit import njit
+from .jit import njit, types
 from .making import STRAIN, TOLD, Making
 from .materials.law import BULK, DENSITY
+from .parallel.arguments import reader
 from .parallel.comm import Comm
 from .parallel.fixed_point import Columns, Grouped, Table, Tally, exact_sums, totals_and_words
+from .parallel.passes import Pass
+from .parallel.team import TASK, Team
 from .state import WORKS, Floats, Model
 
 _NODAL = 10
 """Sums over the nodes (``_of_nodes``), before those of the tets."""
+_F, _F1, _F2 = types.float64, types.float64[::1], types.float64[:, ::1]
+_OF_NODES = _F2, _F2, _F2, _F2, types.int64[:, ::1], _F, _F1, _F1, _F1, _F1, types.boolean[::1]
+_nodal = reader(*_OF_NODES)
 
 
 class Ledger:
@@ -41,8 +47,10 @@ class Ledger:
 
     def __init__(
         self, model: Model, boundaries: list[Boundary], contact: Contact | None, erosion: Erosion | None,
-        fracture: Fracture | None, comm: Comm, clock: Clock,
+        fracture: Fracture | None, comm: Comm, clock: Clock, team: Team,
     ) -> None:  # fmt: skip
+        """``team``: whose threads go over the nodes."""
+        self._of_nodes, self._columns = Pass(team, _of_nodes, *_OF_NODES), np.empty(0)
         self._model = model
         self._boundaries = boundaries
         self._contact = contact
@@ -166,9 +174,11 @@ class Ledger:
         by their names those of friction on boundaries, of ``open`` facets and of what has been booked so far.
         """
         nodes, parts = self._model.nodes, len(self._model.parts)
-        columns = np.empty((_NODAL, nodes.n))
-        _of_nodes(
-            columns, nodes.x, before, nodes.v, nodes.force, self._clock.shorter / nodes.scale, nodes.stepping,
+        if _NODAL * nodes.n > len(self._columns):
+            self._columns = np.empty(int(1.25 * _NODAL * nodes.n))
+        columns = self._columns[: _NODAL * nodes.n].reshape(_NODAL, nodes.n)
+        self._of_nodes.run(
+            nodes.n, columns, nodes.x, before, nodes.v, nodes.force, self._clock.shorter / nodes.scale, nodes.stepping,
             nodes.mass, *self._boundary_work(), nodes.owned,
         )  # fmt: skip
         tables: list[Columns] = [
@@ -245,28 +255,27 @@ def _add(loss, external, nodes, lost, worked):  # type: ignore[no-untyped-def]
         external[nodes[i]] += worked[i]
 
 
-@njit(
-    "void(float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[:, ::1], int64[:, ::1], float64, float64[::1], "
-    "float64[::1], float64[::1], float64[::1], boolean[::1])",
-    cache=True,
-    error_model="numpy",
-)
-def _of_nodes(out, at, before, v, force, shorter, stepping, mass, loss, external, owned):  # type: ignore[no-untyped-def]
+@njit(TASK, cache=True, error_model="numpy")
+def _of_nodes(table, first, stop, thread):  # type: ignore[no-untyped-def]
     """Sets ``out`` (_NODAL, nodes): kinetic energy, J, energy lost by impacts and work from outside, J, momentum,
     kg m/s, what unequal steps have taken, J: that ``kick`` has booked the half of this one already is kinetic energy
     until n; and angular momentum about the origin, kg m^2/s, by the positions ``at`` n, m. Nothing of nodes that are
     not ``owned``.
     """
-    for a in range(out.shape[1]):
-        half, mine = 0.5 * mass[a], owned[a]
-        x, y, z = before[a, 0], before[a, 1], before[a, 2]
+    out, at, before, v, force, shorter, stepping, mass, loss, external, owned = _nodal(table)
+    at, before, v, force = at[first:stop], before[first:stop], v[first:stop], force[first:stop]
+    stepping, mass, loss = stepping[first:stop], mass[first:stop], loss[first:stop]
+    external, owned, out = external[first:stop], owned[first:stop], out[:, first:stop]
+    for a in range(len(mass)):
+        if not owned[a]:
+            out[:, a] = 0.0
+            continue
+        half, x, y, z = 0.5 * mass[a], before[a, 0], before[a, 1], before[a, 2]
         power = x * force[a, 0] + y * force[a, 1] + z * force[a, 2]
         squares = x * v[a, 0] + y * v[a, 1] + z * v[a, 2]
-        out[0, a] = half * squares + shorter * power if mine else 0.0
-        out[1, a], out[2, a] = loss[a] if mine else 0.0, external[a] if mine else 0.0
+        out[0, a], out[1, a], out[2, a] = half * squares + shorter * power, loss[a], external[a]
         p, q, r = half * (x + v[a, 0]), half * (y + v[a, 1]), half * (z + v[a, 2])
-        out[3, a], out[4, a], out[5, a] = p if mine else 0.0, q if mine else 0.0, r if mine else 0.0
-        out[6, a] = stepping[a] - shorter * power if mine else 0.0
-        out[7, a] = at[a, 1] * r - at[a, 2] * q if mine else 0.0
-        out[8, a] = at[a, 2] * p - at[a, 0] * r if mine else 0.0
-        out[9, a] = at[a, 0] * q - at[a, 1] * p if mine else 0.0
+        out[3, a], out[4, a], out[5, a], out[6, a] = p, q, r, stepping[a] - shorter * power
+        out[7, a] = at[a, 1] * r - at[a, 2] * q
+        out[8, a] = at[a, 2] * p - at[a, 0] * r
+        out[9, a] = at[a, 0] * q - at[a, 1] * p

@@ -15,7 +15,8 @@ _of_kick, _of_move = reader(*_KICK), reader(*_MOVE)
 @njit(TASK, cache=True, error_model="numpy")
 def _kick(table, begin, end, thread):  # type: ignore[no-untyped-def]
     v, force, mass, stepping, impulse_quantum, shorter = _of_kick(table)
-    for i in range(begin, end):
+    v, force, mass, stepping = v[begin:end], force[begin:end], mass[begin:end], stepping[begin:end]
+    for i in range(len(mass)):
         factor, power = impulse_quantum / mass[i], 0.0
         for k in range(3):
             power += v[i, k] * force[i, k]
@@ -26,7 +27,8 @@ def _kick(table, begin, end, thread):  # type: ignore[no-untyped-def]
 @njit(TASK, cache=True, error_model="numpy")
 def _move(table, begin, end, thread):  # type: ignore[no-untyped-def]
     x, v, force, stepping, dt, shorter = _of_move(table)
-    for i in range(begin, end):
+    x, v, force, stepping = x[begin:end], v[begin:end], force[begin:end], stepping[begin:end]
+    for i in range(len(x)):
         power = 0.0
         for k in range(3):
             x[i, k] += dt * v[i, k]

@@ -193,12 +193,12 @@ def _assemble(
     if case.fractures:
         by_node: list[KeptByNode] = [*scene, *(stage for stage in (erosion, contact) if stage is not None)]
         fracture = Fracture(case, model, neighbours, elements, by_node, contact, comm, clock)
-    ledger = Ledger(model, scene, contact, erosion, fracture, comm, clock)
+    ledger = Ledger(model, scene, contact, erosion, fracture, comm, clock, threads)
     return Simulation(
         case=case, comm=comm, model=model, elements=elements, leapfrog=Leapfrog(threads), boundaries=scene,
         contact=contact, erosion=erosion, fracture=fracture, clock=clock, ledger=ledger, probes=probes, timers=timers,
         record=Record(model, fracture, comm) if fracture is not None else None,
-        crushing=Crushing.of(case, model, comm, clock),
+        crushing=Crushing.of(case, model, comm, clock, threads),
         neighbours=neighbours, floor=_force_floor(model, comm),
         reduction=StepReduction(comm.size, fractures=case.fractures, contact=contact is not None),
         assembled=float(comm.maximum(np.array([worked(comm) - began]))[0]),

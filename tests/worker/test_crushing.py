@@ -69,18 +69,18 @@ def test_the_hardest_is_that_of_all_tets() -> None:
     """The bounds pass over no tet that counts: whatever is known already, and wherever the hardest stands."""
     stress = stresses(1500)
     for last in (1500, 700, 300, 40, 5, 1):
-        expected = beyond(stress[:last])
-        place, times = hardest(chunks(stress[:last]), np.arange(last), last, STRENGTH, 0.0)
+        expected, of = beyond(stress[:last]), (0, -(-last // CHUNK))
+        place, times = hardest(chunks(stress[:last]), np.arange(last), last, STRENGTH, 0.0, *of)
         assert times == pytest.approx(expected.max(initial=0.0), rel=1e-6)
-        assert crushed(chunks(stress[:last]), last, STRENGTH) == (expected > 1.0).sum()
+        assert crushed(chunks(stress[:last]), last, STRENGTH, *of) == (expected > 1.0).sum()
         if times > 0.0:
             assert place == expected.argmax()
-            assert hardest(chunks(stress[:last]), np.arange(last), last, STRENGTH, times) == (-1, times)
+            assert hardest(chunks(stress[:last]), np.arange(last), last, STRENGTH, times, *of) == (-1, times)
 
 
 def test_of_equal_tets_the_smallest_id_is_named() -> None:
     stress = np.tile(np.diag([-3e9, -1e9, -1e9]), (4, 1, 1))
-    assert hardest(chunks(stress), np.array([7, 3, 5, 9]), 4, STRENGTH, 0.0)[0] == 1
+    assert hardest(chunks(stress), np.array([7, 3, 5, 9]), 4, STRENGTH, 0.0, 0, 1)[0] == 1
 
 
 def test_a_plane_wave_and_a_bar_meet_the_criterion_where_the_warning_says() -> None:
@@ -89,7 +89,7 @@ def test_a_plane_wave_and_a_bar_meet_the_criterion_where_the_warning_says() -> N
     wave = griffith(BRITTLE) * np.diag([-1.0, -k, -k])
     bar = 8.0 * STRENGTH * np.diag([-1.0, 0.0, 0.0])
     for stress in (wave, bar):
-        assert hardest(chunks(stress[None]), np.arange(1), 1, STRENGTH, 0.0)[1] == pytest.approx(1.0)
+        assert hardest(chunks(stress[None]), np.arange(1), 1, STRENGTH, 0.0, 0, 1)[1] == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize(("stress", "times"), [
@@ -97,7 +97,9 @@ def test_a_plane_wave_and_a_bar_meet_the_criterion_where_the_warning_says() -> N
 ])  # fmt: skip
 def test_tension_and_equal_pressures_crush_nothing(stress: list[float], times: float) -> None:
     """Tension beside a pressure changes nothing: the tensile law answers for it."""
-    assert hardest(chunks(np.diag(stress)[None]), np.arange(1), 1, STRENGTH, 0.0)[1] == pytest.approx(times, abs=1e-9)
+    assert hardest(chunks(np.diag(stress)[None]), np.arange(1), 1, STRENGTH, 0.0, 0, 1)[1] == pytest.approx(
+        times, abs=1e-9
+    )
 
 
 MESH = block((5, 3, 3), 1e-3, seed=2)
