@@ -23,8 +23,10 @@ from conoid.cases import whole as whole_file
 from . import blob, share
 from .births import Births
 
-_NICE = 10
-"""Who computes has nine times the right to a core. Chosen: what is left over is enough."""
+_NICE, _LOWEST = 10, 19
+"""By how much the priority is lowered: ranks have nine times the share of a core then. Chosen: the rest is enough. And
+the lowest there is.
+"""
 _PATIENCE = 60.0
 """s that the share of a rank may take to appear. Chosen: many times what a slow disk takes."""
 _LOOK = 0.005
@@ -50,7 +52,8 @@ def main(folder: Path) -> None:
 
 def _step_back() -> None:
     """Lowers the priority of this thread alone, which nobody but the superuser could take back."""
-    os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), _NICE)
+    thread = threading.get_native_id()
+    os.setpriority(os.PRIO_PROCESS, thread, min(os.getpriority(os.PRIO_PROCESS, thread) + _NICE, _LOWEST))
 
 
 def _made(folder: Path, task: dict[str, Any], births: Births) -> dict[str, Any]:
