@@ -13,7 +13,7 @@ from conoid.worker import step
 from conoid.worker.mesh.faces import boundary_faces
 from conoid.worker.mesh.model import TetMesh
 from conoid.worker.simulation import Simulation
-from conoid.worker.state import MASS, PRESSURE, S_XX, S_XY, S_YY, WIDE
+from conoid.worker.state import MASS, PRESSURE, S_XX, S_XY, S_YY, WIDE, Ints
 from conoid.worker.surface_pressure import SurfacePressure
 
 from .kernels import COPPER, STEEL, Floats, build, run, scene
@@ -57,7 +57,7 @@ def test_the_force_is_that_of_the_present_area_against_the_present_normal(ranks:
     faces = boundary_faces(MESH.tets)
     top = faces[(MESH.points[faces][:, :, 2] > 2.9e-3).all(axis=1)]
 
-    def work(sim: Simulation) -> tuple[Floats, Floats, bytes]:
+    def work(sim: Simulation) -> tuple[Ints, Floats, bytes]:
         nodes, load = sim.model.nodes, pressed(sim)
         nodes.x[:] = nodes.x0 @ change
         ids = nodes.id[load.nodes]
