@@ -15,6 +15,8 @@ from .local_files import LocalFile
 
 _LARGEST, _SMALLEST = 1 << 20, 1 << 14
 """Bytes of a piece. Chosen: a proxy takes bodies of 1 MiB; at 1 kB/s 16 KiB are sent before an answer is late."""
+_FIRST = 1 << 17
+"""Bytes of the first piece, until it is known how fast the line is. Chosen."""
 _WANTED = 2.0
 """s that a piece should take; it becomes smaller where it takes longer. Chosen: what is lost by a break is as much."""
 _PATIENCE = 60.0
@@ -63,7 +65,7 @@ class _Sending:
 
     def __init__(self, http: Http, file: LocalFile, opened: FileIO, say: Callable[[str], None]) -> None:
         self._http, self._file, self._opened, self._say = http, file, opened, say
-        self._piece, self._again = _LARGEST, True
+        self._piece, self._again = min(_FIRST, _LARGEST), True
 
     def go_on(self, offset: int) -> None:
         """Sends piece after piece; waits, and goes on, where the connection breaks or another one sends the file."""
