@@ -1,0 +1,145 @@
+"""The case that is made of a deck, as plain data, with what its keys come from as comments."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from .account import Account, Entry
+from .naming import Names, name
+from .toml import NOTE
+from .units import LENGTH, Dimension, System
+
+
+@dataclass
+class Made:
+    """A material of a deck as one of Conoid."""
+
+    material: dict[str, Any]
+    """Keys below ``[materials.NAME]``; empty for a law that Conoid lacks."""
+    erosion: dict[str, Any] = field(default_factory=dict)
+    """What of it removes tets, in Conoid a matter of the part."""
+    rigid: bool = False
+    temperature: str | float | None = None
+    """At the start."""
+
+
+@dataclass
+class Body:
+    """A part of a deck that becomes a part of the case."""
+
+    key: str
+    """By which the deck names it."""
+    title: str
+    material: str
+    """Key of its material in the deck."""
+    group: str | None
+    """``mesh.group`` of the case; None for the whole file."""
+    entry: Entry
+    velocity: tuple[float, float, float] | None = None
+    """In units of the deck."""
+    spin: dict[str, Any] | None = None
+    erosion: dict[str, Any] = field(default_factory=dict)
+    temperature: str | float | None = None
+    name: str = ""
+    """In the case."""
+
+
+class Draft:
+    """The tables of a case, filled keyword by keyword."""
+
+    def __init__(self, deck: Path, system: System, account: Account) -> None:
+        """``deck``: whose mesh the parts have."""
+        self.deck = deck
+        self.system = system
+        self.account = account
+        self.name = name(deck.stem) or "deck"
+        self.title = ""
+        self.materials: dict[str, dict[str, Any]] = {}
+        self.parts: list[dict[str, Any]] = []
+        self.boundaries: list[dict[str, Any]] = []
+        self.bonds: list[dict[str, Any]] = []
+        self.contact: dict[str, Any] | None = None
+        self.numerics: dict[str, Any] = {}
+        self.run: dict[str, Any] = {}
+        self.missing: list[str] = []
+        """What the case lacks and the user must write."""
+        self._names, self._made = Names(), dict[str, tuple[str, Made]]()
+        self._places: dict[str, Entry] = {}
+
+    def quantity(self, value: float, dimension: Dimension) -> str | float:
+        """A number of the deck with its unit."""
+        return self.system.quantity(value, dimension)
+
+    def vector(self, values: tuple[float, ...] | list[float], dimension: Dimension) -> list[str | float]:
+        """Three of them."""
+        return [self.quantity(value, dimension) for value in values]
+
+    # Materials and parts ----------------------------------------------------------------------------------------------
+
+    def add_material(self, key: str, title: str, made: Made, entry: Entry) -> None:
+        """A material; without keys it stays a name that the case does not define."""
+        found = self._names.give(title, "material", key)
+        if made.material:
+            self.materials[found] = {NOTE: [f"{entry.keyword}, {entry.place}"], **made.material}
+            entry.take(f"materials.{found}")
+        self._made[key] = found, made
+
+    def material_of(self, key: str) -> tuple[str, Made] | None:
+        """Name and constants of a material of the deck."""
+        return self._made.get(key)
+
+    def add_part(self, body: Body, names: Names) -> None:
+        """A part of the case, of one of the deck."""
+        body.name = body.name or names.give(body.title, "part", body.key)
+        found = self._made.get(body.material)
+        if found is None:
+            body.entry.refuse(f"its material {body.material!r} is not defined in the deck")
+            found = "undefined", Made({})
+        material, made = found
+        part: dict[str, Any] = {NOTE: [f"{body.entry.keyword}, {body.entry.place}"], "name": body.name}
+        part["material"] = material
+        part["mesh"] = {"shape": "file", "path": self.deck.name, "unit": self.quantity(1.0, LENGTH)}
+        if body.group is not None:
+            part["mesh"]["group"] = body.group
+        if body.velocity is not None and any(body.velocity):
+            part["velocity"] = self.vector(body.velocity, (1, 0, -1, 0))
+        if body.spin is not None:
+            part["spin"] = body.spin
+        temperature = made.temperature if body.temperature is None else body.temperature
+        if temperature is not None:
+            part["temperature"] = temperature
+        if made.rigid:
+            part["rigid"] = True
+        if erosion := {**made.erosion, **body.erosion}:
+            part["erosion"] = erosion
+        body.entry.take(f"parts[{len(self.parts)}]")
+        self.parts.append(part)
+
+    # The rest ---------------------------------------------------------------------------------------------------------
+
+    def add_boundary(self, table: dict[str, Any], *entries: Entry) -> str:
+        """A boundary, and the keywords that it comes from; its place in the case."""
+        place = f"boundaries[{len(self.boundaries)}]"
+        note = ", ".join(dict.fromkeys(f"{each.keyword} ({each.place})" for each in entries))
+        self.boundaries.append({NOTE: [note], **table})
+        for each in entries:
+            each.take(place)
+        return place
+
+    def data(self) -> dict[str, Any]:
+        """The case as plain data with comments."""
+        case: dict[str, Any] = {"name": self.name}
+        if self.title:
+            case["title"] = self.title[:200]
+        if self.materials:
+            case["materials"] = self.materials
+        case["parts"] = self.parts
+        if self.bonds:
+            case["bond"] = self.bonds
+        if self.boundaries:
+            case["boundaries"] = self.boundaries
+        case["contact"] = "none" if self.contact is None else self.contact
+        if self.numerics:
+            case["numerics"] = self.numerics
+        case["run"] = self.run
+        return case

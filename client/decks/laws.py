@@ -1,0 +1,42 @@
+"""Constants of other codes as those of Conoid: what the formulas of both sides have in common."""
+
+from collections.abc import Sequence
+
+_STRAIGHT = 1e-6
+"""By how much points of a line may be off it, of the largest stress: rounding of decks with six digits or more."""
+
+
+def young_of(bulk: float, shear: float) -> tuple[float, float]:
+    """Young's modulus and Poisson's ratio of a bulk and a shear modulus: 9KG/(3K+G), (3K-2G)/(6K+2G)."""
+    return 9.0 * bulk * shear / (3.0 * bulk + shear), (3.0 * bulk - 2.0 * shear) / (6.0 * bulk + 2.0 * shear)
+
+
+def bulk_of(young: float, poisson: float) -> float:
+    """Bulk modulus, E / 3(1 - 2 nu). Raises ZeroDivisionError at nu = 0.5."""
+    return young / (3.0 * (1.0 - 2.0 * poisson))
+
+
+def shear_of(young: float, poisson: float) -> float:
+    """Shear modulus, E / 2(1 + nu). Raises ZeroDivisionError at nu = -1."""
+    return young / (2.0 * (1.0 + poisson))
+
+
+def hardening_of(young: float, tangent: float) -> float:
+    """Rise of the flow stress with the plastic strain, E Et / (E - Et), of a tangent modulus by the total strain.
+
+    Raises ValueError where the tangent is not below Young's modulus.
+    """
+    if not tangent < young:
+        raise ValueError(f"the tangent modulus {tangent:g} is not below Young's modulus {young:g}")
+    return young * tangent / (young - tangent)
+
+
+def line_of(points: Sequence[tuple[float, float]]) -> tuple[float, float] | None:
+    """Yield stress and hardening of (plastic strain, stress), if all points lie on one line that begins at strain 0;
+    None otherwise. One point is a flow stress that does not rise."""
+    if not points or points[0][0] != 0.0 or any(a[0] >= b[0] for a, b in zip(points, points[1:], strict=False)):
+        return None
+    (_, first), (end, last) = points[0], points[-1]
+    slope = (last - first) / end if len(points) > 1 else 0.0
+    near = _STRAIGHT * max(abs(stress) for _, stress in points)
+    return (first, slope) if all(abs(first + slope * e - stress) <= near for e, stress in points) else None

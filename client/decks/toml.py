@@ -1,0 +1,63 @@
+"""Plain data of a case as TOML for people: a table for each material, part and boundary, nested keys with dots."""
+
+import json
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from conoid.cases import reference
+
+NOTE = "#"
+"""A key of a table that is no key of a case: comments above the table, a line each."""
+_FIRST = ("name", "title", "description")
+_LAST = ("run",)
+
+
+def toml(data: Mapping[str, Any]) -> str:
+    """The text of a case file; ends in a line feed."""
+    lines = [f"{reference.LINE} ./{reference.FILE}", *_comment(data.get(NOTE, ()))]
+    order = [*(key for key in _FIRST if key in data), *(key for key in data if key not in (*_FIRST, *_LAST, NOTE))]
+    for key in (*order, *(key for key in _LAST if key in data)):
+        lines += _entry(key, data[key])
+    return "\n".join(lines) + "\n"
+
+
+def bare(value: Any) -> Any:
+    """The data without its comments."""
+    if isinstance(value, Mapping):
+        return {key: bare(each) for key, each in value.items() if key != NOTE}
+    return [bare(each) for each in value] if isinstance(value, list | tuple) else value
+
+
+def _entry(key: str, value: Any) -> Iterator[str]:
+    if key == "materials":
+        for name, material in value.items():
+            yield from ("", *_comment(material.get(NOTE, ())), f"[materials.{name}]", *_pairs(material))
+    elif isinstance(value, Mapping):
+        yield from ("", *_comment(value.get(NOTE, ())), f"[{key}]", *_pairs(value))
+    elif isinstance(value, list) and value and isinstance(value[0], Mapping):
+        for each in value:
+            yield from ("", *_comment(each.get(NOTE, ())), f"[[{key}]]", *_pairs(each))
+    else:
+        yield f"{key} = {_scalar(value)}"
+
+
+def _pairs(table: Mapping[str, Any], prefix: str = "") -> Iterator[str]:
+    for key, value in table.items():
+        if key == NOTE:
+            continue
+        if isinstance(value, Mapping):
+            yield from _pairs(value, f"{prefix}{key}.")
+        else:
+            yield f"{prefix}{key} = {_scalar(value)}"
+
+
+def _scalar(value: Any) -> str:
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(_scalar(each) for each in value)}]"
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    return json.dumps(value)
+
+
+def _comment(lines: Any) -> list[str]:
+    return [f"# {''.join(c if c.isprintable() else '?' for c in line)}" for line in lines]

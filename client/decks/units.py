@@ -1,0 +1,183 @@
+"""The consistent unit systems of decks: named by the user, by the deck, or told from the density of steel.
+
+A deck has numbers without units. A number and its dimension become text with a unit, as cases have it: the digits stay
+those of the deck, and ``cases.units`` converts them exactly.
+"""
+
+import math
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+from fractions import Fraction
+
+from conoid.cases.similar import choices
+from conoid.cases.units import LARGEST, UNITS, parse_unit
+
+from ..errors import UsageError
+
+Dimension = tuple[int, int, int, int]
+"""Exponents of length, mass, time, temperature."""
+
+ONE: Dimension = (0, 0, 0, 0)
+LENGTH: Dimension = (1, 0, 0, 0)
+TIME: Dimension = (0, 0, 1, 0)
+TEMPERATURE: Dimension = (0, 0, 0, 1)
+SPEED: Dimension = (1, 0, -1, 0)
+RATE: Dimension = (0, 0, -1, 0)
+ACCELERATION: Dimension = (1, 0, -2, 0)
+STRESS: Dimension = (-1, 1, -2, 0)
+DENSITY: Dimension = (-3, 1, 0, 0)
+SPECIFIC_HEAT: Dimension = (2, 0, -2, -1)
+MASS: Dimension = (0, 1, 0, 0)
+INERTIA: Dimension = (2, 1, 0, 0)
+
+_SLINCH = Fraction("0.45359237") * Fraction("9.80665") / Fraction("0.0254")
+"""kg of lbf s^2 / in, exact by the agreement of 1959 and standard gravity."""
+_ALIASES = {
+    "ton": "t", "tonne": "t", "to": "t", "mg": "mg", "sec": "s", "msec": "ms", "usec": "us", "µs": "us", "mus": "us",
+    "inch": "in", "kilogram": "kg", "gram": "g", "metre": "m", "meter": "m", "slinch": "lbf*s^2/in",
+    "lbf-s^2/in": "lbf*s^2/in", "lbf*s2/in": "lbf*s^2/in", "lbfs^2/in": "lbf*s^2/in",
+}  # fmt: skip
+_NAMED = {
+    STRESS: ("Pa", "kPa", "MPa", "GPa", "Mbar", "psi", "ksi"), SPECIFIC_HEAT: ("J/kg/K",),
+    DENSITY: ("kg/m^3",), SPEED: ("m/s",), ACCELERATION: ("m/s^2",),
+}  # fmt: skip
+"""Units that people know, used where one is exactly that of a system."""
+
+
+@dataclass(frozen=True)
+class System:
+    """A consistent system: the units of length, mass and time by their symbols."""
+
+    length: str
+    mass: str
+    time: str
+
+    def __str__(self) -> str:
+        """``mm, t, s``."""
+        return f"{self.length}, {self.mass}, {self.time}"
+
+    def factor(self, dimension: Dimension) -> Fraction:
+        """SI units in one unit of a dimension, exact."""
+        scales = (*(_scale(each) for each in (self.length, self.mass, self.time)), Fraction(1))
+        result = Fraction(1)
+        for scale, power in zip(scales, dimension, strict=True):
+            result *= scale**power
+        return result
+
+    def si(self, value: float, dimension: Dimension) -> float:
+        """A number of the deck in SI units, rounded once."""
+        return float(Fraction(repr(float(value))) * self.factor(dimension))
+
+    def quantity(self, value: float, dimension: Dimension) -> str | float:
+        """A number of the deck with its unit, as a case has it. Raises ValueError for one that no case can have."""
+        if not math.isfinite(value):
+            raise ValueError(f"{value!r} is not finite")
+        scaled = Fraction(repr(float(value))) * self.factor(dimension)
+        if scaled and not 1 / LARGEST <= abs(scaled) <= LARGEST:
+            raise ValueError(f"{value:g} is in SI units not between {1.0 / LARGEST:g} and {LARGEST:g}")
+        if dimension == ONE:
+            return float(value)
+        unit = self._unit(dimension)
+        return f"{float(scaled)!r} {_si(dimension)}" if unit is None else f"{float(value)!r} {unit}"
+
+    def _unit(self, dimension: Dimension) -> str | None:
+        """The text of a unit; None where cases know no such unit."""
+        if dimension == TEMPERATURE:
+            return "K"
+        factor = self.factor(dimension)
+        for name in _NAMED.get(dimension, ()):
+            if parse_unit(name)[0] == factor:
+                return name
+        if self.mass not in UNITS and dimension[1]:
+            return None
+        return _composed((self.length, self.mass, self.time, "K"), dimension)
+
+
+def _composed(symbols: tuple[str, str, str, str], dimension: Dimension) -> str:
+    """``kg/mm/ms^2``; ``1/ms``."""
+    above = [s if p == 1 else f"{s}^{p}" for s, p in zip(symbols, dimension, strict=True) if p > 0]
+    below = [s if p == -1 else f"{s}^{-p}" for s, p in zip(symbols, dimension, strict=True) if p < 0]
+    return "/".join(["*".join(above) or "1", *below])
+
+
+def _si(dimension: Dimension) -> str:
+    return _NAMED[dimension][0] if dimension in _NAMED else _composed(("m", "kg", "s", "K"), dimension)
+
+
+def _scale(symbol: str) -> Fraction:
+    return _SLINCH if symbol == "lbf*s^2/in" else UNITS[symbol][0]
+
+
+USUAL = (
+    System("m", "kg", "s"), System("mm", "t", "s"), System("mm", "kg", "ms"), System("mm", "g", "ms"),
+    System("mm", "kg", "s"), System("mm", "mg", "us"), System("mm", "g", "us"), System("cm", "g", "us"),
+    System("cm", "g", "s"), System("in", "lbf*s^2/in", "s"),
+)  # fmt: skip
+"""Systems in which decks are written."""
+
+
+def named(text: str) -> System:
+    """The system of ``mm,ms,kg``: a length, a mass and a time in any order. Raises UsageError."""
+    wanted: dict[Dimension, str] = {}
+    for word in re.split(r"[,;\s]+", text.strip()):
+        symbol = _ALIASES.get(word, _ALIASES.get(word.lower(), word))
+        kind = MASS if symbol == "lbf*s^2/in" else UNITS[symbol][1] if symbol in UNITS else None
+        if kind not in (LENGTH, MASS, TIME) or wanted.setdefault(kind, symbol) != symbol:
+            raise UsageError(f"--units = {text[:60]!r}: {_WANTED}")
+    if len(wanted) < 3:
+        raise UsageError(f"--units = {text[:60]!r}: {_WANTED}")
+    return System(wanted[LENGTH], wanted[MASS], wanted[TIME])
+
+
+_WANTED = "expected a length, a mass and a time, such as 'mm,t,s', 'mm,kg,ms', 'm,kg,s', 'cm,g,us'"
+
+# Told from steel ------------------------------------------------------------------------------------------------------
+
+_STEEL, _NEAR = 7850.0, 0.04
+"""kg/m^3, and how near to it a density is that of steel: 7,536 to 8,164, no other common metal is between them."""
+_LEAST, _MOST = 1.7e11, 2.3e11
+"""Young's modulus of steels, Pa: 190 to 215 in handbooks, with some room."""
+
+
+@dataclass(frozen=True)
+class Weighed:
+    """A material of a deck: what it is called there, its density and Young's modulus (None where it has none)."""
+
+    name: str
+    density: float
+    young: float | None
+
+
+def told(materials: Iterable[Weighed]) -> tuple[System, str]:
+    """The one usual system in which a material is steel by its density, and Young's modulus where it has one; why.
+
+    Raises UsageError where there is none, or several.
+    """
+    every = list(materials)
+    found = [(system, one) for system in USUAL for one in every if _steel(system, one)]
+    systems = list(dict.fromkeys(system for system, _ in found))
+    if len(systems) == 1:
+        system, one = found[0]
+        modulus = "" if one.young is None else f" and Young's modulus {one.young:g} is {_giga(system, one):.3g} GPa"
+        density = system.si(one.density, DENSITY)
+        return system, f"of the usual systems only in {system} is {one.name} steel: its density {one.density:g} is " \
+            f"{density:.4g} kg/m^3{modulus}"  # fmt: skip
+    if systems:
+        fits = choices([str(each) for each in systems])
+        raise UsageError(f"--units is needed: {found[0][1].name} may be steel in {fits}; write --units \"{systems[0]}\"")
+    densities = ", ".join(f"{one.name} {one.density:g}" for one in every[:5]) or "none"
+    raise UsageError(
+        f"--units is needed: no material has the density of steel in a usual system (densities: {densities}); "
+        'write --units "mm,t,s", or whatever the deck is in'
+    )
+
+
+def _steel(system: System, one: Weighed) -> bool:
+    if not math.isfinite(one.density) or abs(system.si(one.density, DENSITY) / _STEEL - 1.0) > _NEAR:
+        return False
+    return one.young is None or _LEAST <= system.si(one.young, STRESS) <= _MOST
+
+
+def _giga(system: System, one: Weighed) -> float:
+    return 1e-9 * system.si(one.young or 0.0, STRESS)
