@@ -151,6 +151,8 @@ class Deck:
         """Opens nothing yet."""
         self.included = Included(path)
         """The files that have been read; the deck itself is the first."""
+        self.followed: list[Block] = []
+        """What ``blocks`` has not given so far: ``*COMMENT``, ``*INCLUDE``, ``*PARAMETER`` and ``*END``."""
         self._parameters: dict[str, str] = {}
 
     def blocks(self) -> Iterator[Block]:
@@ -162,6 +164,8 @@ class Deck:
 
     def _of(self, path: Path, file: str, least: int) -> Iterator[Block]:
         for block in self._plain(path, file, least):
+            if block.name in ("COMMENT", "INCLUDE", "PARAMETER", "PARAMETER_GLOBAL"):
+                self.followed.append(block)
             if block.name == "INCLUDE":
                 for name, number in _names(block):
                     try:
@@ -187,6 +191,7 @@ class Deck:
                 block = self._keyword(text, number, file, standing)
                 standing = block.least if block.name == "KEYWORD" else standing
                 if block.name == "END":
+                    self.followed.append(block)
                     return
             elif block is not None:
                 block.cards.append(Card(number, text))

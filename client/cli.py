@@ -17,6 +17,7 @@ from conoid.cases.run import ExitCode
 from . import benches, commands, converging, hard, reports, shelf, sweeping, validated, viewing
 from .batch import batch_run
 from .console import echo, echo_json, one_line, prepare
+from .decks.command import import_deck
 from .errors import ClientError
 from .examination import examine
 from .once import run_once
@@ -160,6 +161,9 @@ app.command(short_help="Run a case at many points.")(sweeping.sweep)
 app.command(name="sweep-table", short_help="Print a sweep as CSV.")(sweeping.sweep_table)
 app.command(name="sweep-plot", short_help="Draw the results of a sweep.")(sweeping.sweep_plot)
 app.command(name="sweep-cancel", short_help="Cancel the runs of a sweep.")(sweeping.sweep_cancel)
+
+
+app.command(name="import", short_help="Make a case of a deck of another code.")(import_deck)
 
 
 @app.command(name="run", short_help="Do it all on this machine: run, watch, check, draw.")

@@ -40,6 +40,7 @@ class Body:
     spin: dict[str, Any] | None = None
     erosion: dict[str, Any] = field(default_factory=dict)
     temperature: str | float | None = None
+    rigid: bool = False
     name: str = ""
     """In the case."""
 
@@ -108,7 +109,7 @@ class Draft:
         temperature = made.temperature if body.temperature is None else body.temperature
         if temperature is not None:
             part["temperature"] = temperature
-        if made.rigid:
+        if made.rigid or body.rigid:
             part["rigid"] = True
         if erosion := {**made.erosion, **body.erosion}:
             part["erosion"] = erosion

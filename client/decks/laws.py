@@ -1,6 +1,8 @@
 """Constants of other codes as those of Conoid: what the formulas of both sides have in common."""
 
 from collections.abc import Sequence
+from fractions import Fraction
+from itertools import pairwise
 
 _STRAIGHT = 1e-6
 """By how much points of a line may be off it, of the largest stress: rounding of decks with six digits or more."""
@@ -34,9 +36,14 @@ def hardening_of(young: float, tangent: float) -> float:
 def line_of(points: Sequence[tuple[float, float]]) -> tuple[float, float] | None:
     """Yield stress and hardening of (plastic strain, stress), if all points lie on one line that begins at strain 0;
     None otherwise. One point is a flow stress that does not rise."""
-    if not points or points[0][0] != 0.0 or any(a[0] >= b[0] for a, b in zip(points, points[1:], strict=False)):
+    if not points or points[0][0] != 0.0 or any(a[0] >= b[0] for a, b in pairwise(points)):
         return None
     (_, first), (end, last) = points[0], points[-1]
-    slope = (last - first) / end if len(points) > 1 else 0.0
+    slope = float((_exact(last) - _exact(first)) / _exact(end)) if len(points) > 1 else 0.0
     near = _STRAIGHT * max(abs(stress) for _, stress in points)
     return (first, slope) if all(abs(first + slope * e - stress) <= near for e, stress in points) else None
+
+
+def _exact(number: float) -> Fraction:
+    """The decimal number that a deck has: 0.5 - 0.4 is 0.1."""
+    return Fraction(repr(float(number)))

@@ -15,8 +15,9 @@ _LAST = ("run",)
 def toml(data: Mapping[str, Any]) -> str:
     """The text of a case file; ends in a line feed."""
     lines = [f"{reference.LINE} ./{reference.FILE}", *_comment(data.get(NOTE, ()))]
-    order = [*(key for key in _FIRST if key in data), *(key for key in data if key not in (*_FIRST, *_LAST, NOTE))]
-    for key in (*order, *(key for key in _LAST if key in data)):
+    rest = [key for key in data if key not in (*_FIRST, *_LAST, NOTE)]
+    rest.sort(key=lambda key: isinstance(data[key], Mapping | list))
+    for key in (*(key for key in _FIRST if key in data), *rest, *(key for key in _LAST if key in data)):
         lines += _entry(key, data[key])
     return "\n".join(lines) + "\n"
 
@@ -54,6 +55,8 @@ def _pairs(table: Mapping[str, Any], prefix: str = "") -> Iterator[str]:
 def _scalar(value: Any) -> str:
     if isinstance(value, list | tuple):
         return f"[{', '.join(_scalar(each) for each in value)}]"
+    if isinstance(value, Mapping):
+        return f"{{ {', '.join(f'{key} = {_scalar(each)}' for key, each in value.items())} }}"
     if isinstance(value, str):
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
     return json.dumps(value)

@@ -79,7 +79,7 @@ class System:
         if dimension == ONE:
             return float(value)
         unit = self._unit(dimension)
-        return f"{float(scaled)!r} {_si(dimension)}" if unit is None else f"{float(value)!r} {unit}"
+        return f"{_digits(float(scaled))} {_si(dimension)}" if unit is None else f"{_digits(value)} {unit}"
 
     def _unit(self, dimension: Dimension) -> str | None:
         """The text of a unit; None where cases know no such unit."""
@@ -92,6 +92,10 @@ class System:
         if self.mass not in UNITS and dimension[1]:
             return None
         return _composed((self.length, self.mass, self.time, "K"), dimension)
+
+
+def _digits(value: float) -> str:
+    return repr(float(value)).removesuffix(".0")
 
 
 def _composed(symbols: tuple[str, str, str, str], dimension: Dimension) -> str:
@@ -165,7 +169,7 @@ def told(materials: Iterable[Weighed]) -> tuple[System, str]:
             f"{density:.4g} kg/m^3{modulus}"  # fmt: skip
     if systems:
         fits = choices([str(each) for each in systems])
-        raise UsageError(f"--units is needed: {found[0][1].name} may be steel in {fits}; write --units \"{systems[0]}\"")
+        raise UsageError(f'--units is needed: {found[0][1].name} may be steel in {fits}; write --units "{systems[0]}"')
     densities = ", ".join(f"{one.name} {one.density:g}" for one in every[:5]) or "none"
     raise UsageError(
         f"--units is needed: no material has the density of steel in a usual system (densities: {densities}); "

@@ -1,0 +1,1 @@
+"""Abaqus/Explicit input files."""

@@ -1,0 +1,81 @@
+"""A keyword of an Abaqus input file with its parameters and data lines, and what was read of it."""
+
+from dataclasses import dataclass, field
+
+from conoid.cases.inp import InpError, fields, numbers
+
+from ..account import Entry
+
+Row = tuple[int, str]
+
+
+@dataclass
+class Keyword:
+    """``word`` as the manual spells it; ``scope``: name of the part or instance that it stands in, empty outside."""
+
+    word: str
+    line: int
+    parameters: dict[str, str | None]
+    rows: list[Row]
+    entry: Entry
+    scope: str = ""
+    material: str = ""
+    step: int = 0
+    """Of which step it is, from 1; 0 outside of steps."""
+    _read: set[str] = field(default_factory=set)
+
+    def get(self, name: str) -> str | None:
+        """The value of a parameter without quotation marks; empty for one without value, None where it is missing."""
+        joined = "".join(name.split())
+        self._read.add(joined)
+        if joined not in self.parameters:
+            return None
+        return (self.parameters[joined] or "").strip().strip('"')
+
+    def has(self, name: str) -> bool:
+        """Whether a parameter is there."""
+        return self.get(name) is not None
+
+    def key(self, name: str) -> str:
+        """The value as names are compared: without blanks, in upper case."""
+        return joined(self.get(name) or "")
+
+    def forgive(self, names: str, why: str) -> None:
+        """Parameters that are left out, and why."""
+        for name in names.split(","):
+            if (value := self.get(name)) is not None:
+                self.entry.remark("left", f"{name.strip()} = {value}" if value else name.strip(), why)
+
+    def rest(self) -> None:
+        """Parameters that nobody has read refuse the import."""
+        for name in self.parameters:
+            if name not in self._read:
+                self.entry.remark("refused", name, "this parameter is not taken over")
+
+    def filled(self) -> list[Row]:
+        """The data lines that are not empty."""
+        return [row for row in self.rows if row[1].strip()]
+
+    def table(self, columns: int) -> list[list[float]]:
+        """The numbers of its data lines. Raises InpError where a line has more than ``columns`` that are not 0."""
+        found = [(line, numbers(line, text)) for line, text in self.filled()]
+        for line, row in found:
+            if any(row[columns:]):
+                raise InpError(f"line {line}: {len(row)} values; {columns} are taken over (no temperatures or fields)")
+        return [(row + [0.0] * columns)[:columns] for _, row in found]
+
+    def single(self, columns: int) -> list[float]:
+        """The numbers of its only data line. Raises InpError where there are more, or none."""
+        found = self.table(columns)
+        if len(found) != 1:
+            raise InpError(f"line {self.line}: *{self.word} has {len(found)} data lines; one is taken over")
+        return found[0]
+
+    def items(self) -> list[tuple[int, list[str]]]:
+        """The fields of its data lines."""
+        return [(line, fields(text)) for line, text in self.filled()]
+
+
+def joined(text: str) -> str:
+    """A name as Abaqus compares names: no blanks, upper case, no quotation marks."""
+    return "".join(text.strip().strip('"').split()).upper()

@@ -1,0 +1,235 @@
+"""Materials of Abaqus/Explicit as those of Conoid (Analysis User's Guide, "Materials").
+
+What the formulas there and here do not share is a remark of the keyword: docs/import.md has them side by side.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from conoid.cases.inp import InpError
+
+from ..draft import Made
+from ..laws import line_of, young_of
+from ..units import DENSITY, RATE, SPECIFIC_HEAT, SPEED, STRESS, TEMPERATURE, System, Weighed
+from .keyword import Keyword
+
+
+@dataclass(frozen=True)
+class Heat:
+    """Whether work heats (``*DYNAMIC, EXPLICIT, ADIABATIC``), and the temperature of the deck's absolute zero."""
+
+    adiabatic: bool
+    zero: float
+
+
+class Material:
+    """The keywords below one ``*MATERIAL``."""
+
+    def __init__(self, head: Keyword, below: Sequence[Keyword], system: System, heat: Heat) -> None:
+        """``below``: in the order of the deck."""
+        self.head, self._system, self._heat = head, system, heat
+        self._below = {each.word: each for each in below}
+        self._done: set[str] = set()
+        if len(self._below) < len(below):
+            raise InpError(f"line {head.line}: *MATERIAL has a keyword twice, for several conditions or temperatures")
+
+    def made(self) -> Made:
+        """The material; what of it is not taken over stands in the entries. Raises InpError, ValueError."""
+        density = self._need("DENSITY").single(1)[0]
+        material: dict[str, Any] = {"density": self._system.quantity(density, DENSITY)}
+        material |= self._elastic(density)
+        temperature, erosion = None, dict[str, Any]()
+        if (plastic := self._take("PLASTIC")) is not None:
+            kind = plastic.key("HARDENING") or "ISOTROPIC"
+            if kind == "JOHNSONCOOK":
+                material["strength"], temperature = self._johnson_cook(plastic)
+                erosion = self._damage(material["strength"])
+            elif kind == "ISOTROPIC":
+                material["strength"] = self._linear(plastic)
+            else:
+                raise InpError(f"line {plastic.line}: HARDENING = {kind}: ISOTROPIC and JOHNSON COOK are taken over")
+            plastic.rest()
+        erosion |= self._failure(material)
+        for word in ("CONDUCTIVITY", "DEPVAR"):
+            self._take(word)
+        heat = self._take("SPECIFIC HEAT"), self._take("INELASTIC HEAT FRACTION")
+        for each in heat:
+            if each is not None:
+                each.entry.leave("of no meaning without *DYNAMIC, EXPLICIT, ADIABATIC and a law with a temperature")
+        for word, keyword in self._below.items():
+            if word not in self._done:
+                keyword.entry.refuse("this property of the material is not taken over")
+        return Made(material, erosion, temperature=temperature)
+
+    def taken(self, place: str) -> None:
+        """Its keywords went into the material of the case."""
+        self.head.entry.take(place)
+        for word in self._done:
+            if not self._below[word].entry.decided:
+                self._below[word].entry.take(place)
+
+    def _take(self, word: str) -> Keyword | None:
+        if word in self._done or word not in self._below:
+            return None
+        self._done.add(word)
+        return self._below[word]
+
+    def _need(self, word: str) -> Keyword:
+        found = self._take(word)
+        if found is None:
+            raise InpError(f"line {self.head.line}: the material {self.head.get('NAME')!r} has no *{word}")
+        return found
+
+    def _stress(self, value: float) -> str | float:
+        return self._system.quantity(value, STRESS)
+
+    def _kelvin(self, value: float) -> float:
+        return value - self._heat.zero
+
+    # Elasticity and pressure ------------------------------------------------------------------------------------------
+
+    def _elastic(self, density: float) -> dict[str, Any]:
+        elastic, eos = self._need("ELASTIC"), self._take("EOS")
+        kind = elastic.key("TYPE") or "ISOTROPIC"
+        elastic.rest()
+        if eos is None:
+            if kind != "ISOTROPIC":
+                raise InpError(f"line {elastic.line}: TYPE = {kind}; ISOTROPIC is taken over, SHEAR with *EOS")
+            young, poisson = elastic.single(2)
+            return {"elastic": {"young": self._stress(young), "poisson": poisson}}
+        if eos.key("TYPE") != "USUP" or kind != "SHEAR":
+            raise InpError(f"line {eos.line}: *EOS, TYPE=USUP with *ELASTIC, TYPE=SHEAR is taken over alone")
+        eos.rest()
+        speed, slope, gamma = eos.single(3)
+        young, poisson = young_of(density * speed * speed, elastic.single(1)[0])
+        law = {"model": "mie_gruneisen", "c0": self._system.quantity(speed, SPEED), "S": slope, "gamma0": gamma}
+        return {"elastic": {"young": self._stress(young), "poisson": poisson}, "eos": law}
+
+    # Strength ---------------------------------------------------------------------------------------------------------
+
+    def _linear(self, plastic: Keyword) -> dict[str, Any]:
+        if plastic.has("RATE") and float(plastic.get("RATE") or 0.0):
+            raise InpError(f"line {plastic.line}: RATE: the flow stress depends on the rate there, not here")
+        points = [(strain, stress) for stress, strain in plastic.table(2)]
+        found = line_of(points)
+        if found is None or found[1] < 0.0:
+            raise InpError(f"line {plastic.line}: stress by plastic strain is no straight line that rises from 0 on")
+        law: dict[str, Any] = {"model": "linear_hardening", "yield_stress": self._stress(found[0])}
+        if found[1]:
+            law["hardening"] = self._stress(found[1])
+            last = points[-1][0]
+            plastic.entry.remark("differs", f"plastic strain {last:g}", "beyond the last row the flow stress stays there; "
+                                 "here it goes on to rise")  # fmt: skip
+        return law
+
+    def _johnson_cook(self, plastic: Keyword) -> tuple[dict[str, Any], str | float]:
+        A, B, n, m, melt, room = plastic.single(6)
+        law: dict[str, Any] = {"model": "johnson_cook", "A": self._stress(A), "B": self._stress(B), "n": n}
+        rate = self._take("RATE DEPENDENT")
+        C, reference = (0.0, 0.0) if rate is None else tuple(rate.single(2))
+        if rate is not None and rate.key("TYPE") != "JOHNSONCOOK":
+            raise InpError(f"line {rate.line}: TYPE = {rate.key('TYPE')}; JOHNSON COOK is taken over")
+        if rate is not None:
+            rate.rest()
+            law |= {"C": C, "reference_rate": self._system.quantity(reference, RATE)}
+        else:
+            law["C"] = 0.0
+        if m == 0.0 or melt <= room:
+            plastic.entry.remark("differs", "m", "no melting temperature: nothing softens here (taylor_quinney = 0); "
+                                 "melt_temperature and specific_heat have no meaning")  # fmt: skip
+            cold = self._system.quantity(max(self._kelvin(room), 0.0), TEMPERATURE)
+            return law | _cold(cold), cold
+        law |= {"m": m, "reference_temperature": self._system.quantity(self._kelvin(room), TEMPERATURE)}
+        law["melt_temperature"] = self._system.quantity(self._kelvin(melt), TEMPERATURE)
+        law |= self._heating(plastic)
+        return law, self._system.quantity(max(self._kelvin(0.0), 0.0), TEMPERATURE)
+
+    def _heating(self, plastic: Keyword) -> dict[str, Any]:
+        """Specific heat and the share of the work that becomes heat: none without ADIABATIC."""
+        if not self._heat.adiabatic:
+            plastic.entry.remark("differs", "no heat", "without *DYNAMIC, EXPLICIT, ADIABATIC no work becomes heat "
+                                 "(taylor_quinney = 0); specific_heat has no meaning")  # fmt: skip
+            return {"specific_heat": "1000 J/kg/K", "taylor_quinney": 0.0}
+        heat, share = self._need("SPECIFIC HEAT"), self._take("INELASTIC HEAT FRACTION")
+        part = 0.9 if share is None or not share.filled() else share.single(1)[0]
+        return {"specific_heat": self._system.quantity(heat.single(1)[0], SPECIFIC_HEAT), "taylor_quinney": part}
+
+    # Failure ----------------------------------------------------------------------------------------------------------
+
+    def _damage(self, law: dict[str, Any]) -> dict[str, Any]:
+        """``*DAMAGE INITIATION, CRITERION=JOHNSON COOK``: d3 has the other sign there (exp(-d3 triaxiality))."""
+        found = self._below.get("DAMAGE INITIATION")
+        if found is None or found.key("CRITERION") != "JOHNSONCOOK":
+            return {}
+        self._take("DAMAGE INITIATION")
+        found.rest()
+        *d, melt, room, rate = found.single(8)
+        self._same(found, law, melt, room, rate)
+        law["damage"] = {"D1": d[0], "D2": d[1], "D3": -d[2] + 0.0, "D4": d[3], "D5": d[4]}
+        if d[2]:
+            found.entry.remark("differs", f"d3 = {d[2]:g}", "D3 has the other sign: exp(-d3 t) there, exp(D3 t) here")
+        return self._evolution(found)
+
+    def _same(self, found: Keyword, law: dict[str, Any], melt: float, room: float, rate: float) -> None:
+        """Damage has the temperatures and the rate of the strength here."""
+        wanted = {
+            "melt_temperature": self._system.quantity(self._kelvin(melt), TEMPERATURE) if melt else None,
+            "reference_temperature": self._system.quantity(self._kelvin(room), TEMPERATURE) if melt else None,
+            "reference_rate": self._system.quantity(rate, RATE) if rate else None,
+        }  # fmt: skip
+        for key, value in wanted.items():
+            if value is not None and law.setdefault(key, value) != value:
+                found.entry.remark("refused", f"{value}", f"damage and strength have one {key} here, {law[key]}")
+
+    def _evolution(self, found: Keyword) -> dict[str, Any]:
+        """What follows the initiation: tets leave at once where no displacement or energy is given."""
+        evolution = self._take("DAMAGE EVOLUTION")
+        if evolution is None:
+            found.entry.remark("differs", "no *DAMAGE EVOLUTION", "damage is counted and nothing fails, as here")
+            return {}
+        for name in ("TYPE", "SOFTENING", "DEGRADATION"):
+            evolution.get(name)
+        if any(any(row) for row in evolution.table(8)):
+            evolution.entry.remark(
+                "refused", "evolution", "strength falls by a displacement or an energy there; here a tet leaves at "
+                "damage 1",
+            )  # fmt: skip
+        return {"damage": 1.0}
+
+    def _failure(self, material: dict[str, Any]) -> dict[str, Any]:
+        """``*SHEAR FAILURE`` of a plastic strain, and ``*TENSILE FAILURE`` as a cut-off of the pressure."""
+        shear, tensile = self._below.get("SHEAR FAILURE"), self._below.get("TENSILE FAILURE")
+        found: dict[str, Any] = {}
+        if shear is not None and (shear.key("TYPE") or "TABULAR") == "TABULAR":
+            row = shear.single(1)
+            self._take("SHEAR FAILURE")
+            shear.forgive("ELEMENT DELETION", "tets leave here")
+            found["plastic_strain"] = row[0]
+        if tensile is not None:
+            self._take("TENSILE FAILURE")
+            tensile.entry.remark(
+                "refused", "failure", "matter that has failed has no strength or leaves; here the pressure is cut off "
+                "at it (spall)",
+            )  # fmt: skip
+            material["spall"] = self._stress(tensile.single(1)[0])
+        return found
+
+
+def _cold(room: str | float) -> dict[str, Any]:
+    return {"m": 1.0, "reference_temperature": room, "melt_temperature": "2000 K", "specific_heat": "1000 J/kg/K",
+            "taylor_quinney": 0.0}  # fmt: skip
+
+
+def weighed(name: str, below: Sequence[Keyword]) -> Weighed | None:
+    """Density and Young's modulus of a material, to tell the units by; None where they cannot be read."""
+    found = {each.word: each for each in below}
+    try:
+        density = found["DENSITY"].single(1)[0]
+        elastic = found.get("ELASTIC")
+        if elastic is None:
+            return Weighed(repr(name), density, None)
+        value = elastic.table(2)[0][0]
+        return Weighed(repr(name), density, 2.6 * value if elastic.key("TYPE") == "SHEAR" else value)
+    except (KeyError, IndexError, InpError):
+        return None

@@ -1,0 +1,267 @@
+"""An Abaqus/Explicit input file as a case."""
+
+from collections.abc import Iterator
+from functools import cached_property
+from pathlib import Path
+
+from conoid.cases.inp import Block, InpError, Source
+
+from ..account import Account, Entry
+from ..contacts import meet
+from ..draft import Body, Draft, Made
+from ..holds import Holding
+from ..naming import Names
+from ..start import begin
+from ..topology import Chosen, Mesh, Topology
+from ..units import System, Weighed
+from .keyword import Keyword, joined
+from .loads import Loads
+from .materials import Heat, Material, weighed
+from .meetings import Meetings
+from .mesh import AbaqusMesh
+from .words import LEFT, MATERIAL, REFUSED, spelt
+
+_MESH = ("NODE", "ELEMENT")
+
+
+class Abaqus:
+    """The keywords of an input file, and what becomes of each."""
+
+    kind = "Abaqus/Explicit input file"
+    own_units: System | None = None
+
+    def __init__(self, path: Path) -> None:
+        """Reads all of ``path``. Raises InpError, OSError."""
+        self.path, self.account = path, Account()
+        self.keywords: list[Keyword] = []
+        self._scope, self._material, self._step = "", "", 0
+        self._steps = 0
+        self._source = Source(path)
+        for block in self._source.blocks():
+            self._take(block)
+        self.instances = {each.key("NAME"): each for each in self.of("INSTANCE")}
+
+    def of(self, *words: str) -> list[Keyword]:
+        """The keywords of these words, in order."""
+        return [each for each in self.keywords if each.word in words]
+
+    def _take(self, block: Block) -> None:
+        word = spelt(block.word)
+        entry = self.account.open(f"*{word}", block.line)
+        if word not in MATERIAL:
+            self._material = ""
+        rows = [] if word in _MESH else list(self._source.data())
+        made = Keyword(word, block.line, dict(block.parameters), rows, entry, self._scope, self._material, self._step)
+        if word in ("PART", "INSTANCE"):
+            self._scope = made.scope = made.key("NAME")
+        elif word in ("END PART", "END INSTANCE"):
+            self._scope = ""
+        elif word == "MATERIAL":
+            self._material = made.material = made.key("NAME")
+        elif word == "STEP":
+            self._steps += 1
+            self._step = made.step = self._steps
+        elif word == "END STEP":
+            self._step = 0
+        if word in _MESH:
+            entry.take("parts[].mesh")
+        self.keywords.append(made)
+
+    def weighed(self) -> Iterator[Weighed]:
+        """Densities of the materials, to tell the units by."""
+        for head in self.of("MATERIAL"):
+            found = weighed(head.get("NAME") or "material", self._below(head))
+            if found is not None:
+                yield found
+
+    def _below(self, head: Keyword) -> list[Keyword]:
+        return [each for each in self.keywords if each.material == head.material and each.word != "MATERIAL"]
+
+    # The case ---------------------------------------------------------------------------------------------------------
+
+    def draft(self, system: System) -> Draft:
+        """The case, in units of ``system``."""
+        self._draft = Draft(self.path, system, self.account)
+        self._heading()
+        bodies = list(self._bodies())
+        names = Names()
+        for body in bodies:
+            body.name = names.give(body.title, "part", body.key)
+        self.topology = Topology([body.key for body in bodies], self._load_mesh)
+        loads = Loads(self._draft, self.of("AMPLITUDE"), self.chosen)
+        end = loads.end(self.of("STEP"), self.of("DYNAMIC"))
+        self._make_materials(system, bodies, loads.adiabatic)
+        self._rigid(bodies)
+        for each in self.keywords:
+            self._guarded(loads, each, end)
+        loads.temperatures(bodies, self.topology, self._zero())
+        begin(self._draft, self.topology, bodies, loads.starts)
+        for body in bodies:
+            self._draft.add_part(body, names)
+        Holding(self._draft, self.topology, bodies).add(loads.holds, [])
+        meetings = Meetings(self.keywords, bodies, self._surface)
+        meet(self._draft, bodies, meetings.made)
+        self._join(bodies, meetings)
+        self._leave_rest()
+        return self._draft
+
+    def _heading(self) -> None:
+        for each in self.of("HEADING"):
+            text = " ".join(text.strip() for _, text in each.filled())
+            each.entry.take("title") if text else each.entry.leave("it is empty")
+            self._draft.title = self._draft.title or text
+
+    def _zero(self) -> float:
+        """The absolute zero of temperatures: 0 where the deck names none."""
+        named = [each for each in self.of("PHYSICAL CONSTANTS") if each.has("ABSOLUTE ZERO")]
+        found = [each.get("ABSOLUTE ZERO") for each in named]
+        for each in named:
+            each.entry.take("parts[].temperature")
+        try:
+            return float(found[0] or 0.0) if found else 0.0
+        except ValueError:
+            raise InpError(f"ABSOLUTE ZERO = {found[0]!r} is not a number") from None
+
+    def _make_materials(self, system: System, bodies: list[Body], adiabatic: bool) -> None:
+        used = {body.material for body in bodies}
+        for head in self.of("MATERIAL"):
+            head.forgive("RTOL, SRATE FACTOR", "how the other code reads tables")
+            if head.material not in used:
+                for each in (head, *self._below(head)):
+                    each.entry.leave("no part that is taken over has it")
+                continue
+            made = Made({})
+            try:
+                material = Material(head, self._below(head), system, Heat(adiabatic, self._zero()))
+                made = material.made()
+            except (InpError, ValueError, ZeroDivisionError) as error:
+                head.entry.refuse(f"its constants cannot be used: {error}")
+                for each in self._below(head):
+                    if not each.entry.decided:
+                        each.entry.leave("its material is not taken over")
+            self._draft.add_material(head.material, head.get("NAME") or "", made, head.entry)
+            if made.material:
+                material.taken(f"materials.{(self._draft.material_of(head.material) or ('?', made))[0]}")
+
+    def _bodies(self) -> Iterator[Body]:
+        """A body for each section of solids, in each instance of its part."""
+        sections = self.of("SOLID SECTION")
+        for section in sections:
+            section.forgive("CONTROLS, ORIENTATION", "how elements are integrated")
+            elset, material = section.key("ELSET"), section.key("MATERIAL")
+            shown = section.get("ELSET") or ""
+            section.rest()
+            for each in self.of("ELSET"):
+                if each.scope == section.scope and each.key("ELSET") == elset:
+                    each.entry.take(f"of {section.entry.keyword}, {section.entry.place}")
+            alone = sum(each.scope == section.scope for each in sections) == 1
+            if section.scope and self.instances and section.scope not in self.instances:
+                for name, instance in self.instances.items():
+                    if instance.key("PART") == section.scope:
+                        label = instance.get("NAME") or name
+                        title = label if alone else f"{label}_{shown}"
+                        yield Body(f"{name}|{elset}", title, material, f"{label}.{shown}", section.entry)
+                        instance.entry.take("parts[].mesh")
+            else:
+                group = f"{section.scope}.{shown}" if section.scope else shown
+                yield Body(f"{section.scope}|{elset}", shown, material, group, section.entry)
+
+    def _rigid(self, bodies: list[Body]) -> None:
+        """``*RIGID BODY, ELSET=``: a section of solids is rigid."""
+        for each in self.of("RIGID BODY"):
+            wanted = each.key("ELSET").rpartition(".")[2]
+            found = [body for body in bodies if body.key.endswith(f"|{wanted}")] if wanted else []
+            if not found:
+                each.entry.refuse(REFUSED["RIGID BODY"])
+                continue
+            each.forgive("REF NODE, POSITION", "its own centre of mass moves here, no reference node")
+            each.rest()
+            for body in found:
+                body.rigid = True
+            each.entry.take("parts[].rigid")
+
+    def _guarded(self, loads: Loads, each: Keyword, end: float) -> None:
+        try:
+            loads.take(each, end)
+        except (InpError, ValueError) as error:
+            each.entry.refuse(str(error))
+
+    def _join(self, bodies: list[Body], meetings: Meetings) -> None:
+        """Bonds of parts that share nodes, and of ties."""
+        names = {body.key: body.name for body in bodies}
+        for one, other in self.topology.joined() if len(names) > 1 else ():
+            self._draft.bonds.append({"kind": "shared", "parts": [names[one], names[other]]})
+            self.account.remarks.append(f'{names[one]} and {names[other]} share nodes: [[bond]] kind = "shared"')
+        for pair, entry in meetings.ties:
+            entry.take(f"bond[{len(self._draft.bonds)}]")
+            self._draft.bonds.append({"kind": "tied", "parts": [names[key] for key in pair]})
+
+    def _leave_rest(self) -> None:
+        for each in self.keywords:
+            if each.entry.decided:
+                continue
+            if each.word in ("PART", "INSTANCE", "ASSEMBLY"):
+                each.entry.take("parts[].mesh")
+            elif why := LEFT.get(each.word):
+                each.entry.leave(why)
+            elif why := REFUSED.get(each.word):
+                each.entry.refuse(why)
+            elif each.word in MATERIAL:
+                each.entry.refuse("it stands outside of a material that is taken over")
+
+    # What keywords name -----------------------------------------------------------------------------------------------
+
+    @cached_property
+    def mesh(self) -> AbaqusMesh:
+        """Nodes, elements and sets, read when they are asked for."""
+        return AbaqusMesh(self.path)
+
+    def _load_mesh(self) -> Mesh:
+        pairs = {key: key.partition("|") for key in self.topology.bodies}
+        return Mesh(
+            {key: self.mesh.body(scope, elset)[1] for key, (scope, _, elset) in pairs.items()}, self.mesh.points()
+        )
+
+    def chosen(self, name: str, entry: Entry) -> Chosen:
+        """The node set or node of a data line; the keyword of the set is taken with it."""
+        plain, _, last = name.strip().strip('"').rpartition(".")
+        for each in self.of("NSET"):
+            if each.key("NSET") == joined(last) and (not plain or joined(plain) in self._scopes(each)):
+                each.entry.take(f"of {entry.keyword}, {entry.place}")
+
+        def nodes() -> set[int]:
+            found = self.mesh.named(name, "node_sets")
+            if found is None:
+                raise InpError(f"the node set {name[:60]!r} is not defined")
+            return found
+
+        return Chosen(f"node set {name}", nodes=nodes, on=None if name.strip().isdigit() else name.strip().strip('"'))
+
+    def _scopes(self, each: Keyword) -> set[str]:
+        """Instances in which a set may be named."""
+        if each.scope in self.instances:
+            return {each.scope}
+        return {name for name, one in self.instances.items() if one.key("PART") == each.scope} | {each.key("INSTANCE")}
+
+    def _surface(self, name: str, entry: Entry) -> frozenset[str]:
+        """Bodies that have elements of a surface."""
+        sets: list[str] = []
+        for each in self.of("SURFACE"):
+            if each.key("NAME") == joined(name):
+                if (each.key("TYPE") or "ELEMENT") != "ELEMENT":
+                    raise InpError(f"the surface {name!r} is of the type {each.key('TYPE')}; ELEMENT is followed")
+                each.entry.take(f"of {entry.keyword}, {entry.place}")
+                sets += [items[0] for _, items in each.items()]
+        if not sets:
+            raise InpError(f"the surface {name[:60]!r} is not defined, or has no elements")
+        if any(not one for one in sets):
+            return frozenset(self.topology.bodies)
+        wanted = set().union(*(self.mesh.named(one, "element_sets") or set() for one in sets))
+        pairs = {key: key.partition("|") for key in self.topology.bodies}
+        found = {
+            key for key, (scope, _, elset) in pairs.items() if not self.mesh.body(scope, elset)[0].isdisjoint(wanted)
+        }
+        for each in self.of("ELSET"):
+            if any(each.key("ELSET") == joined(one.rpartition(".")[2]) for one in sets):
+                each.entry.take(f"of the surface {name}")
+        return frozenset(found)

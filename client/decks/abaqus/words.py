@@ -1,0 +1,76 @@
+"""Keywords of Abaqus that are left out, and why, and those that change the answer; the rest are read."""
+
+_OUTPUT = "output: a run writes frames, history.csv and probes"
+_END = "the end of what stands before it"
+_USED = "used by nothing that is taken over"
+
+LEFT: dict[str, str] = {
+    "PREPRINT": _OUTPUT, "NODE OUTPUT": _OUTPUT, "ELEMENT OUTPUT": _OUTPUT, "CONTACT OUTPUT": _OUTPUT,
+    "ENERGY OUTPUT": _OUTPUT, "INCREMENTATION OUTPUT": _OUTPUT, "INTEGRATED OUTPUT": _OUTPUT, "RESTART": _OUTPUT,
+    "FILE OUTPUT": _OUTPUT, "NODE FILE": _OUTPUT, "EL FILE": _OUTPUT, "ENERGY FILE": _OUTPUT, "MONITOR": _OUTPUT,
+    "DIAGNOSTICS": _OUTPUT, "FILTER": _OUTPUT, "NODE PRINT": _OUTPUT, "EL PRINT": _OUTPUT,
+    "INTEGRATED OUTPUT SECTION": _OUTPUT, "TRACER PARTICLE": _OUTPUT,
+    "END PART": _END, "END INSTANCE": _END, "END ASSEMBLY": _END, "END STEP": _END,
+    "SECTION CONTROLS": "how elements are integrated and how they are deleted: parts[].erosion",
+    "HOURGLASS STIFFNESS": "tets have no hourglass modes",
+    "BULK VISCOSITY": "numerics.viscosity has the values of this solver",
+    "FIXED MASS SCALING": "mass is not scaled here: the steps are those of the true mass",
+    "VARIABLE MASS SCALING": "mass is not scaled here: the steps are those of the true mass",
+    "CONTACT CONTROLS": "how the other code computes contact",
+    "CONTACT CONTROLS ASSIGNMENT": "how the other code computes contact",
+    "CONTACT FORMULATION": "how the other code computes contact",
+    "CONTACT INITIALIZATION ASSIGNMENT": "bodies that overlap are refused, or pushed apart: contact.overlap",
+    "CONTACT INITIALIZATION DATA": "bodies that overlap are refused, or pushed apart: contact.overlap",
+    "SURFACE PROPERTY ASSIGNMENT": "thickness of shells, of no meaning for solids",
+    "SURFACE BEHAVIOR": "bodies push each other by impulses here, no stiffness",
+    "PHYSICAL CONSTANTS": "the zero of temperatures, if it names one; no other constant has a meaning here",
+    "CONDUCTIVITY": "heat stays where work was done",
+    "DEPVAR": "of a subroutine of the user",
+    "ORIENTATION": _USED, "TRANSFORM": "directions of output; restraints with it are refused",
+    "AMPLITUDE": _USED, "NSET": _USED, "ELSET": _USED, "SURFACE": _USED, "SURFACE INTERACTION": _USED,
+    "FRICTION": _USED,
+}  # fmt: skip
+
+REFUSED: dict[str, str] = {
+    "SHELL SECTION": "shells: here all bodies are solids", "MEMBRANE SECTION": "membranes: here all bodies are solids",
+    "BEAM SECTION": "beams: here all bodies are solids", "COHESIVE SECTION": "cohesive elements: give [[bond]]",
+    "CONNECTOR SECTION": "connectors: there are none here", "MASS": "masses of nodes: there are none here",
+    "ROTARY INERTIA": "masses of nodes: there are none here", "SPRING": "springs: there are none here",
+    "DASHPOT": "dashpots: there are none here", "COUPLING": "joins nodes in a way that is not taken over",
+    "KINEMATIC": "joins nodes in a way that is not taken over", "MPC": "joins nodes in a way that is not taken over",
+    "EQUATION": "joins nodes in a way that is not taken over", "EMBEDDED ELEMENT": "embedded bodies: there are none",
+    "RIGID BODY": "a rigid body that is not a whole section of solids",
+    "CONTACT EXCLUSIONS": "pairs that do not meet; here all parts of contact.parts meet each other",
+    "DSLOAD": "a load on surfaces that is not taken over: [[boundaries]] kind = \"traction\"",
+    "CLOAD": "forces on nodes: [[boundaries]] kind = \"traction\" acts on faces",
+    "TEMPERATURE": "temperatures that are given; here work becomes heat where it is done",
+    "FIELD": "fields that are given", "IMPORT": "a state of another analysis",
+    "INCLUDE": "write what it includes into the file: the mesh is read of one file",
+    "PARAMETER": "values that are computed; write them out",
+    "STATIC": "no step of *DYNAMIC, EXPLICIT", "HEAT TRANSFER": "no step of *DYNAMIC, EXPLICIT",
+    "FREQUENCY": "no step of *DYNAMIC, EXPLICIT", "ANNEAL": "no step of *DYNAMIC, EXPLICIT",
+    "DAMPING": "damping of bodies: there is none here",
+}  # fmt: skip
+
+MATERIAL = {
+    "DENSITY", "ELASTIC", "PLASTIC", "RATE DEPENDENT", "DAMAGE INITIATION", "DAMAGE EVOLUTION", "SPECIFIC HEAT",
+    "INELASTIC HEAT FRACTION", "EOS", "SHEAR FAILURE", "TENSILE FAILURE", "CONDUCTIVITY", "DEPVAR", "DAMPING",
+}  # fmt: skip
+"""Keywords that may stand below ``*MATERIAL`` and are known here."""
+
+READ = {
+    "HEADING", "NODE", "ELEMENT", "NSET", "ELSET", "SURFACE", "PART", "ASSEMBLY", "INSTANCE", "SOLID SECTION",
+    "MATERIAL", "AMPLITUDE", "INITIAL CONDITIONS", "BOUNDARY", "STEP", "DYNAMIC", "DLOAD", "CONTACT",
+    "CONTACT INCLUSIONS", "CONTACT PROPERTY ASSIGNMENT", "CONTACT PAIR", "SURFACE INTERACTION", "FRICTION", "TIE",
+    "OUTPUT", "PHYSICAL CONSTANTS", "RIGID BODY",
+}  # fmt: skip
+
+_SPELT = {"".join(each.split()): each for each in (*LEFT, *REFUSED, *MATERIAL, *READ)}
+
+
+def spelt(word: str) -> str:
+    """A keyword as the manual spells it, also where it is shortened: ``ENDPART`` is ``END PART``."""
+    if word in _SPELT:
+        return _SPELT[word]
+    alike = [whole for joined, whole in _SPELT.items() if joined.startswith(word)] if word else []
+    return alike[0] if len(alike) == 1 else word

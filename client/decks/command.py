@@ -1,0 +1,93 @@
+"""``conoid import``: the case of a deck and the list beside it, on the terminal and as files."""
+
+import os
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from conoid.cases import reference
+from conoid.cases.figures import counted
+from conoid.cases.run import ExitCode
+
+from ..console import echo
+from ..errors import ClientError, UsageError
+from ..options import Json, aloud, complain
+from ..saving import save_text
+from .dialects import DIALECTS
+from .importing import Imported, as_json, lines, read_deck
+from .toml import NOTE
+
+_FORMATS = ", ".join(DIALECTS)
+_SHOWN = 20
+"""Reasons of a refusal that are printed. Chosen: a screen; the list has all."""
+
+
+def import_deck(
+    deck: Annotated[Path, typer.Argument(metavar="DECK", help="LS-DYNA .k, Abaqus .inp or Radioss NAME_0000.rad.")],
+    units: Annotated[
+        str | None, typer.Option("--units", metavar="L,M,T", help="Of the deck, as 'mm,t,s'; else told from steel.")
+    ] = None,
+    kind: Annotated[str | None, typer.Option("--format", help=f"{_FORMATS}; else told from the file.")] = None,
+    out: Annotated[Path | None, typer.Option("--out", help="The case file; DECK with .toml if not given.")] = None,
+    anyway: Annotated[
+        bool, typer.Option("--anyway", help="Write the case in spite of what it lacks; the lack stands in it.")
+    ] = False,
+    as_data: Json = False,
+) -> None:
+    """Make a case of a deck of LS-DYNA, Abaqus/Explicit or Radioss.
+
+    Beside the case stands NAME.import.txt (with --json: NAME.import.json): every keyword of the deck, and where it went
+    or why it did not. Parts have their mesh from the deck itself. Where a case would answer wrong in silence without
+    something that Conoid lacks, the import is refused and names it: --anyway writes the case all the same.
+    Units are given, named by a Radioss deck, or told from a material with the density of steel.
+    docs/import.md has what is taken over.
+    """
+    target = out or deck.with_suffix(".toml")
+    if target.suffix != ".toml":
+        raise UsageError(f"--out = {str(target)!r}: the name of a case file ends in .toml")
+    if target.exists():
+        raise ClientError(f"{target} is there already; name another file with --out")
+    with aloud(f"reading {deck.name}"):
+        found = _placed(read_deck(deck, units, kind), target)
+    written = anyway or not found.refusals
+    listed = target.with_name(f"{target.stem}.import.{'json' if as_data else 'txt'}")
+    text = as_json(found, target.name) if as_data else "\n".join(lines(found, target.name)) + "\n"
+    echo(text, nl=False)
+    save_text(listed, text)
+    if written:
+        save_text(target, _noted(found).toml)
+        save_text(target.with_name(reference.FILE), reference.schema_text())
+    if not as_data:
+        echo("")
+        echo(f"{'written: ' + str(target) + ', ' if written else ''}{listed}")
+    _end(found, target, written)
+
+
+def _placed(found: Imported, target: Path) -> Imported:
+    """With the path of the deck from the folder of the case on."""
+    away = Path(os.path.relpath(found.deck.resolve(), target.resolve().parent)).as_posix()
+    parts = [{**part, "mesh": {**part["mesh"], "path": away}} for part in found.data["parts"]]
+    return replace(found, data={**found.data, "parts": parts})
+
+
+def _noted(found: Imported) -> Imported:
+    """With what it lacks as comments at its head."""
+    lacking = [f"NOT TAKEN OVER: {line}" for line in found.refusals]
+    head = [f"Of {found.deck.name}, {found.kind}, in {found.system}: {found.why}", *lacking]
+    data: dict[str, Any] = {NOTE: head, **found.data}
+    return replace(found, data=data)
+
+
+def _end(found: Imported, target: Path, written: bool) -> None:
+    if not found.refusals:
+        return
+    many = counted(len(found.refusals), "thing")
+    if written:
+        complain(f"warning: {target.name} lacks {many} without which it may answer wrong; they stand at its head")
+        return
+    complain(*found.refusals[:_SHOWN])
+    more = f" ({len(found.refusals) - _SHOWN} more in the list)" if len(found.refusals) > _SHOWN else ""
+    complain(f"no case was written: without {many} it may answer wrong{more}; --anyway writes it, with them at its head")
+    raise typer.Exit(ExitCode.BAD_INPUT)

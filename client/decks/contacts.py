@@ -1,0 +1,71 @@
+"""Which parts of a deck meet each other, with which friction, as the table ``contact`` of a case."""
+
+import itertools
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from .account import Entry
+from .draft import Body, Draft
+
+
+@dataclass(frozen=True)
+class Meeting:
+    """A contact of a deck: bodies, by their keys, that meet ``other``, or each other and themselves (None)."""
+
+    one: frozenset[str]
+    other: frozenset[str] | None
+    friction: float
+    entry: Entry
+
+    def pairs(self) -> set[tuple[str, str]]:
+        """Pairs of different bodies that meet, each in order."""
+        every = itertools.combinations(self.one, 2) if self.other is None else itertools.product(self.one, self.other)
+        return {(min(pair), max(pair)) for pair in every if pair[0] != pair[1]}
+
+
+def meet(draft: Draft, bodies: Sequence[Body], meetings: Sequence[Meeting]) -> None:
+    """The table ``contact``; none where nothing meets, as in the deck."""
+    if not meetings:
+        if len(bodies) > 1:
+            draft.account.remarks.append('the deck has no contact: contact = "none", bodies pass through each other')
+        return
+    names = {body.key: body.name for body in bodies}
+    met = _frictions(meetings)
+    inside = [body for body in bodies if any(body.key in m.one or body.key in (m.other or ()) for m in meetings)]
+    table: dict[str, Any] = {}
+    if len(inside) < len(bodies):
+        table["parts"] = [body.name for body in inside]
+    alone = {key for each in meetings if each.other is None for key in each.one}
+    if alone:
+        table["self_contact"] = [body.name for body in bodies if body.key in alone]
+    common = Counter(met.values()).most_common(1)[0][0] if met else meetings[0].friction
+    table["friction"] = common
+    if other := [
+        {"parts": [names[a], names[b]], "friction": value} for (a, b), value in sorted(met.items()) if value != common
+    ]:
+        table["pairs"] = other
+    draft.contact = table
+    for each in meetings:
+        each.entry.take("contact")
+    _more(meetings, met, [body.key for body in inside], names)
+
+
+def _frictions(meetings: Sequence[Meeting]) -> dict[tuple[str, str], float]:
+    """The friction of each pair; a contact of two bodies goes before one of all."""
+    met: dict[tuple[str, str], float] = {}
+    for each in sorted(meetings, key=lambda one: one.other is not None):
+        for pair in each.pairs():
+            met[pair] = each.friction
+    return met
+
+
+def _more(
+    meetings: Sequence[Meeting], met: dict[tuple[str, str], float], inside: list[str], names: dict[str, str]
+) -> None:
+    """A remark of pairs that meet here and do not in the deck."""
+    extra = [(a, b) for a, b in itertools.combinations(sorted(inside), 2) if (a, b) not in met]
+    if extra:
+        shown = ", ".join(f"{names[a]} and {names[b]}" for a, b in extra[:3]) + (" ..." if len(extra) > 3 else "")
+        meetings[0].entry.remark("differs", "pairs", f"{shown} meet here as well; the deck lets them pass through")

@@ -1,0 +1,76 @@
+"""The codes whose decks are read, and how a file says which one it is of."""
+
+import itertools
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Protocol
+
+from conoid.cases.included import lines
+from conoid.cases.problems import shown
+from conoid.cases.similar import choices
+
+from ..errors import UsageError
+from .abaqus.reading import Abaqus
+from .account import Account
+from .draft import Draft
+from .lsdyna.reading import LsDyna
+from .units import System, Weighed
+
+_LOOKED = 2000
+"""Lines at the start of a file by which it is told. Chosen: no heading of comments is longer."""
+
+
+class Dialect(Protocol):
+    """A deck of one code, read."""
+
+    kind: str
+    account: Account
+
+    def __init__(self, path: Path) -> None:
+        """Reads all of it. Raises CardError or InpError, OSError."""
+
+    @property
+    def own_units(self) -> System | None:
+        """The units that the deck itself names, if it does."""
+
+    def weighed(self) -> Iterable[Weighed]:
+        """Densities of its materials."""
+
+    def draft(self, system: System) -> Draft:
+        """The case; every keyword of ``account`` is decided then."""
+
+
+DIALECTS: dict[str, type[Dialect]] = {"lsdyna": LsDyna, "abaqus": Abaqus}
+_ENDINGS = {".k": "lsdyna", ".key": "lsdyna", ".dyn": "lsdyna", ".inp": "abaqus", ".rad": "radioss"}
+_LSDYNA = ("*KEYWORD", "*TITLE", "*CONTROL_", "*NODE", "*PART", "*INCLUDE", "*PARAMETER", "*COMMENT")
+_ABAQUS = ("*HEADING", "*PREPRINT", "*PART,", "*NODE,", "*ASSEMBLY", "*ELEMENT,", "*PARAMETER")
+
+
+def dialect_of(path: Path, wanted: str | None) -> type[Dialect]:
+    """The code of a deck: the one that is named, else by its first lines and its name. Raises UsageError, OSError."""
+    found = wanted or _told(path)
+    if found not in DIALECTS:
+        raise UsageError(f"--format = {shown(found)}: allowed: {choices(list(DIALECTS))}")
+    return DIALECTS[found]
+
+
+def _told(path: Path) -> str:
+    try:
+        head = [text.strip() for _, text in itertools.islice(lines(path), _LOOKED)]
+    except ValueError as error:
+        raise UsageError(f"{path}: {error}") from None
+    first = next((text.upper() for text in head if text and not text.startswith(("$", "**", "#"))), "")
+    if any(text.startswith(("/BEGIN", "#RADIOSS")) for text in head):
+        return "radioss"
+    if first.startswith("*KEYWORD"):
+        return "lsdyna"
+    by_name = _ENDINGS.get(path.suffix.lower())
+    if by_name is not None and first.startswith(("*", "/")):
+        return by_name
+    if first.startswith(_ABAQUS) and not any(text.startswith("$") for text in head):
+        return "abaqus"
+    if first.startswith(_LSDYNA):
+        return "lsdyna"
+    raise UsageError(
+        f"{path}: neither an LS-DYNA keyword deck, an Abaqus input file nor a Radioss starter; --format says"
+    )

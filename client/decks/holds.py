@@ -1,0 +1,155 @@
+"""Nodes that a deck holds or drives, as boundaries of a case: planes of symmetry, whole parts, sets of the mesh."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from .account import Entry
+from .draft import Body, Draft
+from .topology import Chosen, Topology
+from .units import LENGTH, SPEED, TIME
+
+AXES = ("x", "y", "z")
+Course = tuple[tuple[float, float], ...]
+"""Times, in the unit of the deck, and factors."""
+_NEAR = 1e-6
+"""Of the size of a body: nodes no further apart along an axis are on one plane. Chosen: above the six digits of files,
+far below any tet."""
+
+
+@dataclass
+class Hold:
+    """Nodes whose velocity is given along some axes, in units of the deck."""
+
+    chosen: Chosen
+    entry: Entry
+    speeds: dict[str, float]
+    """Along x, y, z; 0 holds them."""
+    course: Course = ()
+    open: set[str] = field(default_factory=set)
+    """Axes that no boundary has yet."""
+
+    def __post_init__(self) -> None:
+        """All are open."""
+        self.open = set(self.speeds)
+
+
+class Holding:
+    """Makes boundaries of all holds of a deck."""
+
+    def __init__(self, draft: Draft, topology: Topology, bodies: Sequence[Body]) -> None:
+        """``bodies``: those of the case, which have their names."""
+        self._draft, self._topology = draft, topology
+        self._names = {body.key: body.name for body in bodies}
+
+    def add(self, holds: Sequence[Hold], walls: Sequence[tuple[str, ...]]) -> None:
+        """Boundaries of ``holds``. ``walls``: the keys of the parts that each rigid wall stops."""
+        partial = [each for each in holds if each.chosen.bodies is None and not each.course]
+        for axis in AXES:
+            self._planes(axis, [each for each in partial if self._slides(each) and each.speeds.get(axis) == 0.0])
+        for each in holds:
+            if each.open:
+                self._one(each, walls)
+
+    def _slides(self, hold: Hold) -> bool:
+        """Whether the nodes are held along some axes and free along others."""
+        return 0 < sum(speed == 0.0 for speed in hold.speeds.values()) < 3 and not any(hold.speeds.values())
+
+    # Planes of symmetry -----------------------------------------------------------------------------------------------
+
+    def _planes(self, axis: str, holds: list[Hold]) -> None:
+        """A boundary for each plane whose nodes are all held across it, at an end of the bodies that it cuts."""
+        held = set().union(*(self._topology.nodes(each.chosen) for each in holds))
+        planes: dict[float, list[str]] = {}
+        done: set[int] = set()
+        for key in self._topology.bodies:
+            if (at := self._plane(axis, key, held)) is not None:
+                same = next((known for known in planes if abs(known - at) <= _NEAR * max(abs(at), 1e-300)), at)
+                planes.setdefault(same, []).append(key)
+                done |= self._topology.mesh.nodes[key] & held
+        of_bodies = set().union(*(self._topology.mesh.nodes[key] for key in self._topology.bodies)) if planes else set()
+        covered = [each for each in holds if self._topology.nodes(each.chosen) & of_bodies <= done]
+        if not planes or len(covered) < len(holds):
+            return
+        for at, keys in planes.items():
+            nodes = set().union(*(self._topology.mesh.nodes[key] for key in keys))
+            those = [each for each in covered if not self._topology.nodes(each.chosen).isdisjoint(nodes)]
+            table = {"kind": "symmetry", "axis": axis, "at": self._draft.quantity(at, LENGTH)}
+            self._draft.add_boundary({**table, **self._parts(keys)}, *(each.entry for each in those))
+        for each in covered:
+            each.open.discard(axis)
+
+    def _plane(self, axis: str, key: str, held: set[int]) -> float | None:
+        """Where the held nodes of a body are, if they are all nodes of one plane at an end of it."""
+        mesh, d = self._topology.mesh, AXES.index(axis)
+        mine = mesh.nodes[key] & held
+        if not mine:
+            return None
+        every = [mesh.points[node][d] for node in mesh.nodes[key] if node in mesh.points]
+        here = [mesh.points[node][d] for node in mine if node in mesh.points]
+        low, high = min(every, default=0.0), max(every, default=0.0)
+        near = _NEAR * (high - low)
+        if not here or max(here) - min(here) > near or near == 0.0:
+            return None
+        at = here[0]
+        if min(at - low, high - at) > near:
+            return None
+        return at if sum(abs(x - at) <= near for x in every) == len(here) else None
+
+    # Whole parts and sets ---------------------------------------------------------------------------------------------
+
+    def _one(self, hold: Hold, walls: Sequence[tuple[str, ...]]) -> None:
+        full, some = self._topology.whole(hold.chosen)
+        if not full and not some:
+            hold.entry.leave(f"{hold.chosen.what} has no node of a part of the case")
+            return
+        table: dict[str, Any] = {"kind": "velocity"}
+        if some and hold.chosen.on is None:
+            hold.entry.refuse(f"{hold.chosen.what} are some nodes of a part and no set of the mesh that has a name")
+            return
+        if some:
+            table["on"] = hold.chosen.on
+            stopped = {key for wall in walls for key in wall} & {*full, *some}
+            if stopped and len(hold.speeds) < 3:
+                names = ", ".join(sorted(self._names[key] for key in stopped))
+                hold.entry.remark(
+                    "refused", hold.chosen.what,
+                    f"its nodes slide, and a rigid wall stops {names}: walls do not hold nodes that are driven here",
+                )  # fmt: skip
+        table |= self._parts([*full, *some])
+        table |= {axis: self._draft.quantity(hold.speeds[axis], SPEED) for axis in AXES if axis in hold.open}
+        if hold.course:
+            table["course"] = [[self._draft.quantity(time, TIME), factor] for time, factor in hold.course]
+        self._draft.add_boundary(table, hold.entry)
+
+    def _parts(self, keys: Sequence[str]) -> dict[str, Any]:
+        """The key ``parts``; none where all are meant."""
+        return {} if len(keys) == len(self._names) else {"parts": [self._names[key] for key in keys]}
+
+
+def velocity_course(curve: Course, end: float) -> tuple[float, Course]:
+    """Speed and course of velocities by time: the largest one, and its factors. Raises ValueError for no curve."""
+    if not curve:
+        raise ValueError("the curve has no points")
+    most = max((value for _, value in curve), key=abs)
+    if all(value == most for _, value in curve):
+        return most, ()
+    if curve[-1][0] < end:
+        raise ValueError(f"the curve ends at {curve[-1][0]:g}, before the end of the run at {end:g}")
+    return most, tuple((time, value / most) for time, value in curve)
+
+
+def displacement_speed(curve: Course, end: float) -> float:
+    """The constant velocity of displacements that grow evenly from 0 up to the end. Raises ValueError for others."""
+    inside = [(time, value) for time, value in curve if time <= end]
+    if curve and curve[-1][0] < end:
+        raise ValueError(f"the curve ends at {curve[-1][0]:g}, before the end of the run at {end:g}")
+    beyond = [(time, value) for time, value in curve if time > end][:1]
+    points = [*inside, *beyond]
+    if len(points) < 2 or points[0] != (0.0, 0.0):
+        raise ValueError("displacements are taken over that begin at 0 at the time 0")
+    speed = points[-1][1] / points[-1][0]
+    most = max(abs(value) for _, value in points)
+    if any(abs(speed * time - value) > 1e-6 * most for time, value in points):
+        raise ValueError("displacements are taken over that grow evenly alone: their velocity jumps; give velocities")
+    return speed

@@ -1,0 +1,135 @@
+"""A deck of another code becomes a case beside it, with the list of what was taken over and what was not."""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from conoid.cases import whole
+from conoid.cases.cards import CardError
+from conoid.cases.figures import counted
+from conoid.cases.inp import InpError
+from conoid.cases.load import CaseError, parse_case
+from conoid.cases.problems import shown
+
+from ..errors import ClientError, UsageError
+from . import units
+from .account import Account, Entry
+from .dialects import Dialect, dialect_of
+from .toml import bare, toml
+
+
+@dataclass(frozen=True)
+class Imported:
+    """A deck as a case: ``data`` with comments, ``account`` of every keyword, ``refusals`` where it would answer wrong."""
+
+    deck: Path
+    kind: str
+    system: units.System
+    why: str
+    """Of the units."""
+    data: dict[str, Any]
+    account: Account
+    refusals: list[str]
+
+    @property
+    def toml(self) -> str:
+        """The text of the case."""
+        return toml(self.data)
+
+
+def read_deck(path: Path, wanted: str | None = None, kind: str | None = None) -> Imported:
+    """What a deck says. ``wanted``: units as the user names them; ``kind``: of DIALECTS, else told from the file.
+
+    Raises UsageError where units are needed, or for a file that is no deck, with one line.
+    """
+    try:
+        dialect = dialect_of(path, kind)(path)
+        system, why = _units(dialect, wanted)
+        draft = dialect.draft(system)
+    except (CardError, InpError) as error:
+        raise UsageError(f"{path}: {error}") from None
+    except OSError as error:
+        raise ClientError(f"{path}: cannot be read: {error.strerror or error}") from None
+    account = dialect.account
+    account.close()
+    data = draft.data()
+    refusals = account.refusals()
+    if not data["parts"]:
+        refusals.append("the deck has no part of solids")
+    if not refusals:
+        refusals += _checked(data)
+    return Imported(path, dialect.kind, system, why, data, account, refusals)
+
+
+def _units(dialect: Dialect, wanted: str | None) -> tuple[units.System, str]:
+    """The system of the user, of the deck, or the one in which something is steel; and why."""
+    own, system = dialect.own_units, None if wanted is None else units.named(wanted)
+    if own is not None:
+        if system is not None and system != own:
+            raise UsageError(f"--units = {wanted!r}: the deck says {own}")
+        return own, "the deck says so"
+    if system is not None:
+        return system, "given by --units"
+    return units.told(dialect.weighed())
+
+
+def _checked(data: dict[str, Any]) -> list[str]:
+    """What is wrong with the case that was made, as ``conoid validate`` words it."""
+    try:
+        parse_case(bare(data))
+    except CaseError as error:
+        return [f"the case would not be valid: {each}" for each in error.problems]
+    return []
+
+
+# What people are told -------------------------------------------------------------------------------------------------
+
+
+def lines(found: Imported, target: str) -> list[str]:
+    """The list for people: what was taken over, with its key, what was not, and why; every keyword once."""
+    account = found.account
+    told = [f"{found.deck.name}, {found.kind} -> {target}", f"units: {found.system}: {found.why}"]
+    told += [f"note: {each}" for each in account.remarks]
+    for title, fate in (("refused", "refused"), ("taken over", "taken"), ("not taken over", "left")):
+        entries = account.of(fate)  # type: ignore[arg-type]
+        if entries:
+            told += ["", f"{title}: {counted(len(entries), 'keyword')}"]
+            told += [line for entry in entries for line in _entry(entry)]
+    general = [
+        line for line in found.refusals if line not in {each for one in account.entries for each in one.refusals()}
+    ]
+    return [*told, *(["", "refused:"] if general else []), *(f"  {line}" for line in general)]
+
+
+def _entry(entry: Entry) -> list[str]:
+    said = "; ".join(entry.reasons) if entry.fate != "taken" else ", ".join(entry.places)
+    arrow = "->" if entry.fate == "taken" else ":"
+    words = {"left": "left out", "differs": "differs", "refused": "REFUSED"}
+    return [
+        f"  {entry.place:<8} {entry.keyword} {arrow} {said}",
+        *(f"           {words[each.kind]}: {each.what}: {each.why}" for each in entry.details),
+    ]
+
+
+def report(found: Imported, target: str) -> dict[str, Any]:
+    """The same as plain data, for JSON."""
+    return {
+        "deck": str(found.deck), "kind": found.kind, "case": target, "units": str(found.system),
+        "units_why": found.why, "notes": found.account.remarks, "refused": found.refusals,
+        "keywords": [each.data() for each in found.account.entries],
+    }  # fmt: skip
+
+
+def as_json(found: Imported, target: str) -> str:
+    """``report`` as text."""
+    return json.dumps(report(found, target), indent=2, ensure_ascii=False) + "\n"
+
+
+def size_of(path: Path) -> int:
+    """Bytes of a deck. Raises ClientError for what is no regular file."""
+    try:
+        with whole.opened(path) as file:
+            return file.seek(0, 2)
+    except OSError as error:
+        raise ClientError(f"deck = {shown(str(path))}: {error.strerror or error}") from None

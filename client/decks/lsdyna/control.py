@@ -1,0 +1,98 @@
+"""Contact, the end and the time step of an LS-DYNA deck."""
+
+from collections.abc import Callable
+
+from conoid.cases.cards import Block
+
+from ..account import Entry
+from ..contacts import Meeting
+from ..draft import Draft
+from ..units import TIME
+from .fields import Fields, trimmed
+
+SINGLE = frozenset({"CONTACT_AUTOMATIC_SINGLE_SURFACE", "CONTACT_ERODING_SINGLE_SURFACE", "CONTACT_AUTOMATIC_GENERAL",
+                    "CONTACT_SINGLE_SURFACE"})  # fmt: skip
+DOUBLE = frozenset({
+    "CONTACT_AUTOMATIC_SURFACE_TO_SURFACE", "CONTACT_ERODING_SURFACE_TO_SURFACE", "CONTACT_SURFACE_TO_SURFACE",
+    "CONTACT_AUTOMATIC_NODES_TO_SURFACE", "CONTACT_ERODING_NODES_TO_SURFACE", "CONTACT_NODES_TO_SURFACE",
+    "CONTACT_AUTOMATIC_ONE_WAY_SURFACE_TO_SURFACE", "CONTACT_ONE_WAY_SURFACE_TO_SURFACE",
+})  # fmt: skip
+TIED = frozenset({"CONTACT_TIED_SURFACE_TO_SURFACE", "CONTACT_TIED_NODES_TO_SURFACE"})
+OPTIONS = frozenset({"ID", "TITLE", "MPP"})
+_LAYOUT = (
+    "SSID MSID SSTYP MSTYP SBOXID MBOXID SPR MPR", "FS FD DC VC VDC PENCHK BT DT", "SFS SFM SST MST SFST SFMT FSF VSF",
+)  # fmt: skip
+Surface = Callable[[int, int, Entry], frozenset[str]]
+"""Bodies of a surface: its number, its type, the keyword. Raises ValueError."""
+
+
+def contact(block: Block, name: str, options: frozenset[str], entry: Entry, surface: Surface) -> Meeting:
+    """A contact by its three cards; bodies of a single one meet each other and themselves. Raises ValueError."""
+    fields = Fields(block, entry, trimmed(block.cards)[bool(options & {"ID", "TITLE"}) :], _LAYOUT)
+    fields.forgive("SPR MPR PENCHK VC VDC SFS SFM SST MST SFST SFMT VSF", "stiffness and output of the penalty method")
+    fields.refuse("SBOXID MBOXID", "boxes are not taken over")
+    fields.refuse("BT", "the contact begins later; here it is there from the start on")
+    if 0.0 < fields.real("DT") < 1e19:
+        fields.refuse("DT", "the contact ends; here it lasts")
+    scale = fields.nonzero("FSF", 1.0)
+    if scale != 1.0:
+        fields.refuse("FSF", "friction is scaled")
+    still, sliding, decay = fields.real("FS"), fields.real("FD"), fields.real("DC")
+    if still < 0.0 or (decay and still != sliding):
+        entry.remark("refused", f"FS = {still:g}, FD = {sliding:g}", "friction depends on the speed or the part; here it "
+                     "is one number, FS with --anyway")  # fmt: skip
+    elif sliding != still and sliding:
+        entry.remark("left", f"FD = {sliding:g}", "without DC friction is FS at any speed")
+    one = surface(fields.whole("SSID"), fields.whole("SSTYP"), entry)
+    other = None if name in SINGLE else surface(fields.whole("MSID"), fields.whole("MSTYP"), entry)
+    if name in SINGLE:
+        fields.forgive("MSID MSTYP", "a single surface has no other one")
+    if any(card.text.strip() for card in fields.more):
+        entry.remark("left", f"line {fields.more[0].number}", "optional cards of the penalty method")
+        fields.more.clear()
+    fields.rest("refused")
+    return Meeting(one, other, max(still, 0.0), entry)
+
+
+def termination(block: Block, entry: Entry) -> float:
+    """The end of the run, in units of the deck. Raises ValueError."""
+    fields = Fields(block, entry, block.cards, ("ENDTIM ENDCYC DTMIN ENDENG ENDMAS NOSOL",))
+    end = fields.real("ENDTIM")
+    if end <= 0.0:
+        raise ValueError(f"ENDTIM = {end:g} is not above 0")
+    fields.refuse("NOSOL", "no solution is computed")
+    fields.rest("left", "another end of the run: run.max_steps, run.residual_limit")
+    entry.take("run.end_time")
+    return end
+
+
+def time_step(draft: Draft, block: Block, entry: Entry) -> None:
+    """``TSSFAC``, and what is not taken over."""
+    layout = ("DTINIT TSSFAC ISDO TSLIMT DT2MS LCTM ERODE MS1ST",)
+    fields = Fields(block, entry, block.cards, layout)
+    safety = fields.real("TSSFAC")
+    if 0.0 < safety <= 1.0:
+        draft.numerics["dt_safety"] = safety
+        fields.differ("TSSFAC", "of the bound of this solver, which is below that by the smallest altitude")
+        entry.take("numerics.dt_safety")
+    else:
+        entry.leave("no TSSFAC: numerics.dt_safety is 0.9")
+    fields.forgive("DT2MS", "mass is not scaled here: the steps are those of the true mass")
+    fields.forgive("DTINIT TSLIMT ISDO LCTM", "limits of the step")
+    fields.forgive("ERODE MS1ST", "what becomes of elements with small steps")
+    fields.rest("left")
+
+
+def pictures(draft: Draft, block: Block, entry: Entry, end: float) -> None:
+    """``*DATABASE_BINARY_D3PLOT``: frames."""
+    fields = Fields(block, entry, block.cards, ("DT LCDT BEAM NPLTC PSETID",))
+    interval, count = fields.real("DT"), fields.whole("NPLTC")
+    frames = count or (round(end / interval) if interval > 0.0 else 0)
+    if not 0 < frames <= 100_000:
+        entry.leave("neither DT nor NPLTC give a number of frames: run.frames is 20")
+        return
+    draft.run["frames"] = frames
+    entry.take("run.frames")
+    if not count and abs(frames * interval - end) > 1e-6 * end:
+        fields.differ("DT", f"{frames} frames, every {draft.quantity(end / frames, TIME)}: evenly to the end")
+    fields.rest("left")

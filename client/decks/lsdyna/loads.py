@@ -1,0 +1,216 @@
+"""What moves, holds and stops bodies in an LS-DYNA deck: velocities at the start, restraints, motions, walls, gravity."""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from conoid.cases.cards import Block
+
+from ..account import Entry
+from ..draft import Draft
+from ..holds import Course, Hold, displacement_speed, velocity_course
+from ..start import Start
+from ..topology import Chosen
+from ..units import ACCELERATION, LENGTH, TIME
+from .fields import Fields, trimmed
+
+_AXES = {1: "x", 2: "y", 3: "z"}
+_CORNERS = "DOFX DOFY DOFZ"
+
+
+@dataclass
+class Scene:
+    """What loads ask of the deck, and what they add to the case."""
+
+    draft: Draft
+    nodes: Callable[[int, Entry], Chosen]
+    """The node set of a number; raises ValueError."""
+    bodies: Callable[[int, Entry], Chosen]
+    """The part set of a number; raises ValueError."""
+    part: Callable[[int], Chosen]
+    curve: Callable[[int], Course]
+    """Raises ValueError."""
+    end: float
+    starts: list[Start] = field(default_factory=list)
+    holds: list[Hold] = field(default_factory=list)
+    walls: list[tuple[Chosen, dict[str, Any], Entry]] = field(default_factory=list)
+
+
+# Velocities at the start ----------------------------------------------------------------------------------------------
+
+
+def velocity(scene: Scene, block: Block, options: frozenset[str], entry: Entry) -> None:
+    """``*INITIAL_VELOCITY``: of a node set, or of everything."""
+    fields = Fields(block, entry, block.cards, ("NSID NSIDEX BOXID IRIGID ICID", "VX VY VZ VXR VYR VZR"))
+    fields.refuse("NSIDEX BOXID ICID", "exceptions, boxes and local axes are not taken over")
+    fields.forgive("IRIGID", "whether velocities of rigid bodies are overwritten")
+    fields.refuse("VXR VYR VZR", "solids have no rotations of nodes")
+    chosen = scene.nodes(fields.whole("NSID"), entry)
+    scene.starts.append(Start(chosen, entry, {axis: fields.real(f"V{'XYZ'[axis]}") for axis in range(3)}))
+    fields.rest("refused")
+
+
+def velocity_node(scene: Scene, block: Block, options: frozenset[str], entry: Entry) -> None:
+    """``*INITIAL_VELOCITY_NODE``: of single nodes; those with one velocity are taken together."""
+    groups: dict[tuple[float, ...], set[int]] = {}
+    for card in block.filled():
+        fields = Fields(block, entry, [card], ("NID VX VY VZ VXR VYR VZR ICID",))
+        fields.refuse("VXR VYR VZR ICID", "solids have no rotations of nodes, and local axes are not taken over")
+        values = tuple(fields.real(f"V{axis}") for axis in "XYZ")
+        groups.setdefault(values, set()).add(fields.whole("NID"))
+    for values, nodes in groups.items():
+        chosen = Chosen(f"{len(nodes)} nodes", nodes=lambda nodes=nodes: nodes)  # type: ignore[misc]
+        scene.starts.append(Start(chosen, entry, dict(enumerate(values))))
+
+
+def generation(scene: Scene, block: Block, options: frozenset[str], entry: Entry) -> None:
+    """``*INITIAL_VELOCITY_GENERATION``: translation, and rotation about an axis."""
+    layout = ("ID STYP OMEGA VX VY VZ IVATN ICID", "XC YC ZC NX NY NZ PHASE IRIGID")
+    cards = trimmed(block.cards)
+    for one, two in zip(cards[::2], [*cards[1::2], None], strict=False):
+        fields = Fields(block, entry, [card for card in (one, two) if card is not None], layout)
+        fields.refuse("ICID PHASE", "local axes and later phases are not taken over")
+        fields.forgive("IVATN IRIGID", "how rigid bodies and attached nodes are treated")
+        number, kind = fields.whole("ID"), fields.whole("STYP")
+        wanted = {1: scene.bodies, 2: lambda n, _: scene.part(n), 3: scene.nodes}.get(kind)
+        if wanted is None and number:
+            raise ValueError(f"STYP = {kind} is not 1, 2 or 3")
+        chosen = scene.nodes(0, entry) if wanted is None or not number else wanted(number, entry)
+        speed = {axis: fields.real(f"V{'XYZ'[axis]}") for axis in range(3)}
+        rate, centre = _axis(fields)
+        scene.starts.append(Start(chosen, entry, speed, rate, centre))
+        fields.rest("refused")
+
+
+def _axis(fields: Fields) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+    """Rotation vector and a point of the axis."""
+    turn = fields.real("OMEGA")
+    centre = fields.real("XC"), fields.real("YC"), fields.real("ZC")
+    along = [fields.real(name) for name in ("NX", "NY", "NZ")]
+    length = math.sqrt(sum(value * value for value in along))
+    if turn and (length == 0.0 or along[0] == -999.0):
+        raise ValueError("OMEGA turns about an axis that is no direction")
+    x, y, z = (turn * value / length if turn else 0.0 for value in along)
+    return (x, y, z), centre
+
+
+def velocity_rigid(scene: Scene, block: Block, options: frozenset[str], entry: Entry) -> None:
+    """``*INITIAL_VELOCITY_RIGID_BODY``."""
+    for card in block.filled():
+        fields = Fields(block, entry, [card], ("PID VX VY VZ VXR VYR VZR ICID",))
+        fields.refuse("VXR VYR VZR ICID", "the spin is about the centre of mass there; give parts[].spin here")
+        speed = {axis: fields.real(f"V{'XYZ'[axis]}") for axis in range(3)}
+        scene.starts.append(Start(scene.part(fields.whole("PID")), entry, speed))
+
+
+# Restraints and motions -----------------------------------------------------------------------------------------------
+
+
+def restraint(scene: Scene, block: Block, options: frozenset[str], entry: Entry) -> None:
+    """``*BOUNDARY_SPC_SET`` and ``_NODE``: nodes that do not move along some axes."""
+    single = "NODE" in options
+    for card in list(block.filled())["ID" in options :]:
+        fields = Fields(block, entry, [card], ("ID CID DOFX DOFY DOFZ DOFRX DOFRY DOFRZ",))
+        fields.refuse("CID", "local axes are not taken over")
+        fields.forgive("DOFRX DOFRY DOFRZ", "nodes of solids have no rotations")
+        speeds = {axis: 0.0 for axis, name in zip("xyz", _CORNERS.split(), strict=True) if fields.whole(name)}
+        number = fields.whole("ID")
+        chosen = _single(number) if single else scene.nodes(number, entry)
+        if speeds:
+            scene.holds.append(Hold(chosen, entry, speeds))
+        else:
+            entry.leave("no translation is held")
+
+
+def _single(number: int) -> Chosen:
+    return Chosen(f"node {number}", nodes=lambda: {number})
+
+
+def motion(scene: Scene, block: Block, options: frozenset[str], entry: Entry) -> None:
+    """``*BOUNDARY_PRESCRIBED_MOTION_SET``, ``_NODE`` and ``_RIGID``: a velocity or a displacement by a curve."""
+    for card in list(block.filled())["ID" in options :]:
+        fields = Fields(block, entry, [card], ("ID DOF VAD LCID SF VID DEATH BIRTH",))
+        number, axis = fields.whole("ID"), _AXES.get(fields.whole("DOF"))
+        if axis is None:
+            raise ValueError(f"DOF = {fields.text('DOF')} is not 1, 2 or 3: motions along x, y and z are taken over")
+        scale, kind = fields.nonzero("SF", 1.0), fields.whole("VAD")
+        curve = tuple((time, scale * value) for time, value in scene.curve(fields.whole("LCID")))
+        if 0.0 < fields.real("DEATH") < scene.end:
+            fields.refuse("DEATH", "the motion ends before the run does; here it lasts")
+        fields.refuse("BIRTH", "the motion begins later; here it is from the start on")
+        fields.forgive("VID", "a direction of DOF = 4")
+        if kind == 0:
+            speed, course = velocity_course(curve, scene.end)
+        elif kind == 2:
+            speed, course = displacement_speed(curve, scene.end), ()
+        else:
+            raise ValueError(f"VAD = {kind}: velocities (0) and displacements (2) are taken over")
+        chosen = scene.part(number) if "RIGID" in options else _single(number) if "NODE" in options else None
+        scene.holds.append(Hold(chosen or scene.nodes(number, entry), entry, {axis: speed}, course))
+        fields.rest("refused")
+
+
+# Walls and gravity ----------------------------------------------------------------------------------------------------
+
+
+def wall(scene: Scene, block: Block, options: frozenset[str], entry: Entry) -> None:
+    """``*RIGIDWALL_PLANAR``: a plane at rest, without end."""
+    cards = block.cards["ID" in options :]
+    layout = ("NSID NSIDEX BOXID OFFSET BIRTH DEATH RWKSF", "XT YT ZT XH YH ZH FRIC WVEL")
+    fields = Fields(block, entry, cards, layout)
+    fields.refuse("NSIDEX BOXID OFFSET BIRTH", "exceptions, boxes, offsets and times are not taken over")
+    if 0.0 < fields.real("DEATH") < scene.end:
+        fields.refuse("DEATH", "the wall goes before the run ends; here it stays")
+    fields.forgive("RWKSF WVEL", "how rigid bodies meet the wall, and a threshold of welding")
+    tail = [fields.real(name) for name in ("XT", "YT", "ZT")]
+    head = [fields.real(name) for name in ("XH", "YH", "ZH")]
+    friction = fields.real("FRIC")
+    if not 0.0 <= friction < 1.0:
+        fields.refuse("FRIC", "nodes stick to the wall there; here friction is Coulomb's")
+        friction = 0.0
+    number = fields.whole("NSID")
+    if number:
+        entry.remark(
+            "differs", f"NSID = {number}", "it stops the nodes of this set there, here all nodes of their parts"
+        )
+    normal = [b - a for a, b in zip(tail, head, strict=True)]
+    if not any(normal):
+        raise ValueError("its normal, from XT YT ZT to XH YH ZH, has no length")
+    table: dict[str, Any] = {"kind": "wall", "point": scene.draft.vector(tail, LENGTH), "normal": normal}
+    if friction:
+        table["friction"] = friction
+    scene.walls.append((scene.nodes(number, entry), table, entry))
+    fields.rest("refused")
+
+
+def body_load(scene: Scene, block: Block, options: frozenset[str], entry: Entry) -> None:
+    """``*LOAD_BODY_X``, ``_Y``, ``_Z``: the base accelerates that way, so that bodies are pulled the other way."""
+    fields = Fields(block, entry, block.cards, ("LCID SF LCIDDR XC YC ZC CID",))
+    fields.forgive("LCIDDR", "the load of the dynamic relaxation")
+    fields.refuse("CID", "local axes are not taken over")
+    fields.forgive("XC YC ZC", "a centre of rotation, of no meaning for a translation")
+    (axis,) = options & {"X", "Y", "Z"}
+    scale = fields.nonzero("SF", 1.0)
+    curve = tuple((time, -scale * value) for time, value in scene.curve(fields.whole("LCID")))
+    most, course = velocity_course(curve, scene.end)
+    pull = [most if axis == each else 0.0 for each in "XYZ"]
+    table: dict[str, Any] = {"kind": "gravity", "acceleration": scene.draft.vector(pull, ACCELERATION)}
+    if course:
+        table["course"] = [[scene.draft.quantity(time, TIME), factor] for time, factor in course]
+    entry.remark("differs", f"LOAD_BODY_{axis}", f"the base accelerates along +{axis}: bodies are pulled along -{axis}")
+    scene.draft.add_boundary(table, entry)
+
+
+Handler = Callable[[Scene, Block, frozenset[str], Entry], None]
+HANDLERS: Mapping[str, tuple[Handler, frozenset[str]]] = {
+    "INITIAL_VELOCITY": (velocity, frozenset()),
+    "INITIAL_VELOCITY_NODE": (velocity_node, frozenset()),
+    "INITIAL_VELOCITY_GENERATION": (generation, frozenset()),
+    "INITIAL_VELOCITY_RIGID_BODY": (velocity_rigid, frozenset()),
+    "BOUNDARY_SPC": (restraint, frozenset({"SET", "NODE", "ID"})),
+    "BOUNDARY_PRESCRIBED_MOTION": (motion, frozenset({"SET", "NODE", "RIGID", "ID"})),
+    "RIGIDWALL_PLANAR": (wall, frozenset({"ID", "FORCES", "DISPLAY"})),
+    "LOAD_BODY": (body_load, frozenset({"X", "Y", "Z"})),
+}
+"""Keywords that are taken over, with the options that may stand behind them."""

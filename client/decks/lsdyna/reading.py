@@ -1,0 +1,349 @@
+"""An LS-DYNA keyword deck as a case."""
+
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+
+from conoid.cases.cards import Block, CardError, Deck
+
+from ..account import Account, Entry
+from ..contacts import Meeting, meet
+from ..draft import Body, Draft, Made
+from ..holds import Holding
+from ..naming import Names
+from ..start import begin
+from ..topology import Chosen, Topology
+from ..units import TIME, System, Weighed
+from . import control, loads, materials, sets
+from .fields import Fields, numbers
+from .mesh import read_mesh
+from .words import LEFT, REFUSED, reason
+
+_MESH = ("NODE", "ELEMENT_SOLID")
+_SETS = frozenset({"TITLE", "LIST", "GENERATE", "GENERAL", "ADD", "COLUMN", "COLLECT", "ADVANCED", "INTERSECT"})
+
+
+class LsDyna:
+    """The keywords of a deck, and what becomes of each."""
+
+    kind = "LS-DYNA keyword deck"
+
+    def __init__(self, path: Path) -> None:
+        """Reads all of ``path`` and of what it includes. Raises CardError, OSError."""
+        self.path, self.account = path, Account()
+        self._blocks: list[tuple[Block, Entry]] = []
+        deck = Deck(path)
+        for block in deck.blocks():
+            entry = self._open(block)
+            if block.name not in _MESH and not block.name.startswith("ELEMENT_SOLID"):
+                self._blocks.append((block, entry))
+        for block in deck.followed:
+            self._open(block)
+        self._node_sets: dict[int, sets.NodeSet] = {}
+        self._segments: dict[int, sets.NodeSet] = {}
+        self._part_sets: dict[int, tuple[set[int], Entry]] = {}
+        self._curves: dict[int, tuple[sets.Curve, Entry]] = {}
+        self._materials: dict[int, tuple[str, Fields, str]] = {}
+        self._states: dict[int, Fields] = {}
+        self._eroding: dict[int, Fields] = {}
+        self._bodies: list[Body] = []
+        self._state_of: dict[str, int] = {}
+        self.title = ""
+        for block, entry in self._blocks:
+            self._guarded(self._define, block, entry)
+
+    own_units: System | None = None
+
+    def _open(self, block: Block) -> Entry:
+        entry = self.account.open(f"*{block.name}", block.number, block.file)
+        if block.name in _MESH or block.name.startswith("ELEMENT_SOLID"):
+            entry.take("parts[].mesh")
+        elif why := reason(block.name, LEFT):
+            entry.leave(why)
+        return entry
+
+    def _guarded(self, do: object, block: Block, entry: Entry) -> None:
+        """Does what is to be done with a keyword; one that cannot be read refuses the import, with its line."""
+        try:
+            do(block, entry)  # type: ignore[operator]
+        except (CardError, ValueError) as error:
+            entry.refuse(str(error))
+
+    # What the deck defines --------------------------------------------------------------------------------------------
+
+    def _define(self, block: Block, entry: Entry) -> None:
+        name, options = block.parted({"TITLE", "ID"})
+        plain = materials.NUMBERS.get(name, name)
+        if plain in materials.LAYOUTS:
+            title, cards = sets.titled(block, options)
+            fields = Fields(block, entry, cards, materials.LAYOUTS[plain])
+            if plain.startswith("EOS"):
+                self._states[fields.whole("EOSID")] = fields
+            else:
+                self._materials[fields.whole("MID")] = plain, fields, title
+        elif name == "MAT_ADD_EROSION":
+            layout = (
+                "MID EXCL MXPRES MNEPS EFFEPS VOLEPS NUMFIP NCS",
+                "MNPRES SIGP1 SIGVM MXEPS EPSSH SIGTH IMPULSE FAILTM",
+            )
+            fields = Fields(block, entry, sets.titled(block, options)[1], layout)
+            self._eroding[fields.whole("MID")] = fields
+        elif name.startswith("MAT_"):
+            card = sets.titled(block, options)[1][:1]
+            fields = Fields(block, entry, card, ("MID RO",))
+            self._materials[fields.whole("MID")] = plain, fields, sets.titled(block, options)[0]
+        elif name.startswith(("SET_NODE", "SET_SEGMENT", "SET_PART")):
+            self._set(block, entry)
+        elif name == "DEFINE_CURVE":
+            number, curve = sets.curve(block, options, entry)
+            self._curves[number] = curve, entry
+        elif block.name in ("PART", "PART_CONTACT"):
+            self._parts(block, entry)
+        elif name == "TITLE" or block.name == "TITLE":
+            self.title = next((card.text.strip() for card in block.filled()), "")
+            entry.take("title") if self.title else entry.leave("it is empty")
+
+    def _set(self, block: Block, entry: Entry) -> None:
+        name, options = block.parted(_SETS)
+        if name == "SET_NODE":
+            found = sets.node_set(block, options, entry)
+            self._node_sets[found.number] = found
+        elif name == "SET_SEGMENT":
+            found = sets.segment_set(block, options, entry)
+            self._segments[found.number] = found
+        elif name == "SET_PART" and not options - {"LIST", "TITLE"}:
+            cards = sets.titled(block, options)[1]
+            number = Fields(block, entry, cards, ("SID",)).whole("SID")
+            self._part_sets[number] = set(numbers(block, cards[1:], "pid")), entry
+        else:
+            entry.refuse(f"*{block.name} is not followed")
+
+    def _parts(self, block: Block, entry: Entry) -> None:
+        cards, step = list(block.cards), 3 if block.name == "PART_CONTACT" else 2
+        while cards and not cards[-1].text.strip():
+            cards.pop()
+        for title, card in zip(cards[::step], cards[1::step], strict=False):
+            fields = Fields(block, entry, [card], ("PID SECID MID EOSID HGID GRAV ADPOPT TMID",))
+            number = str(fields.whole("PID"))
+            fields.forgive("SECID HGID ADPOPT", "how elements are integrated")
+            fields.refuse("GRAV TMID", "gravity that is there from before, and conduction of heat")
+            eos = fields.whole("EOSID")
+            self._state_of[number] = eos
+            material = f"{fields.whole('MID')}/{eos}" if eos else str(fields.whole("MID"))
+            self._bodies.append(Body(number, title.text.strip(), material, number, entry))
+        if len(cards) < 2:
+            raise block.error(None, "a part has a title and a card of numbers")
+
+    def weighed(self) -> Iterator[Weighed]:
+        """Densities of the materials, to tell the units by."""
+        for number, (name, fields, title) in self._materials.items():
+            shown = f"{title!r}" if title else f"material {number}"
+            try:
+                yield Weighed(shown, *materials.weighed(name, fields))
+            except (CardError, ValueError):
+                continue
+
+    # The case ---------------------------------------------------------------------------------------------------------
+
+    def draft(self, system: System) -> Draft:
+        """The case, in units of ``system``."""
+        self._draft = Draft(self.path, system, self.account)
+        self._draft.title = self.title
+        self._topology = Topology([body.key for body in self._bodies], partial(read_mesh, self.path))
+        names = Names()
+        for body in self._bodies:
+            body.name = names.give(body.title, "part", body.key)
+        self._make_materials(system)
+        end = self._end()
+        self._scene = loads.Scene(self._draft, self._nodes, self._part_set, self._part, self._curve, end)
+        self._meetings: list[Meeting] = []
+        self._ties: list[tuple[Meeting, Entry]] = []
+        for block, entry in self._blocks:
+            self._guarded(self._load, block, entry)
+        begin(self._draft, self._topology, self._bodies, self._scene.starts)
+        for body in self._bodies:
+            self._draft.add_part(body, names)
+        self._walls()
+        meet(self._draft, self._bodies, self._meetings)
+        self._join()
+        self._leave_rest()
+        return self._draft
+
+    def _make_materials(self, system: System) -> None:
+        curves = {number: points for number, (points, _) in self._curves.items()}
+        used = {body.material for body in self._bodies}
+        for key in sorted(used):
+            number, _, eos = key.partition("/")
+            found = self._materials.get(int(number))
+            if found is None:
+                continue
+            name, fields, title = found
+            state = self._states.get(int(eos)) if eos else None
+            context = materials.Context(system, state, curves)
+            made = Made({})
+            try:
+                made = materials.translated(name, fields, context) or made
+            except (CardError, ValueError) as error:
+                fields.entry.refuse(str(error))
+            if fields.given("LCSS"):
+                self._curves.get(fields.whole("LCSS"), ((), fields.entry))[1].take("materials")
+            self._erode(int(number), made)
+            label = title or next(body.title for body in self._bodies if body.material == key)
+            self._draft.add_material(key, label, made, fields.entry)
+            if state is not None and made.material:
+                state.entry.take(f"materials.{(self._draft.material_of(key) or ('?', made))[0]}.eos")
+
+    def _erode(self, number: int, made: Made) -> None:
+        """``*MAT_ADD_EROSION``: criteria of strain; all others change the answer."""
+        fields = self._eroding.get(number) or self._eroding.get(0)
+        if fields is None:
+            return
+        fields.forgive("EXCL NUMFIP NCS", "how many points of an element fail")
+        why = "a strain of the whole deformation; erosion.plastic_strain is that of the plastic one"
+        if fields.real("EFFEPS") > 0.0:
+            made.erosion["plastic_strain"] = fields.real("EFFEPS")
+            fields.differ("EFFEPS", why)
+        elif fields.real("MXEPS") > 0.0:
+            made.erosion["plastic_strain"] = fields.real("MXEPS")
+            fields.refuse(
+                "MXEPS", "the largest principal strain: equal to erosion.plastic_strain in simple tension alone"
+            )
+        if made.erosion:
+            fields.entry.take("parts[].erosion")
+        fields.rest("refused", "a criterion of failure that is not taken over")
+
+    def _load(self, block: Block, entry: Entry) -> None:
+        name = block.name
+        for base, (handler, allowed) in loads.HANDLERS.items():
+            found, options = block.parted(allowed)
+            if found == base and (options or not allowed or base == "RIGIDWALL_PLANAR"):
+                handler(self._scene, block, options, entry)
+                return
+        base, options = block.parted(control.OPTIONS)
+        if base in control.SINGLE | control.DOUBLE:
+            self._meetings.append(control.contact(block, base, options, entry, self._surface))
+        elif base in control.TIED:
+            self._ties.append((control.contact(block, base, options, entry, self._surface), entry))
+        elif name == "CONTROL_TIMESTEP":
+            control.time_step(self._draft, block, entry)
+        elif name == "DATABASE_BINARY_D3PLOT":
+            entry.reasons.clear()
+            control.pictures(self._draft, block, entry, self._scene.end)
+        elif not entry.decided and name not in ("CONTROL_TERMINATION",) and not name.startswith(("SET_", "DEFINE_C")):
+            self._unknown(name, entry)
+
+    def _unknown(self, name: str, entry: Entry) -> None:
+        plain = materials.NUMBERS.get(name.removesuffix("_TITLE"), name.removesuffix("_TITLE"))
+        if plain in materials.LAYOUTS or name.startswith("MAT_"):
+            entry.leave("no part that is taken over has it")
+        elif why := reason(name, REFUSED):
+            entry.refuse(why)
+
+    def _end(self) -> float:
+        found = [(block, entry) for block, entry in self._blocks if block.name == "CONTROL_TERMINATION"]
+        for block, entry in found:
+            try:
+                end = control.termination(block, entry)
+                self._draft.run["end_time"] = self._draft.quantity(end, TIME)
+                return end
+            except (CardError, ValueError) as error:
+                entry.refuse(str(error))
+        if not found:
+            self.account.general.append("the deck has no *CONTROL_TERMINATION: run.end_time is not known")
+        return float("inf")
+
+    def _walls(self) -> None:
+        keys: list[tuple[str, ...]] = []
+        for chosen, table, entry in self._scene.walls:
+            full, some = self._topology.whole(chosen)
+            stopped = [key for key in self._topology.bodies if key in (*full, *some)]
+            names = {body.key: body.name for body in self._bodies}
+            if not stopped:
+                entry.leave(f"{chosen.what} has no node of a part of the case")
+                continue
+            table["name"] = "wall" if not keys else f"wall_{len(keys) + 1}"
+            if len(stopped) < len(names):
+                table["parts"] = [names[key] for key in stopped]
+            keys.append(tuple(stopped))
+            self._draft.add_boundary(table, entry)
+        Holding(self._draft, self._topology, self._bodies).add(self._scene.holds, keys)
+
+    def _join(self) -> None:
+        """Bonds of parts that share nodes, and of tied contacts."""
+        names = {body.key: body.name for body in self._bodies}
+        for one, other in self._topology.joined() if len(names) > 1 else ():
+            self._draft.bonds.append({"kind": "shared", "parts": [names[one], names[other]]})
+            self.account.remarks.append(f'{names[one]} and {names[other]} share nodes: [[bond]] kind = "shared"')
+        for tie, entry in self._ties:
+            for one, other in sorted(tie.pairs()):
+                entry.take(f"bond[{len(self._draft.bonds)}]")
+                self._draft.bonds.append({"kind": "tied", "parts": [names[one], names[other]]})
+
+    def _leave_rest(self) -> None:
+        for number, found in (*self._node_sets.items(), *self._segments.items()):
+            if not found.entry.decided:
+                found.entry.leave(f"set {number} is used by nothing that is taken over")
+        for _, entry in (*self._part_sets.values(), *self._curves.values()):
+            if not entry.decided:
+                entry.leave("used by nothing that is taken over")
+        for fields in (*self._eroding.values(), *self._states.values()):
+            if not fields.entry.decided:
+                fields.entry.leave("no part that is taken over has it")
+
+    # What keywords name -----------------------------------------------------------------------------------------------
+
+    def _nodes(self, number: int, entry: Entry) -> Chosen:
+        if number == 0:
+            return Chosen("everything", bodies=frozenset(self._topology.bodies))
+        found = self._node_sets.get(number)
+        if found is None:
+            raise ValueError(f"the node set {number} is not defined")
+        if found.odd:
+            raise ValueError(f"the node set {number}: {found.odd}")
+        found.entry.take(f"of {entry.keyword}, {entry.place}")
+        if found.everything:
+            return Chosen(f"node set {number}", bodies=frozenset(self._topology.bodies))
+        return Chosen(f"node set {number}", nodes=partial(self._members, found), on=str(number))
+
+    def _members(self, found: sets.NodeSet) -> set[int]:
+        parts = (self._topology.mesh.nodes.get(str(part), set()) for part in found.parts)
+        return found.nodes.union(*parts)
+
+    def _part(self, number: int) -> Chosen:
+        return Chosen(f"part {number}", bodies=frozenset({str(number)}))
+
+    def _part_set(self, number: int, entry: Entry) -> Chosen:
+        if number not in self._part_sets:
+            raise ValueError(f"the part set {number} is not defined")
+        parts, own = self._part_sets[number]
+        own.take(f"of {entry.keyword}, {entry.place}")
+        return Chosen(f"part set {number}", bodies=frozenset(map(str, parts)))
+
+    def _curve(self, number: int) -> sets.Curve:
+        if number not in self._curves:
+            raise ValueError(f"the curve {number} is not defined")
+        curve, entry = self._curves[number]
+        entry.take("courses")
+        return curve
+
+    def _surface(self, number: int, kind: int, entry: Entry) -> frozenset[str]:
+        every = frozenset(self._topology.bodies)
+        if kind == 5 or (number == 0 and kind in (0, 2, 3)):
+            return every
+        if kind == 2:
+            return (self._part_set(number, entry).bodies or frozenset()) & every
+        if kind == 3:
+            return frozenset({str(number)}) & every
+        if kind in (0, 4):
+            return self._of_nodes(number, kind, entry)
+        raise ValueError(f"a surface of the type {kind} is not followed; 0, 2, 3, 4 and 5 are")
+
+    def _of_nodes(self, number: int, kind: int, entry: Entry) -> frozenset[str]:
+        found = (self._segments if kind == 0 else self._node_sets).get(number)
+        if found is None or found.odd:
+            raise ValueError(f"the set {number}: {found.odd if found else 'it is not defined'}")
+        found.entry.take(f"of {entry.keyword}, {entry.place}")
+        entry.remark("differs", f"set {number}", "whole surfaces of the parts meet here, not those of the set alone")
+        members = self._members(found)
+        mesh = self._topology.mesh
+        return frozenset(key for key in self._topology.bodies if not mesh.nodes[key].isdisjoint(members))

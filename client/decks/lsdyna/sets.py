@@ -1,0 +1,99 @@
+"""Sets and curves of an LS-DYNA deck."""
+
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+from conoid.cases.cards import Block, Card
+
+from ..account import Entry
+from .fields import Fields, numbers
+
+Curve = tuple[tuple[float, float], ...]
+
+
+@dataclass
+class NodeSet:
+    """``*SET_NODE`` or ``*SET_SEGMENT``: nodes, or parts whose nodes it has."""
+
+    number: int
+    title: str
+    entry: Entry
+    nodes: set[int] = field(default_factory=set)
+    parts: set[int] = field(default_factory=set)
+    everything: bool = False
+    odd: str = ""
+    """Why its nodes are not known, if they are not."""
+
+
+def titled(block: Block, options: frozenset[str]) -> tuple[str, list[Card]]:
+    """The title of a keyword with the option TITLE, and its other cards."""
+    cards = list(block.cards)
+    if "TITLE" in options and cards:
+        return cards[0].text.strip(), cards[1:]
+    return "", cards
+
+
+def node_set(block: Block, options: frozenset[str], entry: Entry) -> NodeSet:
+    """A set of nodes. Raises CardError."""
+    title, cards = titled(block, options)
+    head = Fields(block, entry, cards, ("SID DA1 DA2 DA3 DA4 SOLVER",))
+    found = NodeSet(head.whole("SID"), title, entry)
+    rest = [card for card in cards[1:] if card.text.strip()]
+    if "GENERAL" in options:
+        _general(found, block, rest)
+    elif "GENERATE" in options:
+        ends = numbers(block, rest, "nid")
+        for first, last in zip(ends[::2], ends[1::2], strict=False):
+            if last - first > 10**8:
+                raise block.error(rest[0], f"{last - first} nodes from {first} to {last}; allowed: 100,000,000")
+            found.nodes.update(range(first, last + 1))
+    elif options - {"TITLE", "LIST", "ADD"}:
+        found.odd = f"*{block.name} is not followed"
+    else:
+        found.nodes.update(numbers(block, rest, "nid"))
+    return found
+
+
+def _general(found: NodeSet, block: Block, cards: list[Card]) -> None:
+    for card in cards:
+        word, *items = block.fields(card, *(10,) * 8)
+        values = [block.whole(card, item, "id") for item in items if item]
+        if word.upper() == "ALL":
+            found.everything = True
+        elif word.upper() == "NODE":
+            found.nodes.update(values)
+        elif word.upper() == "PART":
+            found.parts.update(values)
+        else:
+            found.odd = f"{word} in *{block.name} is not followed"
+
+
+def segment_set(block: Block, options: frozenset[str], entry: Entry) -> NodeSet:
+    """A set of faces, by their nodes. Raises CardError."""
+    title, cards = titled(block, options)
+    found = NodeSet(Fields(block, entry, cards, ("SID",)).whole("SID"), title, entry)
+    if options - {"TITLE"}:
+        found.odd = f"*{block.name} is not followed"
+        return found
+    for card in cards[1:]:
+        found.nodes.update(block.whole(card, item, "n") for item in block.fields(card, *(10,) * 8)[:4] if item)
+    return found
+
+
+def curve(block: Block, options: frozenset[str], entry: Entry) -> tuple[int, Curve]:
+    """``*DEFINE_CURVE``: its number and its points, scaled and shifted. Raises CardError."""
+    _, cards = titled(block, options)
+    head = Fields(block, entry, cards[:1], ("LCID SIDR SFA SFO OFFA OFFO DATTYP LCINT",))
+    number = head.whole("LCID")
+    along, across = head.nonzero("SFA", 1.0), head.nonzero("SFO", 1.0)
+    right, up = head.real("OFFA"), head.real("OFFO")
+    head.refuse("SIDR", "a curve of the dynamic relaxation")
+    head.forgive("DATTYP LCINT", "of no meaning for a curve by time or strain")
+    points = []
+    for card in cards[1:]:
+        if card.text.strip():
+            x, y = (block.real(card, item, "value") for item in block.fields(card, 20, 20))
+            points.append((along * (x + right), across * (y + up)))
+    if any(a[0] >= b[0] for a, b in pairwise(points)):
+        raise block.error(None, f"the points of the curve {number} do not rise")
+    return number, tuple(points)

@@ -1,0 +1,66 @@
+"""Keywords of LS-DYNA that are left out, and why; what is in no table refuses the import."""
+
+LEFT: dict[str, str] = {
+    "KEYWORD": "the format of the file",
+    "END": "the end of the deck",
+    "COMMENT": "a comment",
+    "PARAMETER": "its values stand where the deck names them",
+    "INCLUDE": "the file is read as a part of the deck",
+    "DATABASE": "output: a run writes frames, history.csv and probes",
+    "HOURGLASS": "tets have no hourglass modes",
+    "SECTION_SOLID": "how elements are integrated: all solids are tets with numerics.pressure here",
+    "CONTROL_ACCURACY": "how the other code computes",
+    "CONTROL_BULK_VISCOSITY": "numerics.viscosity has the values of this solver",
+    "CONTROL_CONTACT": "how the other code computes contact",
+    "CONTROL_CPU": "a limit of wall time: run.max_wall_time",
+    "CONTROL_ENERGY": "every energy is in the ledger here",
+    "CONTROL_HOURGLASS": "tets have no hourglass modes",
+    "CONTROL_MPP": "how the other code divides the work: run.ranks",
+    "CONTROL_OUTPUT": "output",
+    "CONTROL_PARALLEL": "how the other code divides the work: run.threads",
+    "CONTROL_SHELL": "how shells are computed",
+    "CONTROL_SOLID": "how the other code computes solids",
+    "CONTROL_UNITS": "units are those of --units",
+    "INTERFACE_SPRINGBACK": "output for another run",
+    "DEFINE_BOX": "used by nothing that is taken over",
+    "DEFINE_COORDINATE": "used by nothing that is taken over",
+    "DEFINE_VECTOR": "used by nothing that is taken over",
+    "DEFINE_TABLE": "used by nothing that is taken over",
+}
+"""Keywords by the words that they begin with."""
+
+REFUSED: dict[str, str] = {
+    "ELEMENT_SHELL": "shells: here all bodies are solids",
+    "ELEMENT_TSHELL": "thick shells: here all bodies are solids",
+    "ELEMENT_BEAM": "beams: here all bodies are solids",
+    "ELEMENT_DISCRETE": "springs and dashpots: there are none here",
+    "ELEMENT_MASS": "masses of nodes: there are none here",
+    "ELEMENT_SEATBELT": "there are no belts here",
+    "ELEMENT_SPH": "particles: here all bodies are tets",
+    "CONSTRAINED": "joins or holds nodes in a way that is not taken over",
+    "DAMPING": "damping of bodies: there is none here",
+    "CONTROL_IMPLICIT": "an implicit analysis; here it is explicit",
+    "CONTROL_THERMAL": "conduction of heat; here work becomes heat where it is done",
+    "CONTROL_DYNAMIC_RELAXATION": "a state before the start, which a case does not have",
+    "INITIAL_STRESS": "bodies have no stress at the start here",
+    "INITIAL_STRAIN": "bodies have no strain at the start here",
+    "LOAD": "a load that is not taken over",
+    "BOUNDARY": "a boundary that is not taken over",
+    "INITIAL": "a state at the start that is not taken over",
+    "RIGIDWALL": "a rigid wall that is not taken over: only fixed planes are",
+    "CONTACT": "a contact that is not taken over",
+    "SECTION": "no section of solids",
+    "MAT": "Conoid has no such material law",
+    "EOS": "Conoid has no such equation of state",
+    "INCLUDE": "includes that move or change what they bring are not followed",
+}
+"""Keywords that change the answer, by the words that they begin with."""
+
+
+def reason(name: str, table: dict[str, str]) -> str | None:
+    """The reason of the longest beginning of a keyword; a beginning ends between words."""
+    words = name.split("_")
+    for count in range(len(words), 0, -1):
+        if found := table.get("_".join(words[:count])):
+            return found
+    return None

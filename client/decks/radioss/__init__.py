@@ -1,0 +1,1 @@
+"""Radioss starter and engine decks."""

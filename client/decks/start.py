@@ -1,0 +1,48 @@
+"""Velocities at the start, of nodes or parts of a deck, as those of the parts of a case."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from .account import Entry
+from .draft import Body, Draft
+from .topology import Chosen, Point, Topology
+from .units import LENGTH
+
+
+@dataclass
+class Start:
+    """What a keyword gives nodes at the start, in units of the deck; later ones add components or replace them."""
+
+    chosen: Chosen
+    entry: Entry
+    velocity: dict[int, float] = field(default_factory=dict)
+    """By axis, 0 to 2."""
+    rate: Point = (0.0, 0.0, 0.0)
+    """Rotation vector, per unit of time."""
+    centre: Point = (0.0, 0.0, 0.0)
+
+
+def begin(draft: Draft, topology: Topology, bodies: Sequence[Body], starts: Sequence[Start]) -> None:
+    """Gives each body its velocity and spin."""
+    by_key = {body.key: body for body in bodies}
+    for each in starts:
+        full, some = topology.whole(each.chosen)
+        if some:
+            names = ", ".join(by_key[key].name for key in some)
+            each.entry.refuse(f"{each.chosen.what} has some nodes of {names} alone; here whole parts have a velocity")
+            continue
+        if not full:
+            each.entry.leave(f"{each.chosen.what} has no node of a part of the case")
+        for key in full:
+            _give(draft, by_key[key], each)
+            each.entry.take(f"parts[{list(by_key).index(key)}].velocity")
+            if any(each.rate):
+                each.entry.take(f"parts[{list(by_key).index(key)}].spin")
+
+
+def _give(draft: Draft, body: Body, start: Start) -> None:
+    old = body.velocity or (0.0, 0.0, 0.0)
+    x, y, z = (start.velocity.get(axis, old[axis]) for axis in range(3))
+    body.velocity = (x, y, z)
+    if any(start.rate):
+        body.spin = {"centre": draft.vector(start.centre, LENGTH), "rate": draft.vector(start.rate, (0, 0, -1, 0))}
