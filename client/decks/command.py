@@ -89,5 +89,5 @@ def _end(found: Imported, target: Path, written: bool) -> None:
         return
     complain(*found.refusals[:_SHOWN])
     more = f" ({len(found.refusals) - _SHOWN} more in the list)" if len(found.refusals) > _SHOWN else ""
-    complain(f"no case was written: without {many} it may answer wrong{more}; --anyway writes it, with them at its head")
+    complain(f"no case was written: without {many} it may answer wrong{more}; --anyway writes it")
     raise typer.Exit(ExitCode.BAD_INPUT)

@@ -14,6 +14,7 @@ from .abaqus.reading import Abaqus
 from .account import Account
 from .draft import Draft
 from .lsdyna.reading import LsDyna
+from .radioss.reading import Radioss
 from .units import System, Weighed
 
 _LOOKED = 2000
@@ -40,7 +41,7 @@ class Dialect(Protocol):
         """The case; every keyword of ``account`` is decided then."""
 
 
-DIALECTS: dict[str, type[Dialect]] = {"lsdyna": LsDyna, "abaqus": Abaqus}
+DIALECTS: dict[str, type[Dialect]] = {"lsdyna": LsDyna, "abaqus": Abaqus, "radioss": Radioss}
 _ENDINGS = {".k": "lsdyna", ".key": "lsdyna", ".dyn": "lsdyna", ".inp": "abaqus", ".rad": "radioss"}
 _LSDYNA = ("*KEYWORD", "*TITLE", "*CONTROL_", "*NODE", "*PART", "*INCLUDE", "*PARAMETER", "*COMMENT")
 _ABAQUS = ("*HEADING", "*PREPRINT", "*PART,", "*NODE,", "*ASSEMBLY", "*ELEMENT,", "*PARAMETER")

@@ -21,7 +21,7 @@ from .toml import bare, toml
 
 @dataclass(frozen=True)
 class Imported:
-    """A deck as a case: ``data`` with comments, ``account`` of every keyword, ``refusals`` where it would answer wrong."""
+    """A deck as a case: ``data`` with comments, ``account`` of every keyword, ``refusals`` for a wrong answer."""
 
     deck: Path
     kind: str

@@ -71,7 +71,7 @@ class Keyword:
             raise InpError(f"line {self.line}: *{self.word} has {len(found)} data lines; one is taken over")
         return found[0]
 
-    def items(self) -> list[tuple[int, list[str]]]:
+    def lists(self) -> list[tuple[int, list[str]]]:
         """The fields of its data lines."""
         return [(line, fields(text)) for line, text in self.filled()]
 

@@ -91,7 +91,7 @@ class Loads:
         each.forgive("LOAD CASE, REGION TYPE", "of no meaning here")
         each.rest()
         speeds: dict[str, dict[str, tuple[float, Course]]] = {}
-        for line, items in each.items():
+        for line, items in each.lists():
             speeds.setdefault(items[0], {}).update(self._row(line, items[1:], kind, course, end))
         for name, by_axis in speeds.items():
             groups: dict[Course, dict[str, float]] = {}
@@ -146,7 +146,7 @@ class Loads:
         kind = each.key("TYPE")
         each.rest()
         if kind == "TEMPERATURE":
-            for line, items in each.items():
+            for line, items in each.lists():
                 self._temperatures.append((self._chosen(items[0], each.entry), numbers(line, items[1])[0], each.entry))
         elif kind == "VELOCITY":
             for name, velocity in self._components(each).items():
@@ -159,7 +159,7 @@ class Loads:
     def _components(self, each: Keyword) -> dict[str, dict[int, float]]:
         """Velocities by node set and axis, of lines with a set, a direction and a value."""
         made: dict[str, dict[int, float]] = {}
-        for line, items in each.items():
+        for line, items in each.lists():
             axis = int(numbers(line, items[1])[0]) if len(items) == 3 else 0
             if not 1 <= axis <= 3:
                 raise InpError(f"line {line}: expected a node set, a direction from 1 to 3, and a velocity")
@@ -168,7 +168,7 @@ class Loads:
 
     def _rotating(self, each: Keyword) -> None:
         """A line of set, rate, and translation; then a line with two points of the axis (Keywords Guide)."""
-        rows = each.items()
+        rows = each.lists()
         for (line, items), (second, axis) in zip(rows[::2], rows[1::2], strict=False):
             rate, vx, vy, vz = (numbers(line, ",".join(items[1:]) + ",") + [0.0] * 4)[:4]
             ends = numbers(second, ",".join(axis))
@@ -199,7 +199,7 @@ class Loads:
         course = self._course(each.get("AMPLITUDE"), each.entry)
         each.forgive("OP", "one step has one set of loads")
         each.rest()
-        for line, items in each.items():
+        for line, items in each.lists():
             if len(items) < 6 or joined(items[1]) != "GRAV" or items[0]:
                 raise InpError(f"line {line}: only gravity of everything (', GRAV, size, x, y, z') is taken over")
             size, *along = numbers(line, ",".join(items[2:6]))

@@ -119,7 +119,7 @@ class Material:
         if found[1]:
             law["hardening"] = self._stress(found[1])
             last = points[-1][0]
-            plastic.entry.remark("differs", f"plastic strain {last:g}", "beyond the last row the flow stress stays there; "
+            plastic.entry.remark("differs", f"plastic strain {last:g}", "beyond the last row the flow stress stays; "
                                  "here it goes on to rise")  # fmt: skip
         return law
 

@@ -83,12 +83,12 @@ class Meetings:
             head.entry.take("contact") if self.made else head.entry.leave("it includes nothing")
 
     def _included(self, each: Keyword, friction: float) -> None:
-        if each.has("ALL EXTERIOR") or not each.items():
+        if each.has("ALL EXTERIOR") or not each.lists():
             each.rest()
             self.made.append(Meeting(self._every, None, friction, each.entry))
             return
         each.rest()
-        for _, items in each.items():
+        for _, items in each.lists():
             one, other = (*items, "")[:2]
             if not one and not other:
                 self.made.append(Meeting(self._every, None, friction, each.entry))
@@ -101,7 +101,7 @@ class Meetings:
         """Friction of everything, and that of pairs of surfaces."""
         friction, pairs = 0.0, []
         each.rest()
-        for _, items in each.items():
+        for _, items in each.lists():
             one, other, name = (*items, "", "")[:3]
             value = self._of(name, each.entry)
             if not one and not other:
@@ -118,7 +118,7 @@ class Meetings:
         friction = self._of(each.get("INTERACTION"), each.entry)
         each.forgive("MECHANICAL CONSTRAINT, WEIGHT, CPSET, TYPE, OP, SMALL SLIDING", "how the other code computes it")
         each.rest()
-        for _, items in each.items():
+        for _, items in each.lists():
             one = self._surface(items[0], each.entry)
             other = self._surface(items[1], each.entry) if len(items) > 1 and items[1] else None
             self.made.append(Meeting(one, other, friction, each.entry))
@@ -126,6 +126,6 @@ class Meetings:
     def _tie(self, each: Keyword) -> None:
         each.forgive("NAME, ADJUST, POSITION TOLERANCE, TYPE, NO ROTATION", "how the other code finds the nodes")
         each.rest()
-        for _, items in each.items():
+        for _, items in each.lists():
             pairs = Meeting(self._surface(items[0], each.entry), self._surface(items[1], each.entry), 0.0, each.entry)
             self.ties += [(pair, each.entry) for pair in sorted(pairs.pairs())]

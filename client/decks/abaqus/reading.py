@@ -7,6 +7,7 @@ from pathlib import Path
 from conoid.cases.inp import Block, InpError, Source
 
 from ..account import Account, Entry
+from ..bonds import join
 from ..contacts import meet
 from ..draft import Body, Draft, Made
 from ..holds import Holding
@@ -101,7 +102,7 @@ class Abaqus:
         Holding(self._draft, self.topology, bodies).add(loads.holds, [])
         meetings = Meetings(self.keywords, bodies, self._surface)
         meet(self._draft, bodies, meetings.made)
-        self._join(bodies, meetings)
+        join(self._draft, self.topology, bodies, meetings.ties)
         self._leave_rest()
         return self._draft
 
@@ -186,16 +187,6 @@ class Abaqus:
         except (InpError, ValueError) as error:
             each.entry.refuse(str(error))
 
-    def _join(self, bodies: list[Body], meetings: Meetings) -> None:
-        """Bonds of parts that share nodes, and of ties."""
-        names = {body.key: body.name for body in bodies}
-        for one, other in self.topology.joined() if len(names) > 1 else ():
-            self._draft.bonds.append({"kind": "shared", "parts": [names[one], names[other]]})
-            self.account.remarks.append(f'{names[one]} and {names[other]} share nodes: [[bond]] kind = "shared"')
-        for pair, entry in meetings.ties:
-            entry.take(f"bond[{len(self._draft.bonds)}]")
-            self._draft.bonds.append({"kind": "tied", "parts": [names[key] for key in pair]})
-
     def _leave_rest(self) -> None:
         for each in self.keywords:
             if each.entry.decided:
@@ -251,7 +242,7 @@ class Abaqus:
                 if (each.key("TYPE") or "ELEMENT") != "ELEMENT":
                     raise InpError(f"the surface {name!r} is of the type {each.key('TYPE')}; ELEMENT is followed")
                 each.entry.take(f"of {entry.keyword}, {entry.place}")
-                sets += [items[0] for _, items in each.items()]
+                sets += [items[0] for _, items in each.lists()]
         if not sets:
             raise InpError(f"the surface {name[:60]!r} is not defined, or has no elements")
         if any(not one for one in sets):

@@ -39,8 +39,8 @@ def contact(block: Block, name: str, options: frozenset[str], entry: Entry, surf
         fields.refuse("FSF", "friction is scaled")
     still, sliding, decay = fields.real("FS"), fields.real("FD"), fields.real("DC")
     if still < 0.0 or (decay and still != sliding):
-        entry.remark("refused", f"FS = {still:g}, FD = {sliding:g}", "friction depends on the speed or the part; here it "
-                     "is one number, FS with --anyway")  # fmt: skip
+        entry.remark("refused", f"FS = {still:g}, FD = {sliding:g}", "friction depends on the speed or the part; here "
+                     "it is one number, FS with --anyway")  # fmt: skip
     elif sliding != still and sliding:
         entry.remark("left", f"FD = {sliding:g}", "without DC friction is FS at any speed")
     one = surface(fields.whole("SSID"), fields.whole("SSTYP"), entry)

@@ -1,4 +1,4 @@
-"""What moves, holds and stops bodies in an LS-DYNA deck: velocities at the start, restraints, motions, walls, gravity."""
+"""What moves, holds and stops bodies in an LS-DYNA deck."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -13,6 +13,7 @@ from ..holds import Course, Hold, displacement_speed, velocity_course
 from ..start import Start
 from ..topology import Chosen
 from ..units import ACCELERATION, LENGTH, TIME
+from ..walls import Stop
 from .fields import Fields, trimmed
 
 _AXES = {1: "x", 2: "y", 3: "z"}
@@ -34,7 +35,7 @@ class Scene:
     end: float
     starts: list[Start] = field(default_factory=list)
     holds: list[Hold] = field(default_factory=list)
-    walls: list[tuple[Chosen, dict[str, Any], Entry]] = field(default_factory=list)
+    walls: list[Stop] = field(default_factory=list)
 
 
 # Velocities at the start ----------------------------------------------------------------------------------------------
@@ -170,17 +171,13 @@ def wall(scene: Scene, block: Block, options: frozenset[str], entry: Entry) -> N
         fields.refuse("FRIC", "nodes stick to the wall there; here friction is Coulomb's")
         friction = 0.0
     number = fields.whole("NSID")
-    if number:
-        entry.remark(
-            "differs", f"NSID = {number}", "it stops the nodes of this set there, here all nodes of their parts"
-        )
     normal = [b - a for a, b in zip(tail, head, strict=True)]
     if not any(normal):
         raise ValueError("its normal, from XT YT ZT to XH YH ZH, has no length")
     table: dict[str, Any] = {"kind": "wall", "point": scene.draft.vector(tail, LENGTH), "normal": normal}
     if friction:
         table["friction"] = friction
-    scene.walls.append((scene.nodes(number, entry), table, entry))
+    scene.walls.append(Stop(scene.nodes(number, entry), table, entry))
     fields.rest("refused")
 
 

@@ -325,8 +325,8 @@ def _mat_holmquist(fields: Fields, context: Context) -> Made:
         "model": "johnson_holmquist", "hel": context.stress(fields.real("HEL")),
         "pressure_hel": context.stress(fields.real("PHEL")), "tension": context.stress(abs(fields.real("T"))),
         "A": fields.real("A"), "N": fields.real("N"), "B": fields.real("B"), "M": fields.real("M"),
-        "C": fields.real("C"), "D1": fields.real("D1"), "D2": fields.real("D2"), "K2": context.stress(fields.real("K2")),
-        "K3": context.stress(fields.real("K3")), "beta": fields.real("BETA"),
+        "C": fields.real("C"), "D1": fields.real("D1"), "D2": fields.real("D2"),
+        "K2": context.stress(fields.real("K2")), "K3": context.stress(fields.real("K3")), "beta": fields.real("BETA"),
     }  # fmt: skip
     if rate > 0.0:
         law["reference_rate"] = context.system.quantity(rate, RATE)
@@ -337,7 +337,7 @@ def _mat_holmquist(fields: Fields, context: Context) -> Made:
     failure = fields.real("FS")
     if failure < 0.0:
         fields.refuse("FS", "elements leave by tension there (p* + T* below 0)")
-    material = {"density": context.system.quantity(fields.real("RO"), DENSITY)}
+    material: dict[str, Any] = {"density": context.system.quantity(fields.real("RO"), DENSITY)}
     material |= {"elastic": {"young": context.stress(young), "poisson": poisson}, "strength": law}
     return Made(material, _failing(failure))
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from conoid.cases.cards import Block, CardError, Deck
 
 from ..account import Account, Entry
+from ..bonds import Tie, join
 from ..contacts import Meeting, meet
 from ..draft import Body, Draft, Made
 from ..holds import Holding
@@ -14,6 +15,7 @@ from ..naming import Names
 from ..start import begin
 from ..topology import Chosen, Topology
 from ..units import TIME, System, Weighed
+from ..walls import stand
 from . import control, loads, materials, sets
 from .fields import Fields, numbers
 from .mesh import read_mesh
@@ -157,15 +159,16 @@ class LsDyna:
         end = self._end()
         self._scene = loads.Scene(self._draft, self._nodes, self._part_set, self._part, self._curve, end)
         self._meetings: list[Meeting] = []
-        self._ties: list[tuple[Meeting, Entry]] = []
+        self._ties: list[Tie] = []
         for block, entry in self._blocks:
             self._guarded(self._load, block, entry)
         begin(self._draft, self._topology, self._bodies, self._scene.starts)
         for body in self._bodies:
             self._draft.add_part(body, names)
-        self._walls()
+        walls = stand(self._draft, self._topology, self._bodies, self._scene.walls)
+        Holding(self._draft, self._topology, self._bodies).add(self._scene.holds, walls)
         meet(self._draft, self._bodies, self._meetings)
-        self._join()
+        join(self._draft, self._topology, self._bodies, self._ties)
         self._leave_rest()
         return self._draft
 
@@ -223,7 +226,8 @@ class LsDyna:
         if base in control.SINGLE | control.DOUBLE:
             self._meetings.append(control.contact(block, base, options, entry, self._surface))
         elif base in control.TIED:
-            self._ties.append((control.contact(block, base, options, entry, self._surface), entry))
+            tied = control.contact(block, base, options, entry, self._surface)
+            self._ties += [(pair, entry) for pair in sorted(tied.pairs())]
         elif name == "CONTROL_TIMESTEP":
             control.time_step(self._draft, block, entry)
         elif name == "DATABASE_BINARY_D3PLOT":
@@ -251,33 +255,6 @@ class LsDyna:
         if not found:
             self.account.general.append("the deck has no *CONTROL_TERMINATION: run.end_time is not known")
         return float("inf")
-
-    def _walls(self) -> None:
-        keys: list[tuple[str, ...]] = []
-        for chosen, table, entry in self._scene.walls:
-            full, some = self._topology.whole(chosen)
-            stopped = [key for key in self._topology.bodies if key in (*full, *some)]
-            names = {body.key: body.name for body in self._bodies}
-            if not stopped:
-                entry.leave(f"{chosen.what} has no node of a part of the case")
-                continue
-            table["name"] = "wall" if not keys else f"wall_{len(keys) + 1}"
-            if len(stopped) < len(names):
-                table["parts"] = [names[key] for key in stopped]
-            keys.append(tuple(stopped))
-            self._draft.add_boundary(table, entry)
-        Holding(self._draft, self._topology, self._bodies).add(self._scene.holds, keys)
-
-    def _join(self) -> None:
-        """Bonds of parts that share nodes, and of tied contacts."""
-        names = {body.key: body.name for body in self._bodies}
-        for one, other in self._topology.joined() if len(names) > 1 else ():
-            self._draft.bonds.append({"kind": "shared", "parts": [names[one], names[other]]})
-            self.account.remarks.append(f'{names[one]} and {names[other]} share nodes: [[bond]] kind = "shared"')
-        for tie, entry in self._ties:
-            for one, other in sorted(tie.pairs()):
-                entry.take(f"bond[{len(self._draft.bonds)}]")
-                self._draft.bonds.append({"kind": "tied", "parts": [names[one], names[other]]})
 
     def _leave_rest(self) -> None:
         for number, found in (*self._node_sets.items(), *self._segments.items()):

@@ -1,0 +1,260 @@
+"""A Radioss starter with its engine file as a case."""
+
+from collections.abc import Callable, Iterator
+from functools import partial
+from pathlib import Path
+
+from conoid.cases.cards import CardError
+
+from ..account import Account, Entry
+from ..bonds import Tie, join
+from ..contacts import Meeting, meet
+from ..draft import Body, Draft, Made
+from ..holds import Holding
+from ..naming import Names
+from ..start import begin
+from ..topology import Chosen, Topology
+from ..units import TIME, System, Weighed, named
+from ..walls import stand
+from . import loads, materials
+from .mesh import read_mesh
+from .text import Fields, Option, cut, numbers, options
+from .words import LEFT, REFUSED, SOLIDS
+
+
+class Radioss:
+    """The options of a starter and its engine file, and what becomes of each."""
+
+    kind = "Radioss starter"
+
+    def __init__(self, path: Path) -> None:
+        """Reads all of ``path``, and ``NAME_0001.rad`` beside ``NAME_0000.rad``. Raises CardError, OSError."""
+        self.path, self.account = path, Account()
+        self.own_units: System | None = None
+        self.title = ""
+        self._options: list[tuple[Option, Entry]] = []
+        self._bodies: list[Body] = []
+        self._mats: dict[int, tuple[str, Fields, str]] = {}
+        self._states: dict[int, Fields] = {}
+        self._failures: dict[int, Fields] = {}
+        self._groups: dict[tuple[str, int], tuple[Option, Entry]] = {}
+        self._curves: dict[int, tuple[Option, Entry]] = {}
+        for option in options(path):
+            self._read(option)
+        self._engine()
+        for option, entry in self._options:
+            self._guarded(self._define, option, entry)
+
+    def _read(self, option: Option) -> None:
+        entry = self.account.open(option.shown, option.line, option.file)
+        if option.words[0] == "NODE" or option.words[0] in SOLIDS:
+            entry.take("parts[].mesh")
+        else:
+            self._options.append((option, entry))
+
+    def _engine(self) -> None:
+        """The engine file, whose name the starter's says."""
+        stem = self.path.stem
+        engine = self.path.with_name(f"{stem[:-4]}0001{self.path.suffix}") if stem.endswith("_0000") else None
+        if engine is None or not engine.is_file():
+            self.account.remarks.append("no engine file (NAME_0001.rad beside NAME_0000.rad) was found")
+            return
+        self.account.remarks.append(f"the engine file {engine.name} was read")
+        for option in options(engine, engine.name):
+            self._read(option)
+
+    def _guarded(self, do: Callable[[Option, Entry], None], option: Option, entry: Entry) -> None:
+        try:
+            do(option, entry)
+        except (CardError, ValueError) as error:
+            entry.refuse(str(error))
+
+    # What the deck defines --------------------------------------------------------------------------------------------
+
+    def _define(self, option: Option, entry: Entry) -> None:
+        word = option.words[0]
+        if word == "BEGIN":
+            self._begin(option, entry)
+        elif word == "TITLE" and not option.file:
+            self.title = next((text.strip() for _, text in option.rows if text.strip()), "")
+            entry.take("title") if self.title else entry.leave("it is empty")
+        elif word == "PART":
+            self._part(option, entry)
+        elif word in ("MAT", "EOS", "FAIL"):
+            self._law(option, entry)
+        elif word in ("GRNOD", "GRPART", "SURF"):
+            self._groups[word, option.number(2)] = option, entry
+        elif word == "FUNCT":
+            self._curves[option.number(1)] = option, entry
+
+    def _begin(self, option: Option, entry: Entry) -> None:
+        """Title, version, and the units of the input and of the work."""
+        rows = [row for row in option.rows if row[1].strip()]
+        self.title = self.title or (rows[0][1].strip() if rows else "")
+        if len(rows) > 2:
+            mass, length, time = cut(rows[2], 20, 20, 20)
+            if mass and length and time:
+                self.own_units = named(f"{'t' if mass == 'Mg' else mass},{length},{time}")
+        entry.take("title")
+
+    def _part(self, option: Option, entry: Entry) -> None:
+        title = option.rows[0][1].strip() if option.rows else ""
+        fields = Fields(option, entry, option.rows[1:], ("PROP: MAT: SUBSET: THICK",))
+        fields.forgive("PROP SUBSET THICK", "how elements are integrated, and groups for people")
+        number = str(option.number(1))
+        self._bodies.append(Body(number, title, str(fields.whole("MAT")), number, entry))
+
+    def _law(self, option: Option, entry: Entry) -> None:
+        kind = materials.NAMES.get(option.words[1], option.words[1]) if len(option.words) > 1 else ""
+        if option.number(3):
+            entry.refuse("units of its own (unit_ID) are not taken over")
+        if option.words[0] == "FAIL":
+            self._failures[option.number(2)] = Fields(option, entry, option.rows, materials.LAYOUTS.get(kind, ()))
+            if kind != "JOHNSON":
+                entry.refuse(REFUSED["FAIL"])
+            return
+        title = option.rows[0][1].strip() if option.rows else ""
+        fields = Fields(option, entry, option.rows[1:], materials.LAYOUTS.get(kind, ("RHO_I",)))
+        if option.words[0] == "EOS":
+            self._states[option.number(2)] = fields
+            if kind != "GRUNEISEN":
+                entry.refuse(REFUSED["EOS"])
+        else:
+            self._mats[option.number(2)] = kind, fields, title
+
+    def weighed(self) -> Iterator[Weighed]:
+        """Densities of the materials, to tell the units by."""
+        for number, (_, fields, title) in self._mats.items():
+            try:
+                young = fields.real("E") or None
+                yield Weighed(repr(title) if title else f"material {number}", fields.real("RHO_I"), young)
+            except CardError:
+                continue
+
+    # The case ---------------------------------------------------------------------------------------------------------
+
+    def draft(self, system: System) -> Draft:
+        """The case, in units of ``system``."""
+        self._draft = draft = Draft(self.path, system, self.account)
+        draft.name = draft.name.removesuffix("_0000")
+        draft.title = self.title
+        self._topology = Topology([body.key for body in self._bodies], partial(read_mesh, self.path))
+        names = Names()
+        for body in self._bodies:
+            body.name = names.give(body.title, "part", body.key)
+        self._make_materials(system)
+        scene = loads.Scene(draft, self._nodes, self._curve, self._end())
+        for option, entry in self._options:
+            self._guarded(partial(loads.take, scene), option, entry)
+        begin(draft, self._topology, self._bodies, scene.starts)
+        for body in self._bodies:
+            draft.add_part(body, names)
+        walls = stand(draft, self._topology, self._bodies, scene.walls)
+        Holding(draft, self._topology, self._bodies).add(scene.holds, walls)
+        self._meet(draft)
+        for option, entry in self._options:
+            if not entry.decided:
+                if why := LEFT.get(option.words[0]):
+                    entry.leave(why)
+                elif why := REFUSED.get(option.words[0]):
+                    entry.refuse(why)
+        return draft
+
+    def _make_materials(self, system: System) -> None:
+        used = {body.material for body in self._bodies}
+        for number, (kind, fields, title) in self._mats.items():
+            if str(number) not in used:
+                fields.entry.leave("no part that is taken over has it")
+                continue
+            eos, failure = self._states.get(number), self._failures.get(number)
+            made = Made({})
+            try:
+                made = materials.translated(kind, fields, materials.Context(system, eos, failure)) or made
+            except CardError as error:
+                fields.entry.refuse(str(error))
+            self._draft.add_material(str(number), title, made, fields.entry)
+            place = (self._draft.material_of(str(number)) or ("?", made))[0]
+            for each, key in ((eos, "eos"), (failure, "strength.damage")):
+                if each is not None and key.partition(".")[0] in made.material and not each.entry.barred:
+                    each.entry.take(f"materials.{place}.{key}")
+
+    def _end(self) -> float:
+        for option, entry in self._options:
+            if option.words[0] == "RUN":
+                try:
+                    rows = [row for row in option.rows if row[1].strip()]
+                    end = float(rows[0][1].split()[0])
+                    self._draft.run["end_time"] = self._draft.quantity(end, TIME)
+                    entry.take("run.end_time")
+                    return end
+                except (IndexError, ValueError):
+                    entry.refuse("the line below has no time")
+        self.account.general.append("there is no /RUN in an engine file: run.end_time is not known")
+        return float("inf")
+
+    # Contact ----------------------------------------------------------------------------------------------------------
+
+    def _meet(self, draft: Draft) -> None:
+        meetings: list[Meeting] = []
+        ties: list[Tie] = []
+        for option, entry in self._options:
+            if option.words[0] == "INTER" and option.words[1:2] in (["TYPE7"], ["TYPE2"]):
+                try:
+                    made = loads.contact(option, entry, self._surface)
+                except (CardError, ValueError) as error:
+                    entry.refuse(str(error))
+                    continue
+                if option.words[1] == "TYPE7":
+                    meetings.append(made)
+                else:
+                    ties += [(pair, entry) for pair in sorted(made.pairs())]
+        join(draft, self._topology, self._bodies, ties)
+        meet(draft, self._bodies, meetings)
+
+    def _surface(self, word: str, number: int, entry: Entry) -> frozenset[str]:
+        """Bodies of ``/SURF/PART`` or of a group of nodes. Raises ValueError."""
+        if word == "GRNOD":
+            full, some = self._topology.whole(self._nodes(number, entry))
+            return frozenset((*full, *some))
+        found = self._groups.get((word, number))
+        if found is None:
+            raise ValueError(f"the surface {number} is not defined")
+        option, own = found
+        if option.words[1] not in ("PART", "MAT") or option.words[1] == "MAT":
+            raise ValueError(f"the surface {number} is a /SURF/{option.words[1]}; PART is followed")
+        own.take(f"of {entry.keyword}, {entry.place}")
+        parts = {str(part) for part in numbers(option.rows[1:], "part")}
+        return frozenset(parts & set(self._topology.bodies))
+
+    # What options name ------------------------------------------------------------------------------------------------
+
+    def _nodes(self, number: int, entry: Entry) -> Chosen:
+        """A group of nodes. Raises ValueError."""
+        found = self._groups.get(("GRNOD", number))
+        if found is None:
+            raise ValueError(f"the group of nodes {number} is not defined")
+        option, own = found
+        what, kind = f"node group {number}", option.words[1]
+        own.take(f"of {entry.keyword}, {entry.place}")
+        items = numbers(option.rows[1:], "node")
+        if kind == "PART":
+            return Chosen(what, bodies=frozenset(map(str, items)))
+        if kind == "NODE":
+            return Chosen(what, nodes=lambda: set(items), on=str(number))
+        if kind == "GRNOD":
+            groups = [self._nodes(item, entry) for item in items]
+            return Chosen(what, nodes=lambda: set().union(*(self._topology.nodes(each) for each in groups)))
+        raise ValueError(f"the group of nodes {number} is a /GRNOD/{kind}; NODE, PART and GRNOD are followed")
+
+    def _curve(self, number: int, entry: Entry) -> tuple[tuple[float, float], ...]:
+        """A function by its number, with its keyword taken. Raises ValueError."""
+        if number not in self._curves:
+            raise ValueError(f"the function {number} is not defined")
+        option, own = self._curves[number]
+        own.take(f"of {entry.keyword}, {entry.place}")
+        points = []
+        for row in option.rows[1:]:
+            if row[1].strip():
+                fields = Fields(option, own, [row], ("X Y",))
+                points.append((fields.real("X"), fields.real("Y")))
+        return tuple(points)

@@ -1,0 +1,164 @@
+"""The text of a Radioss starter or engine file: options with their lines, and named fields of these lines.
+
+Reference Guide, "Block format": a line that begins with ``/`` is an option, one that begins with ``#`` or ``$`` a
+comment; whole numbers take 10 columns, others 20.
+"""
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from conoid.cases.cards import CardError
+from conoid.cases.included import lines
+from conoid.cases.problems import shown
+
+from ..account import Entry, Remark
+
+_REAL = re.compile(r"([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))(?:[eEdD]([+-]?[0-9]{1,4})|([+-][0-9]{1,4}))?", re.ASCII)
+_WHOLE = re.compile(r"[+-]?[0-9]{1,18}", re.ASCII)
+Row = tuple[int, str]
+
+
+@dataclass
+class Option:
+    """``/MAT/LAW2/1``: its words in upper case, and its lines, with their numbers."""
+
+    words: list[str]
+    line: int
+    rows: list[Row]
+    file: str = ""
+
+    @property
+    def shown(self) -> str:
+        """As it stands in the file."""
+        return f"/{'/'.join(self.words)}"
+
+    def number(self, place: int) -> int:
+        """The number among its words at a place; 0 where there is none. Raises CardError."""
+        text = self.words[place].strip() if len(self.words) > place else ""
+        return _whole(self.line, text, self.shown) if text else 0
+
+
+def options(path: Path, file: str = "") -> Iterator[Option]:
+    """Every option of a file, up to ``/END``; empty lines are among their lines. Raises CardError, OSError."""
+    option: Option | None = None
+    try:
+        for number, text in lines(path):
+            if text.startswith("#include"):
+                raise CardError(f"line {number}: #include is not followed; write out what it stands for")
+            if text.startswith(("#", "$")):
+                continue
+            if text.startswith("/"):
+                if option is not None:
+                    yield option
+                words = [word.strip().upper() for word in text.strip()[1:].split("/")]
+                option = Option(words, number, [], file)
+            elif option is not None:
+                option.rows.append((number, text))
+            elif text.strip():
+                raise CardError(f"line {number}: {shown(text.strip())} stands before the first option")
+    except ValueError as error:
+        raise CardError(str(error)) from None
+    if option is None:
+        raise CardError("line 1: the file has no option; this is no Radioss file")
+    yield option
+
+
+def _whole(line: int, item: str, what: str) -> int:
+    if not _WHOLE.fullmatch(item):
+        raise CardError(f"line {line}: {what} = {shown(item)} is not a whole number (fields have fixed widths)")
+    return int(item)
+
+
+def _real(line: int, item: str, what: str) -> float:
+    found = _REAL.fullmatch(item)
+    if found is None or abs(value := float(f"{found[1]}e{found[2] or found[3] or 0}")) == float("inf"):
+        raise CardError(f"line {line}: {what} = {shown(item)} is not a number (fields have fixed widths)")
+    return value
+
+
+def cut(row: Row, *widths: int) -> list[str]:
+    """The fields of a line. Raises CardError for a tab, and for what stands behind them."""
+    line, text = row
+    if "\t" in text:
+        raise CardError(f"line {line}: a tab in a line of fixed widths; write blanks")
+    found, at = [], 0
+    for width in widths:
+        found.append(text[at : at + width].strip())
+        at += width
+    if rest := text[at:].strip():
+        raise CardError(f"line {line}: {shown(rest)} stands behind the last field, beyond column {at}")
+    return found
+
+
+class Fields:
+    """Named fields of the lines of an option; what is not 0 and was read by nobody is told at the end."""
+
+    def __init__(self, option: Option, entry: Entry, rows: Sequence[Row], layout: Sequence[str]) -> None:
+        """``layout``: for each line its fields; a name with ``:`` has 10 columns, others 20, ``-`` no meaning."""
+        self.option, self.entry = option, entry
+        self._found: dict[str, tuple[int, str]] = {}
+        self._read: set[str] = set()
+        for row, names in zip(rows, layout, strict=False):
+            words = names.split()
+            for name, item in zip(words, cut(row, *(10 if word.endswith(":") else 20 for word in words)), strict=True):
+                if name.strip(":") != "-":
+                    self._found[name.strip(":")] = row[0], item
+        self.more = [row for row in rows[len(layout) :] if row[1].strip()]
+
+    def given(self, name: str) -> bool:
+        """Whether the field is there and not empty."""
+        return bool(self._found.get(name, (0, ""))[1])
+
+    def real(self, name: str, default: float = 0.0) -> float:
+        """A number; ``default`` for an empty field. Raises CardError."""
+        self._read.add(name)
+        line, item = self._found.get(name, (0, ""))
+        return _real(line, item, name) if item else default
+
+    def nonzero(self, name: str, default: float) -> float:
+        """A number of which 0 means the default."""
+        return self.real(name) or default
+
+    def whole(self, name: str) -> int:
+        """A whole number; 0 for an empty field. Raises CardError."""
+        self._read.add(name)
+        line, item = self._found.get(name, (0, ""))
+        return _whole(line, item, name) if item else 0
+
+    def text(self, name: str) -> str:
+        """The text of a field."""
+        self._read.add(name)
+        return self._found.get(name, (0, ""))[1]
+
+    def forgive(self, names: str, why: str) -> None:
+        """Fields that are left out, and why; those that are 0 say nothing."""
+        self._tell("left", names.split(), why)
+
+    def refuse(self, names: str, why: str) -> None:
+        """Fields without which the case would answer wrong."""
+        self._tell("refused", names.split(), why)
+
+    def differ(self, name: str, why: str) -> None:
+        """A field whose meaning differs here."""
+        self._read.add(name)
+        self.entry.remark("differs", f"{name} = {self._found.get(name, (0, ''))[1] or '(empty)'}", why)
+
+    def rest(self, kind: Remark = "refused", why: str = "not taken over") -> None:
+        """Everything that is not 0 and nobody has read."""
+        self._tell(kind, [name for name in self._found if name not in self._read], why)
+        if self.more:
+            self.entry.remark(kind, f"line {self.more[0][0]}", "a line that is not read here")
+
+    def _tell(self, kind: Remark, names: list[str], why: str) -> None:
+        for name in names:
+            self._read.add(name)
+            item = self._found.get(name, (0, ""))[1]
+            if item and not (_REAL.fullmatch(item) and _real(0, item, name) == 0.0):
+                self.entry.remark(kind, f"{name} = {item}", why)
+
+
+def numbers(rows: Sequence[Row], what: str) -> list[int]:
+    """Whole numbers of 10 columns, ten in a line. Raises CardError."""
+    return [_whole(row[0], item, what) for row in rows for item in cut(row, *(10,) * 10) if item]

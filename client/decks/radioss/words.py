@@ -1,0 +1,44 @@
+"""Options of Radioss that are left out, and why; what is in no table refuses the import."""
+
+_OUTPUT = "output: a run writes frames, history.csv and probes"
+_HOW = "how the other code computes"
+_USED = "used by nothing that is taken over"
+
+LEFT: dict[str, str] = {
+    "ANALY": _HOW, "DEF_SOLID": _HOW, "DEF_SHELL": _HOW, "DEFAULT": _HOW, "IOFLAG": _OUTPUT, "RANDOM": _HOW,
+    "ARCH": _HOW, "TH": _OUTPUT, "ACCEL": _OUTPUT, "GRNOD": _USED, "GRPART": _USED, "GRBRIC": _USED, "GRTETR": _USED,
+    "SURF": _USED, "FUNCT": _USED, "SKEW": _USED, "FRAME": _USED, "BOX": _USED, "LINE": _USED, "SET": _USED,
+    "TFILE": _OUTPUT, "PRINT": _OUTPUT, "ANIM": _OUTPUT, "H3D": _OUTPUT, "MON": _OUTPUT, "DYREL": _HOW,
+    "OUTP": _OUTPUT, "PROC": _HOW, "TITLE": _OUTPUT,
+    "END": "the end of the deck",
+    "SPMD": "how the other code divides the work: run.ranks",
+    "PROP": "how elements are integrated",
+    "SUBSET": "groups of parts, for people",
+    "UNIT": "units of single options; those with one are refused",
+    "AMS": "mass is not scaled here: the steps are those of the true mass",
+    "VERS": "the format of the file",
+    "RFILE": "checkpoints: run.checkpoint_every",
+    "STOP": "limits of errors: run.residual_limit",
+    "DT": "limits of the step; mass is not scaled here",
+    "PARITH": "the answer is the same on any ranks here",
+    "VER": "the format of the file",
+}  # fmt: skip
+
+REFUSED: dict[str, str] = {
+    "SHELL": "shells: here all bodies are solids", "SH3N": "shells: here all bodies are solids",
+    "BEAM": "beams: here all bodies are solids", "TRUSS": "trusses: here all bodies are solids",
+    "SPRING": "springs: there are none here", "SPHCEL": "particles: here all bodies are tets",
+    "QUAD": "plane elements: here all bodies are solids", "ADMAS": "masses of nodes: there are none here",
+    "RBODY": "a rigid body of nodes; parts[].rigid makes a whole part rigid", "RBE2": "joins nodes",
+    "RBE3": "joins nodes", "RLINK": "joins nodes", "MPC": "joins nodes", "CYL_JOINT": "joins nodes",
+    "INTER": "only TYPE7, and TYPE2 (tied), are taken over", "RWALL": "only fixed planes are taken over",
+    "INIVEL": "only TRA and AXIS are taken over", "IMPVEL": "only motions along x, y and z are taken over",
+    "MAT": "Conoid has no such material law", "EOS": "Conoid has no such equation of state",
+    "FAIL": "Conoid has no such law of failure", "CLOAD": "forces on nodes that are not taken over",
+    "PLOAD": "pressure on surfaces that is not taken over: [[boundaries]] kind = \"traction\"",
+    "DAMP": "damping of bodies: there is none here", "BCS": "a restraint that is not taken over",
+}  # fmt: skip
+"""Options that change the answer, by their first word."""
+
+SOLIDS = {"TETRA4": 4, "TETRA10": 10, "BRICK": 8, "PENTA6": 6, "BRIC20": 20}
+"""Options that make elements with a volume, and their nodes."""

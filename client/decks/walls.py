@@ -1,0 +1,39 @@
+"""Rigid walls of a deck, which stop the nodes of a set, as walls of a case, which stop whole parts."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from .account import Entry
+from .draft import Body, Draft
+from .topology import Chosen, Topology
+
+
+@dataclass(frozen=True)
+class Stop:
+    """A wall: the nodes that it stops, and its table without ``parts`` and ``name``."""
+
+    chosen: Chosen
+    table: dict[str, Any]
+    entry: Entry
+
+
+def stand(draft: Draft, topology: Topology, bodies: Sequence[Body], stops: Sequence[Stop]) -> list[tuple[str, ...]]:
+    """Adds the walls; the keys of the bodies that each one stops."""
+    names = {body.key: body.name for body in bodies}
+    keys: list[tuple[str, ...]] = []
+    for each in stops:
+        full, some = topology.whole(each.chosen)
+        stopped = tuple(key for key in topology.bodies if key in (*full, *some))
+        if not stopped:
+            each.entry.leave(f"{each.chosen.what} has no node of a part of the case")
+            continue
+        if some:
+            why = "it stops some nodes of their parts there, here all of them"
+            each.entry.remark("differs", each.chosen.what, why)
+        table = {**each.table, "name": "wall" if not keys else f"wall_{len(keys) + 1}"}
+        if len(stopped) < len(names):
+            table["parts"] = [names[key] for key in stopped]
+        keys.append(stopped)
+        draft.add_boundary(table, each.entry)
+    return keys
