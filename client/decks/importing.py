@@ -106,10 +106,11 @@ def _entry(entry: Entry) -> list[str]:
     said = "; ".join(entry.reasons) if entry.fate != "taken" else ", ".join(entry.places)
     arrow = "->" if entry.fate == "taken" else ":"
     words = {"left": "left out", "differs": "differs", "refused": "REFUSED"}
-    return [
-        f"  {entry.place:<8} {entry.keyword} {arrow} {said}",
-        *(f"           {words[each.kind]}: {each.what}: {each.why}" for each in entry.details),
-    ]
+    together: dict[tuple[str, str], list[str]] = {}
+    for each in entry.details:
+        together.setdefault((words[each.kind], each.why), []).append(each.what)
+    details = [f"           {word}: {', '.join(what)}: {why}" for (word, why), what in together.items()]
+    return [f"  {entry.place:<8} {entry.keyword} {arrow} {said}", *details]
 
 
 def report(found: Imported, target: str) -> dict[str, Any]:

@@ -16,7 +16,8 @@ class Names:
 
     def give(self, wanted: str, kind: str, number: object = "") -> str:
         """A name as near to ``wanted`` as can be; ``kind`` and ``number`` where nothing of it is left."""
-        base = name(wanted) or name(f"{kind}_{number}") or kind
+        plain = wanted if name(wanted)[:1] == wanted.strip()[:1] else f"{kind}_{wanted or number}"
+        base = name(plain) or kind
         found, count = base, 1
         while found.lower() in self._taken:
             count += 1

@@ -10,7 +10,6 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from fractions import Fraction
 
-from conoid.cases.similar import choices
 from conoid.cases.units import LARGEST, UNITS, parse_unit
 
 from ..errors import UsageError
@@ -168,7 +167,7 @@ def told(materials: Iterable[Weighed]) -> tuple[System, str]:
         return system, f"of the usual systems only in {system} is {one.name} steel: its density {one.density:g} is " \
             f"{density:.4g} kg/m^3{modulus}"  # fmt: skip
     if systems:
-        fits = choices([str(each) for each in systems])
+        fits = " or in ".join(str(each) for each in systems)
         raise UsageError(f'--units is needed: {found[0][1].name} may be steel in {fits}; write --units "{systems[0]}"')
     densities = ", ".join(f"{one.name} {one.density:g}" for one in every[:5]) or "none"
     raise UsageError(

@@ -8,43 +8,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ..draft import Made
-from ..laws import bulk_of, hardening_of, line_of, shear_of, young_of
+from ..laws import hardening_of, line_of, shear_of, young_of
 from ..units import DENSITY, RATE, SPECIFIC_HEAT, SPEED, STRESS, TEMPERATURE, System
 from .fields import Fields
-
-NUMBERS = {
-    "MAT_001": "MAT_ELASTIC", "MAT_003": "MAT_PLASTIC_KINEMATIC", "MAT_010": "MAT_ELASTIC_PLASTIC_HYDRO",
-    "MAT_015": "MAT_JOHNSON_COOK", "MAT_018": "MAT_POWER_LAW_PLASTICITY", "MAT_020": "MAT_RIGID",
-    "MAT_024": "MAT_PIECEWISE_LINEAR_PLASTICITY", "MAT_098": "MAT_SIMPLIFIED_JOHNSON_COOK",
-    "MAT_110": "MAT_JOHNSON_HOLMQUIST_CERAMICS", "EOS_001": "EOS_LINEAR_POLYNOMIAL", "EOS_004": "EOS_GRUNEISEN",
-    "MAT_JH2": "MAT_JOHNSON_HOLMQUIST_CERAMICS",
-}  # fmt: skip
-"""Other names of keywords."""
-
-LAYOUTS: dict[str, tuple[str, ...]] = {
-    "MAT_ELASTIC": ("MID RO E PR DA DB K",),
-    "MAT_PLASTIC_KINEMATIC": ("MID RO E PR SIGY ETAN BETA", "SRC SRP FS VP"),
-    "MAT_ELASTIC_PLASTIC_HYDRO": (
-        "MID RO G SIGY EH PC FS CHARL", "EPS1 EPS2 EPS3 EPS4 EPS5 EPS6 EPS7 EPS8",
-        "EPS9 EPS10 EPS11 EPS12 EPS13 EPS14 EPS15 EPS16", "ES1 ES2 ES3 ES4 ES5 ES6 ES7 ES8",
-        "ES9 ES10 ES11 ES12 ES13 ES14 ES15 ES16",
-    ),
-    "MAT_JOHNSON_COOK": (
-        "MID RO G E PR DTF VP RATEOP", "A B N C M TM TR EPSO", "CP PC SPALL IT D1 D2 D3 D4",
-        "D5 C2/P/XNP EROD EFMIN NUMINT",
-    ),
-    "MAT_POWER_LAW_PLASTICITY": ("MID RO E PR K N SRC SRP", "SIGY VP EPSF"),
-    "MAT_RIGID": ("MID RO E PR N COUPLE M ALIAS", "CMO CON1 CON2", "LCO A2 A3 V1 V2 V3"),
-    "MAT_PIECEWISE_LINEAR_PLASTICITY": (
-        "MID RO E PR SIGY ETAN FAIL TDEL", "C P LCSS LCSR VP", "EPS1 EPS2 EPS3 EPS4 EPS5 EPS6 EPS7 EPS8",
-        "ES1 ES2 ES3 ES4 ES5 ES6 ES7 ES8",
-    ),
-    "MAT_SIMPLIFIED_JOHNSON_COOK": ("MID RO E PR VP", "A B N C PSFAIL SIGMAX SIGSAT EPSO"),
-    "MAT_JOHNSON_HOLMQUIST_CERAMICS": ("MID RO G A B C M N", "EPSI T SFMAX HEL PHEL BETA", "D1 D2 K1 K2 K3 FS"),
-    "EOS_GRUNEISEN": ("EOSID C S1 S2 S3 GAMAO A E0", "V0"),
-    "EOS_LINEAR_POLYNOMIAL": ("EOSID C0 C1 C2 C3 C4 C5 C6", "E0 V0"),
-}  # fmt: skip
-"""Fields of the cards of a keyword, as the manual names them."""
 
 Curve = tuple[tuple[float, float], ...]
 
@@ -128,6 +94,28 @@ def _with_eos(fields: Fields, context: Context, shear: float) -> dict[str, Any]:
     eos.rest("refused", "this term of the pressure has no key here")
     young, poisson = young_of(bulk, shear)
     return {**material, "elastic": {"young": context.stress(young), "poisson": poisson}}
+
+
+# Erosion --------------------------------------------------------------------------------------------------------------
+
+
+def erode(fields: Fields | None, made: Made) -> None:
+    """``*MAT_ADD_EROSION``: criteria of strain; all others change the answer. Raises CardError."""
+    if fields is None:
+        return
+    fields.whole("MID")
+    fields.forgive("EXCL NUMFIP NCS", "how many points of an element fail")
+    if "strength" not in made.material:
+        fields.rest("refused", "its material is elastic here and has no plastic strain by which a tet could leave")
+    elif fields.real("EFFEPS") > 0.0:
+        made.erosion["plastic_strain"] = fields.real("EFFEPS")
+        fields.differ("EFFEPS", "a strain of the whole deformation; erosion.plastic_strain is that of the plastic one")
+    elif fields.real("MXEPS") > 0.0:
+        made.erosion["plastic_strain"] = fields.real("MXEPS")
+        fields.refuse("MXEPS", "the largest principal strain: equal to erosion.plastic_strain in simple tension alone")
+    if "plastic_strain" in made.erosion:
+        fields.entry.take("parts[].erosion")
+    fields.rest("refused", "a criterion of failure that is not taken over")
 
 
 # Laws -----------------------------------------------------------------------------------------------------------------
@@ -247,9 +235,9 @@ def _johnson_cook(fields: Fields, context: Context) -> dict[str, Any]:
 
 
 def _mat_simplified(fields: Fields, context: Context) -> Made:
-    fields.forgive("SIGSAT", "of no meaning where it is large") if fields.real("SIGSAT") >= 1e20 else None
-    fields.forgive("SIGMAX", "of no meaning where it is large") if fields.real("SIGMAX") >= 1e20 else None
-    fields.refuse("SIGMAX SIGSAT", "the flow stress ends there, not here")
+    for name in ("SIGMAX", "SIGSAT"):
+        if fields.real(name) < 1e20:
+            fields.refuse(name, "the flow stress ends there, not here")
     law = _johnson_cook(fields, context) | {
         "m": 1.0, "melt_temperature": "2000 K", "specific_heat": "1000 J/kg/K", "taylor_quinney": 0.0,
     }  # fmt: skip
@@ -349,5 +337,3 @@ _LAWS: dict[str, Callable[[Fields, Context], Made]] = {
     "MAT_PIECEWISE_LINEAR_PLASTICITY": _mat_piecewise, "MAT_SIMPLIFIED_JOHNSON_COOK": _mat_simplified,
     "MAT_JOHNSON_HOLMQUIST_CERAMICS": _mat_holmquist,
 }  # fmt: skip
-
-__all__ = ["LAYOUTS", "NUMBERS", "Context", "Curve", "bulk_of", "translated", "weighed"]

@@ -22,6 +22,17 @@ def read_mesh(path: Path) -> Mesh:
     return Mesh(nodes, points)
 
 
+def parts_of(block: Block) -> set[str]:
+    """Numbers of the parts that have elements in ``*ELEMENT_SOLID``, as text. Raises CardError."""
+    cards = list(block.filled())
+    two = bool(cards) and len(_items(block, cards[0])) <= 2
+    if "," in cards[0].text if cards else False:
+        return {str(block.whole(card, _items(block, card)[1], "pid")) for card in cards[:: 1 + two]}
+    width = max(8, block.least)
+    written = {card.text[width : 2 * width].strip(): card for card in cards[:: 1 + two]}
+    return {str(block.whole(card, text, "pid")) for text, card in written.items()}
+
+
 def _solids(block: Block, nodes: dict[str, set[int]]) -> None:
     """Solids on one line, or on two lines (``ten nodes format``): number and part, then the nodes."""
     cards = list(block.filled())

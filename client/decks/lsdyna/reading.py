@@ -18,7 +18,8 @@ from ..units import TIME, System, Weighed
 from ..walls import stand
 from . import control, loads, materials, sets
 from .fields import Fields, numbers
-from .mesh import read_mesh
+from .layouts import LAYOUTS, NUMBERS
+from .mesh import parts_of, read_mesh
 from .words import LEFT, REFUSED, reason
 
 _MESH = ("NODE", "ELEMENT_SOLID")
@@ -34,10 +35,13 @@ class LsDyna:
         """Reads all of ``path`` and of what it includes. Raises CardError, OSError."""
         self.path, self.account = path, Account()
         self._blocks: list[tuple[Block, Entry]] = []
+        self._solid: set[str] = set()
         deck = Deck(path)
         for block in deck.blocks():
             entry = self._open(block)
-            if block.name not in _MESH and not block.name.startswith("ELEMENT_SOLID"):
+            if block.name.startswith("ELEMENT_SOLID"):
+                self._solid |= parts_of(block)
+            elif block.name not in _MESH:
                 self._blocks.append((block, entry))
         for block in deck.followed:
             self._open(block)
@@ -49,7 +53,6 @@ class LsDyna:
         self._states: dict[int, Fields] = {}
         self._eroding: dict[int, Fields] = {}
         self._bodies: list[Body] = []
-        self._state_of: dict[str, int] = {}
         self.title = ""
         for block, entry in self._blocks:
             self._guarded(self._define, block, entry)
@@ -75,10 +78,10 @@ class LsDyna:
 
     def _define(self, block: Block, entry: Entry) -> None:
         name, options = block.parted({"TITLE", "ID"})
-        plain = materials.NUMBERS.get(name, name)
-        if plain in materials.LAYOUTS:
+        plain = NUMBERS.get(name, name)
+        if plain in LAYOUTS:
             title, cards = sets.titled(block, options)
-            fields = Fields(block, entry, cards, materials.LAYOUTS[plain])
+            fields = Fields(block, entry, cards, LAYOUTS[plain])
             if plain.startswith("EOS"):
                 self._states[fields.whole("EOSID")] = fields
             else:
@@ -130,11 +133,16 @@ class LsDyna:
             fields.forgive("SECID HGID ADPOPT", "how elements are integrated")
             fields.refuse("GRAV TMID", "gravity that is there from before, and conduction of heat")
             eos = fields.whole("EOSID")
-            self._state_of[number] = eos
+            if number not in self._solid:
+                fields.whole("MID")
+                entry.remark("left", f"part {number}", "no solid is of it")
+                continue
             material = f"{fields.whole('MID')}/{eos}" if eos else str(fields.whole("MID"))
             self._bodies.append(Body(number, title.text.strip(), material, number, entry))
         if len(cards) < 2:
             raise block.error(None, "a part has a title and a card of numbers")
+        if not any(body.entry is entry for body in self._bodies):
+            entry.leave("no solid is of it")
 
     def weighed(self) -> Iterator[Weighed]:
         """Densities of the materials, to tell the units by."""
@@ -190,30 +198,11 @@ class LsDyna:
                 fields.entry.refuse(str(error))
             if fields.given("LCSS"):
                 self._curves.get(fields.whole("LCSS"), ((), fields.entry))[1].take("materials")
-            self._erode(int(number), made)
+            materials.erode(self._eroding.get(int(number)) or self._eroding.get(0), made)
             label = title or next(body.title for body in self._bodies if body.material == key)
             self._draft.add_material(key, label, made, fields.entry)
             if state is not None and made.material:
                 state.entry.take(f"materials.{(self._draft.material_of(key) or ('?', made))[0]}.eos")
-
-    def _erode(self, number: int, made: Made) -> None:
-        """``*MAT_ADD_EROSION``: criteria of strain; all others change the answer."""
-        fields = self._eroding.get(number) or self._eroding.get(0)
-        if fields is None:
-            return
-        fields.forgive("EXCL NUMFIP NCS", "how many points of an element fail")
-        why = "a strain of the whole deformation; erosion.plastic_strain is that of the plastic one"
-        if fields.real("EFFEPS") > 0.0:
-            made.erosion["plastic_strain"] = fields.real("EFFEPS")
-            fields.differ("EFFEPS", why)
-        elif fields.real("MXEPS") > 0.0:
-            made.erosion["plastic_strain"] = fields.real("MXEPS")
-            fields.refuse(
-                "MXEPS", "the largest principal strain: equal to erosion.plastic_strain in simple tension alone"
-            )
-        if made.erosion:
-            fields.entry.take("parts[].erosion")
-        fields.rest("refused", "a criterion of failure that is not taken over")
 
     def _load(self, block: Block, entry: Entry) -> None:
         name = block.name
@@ -237,8 +226,8 @@ class LsDyna:
             self._unknown(name, entry)
 
     def _unknown(self, name: str, entry: Entry) -> None:
-        plain = materials.NUMBERS.get(name.removesuffix("_TITLE"), name.removesuffix("_TITLE"))
-        if plain in materials.LAYOUTS or name.startswith("MAT_"):
+        plain = NUMBERS.get(name.removesuffix("_TITLE"), name.removesuffix("_TITLE"))
+        if plain in LAYOUTS or name.startswith("MAT_"):
             entry.leave("no part that is taken over has it")
         elif why := reason(name, REFUSED):
             entry.refuse(why)

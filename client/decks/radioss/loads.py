@@ -186,6 +186,7 @@ def contact(option: Option, entry: Entry, surface: Callable[[str, int, Entry], f
         )  # fmt: skip
         fields.refuse("TSTART SENS IFRIC FRIC_ID ITHE", "contact that begins later, or with another friction")
         friction = fields.real("FRIC")
+        fields.whole("GRNOD"), fields.whole("SURF")
         fields.rest("left", "stiffness, gap and damping of the penalty method") if friction >= 0.0 else None
     one = surface("GRNOD", fields.whole("GRNOD"), entry)
     other = surface("SURF", fields.whole("SURF"), entry)

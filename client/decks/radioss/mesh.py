@@ -19,7 +19,7 @@ def read_mesh(path: Path) -> Mesh:
                     x, y, z = (float(item or 0.0) for item in place)
                     points[int(number)] = x, y, z
         elif option.words[0] in SOLIDS:
-            nodes.setdefault(str(option.number(1)), set()).update(_solids(option))
+            nodes.setdefault(str(option.number()), set()).update(_solids(option))
     return Mesh(nodes, points)
 
 

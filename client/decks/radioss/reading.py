@@ -34,6 +34,7 @@ class Radioss:
         self.title = ""
         self._options: list[tuple[Option, Entry]] = []
         self._bodies: list[Body] = []
+        self._solid: set[str] = set()
         self._mats: dict[int, tuple[str, Fields, str]] = {}
         self._states: dict[int, Fields] = {}
         self._failures: dict[int, Fields] = {}
@@ -49,6 +50,8 @@ class Radioss:
         entry = self.account.open(option.shown, option.line, option.file)
         if option.words[0] == "NODE" or option.words[0] in SOLIDS:
             entry.take("parts[].mesh")
+            if option.words[0] in SOLIDS:
+                self._solid.add(str(option.number()))
         else:
             self._options.append((option, entry))
 
@@ -83,9 +86,9 @@ class Radioss:
         elif word in ("MAT", "EOS", "FAIL"):
             self._law(option, entry)
         elif word in ("GRNOD", "GRPART", "SURF"):
-            self._groups[word, option.number(2)] = option, entry
+            self._groups[word, option.number()] = option, entry
         elif word == "FUNCT":
-            self._curves[option.number(1)] = option, entry
+            self._curves[option.number()] = option, entry
 
     def _begin(self, option: Option, entry: Entry) -> None:
         """Title, version, and the units of the input and of the work."""
@@ -101,26 +104,30 @@ class Radioss:
         title = option.rows[0][1].strip() if option.rows else ""
         fields = Fields(option, entry, option.rows[1:], ("PROP: MAT: SUBSET: THICK",))
         fields.forgive("PROP SUBSET THICK", "how elements are integrated, and groups for people")
-        number = str(option.number(1))
+        number = str(option.number())
+        if number not in self._solid:
+            fields.whole("MAT")
+            entry.leave("no solid is of it")
+            return
         self._bodies.append(Body(number, title, str(fields.whole("MAT")), number, entry))
 
     def _law(self, option: Option, entry: Entry) -> None:
         kind = materials.NAMES.get(option.words[1], option.words[1]) if len(option.words) > 1 else ""
-        if option.number(3):
+        if option.local:
             entry.refuse("units of its own (unit_ID) are not taken over")
         if option.words[0] == "FAIL":
-            self._failures[option.number(2)] = Fields(option, entry, option.rows, materials.LAYOUTS.get(kind, ()))
+            self._failures[option.number()] = Fields(option, entry, option.rows, materials.LAYOUTS.get(kind, ()))
             if kind != "JOHNSON":
                 entry.refuse(REFUSED["FAIL"])
             return
         title = option.rows[0][1].strip() if option.rows else ""
         fields = Fields(option, entry, option.rows[1:], materials.LAYOUTS.get(kind, ("RHO_I",)))
         if option.words[0] == "EOS":
-            self._states[option.number(2)] = fields
+            self._states[option.number()] = fields
             if kind != "GRUNEISEN":
                 entry.refuse(REFUSED["EOS"])
         else:
-            self._mats[option.number(2)] = kind, fields, title
+            self._mats[option.number()] = kind, fields, title
 
     def weighed(self) -> Iterator[Weighed]:
         """Densities of the materials, to tell the units by."""

@@ -24,20 +24,21 @@ Row = tuple[int, str]
 class Option:
     """``/MAT/LAW2/1``: its words in upper case, and its lines, with their numbers."""
 
+    shown: str
+    """As it stands in the file."""
     words: list[str]
     line: int
     rows: list[Row]
     file: str = ""
 
-    @property
-    def shown(self) -> str:
-        """As it stands in the file."""
-        return f"/{'/'.join(self.words)}"
+    def number(self) -> int:
+        """The first number among its words: its identifier; 0 where there is none."""
+        return next((int(word) for word in self.words if _WHOLE.fullmatch(word)), 0)
 
-    def number(self, place: int) -> int:
-        """The number among its words at a place; 0 where there is none. Raises CardError."""
-        text = self.words[place].strip() if len(self.words) > place else ""
-        return _whole(self.line, text, self.shown) if text else 0
+    @property
+    def local(self) -> bool:
+        """Whether a second number follows: units of its own."""
+        return sum(_WHOLE.fullmatch(word) is not None and int(word) > 0 for word in self.words) > 1
 
 
 def options(path: Path, file: str = "") -> Iterator[Option]:
@@ -53,7 +54,7 @@ def options(path: Path, file: str = "") -> Iterator[Option]:
                 if option is not None:
                     yield option
                 words = [word.strip().upper() for word in text.strip()[1:].split("/")]
-                option = Option(words, number, [], file)
+                option = Option(text.strip(), words, number, [], file)
             elif option is not None:
                 option.rows.append((number, text))
             elif text.strip():

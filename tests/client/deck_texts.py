@@ -1,0 +1,74 @@
+"""Small decks of three codes round a material: one tet, a speed, an end."""
+
+from pathlib import Path
+from typing import Any
+
+from conoid.cases.materials import Material
+from conoid.client.decks.importing import Imported, read_deck
+from conoid.client.decks.toml import bare
+
+FOLDER = Path(__file__).parent / "decks"
+DECKS = (
+    "lspp_taylor.k", "lspp_plate.k", "lspp_ceramic.k", "hypermesh_bar.k", "ansa_drop.k", "hypermesh_rod_0000.rad",
+    "ansa_punch_0000.rad", "cae_taylor.inp", "cae_impact.inp", "hypermesh_sandwich.inp",
+)  # fmt: skip
+
+
+def row(*values: object) -> str:
+    """A card of LS-DYNA, fields of 10 columns."""
+    return "".join(f"{value:>10}" for value in values)
+
+
+def r20(*values: object) -> str:
+    """A line of Radioss, fields of 20 columns."""
+    return "".join(f"{value:>20}" for value in values)
+
+
+def lsdyna(*keywords: str, mid: int = 1, eos: int = 0) -> str:
+    """A deck with one tet of the material ``mid``."""
+    nodes = "\n".join(f"{i:8}{x:16.3f}{y:16.3f}{z:16.3f}" for i, (x, y, z) in enumerate(_CORNERS, 1))
+    return "\n".join((
+        "*KEYWORD", "*CONTROL_TERMINATION", row(0.01), "*PART", "body", row(1, 1, mid, eos), "*SECTION_SOLID",
+        row(1, 10), "*NODE", nodes, "*ELEMENT_SOLID", "".join(f"{n:8}" for n in (1, 1, 1, 2, 3, 4, 4, 4, 4, 4)),
+        *keywords, "*END", "",
+    ))  # fmt: skip
+
+
+def abaqus(material: str, step: str = "", model: str = "", dynamic: str = "*Dynamic, Explicit") -> str:
+    """An input file with one tet of the material ``M``."""
+    nodes = "\n".join(f"{i}, {x}, {y}, {z}" for i, (x, y, z) in enumerate(_CORNERS, 1))
+    return (
+        f"*Heading\nbody\n*Node, nset=all\n{nodes}\n*Element, type=C3D4, elset=body\n1, 1, 2, 3, 4\n"
+        f"*Solid Section, elset=body, material=M\n,\n*Material, name=M\n{material}\n{model}\n*Step\n{dynamic}\n, 1e-5\n"
+        f"{step}\n*End Step\n"
+    )
+
+
+def radioss(*options: str) -> str:
+    """A starter with one tet of the material 1, in mm, Mg, s."""
+    nodes = "\n".join(f"{i:10}{x:20.3f}{y:20.3f}{z:20.3f}" for i, (x, y, z) in enumerate(_CORNERS, 1))
+    units = r20("Mg", "mm", "s")
+    return "\n".join((
+        "#RADIOSS STARTER", "/BEGIN", "body", row(2021, 0), units, units, "/PART/1", "body", row(1, 1), "/NODE", nodes,
+        "/TETRA4/1", row(1, 1, 2, 3, 4), *options, "/RUN/body/1", "1e-5", "/END", "",
+    ))  # fmt: skip
+
+
+_CORNERS = ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+
+def read(folder: Path, name: str, text: str, units: str | None = "mm,t,s") -> Imported:
+    """The deck as a case."""
+    (folder / name).write_text(text, encoding="utf-8")
+    return read_deck(folder / name, units)
+
+
+def material(found: Imported) -> Material:
+    """Its only material, read as a case reads it."""
+    (made,) = found.data["materials"].values()
+    return Material.model_validate(bare(made))
+
+
+def part(found: Imported) -> Any:
+    """Its first part, as plain data."""
+    return bare(found.data["parts"][0])
