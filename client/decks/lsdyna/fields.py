@@ -7,6 +7,7 @@ from conoid.cases.cards import Block, Card, CardError
 from ..account import Entry, Remark
 
 _WIDTH = 10
+"""Columns of a field of a card that is no node and no element (the manual, "Card format")."""
 
 
 class Fields:
