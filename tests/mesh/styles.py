@@ -255,7 +255,7 @@ def hypermesh(random: Random) -> tuple[bytes, Groups]:
     if random.random() < 0.6:
         text.extra(int(body.tets[-1]) + 1, body.nodes)
     if random.random() < 0.3:
-        _hexahedron(text, body, int(body.tets[-1]) + 20)
+        _strange(text, body, int(body.tets[-1]) + 20)
         del groups[None]
     some = np.array(sorted(random.sample(list(body.tets), min(5, len(body.tets)))))
     text.elset("some", some)
@@ -265,9 +265,9 @@ def hypermesh(random: Random) -> tuple[bytes, Groups]:
     return text.bytes(), groups
 
 
-def _hexahedron(text: Text, body: Block, number: int) -> None:
-    """A volume that is no tet, in a component of its own."""
-    text.keyword("ELEMENT", "TYPE=C3D8R", "ELSET=hexes")
+def _strange(text: Text, body: Block, number: int) -> None:
+    """A volume that is not read, in a component of its own."""
+    text.keyword("ELEMENT", "TYPE=SC8R", "ELSET=hexes")
     text.lines.append(", ".join(str(each) for each in (number, *body.nodes[:8])))
 
 

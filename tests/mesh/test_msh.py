@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from conoid.worker.errors import MeshError
-from conoid.worker.mesh.msh.reading import read_msh
+from conoid.worker.mesh.msh import reading
 from conoid.worker.mesh.named import NamedMesh
+from conoid.worker.mesh.solid import solid
 
 WRITER = """
 import itertools
@@ -53,6 +54,10 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     place = tmp_path_factory.mktemp("msh")
     subprocess.run([sys.executable, "-c", WRITER], cwd=place, check=True, timeout=120)
     return place
+
+
+def read_msh(path: Path, group: str | None, key: str) -> NamedMesh:
+    return solid(reading.read_msh(path, group, key))
 
 
 def volume(found: NamedMesh) -> float:
@@ -134,18 +139,16 @@ def test_a_name_that_is_the_number_of_another_group_is_refused(tmp_path: Path) -
     assert read_msh(tmp_path / "small.msh", 'Körper "1"', "mesh").names.tets.tolist() == [101]
 
 
-HEXAHEDRON = "3\n102 5 2 3 1 10 20 30 40 50 10 20 30\n"
+POLYHEDRON = "3\n102 29 2 3 1 {}\n".format(" ".join(["10"] * 20))
 
 
 def test_other_volumes_are_refused_where_they_are_chosen(tmp_path: Path) -> None:
-    (tmp_path / "small.msh").write_text(SMALL.replace("$Elements\n2\n", f"$Elements\n{HEXAHEDRON}"))
-    with pytest.raises(
-        MeshError, match=r"^1 elements of the type hexahedron \(the first is 102\); only 4-node tets can"
-    ):
+    (tmp_path / "small.msh").write_text(SMALL.replace("$Elements\n2\n", f"$Elements\n{POLYHEDRON}"))
+    with pytest.raises(MeshError, match=r"^1 elements of the type 29 of gmsh \(the first is 102\); elements with a"):
         read_msh(tmp_path / "small.msh", None, "mesh")
     found = read_msh(tmp_path / "small.msh", "2", "mesh")
     assert found.names.tets.tolist() == [101]
-    assert found.notes == ("elements that are no 4-node tets are outside of the group: 1 of the type hexahedron",)
+    assert found.notes == ("elements that cannot be read are outside of the group: 1 of the type 29 of gmsh",)
 
 
 @pytest.mark.parametrize(

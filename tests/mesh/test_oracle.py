@@ -18,8 +18,10 @@ import pytest
 
 from conoid.cases.bodies import MeshFile
 from conoid.worker.errors import MeshError
+from conoid.worker.mesh.cells import HEX8, PYRAMID5, WEDGE6
 from conoid.worker.mesh.read import read
 
+from .mixtures import FACES
 from .styles import POISONS, STYLES, Floats, block, measured
 
 SEED = int(os.environ.get("CONOID_SEED", "20260801"))
@@ -29,7 +31,8 @@ FEW, MANY = 10, 100
 
 def held(path: Path, group: str | None, unit: float = 1.0) -> Floats:
     """Volume and first moments, (4,), of what a case takes from a file."""
-    mesh = read(MeshFile(shape="file", path=path.name, unit=unit, group=group), path, "mesh")
+    file = MeshFile(shape="file", path=path.name, unit=unit, group=group, second_order="corners")
+    mesh = read(file, path, "mesh")
     return measured(mesh.points, mesh.tets)
 
 
@@ -45,8 +48,17 @@ def of_meshio(path: Path) -> Floats | None:
             found = meshio.read(path)
     except (Exception, SystemExit):
         return None
-    tets = [cells.data for cells in found.cells if cells.type == "tetra"]
-    return measured(found.points, np.unique(np.concatenate(tets), axis=0)) if tets else None
+    kinds = {"hexahedron": HEX8, "wedge": WEDGE6, "pyramid": PYRAMID5}
+    points, tets = found.points, [cells.data for cells in found.cells if cells.type == "tetra"]
+    if any(cells.dim == 3 and cells.type not in (*kinds, "tetra") for cells in found.cells):
+        return None
+    for cells in (cells for cells in found.cells if cells.type in kinds):
+        data = np.unique(cells.data, axis=0)
+        middle = len(points) + np.arange(len(data))
+        points = np.concatenate([points, points[data].mean(axis=1)])
+        for a, b, c, *d in FACES[kinds[cells.type]]:
+            tets += [np.column_stack([data[:, row], middle]) for row in ([a, b, c], [a, c, *d]) if len(row) == 3]
+    return measured(points, np.unique(np.concatenate(tets), axis=0)) if tets else None
 
 
 def refused(path: Path, group: str | None, where: str) -> None:

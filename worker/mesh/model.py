@@ -30,7 +30,7 @@ MAX_TETS = 50_000_000
 REGULAR_STEP = 1.0 / math.sqrt(6.0)
 """Step length of the regular tet with edge 1: half its altitude."""
 
-_FLAT = 1e-9
+FLAT = 1e-9
 """A tet whose volume is below this share of (root of the sum of its squared face areas)^(3/2) has none. Chosen: a
 regular tet has 0.15, rounding of its nodes 1e-16."""
 
@@ -48,6 +48,20 @@ class Origin:
 
 
 @dataclass(frozen=True, eq=False)
+class NodeSet:
+    """Nodes, or a surface, that the file of a mesh names."""
+
+    names: tuple[str, ...]
+    """By which it may be called, the first one in lists."""
+    nodes: Ints
+    """(k,) of the mesh, ascending; of a surface those of all its faces."""
+    faces: Ints | None = None
+    """(n, 3) of a surface: those that are outer faces of the mesh. None for a set of nodes."""
+    inner: int = 0
+    """How many faces of the surface have all their nodes in the mesh and are no outer faces of it."""
+
+
+@dataclass(frozen=True, eq=False)
 class TetMesh:
     """``points``: (n, 3) float64, m. ``tets``: (m, 4) int32 rows of node indices, positively oriented.
 
@@ -58,6 +72,8 @@ class TetMesh:
     tets: Ints
     origin: Origin | None = None
     """None where the mesh was generated."""
+    sets: tuple[NodeSet, ...] = ()
+    """What its file names, empty ones among them."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "points", np.ascontiguousarray(self.points, np.float64))
@@ -69,7 +85,7 @@ class TetMesh:
 
     def volumes(self) -> Floats:
         """(m,) signed volumes, m^3."""
-        return _volume_and_area(self.points, self.tets)[0]
+        return volume_and_area(self.points, self.tets)[0]
 
     def step_lengths(self) -> Floats:
         """(m,) 1 / sqrt(sum |grad N|^2), m, with the sign of the volume: the stable time step is this over the speed
@@ -83,11 +99,18 @@ class Names:
 
     nodes: Ids
     tets: Ids
+    lines: Ids | None = None
+    """(m,) of the file, where the tets stand; 0 where nobody counts lines."""
+
+    def tet(self, index: int) -> str:
+        """``tet 7 (line 12)``."""
+        line = "" if self.lines is None or not self.lines[index] else f" (line {self.lines[index]})"
+        return f"tet {self.tets[index]}{line}"
 
 
 def step_lengths(points: Floats, tets: NDArray[np.integer]) -> Floats:
     """Step lengths, m, of the tets (..., 4) over ``points``; see ``TetMesh.step_lengths``."""
-    volume, area = _volume_and_area(points, tets)
+    volume, area = volume_and_area(points, tets)
     return np.divide(3 * volume, area, out=np.zeros_like(volume), where=area > 0)
 
 
@@ -109,7 +132,7 @@ def check(mesh: TetMesh, names: Names | None = None) -> TetMesh:
     wild = np.flatnonzero(((tets < 0) | (tets >= len(points))).any(axis=1))
     if len(wild):
         raise MeshError(
-            f"tet {names.tets[wild[0]]} has the node indices {_list(tets[wild[0]])}; allowed: 0 to {len(points) - 1}"
+            f"{names.tet(wild[0])} has the node indices {_list(tets[wild[0]])}; allowed: 0 to {len(points) - 1}"
         )
     unused = np.flatnonzero(np.bincount(tets.ravel(), minlength=len(points)) == 0)
     if len(unused):
@@ -119,19 +142,19 @@ def check(mesh: TetMesh, names: Names | None = None) -> TetMesh:
 
 
 def _check_volumes(mesh: TetMesh, names: Names) -> None:
-    volumes, areas = _volume_and_area(mesh.points, mesh.tets)
-    nothing = _FLAT * areas * np.sqrt(areas)
+    volumes, areas = volume_and_area(mesh.points, mesh.tets)
+    nothing = FLAT * areas * np.sqrt(areas)
     bad = np.flatnonzero(volumes <= nothing)
     if len(bad):
         tet, inverted = bad[0], volumes[bad[0]] < -nothing[bad[0]]
         raise MeshError(
-            f"tet {names.tets[tet]} is {'inverted' if inverted else 'flat'}: its nodes "
+            f"{names.tet(tet)} is {'inverted' if inverted else 'flat'}: its nodes "
             f"{_list(names.nodes[mesh.tets[tet]])} span a volume of {volumes[tet]:.3g} m^3; it must be above "
             f"{nothing[tet]:.2g} ({_count(bad, volumes)} tets are inverted or flat)"
         )
 
 
-def _volume_and_area(points: Floats, tets: NDArray[np.integer]) -> tuple[Floats, Floats]:
+def volume_and_area(points: Floats, tets: NDArray[np.integer]) -> tuple[Floats, Floats]:
     """Signed volume, m^3, and root of the sum of the four squared face areas, m^2."""
     x, y, z = ([column[tets[..., i]] for i in range(4)] for column in points.T)
     e = [[x[i] - x[0], y[i] - y[0], z[i] - z[0]] for i in (1, 2, 3)]

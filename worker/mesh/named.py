@@ -1,5 +1,6 @@
 """A mesh as its file has it: with the names of its nodes and tets there."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -34,3 +35,23 @@ def gathered(node_tags: Ids, points: Any, tet_tags: Ids, corners: Ids) -> NamedM
         raise MeshError(f"tet {tet} uses node {lost}, which is not defined")
     mesh = TetMesh(np.asarray(points, np.float64)[order[place]], tets.reshape(-1, 4).astype(np.int32))
     return NamedMesh(mesh, Names(used, tet_tags), used)
+
+
+def placed(tags: Ids, nodes: Ids, called: Callable[[int], str]) -> Ids:
+    """Node numbers (m, k) of a file as places in ``tags``. MeshError for one that is not there, of element ``called``
+    by its place.
+    """
+    order = np.argsort(tags, kind="stable")
+    found = np.minimum(np.searchsorted(tags, nodes, sorter=order), max(len(tags) - 1, 0))
+    good = tags[order[found]] == nodes if len(tags) else np.zeros(nodes.shape, bool)
+    if not good.all():
+        k = int(np.flatnonzero(~good.all(axis=1))[0])
+        raise MeshError(f"{called(k)} uses node {nodes[k][~good[k]][0]}, which is not defined")
+    return np.asarray(order[found], np.int64)
+
+
+def refuse_repeated(what: str, numbers: Ids, where: str = "") -> None:
+    """MeshError where two nodes, or two elements, have the same number."""
+    found, times = np.unique(numbers, return_counts=True)
+    if len(found) < len(numbers):
+        raise MeshError(f"{what} {found[times > 1][0]} is defined twice{where}")

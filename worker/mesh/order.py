@@ -56,4 +56,8 @@ def morton_ordered(mesh: TetMesh) -> TetMesh:
     centroids = np.stack([column[mesh.tets].sum(axis=1) / 4 for column in mesh.points.T], axis=1)
     by_tet = np.argsort(morton_codes(centroids, low, edge), kind="stable")
     origin = mesh.origin and replace(mesh.origin, nodes=mesh.origin.nodes[by_node])
-    return TetMesh(mesh.points[by_node], place[mesh.tets[by_tet]], origin)
+    sets = tuple(
+        replace(each, nodes=np.sort(place[each.nodes]), faces=None if each.faces is None else place[each.faces])
+        for each in mesh.sets
+    )
+    return TetMesh(mesh.points[by_node], place[mesh.tets[by_tet]], origin, sets)

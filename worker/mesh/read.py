@@ -17,8 +17,8 @@ from .abaqus.reading import read_inp
 from .faces import same_side
 from .model import Origin, TetMesh, check
 from .msh.reading import read_msh
-from .named import NamedMesh
 from .scale import scaled
+from .solid import Content, solid
 
 
 def read(file: MeshFile, path: Path, key: str = "mesh") -> TetMesh:
@@ -26,20 +26,22 @@ def read(file: MeshFile, path: Path, key: str = "mesh") -> TetMesh:
 
     Nodes that no tet uses and everything that is not a volume are left out; other volumes than tets are refused.
     """
-    readers: dict[str, Callable[[Path, str | None, str], NamedMesh]] = {".msh": read_msh, ".inp": read_inp}
+    readers: dict[str, Callable[[Path, str | None, str], Content]] = {".msh": read_msh, ".inp": read_inp}
     if path.suffix.lower() not in readers:
         raise MeshError(f"{key}.path = {file.path!r}: expected a file name that ends in {' or '.join(readers)}")
     try:
-        found = readers[path.suffix.lower()](path, file.group, key)
-        if file.group is not None and not len(found.mesh.tets):
-            raise MeshError(f"{key}.group = {file.group!r}: no tet is in it")
-        with path.open("rb") as content:
-            origin = Origin(hashlib.file_digest(content, "sha256").hexdigest(), found.places, found.notes)
-        mesh = check(TetMesh(scaled(found.mesh.points, file.unit), found.mesh.tets, origin), found.names)
+        content = readers[path.suffix.lower()](path, file.group, key)
+        if file.group is not None and not any(len(each.numbers) for each in content.cells):
+            raise MeshError(f"{key}.group = {file.group!r}: no element with a volume is in it")
+        found = solid(content, None if file.second_order == "auto" else file.second_order)
+        with path.open("rb") as data:
+            origin = Origin(hashlib.file_digest(data, "sha256").hexdigest(), found.places, found.notes)
+        points = scaled(found.mesh.points, file.unit)
+        mesh = check(TetMesh(points, found.mesh.tets, origin, found.mesh.sets), found.names)
         if len(twins := same_side(mesh.tets)):
             one, other = found.names.tets[twins[0]]
             raise MeshError(
-                f"tets {one} and {other} lie on the same side of a face that both have; is a tet there twice?"
+                f"elements {one} and {other} lie on the same side of a face that both have; is an element there twice?"
             )
         return mesh
     except MeshError as error:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .model import Origin, TetMesh
+from .model import Ints, NodeSet, Origin, TetMesh
 
 
 def save(mesh: TetMesh, path: Path) -> None:
@@ -18,7 +18,7 @@ def save(mesh: TetMesh, path: Path) -> None:
     handle, name = tempfile.mkstemp(dir=path.parent, prefix=".writing-", suffix=".npz")
     try:
         with os.fdopen(handle, "wb") as file:
-            np.savez(file, points=mesh.points, tets=mesh.tets, **_of_file(mesh.origin))
+            np.savez(file, points=mesh.points, tets=mesh.tets, **_of_file(mesh.origin), **_of_sets(mesh.sets))
             file.flush()
             os.fsync(file.fileno())
         os.replace(name, path)
@@ -31,7 +31,7 @@ def load(path: Path) -> TetMesh | None:
     """The mesh in ``path``; None when there is none, or when the file is damaged (every array has a checksum)."""
     try:
         with path.open("rb") as file, np.load(file, allow_pickle=False) as arrays:
-            return TetMesh(arrays["points"], arrays["tets"], _origin(arrays))
+            return TetMesh(arrays["points"], arrays["tets"], _origin(arrays), _sets(arrays))
     except (OSError, ValueError, KeyError, EOFError, MemoryError, zipfile.BadZipFile):
         return None
 
@@ -46,3 +46,37 @@ def _origin(arrays: Mapping[str, NDArray[Any]]) -> Origin | None:
     if "sha256" not in arrays:
         return None
     return Origin(str(arrays["sha256"]), arrays["nodes"], tuple(map(str, arrays["notes"])))
+
+
+def _of_sets(sets: tuple[NodeSet, ...]) -> dict[str, Any]:
+    """All sets in few arrays; a set of nodes has -1 faces."""
+    if not sets:
+        return {}
+    faces = [_no_faces() if each.faces is None else each.faces for each in sets]
+    counts = [
+        (len(each.names), len(each.nodes), -1 if each.faces is None else len(each.faces), each.inner) for each in sets
+    ]
+    return {
+        "set_names": np.array([name for each in sets for name in each.names], np.str_),
+        "set_counts": np.array(counts, np.int64),
+        "set_nodes": np.concatenate([each.nodes for each in sets]),
+        "set_faces": np.concatenate(faces),
+    }
+
+
+def _sets(arrays: Mapping[str, NDArray[Any]]) -> tuple[NodeSet, ...]:
+    if "set_counts" not in arrays:
+        return ()
+    names, nodes, faces = (arrays[f"set_{what}"] for what in ("names", "nodes", "faces"))
+    found, first = list[NodeSet](), np.zeros(3, np.int64)
+    for *counts, inner in arrays["set_counts"].tolist():
+        last = first + np.maximum(counts, 0)
+        (a, b, c), (d, e, f) = first, last
+        some = faces[c:f].reshape(-1, 3) if counts[2] >= 0 else None
+        found.append(NodeSet(tuple(map(str, names[a:d])), nodes[b:e], some, inner))
+        first = last
+    return tuple(found)
+
+
+def _no_faces() -> Ints:
+    return np.zeros((0, 3), np.int32)

@@ -21,7 +21,7 @@ def everything(pieces: list[Piece]) -> Chosen:
 
 
 def _every(mesh: Scope) -> Ids:
-    return np.sort(np.concatenate([np.array(each, np.int64) for each in (mesh.tets, *mesh.others.values())]))
+    return np.sort(mesh.numbers())
 
 
 def grouped(deck: Deck, pieces: list[Piece], group: str, key: str) -> Chosen:

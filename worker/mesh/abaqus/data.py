@@ -39,7 +39,7 @@ def element_rows(lines: Iterator[tuple[int, str]], kind: ElementType) -> Iterato
 def _complete(row: list[str], kind: ElementType, goes_on: bool, line: int) -> bool:
     if kind.nodes is None:
         return not goes_on
-    if kind.kind is Kind.TET and len(row) > 1 + kind.nodes:
+    if kind.kind is Kind.SOLID and len(row) > 1 + kind.nodes:
         raise MeshError(f"line {line}: an element of the type {kind.name} with {len(row) - 1} nodes{_expected(kind)}")
     return len(row) >= 1 + kind.nodes
 

@@ -10,9 +10,9 @@ from conoid.cases.inp import Block, Source, fields, is_whole, numbers, shortened
 from ...errors import MeshError
 from .data import axis, cylindrical, element_rows, numbers_of, translation
 from .elements import Kind, element_type
-from .keywords import JOINING, MESH, REFUSED, known, needed, options
+from .keywords import JOINING, MESH, REFUSED, SURFACE, known, needed, options
 from .labels import Label, Labelled, label
-from .scopes import OWN, ElementSet, Instance, Scope
+from .scopes import OWN, ElementSet, Instance, Rows, Scope, Surface
 
 _ROOT = Label("", "")
 _NODE_VALUES = 6
@@ -29,6 +29,8 @@ class Deck:
         self.instances: Labelled[Instance] = Labelled()
         self.joining: Counter[str] = Counter()
         """How often keywords that join, hold or remove bodies stand in the file."""
+        self.unread: list[str] = []
+        """Names of surfaces that are not made of elements or nodes."""
         self._here: Scope = self.root
         self._assembly = self._step = False
         self._source = Source(path)
@@ -46,6 +48,8 @@ class Deck:
             raise MeshError(f"line {block.line}: *{word}{extra} is not followed; write the nodes and elements out")
         if word in JOINING:
             self.joining[word] += 1
+        if word == SURFACE:
+            self._surface(block)
         reader = _READERS.get(word)
         if reader is not None:
             reader(self, block, options(block, word))
@@ -113,36 +117,54 @@ class Deck:
         system = found.get("SYSTEM", "R").upper()
         if system not in ("R", "C"):
             raise MeshError(f"line {block.line}: *NODE, SYSTEM={system} is not read; allowed: R, C")
-        here = self._here
+        here, made = self._here, array("q")
         for number, text in self._source.filled():
             first, _, rest = text.partition(",")
             values = numbers(number, rest)
             if len(values) > _NODE_VALUES:
                 raise MeshError(f"line {number}: a node has up to {_NODE_VALUES} values; found {len(values)}")
             point = [*values, 0.0, 0.0, 0.0][:3]
-            here.nodes.append(whole(number, first))
+            made.append(whole(number, first))
             here.points.extend(point if system == "R" else cylindrical(*point))
+        here.nodes.extend(made)
+        if "NSET" in found:
+            here.named_set(label(found["NSET"]), here.node_sets).add(OWN, made)
 
     def _element(self, block: Block, found: dict[str, str]) -> None:
         kind = element_type(needed(block, found, "ELEMENT", "TYPE"))
-        here, made = self._here, array("q")
+        here, made = self._here, Rows()
+        known = kind.kind is Kind.SOLID or kind.corners is not None
         for line, items in element_rows(self._source.filled(), kind):
-            row = wholes(line, items if kind.kind is Kind.TET else items[:1])
-            made.append(row[0])
-            here.corners.extend(row[1:])
-        if kind.kind is Kind.TET:
-            here.tets.extend(made)
-        elif made:
-            here.others.setdefault(kind, array("q")).extend(made)
+            row = wholes(line, items if known else items[:1])
+            made.numbers.append(row[0])
+            made.nodes.extend(row[1 : 1 + (kind.corners or len(row))])
+            made.lines.append(line)
+        if kind.kind is Kind.SOLID:
+            here.solids.setdefault(kind, Rows()).extend(made)
+        elif made.numbers:
+            here.others.setdefault(kind, array("q")).extend(made.numbers)
+            if known:
+                here.plates.setdefault(kind, Rows()).extend(made)
         if "ELSET" in found:
-            here.named_set(label(found["ELSET"])).add(OWN, made)
+            here.named_set(label(found["ELSET"])).add(OWN, made.numbers)
 
     # Sets -------------------------------------------------------------------------------------------------------------
 
     def _elset(self, block: Block, found: dict[str, str]) -> None:
-        instance = self._instance_of(block, found)
         name = label(needed(block, found, "ELSET", "ELSET"))
-        one, owner = self._here.named_set(name), OWN if instance is None else instance.name.key
+        self._fill(block, found, self._here.named_set(name), of_nodes=False)
+
+    def _nset(self, block: Block, found: dict[str, str]) -> None:
+        name = label(needed(block, found, "NSET", "NSET"))
+        one = self._here.named_set(name, self._here.node_sets)
+        if "ELSET" in found:
+            self._here.node_sets_of.append((one, label(found["ELSET"]), block.line))
+        else:
+            self._fill(block, found, one, of_nodes=True)
+
+    def _fill(self, block: Block, found: dict[str, str], one: ElementSet, of_nodes: bool) -> None:
+        instance = self._instance_of(block, found)
+        owner = OWN if instance is None else instance.name.key
         for number, text in self._source.filled():
             items = [item for item in fields(text) if item]
             if "GENERATE" in found:
@@ -151,7 +173,7 @@ class Deck:
                 one.add(owner, array("q", wholes(number, items)))
             else:
                 for item in items:
-                    self._member(one, instance, item, number)
+                    self._member(one, instance, item, number, of_nodes)
 
     def _instance_of(self, block: Block, found: dict[str, str]) -> Instance | None:
         if "INSTANCE" not in found:
@@ -159,18 +181,21 @@ class Deck:
         instance = self.instances.get(label(found["INSTANCE"]))
         if instance is None or self._here is not self.root:
             names = ", ".join(each.text for each, _ in self.instances) or "none"
-            raise MeshError(f"line {block.line}: *ELSET of the unknown instance {found['INSTANCE']!r}; known: {names}")
+            raise MeshError(
+                f"line {block.line}: *{block.word} of the unknown instance {found['INSTANCE']!r}; known: {names}"
+            )
         return instance
 
-    def _member(self, one: ElementSet, instance: Instance | None, item: str, line: int) -> None:
-        """Adds an element, or the elements of a set, of an instance or of this scope, to a set."""
+    def _member(self, one: ElementSet, instance: Instance | None, item: str, line: int, of_nodes: bool) -> None:
+        """Adds an element, or the elements of a set, of an instance or of this scope, to a set; or nodes."""
         owner = OWN if instance is None else instance.name.key
         if is_whole(item):
             one.add(owner, array("q", [whole(line, item)]))
             return
-        other = self._here.sets.get(label(item)) if instance is None else instance.set_named(label(item))
+        here = self._here.node_sets if of_nodes else self._here.sets
+        other = here.get(label(item)) if instance is None else instance.set_named(label(item), of_nodes)
         if other is None and instance is None and isinstance(self._here, Instance):
-            other = self._here.part.sets.get(label(item))
+            other = self._here.set_named(label(item), of_nodes)
         if other is one:
             raise MeshError(f"line {line}: the set {label(item).text!r} has itself among its members")
         if other is not None:
@@ -179,10 +204,21 @@ class Deck:
         place, rest = self._qualified(item)
         if place is not None and is_whole(rest):
             one.add(place.name.key, array("q", [whole(line, rest)]))
-        elif place is not None and (other := place.set_named(label(rest))) is not None:
+        elif place is not None and (other := place.set_named(label(rest), of_nodes)) is not None:
             one.include(other, place.name.key)
         else:
-            raise MeshError(f"line {line}: {shortened(item)} is no element and no element set that is defined above")
+            what = "node and no node set" if of_nodes else "element and no element set"
+            raise MeshError(f"line {line}: {shortened(item)} is no {what} that is defined above")
+
+    def _surface(self, block: Block) -> None:
+        """Kept as it is written; what it needs may be defined below."""
+        found = dict(block.parameters)
+        kind, name = (found.get("TYPE") or "ELEMENT").upper(), found.get("NAME")
+        if name is None or "COMBINE" in found or kind not in ("ELEMENT", "NODE"):
+            self.unread.append(label(name or "?").text)
+            return
+        rows = [(number, [*fields(text), ""]) for number, text in self._source.filled()]
+        self._here.surfaces.append(Surface(label(name), block.line, kind == "NODE", rows))
 
     def _qualified(self, item: str) -> tuple[Instance | None, str]:
         """The instance and the rest of ``Bar-1.5`` or ``Bar-1.Set-1``, at the level of the assembly."""
@@ -207,6 +243,7 @@ _READERS: dict[str, Callable[[Deck, Block, dict[str, str]], None]] = {
     "NODE": Deck._node,
     "ELEMENT": Deck._element,
     "ELSET": Deck._elset,
+    "NSET": Deck._nset,
 }
 
 

@@ -1,4 +1,4 @@
-"""The element types of Abaqus and CalculiX: tets that can be used, other volumes, and what carries no volume.
+"""The element types of Abaqus and CalculiX: volumes that are read, other ones, and what carries no volume.
 
 The names are those of the Elements Guide: a family, its number of nodes, and letters for variants.
 """
@@ -8,14 +8,27 @@ from dataclasses import dataclass
 from enum import Enum
 from functools import cache
 
+from ..cells import HEX8, HEX20, PYRAMID5, TET4, TET10, WEDGE6, WEDGE15, Form
+
 
 class Kind(Enum):
     """What an element is for a mesh of tets."""
 
-    TET = "a 4-node tet"
+    SOLID = "a volume that is read"
     VOLUME = "another volume"
     EMPTY = "without volume"
     UNKNOWN = "unknown"
+
+
+FORMS = {4: TET4, 5: PYRAMID5, 6: WEDGE6, 8: HEX8, 10: TET10, 15: WEDGE15, 20: HEX20}
+"""Volumes that are read, by their nodes."""
+FACES = {
+    Form.TET: ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)),
+    Form.PYRAMID: ((0, 1, 2, 3), (0, 4, 1), (1, 4, 2), (2, 4, 3), (3, 4, 0)),
+    Form.WEDGE: ((0, 1, 2), (3, 5, 4), (0, 3, 4, 1), (1, 4, 5, 2), (2, 5, 3, 0)),
+    Form.HEXAHEDRON: ((0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0)),
+}
+"""Corners of the faces S1, S2, ... (Elements Guide, "Three-dimensional solid element library")."""
 
 
 @dataclass(frozen=True)
@@ -26,8 +39,15 @@ class ElementType:
     kind: Kind
     nodes: int | None
 
+    @property
+    def corners(self) -> int | None:
+        """Of an element of a surface, 3 or 4; None of others."""
+        plate = self.kind is Kind.EMPTY and _PLATE.fullmatch(self.name)
+        return {3: 3, 6: 3, 4: 4, 8: 4, 9: 4}.get(self.nodes or 0) if plate else None
 
-_TET = re.compile(r"C3D4(E|H|HT|P|PH|PHT|PT|T)?")
+
+_SOLID = re.compile(r"C3D(4|5|6|8|10|15|20)(?:E|S|HS|(?:I|M|R)?H?T?|(?:M|R)?P?H?T?|RE)")
+_PLATE = re.compile(r"(?:STRI|S|DS|M3D|SFM3D|R3D|CPE|CPS|CAX)\d+[A-Z0-9]*")
 _VOLUME = re.compile(r"(?:A?C3D|DC3D|DCC3D|EC3D|EMC3D|Q3D|CIN3D|CSS|SC|CCL|GK3D)(\d+)[A-Z]*")
 _COUNTED = re.compile(
     r"(?:STRI|S|DS|M3D|MCL|SFM3D|SFMCL|R2D|R3D|RB2D|RB3D|T2D|T3D|CPE|CPEG|CPS|CAX|CGAX|DC1D|DC2D|DCAX|AC1D|AC2D|ACAX"
@@ -46,8 +66,8 @@ _NODES = {"STRI65": 6, "S4R5": 4, "S8R5": 8, "S9R5": 9}
 def element_type(name: str) -> ElementType:
     """The type that a file calls ``name``."""
     name = "".join(name.split()).upper()
-    if _TET.fullmatch(name):
-        return ElementType(name, Kind.TET, 4)
+    if found := _SOLID.fullmatch(name):
+        return ElementType(name, Kind.SOLID, int(found[1]))
     if found := _VOLUME.fullmatch(name):
         return ElementType(name, Kind.VOLUME, int(found[1]))
     if name in _NODES:

@@ -1,4 +1,4 @@
-"""The mesh that a case takes from an Abaqus input file: all of its tets, or those of a set, an instance or a part."""
+"""What a case takes from an Abaqus input file: all of its elements, or those of a set, an instance or a part."""
 
 import math
 from collections import Counter
@@ -6,27 +6,28 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from conoid.cases.inp import InpError
 
 from ...errors import MeshError
 from ...turning import sine_and_cosine
-from ..model import Floats, Ids, Names
-from ..named import NamedMesh, gathered
+from ..model import Floats, Ids
+from ..solid import Content
 from .choosing import Chosen, everything, grouped
 from .deck import Deck
 from .elements import ElementType, Kind
 from .keywords import JOINING
+from .named_sets import named_sets
+from .placed import Placed, Tags
 from .scopes import Piece, Scope
 
 
-def read_inp(path: Path, group: str | None, key: str) -> NamedMesh:
-    """The tets of an .inp file, all or those that ``group`` names, in the unit of the file.
+def read_inp(path: Path, group: str | None, key: str) -> Content:
+    """The elements of an .inp file, all or those that ``group`` names, in the unit of the file, and its sets.
 
     ``group`` is an element set of the model or of the assembly, ``Bar-1.Set-1`` (a set of an instance or of a part), an
     instance, a part, or a set that one part alone has. Raises MeshError, with the number of the line where there is
-    one. Node and tet names are the numbers in the file.
+    one. Nodes and elements are called by the numbers in the file.
     """
     try:
         deck = Deck(path)
@@ -39,8 +40,24 @@ def read_inp(path: Path, group: str | None, key: str) -> NamedMesh:
         piece.mesh.check(f" in {piece.mesh.name.text!r}" if piece.mesh.line else "")
     chosen = everything(pieces) if group is None else grouped(deck, pieces, group, key)
     _refuse_volumes(pieces, chosen)
-    found = _taken(pieces, chosen)
-    return NamedMesh(found.mesh, found.names, found.places, tuple(_notes(deck, pieces, group)))
+    tags, points, places = _nodes(pieces)
+    model = Placed(deck, pieces, places)
+    every = [each for place, numbers in chosen.items() for each in model.solids(place, numbers)]
+    named, told = named_sets(model)
+    return Content(tags, points, every, named, (*_notes(deck, pieces, group), *told))
+
+
+def _nodes(pieces: list[Piece]) -> tuple[Ids, Floats, list[Tags]]:
+    """All nodes, those of each piece by ascending number, and where they are."""
+    tags, points, places, first = [], [], list[Tags](), 0
+    for piece in pieces:
+        numbers = np.array(piece.mesh.nodes, np.int64)
+        order = np.argsort(numbers, kind="stable")
+        tags.append(numbers[order])
+        points.append(piece.points[order])
+        places.append(Tags(numbers[order], first))
+        first += len(order)
+    return np.concatenate(tags), np.concatenate(points), places
 
 
 def _pieces(deck: Deck) -> Iterator[Piece]:
@@ -81,36 +98,9 @@ def _refuse_volumes(pieces: list[Piece], chosen: Chosen) -> None:
             if len(among):
                 strange = ", a type that is not known" if kind.kind is Kind.UNKNOWN else ""
                 raise MeshError(
-                    f"{len(among)} elements of the type {kind.name}{strange} (the first is {among[0]}); only C3D4, "
-                    "4-node tets, can be used"
+                    f"{len(among)} elements of the type {kind.name}{strange} (the first is {among[0]}); elements with "
+                    "a volume can be C3D4, C3D5, C3D6, C3D8, C3D10, C3D15, C3D20 and their variants"
                 )
-
-
-def _taken(pieces: list[Piece], chosen: Chosen) -> NamedMesh:
-    nodes, points, numbers, corners, first = [], [], [], [], 0
-    for place, piece in enumerate(pieces):
-        keep = np.isin(piece.numbers, chosen.get(place, np.zeros(0, np.int64)))
-        tags = np.array(piece.mesh.nodes, np.int64)
-        nodes.append(tags)
-        points.append(piece.points)
-        numbers.append(piece.numbers[keep])
-        corners.append(_placed(tags, np.array(piece.mesh.corners, np.int64).reshape(-1, 4)[keep], numbers[-1]) + first)
-        first += len(tags)
-    found = gathered(np.arange(first), np.concatenate(points), np.concatenate(numbers), np.concatenate(corners))
-    names = Names(np.concatenate(nodes)[found.places], found.names.tets)
-    return NamedMesh(found.mesh, names, found.places)
-
-
-def _placed(tags: Ids, corners: Ids, numbers: Ids) -> Ids:
-    """Node numbers of the file as places in ``tags``."""
-    order = np.argsort(tags, kind="stable")
-    found = np.searchsorted(tags, corners, sorter=order)
-    good: NDArray[np.bool_] = found < len(tags)
-    good[good] = tags[order[found[good]]] == corners[good]
-    if not good.all():
-        tet = np.flatnonzero(~good.all(axis=1))[0]
-        raise MeshError(f"tet {numbers[tet]} uses node {corners[tet][~good[tet]][0]}, which is not defined")
-    return np.asarray(order[found], np.int64)
 
 
 def _notes(deck: Deck, pieces: list[Piece], group: str | None) -> Iterator[str]:
@@ -123,14 +113,16 @@ def _notes(deck: Deck, pieces: list[Piece], group: str | None) -> Iterator[str]:
     if empty := _counted(counts, Kind.EMPTY):
         yield f"elements that carry no volume are skipped: {empty}"
     if solid := ", ".join(filter(None, (_counted(counts, kind) for kind in (Kind.VOLUME, Kind.UNKNOWN)))):
-        yield f"elements that are no 4-node tets are outside of the group: {solid}"
+        yield f"elements that cannot be read are outside of the group: {solid}"
     if deck.joining:
         words = ", ".join(f"{n} *{JOINING[word]}" for word, n in sorted(deck.joining.items()))
         yield f"keywords that join, hold or remove bodies are passed over: {words}"
+    if deck.unread:
+        yield f"surfaces that are not lists of elements or nodes are not read: {', '.join(map(repr, deck.unread))}"
     placed = {id(piece.mesh) for piece in pieces}
-    left = [part for _, part in deck.parts if id(part) not in placed and part.tets]
+    left = [part for _, part in deck.parts if id(part) not in placed and part.volumes]
     if left:
-        names = ", ".join(f"{part.name.text!r} ({len(part.tets)} tets)" for part in left)
+        names = ", ".join(f"{part.name.text!r} ({part.volumes} elements)" for part in left)
         yield f"parts without an instance are left out: {names}"
     hidden = (
         []

@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ...errors import MeshError
 from ..model import Floats, Ids
+from ..named import refuse_repeated
 from .elements import ElementType
 from .labels import Label, Labelled
 
@@ -15,7 +15,7 @@ OWN = ""
 
 
 class ElementSet:
-    """Numbers of elements, by the key of the instance whose they are (``OWN`` for those of its own scope)."""
+    """Numbers of elements, or of nodes, by the key of the instance whose they are (``OWN``: of its own scope)."""
 
     def __init__(self) -> None:
         """Holds nothing."""
@@ -32,6 +32,33 @@ class ElementSet:
 
 
 @dataclass
+class Rows:
+    """Elements of one type."""
+
+    numbers: "array[int]" = field(default_factory=lambda: array("q"))
+    nodes: "array[int]" = field(default_factory=lambda: array("q"))
+    """Those of each element, one after the other."""
+    lines: "array[int]" = field(default_factory=lambda: array("q"))
+
+    def extend(self, other: "Rows") -> None:
+        """Adds more of the type."""
+        self.numbers.extend(other.numbers)
+        self.nodes.extend(other.nodes)
+        self.lines.extend(other.lines)
+
+
+@dataclass
+class Surface:
+    """A ``*SURFACE`` as it is written: an element, or a set of them, and the name of a face in each line."""
+
+    name: Label
+    line: int
+    of_nodes: bool
+    rows: list[tuple[int, list[str]]]
+    """Number and fields of each line."""
+
+
+@dataclass
 class Scope:
     """A part, an instance or the whole model: what stands between its keyword and the end of it."""
 
@@ -40,29 +67,45 @@ class Scope:
     """Of its keyword in the file."""
     nodes: "array[int]" = field(default_factory=lambda: array("q"))
     points: "array[float]" = field(default_factory=lambda: array("d"))
-    tets: "array[int]" = field(default_factory=lambda: array("q"))
-    corners: "array[int]" = field(default_factory=lambda: array("q"))
-    """Four nodes of each tet."""
+    solids: dict[ElementType, Rows] = field(default_factory=dict)
+    """Elements with a volume, by type."""
+    plates: dict[ElementType, Rows] = field(default_factory=dict)
+    """Elements of surfaces, which are among the others, by type."""
     others: "dict[ElementType, array[int]]" = field(default_factory=dict)
-    """Numbers of the elements that are no tets, by type."""
+    """Numbers of the elements that carry no volume, or are not read, by type."""
     sets: Labelled[ElementSet] = field(default_factory=Labelled)
+    node_sets: Labelled[ElementSet] = field(default_factory=Labelled)
+    node_sets_of: list[tuple[ElementSet, Label, int]] = field(default_factory=list)
+    """Sets of the nodes of a set of elements: both, and the line."""
+    surfaces: list[Surface] = field(default_factory=list)
 
     @property
     def empty(self) -> bool:
         """Whether it has neither nodes nor elements."""
-        return not (self.nodes or self.tets or self.others)
+        return not (self.nodes or self.solids or self.others)
 
-    def named_set(self, name: Label) -> ElementSet:
-        """The set of this name, made where there is none: a second definition adds to the first."""
-        return self.sets.get(name) or self.sets.add(name, ElementSet())
+    @property
+    def volumes(self) -> int:
+        """How many elements with a volume it has."""
+        return sum(len(rows.numbers) for rows in self.solids.values())
+
+    def numbers(self) -> Ids:
+        """Of all elements, in the order of types."""
+        every = (*(rows.numbers for rows in self.solids.values()), *self.others.values())
+        return np.concatenate([np.zeros(0, np.int64), *(np.array(each, np.int64) for each in every)])
+
+    def named_set(self, name: Label, among: Labelled[ElementSet] | None = None) -> ElementSet:
+        """The set of elements of this name, or that of nodes ``among`` these, made where there is none: a second
+        definition adds to the first.
+        """
+        sets = self.sets if among is None else among
+        found = sets.get(name)
+        return sets.add(name, ElementSet()) if found is None else found
 
     def check(self, where: str) -> None:
         """Raises MeshError where two nodes, or two elements, have the same number."""
-        for what, numbers in (("node", [self.nodes]), ("element", [self.tets, *self.others.values()])):
-            every = np.concatenate([np.array(each, np.int64) for each in numbers])
-            found, times = np.unique(every, return_counts=True)
-            if len(found) < len(every):
-                raise MeshError(f"{what} {found[times > 1][0]} is defined twice{where}")
+        refuse_repeated("node", np.array(self.nodes, np.int64), where)
+        refuse_repeated("element", self.numbers(), where)
 
 
 @dataclass
@@ -79,8 +122,10 @@ class Instance(Scope):
         """Where its nodes and elements stand."""
         return self.part if self.empty else self
 
-    def set_named(self, name: Label) -> ElementSet | None:
+    def set_named(self, name: Label, of_nodes: bool = False) -> ElementSet | None:
         """A set of its own, else of its part."""
+        if of_nodes:
+            return self.node_sets.get(name) or self.part.node_sets.get(name)
         return self.sets.get(name) or self.part.sets.get(name)
 
 
@@ -92,8 +137,3 @@ class Piece:
     mesh: Scope
     points: Floats
     """(n, 3), in the unit of the file."""
-
-    @property
-    def numbers(self) -> Ids:
-        """(m,) numbers of its tets."""
-        return np.array(self.mesh.tets, np.int64)

@@ -3,10 +3,9 @@
 from dataclasses import dataclass
 
 from ...errors import MeshError
+from ..cells import HEX8, PYRAMID5, TET4, WEDGE6, Form, Kind
 from ..model import Floats, Ids
 
-TET = 4
-"""gmsh's number of the 4-node tet."""
 VOLUME = 3
 """Dimension of what has a volume."""
 
@@ -21,7 +20,20 @@ _TYPES = {
         110: 550, 111: 24, 118: 30, 119: 55, 120: 91, 121: 140, 122: 204, 123: 285, 124: 385, 125: 21, 132: 1},
 }  # fmt: skip
 """Nodes of the element types of gmsh by dimension (its source, GmshDefines.h)."""
-_NAMES = {5: "hexahedron", 6: "prism", 7: "pyramid", 11: "tetrahedron of 10 nodes", 17: "hexahedron of 20 nodes"}
+_RING = ((0, 1), (0, 3), (0, 4), (1, 2), (1, 5), (2, 3), (2, 6), (3, 7), (4, 5), (4, 7), (5, 6), (6, 7))
+_OF_WEDGE = ((0, 1), (0, 2), (0, 3), (1, 2), (1, 4), (2, 5), (3, 4), (3, 5), (4, 5))
+_OF_PYRAMID = ((0, 1), (0, 3), (0, 4), (1, 2), (1, 4), (2, 3), (2, 4), (3, 4))
+KINDS = {
+    4: TET4, 5: HEX8, 6: WEDGE6, 7: PYRAMID5,
+    11: Kind(Form.TET, 10, ((0, 1), (1, 2), (0, 2), (0, 3), (2, 3), (1, 3))),
+    17: Kind(Form.HEXAHEDRON, 20, _RING), 12: Kind(Form.HEXAHEDRON, 27, _RING),
+    18: Kind(Form.WEDGE, 15, _OF_WEDGE), 13: Kind(Form.WEDGE, 18, _OF_WEDGE),
+    19: Kind(Form.PYRAMID, 13, _OF_PYRAMID), 14: Kind(Form.PYRAMID, 14, _OF_PYRAMID),
+}  # fmt: skip
+"""Elements with a volume that are read (order of nodes: gmsh reference manual, "Node ordering")."""
+TRIANGLES = frozenset((2, 9, 20, 21, 22, 23, 24, 25, 42, 43, 44, 45, 46))
+QUADRILATERALS = frozenset((3, 10, 16, 36, 37, 38, 39, 40, 41, 47, 48, 49, 50, 51))
+"""Elements of surfaces; their first nodes are the corners."""
 
 
 @dataclass(frozen=True)
@@ -44,11 +56,11 @@ class Block:
     @property
     def name(self) -> str:
         """Of the type, for messages."""
-        return _NAMES.get(self.kind, f"type {self.kind} of gmsh")
+        return f"type {self.kind} of gmsh"
 
 
 @dataclass(frozen=True)
-class Content:
+class Read:
     """What a file has: ``nodes`` (n,) and ``points`` (n, 3), elements, and remarks on what is not in it."""
 
     nodes: Ids

@@ -7,10 +7,13 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import MeshError
+from ..cells import Cells, cells
 from ..model import Ids
-from ..named import NamedMesh, gathered
-from .blocks import TET, VOLUME, Block, Content
+from ..named import placed, refuse_repeated
+from ..solid import Content
+from .blocks import KINDS, VOLUME, Block, Read
 from .sections import Sections, read_sections
+from .sets import named_sets
 from .version2 import read_version2
 from .version4 import read_version4
 
@@ -24,26 +27,32 @@ _LISTED = {
 """Sections of the format; those that hold no part of the mesh are passed over."""
 
 
-def read_msh(path: Path, group: str | None, key: str) -> NamedMesh:
-    """The tets of a .msh file, all or those of a physical group of volumes, in the unit of the file.
+def read_msh(path: Path, group: str | None, key: str) -> Content:
+    """The elements of an .msh file, all or those of a physical group of volumes, and the physical groups of points,
+    curves and surfaces as sets.
 
-    ``group`` is the name of the physical group, or its number. Groups that have the same name are taken together. Node
-    and tet names are the numbers in the file. Raises MeshError.
+    ``group`` is the name of the physical group, or its number. Groups that have the same name are taken together.
+    Raises MeshError.
     """
     file = read_sections(path)
-    content = read_version2(file) if file.version == "2.2" else read_version4(file)
+    found = read_version2(file) if file.version == "2.2" else read_version4(file)
     names = _names(file)
-    volumes = [block for block in content.blocks if block.dimension == VOLUME]
+    volumes = [block for block in found.blocks if block.dimension == VOLUME]
     wanted = None if group is None else _wanted(names, volumes, group, key)
     chosen = [block for block in volumes if wanted is None or block.groups & wanted]
     _refuse_others(chosen)
-    numbers, corners = _tets(chosen)
-    if file.version == "2.2":
-        numbers, corners = _once(chosen, numbers, corners)
-    _refuse_repeated("node", content.nodes)
-    _refuse_repeated("element", numbers)
-    found = gathered(content.nodes, content.points, numbers, corners)
-    return NamedMesh(found.mesh, found.names, found.places, tuple(_notes(file, content, wanted, group)))
+    order = np.argsort(found.nodes, kind="stable")
+    tags = found.nodes[order]
+    refuse_repeated("node", tags)
+    every = [_cells(block, tags) for block in (_once(chosen) if file.version == "2.2" else chosen)]
+    refuse_repeated("element", np.concatenate([np.zeros(0, np.int64), *(each.numbers for each in every)]))
+    notes = tuple(_notes(file, found, wanted, group))
+    return Content(tags, found.points[order], every, list(named_sets(found.blocks, names, tags)), notes)
+
+
+def _cells(block: Block, tags: Ids) -> Cells:
+    kind = KINDS[block.kind]
+    return cells(kind, block.numbers, placed(tags, block.nodes, lambda k: f"{kind.form.word} {block.numbers[k]}"))
 
 
 def _names(file: Sections) -> dict[tuple[int, int], str]:
@@ -75,43 +84,29 @@ def _wanted(names: dict[tuple[int, int], str], volumes: list[Block], group: str,
 
 def _refuse_others(chosen: list[Block]) -> None:
     for block in chosen:
-        if block.kind != TET and len(block.numbers):
+        if block.kind not in KINDS and len(block.numbers):
             raise MeshError(
-                f"{len(block.numbers)} elements of the {_called(block)} (the first is {block.numbers[0]}); only 4-node "
-                "tets can be used"
+                f"{len(block.numbers)} elements of the {block.name} (the first is {block.numbers[0]}); elements with a "
+                "volume can be tets, hexahedra, prisms and pyramids of first and second order"
             )
 
 
-def _called(block: Block) -> str:
-    return block.name if block.name.startswith("type") else f"type {block.name}"
+def _once(chosen: list[Block]) -> list[Block]:
+    """The same, each element once: in the format 2.2 one that is in several groups stands there for each of them."""
+    found = []
+    for kind in dict.fromkeys(block.kind for block in chosen):
+        alike = [block for block in chosen if block.kind == kind]
+        numbers, nodes = (np.concatenate([getattr(each, what) for each in alike]) for what in ("numbers", "nodes"))
+        group = np.concatenate([np.full(len(each.numbers), min(each.groups, default=0)) for each in alike])
+        both = np.column_stack([nodes, group])
+        kept = np.arange(len(both))
+        if len(np.unique(both, axis=0)) == len(both):
+            kept = np.sort(np.unique(nodes, axis=0, return_index=True)[1])
+        found.append(Block(kind, numbers[kept], nodes[kept], frozenset()))
+    return found
 
 
-def _tets(chosen: list[Block]) -> tuple[Ids, Ids]:
-    """Numbers and nodes of the tets."""
-    numbers = np.concatenate([np.zeros(0, np.int64), *(block.numbers for block in chosen)])
-    corners = np.concatenate([np.zeros((0, 4), np.int64), *(block.nodes for block in chosen)])
-    return numbers, corners
-
-
-def _once(chosen: list[Block], numbers: Ids, corners: Ids) -> tuple[Ids, Ids]:
-    """The same, each tet once: in the format 2.2 one that is in several groups stands there for each of them."""
-    group = np.concatenate(
-        [np.zeros(0, np.int64), *(np.full(len(b.numbers), min(b.groups, default=0)) for b in chosen)]
-    )
-    both = np.column_stack([corners, group])
-    if len(np.unique(both, axis=0)) < len(both):
-        return numbers, corners
-    first = np.sort(np.unique(corners, axis=0, return_index=True)[1])
-    return numbers[first], corners[first]
-
-
-def _refuse_repeated(what: str, numbers: Ids) -> None:
-    found, times = np.unique(numbers, return_counts=True)
-    if len(found) < len(numbers):
-        raise MeshError(f"{what} {found[times > 1][0]} is defined twice")
-
-
-def _notes(file: Sections, content: Content, wanted: frozenset[int] | None, group: str | None) -> Iterator[str]:
+def _notes(file: Sections, content: Read, wanted: frozenset[int] | None, group: str | None) -> Iterator[str]:
     """What of the file is not in the mesh, or is taken together, in a line each."""
     yield from content.notes
     if wanted is not None and len(wanted) > 1:
@@ -119,10 +114,10 @@ def _notes(file: Sections, content: Content, wanted: frozenset[int] | None, grou
     left = {
         block.name: sum(len(b.numbers) for b in content.blocks if b.kind == block.kind)
         for block in content.blocks
-        if block.dimension == VOLUME and block.kind != TET
+        if block.dimension == VOLUME and block.kind not in KINDS
     }
     if left:
-        listed = ", ".join(f"{n} of the type {name}" for name, n in sorted(left.items()))
-        yield f"elements that are no 4-node tets are outside of the group: {listed}"
+        listed = ", ".join(f"{n} of the {name}" for name, n in sorted(left.items()))
+        yield f"elements that cannot be read are outside of the group: {listed}"
     if strange := sorted(set(file.parts) - _LISTED):
         yield f"sections that are not known are passed over: {', '.join(f'${name}' for name in strange)}"

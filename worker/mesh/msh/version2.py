@@ -6,14 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..model import Floats, Ids
-from .blocks import Block, Content, shape_of
+from .blocks import Block, Read, shape_of
 from .sections import Numbers, Sections, Stored
 
 _PARAMETERS = {0: 0, 1: 1, 2: 2, 3: 0}
 """Parametric coordinates of a node on an entity of a dimension."""
 
 
-def read_version2(file: Sections) -> Content:
+def read_version2(file: Sections) -> Read:
     """All nodes and elements. Raises MeshError."""
     if "ParametricNodes" in file.parts:
         nodes, points = _parametric(file.numbers("ParametricNodes"))
@@ -26,7 +26,7 @@ def read_version2(file: Sections) -> Content:
         )
         for (kind, *group), (numbers, corners) in rows.items()
     ]
-    return Content(nodes, points, blocks)
+    return Read(nodes, points, blocks)
 
 
 def _nodes(numbers: Numbers) -> tuple[Ids, Floats]:

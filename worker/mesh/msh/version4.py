@@ -5,14 +5,14 @@ from collections import defaultdict
 import numpy as np
 
 from ..model import Floats, Ids
-from .blocks import VOLUME, Block, Content, shape_of
+from .blocks import VOLUME, Block, Read, shape_of
 from .sections import Numbers, Sections
 
 Groups = dict[tuple[int, int], frozenset[int]]
 """Physical groups by dimension and number of an entity."""
 
 
-def read_version4(file: Sections) -> Content:
+def read_version4(file: Sections) -> Read:
     """All nodes and elements. Raises MeshError."""
     groups: Groups = {}
     partitions: dict[int, frozenset[int]] = {}
@@ -24,7 +24,7 @@ def read_version4(file: Sections) -> Content:
         groups |= more
     nodes, points = _nodes(file.numbers("Nodes"))
     blocks, filled = _elements(file.numbers("Elements"), groups, ghosts)
-    return Content(nodes, points, blocks, tuple(_lacking(partitions, filled)))
+    return Read(nodes, points, blocks, tuple(_lacking(partitions, filled)))
 
 
 def _entities(numbers: Numbers) -> Groups:

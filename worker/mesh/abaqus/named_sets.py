@@ -1,0 +1,114 @@
+"""Node sets and surfaces of an Abaqus input file, and sets of elements of surfaces, as a case may be on them."""
+
+from array import array
+from collections.abc import Iterator
+
+import numpy as np
+
+from conoid.cases.inp import is_whole
+
+from ...errors import MeshError
+from ..model import Ids
+from ..sets import Named, joined, surface
+from .deck import Deck
+from .labels import label
+from .placed import Placed
+from .scopes import OWN, ElementSet, Instance, Scope, Surface
+
+_NONE = np.zeros(0, np.int64)
+
+
+def named_sets(model: Placed) -> tuple[list[Named], list[str]]:
+    """The sets, and what of them is not read. A set of a part or an instance is ``Bar.CLAMP`` or ``Bar-1.CLAMP``, and
+    ``CLAMP``, too, where the assembly has none of this name.
+    """
+    told = nodes_of_elements(model.deck)
+    found = list(_sets(model, model.deck.root, None, told))
+    outer = {each.names[0].casefold() for each in found}
+    of_parts: dict[tuple[int, str, bool], list[Named]] = {}
+    for place, piece in enumerate(model.pieces):
+        scope = piece.scope
+        owners: list[Scope] = [] if not scope.line else [scope, scope.part] if isinstance(scope, Instance) else [scope]
+        for owner in owners:
+            for each in _sets(model, owner, place, told):
+                name = each.names[0]
+                of_parts.setdefault((id(owner), f"{owner.name.text}.{name}", each.faces is None), []).append(each)
+                if owner is not scope:
+                    found.append(joined((f"{scope.name.text}.{name}",), [each]))
+    for (_, name, _), several in of_parts.items():
+        alone = several[0].names[0]
+        found.append(joined((name, *([] if alone.casefold() in outer else [alone])), several))
+    return found, list(dict.fromkeys(told))
+
+
+def _sets(model: Placed, scope: Scope, place: int | None, told: list[str]) -> Iterator[Named]:
+    """What a scope defines, as it is in the piece ``place``; None for what is in no part, or in the assembly."""
+    for name, one in scope.node_sets:
+        nodes = [model.nodes(at, _ids(one, owner)) for owner, at in _owners(model, scope, one, place)]
+        yield Named((name.text,), np.unique(np.concatenate([_NONE, *nodes])))
+    for each in scope.surfaces:
+        try:
+            yield _surface(model, scope, each, place)
+        except MeshError as error:
+            told.append(f"the surface {each.name.text!r} is not read: {error}")
+    for name, one in scope.sets:
+        faces = [face for owner, at in _owners(model, scope, one, place) for face in model.plates(at, _ids(one, owner))]
+        if any(map(len, faces)):
+            yield surface((name.text,), faces)
+
+
+def _surface(model: Placed, scope: Scope, given: Surface, place: int | None) -> Named:
+    nodes, faces = [_NONE], list[Ids]()
+    for line, (item, side, *_) in given.rows:
+        sets = scope.node_sets if given.of_nodes else scope.sets
+        one = ElementSet() if is_whole(item) else sets.get(label(item))
+        if one is None:
+            raise MeshError(f"line {line}: the set {item!r} is not defined")
+        if is_whole(item):
+            one.add(OWN, array("q", [int(item)]))
+        for owner, at in _owners(model, scope, one, place):
+            numbers = _ids(one, owner)
+            if given.of_nodes:
+                nodes.append(model.nodes(at, numbers))
+            else:
+                faces += model.faces(at, numbers, side.upper())
+    if given.of_nodes:
+        return Named((given.name.text,), np.unique(np.concatenate(nodes)))
+    return surface((given.name.text,), faces, free=not all(side for _, (_, side, *_) in given.rows))
+
+
+def _owners(model: Placed, scope: Scope, one: ElementSet, place: int | None) -> Iterator[tuple[str, int]]:
+    """Whose members a set has, and in which pieces these are."""
+    for owner in one.members:
+        if owner == OWN and place is not None:
+            yield owner, place
+            continue
+        key = scope.name.key if owner == OWN else owner
+        yield from ((owner, at) for at, piece in enumerate(model.pieces) if piece.scope.name.key == key)
+
+
+def _ids(one: ElementSet, owner: str) -> Ids:
+    return np.unique(np.array(one.members[owner], np.int64))
+
+
+def nodes_of_elements(deck: Deck) -> list[str]:
+    """Fills the sets of nodes that are given by sets of elements; what is not defined."""
+    told = []
+    for scope in (deck.root, *(part for _, part in deck.parts), *(each for _, each in deck.instances)):
+        for one, name, line in scope.node_sets_of:
+            elements = scope.sets.get(name)
+            if elements is None:
+                told.append(f"line {line}: the set of elements {name.text!r} is not defined; its nodes are left out")
+                continue
+            for owner, numbers in elements.members.items():
+                mesh = scope if owner == OWN else next(each for _, each in deck.instances if each.name.key == owner)
+                one.add(owner, _nodes_of(mesh.mesh if isinstance(mesh, Instance) else mesh, np.array(numbers)))
+    return told
+
+
+def _nodes_of(mesh: Scope, numbers: Ids) -> "array[int]":
+    found = array("q")
+    for rows in (*mesh.solids.values(), *mesh.plates.values()):
+        chosen = np.isin(np.array(rows.numbers), numbers)
+        found.extend(np.array(rows.nodes).reshape(len(chosen), -1)[chosen].ravel().tolist())
+    return found

@@ -1,0 +1,123 @@
+"""Hexahedra, wedges and pyramids cut into tets that meet face to face.
+
+Each quadrilateral face is cut by the diagonal through the smallest of its four node numbers: both elements that have it
+cut it alike, on any rank, and there is always a cut of the element that has these diagonals (Dompierre, Labbe, Vallet,
+Camarero 1999, "How to subdivide pyramids, prisms and hexahedra into tetrahedra"). Of several the one with the longest
+stable step is taken. Where all are flat or far worse than that, a node in the middle of the element takes part.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .model import FLAT, Floats, Ids, step_lengths, volume_and_area
+from .patterns import QUADS, cuts, skin
+
+_TOGETHER = 20_000
+"""Elements that are looked at at once. Chosen: 100 MB."""
+_NOTHING = np.zeros((0, 4), np.int64), np.zeros(0, np.int64), np.zeros(0, np.int64)
+_WORSE = 0.5
+"""A cut whose step is below this share of what a node in the middle allows gives way to that. Chosen: it makes twelve
+tets of an element where five or six would do, which half of the steps outweigh."""
+
+
+@dataclass(frozen=True)
+class Cut:
+    """``tets`` (k, 4) of the elements ``owner`` (k,); nodes from the number of points on are ``middles`` (j, 3)."""
+
+    tets: Ids
+    owner: Ids
+    middles: Floats
+    of: Ids
+    """(j,) the elements in whose middle they are."""
+    flat: Ids
+    """The elements that have no cut into tets with a volume."""
+
+
+def cut(nodes: Ids, points: Floats, diagonals: Ids) -> Cut:
+    """Elements (m, 8), nodes repeated as ``cells.Form`` says, over ``points``, with these diagonals of faces (m,)."""
+    made = [_cut_alike(nodes, points, each, diagonals) for each in _portions(diagonals)]
+    tets, owner, poor = (np.concatenate(column) for column in zip(*made, strict=True)) if made else _NOTHING
+    more, of, middles, centred, flat = _around(nodes, points, diagonals, np.sort(poor))
+    return Cut(np.concatenate([tets, more]), np.concatenate([owner, of]), middles, centred, flat)
+
+
+def pattern(nodes: Ids) -> Ids:
+    """(m,) the diagonals of the faces (see ``patterns.cuts``): through the smallest node, the first of equal ones."""
+    rank = np.argsort(np.argsort(nodes, axis=1, kind="stable"), axis=1, kind="stable")
+    second = rank[:, QUADS].argmin(axis=2) % 2
+    return np.asarray((second << np.arange(len(QUADS))).sum(axis=1))
+
+
+def halves(quads: Ids) -> Ids:
+    """(2 n, 3) the triangles of quadrilaterals (n, 4), cut by the same rule."""
+    odd = (quads.argmin(axis=1) % 2 == 1)[:, None]
+    rolled = np.where(odd, np.roll(quads, -1, axis=1), quads)
+    return rolled[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3)
+
+
+def _portions(diagonals: Ids) -> Iterator[Ids]:
+    """Elements of one pattern, so many at once as fit into memory."""
+    for each in np.unique(diagonals):
+        chosen = np.flatnonzero(diagonals == each)
+        yield from np.split(chosen, range(_TOGETHER, len(chosen), _TOGETHER))
+
+
+def _cut_alike(nodes: Ids, points: Floats, some: Ids, diagonals: Ids) -> tuple[Ids, Ids, Ids]:
+    """Tets of the elements ``some``, whose these are, and the elements that are better cut round their middle."""
+    table = cuts(int(diagonals[some[0]]))
+    if not len(table):
+        return np.zeros((0, 4), np.int64), np.zeros(0, np.int64), some
+    every = nodes[some][:, table]
+    length = _shortest(points, every, every)
+    best = every[np.arange(len(some)), length.argmax(axis=1)]
+    corners, spokes, names = _spoked(nodes[some], points, int(diagonals[some[0]]))
+    good = length.max(axis=1) > np.maximum(_WORSE * _shortest(corners, spokes, names), 0.0)
+    real = good[:, None] & ~_repeats(best)
+    return best[real], np.broadcast_to(some[:, None], real.shape)[real], some[~good]
+
+
+def _around(nodes: Ids, points: Floats, diagonals: Ids, poor: Ids) -> tuple[Ids, Ids, Floats, Ids, Ids]:
+    """Tets of the elements ``poor`` with a node in their middle, whose these are, these nodes, the elements that have
+    one, and those that are flat.
+    """
+    found = [_spoked(nodes[[each]], points, int(diagonals[each])) for each in poor]
+    good = np.array([_shortest(*each)[0] > 0 for each in found], bool)
+    middles = np.array([corners[8] for corners, _, _ in found]).reshape(-1, 3)[good]
+    tets, of = [np.zeros((0, 4), np.int64)], [np.zeros(0, np.int64)]
+    for k, each in enumerate(np.flatnonzero(good)):
+        names = found[each][2][0]
+        named = np.where(names < 0, len(points) + k, names)[~_repeats(names)]
+        tets.append(named)
+        of.append(np.full(len(named), poor[each]))
+    return np.concatenate(tets), np.concatenate(of), middles, poor[good], poor[~good]
+
+
+def _spoked(nodes: Ids, points: Floats, diagonals: int) -> tuple[Floats, Ids, Ids]:
+    """Corners and middle (9 s, 3) of each element, and the tets (s, 12, 4) between its faces and its middle: by places
+    in these points and by nodes, of which -1 is the middle.
+    """
+    wheel = np.array([(a, c, b, 8) for a, b, c in skin(diagonals)], np.int64)
+    different = np.array([(nodes[:, :k] != nodes[:, k, None]).all(axis=1) for k in range(8)]).T[..., None]
+    middle = (points[nodes] * different).sum(axis=1) / different.sum(axis=1)
+    corners = np.concatenate([points[nodes], middle[:, None]], axis=1).reshape(-1, 3)
+    names = np.column_stack([nodes, np.full(len(nodes), -1)])[:, wheel]
+    return corners, 9 * np.arange(len(nodes))[:, None, None] + wheel, names
+
+
+def _shortest(points: Floats, tets: Ids, names: Ids) -> Floats:
+    """The shortest step length, m, of tets (..., k, 4), but of those that repeat a node; 0 where one has no volume."""
+    length = step_lengths(points, tets)
+    volume, area = volume_and_area(points, tets)
+    length[volume <= FLAT * area * np.sqrt(area)] = 0.0
+    length[_repeats(names)] = np.inf
+    shortest = length.min(axis=-1)
+    return np.where(np.isfinite(shortest), shortest, 0.0)
+
+
+def _repeats(tets: Ids) -> NDArray[np.bool_]:
+    """Which of the tets (..., 4) have one node twice."""
+    ordered = np.sort(tets, axis=-1)
+    return np.asarray((ordered[..., 1:] == ordered[..., :-1]).any(axis=-1))

@@ -1,0 +1,43 @@
+"""Degenerate hexahedra: eight nodes of which some are one, as decks write wedges, pyramids and tets."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .cells import Form
+from .model import Ids
+from .patterns import EDGES, QUADS
+
+_TET = Form.TET.inside
+
+
+def folded(nodes: Ids) -> tuple[Ids, NDArray[np.bool_]]:
+    """Hexahedra (m, 8) with what has four different nodes as a tet, and which of them have a volume at all: nodes that
+    are one must hang together by edges, and no face may have two opposite corners in one.
+    """
+    first = (nodes[:, :, None] == nodes[:, None, :]).argmax(axis=2)
+    kinds, of = np.unique(first, axis=0, return_inverse=True)
+    of = of.reshape(-1)
+    found, good = nodes.copy(), np.ones(len(nodes), bool)
+    for k, kind in enumerate(kinds):
+        chosen, different = of == k, np.unique(kind)
+        if len(different) == Form.TET.corners:
+            found[chosen] = nodes[chosen][:, different][:, _TET]
+        elif len(different) < 8:
+            good[chosen] = len(different) > Form.TET.corners and _folds(kind)
+    return found, good
+
+
+def _folds(first: Ids) -> bool:
+    """Whether the nodes that are one, given by the first place of each, can be: see ``folded``."""
+    reached = np.arange(8)
+    for _ in range(8):
+        for a, b in EDGES:
+            if first[a] == first[b]:
+                reached[a] = reached[b] = min(reached[a], reached[b])
+    crossed = [
+        first[a] == first[c] and len(np.unique(first[[a, b, c, d]])) > 2
+        for a, b, c, d in [*QUADS.tolist(), *np.roll(QUADS, 1, axis=1).tolist()]
+    ]
+    return bool((first[reached] == first).all() and len(np.unique(reached)) == len(np.unique(first))) and not any(
+        crossed
+    )

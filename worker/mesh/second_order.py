@@ -1,0 +1,99 @@
+"""Elements whose edges have a node in their middle: the volume that straight edges lose, and tets in eight."""
+
+from collections.abc import Sequence
+from itertools import combinations, pairwise
+from typing import Literal
+
+import numpy as np
+
+from ..errors import MeshError
+from .cells import Cells, sides
+from .model import FLAT, Floats, Ids, step_lengths, volume_and_area
+
+Way = Literal["eight", "corners"]
+
+LOST = 1e-3
+"""Of the volume: what the corners alone may lose before tets become eight. Chosen: as much of the mass is wrong then,
+and eight tets with half the step cost 16 times as much."""
+_OFF = 0.4
+"""Of the length of an edge: how far from its middle its node may be. Chosen: quarter points are 0.25 off, and an arc of
+90 degrees 0.21; the middle of another edge of a regular tet is 0.5 off, where another order of nodes was meant."""
+_CORNERS = ((0, 4, 6, 7), (4, 1, 5, 8), (6, 5, 2, 9), (7, 8, 9, 3))
+_LONG = ((4, 9), (6, 8), (7, 5))
+"""Opposite corners of what is left inside of the four: an octahedron."""
+_AT = np.array([[0.0, 0, 0], [2, 0, 0], [0, 2, 0], [0, 0, 2], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1],
+                       [1, 0, 1], [0, 1, 1]])  # fmt: skip
+
+
+def checked(cells: Cells, points: Floats, tags: Ids) -> None:
+    """MeshError where a node is not near the middle of its edge; the cells' nodes are places in ``points``."""
+    for (a, b), middle in zip(cells.kind.edges, cells.middles.T, strict=True):
+        one, other = points[cells.corners[:, a]], points[cells.corners[:, b]]
+        off, along = points[middle] - 0.5 * (one + other), other - one
+        far = np.flatnonzero((off * off).sum(axis=1) > _OFF * _OFF * (along * along).sum(axis=1))
+        if len(far):
+            k = far[0]
+            raise MeshError(
+                f"{cells.called(k)}: node {tags[middle[k]]} is not near the middle of the edge between nodes "
+                f"{tags[cells.corners[k, a]]} and {tags[cells.corners[k, b]]}"
+            )
+
+
+def lost(cells: Cells, points: Floats) -> float:
+    """The volume, in that of ``points``, that the curved elements have more than those with straight edges, about.
+
+    A node in the middle of an edge bears a third of the area of each face that has it (exactly on triangles and on
+    quadrilaterals of eight nodes): the shape functions' integral there.
+    """
+    total = 0.0
+    for side in sides(cells.kind.form):
+        area = _area([points[cells.corners[:, k]] for k in side])
+        for a, b in pairwise([*side, side[0]]):
+            for k in (k for k, edge in enumerate(cells.kind.edges) if set(edge) == {a, b}):
+                off = points[cells.middles[:, k]] - 0.5 * (points[cells.corners[:, a]] + points[cells.corners[:, b]])
+                total += float((area * off).sum()) / 3.0
+    return total
+
+
+def _area(corners: Sequence[Floats]) -> Floats:
+    """(m, 3) of triangles or quadrilaterals, as a vector that points outwards."""
+    a, b, c, d = (*corners, corners[0])[:4]
+    return np.asarray(0.5 * (np.cross(b - a, c - a) if len(corners) == 3 else np.cross(c - a, d - b)))
+
+
+def eight(nodes: Ids, points: Floats) -> Ids:
+    """(m, 8, 4) tets of each of the tets (m, 10): one at each corner, and four round one of three diagonals of what is
+    left: of that with the longest stable step, most often the shortest.
+    """
+    every = np.stack([nodes[:, [*_CORNERS, *_inner(*long)]] for long in _LONG], axis=1)
+    volume, area = volume_and_area(points, every)
+    length = np.where(volume > FLAT * area * np.sqrt(area), step_lengths(points, every), 0.0)
+    best = length.min(axis=2).argmax(axis=1)
+    return np.asarray(every[np.arange(len(nodes)), best], np.int64)
+
+
+def _inner(one: int, other: int) -> list[tuple[int, int, int, int]]:
+    """The tets round the diagonal between two nodes in the middle of edges, positive."""
+    ring, found = [k for k in range(4, 10) if k not in (one, other)], []
+    for p, q in combinations(ring, 2):
+        volume = (np.cross(_AT[other] - _AT[one], _AT[p] - _AT[one]) * (_AT[q] - _AT[one])).sum()
+        if volume:
+            found.append((one, other, p, q) if volume > 0 else (one, other, q, p))
+    return found
+
+
+def refuse_halves(cells: Cells, tags: Ids) -> None:
+    """MeshError where two elements have an edge in common whose middle is another node in one of them."""
+    rows = np.concatenate([
+        np.column_stack([np.sort(cells.corners[:, edge], axis=1), middle])
+        for edge, middle in zip(cells.kind.edges, cells.middles.T, strict=True)
+    ])  # fmt: skip
+    different = np.unique(rows, axis=0)
+    for columns in ([0, 1], [2]):
+        _, first, times = np.unique(different[:, columns], axis=0, return_index=True, return_counts=True)
+        if len(twice := first[times > 1]):
+            a, b, middle = tags[different[twice[0]]]
+            raise MeshError(
+                f"node {middle} is in the middle of the edge between nodes {a} and {b}, but not in every element that "
+                "has this edge, or in the middle of another edge, too"
+            )
