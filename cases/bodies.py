@@ -213,8 +213,8 @@ class MeshFile(Model):
     """Of elements: a physical group of gmsh by its name or number; of Abaqus an element set, ``Bar-1.Set-1`` (a set of
     an instance or a part), an instance or a part. All when absent. docs/meshes.md has what is read of a file."""
     second_order: Literal["auto", "corners", "eight"] = "auto"
-    """Tets of 10 nodes as the tets of their 4 corners, or as eight tets of 4 nodes each. ``auto`` is ``eight`` where the
-    corners alone would lose more than a thousandth of the volume, else ``corners``; a warning says which."""
+    """Tets of 10 nodes as the tets of their 4 corners, or as eight tets of 4 nodes each. ``auto`` is ``eight`` where
+    the corners alone would lose more than a thousandth of the volume, else ``corners``; a warning says which."""
     sha256: Sha256 | None = None
     """Of the file, 64 hexadecimal digits; a file with another one is refused. Commands that send the file fill it in;
     a server needs it. Not checked when absent."""
