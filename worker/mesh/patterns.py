@@ -25,6 +25,7 @@ EDGES = ((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4),
 MOST = 6
 """Tets of a cut. Five have the middle of the hexahedron in one, six have a long diagonal."""
 _CUBE = ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1))
+"""Its nodes."""
 
 Triangle = tuple[int, int, int]
 Tet = tuple[int, int, int, int]

@@ -23,6 +23,7 @@ _LONG = ((4, 9), (6, 8), (7, 5))
 """Opposite corners of what is left inside of the four: an octahedron."""
 _AT = np.array([[0.0, 0, 0], [2, 0, 0], [0, 2, 0], [0, 0, 2], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1],
                        [1, 0, 1], [0, 1, 1]])  # fmt: skip
+"""Nodes of a tet of ten."""
 
 
 def checked(cells: Cells, points: Floats, tags: Ids) -> None:

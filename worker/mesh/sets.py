@@ -71,7 +71,10 @@ class Members:
         faces = [each[good] for each, good in parted]
         inner = 0 if named.free else sum(int((~good).sum()) for _, good in parted)
         return NodeSet(
-            named.names, np.unique(nodes), np.concatenate([_NONE, *(f.reshape(-1, 3) for f in faces)]), inner
+            named.names,
+            np.unique(nodes),
+            np.concatenate([np.zeros((0, 3), np.int32), *(f.reshape(-1, 3) for f in faces)]),
+            inner,
         )
 
     def _indices(self, places: Ids) -> tuple[Ints, NDArray[np.bool_]]:
@@ -124,9 +127,6 @@ class Members:
         known[of[: len(self._edges)]] = self._edges[:, 2]
         found = known[of[len(self._edges) :]]
         return np.where(found < 0, one, found)
-
-
-_NONE = np.zeros((0, 3), np.int32)
 
 
 def _other_halves(quads: Ids) -> Ids:
