@@ -19,7 +19,7 @@ from .holds import words
 from .sent import SentFiles
 from .settings import Settings
 from .store import Store
-from .weights import Weights, copies, size
+from .weights import Left, Weights, copies, size
 
 _log = logging.getLogger("conoid.server")
 _PATIENCE = 5.0
@@ -86,7 +86,7 @@ class Keeper:
         folder.purge(self._settings.runs, run.id)
         with self._lock:
             self._weights.drop(run.id)
-            self._kept[run.owner] = self._weights.of(run.owner)
+            self._kept = self._weights.by_owner()
 
     def look(self) -> None:
         """One look at what users have sent, and at all folders. Raises OSError, SQLAlchemyError."""
@@ -120,15 +120,14 @@ class Keeper:
         sent = {owner: self._sent.weigh(owner) for owner in self._sent.owners()}
         with self._lock:
             self._weights.keep(there, sent)
-            owners = {run.owner for run in known.values()} | sent.keys()
-            self._kept = Counter({owner: self._weights.of(owner) for owner in owners})
+            self._kept = self._weights.by_owner()
 
     def _due(self, runs: list[Run], now: float) -> Iterator[tuple[Run, str]]:
         """The runs to be removed, oldest first, and why."""
-        left, most, oldest = self._weights.copy(), self._rules.bytes, self._rules.oldest
+        left, most, oldest = Left(self._weights), self._rules.bytes, self._rules.oldest
         for run in sorted(runs, key=lambda run: run.finished):
             old = oldest is not None and now - run.finished > oldest
-            large = most is not None and left.total() > most
+            large = most is not None and left.total > most
             if not run.state.final or not (old or large) or self._is_open(run.id):
                 continue
             if pins.pinned(self._settings.runs / run.id):

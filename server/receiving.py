@@ -147,7 +147,7 @@ class Receiver:
             await self._lanes.run(self._sent.remove, owner, sha256)
             detail = f"the bytes that have arrived have the sha256 {total.hexdigest()}: none of them is kept"
             raise ServiceError(422, "wrong_hash", detail, pointer="sha256")
-        await self._lanes.run(self._sent.finish, part)
+        await self._lanes.run(self._sent.finish, owner, part)
 
 
 async def _next(chunks: AsyncIterator[bytes], transfer: _Transfer) -> bytes | None:

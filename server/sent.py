@@ -89,9 +89,13 @@ class SentFiles:
     def __init__(self, runs: Path, rules: Files, free_disk: int) -> None:
         """Makes nothing yet. ``free_disk``: bytes of the disk that nobody's file may take."""
         self._runs, self._folder, self._rules, self._free_disk = runs, runs / FOLDER, rules, free_disk
-        self._lock = threading.Lock()
+        self._locks: dict[str, threading.Lock] = {}
         self.left: Callable[[str], int | None] = lambda owner: None
         """Bytes that an owner may have besides what he has; None: no limit but that of ``rules``."""
+
+    def _lock(self, owner: str) -> threading.Lock:
+        """By owner: nobody waits for the disk of another one's files."""
+        return self._locks.setdefault(owner, threading.Lock())
 
     def of(self, owner: str) -> list[Sent]:
         """All files of an owner, by hash. Raises OSError."""
@@ -104,7 +108,7 @@ class SentFiles:
 
     def find(self, owner: str, sha256: str) -> Sent | None:
         """The file of an owner, whole or on its way; it is kept for a while from now on. Raises OSError."""
-        with self._lock:
+        with self._lock(owner):
             for path in self._paths(owner, sha256):
                 with suppress(FileNotFoundError):
                     status = os.stat(path, follow_symlinks=False)
@@ -120,7 +124,7 @@ class SentFiles:
     def begin(self, owner: str, sha256: str, total: int, *, anew: bool = False) -> Part:
         """Opens what is on its way; its size counts from now on. Raises ServiceError 413, 429, 507, OSError."""
         path = self._folder / owner / f"{sha256}.{total}{_PART}"
-        with self._lock:
+        with self._lock(owner):
             for other in self._paths(owner, sha256)[1:]:
                 if other != path:
                     other.unlink(missing_ok=True)
@@ -153,14 +157,14 @@ class SentFiles:
             detail = f"the server's disk has no room for {size(more)}; it keeps {size(self._free_disk)} free"
             raise ServiceError(507, "disk_full", detail, retryable=True)
 
-    def finish(self, part: Part) -> None:
-        """The file is whole, and has been verified: it is there under its name, on disk, when this returns.
+    def finish(self, owner: str, part: Part) -> None:
+        """The file of an owner is whole, and has been verified: it is there under its name, on disk, when this returns.
 
         Raises OSError.
         """
         part.sync()
         whole = part.path.with_name(part.path.name.partition(".")[0])
-        with self._lock:
+        with self._lock(owner):
             os.chmod(part.path, 0o400)
             _want(part.path, os.stat(part.path))
             os.replace(part.path, whole)
@@ -168,12 +172,12 @@ class SentFiles:
 
     def give(self, owner: str, sha256: str, target: Path) -> None:
         """A second name of the file in the folder of a run. Raises FileNotFoundError, OSError."""
-        with self._lock:
+        with self._lock(owner):
             give(self._folder / owner / sha256, target)
 
     def remove(self, owner: str, sha256: str) -> bool:
         """Removes a file, whole or on its way; False where there is none. Runs keep theirs. Raises OSError."""
-        with self._lock:
+        with self._lock(owner):
             there = [path for path in self._paths(owner, sha256) if path.exists()]
             for path in there:
                 path.unlink(missing_ok=True)
@@ -187,13 +191,13 @@ class SentFiles:
         for owner in self.owners():
             hashes = [sent.sha256 for sent in self.of(owner) if sent.sha256 not in needed]
             gone += [f"file {sha256} of {owner}" for sha256 in hashes if self._dropped(owner, sha256, now)]
-            with self._lock, suppress(OSError):
+            with self._lock(owner), suppress(OSError):
                 (self._folder / owner).rmdir()  # where it is empty
         return gone
 
     def _dropped(self, owner: str, sha256: str, now: float) -> bool:
         """Whether the file was old, and has been removed. Nobody can ask for it while it is looked at."""
-        with self._lock:
+        with self._lock(owner):
             for path in self._paths(owner, sha256):
                 with suppress(FileNotFoundError):
                     status = os.stat(path, follow_symlinks=False)

@@ -3,6 +3,7 @@ user counts it once.
 """
 
 import os
+from collections import Counter
 from collections.abc import Set
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -66,21 +67,29 @@ class Weights:
         self.files.pop(run, None)
         self.owners.pop(run, None)
 
-    def copy(self) -> "Weights":
-        """Another one, to try what would be left."""
-        return Weights(dict(self.sizes), dict(self.files), dict(self.owners), dict(self.sent))
-
-    def of(self, owner: str) -> int:
-        """Bytes of a user: of the folders of his runs, and of his files, each once."""
-        runs = [run for run, its in self.owners.items() if its == owner]
-        return sum(self.sizes[run] for run in runs) + _once(
-            *(self.files[run] for run in runs), self.sent.get(owner, {})
-        )
-
-    def total(self) -> int:
-        """Bytes of all users."""
-        return sum(self.sizes.values()) + _once(*self.files.values(), *self.sent.values())
+    def by_owner(self) -> Counter[str]:
+        """Bytes of each user: of the folders of his runs, and of his files, each once."""
+        found, files = Counter[str](), {owner: dict(copies) for owner, copies in self.sent.items()}
+        for run, owner in self.owners.items():
+            found[owner] += self.sizes[run]
+            files.setdefault(owner, {}).update(self.files[run])
+        return found + Counter({owner: sum(copies.values()) for owner, copies in files.items()})
 
 
-def _once(*some: Copies) -> int:
-    return sum({inode: size for copies in some for inode, size in copies.items()}.values())
+class Left:
+    """What would be left of all users' bytes if runs went, one after the other."""
+
+    def __init__(self, weights: Weights) -> None:
+        """All of it: ``total`` in bytes."""
+        self._sizes, self._files = dict(weights.sizes), dict(weights.files)
+        held = [*self._files.values(), *weights.sent.values()]
+        self._names = Counter(inode for copies in held for inode in copies)
+        files = {inode: size for copies in held for inode, size in copies.items()}
+        self.total = sum(self._sizes.values()) + sum(files.values())
+
+    def drop(self, run: str) -> None:
+        """A run goes, and with it the files that nothing else has."""
+        self.total -= self._sizes.pop(run, 0)
+        for inode, size in self._files.pop(run, {}).items():
+            self._names[inode] -= 1
+            self.total -= 0 if self._names[inode] else size

@@ -36,6 +36,7 @@ def me(request: Request, service: ServiceOf, identity: Annotated[Identity, Depen
             "core_seconds": caps.core_seconds,
             "wall_time": caps.wall_time,
             "output_bytes": caps.output_bytes,
+            "file_bytes": service.settings.site.files.size,
             **{name: getattr(service.settings.site.http, name) for name in ("requests", "waiting", "streams")},
         },
         "quota": _quota(service),
@@ -47,16 +48,20 @@ def _quota(service: Service) -> dict[str, float | None]:
     """What one user may take; null: no limit."""
     quota = service.settings.site.quota
     named = {name: getattr(quota, name) for name in quota.__struct_fields__}
-    return {**named, "queued": service.settings.caps.queued}
+    files = service.settings.site.files
+    return {**named, "queued": service.settings.caps.queued, "file_bytes": files.bytes, "files": files.number}
 
 
 def _used(service: Service, owner: str) -> dict[str, float]:
     running, seconds = service.supervisor.taken(owner)
+    files = service.sent.of(owner)
     return {
         "queued": service.store.open_runs(owner),
         "running": running,
         "core_seconds": seconds,
         "output_bytes": service.keeper.kept_now(owner),
+        "file_bytes": sum(file.size for file in files),
+        "files": len(files),
     }
 
 

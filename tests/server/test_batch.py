@@ -1,5 +1,6 @@
 """A run as a job of Slurm without a server: the commands of docs/cluster.md, followed."""
 
+import hashlib
 import json
 import os
 import re
@@ -13,6 +14,7 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from conoid.cases import batch, layout, whole
+from conoid.cases.files import located
 from conoid.cases.run import Cause, State
 from conoid.client import following
 from conoid.client.batch import slurm_of
@@ -177,6 +179,38 @@ def test_a_folder_is_handed_over_for_one_case(elsewhere: Path) -> None:
         assert other.exit_code == 1
         assert f"{wrong}; --out names another folder" in other.output
     assert "job 101" in conoid(*words, "--slurm", "standard").stdout
+
+
+MESHED = """
+name = "bar"
+contact = "none"
+run.end_time = "1 us"
+[[parts]]
+name = "bar"
+material = "steel"
+mesh = { shape = "file", path = "bar.inp", unit = "1 mm" }
+"""
+MESH = "*NODE\n1, 0, 0, 0\n2, 10, 0, 0\n3, 0, 10, 0\n4, 0, 0, 10\n*ELEMENT, TYPE=C3D4\n1, 1, 2, 3, 4\n"
+
+
+def test_a_job_has_its_own_copy_of_a_mesh_file(elsewhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The same command with another file is another case."""
+    here = elsewhere.parent
+    monkeypatch.setenv("CONOID_CACHE_DIR", str(here / "cache"))
+    (here / "bar.toml").write_text(MESHED)
+    (here / "bar.inp").write_text(MESH)
+    words = ["batch", "bar.toml", "--site", elsewhere]
+    handed = conoid(*words)
+    assert handed.exit_code == 0, handed.output
+    digest = hashlib.sha256(MESH.encode()).hexdigest()
+    folder = here / "runs" / "bar"
+    assert (folder / layout.FILES / f"{digest}.inp").read_text() == MESH
+    case = json.loads((folder / "case.json").read_bytes())
+    assert case["parts"][0]["mesh"]["sha256"] == digest
+    assert located("bar.inp", digest, folder).parent == folder / layout.FILES
+    assert "job 101" in conoid(*words).stdout
+    (here / "bar.inp").write_text(MESH.replace("0, 0, 10\n", "0, 0, 11\n"))
+    assert "another case, other ranks or threads; --out names another folder" in conoid(*words).output
 
 
 def evil(folder: Path, **changes: str) -> Path:

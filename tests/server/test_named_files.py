@@ -192,6 +192,23 @@ def submission_wish() -> Any:
     return Wish(case=case(), points=[{"parts[0].mesh.sha256": "0" * 64}])
 
 
+def test_the_keeper_removes_what_nobody_needs_without_being_asked(server: Running, quick: list[Path]) -> None:
+    """Also where a site has no rules; a file that a run has stays as long as the run."""
+    other = send(server.ann, b"nobody's")
+    send(server.ann)
+    run = hand_in(server.ann, case())["id"]
+    server.ann.wait_for(run)
+    folder = server.ann.runs / sent.FOLDER / "ann"
+    for path in folder.iterdir():
+        os.utime(path, (0, 0))
+    server.service.keeper.look()
+    assert [path.name for path in folder.iterdir()] == [HASH]
+    assert server.ann.http.get(f"/v1/files/{other}").status_code == 404
+    server.ann.http.delete(f"/v1/runs/{run}")
+    server.service.keeper.look()
+    assert not folder.exists()
+
+
 def test_a_file_counts_once_for_each_user(server: Running, quick: list[Path]) -> None:
     """However many runs have it; and what a run may write does not include it."""
     data = MESH + b"**" + b" " * 100_000
@@ -204,6 +221,20 @@ def test_a_file_counts_once_for_each_user(server: Running, quick: list[Path]) ->
     assert len(data) < kept < 2 * len(data)
     assert server.ann.http.get("/v1/me").json()["used"]["output_bytes"] == kept
     assert server.service.keeper.kept_now("bob") == 0
+
+
+def test_a_file_is_gone_with_the_last_run_that_has_it() -> None:
+    known = weights.Weights()
+    for n, run in enumerate(("a", "b", "c")):
+        known.note(run, "ann", 10, {(1, n % 2): 100})
+    known.keep({"a", "b", "c"}, {"bob": {(1, 7): 5}})
+    assert known.by_owner() == {"ann": 230, "bob": 5}
+    left = weights.Left(known)
+    totals = [left.total]
+    for run in ("a", "b", "c", "c"):
+        left.drop(run)
+        totals.append(left.total)
+    assert totals == [235, 225, 115, 5, 5]
 
 
 @pytest.mark.parametrize("read", [True, False])

@@ -134,6 +134,33 @@ def test_a_body_that_breaks_off_leaves_what_has_come(up: tuple[Process, User, Us
     assert rest.status_code == 201
 
 
+def test_who_comes_again_takes_over_from_a_connection_that_says_nothing_more(up: tuple[Process, User, User]) -> None:
+    """A line that broke without a word looks like one that is slow: for five seconds."""
+    _, ann, _ = up
+    data = random.Random(3).randbytes(MEGA)
+    sha256 = hashlib.sha256(data).hexdigest()
+    url = urlsplit(str(ann.http.base_url))
+    with socket.create_connection((url.hostname, url.port)) as line:
+        head = f"PUT /v1/files/{sha256} HTTP/1.1\r\nHost: x\r\nContent-Length: {MEGA}\r\n"
+        line.sendall(f"{head}Authorization: {ann.http.headers['Authorization']}\r\n\r\n".encode() + data[: MEGA // 2])
+        first = time.monotonic()
+        codes = []
+        while True:
+            there = ann.http.get(f"/v1/files/{sha256}").json().get("offset", 0)
+            span = {"Content-Range": f"bytes {there}-{MEGA - 1}/{MEGA}"}
+            answer = ann.http.put(f"/v1/files/{sha256}", content=data[there:], headers=span)
+            codes.append(answer.json().get("code", ""))
+            if answer.status_code == 201:
+                break
+            assert time.monotonic() < first + 20
+            time.sleep(0.2)
+        line.settimeout(10)
+        assert b"HTTP/1.1 409" in line.recv(65536)
+    assert time.monotonic() - first > 4.0
+    assert set(codes[:-1]) <= {"in_progress", "wrong_offset"}
+    assert codes[0] == "in_progress"
+
+
 def peak(server: Process) -> int:
     """The most memory that a server has had at a time, bytes."""
     assert server.child is not None

@@ -227,7 +227,7 @@ def test_wherever_a_disk_fails_the_same_again_makes_the_file_whole(tmp_path: Pat
     def bring() -> None:
         part = store.begin("ann", sha256, 1000)
         part.write(data[part.offset :])
-        store.finish(part)
+        store.finish("ann", part)
 
     for n in range(20):
         plan = Plan(tmp_path, n, OSError(errno.EIO, "Input/output error"))
@@ -269,7 +269,7 @@ def test_old_files_go_unless_a_run_or_a_sweep_needs_them(tmp_path: Path) -> None
         part = store.begin("ann", sha256, 10)
         part.write(made(10, n)[0][: 10 if n else 5])
         if n:
-            store.finish(part)
+            store.finish("ann", part)
     folder = tmp_path / sent.FOLDER / "ann"
     os.link(folder / hashes[1], tmp_path / "of a run")
     for path in folder.iterdir():
@@ -294,7 +294,7 @@ def test_a_part_that_a_hung_thread_holds_harms_no_later_one(tmp_path: Path) -> N
     assert new.offset == 50
     new.write(data[50:])
     old.write(data[50:70])
-    store.finish(new)
+    store.finish("ann", new)
     assert (tmp_path / sent.FOLDER / "ann" / sha256).read_bytes() == data
 
 
