@@ -9,15 +9,15 @@ from pydantic import BaseModel, ValidationError
 
 from .bodies import MeshFile
 from .bond_checks import check_bonds
-from .boundary_checks import ROUNDING, check_boundaries, check_walls, ordered
-from .geometry import AXES, bounds, centre, cut_directions, whole_bounds
-from .history import COLUMNS
+from .boundary_checks import ROUNDING, check_boundaries, check_walls
+from .geometry import AXES, centre, cut_directions, whole_bounds
 from .library import library
 from .materials import Material, Strength
 from .mesh_checks import check_mesh
 from .overlap import overlaps
+from .probe_checks import check_probes
 from .problems import Location, Problem, dotted, problem
-from .schema import MOST_PARTS, Case, Contact, Erosion, Part, Probe, Reference, Symmetry, Wall
+from .schema import MOST_PARTS, Case, Contact, Erosion, Part, Reference, Symmetry, Wall
 from .similar import choices, nearest
 
 NEEDED: dict[str, frozenset[str]] = {
@@ -30,6 +30,7 @@ NEEDED: dict[str, frozenset[str]] = {
     "probe_mean": frozenset({"probe"}),
     "probe_max": frozenset({"probe"}),
     "probe_min": frozenset({"probe"}),
+    "probe_last": frozenset({"probe"}),
     "contact_time": frozenset(),
     "contact_loss": frozenset(),
     "penetration": frozenset({"part", "axis"}),
@@ -43,7 +44,7 @@ Read = TypeVar("Read", bound=BaseModel)
 def check(case: Case) -> list[Problem]:
     """Every cross-field problem of a case, in the order of its keys."""
     checks: tuple[Callable[[Case], Iterable[Problem]], ...] = (
-        _materials, _parts, _overlaps, _sectors, check_boundaries, check_walls, check_bonds, _contact, _probes,
+        _materials, _parts, _overlaps, _sectors, check_boundaries, check_walls, check_bonds, _contact, check_probes,
         _references,
     )  # fmt: skip
     return list(chain.from_iterable(found(case) for found in checks))
@@ -185,46 +186,6 @@ def _contact(case: Case) -> Iterator[Problem]:
             if sorted(earlier.parts) == sorted(pair.parts):
                 message = f"contact.pairs[{k}] is of these parts; keep one of the two"
                 yield problem(("contact", "pairs", i, "parts"), f"{one}, {other}", message)
-
-
-def _probes(case: Case) -> Iterator[Problem]:
-    yield from _unique([probe.name for probe in case.probes], "probes")
-    parts = {part.name: part for part in case.parts}
-    for i, probe in enumerate(case.probes):
-        if probe.name in COLUMNS:
-            message = f"is a column of every history.csv; allowed: any name but {choices(COLUMNS)}"
-            yield problem(("probes", i, "name"), probe.name, message)
-        if (probe.low is None) != (probe.high is None):
-            yield problem(("probes", i), ..., "low and high go together; give both, or none for the whole part")
-        elif probe.low is not None and probe.high is not None:
-            yield from ordered(probe.low, probe.high, ("probes", i))
-        if probe.part not in parts:
-            yield problem(("probes", i, "part"), probe.part, f"no part of this name; {nearest(probe.part, parts)}")
-            continue
-        body = bounds(parts[probe.part].mesh)
-        if probe.low is not None and "_force_" in probe.field:
-            message = f"{probe.field[:-2]} is that of the whole part; remove low and high"
-            yield problem(("probes", i), ..., message)
-        yield from _wall_of(case, i, probe)
-        turned = parts[probe.part].turn is not None
-        if body is None or turned or probe.low is None or probe.high is None:
-            continue
-        for d, (a, b) in enumerate(zip(*body, strict=True)):
-            if probe.high[d] < a or probe.low[d] > b:
-                message = f"the box misses part {probe.part!r}, which lies between {a:g} and {b:g} m along {AXES[d]}"
-                yield problem(("probes", i), ..., message)
-
-
-def _wall_of(case: Case, number: int, probe: Probe) -> Iterator[Problem]:
-    """A force of a wall that is not there, or a wall where none is measured."""
-    names = [wall.name for _, wall in case.boundaries_of(Wall)]
-    if not probe.field.startswith("wall_force"):
-        if probe.wall is not None:
-            yield problem(("probes", number, "wall"), probe.wall, "is of wall_force alone; remove it")
-    elif not names:
-        yield problem(("probes", number, "field"), probe.field, "the case has no wall")
-    elif probe.wall is not None and probe.wall not in names:
-        yield problem(("probes", number, "wall"), probe.wall, f"no wall of this name; {nearest(probe.wall, names)}")
 
 
 def _references(case: Case) -> Iterator[Problem]:

@@ -20,6 +20,14 @@ class Check(msgspec.Struct, kw_only=True, frozen=True):
     source: str = ""
 
 
+class Measured(msgspec.Struct, kw_only=True, frozen=True):
+    """What a probe has measured at the end."""
+
+    name: str
+    value: float
+    unit: str = ""
+
+
 class Made(msgspec.Struct, kw_only=True, frozen=True):
     """The most that a line of the ledger has made, a share of the largest energy until then, at ``time``, s."""
 
@@ -141,6 +149,8 @@ class Outcome(msgspec.Struct, kw_only=True, frozen=True):
     element_updates_per_second: float = math.nan
     """Per CPU-second and core."""
     reference: list[Check] = []
+    probes: list[Measured] = []
+    """The last value of each probe."""
     warnings: list[str] = []
 
 
@@ -170,11 +180,13 @@ def from_json(text: bytes | str) -> Outcome:
     """
     data = msgspec.json.decode(text)
     if isinstance(data, dict):
-        checks = data.get("reference")
+        checks, probes = data.get("reference"), data.get("probes")
         _null_to_nan(Outcome, data)
         _null_to_nan(Energy, data.get("energy"))
         for check in checks if isinstance(checks, list) else ():
             _null_to_nan(Check, check)
+        for probe in probes if isinstance(probes, list) else ():
+            _null_to_nan(Measured, probe)
     return msgspec.convert(data, Outcome, str_keys=True)
 
 

@@ -13,6 +13,12 @@ FIELD_UNITS: dict[str, str] = {
     "internal_energy": "J/kg", "velocity_x": "m/s", "velocity_y": "m/s", "velocity_z": "m/s",
     "contact_force_x": "N", "contact_force_y": "N", "contact_force_z": "N",
     "wall_force_x": "N", "wall_force_y": "N", "wall_force_z": "N",
+    "contact_impulse_x": "N s", "contact_impulse_y": "N s", "contact_impulse_z": "N s",
+    "wall_impulse_x": "N s", "wall_impulse_y": "N s", "wall_impulse_z": "N s", "mass": "kg",
+    "momentum_x": "kg m/s", "momentum_y": "kg m/s", "momentum_z": "kg m/s", "kinetic_energy": "J",
+    "centre_x": "m", "centre_y": "m", "centre_z": "m", "centre_velocity_x": "m/s", "centre_velocity_y": "m/s",
+    "centre_velocity_z": "m/s", "residual_velocity": "m/s", "residual_mass": "kg", "fragment_velocity": "m/s",
+    "fragment_mass": "kg", "penetration": "m", "hole_diameter": "m", "hole_width": "m", "cone_angle": "",
 }  # fmt: skip
 """Unit of every field that a probe reads."""
 
@@ -79,7 +85,7 @@ def _unit(entry: Mapping[str, Any], data: Mapping[str, Any]) -> str:
     return FIELD_UNITS[fields[name]]
 
 
-_PROBED = ("probe_mean", "probe_max", "probe_min")
+_PROBED = ("probe_mean", "probe_max", "probe_min", "probe_last")
 
 
 def _tables(value: object) -> list[Mapping[str, Any]]:

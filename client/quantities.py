@@ -52,7 +52,7 @@ def of_run(case: Case, outcome: Outcome, told: Columns) -> list[Number]:
 
 def names(case: Case) -> list[str]:
     """Of all that ``of_run`` may find."""
-    of_probes = (f"{what} of {probe.name}" for probe in case.probes for what in ("mean", "peak"))
+    of_probes = (f"{what} of {probe.name}" for probe in case.probes for what in ("mean", "peak", "end"))
     energies = (f"{name} energy, share" for name in history.LEDGER if name not in _NO_STORE)
     counts = (f"{name}, number" for name in _COUNTS if case.fractures or case.erodes)
     found = [*_numbered(each.title for each in case.reference), *of_probes, *energies, *counts]
@@ -74,13 +74,14 @@ def _references(outcome: Outcome) -> Iterator[Number]:
 
 
 def _probes(case: Case, told: Columns) -> Iterator[Number]:
-    """Mean over the time of the run, and the value furthest from zero."""
+    """Mean over the time of the run, the value furthest from zero, and the last one."""
     for name in (probe.name for probe in case.probes):
         values, unit = told.numbers(name), told.units[name]
         finite = [value for value in values if value == value]
         if finite:
             yield Number(f"mean of {name}", sum(finite) / len(finite), unit)
             yield Number(f"peak of {name}", max(finite, key=abs), unit)
+            yield Number(f"end of {name}", finite[-1], unit)
 
 
 def _energies(outcome: Outcome) -> Iterator[Number]:

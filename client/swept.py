@@ -14,7 +14,16 @@ _COLOURS = ("#4c78a8", "#f58518", "#54a24b", "#e45756", "#72b7b2", "#b279a2", "#
 _PANELS = 6
 """Results that are drawn when nobody names any. Chosen: as many as are read on one page."""
 _QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*")
-_FIRST = ("reference.", "fragments", "broken", "eroded", "energy.fracture", "energy.plastic", "energy.kinetic")
+_FIRST = (
+    "reference.",
+    "probe.",
+    "fragments",
+    "broken",
+    "eroded",
+    "energy.fracture",
+    "energy.plastic",
+    "energy.kinetic",
+)
 """What is drawn rather than other columns."""
 _NEVER = frozenset({"time", "elapsed", "cpu", "elements", "nodes", "worst_residual", "reference.worst_residual",
                     "energy.residual", "energy.initial"})  # fmt: skip
@@ -92,7 +101,7 @@ def _bare(column: str) -> str:
 
 def _labelled(column: str) -> str:
     """As an axis has it."""
-    return re.sub(r" \[([^]]*)\]$", r", \1", column.removeprefix("reference."))
+    return re.sub(r" \[([^]]*)\]$", r", \1", column.removeprefix("reference.").removeprefix("probe."))
 
 
 def _places(rows: Sequence[Row], over: str) -> tuple[str | None, dict[str, float]]:

@@ -13,7 +13,7 @@ from conoid.cases import messages
 from conoid.cases.checkpoints import Manifest
 from conoid.cases.compression import borne
 from conoid.cases.history import of_parts
-from conoid.cases.outcome import Made, Outcome, Sharing
+from conoid.cases.outcome import Made, Measured, Outcome, Sharing
 from conoid.cases.quantities import FIELD_UNITS
 from conoid.cases.run import State
 from conoid.cases.schema import Case
@@ -218,6 +218,10 @@ def _sum_up(
         without=without(sim.case), peak_memory=memory or [],
         element_updates_per_second=(loop.updates - start.updates) / total_cpu if total_cpu > 0.0 else 0.0,
         reference=checks,
+        probes=[
+            Measured(name=probe.name, value=value, unit=FIELD_UNITS[probe.field])
+            for probe, value in zip(sim.case.probes, loop.measured, strict=False)
+        ],
         warnings=[
             *borne(compressed), *start.warnings, *loop.warnings, *loop.lost,
             *sim.ledger.warnings(sim.case.numerics.dt_safety),

@@ -74,6 +74,8 @@ class Loop:
         self.sim, self.balance = sim, balance
         self.energy: Energy | None = None
         self._parts: dict[str, PartEnergy] = {}
+        self.measured: list[float] = []
+        """Of the probes, at the last line of the history."""
         self.stopped = 0
         self.warnings: list[str] = []
         """What the steps have given reason for; equal on all ranks."""
@@ -213,7 +215,8 @@ class Loop:
             step.end(sim, before)
         if sim.crushing is not None:
             sim.crushing.count()
-        probes = sim.probes.measure()
+        probes = sim.probes.measure(step.between(sim, before) if sim.probes.sums and not ending else None)
+        self.measured = probes.tolist()
         self._sample = int(clock.t * sim.case.run.samples / sim.case.run.end_time) + 1
         self._sample_time = self._sample * sim.case.run.end_time / sim.case.run.samples
         limiter = sim.limiter()

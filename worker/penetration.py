@@ -9,7 +9,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from .state import Floats, Ints, Tets
+from .parallel.comm import Comm
+from .state import Floats, Ints, Model, Tets
 
 LINES = np.arange(1, 11) / 10.0
 """Distances of the lines from the axis, of the radius of the part; voids of each are joined to those of the next."""
@@ -58,6 +59,32 @@ def passed(x: Floats, tets: Tets, part: Ints, axis: int, radius: float) -> Float
         which, span = spans(x, tets, axis, (at, at))
         rows.append(np.column_stack([np.full(len(which), float(line)), part[which], span]))
     return np.concatenate(rows)
+
+
+def passed_by(model: Model, name: str, along: str, comm: Comm) -> tuple[Floats, float]:
+    """What lines along the axis pass now of the other parts than ``name`` (``passed``), and its radius, m.
+
+    The part comes from below: else the axis is turned round. All ranks take part, all get the same rows.
+    """
+    nodes, axis = model.nodes, "xyz".index(along)
+    mine = nodes.part == model.parts.index(name)
+    radius = _maximum(comm, np.hypot(*np.delete(nodes.x0[mine], axis, axis=1).T))
+    others = [block for block in model.blocks if model.parts[block.part] != name]
+    rows = [passed(nodes.x, b.tets, np.full(b.n, b.part), axis, radius) for b in others]
+    gathered = comm.gather(np.concatenate([np.zeros((0, 4)), *rows]))
+    found: Floats = comm.broadcast(np.concatenate(gathered) if gathered is not None else None)
+    found = found[np.lexsort(found.T[::-1])]
+    if _middle(comm, nodes.x0[mine, axis]) > _middle(comm, nodes.x0[~mine, axis]):
+        found = np.column_stack([found[:, :2], -found[:, 3], -found[:, 2]])
+    return found, radius
+
+
+def _middle(comm: Comm, x: Floats) -> float:
+    return _maximum(comm, x) - _maximum(comm, -x)
+
+
+def _maximum(comm: Comm, values: Floats) -> float:
+    return float(comm.maximum(np.array([np.max(values, initial=-np.inf)]))[0])
 
 
 def thickness(rows: Floats, parts: int) -> Floats:

@@ -1,19 +1,24 @@
-"""Probes: mass-weighted means of a field over chosen tets, as columns of history.csv."""
+"""Probes: mass-weighted means of a field over chosen tets, and gauges, as columns of history.csv."""
 
 import logging
 import math
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
+from conoid.cases.measures import BEYOND, PUSHES, SHAPES, SUMS, kind
 from conoid.cases.region import Region
-from conoid.cases.schema import Case, Probe, Wall
+from conoid.cases.schema import Case, Probe
 
-from .clock import Clock
-from .contact.stage import Contact
 from .errors import InputError
+from .gauges.flying import Flying
+from .gauges.gauge import Gauge, Scene
+from .gauges.pushes import Pushes
+from .gauges.shapes import Shapes
+from .gauges.sums import NodeSums
 from .output.frames import von_mises
-from .parallel.comm import Comm
-from .parallel.fixed_point import Ragged, exact_sums, exact_totals
+from .parallel.fixed_point import Ragged, exact_totals
 from .state import (
     DAMAGE,
     MASS,
@@ -35,15 +40,12 @@ from .state import (
     Model,
     Tets,
 )
-from .walls import RigidWalls
 
 log = logging.getLogger("conoid.worker")
 
 _NORMAL = {"stress_xx": S_XX, "stress_yy": S_YY, "stress_zz": S_ZZ}
 _SHEAR = {"stress_yz": S_YZ, "stress_zx": S_ZX, "stress_xy": S_XY}
 _ROWS = {"plastic_strain": PLASTIC_STRAIN, "damage": DAMAGE, "temperature": TEMPERATURE, **_SHEAR}
-_FORCE = {"contact_force_x": 0, "contact_force_y": 1, "contact_force_z": 2}
-_WALL = {"wall_force_x": 0, "wall_force_y": 1, "wall_force_z": 2}
 _VELOCITY = {"velocity_x": 0, "velocity_y": 1, "velocity_z": 2}
 
 
@@ -81,33 +83,34 @@ def field(block: Block, name: str, model: Model, places: Ints) -> Floats:
     return (row(WORK) + row(WORK_VISCOUS)) / row(MASS)
 
 
+def _gauges(case: Case, scene: Scene) -> list[Gauge]:
+    """Those that the probes of a case ask for."""
+    kinds = {kind(probe.field) for probe in case.probes}
+    every: tuple[tuple[tuple[str, ...], Callable[[Case, Scene], Gauge]], ...] = (
+        (PUSHES, Pushes), (SUMS, NodeSums), (("fragment_velocity", "fragment_mass"), Flying), (SHAPES, Shapes),
+    )  # fmt: skip
+    return [make(case, scene) for fields, make in every if kinds & {*fields}]
+
+
 class Probes:
     """The probes of a case on this rank."""
 
-    def __init__(
-        self, case: Case, model: Model, contact: Contact | None, walls: RigidWalls | None, clock: Clock, comm: Comm
-    ) -> None:
+    def __init__(self, case: Case, scene: Scene) -> None:
         self.names = [probe.name for probe in case.probes]
-        self._fields = [probe.field for probe in case.probes]
-        self._parts = [model.parts.index(probe.part) for probe in case.probes]
-        self._contact, self._walls, self._clock = contact, walls, clock
-        self._pushed, self._given = np.zeros((len(model.parts), 3)), np.zeros(len(case.probes))
-        self._since = 0.0
-        names = [wall.name for _, wall in case.boundaries_of(Wall)]
-        self._of_walls = [
-            [k for k, name in enumerate(names) if probe.wall in (None, name)] if probe.field in _WALL else []
-            for probe in case.probes
-        ]
-        """Which walls each probe is of."""
-        self._model = model
-        self._comm = comm
-        centres = [_centres(block, model) for block in model.blocks] if case.probes else []
-        self._chosen = [
-            [_inside(probe, block, model, x) for block, x in zip(model.blocks, centres, strict=True)]
-            for probe in case.probes
-        ]
-        """Global ids of the tets that each probe has in each block."""
-        self._means = [k for k, name in enumerate(self._fields) if name not in _FORCE and name not in _WALL]
+        self._fields, self._model, self._comm = [probe.field for probe in case.probes], scene.model, scene.comm
+        self._gauges = _gauges(case, scene)
+        self._sums = NodeSums(case, scene)
+        self.sums = any(isinstance(gauge, NodeSums) for gauge in self._gauges)
+        """Whether there are sums over nodes, which have velocities of their own."""
+        other = (*PUSHES, *SUMS, *BEYOND, *SHAPES)
+        self._means = [k for k, name in enumerate(self._fields) if kind(name) not in other]
+        model = scene.model
+        centres = [_centres(block, model) for block in model.blocks] if self._means else []
+        self._chosen = {
+            k: [_inside(case.probes[k], block, model, x) for block, x in zip(model.blocks, centres, strict=True)]
+            for k in self._means
+        }
+        """Global ids of the tets that each mean has in each block."""
         self._counted: list[int] | None = None
         """How many tets each block had when these were last found."""
         self._found: list[tuple[str, Block, Ints, slice, slice]] = []
@@ -118,68 +121,43 @@ class Probes:
         """Where the values of each begin."""
 
     def require_tets(self, case: Case) -> None:
-        """Raises InputError, on every rank alike, when a probe holds no tet."""
-        counts = self._comm.sum(np.array([sum(len(c) for c in chosen) for chosen in self._chosen], np.int64))
-        if self._comm.rank == 0:
-            for number, count in enumerate(counts.tolist()):
-                log.info("probes[%d] has %d tets", number, count)
-        for index in np.flatnonzero(counts == 0):
-            raise InputError(
-                f"probes[{index}]: no tet of part {case.probes[index].part!r} has its centre between low and high"
-            )
+        """Raises InputError, on every rank alike, when a mean holds no tet, or a sum over a box no node."""
+        boxes = [k for k, probe in enumerate(case.probes) if kind(probe.field) in SUMS and probe.low is not None]
+        tets = [sum(len(ids) for ids in self._chosen[k]) for k in self._means]
+        nodes = [int(self._sums.started(case.probes[k]).sum()) for k in boxes]
+        counts = self._comm.sum(np.array([*tets, *nodes], np.int64)).tolist()
+        for k, count in sorted(zip([*self._means, *boxes], counts, strict=True)):
+            what, where = ("tet", "its centre") if k in self._means else ("node", "its place")
+            if self._comm.rank == 0:
+                log.info("probes[%d] has %d %ss", k, count, what)
+            if count == 0:
+                raise InputError(
+                    f"probes[{k}]: no {what} of part {case.probes[k].part!r} has {where} between low and high"
+                )
 
-    def keep(self) -> tuple[Floats, Floats, float]:
+    def keep(self) -> list[Any]:
         """What they remember, equal on all ranks."""
-        return self._pushed, self._given, self._since
+        return [gauge.keep() for gauge in self._gauges]
 
-    def resume(self, known: tuple[Floats, Floats, float]) -> None:
+    def resume(self, known: list[Any]) -> None:
         """Takes it back."""
-        self._pushed, self._given, self._since = known
+        for gauge, own in zip(self._gauges, known, strict=True):
+            gauge.resume(own)
 
-    def measure(self) -> Floats:
-        """(probes,) the present values, equal on any number of ranks; NaN when all tets of a probe have left."""
+    def measure(self, v: Floats | None = None) -> Floats:
+        """(probes,) the present values, equal on any number of ranks; NaN when all tets of a probe have left. ``v``
+        (nodes, 3): velocities of sums now, m/s, where those of the model are half a step ahead.
+        """
         if not self.names:
             return np.zeros(0)
-        passed = self._clock.t - self._since
-        forces, walls = self._forces(passed), self._wall_forces(passed)
-        self._since = self._clock.t
-        sums = iter(exact_totals(self._comm, self._columns())[0].reshape(-1, 2).tolist())
-        values = []
-        for k, (name, part) in enumerate(zip(self._fields, self._parts, strict=True)):
-            if name in _FORCE:
-                values.append(float(forces[part, _FORCE[name]]))
-            elif name in _WALL:
-                values.append(float(walls[k]))
-            else:
-                total, mass = next(sums)
-                values.append(total / mass if mass > 0.0 else math.nan)
-        return np.array(values)
-
-    def _forces(self, passed: float) -> Floats:
-        """(parts, 3) mean force of contact on each part over the time ``passed``, s, since the last call, N; zero when
-        none has, and the impulses that have been until then are in the next.
-        """
-        if passed == 0.0 or self._contact is None or not any(name in _FORCE for name in self._fields):
-            return np.zeros_like(self._pushed)
-        pushed = self._contact.impulses()
-        forces = (pushed - self._pushed) / passed
-        self._pushed = pushed
-        return np.asarray(forces)
-
-    def _wall_forces(self, passed: float) -> Floats:
-        """(probes,) the same of walls, zero for other probes; all ranks take part."""
-        nodes, walls = self._model.nodes, self._walls
-        if passed == 0.0 or not any(name in _WALL for name in self._fields):
-            return np.zeros_like(self._given)
-        columns = np.zeros((0 if walls is None else len(walls.nodes), len(self._fields)))
-        for k, name in enumerate(self._fields):
-            if walls is not None and name in _WALL:
-                mine = nodes.owned[walls.nodes] & (nodes.part[walls.nodes] == self._parts[k])
-                columns[:, k] = walls.given[:, [3 * w + _WALL[name] for w in self._of_walls[k]]].sum(axis=1) * mine
-        given = np.array([float(total) for total in exact_sums(self._comm, columns)])
-        forces = (given - self._given) / passed
-        self._given = given
-        return np.asarray(forces)
+        found = {}
+        if self._means:
+            sums = exact_totals(self._comm, self._columns())[0].reshape(-1, 2).tolist()
+            for k, (total, mass) in zip(self._means, sums, strict=True):
+                found[k] = total / mass if mass > 0.0 else math.nan
+        for gauge in self._gauges:
+            found |= gauge.measure(self._model.nodes.v if v is None else v)
+        return np.array([found[k] for k in range(len(self.names))])
 
     def _columns(self) -> Ragged:
         """Of each mean the field times mass, and mass, of its tets."""

@@ -108,25 +108,7 @@ def _largest(sim: Simulation, spec: Reference) -> float:
 
 
 def _passed(sim: Simulation, spec: Reference) -> tuple[Floats, float]:
-    """What lines along the axis pass of the other parts now (penetration.passed), and the radius of the part, m.
-
-    The part comes from below: else the axis is turned round. All ranks take part, all get the same rows.
-    """
-    nodes, axis = sim.model.nodes, _AXES[spec.axis or "z"]
-    mine = nodes.part == sim.model.parts.index(spec.part or "")
-    radius = _maximum(sim.comm, np.hypot(*np.delete(nodes.x0[mine], axis, axis=1).T))
-    others = [block for block in sim.model.blocks if sim.model.parts[block.part] != spec.part]
-    rows = [penetration.passed(nodes.x, b.tets, np.full(b.n, b.part), axis, radius) for b in others]
-    gathered = sim.comm.gather(np.concatenate([np.zeros((0, 4)), *rows]))
-    found: Floats = sim.comm.broadcast(np.concatenate(gathered) if gathered is not None else None)
-    found = found[np.lexsort(found.T[::-1])]
-    if _middle(sim.comm, nodes.x0[mine, axis]) > _middle(sim.comm, nodes.x0[~mine, axis]):
-        found = np.column_stack([found[:, :2], -found[:, 3], -found[:, 2]])
-    return found, radius
-
-
-def _middle(comm: Comm, x: Floats) -> float:
-    return _maximum(comm, x) - _maximum(comm, -x)
+    return penetration.passed_by(sim.model, spec.part or "", spec.axis or "z", sim.comm)
 
 
 def _probe(folder: Path, spec: Reference) -> float:
@@ -140,6 +122,8 @@ def _probe(folder: Path, spec: Reference) -> float:
     if not inside:
         return float("nan")
     t, values = np.array(inside).T
+    if spec.quantity == "probe_last":
+        return float(values[-1])
     if spec.quantity == "probe_max":
         return float(values.max())
     if spec.quantity == "probe_min":

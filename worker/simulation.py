@@ -22,6 +22,7 @@ from .energy import Ledger
 from .erosion import Erosion
 from .fracture.record import Record
 from .fracture.stage import Fracture
+from .gauges.gauge import Scene
 from .materials.elementary import power
 from .materials.law import BULK, DENSITY, SHEAR
 from .materials.models import eos_of, equation_of, parameters
@@ -184,8 +185,6 @@ def _assemble(
         erosion = Erosion(case, model, neighbours, contact, scene, comm, clock, extremes)
     if case.boundaries_of(Symmetry):
         scene.append(Mirrors.of(case, model, scene, comm))
-    walls = next((bound for bound in scene if type(bound) is RigidWalls), None)
-    probes = Probes(case, model, contact, walls, clock, comm)
     for bound in scene:
         bound.over = Ranges(threads)
     elements = _elements(case, model, neighbours, scene, node_volume, comm, timers, threads)
@@ -193,6 +192,8 @@ def _assemble(
     if case.fractures:
         by_node: list[KeptByNode] = [*scene, *(stage for stage in (erosion, contact) if stage is not None)]
         fracture = Fracture(case, model, neighbours, elements, by_node, contact, comm, clock)
+    walls = next((bound for bound in scene if type(bound) is RigidWalls), None)
+    probes = Probes(case, Scene(model, contact, walls, erosion, fracture, clock, comm))
     ledger = Ledger(model, scene, contact, erosion, fracture, comm, clock, threads)
     return Simulation(
         case=case, comm=comm, model=model, elements=elements, leapfrog=Leapfrog(threads), boundaries=scene,

@@ -31,6 +31,8 @@ has some and whom they concern; which cracks open is found in 8, and they open a
 
 import math
 
+import numpy as np
+
 from . import failed
 from .boundaries import Acts
 from .errors import PhysicsError
@@ -74,10 +76,16 @@ def end(sim: Simulation, before: Floats) -> None:
     """After the first half of the step that would follow the last one: v(n), between v(n-1/2), ``before`` (nodes, 3),
     and v(n+1/2), in which walls and contact have had their part as in any step.
     """
-    nodes, clock = sim.model.nodes, sim.clock
-    nodes.v[:] = before + 0.5 * clock.last_dt / clock.mean_dt * (nodes.v - before)
+    nodes = sim.model.nodes
+    nodes.v[:] = between(sim, before)
     if sim.erosion is not None:
         nodes.v[sim.erosion.removed] = 0.0
+
+
+def between(sim: Simulation, before: Floats) -> Floats:
+    """(nodes, 3) v(n), m/s, between v(n-1/2), ``before`` (nodes, 3), and v(n+1/2) of the model."""
+    v = sim.model.nodes.v
+    return np.asarray(before + 0.5 * sim.clock.last_dt / sim.clock.mean_dt * (v - before))
 
 
 def _before_kick(sim: Simulation, acts: Acts) -> None:

@@ -137,7 +137,9 @@ def _line(service: Service, point: dict[str, Any], run: Run) -> dict[str, Any]:
 
 
 def _results(ended: Outcome | None) -> dict[str, Any]:
-    """The numbers of an outcome that stand alone, the terms of the energy, the references; with units in brackets."""
+    """The numbers of an outcome that stand alone, the terms of the energy, the references, the last values of the
+    probes; with units in brackets.
+    """
     if ended is None:
         return {}
     names = ("elements", "nodes", "fragments", "broken", "eroded", "worst_residual")
@@ -145,8 +147,9 @@ def _results(ended: Outcome | None) -> dict[str, Any]:
     energy = {} if ended.energy is None else structs.asdict(ended.energy)
     terms = {_with_unit(f"energy.{name}", "" if name == "residual" else "J"): joule for name, joule in energy.items()}
     checks = {_with_unit(f"reference.{check.name}", check.unit): check.value for check in ended.reference}
+    probes = {_with_unit(f"probe.{each.name}", each.unit): each.value for each in ended.probes}
     numbers = {"steps": ended.steps, **times, **{name: getattr(ended, name) for name in names}}
-    found = {**numbers, **terms, **checks}
+    found = {**numbers, **terms, **checks, **probes}
     return {**{name: "" if known(value) is None else value for name, value in found.items()}, "digest": ended.digest}
 
 

@@ -84,7 +84,7 @@ def test_the_rod_is_sound() -> None:
         (["boundaries[0]={kind='velocity'}"], "boundaries[0]", "prescribes nothing"),
         (["boundaries[0]={kind='velocity', x=1, low=[0, 0, 0]}"], "boundaries[0]", "give both low and high"),
         (["boundaries[0]={kind='velocity', x=1, low=[0, 0, 1], high=[1, 1, 0]}"], "boundaries[0].high[2]", "low[2]"),
-        (["probes[0].wall=anvil"], "probes[0].wall", "is of wall_force alone; remove it"),
+        (["probes[0].wall=anvil"], "probes[0].wall", "stress_zz does not use this key; remove it"),
         (["probes[0].low[2]=17 mm"], "probes[0].high[2]", "must not be below low[2]"),
         (["probes[0].low[2]=31 mm", "probes[0].high[2]=32 mm"], "probes[0]", "lies between 0 and 0.03 m along z"),
         (["probes[0].low[0]=-2 mm", "probes[0].high[0]=-1 mm"], "probes[0]", "lies between 0 and 0.003 m along x"),

@@ -198,6 +198,7 @@ def test_the_numbers_of_a_run_are_references_probes_and_shares_of_energy() -> No
     found = of_run(case("bar_on_bar"), Outcome(state="succeeded", energy=energy, reference=checks), told)
     assert {n.name: n.value for n in found} == {
         "extent rod z": 1.0, "extent rod z (2)": 1.0, "mean of middle_stress": -1.0, "peak of middle_stress": -5.0,
+        "end of middle_stress": 1.0,
         "kinetic energy, share": 0.6, "elastic energy, share": 0.3, "contact energy, share": 0.1,
     }  # fmt: skip
 

@@ -36,6 +36,17 @@ def block(
     return TetMesh((grid + move) * size, positive(grid, tets))
 
 
+def ring(radial: int, around: int, inner: float, outer: float, width: float) -> TetMesh:
+    """A quarter of a ring round z: a block of cubes that is bent; one layer along z."""
+    flat = block((radial, around, 1), shake=0.0)
+    r = inner + (outer - inner) * flat.points[:, 0] / radial
+    angle = 0.5 * np.pi * flat.points[:, 1] / around
+    x, y = r * np.cos(angle), r * np.sin(angle)
+    x[flat.points[:, 1] == around], y[flat.points[:, 1] == 0] = 0.0, 0.0
+    points = np.column_stack([x, y, width * flat.points[:, 2]])
+    return TetMesh(points, positive(points, flat.tets))
+
+
 def _paths(ways: npt.NDArray[np.int64]) -> list[npt.NDArray[np.int64]]:
     """(cubes, 4) from a cube's first corner to that across, six times; ``ways`` (cubes, 3) are its edges as strides."""
     start, end = np.zeros(len(ways), np.int64), ways.sum(axis=1)

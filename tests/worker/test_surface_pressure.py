@@ -11,13 +11,12 @@ from conoid.cases import materials, schema
 from conoid.cases.load import CaseError, parse_case
 from conoid.worker import step
 from conoid.worker.mesh.faces import boundary_faces
-from conoid.worker.mesh.model import TetMesh
 from conoid.worker.simulation import Simulation
 from conoid.worker.state import MASS, PRESSURE, S_XX, S_XY, S_YY, WIDE, Ints
 from conoid.worker.surface_pressure import SurfacePressure
 
 from .kernels import COPPER, STEEL, Floats, build, run, scene
-from .meshes import block, positive
+from .meshes import block, ring
 from .simulations import kept_again, on, tick
 
 MESH = block((3, 3, 3), 1e-3, seed=2)
@@ -121,17 +120,6 @@ def test_a_pressure_on_one_face_turns_with_the_body() -> None:
     ideal = -1e5 * 9e-6 / 6e4 * np.array([1.0 - math.cos(angle), 0.0, math.sin(angle)])
     assert impulse == pytest.approx(ideal, abs=0.05 * float(np.abs(ideal).max()))  # no principal axis
     assert sim.ledger.worst < 1e-5
-
-
-def ring(radial: int, around: int, inner: float, outer: float, width: float) -> TetMesh:
-    """A quarter of a ring round z: a block of cubes that is bent; one layer along z."""
-    flat = block((radial, around, 1), shake=0.0)
-    r = inner + (outer - inner) * flat.points[:, 0] / radial
-    angle = 0.5 * np.pi * flat.points[:, 1] / around
-    x, y = r * np.cos(angle), r * np.sin(angle)
-    x[flat.points[:, 1] == around], y[flat.points[:, 1] == 0] = 0.0, 0.0
-    points = np.column_stack([x, y, width * flat.points[:, 2]])
-    return TetMesh(points, positive(points, flat.tets))
 
 
 def test_a_ring_carries_the_pressure_on_its_present_radius() -> None:

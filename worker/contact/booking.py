@@ -60,6 +60,30 @@ def heat(words, loaded, active, before, places, joule, k):  # type: ignore[no-un
                 words[1, m] += np.int64(np.rint((value[m] * joule - high) * 2.0**30))
 
 
+@njit(types.void(types.int64[:, :, ::1], LOADED, _N1, _N1, _F, _I), cache=True)
+def between(words, loaded, places, part, scale, k):  # type: ignore[no-untyped-def]
+    """Adds what the contacts of set ``k`` give to a part from another one, along the normals and across, to ``words``
+    (parts, parts, 3) in quanta of 1 / ``scale`` N s, and the opposite to those of the other. ``part`` (crowd,) of the
+    nodes at the ``places`` of the slots.
+    """
+    normal, tangent, slots = loaded.normal, loaded.tangent, loaded.slots
+    for q in range(loaded.begin[k], loaded.begin[k] + loaded.many[k, 0]):
+        many, one = 2 if slots[q, 2] < 0 else 4, part[places[slots[q, 0]]]
+        other, share = one, 0.0
+        for j in range(many):
+            each = part[places[slots[q, j]]]
+            if each == one:
+                share += tangent[q, j]
+            else:
+                other = each
+        if other == one:
+            continue
+        for i in range(3):
+            given = np.int64(np.rint(share * (normal[q, PUSH] * normal[q, i] + tangent[q, PUSH_T + i]) * scale))
+            words[one, other, i] += given
+            words[other, one, i] -= given
+
+
 @njit(types.void(_F1, _F1, _N1, _N1, _F2, _I2, _F2, _F, _I, _I), cache=True)
 def book(loss, external, places, index, before, total, mobility, scale, first, stop):  # type: ignore[no-untyped-def]
     """Half of the impulse times velocity at the ``places`` from ``first`` to ``stop``: lost by contact; where a

@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from conoid.cases.schema import Case
+
 from ..migration.parcel import Parcel
 from ..parallel import fixed_point
 from ..parallel.comm import Comm
@@ -16,7 +18,7 @@ from .scene import Scene
 class Books:
     """One half of the work of an impulse is booked in the step that gives it, the other in the next one."""
 
-    def __init__(self, nodes: int, parts: int, impulse: float, energy: float, team: Team) -> None:
+    def __init__(self, nodes: int, case: Case, impulse: float, energy: float, team: Team) -> None:
         """The most that may be on one node in a step: ``impulse``, N s, and ``energy``, J."""
         self._book = Pass(team, tasks.book, *tasks.BOOK, size=tasks.SLOTS_OF_A_TASK)
         self.contact_loss = np.zeros(nodes)
@@ -30,8 +32,11 @@ class Books:
         self.account = Account(energy)
         self.agreed = self.account.words
         """What contact has taken on all ranks, when they last agreed (account.py)."""
+        parts, asked = len(case.parts), any(probe.by is not None for probe in case.probes)
         self.parts = np.zeros((parts, 3), np.int64)
         """(parts, 3) impulses so far, quanta."""
+        self.pairs = np.zeros((parts, parts, 3) if asked else (0, 0, 3), np.int64)
+        """(parts, parts, 3) impulses so far that each has got from each, quanta; (0, 0, 3) where nobody asks."""
         self.open: Ints = np.zeros((0, 3), np.int64)
         """(nodes, 3) impulses of the last step, quanta, of a run that goes on here; (0, 3) once they are booked."""
 
@@ -40,7 +45,7 @@ class Books:
         parcel.nodes["contact.contact_loss"] = self.contact_loss
         parcel.nodes["contact.external_work"] = self.external_work
         parcel.sums["contact.parts"], parcel.sums["contact.friction"] = self.parts, self.friction.words
-        parcel.sums["contact.account"] = self.account.words
+        parcel.sums["contact.account"], parcel.sums["contact.pairs"] = self.account.words, self.pairs
         total = np.array(self.open) if len(self.open) else np.zeros((len(self.contact_loss), 3), np.int64)
         if scene is not None:
             total[scene.own.local] = scene.slots.total[scene.own.slots]
@@ -52,7 +57,7 @@ class Books:
         self.external_work = np.array(parcel.nodes["contact.external_work"])
         self.account.resume(parcel.sums["contact.account"], known)
         self.parts, self.friction.words = parcel.sums["contact.parts"], parcel.sums["contact.friction"]
-        self.open = parcel.nodes["contact.total"]
+        self.pairs, self.open = parcel.sums["contact.pairs"], parcel.nodes["contact.total"]
 
     def grow(self, copies: int) -> None:
         """Takes up copies of nodes; what has been booked stays with their parents."""
@@ -70,6 +75,10 @@ class Books:
     def impulses(self, comm: Comm) -> Floats:
         """(parts, 3) what contact has given each part so far, N s; all ranks take part."""
         return np.asarray(comm.sum(self.parts) / self.scale)
+
+    def between(self, comm: Comm) -> Floats:
+        """(parts, parts, 3) what each part has got from each by contact so far, N s; all ranks take part."""
+        return np.asarray(comm.sum(self.pairs) / self.scale)
 
     def due(self) -> None:
         """The second half of the work of the last impulses is due: friction's as well."""

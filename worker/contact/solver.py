@@ -5,9 +5,9 @@ import numpy as np
 from ..parallel.fixed_point import Tally
 from ..parallel.team import Team
 from ..state import Flags, Floats, Indices, Ints, Nodes
-from . import held, stops, sweeps, tasks
-from .account import Account
+from . import booking, held, stops, sweeps, tasks
 from .active import IMPULSE, PUSH, PUSH_T, ActiveContacts, ActiveNodes, Kept, Loaded
+from .books import Books
 from .company import ActiveSum
 from .records import Crowd
 from .rows import ActiveRows
@@ -107,10 +107,14 @@ class ActiveSet:
             self._passes.give.run(len(self.places), room.active, scale, k + 1 == many)
             stops.stop(room.active, room.braced)
 
-    def cost(self, account: Account, before: Floats) -> None:
-        """Books what the impulses take from the bodies; ``before`` (crowd, 3): v(n-1/2)."""
-        self._add(account.words, before, account.scale, rubs=False)
-        account.carry()
+    def cost(self, books: Books, before: Floats, part: Indices) -> None:
+        """Books what the impulses take from the bodies, and what parts give each other where that is asked for;
+        ``before`` (crowd, 3): v(n-1/2), ``part`` (crowd,).
+        """
+        self._add(books.account.words, before, books.account.scale, rubs=False)
+        books.account.carry()
+        for k in range(len(self._room.loaded.many) if len(books.pairs) else 0):
+            booking.between(books.pairs, self._room.loaded, self.places, part, self.scale, k)
 
     def heat(self, friction: Tally, before: Floats) -> None:
         """Books the work of friction, see booking.heat."""

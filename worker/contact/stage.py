@@ -74,7 +74,7 @@ class Contact:
         self.searches = Searches(case, model, neighbours, self.exterior, comm, clock)
         largest, speed = extremes
         mass = pairing.lighter(self.searches.mu, model.nodes, self.exterior.flight.mobility, comm) or largest
-        self.books = Books(model.nodes.n, len(case.parts), mass * speed, mass * speed * speed, team)
+        self.books = Books(model.nodes.n, case, mass * speed, mass * speed * speed, team)
         self._active = ActiveSet(self.books.scale, Stops.of(case, model, comm), team)
         self._scheme, self.need = _Scheme.of(case), Need(sweeps(case))
         self._detection = Detection(team)
@@ -268,7 +268,7 @@ class Contact:
         active.store(kept)
         if self.searches.rubs:
             active.heat(books.friction, now.slots.before)
-        active.cost(books.account, now.slots.before)
+        active.cost(books, now.slots.before, crowd.part)
         if active.leave(crowd, now.slots.total, state, books.parts, self.need.unsettled):
             self.last_push = t
         shared.free()

@@ -1,0 +1,36 @@
+"""A gauge: the probes of a case that are measured in one way, and what of the simulation they look at."""
+
+from typing import Any, NamedTuple, Protocol
+
+from ..clock import Clock
+from ..contact.stage import Contact
+from ..erosion import Erosion
+from ..fracture.stage import Fracture
+from ..parallel.comm import Comm
+from ..state import Floats, Model
+from ..walls import RigidWalls
+
+
+class Scene(NamedTuple):
+    """What gauges look at, on this rank."""
+
+    model: Model
+    contact: Contact | None
+    walls: RigidWalls | None
+    erosion: Erosion | None
+    fracture: Fracture | None
+    clock: Clock
+    comm: Comm
+
+
+class Gauge(Protocol):
+    """All ranks take part in everything, and have the same answers."""
+
+    def measure(self, v: Floats) -> dict[int, float]:
+        """The present values by the number of the probe; ``v`` (nodes, 3): velocities now, m/s."""
+
+    def keep(self) -> Any:
+        """What it remembers, equal on all ranks."""
+
+    def resume(self, known: Any) -> None:
+        """Takes it back."""

@@ -1,0 +1,75 @@
+"""What contact and walls push parts with: impulses so far, and forces as means since the line before."""
+
+from typing import Any
+
+import numpy as np
+
+from conoid.cases.measures import PUSHES, Probe, kind
+from conoid.cases.schema import Case, Wall
+
+from ..parallel.fixed_point import exact_sums
+from ..state import Floats
+from .gauge import Scene
+
+_AXES = "xyz"
+
+
+class Pushes:
+    """The forces and impulses of a case on this rank."""
+
+    def __init__(self, case: Case, scene: Scene) -> None:
+        self._scene = scene
+        self._probes = {k: probe for k, probe in enumerate(case.probes) if kind(probe.field) in PUSHES}
+        self._names = [wall.name for _, wall in case.boundaries_of(Wall)]
+        self._given, self._since = np.zeros(len(self._probes)), 0.0
+        """(probes,) impulses, N s, at the time, s, of the line before."""
+
+    def measure(self, v: Floats) -> dict[int, float]:
+        now, t = self._impulses(), self._scene.clock.t
+        passed = t - self._since
+        forces = (now - self._given) / passed if passed > 0.0 else np.zeros_like(now)
+        if passed > 0.0:
+            self._given, self._since = now, t
+        found = zip(self._probes.items(), now.tolist(), forces.tolist(), strict=True)
+        return {k: impulse if "_impulse_" in probe.field else force for (k, probe), impulse, force in found}
+
+    def keep(self) -> Any:
+        return self._given, self._since
+
+    def resume(self, known: Any) -> None:
+        self._given, self._since = known
+
+    def _impulses(self) -> Floats:
+        """(probes,) what each part has got so far along the axis of its probe, N s."""
+        parts, contact = self._scene.model.parts, self._scene.contact
+        of = {probe.by is None for probe in self._probes.values() if probe.field.startswith("contact_")}
+        every = contact.impulses() if contact is not None and True in of else None
+        pairs = contact.books.between(self._scene.comm) if contact is not None and False in of else None
+        walls, found = self._of_walls(), np.zeros(len(self._probes))
+        for place, probe in enumerate(self._probes.values()):
+            axis, part = _AXES.index(probe.field[-1]), parts.index(probe.part)
+            if not probe.field.startswith("contact_"):
+                found[place] = walls[place]
+            elif probe.by is None:
+                found[place] = every[part, axis] if every is not None else 0.0
+            elif pairs is not None:
+                found[place] = pairs[part, parts.index(probe.by), axis]
+        return found
+
+    def _of_walls(self) -> Floats:
+        """(probes,) of those of walls, zero for the others."""
+        if not any(probe.field.startswith("wall_") for probe in self._probes.values()):
+            return np.zeros(len(self._probes))
+        nodes, walls = self._scene.model.nodes, self._scene.walls
+        columns = np.zeros((0 if walls is None else len(walls.nodes), len(self._probes)))
+        for place, probe in enumerate(self._probes.values()):
+            if walls is not None and probe.field.startswith("wall_"):
+                part = self._scene.model.parts.index(probe.part)
+                mine = nodes.owned[walls.nodes] & (nodes.part[walls.nodes] == part)
+                columns[:, place] = walls.given[:, self._columns(probe)].sum(axis=1) * mine
+        return exact_sums(self._scene.comm, columns)
+
+    def _columns(self, probe: Probe) -> list[int]:
+        """Of what walls have given: those of its walls along its axis."""
+        axis = _AXES.index(probe.field[-1])
+        return [3 * k + axis for k, name in enumerate(self._names) if probe.wall in (None, name)]

@@ -1,0 +1,42 @@
+"""Rays in a plane from a line to matter: how far the opening of a body reaches round the line."""
+
+import numpy as np
+
+from ..mesh.faces import FACES
+from ..state import Floats, Tets
+from ..turning import sines_and_cosines
+
+RAYS = 360
+"""Chosen: an opening of a hundred tets round has three or four rays each."""
+
+
+def directions(axis: int) -> Floats:
+    """(RAYS, 3) unit vectors across an axis; none lies in a plane of symmetry that the line is in."""
+    angles: Floats = (np.arange(RAYS, dtype=float) + 0.5) * (2.0 * np.pi / RAYS)
+    sines, cosines = sines_and_cosines(angles)
+    found = np.zeros((RAYS, 3))
+    found[:, (axis + 1) % 3], found[:, (axis + 2) % 3] = cosines, sines
+    return found
+
+
+def reach(x: Floats, tets: Tets, origin: Floats, axis: int) -> Floats:
+    """(RAYS,) how far matter is from ``origin`` (3,) along each ray across an axis, m; infinite where there is none.
+
+    A ray is in a tet while it is behind the planes of all its faces (Cyrus and Beck).
+    """
+    along = x[tets][:, :, axis]
+    corners = x[tets[(along.min(axis=1) <= origin[axis]) & (along.max(axis=1) >= origin[axis])]]
+    first = corners[:, FACES[:, 0]]
+    outward = np.cross(corners[:, FACES[:, 1]] - first, corners[:, FACES[:, 2]] - first)
+    r = origin - first
+    height = outward[..., 0] * r[..., 0] + outward[..., 1] * r[..., 1] + outward[..., 2] * r[..., 2]
+    found = np.full(RAYS, np.inf)
+    for k, way in enumerate(directions(axis)):
+        slope = outward[..., 0] * way[0] + outward[..., 1] * way[1] + outward[..., 2] * way[2]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            at = -height / slope
+        enters = np.where(slope < 0.0, at, np.where((slope == 0.0) & (height > 0.0), np.inf, 0.0)).max(axis=1)
+        leaves = np.where(slope > 0.0, at, np.inf).min(axis=1)
+        enters = np.maximum(enters, 0.0)
+        found[k] = enters[enters < leaves].min(initial=np.inf)
+    return found

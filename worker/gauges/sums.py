@@ -1,0 +1,83 @@
+"""Sums over nodes: mass, momentum, energy, centre of mass, and of what is beyond a plane alone."""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from conoid.cases.measures import SUMS, Beyond, Probe, kind
+from conoid.cases.region import Region
+from conoid.cases.schema import Case
+
+from ..parallel.fixed_point import exact_sums
+from ..state import Flags, Floats
+from .gauge import Scene
+
+_AXES = "xyz"
+
+
+def ahead(beyond: Beyond, x: Floats) -> Floats:
+    """(n,) how far points (n, 3) are beyond a plane, m."""
+    return np.asarray((x[:, _AXES.index(beyond.axis)] - beyond.at) * way(beyond))
+
+
+def way(beyond: Beyond) -> float:
+    """The sign of the direction that leads away from the plane."""
+    return 1.0 if beyond.side == "above" else -1.0
+
+
+class NodeSums:
+    """The sums of a case on this rank. They have no memory."""
+
+    def __init__(self, case: Case, scene: Scene) -> None:
+        self._scene = scene
+        self._probes = {k: probe for k, probe in enumerate(case.probes) if kind(probe.field) in SUMS}
+
+    def measure(self, v: Floats) -> dict[int, float]:
+        columns = [column for probe in self._probes.values() for column in self._columns(probe, v)]
+        sums = iter(exact_sums(self._scene.comm, np.column_stack(columns)).tolist())
+        return {k: _value(probe, next(sums), next(sums)) for k, probe in self._probes.items()}
+
+    def keep(self) -> Any:
+        return None
+
+    def resume(self, known: Any) -> None:
+        pass
+
+    def started(self, probe: Probe) -> Flags:
+        """(nodes,) the nodes that started in the box of a probe, of those that this rank counts."""
+        model, nodes = self._scene.model, self._scene.model.nodes
+        part = model.parts.index(probe.part)
+        inside = Region.of(probe).holds(nodes.x0.T, model.slack[part])
+        return np.asarray(nodes.owned & (nodes.part == part) & inside)
+
+    def chosen(self, probe: Probe) -> Flags:
+        """(nodes,) the nodes of a probe that this rank counts."""
+        nodes, erosion, found = self._scene.model.nodes, self._scene.erosion, self.started(probe)
+        if erosion is not None:
+            found &= ~erosion.removed
+        if probe.beyond is not None:
+            found &= ahead(probe.beyond, nodes.x) > 0.0
+        return np.asarray(found)
+
+    def _columns(self, probe: Probe, v: Floats) -> tuple[Floats, Floats]:
+        """(nodes,) what is added up, and what the sum is divided by."""
+        nodes, field = self._scene.model.nodes, kind(probe.field)
+        mass = np.where(self.chosen(probe), nodes.mass, 0.0)
+        if field in ("mass", "residual_mass"):
+            return mass, mass
+        if field == "kinetic_energy":
+            return 0.5 * mass * (v[:, 0] * v[:, 0] + v[:, 1] * v[:, 1] + v[:, 2] * v[:, 2]), mass
+        if field == "residual_velocity":
+            assert probe.beyond is not None
+            return mass * v[:, _AXES.index(probe.beyond.axis)] * way(probe.beyond), mass
+        return mass * (nodes.x if field == "centre" else v)[:, _AXES.index(probe.field[-1])], mass
+
+
+def _value(probe: Probe, total: float, mass: float) -> float:
+    field = kind(probe.field)
+    if field == "residual_velocity":
+        return total / mass if mass > 0.0 else 0.0
+    if field in ("centre", "centre_velocity"):
+        return total / mass if mass > 0.0 else math.nan
+    return total
