@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
+import msgspec
 import numpy as np
 
 from conoid.cases.figures import exact
@@ -20,6 +21,11 @@ FROM = (1.0, -1.55, 0.62)
 """Direction from the body to the camera where nothing else decides: from the front, the right and above. Chosen."""
 _ASIDE = 1.55
 """How much more the camera looks at a plane of symmetry than at the other sides. Chosen."""
+_LONG = 2.2
+"""Times its second extent, from which on a body is long, and lies along the picture. Chosen."""
+_ALONG = (0.6, 0.55)
+"""Components of the direction to the camera along a long body and from the third side, where the one from the side that
+it shows is 1.55. Chosen."""
 _FILL = 0.84
 """Share of a panel that the body takes up. Chosen."""
 _SCALE = 0.28
@@ -29,7 +35,7 @@ _SCALE = 0.28
 @dataclass(frozen=True)
 class Camera:
     """A parallel view: unit vectors to the camera, to the right and upwards; ``half`` is half the height that a panel
-    shows, m.
+    shows, m, and within ``deep`` of the centre, m, lies all of the body.
     """
 
     centre: Array
@@ -37,24 +43,53 @@ class Camera:
     right: Array
     above: Array
     half: float
+    deep: float
 
 
-def direction(picture: Picture, centre: Array) -> Array:
-    """To the camera: as it was asked for, else the front right from above, or where planes of symmetry can be seen."""
+def settled(picture: Picture, bounds: Array) -> Picture:
+    """The picture with a camera; ``bounds`` (3, 2): lowest and highest coordinates of the body, m.
+
+    As it was asked for; else from the side where planes of symmetry can be seen, or from the front right and above. A
+    long body lies along the picture, unless it was said what is up.
+    """
     if picture.camera is not None:
-        return np.array(picture.camera)
-    sides = {cut.axis: 1.0 if cut.at > centre[cut.axis] else -1.0 for cut in picture.cuts if cut.axis < 2}
+        return picture
+    centre, extent = bounds.mean(axis=1), np.ptp(bounds, axis=1)
+    extent[[mirror.axis for mirror in picture.mirrors]] *= 2.0
+    sides = {cut.axis: 1.0 if cut.at > centre[cut.axis] else -1.0 for cut in picture.cuts}
+    longest, second = np.argsort(extent)[:-3:-1].tolist()
+    if picture.up is None and extent[longest] > _LONG * extent[second]:
+        towards, up = _beside(longest, sides)
+        return msgspec.structs.replace(picture, camera=towards, up=up)
+    return msgspec.structs.replace(picture, camera=_before({axis: sides[axis] for axis in sides if axis < 2}))
+
+
+def _before(sides: dict[int, float]) -> tuple[float, float, float]:
+    """To a camera that sees the sides, -1 or 1, across x and y."""
     if not sides:
-        return np.array(FROM)
-    towards = np.array([sides.get(0, 0.8), sides.get(1, -0.8), FROM[2]])
-    if len(sides) == 1:
-        towards[list(sides)] *= _ASIDE
-    return towards
+        return FROM
+    x, y = sides.get(0, 0.8), sides.get(1, -0.8)
+    return x * (_ASIDE if list(sides) == [0] else 1.0), y * (_ASIDE if list(sides) == [1] else 1.0), FROM[2]
 
 
-def axes(towards: Array, up: Sequence[float] | None) -> tuple[Array, Array, Array]:
+def _beside(along: int, sides: dict[int, float]) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """To a camera that sees a body along one axis from its side, the low end at the left, and what is up there: z; of a
+    body along z the side that is not shown, so that planes of symmetry are seen from the front and from above.
+    """
+    if along < 2:
+        shown, upper, face, top = 1 - along, 2, sides.get(1 - along, 1.0 if along else -1.0), 1.0
+    else:
+        x, y = sides.get(0, sides.get(1, -1.0)), sides.get(1, -sides.get(0, -1.0))
+        shown, upper, face, top = (0, 1, x, y) if x * y < 0.0 else (1, 0, y, x)
+    towards, up = np.zeros(3), np.zeros(3)
+    towards[[shown, upper, along]] = _ASIDE * face, _ALONG[1] * top, _ALONG[0] * sides.get(along, 1.0)
+    up[upper] = top
+    return tuple(towards.tolist()), tuple(up.tolist())
+
+
+def axes(direction: Sequence[float], up: Sequence[float] | None) -> tuple[Array, Array, Array]:
     """Unit vectors to the camera, to the right and upwards; ``up`` is z, or y where the camera looks along z."""
-    towards = towards / np.linalg.norm(towards)
+    towards = np.array(direction, float) / np.linalg.norm(direction)
     for above in (np.array(up, float) if up is not None else np.array([0.0, 0.0, 1.0]), np.array([0.0, 1.0, 0.0]),
                   np.array([1.0, 0.0, 0.0])):  # fmt: skip
         right = np.cross(above, towards)
@@ -88,12 +123,11 @@ def panels(n: int, body: tuple[float, float], room: tuple[float, float]) -> int:
 
 def place(points: Sequence[Array], picture: Picture, aspect: float) -> Camera:
     """A camera that sees all points in a panel whose width over height is ``aspect``."""
-    bounds = np.array([[each.min(axis=0), each.max(axis=0)] for each in points if len(each)])
-    middle = 0.5 * (bounds[:, 0].min(axis=0) + bounds[:, 1].max(axis=0))
-    towards, right, above = axes(direction(picture, middle), picture.up)
+    towards, right, above = axes(picture.camera or FROM, picture.up)
     width, height, centre = reach(points, right, above)
     half = 0.5 * max(height, width / aspect, 1e-30) / _FILL / picture.look.zoom
-    return Camera(centre, towards, right, above, half)
+    deep = max(float(np.linalg.norm(each - centre, axis=1).max()) for each in points if len(each))
+    return Camera(centre, towards, right, above, half, max(deep, half))
 
 
 def round_length(most: float) -> float:

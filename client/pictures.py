@@ -32,6 +32,13 @@ _SECONDS = 180.0
 SMALLEST = 64
 """Pixels of a picture, each way. Chosen: below it nothing is to be seen."""
 
+_VIRIDIS = "#355f8d", "#2a788e", "#21918c", "#22a884", "#44bf70", "#7ad151", "#bddf26", "#fde725"
+_CIVIDIS = "#3b496c", "#575d6d", "#707173", "#8a8779", "#a59c74", "#c3b369", "#e1cc55", "#fee838"
+_PLASMA = "#5302a3", "#8b0aa5", "#b83289", "#db5c68", "#f48849", "#febd2a", "#f0f921"
+"""Perceptual scales (van der Walt and Smith 2015, CC0; cividis: Nunez, Anderton and Renslow 2018) without their darkest
+part: where a value is low, the shape of the body is to be seen."""
+_STRAINED = "#d9dfe6", "#f7d889", "#f49a3d", "#d4432c", "#7c0f34"
+
 
 @dataclass(frozen=True)
 class Field:
@@ -44,18 +51,18 @@ class Field:
     label: str
     unit: str = ""
     factor: float = 1.0
-    colours: str | tuple[str, ...] = "viridis"
+    colours: str | tuple[str, ...] = _VIRIDIS
     kind: str = "linear"
 
 
 FIELDS = {
-    "mises": Field("von Mises stress", "MPa", 1e-6, "viridis"),
+    "mises": Field("von Mises stress", "MPa", 1e-6),
     "pressure": Field("pressure", "MPa", 1e-6, "RdBu_r", "centred"),
     "principal_stress": Field("largest principal stress", "MPa", 1e-6, "RdBu_r", "centred"),
-    "damage": Field("damage", "", 1.0, ("#d9dfe6", "#f7d889", "#f49a3d", "#d4432c", "#7c0f34")),
-    "plastic_strain": Field("plastic strain", "", 1.0, ("#d9dfe6", "#f7d889", "#f49a3d", "#d4432c", "#7c0f34")),
-    "temperature": Field("temperature", "K", 1.0, "plasma"),
-    "speed": Field("speed", "m/s", 1.0, "cividis"),
+    "damage": Field("damage", "", 1.0, _STRAINED),
+    "plastic_strain": Field("plastic strain", "", 1.0, _STRAINED),
+    "temperature": Field("temperature", "K", 1.0, _PLASMA),
+    "speed": Field("speed", "m/s", 1.0, _CIVIDIS),
     "part": Field("part", kind="classes"),
     "rank": Field("rank", kind="classes"),
     "fragment": Field("fragment", kind="fragments"),
@@ -85,9 +92,11 @@ class Look(msgspec.Struct, kw_only=True, frozen=True):
     section: str = ""
     """Planes, written as in ``mirror``: what lies between a plane and the camera is cut away."""
     camera: str = ""
-    """From where the body is seen: an axis such as ``-x``, or a direction such as ``1,-1.5,0.6``; empty: as it fits."""
+    """From where the body is seen: an axis such as ``-x``, or a direction such as ``1,-1.5,0.6``; empty: from
+    the side where planes of symmetry can be seen, and so that a long body lies along the picture."""
     up: str = ""
-    """What points upwards in the picture, written as in ``camera``; z, or y where the camera looks along z."""
+    """What points upwards in the picture, written as in ``camera``; empty: z, or y where the camera looks along z; of a
+    body that is long along z the side that is not shown."""
     zoom: float = 1.0
     """1: the body fills the picture."""
     size: tuple[int, int] = (1600, 1200)

@@ -25,6 +25,13 @@ from .frame import require_whole
 from .pictures import FIELDS, Drawn, Field, Mirror, Picture, Wall, reason
 from .sheet import Sheet
 
+_FAR = 4.0
+"""How far the camera stands, in reaches of the body, and half of it the bar of a length. Chosen: beyond walls."""
+_BEND = 40.0
+"""Degrees by which faces are bent where the outline of a body has a line. Chosen: more than a curved face has."""
+_SHADE = 0.04
+"""Of the reach of the body, that deep hollows are darker up to this distance. Chosen."""
+
 
 @dataclass(frozen=True)
 class Shot:
@@ -39,7 +46,7 @@ class Shot:
 def draw(picture: Picture) -> Drawn:
     """Writes ``picture.out``. Raises ViewError where a frame cannot be drawn."""
     field = FIELDS[picture.field]
-    shots = [_shot(path, picture) for path in picture.frames]
+    picture, shots = _shots(picture)
     _require_sections(picture, np.array([shot.bounds for shot in shots]))
     values = [np.asarray(shot.surface["shown"]) for shot in shots]
     scale = None if field.kind in scales.NAMED else scales.ends(values, field, picture.look)
@@ -68,9 +75,15 @@ def _animation(shots: Sequence[Shot], picture: Picture, scale: Scale) -> None:
 # The surface --------------------------------------------------------------------------------------------------------
 
 
-def _shot(path: str, picture: Picture) -> Shot:
-    mesh, time = _read(path)
-    return Shot(_surface(mesh, picture), time, np.reshape(mesh.bounds, (3, 2)))
+def _shots(picture: Picture) -> tuple[Picture, list[Shot]]:
+    """All frames, and the picture with the camera that the first one asks for."""
+    shots = []
+    for path in picture.frames:
+        mesh, time = _read(path)
+        bounds = np.reshape(mesh.bounds, (3, 2))
+        picture = camera.settled(picture, bounds)
+        shots.append(Shot(_surface(mesh, picture), time, bounds))
+    return picture, shots
 
 
 def read_mesh(path: Path) -> Any:
@@ -97,10 +110,10 @@ def _surface(mesh: Any, picture: Picture) -> Any:
     field = FIELDS[picture.field]
     length = float(mesh.length)
     mesh = _with_field(mesh, picture.field, picture.look.raw or field.kind in scales.NAMED)
-    towards = camera.direction(picture, np.asarray(mesh.center))
+    towards = picture.camera or camera.FROM
     bounds = np.reshape(mesh.bounds, (3, 2))
     for plane in picture.sections:
-        mesh = _cut(mesh, plane, float(towards[plane.axis]), bounds[plane.axis])
+        mesh = _cut(mesh, plane, towards[plane.axis], bounds[plane.axis])
     surface = mesh.extract_surface(algorithm="dataset_surface")
     if picture.mirrors:
         surface = surface.triangulate()  # a section leaves faces of three to six corners
@@ -180,6 +193,8 @@ def _image(shots: Sequence[Shot], picture: Picture, scale: Scale, every: Sequenc
         plotter.subplot(*laid.panel(place))
         drawn = _add_body(plotter, shot.surface, field, picture, scale)
         _set_camera(plotter, laid.eye)
+        if not picture.out.lower().endswith(".gif"):  # a second a picture
+            _add_shade(plotter, laid.eye.deep)
         _add_marks(plotter, laid, place, [shot.time for shot in shots], picture)
     if title:
         add_title(plotter, title, picture)
@@ -214,7 +229,7 @@ def _add_body(plotter: Any, surface: Any, field: Field, picture: Picture, scale:
     raw = picture.look.raw
     look = {
         "scalars": "shown", "smooth_shading": not raw, "split_sharp_edges": not raw, "feature_angle": 35.0,
-        "ambient": 0.38, "diffuse": 0.85, "specular": 0.10, "specular_power": 20.0, "show_scalar_bar": False,
+        "ambient": 0.45, "diffuse": 0.85, "specular": 0.10, "specular_power": 20.0, "show_scalar_bar": False,
         "show_edges": picture.look.edges, "edge_color": INK, "edge_opacity": 0.25,
     }  # fmt: skip
     if scale is None:
@@ -225,16 +240,31 @@ def _add_body(plotter: Any, surface: Any, field: Field, picture: Picture, scale:
     else:
         colours = field.colours if isinstance(field.colours, str) else scales.blend(field.colours)
         drawn = plotter.add_mesh(surface, cmap=colours, clim=scale[:2], **look)
+    if not (raw or picture.look.edges):
+        _add_outline(plotter, surface, picture.look.size[1])
     for wall in picture.walls:
         _add_wall(plotter, surface, wall)
     return drawn
 
 
+def _add_outline(plotter: Any, surface: Any, height: int) -> None:
+    """Thin lines along the sharp edges of the bodies and of their fragments."""
+    lines = surface.extract_feature_edges(
+        _BEND, boundary_edges=True, feature_edges=True, manifold_edges=False, non_manifold_edges=False
+    )
+    if lines.n_cells:
+        plotter.add_mesh(lines, color=INK, line_width=max(1.0, height / 900), opacity=0.5, lighting=False)
+
+
+def _add_shade(plotter: Any, deep: float) -> None:
+    """Ambient occlusion: cracks and hollows are darker."""
+    plotter.enable_ssao(radius=_SHADE * deep, bias=0.1 * _SHADE * deep, kernel_size=64, blur=True)
+
+
 def _set_camera(plotter: Any, eye: Camera) -> None:
-    """Parallel, far enough that everything lies before it."""
-    far = 100.0 * eye.half
+    """Parallel, far enough that everything lies before it, and no farther: depths are of single precision."""
     plotter.camera.focal_point = eye.centre
-    plotter.camera.position = eye.centre + far * eye.towards
+    plotter.camera.position = eye.centre + _FAR * eye.deep * eye.towards
     plotter.camera.up = eye.above
     plotter.camera.enable_parallel_projection()
     plotter.camera.parallel_scale = eye.half
@@ -260,7 +290,7 @@ def _add_scale(plotter: Any, laid: Sheet, size: int) -> None:
     eye, aspect = laid.eye, laid.aspect
     length, text = camera.scale_bar(eye, aspect)
     corner = 0.95 * aspect * eye.half * eye.right - 0.95 * eye.half * eye.above
-    end = eye.centre + corner + 50.0 * eye.half * eye.towards
+    end = eye.centre + corner + 0.5 * _FAR * eye.deep * eye.towards
     line = pv.Line(end - length * eye.right, end)
     plotter.add_mesh(line, color=INK, line_width=max(2, size // 3), lighting=False, reset_camera=False)
     plotter.renderer.ResetCameraClippingRange()

@@ -55,11 +55,10 @@ class Sheet:
 
 
 def lay(points: Sequence[Any], n: int, picture: Picture, titled: bool, barred: bool) -> Sheet:
-    """A sheet of ``n`` panels, each of which shows all of ``points``, arrays (., 3)."""
+    """A sheet of ``n`` panels, each of which shows all of ``points``, arrays (., 3), by a camera that is settled."""
     head, side, (width, height) = _HEAD * titled, _SIDE * barred, picture.look.size
     room = (width * (1.0 - side), height * (1.0 - head))
-    low, high = np.min([p.min(axis=0) for p in points], axis=0), np.max([p.max(axis=0) for p in points], axis=0)
-    _, right, above = camera.axes(camera.direction(picture, 0.5 * (low + high)), picture.up)
+    _, right, above = camera.axes(picture.camera or camera.FROM, picture.up)
     columns = camera.panels(n, camera.reach(points, right, above)[:2], room)
     rows = math.ceil(n / columns)
     aspect = (room[0] / columns) / (room[1] / rows)

@@ -1,8 +1,8 @@
 // Colours of the view: one for each of many, and a scale from low to high that grey prints and the colour blind keep apart.
 
 const NAMED = ["#3b7dd8", "#e07b39", "#2aa198", "#c2334a", "#8e6bd1", "#7f9f2f", "#d05a8c", "#5c6977", "#e0a32e", "#4fae7b"];
-// Of the viridis scale (van der Walt and Smith 2015, CC0), at equal distances.
-const SCALE = ["#440154", "#482878", "#3e4989", "#31688e", "#26828e", "#1f9e89", "#35b779", "#6ece58", "#b5de2b", "#fde725"];
+// Of the viridis scale (van der Walt and Smith 2015, CC0), at equal distances, without its darkest part.
+const SCALE = ["#355f8d", "#2a788e", "#21918c", "#22a884", "#44bf70", "#7ad151", "#bddf26", "#fde725"];
 
 const bytes = (hex) => [1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16));
 

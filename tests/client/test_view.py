@@ -43,7 +43,7 @@ def test_a_picture_shows_the_body_whole_and_large(folder: Path, tmp_path: Path) 
     drawn = view(folder, "temperature", tmp_path / "t.png", size=SIZE)
     assert drawn.faces == 4 * 2 * 4 * 16 + 2 * 2 * 4 * 4, "four sides and two ends of 4 x 4 x 16 cells"
     left, right, top, bottom = body_box(tmp_path / "t.png")
-    assert bottom - top > 0.6, "the camera fits"
+    assert right - left > 0.6, "the camera fits, and a long body lies along the picture"
     assert left > 0.05
     assert right < 0.8
     assert 0.02 < top < bottom < 0.98
@@ -162,7 +162,7 @@ def test_fields_can_be_listed_without_vtk() -> None:
 
 @pytest.mark.usefixtures("warm")
 def test_frames_know_their_times_and_stand_side_by_side(folder: Path, tmp_path: Path) -> None:
-    drawn = view(folder, "mises", tmp_path / "two.png", size=SIZE, time=[0.0, 75e-6])
+    drawn = view(folder, "mises", tmp_path / "two.png", size=SIZE, time=[0.0, 75e-6], up="z")
     assert drawn.times == [0.0, 80e-6], "of each time the nearest frame"
     one = view(folder, "mises", tmp_path / "one.png", size=SIZE, frame=0)
     assert drawn.faces == 2 * one.faces
@@ -236,6 +236,28 @@ def test_the_bar_of_a_length_is_as_long_as_it_says(folder: Path, tmp_path: Path)
     bar = int(np.count_nonzero(dark, axis=1).max())
     height = 32.4e-3 * 0.82
     assert (bar / len(body)) * height == pytest.approx(5e-3, rel=0.03)
+
+
+@pytest.mark.parametrize("cuts", [{}, {0: 0.0}, {1: 0.0}, {0: 0.0, 1: 0.0}, {0: 1.0, 1: 0.0}, {0: 1.0, 1: 1.0}])
+@pytest.mark.parametrize("along", [0, 1, 2])
+def test_a_long_body_lies_along_the_picture_and_shows_its_planes_of_symmetry(
+    along: int, cuts: dict[int, float]
+) -> None:
+    """Its low end at the left where no plane stands against that; ``up`` alone stands it up again."""
+    bounds = np.array([[0.0, 1.0]] * 3)
+    bounds[along, 1] = 4.0
+    planes = tuple(pictures.Mirror(axis, at) for axis, at in cuts.items())
+    eye = camera.settled(seen(cuts=planes), bounds)
+    assert eye.camera is not None
+    towards, right, _ = camera.axes(eye.camera, eye.up)
+    assert abs(right[along]) > 0.9
+    if along == 2 or not cuts:
+        assert right[along] > 0.0
+    for axis, at in cuts.items():
+        assert axis == along or towards[axis] * (1.0 if at else -1.0) > 0.2, "the plane is seen"
+    assert camera.settled(seen(cuts=planes, up=(0.0, 0.0, 1.0)), bounds).up == (0.0, 0.0, 1.0)
+    bounds[along, 1] = 2.0
+    assert camera.settled(seen(), bounds).camera == camera.FROM
 
 
 def test_a_scale_has_a_round_length() -> None:
