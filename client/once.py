@@ -61,8 +61,11 @@ def run_once(
     _warn_of_cores(checked)
     server = LocalServer(runs, checked.run.cores)
     with ExitStack() as up:
-        with silence.broken(out.print, lambda: "the server is starting"):
+        at = ["the server is starting"]
+        with silence.broken(out.print, lambda: at[-1]):
             up.enter_context(server)
+            at.append("handing the case in")
+            server.session.outbox.say = at.append
             run = server.session.submit(data, folder=folder_of(case))
         info, told = _follow(run, checked, out, plain)
     result = Result.open(server.runs / run.id)

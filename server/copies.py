@@ -1,5 +1,6 @@
 """A run's own copies of the files that its case names: second names of files that never change."""
 
+import re
 import secrets
 import shutil
 from collections.abc import Callable, Iterator, Sequence
@@ -18,6 +19,7 @@ from .reading import FileName
 from .sent import SentFiles, give
 
 _LACKING = "you have sent no such file, or it has been removed since; send it first (PUT /v1/files/{sha256})"
+_NAMING = re.compile(rb"""path["']?[ \t]*[=:]|\\[uUx]""")
 Source = Callable[[FileName, Path], None]
 """Puts a file that a case names where it is told. Raises FileNotFoundError, OSError."""
 
@@ -78,4 +80,4 @@ def apart(runs: Path, files: Sequence[FileName], source: Source) -> Iterator[Pat
 
 def names_files(body: bytes) -> bool:
     """Whether a case may name files, by its text alone: a key ``path``, or letters that are written in another way."""
-    return b"path" in body or b"\\" in body
+    return _NAMING.search(body) is not None

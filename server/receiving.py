@@ -79,12 +79,11 @@ class Receiver:
         """
         span = span_of(request)
         place_of(request).lengthen()
-        known = await self._lanes.run(self._sent.find, owner, sha256)
-        if known is not None and known.whole:
-            return known, False
         transfer = await self._begun(owner, sha256)
         try:
             part = await self._lanes.run(self._opened, owner, sha256, span)
+            if isinstance(part, Sent):
+                return part, False
             await self._taken(request, transfer, part, check)
             if part.offset < span.end:
                 raise ServiceError(400, "incomplete", f"the body broke off at byte {part.offset}", retryable=True)
@@ -110,14 +109,14 @@ class Receiver:
         made = self._open[owner, sha256] = _Transfer()
         return made
 
-    def _opened(self, owner: str, sha256: str, span: Span) -> Part:
-        """What is on its way, where it ends where the body begins. Raises ServiceError 409, 413, 429, 507, OSError."""
-        part = self._sent.begin(owner, sha256, span.total, anew=span.anew)
-        if span.first != part.offset:
-            detail = f"the server has {part.offset} bytes of the file, and the body begins at {span.first}"
-            headers = {"Upload-Offset": str(part.offset)}
-            raise ServiceError(409, "wrong_offset", detail, pointer="Content-Range", headers=headers)
-        return part
+    def _opened(self, owner: str, sha256: str, span: Span) -> Part | Sent:
+        """What is on its way, open where the body begins; the file where it is whole already. Raises ServiceError 409,
+        413, 429, 507, OSError.
+        """
+        known = self._sent.find(owner, sha256)
+        if known is not None and known.whole:
+            return known
+        return self._sent.begin(owner, sha256, span.total, None if span.anew else span.first)
 
     async def _taken(
         self, request: Request, transfer: _Transfer, part: Part, check: Callable[[], Awaitable[None]]

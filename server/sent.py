@@ -121,19 +121,23 @@ class SentFiles:
         folder = self._folder / owner
         return [folder / sha256, *(p for p in folder.glob(f"{sha256}.*{_PART}") if _size_of(p.name) is not None)]
 
-    def begin(self, owner: str, sha256: str, total: int, *, anew: bool = False) -> Part:
-        """Opens what is on its way; its size counts from now on. Raises ServiceError 413, 429, 507, OSError."""
+    def begin(self, owner: str, sha256: str, total: int, first: int | None = None) -> Part:
+        """Opens what is on its way, to go on with the byte ``first``, or from the beginning for None; the size of the
+        file counts from now on. Raises ServiceError 409, 413, 429, 507, OSError.
+        """
         path = self._folder / owner / f"{sha256}.{total}{_PART}"
         with self._lock(owner):
             for other in self._paths(owner, sha256)[1:]:
                 if other != path:
                     other.unlink(missing_ok=True)
             there = path.stat().st_size if path.exists() else None
+            if first not in {None, there or 0}:
+                raise _wrong_offset(there or 0, first)
             if there is None:
                 self._check_room(owner, total)
-            self._check_disk(total if anew else total - (there or 0))
+            self._check_disk(total - (first or 0))
             path.parent.mkdir(0o700, parents=True, exist_ok=True)
-            return Part(path, total, anew=anew)
+            return Part(path, total, anew=first is None)
 
     def _check_room(self, owner: str, total: int) -> None:
         rules, there = self._rules, self.of(owner)
@@ -222,6 +226,12 @@ class SentFiles:
                     status = entry.stat(follow_symlinks=False)
                     found[status.st_dev, status.st_ino] = status.st_size
         return found
+
+
+def _wrong_offset(there: int, first: int | None) -> ServiceError:
+    detail = f"the server has {there} bytes of the file, and the body begins at {first}"
+    headers = {"Upload-Offset": str(there)}
+    return ServiceError(409, "wrong_offset", detail, pointer="Content-Range", headers=headers)
 
 
 def give(source: Path, target: Path) -> None:

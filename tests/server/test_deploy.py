@@ -1,5 +1,6 @@
 """What a site copies from deploy/, at work: nginx with TLS in front of a server, a backup and what comes back of it."""
 
+import hashlib
 import json
 import os
 import shutil
@@ -18,7 +19,7 @@ import pytest
 
 from conoid.cases.run import State
 
-from .running import MakeProcess, User
+from .running import TOML, MakeProcess, User, case_text
 
 DEPLOY = Path(__file__).parents[2] / "deploy"
 NGINX = shutil.which("nginx", path=f"{os.environ.get('PATH', '')}:/usr/sbin:/sbin")
@@ -58,7 +59,7 @@ def placed(place: Path, port: int, server: int) -> Path:
         "listen 443 ssl;": f"listen 127.0.0.1:{port} ssl;",
         "/etc/ssl/conoid/fullchain.pem": f"{place}/chain.pem",
         "/etc/ssl/conoid/key.pem": f"{place}/key.pem",
-        "http://127.0.0.1:8750;": f"http://127.0.0.1:{server};",
+        "server 127.0.0.1:8750;": f"server 127.0.0.1:{server};",
     }.items():
         assert text.count(shipped) == 1, shipped
         text = text.replace(shipped, here)
@@ -141,6 +142,9 @@ def test_events_pass_through_nginx_when_they_happen(process: MakeProcess, tmp_pa
         assert far.get(f"/v1/runs/{run}").json()["state"] == "succeeded"
         assert far.post("/v1/runs", content=b"x" * 3_000_000).status_code == 413
         assert far.get("/readyz").status_code == 200
+        mesh = b"x" * 3_000_000
+        assert far.put(f"/v1/files/{hashlib.sha256(mesh).hexdigest()}", content=mesh).status_code == 201
+        assert far.post("/v1/cases:validate", content=case_text(), headers=TOML).json()["valid"]
         far.headers["Authorization"] = "Bearer wrong"
         assert far.get("/v1/me").status_code == 401
 

@@ -59,6 +59,9 @@ def files_of(user: User) -> list[str]:
 def test_a_file_comes_in_pieces_and_is_there_when_it_is_whole(server: Running) -> None:
     data, sha256 = made(1000)
     assert server.ann.http.get(f"/v1/files/{sha256}").status_code == 404
+    early = put(server.ann, sha256, data[400:], "400-999/1000")
+    assert refused(early, 409, "wrong_offset") == "the server has 0 bytes of the file, and the body begins at 400"
+    assert files_of(server.ann) == [], "and nothing counts"
     first = put(server.ann, sha256, data[:400], "0-399/1000")
     assert (first.status_code, first.json()["offset"], first.json()["whole"]) == (200, 400, False)
     assert files_of(server.ann) == [f"{sha256}.1000.part"]
@@ -225,7 +228,8 @@ def test_wherever_a_disk_fails_the_same_again_makes_the_file_whole(tmp_path: Pat
     store, fired = SentFiles(tmp_path, Files(), 0), 0
 
     def bring() -> None:
-        part = store.begin("ann", sha256, 1000)
+        found = store.find("ann", sha256)
+        part = store.begin("ann", sha256, 1000, found.offset if found else 0)
         part.write(data[part.offset :])
         store.finish("ann", part)
 
@@ -266,7 +270,7 @@ def test_old_files_go_unless_a_run_or_a_sweep_needs_them(tmp_path: Path) -> None
     store = SentFiles(tmp_path, Files(age="1 h"), 0)
     now, hashes = time.time(), [made(10, n)[1] for n in range(5)]
     for n, sha256 in enumerate(hashes):
-        part = store.begin("ann", sha256, 10)
+        part = store.begin("ann", sha256, 10, 0)
         part.write(made(10, n)[0][: 10 if n else 5])
         if n:
             store.finish("ann", part)
@@ -288,9 +292,9 @@ def test_old_files_go_unless_a_run_or_a_sweep_needs_them(tmp_path: Path) -> None
 def test_a_part_that_a_hung_thread_holds_harms_no_later_one(tmp_path: Path) -> None:
     store = SentFiles(tmp_path, Files(), 0)
     data, sha256 = made(100)
-    old = store.begin("ann", sha256, 100)
+    old = store.begin("ann", sha256, 100, 0)
     old.write(data[:50])
-    new = store.begin("ann", sha256, 100)
+    new = store.begin("ann", sha256, 100, 50)
     assert new.offset == 50
     new.write(data[50:])
     old.write(data[50:70])
