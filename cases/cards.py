@@ -147,8 +147,9 @@ def placed(file: str, number: int) -> str:
 class Deck:
     """The keywords of a deck and of the files that it includes, read once from its start."""
 
-    def __init__(self, path: Path) -> None:
-        """Opens nothing yet."""
+    def __init__(self, path: Path, without: Collection[str] = ()) -> None:
+        """Opens nothing yet. ``without``: keywords whose cards are not kept."""
+        self._without = without
         self.included = Included(path)
         """The files that have been read; the deck itself is the first."""
         self.followed: list[Block] = []
@@ -194,7 +195,8 @@ class Deck:
                     self.followed.append(block)
                     return
             elif block is not None:
-                block.cards.append(Card(number, text))
+                if block.name not in self._without:
+                    block.cards.append(Card(number, text))
             elif text.strip():
                 raise CardError(f"{placed(file, number)}: {shown(text.strip())} stands before the first keyword")
         if block is None:

@@ -5,6 +5,7 @@ begins with ``**`` a comment; case and blanks mean nothing outside of quotation 
 comma goes on in the next line; a number may have a D for its exponent, an empty field is 0.
 """
 
+import math
 import re
 from collections.abc import Iterator
 from contextlib import suppress
@@ -144,7 +145,9 @@ def numbers(line: int, text: str) -> list[float]:
             items = text.translate(_D).split(",")
             if not items[-1].strip():
                 items.pop()
-            return [float(item) if item.strip() else 0.0 for item in items]
+            found = [float(item) if item.strip() else 0.0 for item in items]
+            if all(map(math.isfinite, found)):
+                return found
         except ValueError:
             pass
     raise InpError(f"line {line}: {shortened(text)} is not a list of numbers")

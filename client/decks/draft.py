@@ -1,5 +1,6 @@
 """The case that is made of a deck, as plain data, with what its keys come from as comments."""
 
+import math
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -8,6 +9,9 @@ from .account import Account, Entry
 from .naming import Names, name
 from .toml import NOTE
 from .units import LENGTH, Dimension, System
+
+_MOST_FRAMES = 100_000
+"""That a case may have (cases/schema.py)."""
 
 
 @dataclass
@@ -115,6 +119,16 @@ class Draft:
             part["erosion"] = erosion
         body.entry.take(f"parts[{len(self.parts)}]")
         self.parts.append(part)
+
+    def set_frames(self, count: float, interval: float, end: float, entry: Entry) -> int:
+        """``run.frames`` of a number, or of an interval up to the end, in the unit of the deck; 0 for none."""
+        frames = count if count > 0.0 else end / interval if interval > 0.0 and math.isfinite(end) else 0.0
+        if not 0.5 <= frames <= _MOST_FRAMES:
+            entry.leave(f"no number of frames from 1 to {_MOST_FRAMES:,}: run.frames is 20")
+            return 0
+        self.run["frames"] = round(frames)
+        entry.take("run.frames")
+        return round(frames)
 
     # The rest ---------------------------------------------------------------------------------------------------------
 

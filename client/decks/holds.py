@@ -66,13 +66,13 @@ class Holding:
             if (at := self._plane(axis, key, held)) is not None:
                 same = next((known for known in planes if abs(known - at) <= _NEAR * max(abs(at), 1e-300)), at)
                 planes.setdefault(same, []).append(key)
-                done |= self._topology.mesh.nodes[key] & held
-        of_bodies = set().union(*(self._topology.mesh.nodes[key] for key in self._topology.bodies)) if planes else set()
+                done |= self._topology.of[key] & held
+        of_bodies = set().union(*(self._topology.of[key] for key in self._topology.bodies)) if planes else set()
         covered = [each for each in holds if self._topology.nodes(each.chosen) & of_bodies <= done]
         if not planes or len(covered) < len(holds):
             return
         for at, keys in planes.items():
-            nodes = set().union(*(self._topology.mesh.nodes[key] for key in keys))
+            nodes = set().union(*(self._topology.of[key] for key in keys))
             those = [each for each in covered if not self._topology.nodes(each.chosen).isdisjoint(nodes)]
             table = {"kind": "symmetry", "axis": axis, "at": self._draft.quantity(at, LENGTH)}
             self._draft.add_boundary({**table, **self._parts(keys)}, *(each.entry for each in those))
@@ -81,12 +81,12 @@ class Holding:
 
     def _plane(self, axis: str, key: str, held: set[int]) -> float | None:
         """Where the held nodes of a body are, if they are all nodes of one plane at an end of it."""
-        mesh, d = self._topology.mesh, AXES.index(axis)
-        mine = mesh.nodes[key] & held
+        d, mine = AXES.index(axis), self._topology.of[key] & held
         if not mine:
             return None
-        every = [mesh.points[node][d] for node in mesh.nodes[key] if node in mesh.points]
-        here = [mesh.points[node][d] for node in mine if node in mesh.points]
+        points = self._topology.points
+        every = [points[node][d] for node in self._topology.of[key] if node in points]
+        here = [points[node][d] for node in mine if node in points]
         low, high = min(every, default=0.0), max(every, default=0.0)
         near = _NEAR * (high - low)
         if not here or max(here) - min(here) > near or near == 0.0:

@@ -3,16 +3,8 @@
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
 
 Point = tuple[float, float, float]
-
-
-class Mesh(NamedTuple):
-    """Nodes of each part by its key, and the position of each node in the unit of the deck."""
-
-    nodes: Mapping[str, set[int]]
-    points: Mapping[int, Point]
 
 
 @dataclass(frozen=True)
@@ -32,21 +24,33 @@ class Chosen:
 class Topology:
     """The parts of a deck by their nodes."""
 
-    def __init__(self, bodies: Iterable[str], load: Callable[[], Mesh]) -> None:
-        """``bodies``: keys of the parts that become parts of the case; ``load`` reads the mesh when it is needed."""
+    def __init__(
+        self,
+        bodies: Iterable[str],
+        nodes: Callable[[], Mapping[str, set[int]]],
+        points: Callable[[], Mapping[int, Point]],
+    ) -> None:
+        """``bodies``: keys of the parts that become parts of the case; the others read the nodes of each part, and where
+        nodes are in the unit of the deck, when they are asked for.
+        """
         self.bodies = list(bodies)
-        self._load = load
+        self._read_nodes, self._read_points = nodes, points
 
     @cached_property
-    def mesh(self) -> Mesh:
-        """The nodes of the parts of the case."""
-        found = self._load()
-        return Mesh({key: found.nodes.get(key, set()) for key in self.bodies}, found.points)
+    def of(self) -> dict[str, set[int]]:
+        """The nodes of each body, by its key."""
+        found = self._read_nodes()
+        return {key: found.get(key, set()) for key in self.bodies}
+
+    @cached_property
+    def points(self) -> Mapping[int, Point]:
+        """Where nodes are."""
+        return self._read_points()
 
     def nodes(self, chosen: Chosen) -> set[int]:
         """The nodes that are meant, of bodies or not."""
         if chosen.bodies is not None:
-            return set().union(*(self.mesh.nodes.get(key, set()) for key in chosen.bodies))
+            return set().union(*(self.of.get(key, set()) for key in chosen.bodies))
         return chosen.nodes() if chosen.nodes is not None else set()
 
     def whole(self, chosen: Chosen) -> tuple[list[str], list[str]]:
@@ -54,13 +58,13 @@ class Topology:
         if chosen.bodies is not None:
             return [key for key in self.bodies if key in chosen.bodies], []
         wanted = self.nodes(chosen)
-        full = [key for key in self.bodies if self.mesh.nodes[key] and self.mesh.nodes[key] <= wanted]
-        some = [key for key in self.bodies if key not in full and not self.mesh.nodes[key].isdisjoint(wanted)]
+        full = [key for key in self.bodies if self.of[key] and self.of[key] <= wanted]
+        some = [key for key in self.bodies if key not in full and not self.of[key].isdisjoint(wanted)]
         return full, some
 
     def joined(self) -> list[tuple[str, str]]:
         """Pairs of bodies that have nodes in common."""
         return [
             (one, other) for i, one in enumerate(self.bodies) for other in self.bodies[i + 1 :]
-            if not self.mesh.nodes[one].isdisjoint(self.mesh.nodes[other])
+            if not self.of[one].isdisjoint(self.of[other])
         ]  # fmt: skip

@@ -60,7 +60,7 @@ class Loads:
             "how the other code finds its time step",
         )
         if scale:
-            self._draft.numerics["dt_safety"] = float(scale)
+            self._draft.numerics["dt_safety"] = _number(scale)
             each.entry.remark("differs", f"SCALE FACTOR = {scale}", "of the bound of this solver: numerics.dt_safety")
         each.rest()
         row = numbers(*each.filled()[0]) if each.filled() else []
@@ -110,7 +110,7 @@ class Loads:
         """Velocities by axis, and their courses, of one data line without its node set."""
         if not items or joined(items[0]) in _NAMED:
             return dict.fromkeys(_NAMED[joined(items[0])] if items else "", (0.0, ()))
-        first, last, value = ([float(x or 0.0) for x in items] + [0.0] * 3)[:3]
+        first, last, value = (numbers(line, ",".join(items) + ",") + [0.0] * 3)[:3]
         last = last or first
         axes = [AXES[d] for d in range(3) if first <= d + 1 <= last]
         if value == 0.0:
@@ -132,7 +132,7 @@ class Loads:
         if found is None:
             raise InpError(f"the amplitude {name!r} is not defined")
         kind, smooth = found.key("DEFINITION") or "TABULAR", found.get("SMOOTH")
-        if kind != "TABULAR" or (smooth and float(smooth)):
+        if kind != "TABULAR" or _number(smooth):
             raise InpError(f"the amplitude {name!r} is {kind}{' with SMOOTH' if smooth else ''}; TABULAR is taken over")
         if found.key("VALUE") == "ABSOLUTE" or found.key("TIME") == "TOTALTIME":
             found.entry.remark("left", "TIME, VALUE", "one step has one time, and values are factors")
@@ -147,7 +147,10 @@ class Loads:
         each.rest()
         if kind == "TEMPERATURE":
             for line, items in each.lists():
-                self._temperatures.append((self._chosen(items[0], each.entry), numbers(line, items[1])[0], each.entry))
+                if len(items) < 2:
+                    raise InpError(f"line {line}: expected a node set and a temperature")
+                value = numbers(line, items[1] + ",")[0]
+                self._temperatures.append((self._chosen(items[0], each.entry), value, each.entry))
         elif kind == "VELOCITY":
             for name, velocity in self._components(each).items():
                 self.starts.append(Start(self._chosen(name, each.entry), each.entry, velocity))
@@ -160,10 +163,10 @@ class Loads:
         """Velocities by node set and axis, of lines with a set, a direction and a value."""
         made: dict[str, dict[int, float]] = {}
         for line, items in each.lists():
-            axis = int(numbers(line, items[1])[0]) if len(items) == 3 else 0
-            if not 1 <= axis <= 3:
+            axis = numbers(line, items[1] + ",")[0] if len(items) == 3 else 0.0
+            if axis not in (1.0, 2.0, 3.0):
                 raise InpError(f"line {line}: expected a node set, a direction from 1 to 3, and a velocity")
-            made.setdefault(items[0], {})[axis - 1] = numbers(line, items[2])[0]
+            made.setdefault(items[0], {})[int(axis) - 1] = numbers(line, items[2] + ",")[0]
         return made
 
     def _rotating(self, each: Keyword) -> None:
@@ -218,9 +221,12 @@ class Loads:
         if not each.has("FIELD") or not (count or interval):
             each.entry.leave("output: a run writes frames, history.csv and probes")
             return
-        frames = int(float(count)) if count else round(end / float(interval or 0.0))
-        if not 0 < frames <= 100_000:
-            each.entry.leave("no number of frames from 1 to 100,000: run.frames is 20")
-            return
-        self._draft.run["frames"] = frames
-        each.entry.take("run.frames")
+        self._draft.set_frames(_number(count), _number(interval), end, each.entry)
+
+
+def _number(text: str | None) -> float:
+    """The number of a parameter; 0 where it is missing. Raises InpError."""
+    try:
+        return float(text or 0.0)
+    except ValueError:
+        raise InpError(f"{text!r} is not a number") from None

@@ -193,6 +193,8 @@ def _placed(point: Point, scope: Scope) -> Point:
 
 
 def _generated(line: int, items: list[str]) -> range:
+    if not 2 <= len(items) <= 3:
+        raise InpError(f"line {line}: GENERATE takes a first number, a last one and a step")
     first, last, step = (*(_number(line, item) for item in items), 1)[:3]
     if last < first or step < 1 or (last - first) // step > _MOST:
         raise InpError(f"line {line}: from {first} to {last} by {step} is no range, or longer than {_MOST}")

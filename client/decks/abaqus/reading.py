@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from functools import cached_property
 from pathlib import Path
 
-from conoid.cases.inp import Block, InpError, Source
+from conoid.cases.inp import Block, InpError, Source, numbers
 
 from ..account import Account, Entry
 from ..bonds import join
@@ -13,7 +13,7 @@ from ..draft import Body, Draft, Made
 from ..holds import Holding
 from ..naming import Names
 from ..start import begin
-from ..topology import Chosen, Mesh, Topology
+from ..topology import Chosen, Topology
 from ..units import System, Weighed
 from .keyword import Keyword, joined
 from .loads import Loads
@@ -88,7 +88,7 @@ class Abaqus:
         names = Names()
         for body in bodies:
             body.name = names.give(body.title, "part", body.key)
-        self.topology = Topology([body.key for body in bodies], self._load_mesh)
+        self.topology = Topology([body.key for body in bodies], self._nodes_of, lambda: self.mesh.points())
         loads = Loads(self._draft, self.of("AMPLITUDE"), self.chosen)
         end = loads.end(self.of("STEP"), self.of("DYNAMIC"))
         self._make_materials(system, bodies, loads.adiabatic)
@@ -118,10 +118,7 @@ class Abaqus:
         found = [each.get("ABSOLUTE ZERO") for each in named]
         for each in named:
             each.entry.take("parts[].temperature")
-        try:
-            return float(found[0] or 0.0) if found else 0.0
-        except ValueError:
-            raise InpError(f"ABSOLUTE ZERO = {found[0]!r} is not a number") from None
+        return numbers(named[0].line, found[0] or "0")[0] if named else 0.0
 
     def _make_materials(self, system: System, bodies: list[Body], adiabatic: bool) -> None:
         used = {body.material for body in bodies}
@@ -207,11 +204,9 @@ class Abaqus:
         """Nodes, elements and sets, read when they are asked for."""
         return AbaqusMesh(self.path)
 
-    def _load_mesh(self) -> Mesh:
+    def _nodes_of(self) -> dict[str, set[int]]:
         pairs = {key: key.partition("|") for key in self.topology.bodies}
-        return Mesh(
-            {key: self.mesh.body(scope, elset)[1] for key, (scope, _, elset) in pairs.items()}, self.mesh.points()
-        )
+        return {key: self.mesh.body(scope, elset)[1] for key, (scope, _, elset) in pairs.items()}
 
     def chosen(self, name: str, entry: Entry) -> Chosen:
         """The node set or node of a data line; the keyword of the set is taken with it."""

@@ -87,12 +87,7 @@ def pictures(draft: Draft, block: Block, entry: Entry, end: float) -> None:
     """``*DATABASE_BINARY_D3PLOT``: frames."""
     fields = Fields(block, entry, block.cards, ("DT LCDT BEAM NPLTC PSETID",))
     interval, count = fields.real("DT"), fields.whole("NPLTC")
-    frames = count or (round(end / interval) if interval > 0.0 else 0)
-    if not 0 < frames <= 100_000:
-        entry.leave("neither DT nor NPLTC give a number of frames: run.frames is 20")
-        return
-    draft.run["frames"] = frames
-    entry.take("run.frames")
-    if not count and abs(frames * interval - end) > 1e-6 * end:
+    frames = draft.set_frames(count, interval, end, entry)
+    if frames and not count and abs(frames * interval - end) > 1e-6 * end:
         fields.differ("DT", f"{frames} frames, every {draft.quantity(end / frames, TIME)}: evenly to the end")
     fields.rest("left")

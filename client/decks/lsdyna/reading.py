@@ -19,7 +19,7 @@ from ..walls import stand
 from . import control, loads, materials, sets
 from .fields import Fields, numbers
 from .layouts import LAYOUTS, NUMBERS
-from .mesh import parts_of, read_mesh
+from .mesh import parts_of, read_nodes, read_points
 from .words import LEFT, REFUSED, reason
 
 _MESH = ("NODE", "ELEMENT_SOLID")
@@ -36,7 +36,7 @@ class LsDyna:
         self.path, self.account = path, Account()
         self._blocks: list[tuple[Block, Entry]] = []
         self._solid: set[str] = set()
-        deck = Deck(path)
+        deck = Deck(path, without=("NODE",))
         for block in deck.blocks():
             entry = self._open(block)
             if block.name.startswith("ELEMENT_SOLID"):
@@ -159,7 +159,9 @@ class LsDyna:
         """The case, in units of ``system``."""
         self._draft = Draft(self.path, system, self.account)
         self._draft.title = self.title
-        self._topology = Topology([body.key for body in self._bodies], partial(read_mesh, self.path))
+        self._topology = Topology(
+            [body.key for body in self._bodies], partial(read_nodes, self.path), partial(read_points, self.path)
+        )
         names = Names()
         for body in self._bodies:
             body.name = names.give(body.title, "part", body.key)
@@ -272,7 +274,7 @@ class LsDyna:
         return Chosen(f"node set {number}", nodes=partial(self._members, found), on=str(number))
 
     def _members(self, found: sets.NodeSet) -> set[int]:
-        parts = (self._topology.mesh.nodes.get(str(part), set()) for part in found.parts)
+        parts = (self._topology.of.get(str(part), set()) for part in found.parts)
         return found.nodes.union(*parts)
 
     def _part(self, number: int) -> Chosen:
@@ -311,5 +313,4 @@ class LsDyna:
         found.entry.take(f"of {entry.keyword}, {entry.place}")
         entry.remark("differs", f"set {number}", "whole surfaces of the parts meet here, not those of the set alone")
         members = self._members(found)
-        mesh = self._topology.mesh
-        return frozenset(key for key in self._topology.bodies if not mesh.nodes[key].isdisjoint(members))
+        return frozenset(key for key in self._topology.bodies if not self._topology.of[key].isdisjoint(members))

@@ -12,7 +12,7 @@ from ..start import Start
 from ..topology import Chosen
 from ..units import ACCELERATION, LENGTH, TIME
 from ..walls import Stop
-from .text import Fields, Option
+from .text import Fields, Option, real
 
 
 @dataclass
@@ -147,20 +147,20 @@ def _wall(scene: Scene, option: Option, entry: Entry) -> None:
     fields.rest()
 
 
+def _values(option: Option) -> list[float]:
+    """Numbers of the engine file, between blanks. Raises CardError."""
+    return [real(line, item, option.shown) for line, text in option.rows for item in text.split()]
+
+
 def _frames(scene: Scene, option: Option, entry: Entry) -> None:
     """``/ANIM/DT`` and ``/H3D/DT``: a start and an interval."""
-    values = [float(item) for _, text in option.rows for item in text.split()]
-    frames = round(scene.end / values[1]) if len(values) > 1 and values[1] > 0.0 and scene.end < float("inf") else 0
-    if not 0 < frames <= 100_000:
-        entry.leave("no number of frames from 1 to 100,000: run.frames is 20")
-        return
-    scene.draft.run["frames"] = frames
-    entry.take("run.frames")
+    values = _values(option)
+    scene.draft.set_frames(0.0, values[1] if len(values) > 1 else 0.0, scene.end, entry)
 
 
 def _step(scene: Scene, option: Option, entry: Entry) -> None:
     """``/DT``: the share of the bound; ``/DT/...`` are limits of elements and nodes."""
-    values = [float(item) for _, text in option.rows for item in text.split()]
+    values = _values(option) if len(option.words) == 1 else []
     if len(option.words) > 1 or not values or not 0.0 < values[0] <= 1.0:
         entry.leave("limits of the step: mass is not scaled here, and tets leave by parts[].erosion alone")
         return

@@ -1,26 +1,32 @@
-"""Which nodes the parts of a Radioss starter have, and where they are: a second reading, when somebody asks."""
+"""Which nodes the parts of a Radioss starter have, and where they are: read again, when somebody asks."""
 
 from pathlib import Path
 
-from ..topology import Mesh, Point
-from .text import Option, Row, cut, numbers, options
+from ..topology import Point
+from .text import Option, Row, cut, numbers, options, real, whole
 from .words import SOLIDS
 
 
-def read_mesh(path: Path) -> Mesh:
-    """Nodes of each part with solids, by its number as text. Raises CardError."""
-    nodes: dict[str, set[int]] = {}
+def read_points(path: Path) -> dict[int, Point]:
+    """Where nodes are, by their numbers. Raises CardError."""
     points: dict[int, Point] = {}
     for option in options(path):
         if option.words[0] == "NODE":
             for row in option.rows:
                 if row[1].strip():
                     number, *place = cut(row, 10, 20, 20, 20)
-                    x, y, z = (float(item or 0.0) for item in place)
-                    points[int(number)] = x, y, z
-        elif option.words[0] in SOLIDS:
+                    x, y, z = (real(row[0], item, "coordinate") if item else 0.0 for item in place)
+                    points[whole(row[0], number, "node")] = x, y, z
+    return points
+
+
+def read_nodes(path: Path) -> dict[str, set[int]]:
+    """Nodes of each part with solids, by its number as text. Raises CardError."""
+    nodes: dict[str, set[int]] = {}
+    for option in options(path):
+        if option.words[0] in SOLIDS:
             nodes.setdefault(str(option.number()), set()).update(_solids(option))
-    return Mesh(nodes, points)
+    return nodes
 
 
 def _solids(option: Option) -> set[int]:

@@ -17,8 +17,8 @@ from ..topology import Chosen, Topology
 from ..units import TIME, System, Weighed, named
 from ..walls import stand
 from . import loads, materials
-from .mesh import read_mesh
-from .text import Fields, Option, cut, numbers, options
+from .mesh import read_nodes, read_points
+from .text import Fields, Option, cut, numbers, options, real
 from .words import LEFT, REFUSED, SOLIDS
 
 
@@ -145,7 +145,9 @@ class Radioss:
         self._draft = draft = Draft(self.path, system, self.account)
         draft.name = draft.name.removesuffix("_0000")
         draft.title = self.title
-        self._topology = Topology([body.key for body in self._bodies], partial(read_mesh, self.path))
+        self._topology = Topology(
+            [body.key for body in self._bodies], partial(read_nodes, self.path), partial(read_points, self.path)
+        )
         names = Names()
         for body in self._bodies:
             body.name = names.give(body.title, "part", body.key)
@@ -188,14 +190,17 @@ class Radioss:
     def _end(self) -> float:
         for option, entry in self._options:
             if option.words[0] == "RUN":
+                row = next((row for row in option.rows if row[1].strip()), None)
                 try:
-                    rows = [row for row in option.rows if row[1].strip()]
-                    end = float(rows[0][1].split()[0])
+                    end = real(row[0], row[1].split()[0], "T_stop") if row is not None else 0.0
+                except CardError as error:
+                    entry.refuse(str(error))
+                    return float("inf")
+                if end > 0.0:
                     self._draft.run["end_time"] = self._draft.quantity(end, TIME)
                     entry.take("run.end_time")
                     return end
-                except (IndexError, ValueError):
-                    entry.refuse("the line below has no time")
+                entry.refuse("the line below has no time above 0")
         self.account.general.append("there is no /RUN in an engine file: run.end_time is not known")
         return float("inf")
 

@@ -66,13 +66,15 @@ def options(path: Path, file: str = "") -> Iterator[Option]:
     yield option
 
 
-def _whole(line: int, item: str, what: str) -> int:
+def whole(line: int, item: str, what: str) -> int:
+    """A whole number. Raises CardError."""
     if not _WHOLE.fullmatch(item):
         raise CardError(f"line {line}: {what} = {shown(item)} is not a whole number (fields have fixed widths)")
     return int(item)
 
 
-def _real(line: int, item: str, what: str) -> float:
+def real(line: int, item: str, what: str) -> float:
+    """A number, also ``1.5-3`` and ``1D5``. Raises CardError."""
     found = _REAL.fullmatch(item)
     if found is None or abs(value := float(f"{found[1]}e{found[2] or found[3] or 0}")) == float("inf"):
         raise CardError(f"line {line}: {what} = {shown(item)} is not a number (fields have fixed widths)")
@@ -116,7 +118,7 @@ class Fields:
         """A number; ``default`` for an empty field. Raises CardError."""
         self._read.add(name)
         line, item = self._found.get(name, (0, ""))
-        return _real(line, item, name) if item else default
+        return real(line, item, name) if item else default
 
     def nonzero(self, name: str, default: float) -> float:
         """A number of which 0 means the default."""
@@ -126,7 +128,7 @@ class Fields:
         """A whole number; 0 for an empty field. Raises CardError."""
         self._read.add(name)
         line, item = self._found.get(name, (0, ""))
-        return _whole(line, item, name) if item else 0
+        return whole(line, item, name) if item else 0
 
     def text(self, name: str) -> str:
         """The text of a field."""
@@ -156,10 +158,10 @@ class Fields:
         for name in names:
             self._read.add(name)
             item = self._found.get(name, (0, ""))[1]
-            if item and not (_REAL.fullmatch(item) and _real(0, item, name) == 0.0):
+            if item and not (_REAL.fullmatch(item) and real(0, item, name) == 0.0):
                 self.entry.remark(kind, f"{name} = {item}", why)
 
 
 def numbers(rows: Sequence[Row], what: str) -> list[int]:
     """Whole numbers of 10 columns, ten in a line. Raises CardError."""
-    return [_whole(row[0], item, what) for row in rows for item in cut(row, *(10,) * 10) if item]
+    return [whole(row[0], item, what) for row in rows for item in cut(row, *(10,) * 10) if item]
