@@ -30,8 +30,8 @@ class Topology:
         nodes: Callable[[], Mapping[str, set[int]]],
         points: Callable[[], Mapping[int, Point]],
     ) -> None:
-        """``bodies``: keys of the parts that become parts of the case; the others read the nodes of each part, and where
-        nodes are in the unit of the deck, when they are asked for.
+        """``bodies``: keys of the parts that become parts of the case. ``nodes`` reads the nodes of each part, and
+        ``points`` where nodes are, in the unit of the deck, when they are asked for.
         """
         self.bodies = list(bodies)
         self._read_nodes, self._read_points = nodes, points
