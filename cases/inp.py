@@ -21,6 +21,8 @@ _WHOLES = re.compile(r"[0-9,\s]*", re.ASCII)
 _D = str.maketrans("dD", "ee")
 _LONGEST = 60
 """Characters of a line that a message shows. Chosen: half a line of a terminal."""
+_LONGEST_LINE = 65_536
+"""Characters of a line that is read. Chosen: Abaqus has 256, programs that write sets in one line some thousand."""
 _UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 _UTF_8 = b"\xef\xbb\xbf"
 
@@ -53,7 +55,7 @@ class Source:
             if start.read(2) in _UTF_16:
                 raise InpError("the file is UTF-16; save it as UTF-8 text")
         with self._name.open(encoding="latin-1", newline=None) as file:
-            self._lines = self._useful(file)
+            self._lines = self._useful(iter(lambda: file.readline(_LONGEST_LINE), ""))
             for number, text in self.data():
                 if text.strip():
                     raise InpError(f"line {number}: data before the first keyword; this is not an .inp file")
@@ -83,6 +85,8 @@ class Source:
     def _useful(self, file: Iterator[str]) -> Iterator[tuple[int, str]]:
         """Lines that are no comments."""
         for number, text in enumerate(file, 1):
+            if len(text) == _LONGEST_LINE:
+                raise InpError(f"line {number}: a line of more than {_LONGEST_LINE} characters; this is no text file")
             if number == 1:
                 text = text.removeprefix(_UTF_8.decode("latin-1"))
             if not text.isascii():

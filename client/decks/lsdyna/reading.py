@@ -13,13 +13,15 @@ from ..draft import Body, Draft, Made
 from ..holds import Holding
 from ..naming import Names
 from ..start import begin
-from ..topology import Chosen, Topology
+from ..topology import Topology
 from ..units import TIME, System, Weighed
 from ..walls import stand
 from . import control, loads, materials, sets
+from .elasticity import Context
 from .fields import Fields, numbers
 from .layouts import LAYOUTS, NUMBERS
 from .mesh import parts_of, read_nodes, read_points
+from .named import Numbered
 from .words import LEFT, REFUSED, reason
 
 _MESH = ("NODE", "ELEMENT_SOLID")
@@ -45,10 +47,7 @@ class LsDyna:
                 self._blocks.append((block, entry))
         for block in deck.followed:
             self._open(block)
-        self._node_sets: dict[int, sets.NodeSet] = {}
-        self._segments: dict[int, sets.NodeSet] = {}
-        self._part_sets: dict[int, tuple[set[int], Entry]] = {}
-        self._curves: dict[int, tuple[sets.Curve, Entry]] = {}
+        self._numbered = Numbered()
         self._materials: dict[int, tuple[str, Fields, str]] = {}
         self._states: dict[int, Fields] = {}
         self._eroding: dict[int, Fields] = {}
@@ -101,7 +100,7 @@ class LsDyna:
             self._set(block, entry)
         elif name == "DEFINE_CURVE":
             number, curve = sets.curve(block, options, entry)
-            self._curves[number] = curve, entry
+            self._numbered.curves[number] = curve, entry
         elif block.name in ("PART", "PART_CONTACT"):
             self._parts(block, entry)
         elif name == "TITLE" or block.name == "TITLE":
@@ -112,14 +111,14 @@ class LsDyna:
         name, options = block.parted(_SETS)
         if name == "SET_NODE":
             found = sets.node_set(block, options, entry)
-            self._node_sets[found.number] = found
+            self._numbered.node_sets[found.number] = found
         elif name == "SET_SEGMENT":
             found = sets.segment_set(block, options, entry)
-            self._segments[found.number] = found
+            self._numbered.segments[found.number] = found
         elif name == "SET_PART" and not options - {"LIST", "TITLE"}:
             cards = sets.titled(block, options)[1]
             number = Fields(block, entry, cards, ("SID",)).whole("SID")
-            self._part_sets[number] = set(numbers(block, cards[1:], "pid")), entry
+            self._numbered.part_sets[number] = set(numbers(block, cards[1:], "pid")), entry
         else:
             entry.refuse(f"*{block.name} is not followed")
 
@@ -166,8 +165,9 @@ class LsDyna:
         for body in self._bodies:
             body.name = names.give(body.title, "part", body.key)
         self._make_materials(system)
-        end = self._end()
-        self._scene = loads.Scene(self._draft, self._nodes, self._part_set, self._part, self._curve, end)
+        end, named = self._end(), self._numbered
+        named.topology = self._topology
+        self._scene = loads.Scene(self._draft, named.nodes, named.part_set, named.part, named.curve, end)
         self._meetings: list[Meeting] = []
         self._ties: list[Tie] = []
         for block, entry in self._blocks:
@@ -183,7 +183,7 @@ class LsDyna:
         return self._draft
 
     def _make_materials(self, system: System) -> None:
-        curves = {number: points for number, (points, _) in self._curves.items()}
+        curves = {number: points for number, (points, _) in self._numbered.curves.items()}
         used = {body.material for body in self._bodies}
         for key in sorted(used):
             number, _, eos = key.partition("/")
@@ -192,14 +192,14 @@ class LsDyna:
                 continue
             name, fields, title = found
             state = self._states.get(int(eos)) if eos else None
-            context = materials.Context(system, state, curves)
+            context = Context(system, state, curves)
             made = Made({})
             try:
                 made = materials.translated(name, fields, context) or made
             except (CardError, ValueError) as error:
                 fields.entry.refuse(str(error))
             if fields.given("LCSS"):
-                self._curves.get(fields.whole("LCSS"), ((), fields.entry))[1].take("materials")
+                self._numbered.curves.get(fields.whole("LCSS"), ((), fields.entry))[1].take("materials")
             materials.erode(self._eroding.get(int(number)) or self._eroding.get(0), made)
             label = title or next(body.title for body in self._bodies if body.material == key)
             self._draft.add_material(key, label, made, fields.entry)
@@ -215,9 +215,9 @@ class LsDyna:
                 return
         base, options = block.parted(control.OPTIONS)
         if base in control.SINGLE | control.DOUBLE:
-            self._meetings.append(control.contact(block, base, options, entry, self._surface))
+            self._meetings.append(control.contact(block, base, options, entry, self._numbered.surface))
         elif base in control.TIED:
-            tied = control.contact(block, base, options, entry, self._surface)
+            tied = control.contact(block, base, options, entry, self._numbered.surface)
             self._ties += [(pair, entry) for pair in sorted(tied.pairs())]
         elif name == "CONTROL_TIMESTEP":
             control.time_step(self._draft, block, entry)
@@ -248,69 +248,7 @@ class LsDyna:
         return float("inf")
 
     def _leave_rest(self) -> None:
-        for number, found in (*self._node_sets.items(), *self._segments.items()):
-            if not found.entry.decided:
-                found.entry.leave(f"set {number} is used by nothing that is taken over")
-        for _, entry in (*self._part_sets.values(), *self._curves.values()):
-            if not entry.decided:
-                entry.leave("used by nothing that is taken over")
+        self._numbered.leave_rest()
         for fields in (*self._eroding.values(), *self._states.values()):
             if not fields.entry.decided:
                 fields.entry.leave("no part that is taken over has it")
-
-    # What keywords name -----------------------------------------------------------------------------------------------
-
-    def _nodes(self, number: int, entry: Entry) -> Chosen:
-        if number == 0:
-            return Chosen("everything", bodies=frozenset(self._topology.bodies))
-        found = self._node_sets.get(number)
-        if found is None:
-            raise ValueError(f"the node set {number} is not defined")
-        if found.odd:
-            raise ValueError(f"the node set {number}: {found.odd}")
-        found.entry.take(f"of {entry.keyword}, {entry.place}")
-        if found.everything:
-            return Chosen(f"node set {number}", bodies=frozenset(self._topology.bodies))
-        return Chosen(f"node set {number}", nodes=partial(self._members, found), on=str(number))
-
-    def _members(self, found: sets.NodeSet) -> set[int]:
-        parts = (self._topology.of.get(str(part), set()) for part in found.parts)
-        return found.nodes.union(*parts)
-
-    def _part(self, number: int) -> Chosen:
-        return Chosen(f"part {number}", bodies=frozenset({str(number)}))
-
-    def _part_set(self, number: int, entry: Entry) -> Chosen:
-        if number not in self._part_sets:
-            raise ValueError(f"the part set {number} is not defined")
-        parts, own = self._part_sets[number]
-        own.take(f"of {entry.keyword}, {entry.place}")
-        return Chosen(f"part set {number}", bodies=frozenset(map(str, parts)))
-
-    def _curve(self, number: int) -> sets.Curve:
-        if number not in self._curves:
-            raise ValueError(f"the curve {number} is not defined")
-        curve, entry = self._curves[number]
-        entry.take("courses")
-        return curve
-
-    def _surface(self, number: int, kind: int, entry: Entry) -> frozenset[str]:
-        every = frozenset(self._topology.bodies)
-        if kind == 5 or (number == 0 and kind in (0, 2, 3)):
-            return every
-        if kind == 2:
-            return (self._part_set(number, entry).bodies or frozenset()) & every
-        if kind == 3:
-            return frozenset({str(number)}) & every
-        if kind in (0, 4):
-            return self._of_nodes(number, kind, entry)
-        raise ValueError(f"a surface of the type {kind} is not followed; 0, 2, 3, 4 and 5 are")
-
-    def _of_nodes(self, number: int, kind: int, entry: Entry) -> frozenset[str]:
-        found = (self._segments if kind == 0 else self._node_sets).get(number)
-        if found is None or found.odd:
-            raise ValueError(f"the set {number}: {found.odd if found else 'it is not defined'}")
-        found.entry.take(f"of {entry.keyword}, {entry.place}")
-        entry.remark("differs", f"set {number}", "whole surfaces of the parts meet here, not those of the set alone")
-        members = self._members(found)
-        return frozenset(key for key in self._topology.bodies if not self._topology.of[key].isdisjoint(members))

@@ -20,6 +20,8 @@ class NodeSet:
     entry: Entry
     nodes: set[int] = field(default_factory=set)
     parts: set[int] = field(default_factory=set)
+    ranges: list[range] = field(default_factory=list)
+    """Numbers from one to another, whether there are such nodes or not."""
     everything: bool = False
     odd: str = ""
     """Why its nodes are not known, if they are not."""
@@ -44,9 +46,9 @@ def node_set(block: Block, options: frozenset[str], entry: Entry) -> NodeSet:
     elif "GENERATE" in options:
         ends = numbers(block, rest, "nid")
         for first, last in zip(ends[::2], ends[1::2], strict=False):
-            if last - first > 10**8:
-                raise block.error(rest[0], f"{last - first} nodes from {first} to {last}; allowed: 100,000,000")
-            found.nodes.update(range(first, last + 1))
+            if last < first:
+                raise block.error(rest[0], f"no numbers lead from {first} to {last}")
+            found.ranges.append(range(first, last + 1))
     elif options - {"TITLE", "LIST", "ADD"}:
         found.odd = f"*{block.name} is not followed"
     else:

@@ -1,0 +1,119 @@
+"""The laws of Johnson and Cook and of Johnson and Holmquist in LS-DYNA (materials 15, 98 and 110)."""
+
+from typing import Any
+
+from ..draft import Made
+from ..laws import shear_of, young_of
+from ..units import DENSITY, RATE, SPECIFIC_HEAT, TEMPERATURE
+from .elasticity import Context, cut_off, elastic, failing, with_eos
+from .fields import Fields
+
+
+def _flow(fields: Fields, context: Context) -> dict[str, Any]:
+    """A, B, n, C and the reference rate, which both laws have."""
+    rate = fields.real("EPSO")
+    if rate <= 0.0:
+        raise ValueError("EPSO, the reference rate, is not above 0")
+    if rate == 1.0 and context.system.time != "s" and fields.real("C"):
+        shown = context.system.quantity(rate, RATE)
+        fields.differ("EPSO", f"taken as it stands: {shown}. Tables of constants mean 1/s: is it that here?")
+    if fields.real("C") and fields.real("VP") == 0.0:
+        fields.differ("VP", "the rate of the whole strain there, with VP = 0; here that of the plastic strain")
+    return {
+        "model": "johnson_cook", "A": context.stress(fields.real("A")), "B": context.stress(fields.real("B")),
+        "n": fields.nonzero("N", 1.0), "C": fields.real("C"), "m": fields.nonzero("M", 1.0),
+        "reference_rate": context.system.quantity(rate, RATE),
+    }  # fmt: skip
+
+
+def simplified(fields: Fields, context: Context) -> Made:
+    """``*MAT_SIMPLIFIED_JOHNSON_COOK``."""
+    for name in ("SIGMAX", "SIGSAT"):
+        if fields.real(name) < 1e20:
+            fields.refuse(name, "the flow stress ends there, not here")
+    law = _flow(fields, context) | {
+        "m": 1.0, "melt_temperature": "2000 K", "specific_heat": "1000 J/kg/K", "taylor_quinney": 0.0,
+    }  # fmt: skip
+    fields.entry.remark(
+        "differs", "no heat", "the law there knows no temperature: no work becomes heat here (taylor_quinney = 0), so "
+        "that melt_temperature and specific_heat have no meaning",
+    )  # fmt: skip
+    return Made({**elastic(fields, context), "strength": law}, failing(fields.real("PSFAIL")))
+
+
+def johnson_cook(fields: Fields, context: Context) -> Made:
+    """``*MAT_JOHNSON_COOK``."""
+    shear = fields.real("G") or shear_of(fields.real("E"), fields.real("PR"))
+    fields.forgive("E PR", "of shells; solids have G and the equation of state")
+    fields.forgive("DTF", "elements leave at a small step there; parts[].erosion.time_step does that here")
+    fields.forgive("IT NUMINT", "how shells are computed")
+    material = with_eos(fields, context, shear)
+    law = _flow(fields, context)
+    heat, room = fields.real("CP"), context.system.quantity(fields.real("TR"), TEMPERATURE)
+    law["reference_temperature"] = room
+    law["melt_temperature"] = context.system.quantity(fields.real("TM"), TEMPERATURE)
+    if heat <= 0.0:
+        raise ValueError("CP, the specific heat, is not above 0")
+    law["specific_heat"] = context.system.quantity(heat, SPECIFIC_HEAT)
+    law["taylor_quinney"] = 1.0
+    fields.entry.remark(
+        "differs", "taylor_quinney = 1", "the deck has no share of the plastic work that becomes heat: all of it does "
+        "there; 0.9 is usual here",
+    )  # fmt: skip
+    _spall(fields, material, context)
+    erosion = _damage(fields, law)
+    return Made({**material, "strength": law}, erosion, temperature=room)
+
+
+def _spall(fields: Fields, material: dict[str, Any], context: Context) -> None:
+    kind = fields.nonzero("SPALL", 2.0)
+    pressure = fields.real("PC")
+    if pressure and kind != 1.0:
+        fields.entry.remark(
+            "refused", f"SPALL = {kind:g}", "matter that spalls is rubble without tension there; here the pressure is "
+            "cut off at PC, as with SPALL = 1",
+        )  # fmt: skip
+    cut_off(fields, material, context, -abs(pressure), "PC")
+
+
+def _damage(fields: Fields, law: dict[str, Any]) -> dict[str, Any]:
+    """``strength.damage``, and the erosion that goes with it; all of D1 to D5 at 0 mean no failure."""
+    values = {f"D{i}": fields.real(f"D{i}") for i in range(1, 6)}
+    stays = fields.real("EROD")
+    if fields.real("EFMIN") > 1e-6:
+        fields.refuse("EFMIN", "least strain of failure, 1e-6 here")
+    if not any(values.values()):
+        return {}
+    law["damage"] = values
+    if stays:
+        fields.refuse("EROD", "what has failed stays without strength there; here it leaves, or keeps its strength")
+        return {}
+    return {"damage": 1.0}
+
+
+def holmquist(fields: Fields, context: Context) -> Made:
+    """``*MAT_JOHNSON_HOLMQUIST_CERAMICS``."""
+    shear, bulk = fields.real("G"), fields.real("K1")
+    young, poisson = young_of(bulk, shear)
+    rate = fields.real("EPSI")
+    if rate <= 0.0 and fields.real("C"):
+        raise ValueError("EPSI, the reference rate, is not above 0")
+    law: dict[str, Any] = {
+        "model": "johnson_holmquist", "hel": context.stress(fields.real("HEL")),
+        "pressure_hel": context.stress(fields.real("PHEL")), "tension": context.stress(abs(fields.real("T"))),
+        "A": fields.real("A"), "N": fields.real("N"), "B": fields.real("B"), "M": fields.real("M"),
+        "C": fields.real("C"), "D1": fields.real("D1"), "D2": fields.real("D2"),
+        "K2": context.stress(fields.real("K2")), "K3": context.stress(fields.real("K3")), "beta": fields.real("BETA"),
+    }  # fmt: skip
+    if rate > 0.0:
+        law["reference_rate"] = context.system.quantity(rate, RATE)
+    if fields.real("T") < 0.0:
+        fields.differ("T", "taken without its sign: it is a tension here")
+    if 0.0 < fields.real("SFMAX") < 1e10:
+        law["largest_fractured"] = fields.real("SFMAX")
+    failure = fields.real("FS")
+    if failure < 0.0:
+        fields.refuse("FS", "elements leave by tension there (p* + T* below 0)")
+    material: dict[str, Any] = {"density": context.system.quantity(fields.real("RO"), DENSITY)}
+    material |= {"elastic": {"young": context.stress(young), "poisson": poisson}, "strength": law}
+    return Made(material, failing(failure))

@@ -1,0 +1,91 @@
+"""What keywords of an LS-DYNA deck name by numbers: node sets, parts, curves, surfaces."""
+
+from functools import partial
+
+from ..account import Entry
+from ..topology import Chosen, Topology
+from . import sets
+
+
+class Numbered:
+    """Sets and curves of a deck by their numbers; who asks for one has its keyword taken over."""
+
+    topology: Topology
+
+    def __init__(self) -> None:
+        """None yet; ``topology`` is set before anybody asks."""
+        self.node_sets: dict[int, sets.NodeSet] = {}
+        self.segments: dict[int, sets.NodeSet] = {}
+        self.part_sets: dict[int, tuple[set[int], Entry]] = {}
+        self.curves: dict[int, tuple[sets.Curve, Entry]] = {}
+
+    def leave_rest(self) -> None:
+        """Those that nobody has asked for."""
+        for number, found in (*self.node_sets.items(), *self.segments.items()):
+            if not found.entry.decided:
+                found.entry.leave(f"set {number} is used by nothing that is taken over")
+        for _, entry in (*self.part_sets.values(), *self.curves.values()):
+            if not entry.decided:
+                entry.leave("used by nothing that is taken over")
+
+    def nodes(self, number: int, entry: Entry) -> Chosen:
+        """The node set of a number; 0 is everything. Raises ValueError."""
+        if number == 0:
+            return Chosen("everything", bodies=frozenset(self.topology.bodies))
+        found = self.node_sets.get(number)
+        if found is None:
+            raise ValueError(f"the node set {number} is not defined")
+        if found.odd:
+            raise ValueError(f"the node set {number}: {found.odd}")
+        found.entry.take(f"of {entry.keyword}, {entry.place}")
+        if found.everything:
+            return Chosen(f"node set {number}", bodies=frozenset(self.topology.bodies))
+        return Chosen(f"node set {number}", nodes=partial(self._members, found), on=str(number))
+
+    def _members(self, found: sets.NodeSet) -> set[int]:
+        every = self.topology.of
+        within = (node for nodes in every.values() for node in nodes if any(node in each for each in found.ranges))
+        parts = (every.get(str(part), set()) for part in found.parts)
+        return found.nodes.union(within if found.ranges else (), *parts)
+
+    def part(self, number: int) -> Chosen:
+        """The part of a number."""
+        return Chosen(f"part {number}", bodies=frozenset({str(number)}))
+
+    def part_set(self, number: int, entry: Entry) -> Chosen:
+        """The part set of a number. Raises ValueError."""
+        if number not in self.part_sets:
+            raise ValueError(f"the part set {number} is not defined")
+        parts, own = self.part_sets[number]
+        own.take(f"of {entry.keyword}, {entry.place}")
+        return Chosen(f"part set {number}", bodies=frozenset(map(str, parts)))
+
+    def curve(self, number: int) -> sets.Curve:
+        """The curve of a number. Raises ValueError."""
+        if number not in self.curves:
+            raise ValueError(f"the curve {number} is not defined")
+        curve, entry = self.curves[number]
+        entry.take("courses")
+        return curve
+
+    def surface(self, number: int, kind: int, entry: Entry) -> frozenset[str]:
+        """The bodies of a surface by its number and type (the manual, *CONTACT, SSTYP). Raises ValueError."""
+        every = frozenset(self.topology.bodies)
+        if kind == 5 or (number == 0 and kind in (0, 2, 3)):
+            return every
+        if kind == 2:
+            return (self.part_set(number, entry).bodies or frozenset()) & every
+        if kind == 3:
+            return frozenset({str(number)}) & every
+        if kind in (0, 4):
+            return self._of_nodes(number, kind, entry)
+        raise ValueError(f"a surface of the type {kind} is not followed; 0, 2, 3, 4 and 5 are")
+
+    def _of_nodes(self, number: int, kind: int, entry: Entry) -> frozenset[str]:
+        found = (self.segments if kind == 0 else self.node_sets).get(number)
+        if found is None or found.odd:
+            raise ValueError(f"the set {number}: {found.odd if found else 'it is not defined'}")
+        found.entry.take(f"of {entry.keyword}, {entry.place}")
+        entry.remark("differs", f"set {number}", "whole surfaces of the parts meet here, not those of the set alone")
+        members = self._members(found)
+        return frozenset(key for key in self.topology.bodies if not self.topology.of[key].isdisjoint(members))
