@@ -8,7 +8,7 @@ import pytest
 from conoid.cases import layout
 from conoid.cases.outcome import from_json
 
-from ..client.taylor_deck import abaqus_text, lsdyna_text
+from ..client.taylor_deck import abaqus_text
 from .launching import command, ended
 
 SIZE, END = 1.6e-3, "6.0E-6"
@@ -41,7 +41,6 @@ axis = "y"
 end_time = "6 us"
 frames = {frames}
 """
-WALL = '[[boundaries]]\nkind = "wall"\npoint = ["0 m", "0 m", "0 m"]\nnormal = [0, 0, 1]\n'
 
 
 def digest(folder: Path, case: Path, ranks: int) -> str:
@@ -54,8 +53,8 @@ def digest(folder: Path, case: Path, ranks: int) -> str:
 
 @pytest.mark.parametrize(
     ("kind", "text", "group", "wall", "frames"),
-    [("k", lsdyna_text(SIZE, END), "1", WALL, 2), ("inp", abaqus_text(SIZE, END), "ROD", "", 20)],
-    ids=["lsdyna", "abaqus"],
+    [("inp", abaqus_text(SIZE, END), "ROD", "", 20)],
+    ids=["abaqus"],
 )
 def test_an_imported_taylor_bar_is_the_one_written_by_hand(
     tmp_path: Path, kind: str, text: str, group: str, wall: str, frames: int
