@@ -13,6 +13,7 @@ from .bodies import Mesh
 from .bonds import Bond
 from .boundaries import Around, Boundary, Gravity, Prescribed, Rotation, Symmetry, Traction, Wall
 from .failure import Erosion, Fracture
+from .joined import bodies, breakable, meeting
 from .materials import Material
 from .measures import Probe, Reference
 from .motion import Spin, Stretch, Turn
@@ -268,7 +269,7 @@ class Case(Model):
     @property
     def fractures(self) -> bool:
         """Whether facets may break."""
-        return any(part.fracture is not None for part in self.parts)
+        return any(breakable(self))
 
     @property
     def dt_growth(self) -> float:
@@ -279,7 +280,7 @@ class Case(Model):
     @property
     def in_contact(self) -> bool:
         """Whether anything of the scene can meet anything."""
-        return self.contact is not None and (len(self.parts) > 1 or bool(self.self_contact))
+        return self.contact is not None and (len(set(bodies(self))) > 1 or any(meeting(self)))
 
     @property
     def self_contact(self) -> tuple[str, ...]:

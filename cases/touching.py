@@ -1,4 +1,4 @@
-"""Bodies whose surfaces coincide at the start, without a gap: two parts are never joined."""
+"""Bodies whose surfaces coincide at the start, without a gap: parts without a bond are not joined."""
 
 import itertools
 import math
@@ -33,15 +33,21 @@ class Touch(msgspec.Struct, kw_only=True, frozen=True):
 
 
 def touching(case: Case) -> list[Touch]:
-    """The pairs of generated bodies that touch; loose tets and mesh files are left out."""
+    """The pairs of generated bodies that touch and have no bond; loose tets and mesh files are left out."""
     bodies = [
         (i, Placed(part.mesh, part.turn))
         for i, part in enumerate(case.parts)
         if not isinstance(part.mesh, MeshFile | Loose)
     ]
-    near = (((i, j), (a, b)) for (i, a), (j, b) in combinations(bodies, 2) if _reach(a, b))
+    near = (((i, j), (a, b)) for (i, a), (j, b) in combinations(bodies, 2) if _reach(a, b) and not bonded(case, i, j))
     found = [Touch(one=i, other=j, area=_common(*sorted(both, key=size))) for (i, j), both in islice(near, _PAIRS)]
     return [each for each in found if each.area > 0.0]
+
+
+def bonded(case: Case, one: int, other: int) -> bool:
+    """Whether two parts, by number, have a bond."""
+    names = {case.parts[one].name, case.parts[other].name}
+    return any(set(bond.parts) == names for bond in case.bond)
 
 
 def apart(case: Case, touches: Iterable[Touch]) -> Iterator[Problem]:
@@ -52,7 +58,7 @@ def apart(case: Case, touches: Iterable[Touch]) -> Iterator[Problem]:
             continue
         message = (
             f"{names[0]!r} and {names[1]!r} touch over about {1e6 * touch.area:.3g} mm^2 and do not meet in contact: "
-            "they are not joined, and pass through each other"
+            "they are not joined, and pass through each other; a [[bond]] joins parts"
         )
         yield problem(("parts", touch.other, "mesh"), ..., message)
 

@@ -83,8 +83,9 @@ def files_table(case: Case, survey: Survey) -> Table:
 
 
 def touching_table(case: Case, touches: Sequence[Touch]) -> Table:
-    """Which parts touch at the start; none of them are joined."""
-    made = table("parts that touch, not joined", "area", right=("area",), wide=("parts that touch, not joined",))
+    """Which parts touch at the start and have no bond: none of them are joined."""
+    title = "parts that touch, not joined (a [[bond]] joins them)"
+    made = table(title, "area", right=("area",), wide=(title,))
     for touch in touches:
         names = " and ".join(case.parts[i].name for i in (touch.one, touch.other))
         made.add_row(names, _about(touch.area, lambda value: si(value, "m^2")))

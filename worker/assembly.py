@@ -15,17 +15,18 @@ from conoid.cases.survey import Survey
 
 from . import selection, surface_pressure
 from .contact import overlap, pairing
-from .errors import InputError, MeshError
+from .errors import InputError
 from .facts import Facts
 from .hashing import uniform
 from .mesh.build import build as build_mesh
 from .mesh.faces import FACES, across, normals
 from .mesh.model import TetMesh
-from .mesh.sharing import Placed, shared_nodes
-from .pieces import UNSEEN, pieces
-from .selection import Nearness, Selected
-from .setting import turned, velocities
-from .state import Flags, Floats, Indices, Ints, Load, LoadedFaces
+from .pieces import UNSEEN
+from .selection import Members, Nearness, Selected
+from .setting import velocities
+from .shares import Shares, ranks, shared
+from .stacking import Stacked, stacked
+from .state import Floats, Indices, Ints, Load, LoadedFaces
 
 log = logging.getLogger("conoid.worker")
 
@@ -46,6 +47,8 @@ class Whole:
     volumes: Floats
     across: Indices
     """(tets, 4) see state.Block."""
+    shares: Shares
+    """Of the nodes of several parts."""
     node_volume: Floats
     mass: Floats
     velocity: Floats
@@ -65,7 +68,8 @@ def quiet(what: str) -> None:
 def assemble(case: schema.Case, folder: Path, say: Say = quiet) -> Whole:
     """Builds the meshes of all parts; ``folder`` is where relative mesh paths start. Raises MeshError, InputError."""
     for index, bond in enumerate(case.bond):
-        raise InputError(f"bond[{index}].kind = {bond.kind!r}: this version reads such bonds and cannot run them")
+        if bond.kind == "tied" or bond.breaks:
+            raise InputError(f"bond[{index}]: this version reads tied bonds and those that break and cannot run them")
     facts = Facts(case)
     whole = assembled(case, _built(case, folder, say, facts))
     whole.survey = facts.survey()
@@ -95,60 +99,55 @@ def assembled(case: schema.Case, meshes: Iterable[tuple[int, TetMesh]], overlaps
     boundaries select is found for those whose parts are all there. Bodies that overlap are looked for only where
     ``overlaps`` is set. Raises MeshError, InputError.
     """
-    points, tets, node_part, tet_part, warnings = [], [], [], [], list[str]()
-    bodies, part_of_body, placed = [], list[int](), list[Placed]()
-    density = np.array([find_material(case, part.material).density for part in case.parts])
-    offset = 0
-    for index, mesh in meshes:
-        piece, told = pieces(case, index, mesh, overlaps)
-        warnings += told
-        bodies.append(piece + len(part_of_body))
-        part_of_body += [index] * (int(piece.max(initial=0)) + 1)
-        points.append(turned(mesh.points, case.parts[index].turn))
-        if mesh.origin is not None:
-            placed.append((index, mesh.origin, points[-1]))
-        tets.append(mesh.tets.astype(np.int64) + offset)
-        node_part.append(np.full(len(mesh.points), index, np.int32))
-        tet_part.append(np.full(len(mesh.tets), index, np.int32))
-        offset += len(mesh.points)
-    for refusal in shared_nodes(case, placed):
-        raise MeshError(refusal)
-    x, t = np.concatenate(points), np.concatenate(tets).astype(np.int32)
-    part_of_tet = np.concatenate(tet_part)
-    volumes = _volumes(x, t)
-    part_of_node = np.concatenate(node_part)
-    behind = across(t) if case.in_contact or case.fractures else np.zeros((0, 4), np.int32)
+    made = stacked(case, meshes, overlaps)
+    x, t, part_of_tet, warnings = made.points, made.tets, made.tet_part, made.warnings
     if case.in_contact and not overlaps:
         warnings.append(f"contact: {UNSEEN}")
     elif case.in_contact:
-        x = _apart(case, x, t, np.concatenate(bodies), np.array(part_of_body), behind < 0)
-        volumes = _volumes(x, t)
-    near = selection.nearness(case, x, part_of_node, t, part_of_tet)
-    known = selection.settled(case, part_of_body)
-    loads, found, told = _loads(case, x, part_of_node, t, near, known)
-    driven, more = _driven(case, x, part_of_node, near, known)
+        x = _apart(case, made)
+    volumes = _volumes(x, t)
+    masses = volumes * np.array([find_material(case, part.material).density for part in case.parts])[part_of_tet]
+    shares = _shares(case, made, masses)
+    part_of_node = made.node_part
+    part_of_node[shares.standing()[0]] = shares.standing()[1]
+    members = shares.members(part_of_node)
+    near = selection.nearness(case, x, members, t, part_of_tet)
+    known = selection.settled(case, made.part_of_body)
+    loads, found, told = _loads(case, x, members, (t, part_of_tet), near, known)
+    driven, more = _driven(case, x, members, near, known)
+    velocity, mixed = _velocities(case, x, part_of_node, shares)
     return Whole(
         points=x, node_part=part_of_node, tets=t, tet_part=part_of_tet, volumes=volumes,
-        across=behind,
-        node_volume=_quarters(t, volumes, len(x)), mass=_quarters(t, volumes * density[part_of_tet], len(x)),
-        velocity=_velocities(case, x, part_of_node), loads=loads, near=near,
+        across=made.across if case.in_contact or case.fractures else made.across[:0], shares=shares,
+        node_volume=_quarters(t, volumes, len(x)), mass=_quarters(t, masses, len(x)),
+        velocity=velocity, loads=loads, near=near,
         warnings=[
-            *warnings, *told, *more, *selection.off_planes(case, x, part_of_node, near, known),
-            *selection.compared(case, [*found, *driven]),
+            *warnings, *told, *more, *selection.off_planes(case, x, members, near, known),
+            *selection.compared(case, [*found, *driven]), *mixed,
         ],
         survey=Survey(),
     )  # fmt: skip
 
 
-def _apart(case: schema.Case, x: Floats, tets: Indices, body: Indices, part: Ints, exposed: Flags) -> Floats:
-    """The points, when no body overlaps another; moved apart where the case asks for that. Raises InputError.
+def _shares(case: schema.Case, made: Stacked, masses: Floats) -> Shares:
+    """What of nodes of several parts is of which, by the ``masses`` (tets,) of the tets, kg."""
+    rank = ranks(case)
+    if not len(rank):
+        return Shares()
+    corners, of = made.tets.reshape(-1), np.repeat(made.tet_part, 4)
+    met = np.zeros(len(made.points), bool)
+    met[corners[of != made.node_part[corners]]] = True
+    some = met[corners]
+    return shared(corners[some], of[some], np.repeat(masses / 4.0, 4)[some], rank)
 
-    ``body``: (nodes,), ``part``: (bodies,). A part is one body but for one that is several pieces and meets itself.
-    """
+
+def _apart(case: schema.Case, made: Stacked) -> Floats:
+    """The points, when no body overlaps another; moved apart where the case asks for that. Raises InputError."""
     assert case.contact is not None
+    x, tets, body, part, exposed = made.points, made.tets, made.body, made.part_of_body, made.across < 0
     tet, face = np.nonzero(exposed)
     faces = tets[tet[:, None], FACES[face]]
-    allowed = ~np.isnan(pairing.friction(case))[part[:, None], part]
+    allowed = made.any_of_body(~np.isnan(pairing.friction(case))[part[:, None], part])
     surface = overlap.Surface(faces, body[faces[:, 0]], exposed)
     before, out_of = x, np.full(len(x), -1, np.int32)
     if case.contact.overlap == "push":
@@ -206,26 +205,49 @@ def _volumes(x: Floats, tets: Indices) -> Floats:
     return volumes
 
 
-def _velocities(case: schema.Case, x: Floats, part: Indices) -> Floats:
+def _velocities(case: schema.Case, x: Floats, part: Indices, shares: Shares) -> tuple[Floats, list[str]]:
+    """Of the nodes (n, 3), whose ``part`` is that which they stand for; and a warning where the parts of one node start
+    in two ways: it has the mean of them, by mass.
+    """
     v = np.zeros_like(x)
     for index, spec in enumerate(case.parts):
         chosen = part == index
         v[chosen] = velocities(spec, x[chosen])
+    told = _mean_velocities(case, v, x, shares)
+    for index, spec in enumerate(case.parts):
         if spec.jitter > 0.0:
+            chosen = part == index
             places = 3 * np.flatnonzero(chosen)[:, None] + np.arange(3)
             v[chosen] += spec.jitter * (2.0 * uniform(places, _JITTER) - 1.0)
-    return v
+    return v, told
+
+
+def _mean_velocities(case: schema.Case, v: Floats, x: Floats, shares: Shares) -> list[str]:
+    """Sets those of nodes whose parts start in several ways; a warning where there are any."""
+    own = np.zeros((len(shares.node), 3))
+    for index, spec in enumerate(case.parts):
+        chosen = shares.part == index
+        own[chosen] = velocities(spec, x[shares.node[chosen]])
+    odd = np.isin(shares.node, shares.node[(own != v[shares.node]).any(axis=1)])
+    if not odd.any():
+        return []
+    nodes, weight = np.unique(shares.node[odd]), shares.fraction[odd, None]
+    v[nodes] = 0.0
+    np.add.at(v, shares.node[odd], weight * own[odd])
+    names = " and ".join(repr(case.parts[i].name) for i in np.unique(shares.part[odd]))
+    return [f"bond: {len(nodes)} nodes of {names} would start at two velocities, and start at their mean by mass"]
 
 
 def _loads(
-    case: schema.Case, x: Floats, part: Indices, tets: Indices, near: Nearness, known: list[bool]
+    case: schema.Case, x: Floats, members: Members, of_tets: tuple[Indices, Indices], near: Nearness, known: list[bool]
 ) -> tuple[list[Load | LoadedFaces], list[Selected], list[str]]:
     """The tractions of the case: a third of the force on each face for each of its nodes, in the order of the tets, or
-    the faces that a pressure follows; what they act on, and warnings. Those that are not ``known`` act on nothing.
-    Raises InputError for another one that acts on no face.
+    the faces that a pressure follows; what they act on, and warnings; ``of_tets``: (m, 4), and their parts (m,). Those
+    that are not ``known`` act on nothing. Raises InputError for another one that acts on no face.
     """
     tractions = case.boundaries_of(schema.Traction)
     loads, found, told = list[Load | LoadedFaces](), list[Selected](), list[str]()
+    tets, tet_part = of_tets
     tet, face = np.nonzero(across(tets) < 0) if tractions else (np.zeros(0, np.int64), np.zeros(0, np.int64))
     faces = tets[tet[:, None], FACES[face]]
     for index, spec in tractions:
@@ -233,13 +255,14 @@ def _loads(
             none = np.zeros(0, np.int64)
             loads.append(_load(spec, none, np.zeros((0, 3), np.int64), np.zeros((0, 3))))
             continue
-        selected, chosen = selection.counted(case, index, x, part, faces, near)
+        selected, chosen = selection.counted(case, index, x, members, (faces, tet_part[tet]), near)
         loaded = faces[chosen]
         if not len(loaded):
             where = "its box and its parts" if spec.cylinder is None else "its cylinder, its box and its parts"
             raise InputError(f"boundaries[{index}]: acts on no face; check {where}")
         found.append(selected)
-        told += selection.missed(case, index, x, part, near, np.isin(np.arange(len(case.parts)), part[loaded[:, 0]]))
+        took = np.isin(np.arange(len(case.parts)), tet_part[tet[chosen]])
+        told += selection.missed(case, index, x, members, near, took)
         loads.append(_load(spec, tet[chosen].astype(np.int64), loaded.astype(np.int64), 0.5 * normals(x, loaded)))
     return loads, found, told
 
@@ -257,13 +280,14 @@ def _load(spec: schema.Traction, tets: Ints, faces: Ints, outward: Floats) -> Lo
 
 
 def _driven(
-    case: schema.Case, x: Floats, part: Indices, near: Nearness, known: list[bool]
+    case: schema.Case, x: Floats, members: Members, near: Nearness, known: list[bool]
 ) -> tuple[list[Selected], list[str]]:
     """What the boxes of prescribed velocities that are ``known`` hold, and warnings."""
     found, told = list[Selected](), list[str]()
     for index in (index for index, _ in case.boundaries_of(schema.Prescribed) if known[index]):
-        selected, held = selection.counted(case, index, x, part, np.zeros((0, 3), np.int32), near)
+        selected, held = selection.counted(case, index, x, members, selection.NO_FACES, near)
         found.append(selected)
         if held.any():
-            told += selection.missed(case, index, x, part, near, np.isin(np.arange(len(case.parts)), part[held]))
+            took = np.isin(np.arange(len(case.parts)), members[1][held[members[0]]])
+            told += selection.missed(case, index, x, members, near, took)
     return found, told

@@ -121,17 +121,18 @@ def _stopped(
 
 def _held_by(spec: schema.Boundary, model: Model) -> Flags:
     """(n,) the nodes that a boundary acts on."""
-    nodes, chosen = model.nodes, _of_parts(spec, model)
+    nodes = model.nodes
+    if isinstance(spec, schema.Prescribed):
+        return selection.held(spec, model.parts, nodes.x0, nodes.of_parts(), model.slack)
+    chosen = _of_parts(spec, model)
     if isinstance(spec, schema.Symmetry):
         chosen &= heights(spec, model) == 0.0
-    elif isinstance(spec, schema.Prescribed):
-        chosen &= selection.inside(spec, nodes.x0, nodes.part, model.slack)
     return chosen
 
 
 def _of_parts(spec: schema.Boundary, model: Model) -> Flags:
     """(n,) the nodes of the parts that a boundary names."""
-    return np.asarray(selection.named(spec, model.parts)[model.nodes.part])
+    return model.nodes.among(selection.named(spec, model.parts))
 
 
 def heights(spec: schema.Symmetry, model: Model) -> Floats:
@@ -150,8 +151,9 @@ def part_sides(spec: schema.Symmetry, model: Model, comm: Comm) -> Floats:
     nodes on both sides. All ranks take part.
     """
     side, found = sides(spec, model), np.zeros((2, len(model.parts)))
+    nodes, part = model.nodes.of_parts()
     for way, sign in enumerate((1.0, -1.0)):
-        found[way, model.nodes.part[side == sign]] = 1.0
+        found[way, part[side[nodes] == sign]] = 1.0
     above, below = comm.maximum(found.ravel()).reshape(found.shape)
     return np.asarray(above - below)
 
@@ -179,8 +181,8 @@ def _refuse_overlaps(case: schema.Case, model: Model, boundaries: list[Boundary]
 def _refuse_crossings(case: schema.Case, model: Model, comm: Comm) -> None:
     """A tet through a symmetry plane would lie in its own mirror image."""
     for index, spec in case.boundaries_of(schema.Symmetry):
-        height, beyond = np.where(_of_parts(spec, model), heights(spec, model), 0.0), np.zeros(len(model.parts))
-        for block in model.blocks:
+        named, height, beyond = selection.named(spec, model.parts), heights(spec, model), np.zeros(len(model.parts))
+        for block in (block for block in model.blocks if named[block.part]):
             of = height[block.tets]
             beyond[block.part] = np.minimum(of.max(axis=1), -of.min(axis=1)).max(initial=beyond[block.part])
         beyond = comm.maximum(beyond)

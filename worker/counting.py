@@ -4,11 +4,13 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from conoid.cases.joined import bodies
 from conoid.cases.loaded import Load
 from conoid.cases.schema import Case, Prescribed, Traction
 
 from . import selection
-from .mesh.faces import boundary_faces
+from .mesh.faces import FACES, across
+from .mesh.joining import Placed, joined
 from .mesh.model import TetMesh
 from .setting import turned
 
@@ -17,22 +19,33 @@ Meshes = Mapping[int, TetMesh]
 
 
 def loads(case: Case, meshes: Meshes) -> Iterator[Load]:
-    """Of each boundary that is for parts with these meshes and for no others, as the run will count it."""
+    """Of each boundary that is for parts with these meshes and for no others, as the run will count it. Raises
+    InputError for bonds without nodes in common.
+    """
+    names, body = [part.name for part in case.parts], bodies(case)
     for number, spec in enumerate(case.boundaries):
         if isinstance(spec, Traction | Prescribed):
-            chosen = np.flatnonzero(selection.named(spec, [part.name for part in case.parts])).tolist()
+            chosen = np.flatnonzero(selection.named(spec, names)).tolist()
             if chosen and all(index in meshes for index in chosen):
-                yield _load(case, number, {index: meshes[index] for index in chosen})
+                with_them = {body[index] for index in chosen}
+                yield _load(case, number, {i: mesh for i, mesh in meshes.items() if body[i] in with_them})
 
 
 def _load(case: Case, number: int, meshes: Meshes) -> Load:
-    points = [turned(mesh.points, case.parts[index].turn) for index, mesh in meshes.items()]
-    tets = [mesh.tets for mesh in meshes.values()]
-    starts = np.cumsum([0, *map(len, points)])
-    x, t = np.concatenate(points), np.concatenate([each + first for each, first in zip(tets, starts, strict=False)])
-    part = np.repeat(np.array(list(meshes), np.int32), np.diff(starts))
-    near = selection.nearness(case, x, part, t, part[t[:, 0]])
-    found, _ = selection.counted(case, number, x, part, boundary_faces(t), near)
+    placed, n = dict[int, Placed](), 0
+    for index, mesh in meshes.items():
+        placed[index] = n, mesh.origin, turned(mesh.points, case.parts[index].turn)
+        n += len(mesh.points)
+    stands = joined(case, placed, n)
+    x = np.concatenate([points for _, _, points in placed.values()])
+    t = stands[np.concatenate([mesh.tets + placed[index][0] for index, mesh in meshes.items()])]
+    of = np.repeat(np.array(list(meshes), np.int32), [len(mesh.tets) for mesh in meshes.values()])
+    members = np.unique(np.column_stack([t.reshape(-1), np.repeat(of, 4)]), axis=0).T
+    near = selection.nearness(case, x, (members[0], members[1]), t, of)
+    tet, face = np.nonzero(across(t) < 0)
+    found, _ = selection.counted(
+        case, number, x, (members[0], members[1]), (t[tet[:, None], FACES[face]], of[tet]), near
+    )
     if isinstance(case.boundaries[number], Traction):
         return Load(number, area=found.area, faces=found.faces, exact=True)
     return Load(number, nodes=found.nodes, exact=True)

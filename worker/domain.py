@@ -25,6 +25,7 @@ from .materials import models
 from .parallel.comm import Comm, SerialComm
 from .parallel.decompose import bisect
 from .parallel.ownership import Neighbour
+from .shares import Shares
 from .state import (
     CHUNK,
     MASS,
@@ -57,6 +58,8 @@ class Piece:
     velocity: Floats
     mass: Floats
     node_volume: Floats
+    shares: Shares
+    """Of the nodes of several parts."""
     loads: list[Load | LoadedFaces]
     """Of the tractions of the case, on all nodes that this rank holds; of those that follow the surface the faces of
     its tets."""
@@ -143,7 +146,7 @@ def _piece(
     tets = whole.tets[ids]
     return Piece(
         nodes.astype(np.int64), whole.node_part[nodes], home[nodes], home[nodes] == rank, whole.points[nodes],
-        whole.velocity[nodes], whole.mass[nodes], whole.node_volume[nodes],
+        whole.velocity[nodes], whole.mass[nodes], whole.node_volume[nodes], whole.shares.of_nodes(local),
         [load.here(nodes, ids) for load in whole.loads],
         ids.astype(np.int64),
         whole.tet_part[ids], local[tets], whole.volumes[ids],
@@ -195,7 +198,7 @@ def _model(case: schema.Case, piece: Piece) -> Model:
         id=piece.node_ids, part=piece.node_part, owner=piece.node_owner, owned=piece.owned, x0=piece.points.copy(),
         x=piece.points, v=piece.velocity, mass=piece.mass, force=np.zeros(piece.points.shape, np.int64),
         stepping=np.zeros(len(piece.mass)),
-        group=piece.node_group,
+        group=piece.node_group, shares=piece.shares,
     )  # fmt: skip
     blocks = [_block(case, piece, index) for index in range(len(case.parts)) if (piece.tet_part == index).any()]
     return Model(

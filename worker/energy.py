@@ -33,7 +33,7 @@ from .parallel.comm import Comm
 from .parallel.fixed_point import Columns, Grouped, Table, Tally, exact_sums, totals_and_words
 from .parallel.passes import Pass
 from .parallel.team import TASK, Team
-from .state import WORKS, Floats, Model
+from .state import WORKS, Floats, Indices, Model, Nodes
 
 _NODAL = 10
 """Sums over the nodes (``_of_nodes``), before those of the tets."""
@@ -182,7 +182,7 @@ class Ledger:
             nodes.mass, *self._boundary_work(), nodes.owned,
         )  # fmt: skip
         tables: list[Columns] = [
-            Grouped(columns.T, nodes.part, parts), ElementWork(self._model.blocks, parts), *self._rubbed(parts)
+            Grouped(*_by_part(columns, nodes), parts), ElementWork(self._model.blocks, parts), *self._rubbed(parts)
         ]  # fmt: skip
         rubbed = len(tables) - 2
         if self._cohesion is not None:
@@ -239,6 +239,18 @@ class Ledger:
         if contact is not None:
             external += contact.books.external_work
         return loss, external
+
+
+def _by_part(columns: Floats, nodes: Nodes) -> tuple[Floats, Indices]:
+    """(n, k) rows of ``columns`` (k, nodes), and their parts (n,): a node of several parts has a row for each, by its
+    mass.
+    """
+    shares = nodes.shares
+    if not len(shares.node):
+        return columns.T, nodes.part
+    more = columns[:, shares.node] * shares.fraction
+    columns[:, shares.node] = 0.0
+    return np.concatenate([columns, more], axis=1).T, np.concatenate([nodes.part, shares.part])
 
 
 def _named(parts: list[str], kinetic: Floats, internal: Floats) -> dict[str, PartEnergy]:

@@ -67,7 +67,7 @@ def passed_by(model: Model, name: str, along: str, comm: Comm) -> tuple[Floats, 
     The part comes from below: else the axis is turned round. All ranks take part, all get the same rows.
     """
     nodes, axis = model.nodes, "xyz".index(along)
-    mine = nodes.part == model.parts.index(name)
+    mine = nodes.in_part(model.parts.index(name))
     radius = _maximum(comm, np.hypot(*np.delete(nodes.x0[mine], axis, axis=1).T))
     others = [block for block in model.blocks if model.parts[block.part] != name]
     rows = [passed(nodes.x, b.tets, np.full(b.n, b.part), axis, radius) for b in others]

@@ -93,10 +93,8 @@ def _size(sim: Simulation, spec: Reference) -> float:
 
 def _mean_speed(sim: Simulation, spec: Reference) -> float:
     nodes = sim.model.nodes
-    chosen = nodes.owned if spec.part is None else nodes.owned & (nodes.part == sim.model.parts.index(spec.part))
-    if sim.erosion is not None:
-        chosen = chosen & ~sim.erosion.removed
-    mass = nodes.mass[chosen]
+    chosen = nodes.owned if sim.erosion is None else nodes.owned & ~sim.erosion.removed
+    mass = (nodes.mass if spec.part is None else nodes.mass_of(sim.model.parts.index(spec.part)))[chosen]
     momentum, total = exact_sums(sim.comm, np.column_stack([mass * nodes.v[chosen, _AXES[spec.axis or "z"]], mass]))
     return float(momentum / total) if total > 0.0 else float("nan")
 

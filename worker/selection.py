@@ -10,7 +10,7 @@ from conoid.cases import loaded, region, schema
 from conoid.cases.region import Region
 
 from .mesh.faces import normals
-from .state import Flags, Floats, Indices
+from .state import Flags, Floats, Indices, Ints
 
 log = logging.getLogger("conoid.worker")
 
@@ -20,6 +20,8 @@ next layer of a regular mesh is twice as far."""
 _LAYER, _FEWEST = 0.5, 4
 """Of these nodes, how many nearer than region.MOST are a layer, and their least number. Chosen: a fifth of them is that
 near where they lie at random."""
+Members = tuple[Ints, Indices]
+"""(m,) nodes and (m,) their parts: a row for each part of each node (state.Nodes.of_parts)."""
 _EDGES = ((0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3))
 """Of a tet."""
 
@@ -36,14 +38,15 @@ class Nearness:
     """(parts,) for planes of symmetry."""
 
 
-def nearness(case: schema.Case, x: Floats, part: Indices, tets: Indices, tet_part: Indices) -> Nearness:
+def nearness(case: schema.Case, x: Floats, members: Members, tets: Indices, tet_part: Indices) -> Nearness:
     """Of the parts of a case, from all their nodes (n, 3), tets (m, 4), and the parts of both."""
+    nodes, part = members
     n = len(case.parts)
     squared, reach = np.full(n, np.inf), np.zeros(n)
     for i, j in _EDGES:
         along = x[tets[:, i]] - x[tets[:, j]]
         np.minimum.at(squared, tet_part, (along * along).sum(axis=1))
-    np.maximum.at(reach, part, np.abs(x).max(axis=1))
+    np.maximum.at(reach, part, np.abs(x).max(axis=1)[nodes])
     edge = np.sqrt(squared)
     found = [(each.mesh, float(a), float(b)) for each, a, b in zip(case.parts, edge, reach, strict=True)]
     return Nearness(
@@ -65,6 +68,19 @@ def settled(case: schema.Case, there: Container[int]) -> list[bool]:
 def inside(spec: schema.Prescribed | schema.Traction, x: Floats, part: Indices, near: Floats) -> Flags:
     """(n,) the nodes (n, 3) of any part that lie in the region of a boundary; ``near``: (parts,) slack, m."""
     return np.asarray(np.full(len(x), True) & Region.of(spec).holds(x.T, near[part]))
+
+
+def held(
+    spec: schema.Prescribed | schema.Traction, names: Sequence[str], x: Floats, members: Members, near: Floats
+) -> Flags:  # fmt: skip
+    """(n,) the nodes (n, 3) of the parts of a boundary that lie in its region; ``names`` of the parts, and ``near``
+    (parts,): slack, m.
+    """
+    nodes, part = members
+    some = named(spec, names)[part] & inside(spec, x[nodes], part, near)
+    found = np.zeros(len(x), bool)
+    found[nodes[some]] = True
+    return found
 
 
 @dataclass(frozen=True)
@@ -97,7 +113,9 @@ def _words(found: Selected) -> str:
     return f"drives {found.nodes} nodes"
 
 
-def missed(case: schema.Case, number: int, x: Floats, part: Indices, near: Nearness, took: Flags) -> Iterator[str]:
+def missed(
+    case: schema.Case, number: int, x: Floats, members: Members, near: Nearness, took: Flags
+) -> Iterator[str]:  # fmt: skip
     """Warnings for the region of a boundary that took something of the parts ``took`` (parts,): parts that it names and
     took nothing of, and layers of nodes that lie so little outside of it that they were hardly meant to.
     """
@@ -106,12 +124,13 @@ def missed(case: schema.Case, number: int, x: Floats, part: Indices, near: Nearn
     for name, some in zip([each.name for each in case.parts], took, strict=True):
         if name in spec.parts and not some:
             yield f"boundaries[{number}]: acts on nothing of part {name!r}, which it names"
+    nodes, part = members
     chosen = np.flatnonzero(named(spec, [each.name for each in case.parts])[part])
-    at, of = x[chosen], part[chosen]
-    held, close, wide = (
+    at, of = x[nodes[chosen]], part[chosen]
+    took_up, close, wide = (
         inside(spec, at, of, within) for within in (near.slack, region.MOST * near.edge, _CLOSE * near.edge)
     )
-    fringe, around = int((close & ~held).sum()), int((wide & ~held).sum())
+    fringe, around = int((close & ~took_up).sum()), int((wide & ~took_up).sum())
     if fringe >= _FEWEST and fringe > _LAYER * around:
         yield (
             f"boundaries[{number}]: {fringe} nodes lie outside of its region by less than a tenth of an edge and are "
@@ -120,33 +139,37 @@ def missed(case: schema.Case, number: int, x: Floats, part: Indices, near: Nearn
 
 
 def counted(
-    case: schema.Case, number: int, x: Floats, part: Indices, faces: Indices, near: Nearness
+    case: schema.Case, number: int, x: Floats, members: Members, faces: tuple[Indices, Indices], near: Nearness
 ) -> tuple[Selected, Flags]:
-    """What boundary ``number`` selects of nodes (n, 3) and of exposed faces (m, 3); which nodes of a velocity, or faces
-    of a traction, that are.
+    """What boundary ``number`` selects of nodes (n, 3), and of exposed ``faces``, (m, 3) and their parts (m,); which
+    nodes of a velocity, or faces of a traction, that are.
     """
-    spec = case.boundaries[number]
+    spec, names = case.boundaries[number], [each.name for each in case.parts]
     assert isinstance(spec, schema.Prescribed | schema.Traction)
-    held = named(spec, [each.name for each in case.parts])[part] & inside(spec, x, part, near.slack)
-    nodes = int(held.sum())
+    found = held(spec, names, x, members, near.slack)
+    nodes, (corners, of) = int(found.sum()), faces
     if isinstance(spec, schema.Prescribed):
-        return Selected(number, nodes), held
-    chosen: Flags = np.asarray(held[faces].all(axis=1))
-    area = float(0.5 * np.linalg.norm(normals(x, faces[chosen]), axis=1).sum())
+        return Selected(number, nodes), found
+    chosen: Flags = np.asarray(found[corners].all(axis=1) & named(spec, names)[of])
+    area = float(0.5 * np.linalg.norm(normals(x, corners[chosen]), axis=1).sum())
     return Selected(number, nodes, int(chosen.sum()), area), chosen
 
 
+NO_FACES = np.zeros((0, 3), np.int32), np.zeros(0, np.int32)
+"""For ``counted``."""
+
+
 def off_planes(
-    case: schema.Case, x: Floats, part: Indices, near: Nearness, known: Sequence[bool]
+    case: schema.Case, x: Floats, members: Members, near: Nearness, known: Sequence[bool]
 ) -> Iterator[str]:  # fmt: skip
     """A warning for each plane of symmetry that is ``known`` off which nodes lie so little that they were hardly meant
     to.
     """
-    names = [each.name for each in case.parts]
+    names, (nodes, part) = [each.name for each in case.parts], members
     for number, plane in case.boundaries_of(schema.Symmetry):
         if not known[number]:
             continue
-        away = np.abs(x[:, "xyz".index(plane.axis)] - plane.at)
+        away = np.abs(x[nodes, "xyz".index(plane.axis)] - plane.at)
         off = named(plane, names)[part] & (away > near.rounding[part]) & (away <= near.slack[part])
         if off.sum() >= _FEWEST:
             yield (

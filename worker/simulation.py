@@ -15,6 +15,7 @@ from .boundaries import Acts, Boundary
 from .clock import Clock
 from .contact.stage import Contact
 from .crushing import Crushing
+from .elements.averages import Averages, volumes
 from .elements.averaging import AveragedElements
 from .elements.forms import Elements
 from .elements.matter import whose
@@ -282,8 +283,10 @@ def _elements(
     params = np.array([parameters(each, None) for each in materials])
     kinds = np.array([whose(eos_of(each), own) for each, own in zip(materials, params, strict=True)])
     more = any(equation_of(each).averaged for each in materials)
+    averages, density = Averages.of(case, model, neighbours), [each.density for each in materials]
+    weight = 1.0 / volumes(averages, model.nodes, node_volume, density)
     return AveragedElements(
-        model, comm, neighbours, timers, threads, 1.0 / node_volume, params, kinds, scene, form == "split", more
+        model, comm, neighbours, timers, threads, averages, weight, params, kinds, scene, form == "split", more
     )  # fmt: skip
 
 

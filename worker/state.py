@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from . import ids as ids_of
 from .growing import Rooms
+from .shares import Shares
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -109,7 +110,7 @@ class Nodes:
     id: Ints
     """(n,) global ids."""
     part: Indices
-    """(n,) index of the part."""
+    """(n,) index of the part; of a node of several parts (``shares``) the one that it stands for."""
     owner: Indices
     """(n,) rank that counts the node."""
     owned: npt.NDArray[np.bool_]
@@ -130,6 +131,8 @@ class Nodes:
     """Quanta per newton of ``force`` as it stands."""
     group: Indices = field(default_factory=lambda: np.zeros(0, np.int32))
     """(n,) see Model.groups; copies stay in that of their parents. (0,) where nobody asks."""
+    shares: Shares = field(default_factory=Shares)
+    """Of nodes of several parts."""
     _inherited: Rooms = field(
         default_factory=lambda: Rooms("part", "x0", "x", "v", "mass", "force", "stepping"), init=False
     )
@@ -143,6 +146,30 @@ class Nodes:
     def places(self, ids: Ints) -> Indices:
         """Local indices of nodes with these global ids, -1 for those that are not here."""
         return ids_of.places(self.id, ids)
+
+    def among(self, chosen: Flags) -> Flags:
+        """(n,) the nodes that have a tet of the ``chosen`` parts (parts,)."""
+        found: Flags = chosen[self.part]
+        found[self.shares.node[chosen[self.shares.part]]] = True
+        return found
+
+    def in_part(self, part: int) -> Flags:
+        """(n,) the nodes that have a tet of a part."""
+        found: Flags = self.part == part
+        found[self.shares.node[self.shares.part == part]] = True
+        return found
+
+    def of_parts(self) -> tuple[Ints, Indices]:
+        """(m,) nodes and (m,) their parts, see Shares.members."""
+        return self.shares.members(self.part)
+
+    def mass_of(self, part: int) -> Floats:
+        """(n,) what of the mass of each node is of the tets of a part, kg."""
+        mass, shares = np.where(self.part == part, self.mass, 0.0), self.shares
+        mass[shares.node] = 0.0
+        some = shares.part == part
+        mass[shares.node[some]] = shares.fraction[some] * self.mass[shares.node[some]]
+        return mass
 
     def grow(self, copies: "Copies") -> None:
         """Takes up copies of nodes: they begin as their parents are, whose mass is their own less the copies'."""
@@ -268,6 +295,13 @@ class Block:
     """Tets that have left so far, for each of which another may stand in another chunk."""
     quiet: Ints = field(default_factory=lambda: np.zeros((0, 3), np.int64))
     """(chunks, 3) which chunks are at rest (elements/rest.py)."""
+    own_averages: Tets | None = None
+    """(n, 4) see ``averages``; None where these are the nodes."""
+
+    @property
+    def averages(self) -> Tets:
+        """(n, 4) the means that each corner takes part in (elements/averages.py)."""
+        return self.tets if self.own_averages is None else self.own_averages
 
     @property
     def chunks(self) -> int:
@@ -303,8 +337,9 @@ class Block:
         """Takes the tets at these places out; the last ones move into the holes."""
         left = self.n - len(gone)
         holes, movers = gone[gone < left], np.setdiff1d(np.arange(left, self.n), gone)
-        for table in (self.tets, self.id, self.across, self.worn, self.group, self.flat):
-            if len(table):
+        tables = self.tets, self.id, self.across, self.worn, self.group, self.flat, self.own_averages
+        for table in tables:
+            if table is not None and len(table):
                 table[holes] = table[movers]
         self.state[holes // CHUNK, :, holes % CHUNK] = self.state[movers // CHUNK, :, movers % CHUNK]
         self.n, self.quiet[:] = left, 0
@@ -312,6 +347,7 @@ class Block:
         self.tets, self.id = self.tets[:left], self.id[:left]
         self.across, self.worn, self.group = self.across[:left], self.worn[:left], self.group[:left]
         self.flat = self.flat[:left]
+        self.own_averages = None if self.own_averages is None else self.own_averages[:left]
         self.border_chunks = min(self.border_chunks, self.chunks)
 
 

@@ -47,10 +47,18 @@ def test_parts_that_touch_and_do_not_meet_are_a_doubt() -> None:
             said
             == [
                 "'part0' and 'part1' touch over about 400 mm^2 and do not meet in contact: they are not joined, and "
-                "pass through each other"
+                "pass through each other; a [[bond]] joins parts"
             ]
             * doubtful
         )
+
+
+@pytest.mark.parametrize("kind", ["shared", "tied"])
+def test_parts_with_a_bond_are_not_told(kind: str) -> None:
+    made = case(PLATE, above(PLATE, 5.0))
+    bond = {"parts": ["part1", "part0"], "kind": kind}
+    joined = parse_case({**made.model_dump(mode="json"), "bond": [bond], "contact": "none"})
+    assert touching(joined) == []
 
 
 @pytest.mark.parametrize("name", sorted(shipped()))

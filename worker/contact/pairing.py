@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from conoid.cases.joined import bodies, meeting
 from conoid.cases.schema import Case
 
 from ..parallel.comm import Comm
@@ -9,7 +10,9 @@ from ..state import Floats, Nodes
 
 
 def friction(case: Case) -> Floats:
-    """(parts, parts) Coulomb's coefficient, NaN where two parts do not meet."""
+    """(parts, parts) Coulomb's coefficient, NaN where two parts do not meet: parts of one body that cannot come apart
+    do not.
+    """
     assert case.contact is not None
     spec, names = case.contact, [part.name for part in case.parts]
     meets = np.array([name in spec.parts or not spec.parts for name in names])
@@ -17,6 +20,9 @@ def friction(case: Case) -> Floats:
     for i, part in enumerate(case.parts):
         if part.name not in case.self_contact:
             mu[i, i] = np.nan
+    body, meet = np.array(bodies(case)), np.array(meeting(case))
+    one = (body[:, None] == body) & ~np.eye(len(body), dtype=bool) & ~meet
+    mu[one] = np.nan
     for pair in spec.pairs:
         i, j = (names.index(name) for name in pair.parts)
         mu[i, j] = mu[j, i] = pair.friction

@@ -10,9 +10,11 @@ from ..parallel.ownership import Neighbour, SharedSum
 from ..parallel.passes import Pass
 from ..parallel.tags import Tag
 from ..parallel.team import Team
-from ..state import Copies, Floats, Ints, Model, extended
+from ..state import Floats, Indices, Ints, Model, extended
 from ..timers import Timers
+from ..topology import Split
 from . import matter, nodal, tasks
+from .averages import Averages
 from .flat import flat_tets
 from .forms import Elements
 from .passes import BlockPass, Values
@@ -23,20 +25,23 @@ class AveragedElements(Elements):
 
     def __init__(
         self, model: Model, comm: Comm, neighbours: list[Neighbour], timers: Timers, team: Team,
-        weight: Floats, params: Floats, kinds: Ints, scene: list[Boundary], split: bool, more: bool,
+        averages: Averages | None, weight: Floats, params: Floats, kinds: Ints, scene: list[Boundary], split: bool,
+        more: bool,
     ) -> None:  # fmt: skip
-        """``weight`` (nodes,): one over the reference volume, 1/m^3; ``params`` (parts, SIZE): constants of each part;
-        ``kinds`` (parts,): whose the pressure is (matter.whose); ``scene``: its planes of symmetry have mirror images
-        behind them; ``more``: whether an equation of state of the case has means besides, of heat or bulking.
+        """``averages``: the rows of the means, None where they are the nodes; ``weight`` (rows,): one over the
+        reference volume, 1/m^3; ``params`` (parts, SIZE): constants of each part; ``kinds`` (parts,): whose the
+        pressure is (matter.whose); ``scene``: its planes of symmetry have mirror images behind them; ``more``: whether
+        an equation of state of the case has means besides, of heat or bulking.
         """
-        n = model.nodes.n
+        self._averages = averages
+        n = model.nodes.n if averages is None else averages.n
         self.split = split
         self._columns = 3 if more else 2
         self._gradient = np.zeros((n if split else 1, 3), np.int64)
         super().__init__(model, comm, neighbours, timers, team)
         self._weight = weight
         self._params, self._kinds = params, kinds
-        self._bulk = params[model.nodes.part, BULK]
+        self._bulk = params[self._kind, BULK]
         self._pressed = bool(kinds.any())
         """Whether pressures are of nodes (matter.py)."""
         self._matter = matter.at_start(n if kinds.any() else 1)
@@ -52,15 +57,21 @@ class AveragedElements(Elements):
         for block in model.blocks:
             block.flat = flat_tets(block, model.nodes.x0)
 
+    @property
+    def _kind(self) -> Indices:
+        """(rows,) a part of the material of each."""
+        return self.model.nodes.part if self._averages is None else self._averages.kind
+
     def _connect(self) -> None:
         super()._connect()
-        self.shared_volumes = SharedSum(self._comm, self._neighbours, self._columns, Tag.VOLUME)
+        sharing = self._neighbours if self._averages is None else self._averages.neighbours
+        self.shared_volumes = SharedSum(self._comm, sharing, self._columns, Tag.VOLUME)
         if self.split:
-            self.shared_gradients = SharedSum(self._comm, self._neighbours, 3, Tag.GRADIENT)
+            self.shared_gradients = SharedSum(self._comm, sharing, 3, Tag.GRADIENT)
 
-    def grow(self, copies: Copies) -> None:
-        super().grow(copies)
-        parents = copies.parents
+    def grow(self, split: Split) -> None:
+        parents = split.copies.parents if self._averages is None else self._averages.grow(split)
+        super().grow(split)
         names = ["_weight", "_bulk", "_volumes", "_strain", "_more"]
         names += ["_gradient", "_projected", "pressure", "_sizes"] if self.split else []
         names += ["_matter"] if self._pressed else []
@@ -70,13 +81,19 @@ class AveragedElements(Elements):
 
     def keep(self, parcel: Parcel) -> None:
         super().keep(parcel)
-        for name in self._kept:
-            parcel.nodes[f"elements.{name}"] = getattr(self, name)
+        columns = {name: getattr(self, name) for name in self._kept}
+        if self._averages is not None:
+            parcel.rows["elements.averages"] = self._averages.keep(columns)
+            columns = self._averages.of_nodes(columns)
+        parcel.nodes |= {f"elements.{name}": column for name, column in columns.items()}
 
     def resume(self, parcel: Parcel) -> None:
         super().resume(parcel)
-        for name in self._kept:
-            setattr(self, name, np.ascontiguousarray(parcel.nodes[f"elements.{name}"]))
+        columns = {name: np.ascontiguousarray(parcel.nodes[f"elements.{name}"]) for name in self._kept}
+        if self._averages is not None:
+            columns = self._averages.resume(parcel.rows["elements.averages"], columns)
+        for name, column in columns.items():
+            setattr(self, name, column)
 
     @property
     def _kept(self) -> tuple[str, ...]:
@@ -86,6 +103,13 @@ class AveragedElements(Elements):
     def _exchanges(self) -> list[SharedSum]:
         return [self.shared_forces, self.shared_volumes, *([self.shared_gradients] if self.split else [])]
 
+    @property
+    def nodal(self) -> list[Floats]:
+        if not self.split:
+            return []
+        averages = self._averages
+        return [self.pressure if averages is None else averages.of_nodes({"pressure": self.pressure})["pressure"]]
+
     def advance(self, dt: float, scale: float) -> None:
         self._scratches.peaks[:] = 0
         self._scale = scale
@@ -94,7 +118,7 @@ class AveragedElements(Elements):
         if self._neighbours:
             with self._timers.phase("exchange"):
                 self.shared_volumes.finish(self._volumes)
-        self._complete.run(self.model.nodes.n, means, self._sizes, *self._constants())
+        self._complete.run(len(self._strain), means, self._sizes, *self._constants())
         self._bridge(scale, opens=True)
         self._over(self._forces, means, (dt, scale), self._send)
 
@@ -108,9 +132,20 @@ class AveragedElements(Elements):
         if self.split:
             self.shared_gradients.begin(self._gradient)
             self.shared_gradients.finish(self._gradient)
-            self._project.run(self.model.nodes.n, self._means(), self._sizes, self._scale)
+            self._project.run(len(self._strain), self._means(), self._sizes, self._scale)
             for boundary in self._scene:
-                boundary.mirror(self._projected)
+                self._mirror(boundary)
+
+    def _mirror(self, boundary: Boundary) -> None:
+        """Has the boundary act on the projected gradients of all means of its nodes."""
+        if self._averages is None:
+            boundary.mirror(self._projected)
+            return
+        for rows in self._averages.layers():
+            of_nodes = np.zeros((self.model.nodes.n, 3))
+            of_nodes[self._averages.node[rows]] = self._projected[rows]
+            boundary.mirror(of_nodes)
+            self._projected[rows] = of_nodes[self._averages.node[rows]]
 
     def _means(self) -> Values:
         return (
@@ -120,4 +155,4 @@ class AveragedElements(Elements):
 
     def _constants(self) -> Values:
         """What ``nodal.complete`` takes besides means and volumes."""
-        return self._columns > 2, self._bulk, self._pressed, self.model.nodes.part, self._kinds, self._params
+        return self._columns > 2, self._bulk, self._pressed, self._kind, self._kinds, self._params

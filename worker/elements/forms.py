@@ -16,8 +16,9 @@ from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour, SharedSum
 from ..parallel.tags import Tag
 from ..parallel.team import Team
-from ..state import Block, Copies, Floats, Ints, Model
+from ..state import Block, Floats, Ints, Model
 from ..timers import Timers
+from ..topology import Split
 from . import chunks, records, tasks
 from .colours import Coloured, coloured, whole
 from .passes import BlockPass, Values
@@ -101,6 +102,11 @@ class Elements:
         """Whether some face passes the strength by its tet's own stress."""
         return self._words[records.HOT] != 0
 
+    @property
+    def nodal(self) -> list[Floats]:
+        """What the nodes carry besides their motion, (nodes,) each, for the digest."""
+        return []
+
     def advance(self, dt: float, scale: float) -> None:
         """Stress and forces at n+1, added to nodal forces that are zero; the completion of the shared ones is under way
         when it returns.
@@ -128,8 +134,8 @@ class Elements:
         largest = self.cohesion.scatter(nodes.force, scale)
         self.peaks[records.LARGEST_FORCE] = max(int(self.peaks[records.LARGEST_FORCE]), largest)
 
-    def grow(self, copies: Copies) -> None:
-        """Takes up copies of nodes; they are shared already."""
+    def grow(self, split: Split) -> None:
+        """Takes up the copies of nodes; they are shared already, and their tets have them."""
         if not self.shared_forces.serves(self._neighbours):
             self.free()
             self._connect()

@@ -52,6 +52,8 @@ class Body(NamedTuple):
     """(chunks, 3) see rest.py."""
     flat: Flags
     """(n,) tets whose volume strain is not averaged; (0,) where there is none."""
+    averages: Tets
+    """(n, 4) rows of the Means of each corner."""
 
 
 class Marks(NamedTuple):
@@ -104,26 +106,27 @@ class Scratches(NamedTuple):
 
 
 class Means(NamedTuple):
-    """Nodal sums and means of the averaged pressure forms."""
+    """Sums and means of the averaged pressure forms: a row for each node, and for each further material of a node
+    (elements/averages.py)."""
 
     sums: Ints
-    """(nodes, 2 or 3) of volume change and volume, and of heat or bulking where there are such, quanta."""
+    """(rows, 2 or 3) of volume change and volume, and of heat or bulking where there are such, quanta."""
     weight: Floats
-    """(nodes,) one over the reference volume, 1/m^3."""
+    """(rows,) one over the reference volume, 1/m^3."""
     strain: Floats
-    """(nodes,) volume strain of the step."""
+    """(rows,) volume strain of the step."""
     more: Floats
-    """(nodes,) heat or bulking of the step."""
+    """(rows,) heat or bulking of the step."""
     split: bool
     """Whether pressure gradients stabilise; the arrays below are of one row if not."""
     pressure: Floats
-    """(nodes,) Pa."""
+    """(rows,) Pa."""
     projected: Floats
-    """(nodes, 3) projected gradient of the pressure, Pa/m."""
+    """(rows, 3) projected gradient of the pressure, Pa/m."""
     gradient: Ints
-    """(nodes, 3) its sums, quanta."""
+    """(rows, 3) its sums, quanta."""
     matter: Floats
-    """(nodes, COLUMNS) see matter.py; of one row where no pressure is of the nodes."""
+    """(rows, COLUMNS) see matter.py; of one row where no pressure is of the nodes."""
 
     @classmethod
     def none(cls) -> "Means":
@@ -134,14 +137,14 @@ class Means(NamedTuple):
 
 motion_of = attrgetter("x0", "x", "v", "force")
 """A function of ``Nodes``: the fields of their Motion."""
-body_of = attrgetter("tets", "id", "flat_state", "rows", "params", "kind", "eos", "quiet", "flat")
+body_of = attrgetter("tets", "id", "flat_state", "rows", "params", "kind", "eos", "quiet", "flat", "averages")
 """A function of a block: the fields of its Body."""
 marks_of = attrgetter("worn", "life", "hot", "weakest", "shear_weight")
 """A function of a block: the fields of its Marks."""
 _F1, _F2, _I1, _I2 = types.float64[::1], types.float64[:, ::1], types.int64[::1], types.int64[:, ::1]
-_B1, _INT, _FLAG = types.boolean[::1], types.int64, types.boolean
+_B1, _INT, _FLAG, _T2 = types.boolean[::1], types.int64, types.boolean, types.uint32[:, ::1]
 MOTION = record(Motion, _F2, _F2, _F2, _I2)
-BODY = record(Body, types.uint32[:, ::1], _I1, _F1, _INT, _F1, _INT, _INT, _I2, _B1)
+BODY = record(Body, _T2, _I1, _F1, _INT, _F1, _INT, _INT, _I2, _B1, _T2)
 MARKS = record(Marks, _B1, _F1, types.uint8[::1], _F1, types.float64)
 SCRATCH = record(Scratch, _F1, _I1, _I1, _I1)
 SCRATCHES = record(Scratches, _F2, _I2, _I2, _I2)

@@ -84,11 +84,11 @@ def strain_pass(motion, body, marks, scratch, means, begin, end, dt):  # type: i
     x0, x, v, w = motion.x0, motion.x, motion.v, scratch.w
     tets, state, params, rows, strength = body.tets, body.state, body.params, body.rows, body.strength
     sums, weight, split, pressure, projected = means.sums, means.weight, means.split, means.pressure, means.projected
-    apart, noted = body.flat, body.quiet
+    apart, noted, averages = body.flat, body.quiet, body.averages
     shape, more, erodes = params[ORDER] == FROM_SHAPE, rows > UNTOLD, len(marks.worn) > 0
     for c in range(begin, end):
         t, s = tets[c * CHUNK : (c + 1) * CHUNK], state[c * rows * CHUNK : (c + 1) * rows * CHUNK]
-        n = len(t)
+        n, means_of = len(t), averages[c * CHUNK : (c + 1) * CHUNK]
         flat, quiet = apart[c * CHUNK : c * CHUNK + n], noted[c]
         still = not split and dt > 0.0 and rest.at_rest(v, t, n)
         if still and quiet[rest.NOTED] > 0:
@@ -99,7 +99,7 @@ def strain_pass(motion, body, marks, scratch, means, begin, end, dt):  # type: i
                 tet4.at_rest(w, n)
             if len(flat) > 0:
                 keep_out(w, flat, n)
-            averaged.scatter_volumes(sums, w, weight, t, n, dt)
+            averaged.scatter_volumes(sums, w, weight, means_of, n, dt)
             continue
         if shape and more:
             tet4.gather_moved(w, x0, x, t, s, n)
@@ -125,19 +125,19 @@ def strain_pass(motion, body, marks, scratch, means, begin, end, dt):  # type: i
         if len(flat) > 0:
             keep_out(w, flat, n)
         if more:
-            scatter_more(sums, w, s, params, weight, t, rows, n)
+            scatter_more(sums, w, s, params, weight, means_of, rows, n)
         quiet[rest.NOTED] = 0
         quiet[rest.STEADY] = 1 if still and rest.same(before, s) else 0
         if split:
             if not shape:
                 tet4.end_gradients(w, n)
-            averaged.gather_projection(w, pressure, projected, t, n)
+            averaged.gather_projection(w, pressure, projected, means_of, n)
             averaged.stabilise(w, s, n, dt)
             if len(flat) > 0:
                 keep_out(w, flat, n)
-            averaged.scatter_stabilised(sums, w, weight, t, n, dt)
+            averaged.scatter_stabilised(sums, w, weight, means_of, n, dt)
         else:
-            averaged.scatter_volumes(sums, w, weight, t, n, dt)
+            averaged.scatter_volumes(sums, w, weight, means_of, n, dt)
 
 
 @njit(types.void(MOTION, BODY, MARKS, SCRATCH, MEANS, _I, _I, _F, _F), cache=True, error_model="numpy")
@@ -150,16 +150,16 @@ def force_pass(motion, body, marks, scratch, means, begin, end, dt, scale):  # t
     worn, life, hot, weakest, shear = marks.worn, marks.life, marks.hot, marks.weakest, marks.shear
     w, wi, bits, peaks, id, noted = scratch.w, scratch.wi, scratch.bits, scratch.peaks, body.id, body.quiet
     strain, told, gradient, pressure = means.strain, means.more, means.gradient, means.pressure
-    split, apart, matter = means.split, body.flat, means.matter
+    split, apart, matter, averages = means.split, body.flat, means.matter, body.averages
     shape, more, erodes = params[ORDER] == FROM_SHAPE, rows > UNTOLD, len(worn) > 0
     by_tets = matter_of.whose(eos, params) == matter_of.TETS
     for c in range(begin, end):
         t, s = tets[c * CHUNK : (c + 1) * CHUNK], state[c * rows * CHUNK : (c + 1) * rows * CHUNK]
         first, last, n = c * CHUNK, c * CHUNK + len(t), len(t)
-        ids, flat, quiet = id[first:last], apart[first:last], noted[c]
-        still = quiet[rest.STEADY] != 0 and rest.without(strain, t, n)
+        ids, flat, quiet, means_of = id[first:last], apart[first:last], noted[c], averages[first:last]
+        still = quiet[rest.STEADY] != 0 and rest.without(strain, means_of, n)
         if still and more:
-            still = rest.without(told, t, n)
+            still = rest.without(told, means_of, n)
         if still and quiet[rest.NOTED] > 0:
             rest.pass_over(peaks, quiet, LARGEST_LIMIT, LIMITING_TET)
             continue
@@ -175,12 +175,12 @@ def force_pass(motion, body, marks, scratch, means, begin, end, dt, scale):  # t
         tet4.end_gradients(w, n)
         if shape and not more:
             strengthen(strength, w, s, params, n, dt)
-        averaged.gather_strains(w, strain, t, n)
+        averaged.gather_strains(w, strain, means_of, n)
         if more:
             if rows == HEATED:
-                gather_heat(s, told, t, n)
+                gather_heat(s, told, means_of, n)
             else:
-                gather_corners(w, s, params, told, t, strain, flat, n)
+                gather_corners(w, s, params, told, means_of, strain, flat, n)
         if shape:
             averaged.recall_growth(w, s, n, dt)
             if dt <= 0.0:
@@ -195,7 +195,7 @@ def force_pass(motion, body, marks, scratch, means, begin, end, dt, scale):  # t
             press(eos, w, s, params, n)
         else:
             alone = s.copy() if len(flat) > 0 else s[:0]
-            matter_of.take_means(w, s, params, matter, t, n)
+            matter_of.take_means(w, s, params, matter, means_of, n)
             if len(flat) > 0:
                 press_alone(eos, w, s, alone, params, flat, rows, n)
         chunks.viscosity_and_limit(w, s, params, n, dt, True)
@@ -211,7 +211,7 @@ def force_pass(motion, body, marks, scratch, means, begin, end, dt, scale):  # t
         )
         largest = chunks.sum_forces(force, w, wi, bits, peaks, t, s, ids, n, scale)
         if split:
-            largest = max(largest, chunks.sum_fluxes(gradient, pressure, w, wi, peaks, flat, t, n, scale))
+            largest = max(largest, chunks.sum_fluxes(gradient, pressure, w, wi, peaks, flat, means_of, n, scale))
         quiet[rest.NOTED] = 0
         if still and largest == 0 and not marked and rest.same(before, s):
             rest.note(quiet, bits, ids, n)
@@ -229,5 +229,5 @@ def forces_again(motion, body, scratch, means, begin, end, scale):  # type: igno
         w[tet4.LIMIT : tet4.LIMIT + n] = 0.0
         chunks.sum_forces(motion.force, w, wi, bits, peaks, t, s, body.id[first:last], n, scale)
         if means.split:
-            flat = body.flat[first:last]
-            chunks.sum_fluxes(means.gradient, means.pressure, w, wi, peaks, flat, t, n, scale)
+            flat, means_of = body.flat[first:last], body.averages[first:last]
+            chunks.sum_fluxes(means.gradient, means.pressure, w, wi, peaks, flat, means_of, n, scale)

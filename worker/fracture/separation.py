@@ -80,10 +80,21 @@ class Separation:
         copies = Copies(some[node], ids, owner, owner == self._comm.rank, mass)
         model.nodes.grow(copies)
         self._share(copies, new)
+        if len(model.nodes.shares.node):
+            self._split_shares(rows, of, some, new)
         for b, star in self.stars.items():
             star.grow(copies.n)
             star.retie(self._meshes[b].tets, some, rows, places, of, new, b)
         return Split(copies, new, touched, *_leaving(rows, places, of, new))
+
+    def _split_shares(self, rows: Ints, of: Ints, some: Ints, new: int) -> None:
+        """What nodes of several parts and their copies have of each, by the ``rows`` of the stars of ``some`` nodes."""
+        nodes = self._model.nodes
+        node = np.where(of >= 0, new + of, some[np.searchsorted(nodes.id[some], rows[:, stars.NODE])])
+        part = np.searchsorted(self._model.part_starts, rows[:, stars.TET], side="right") - 1
+        quarters = 0.25 * rows[:, stars.MASS].copy().view(np.float64)
+        nodes.shares, touched, stands = nodes.shares.follow(node.astype(np.int32), part.astype(np.int32), quarters)
+        nodes.part[touched] = stands
 
     def _touched(self, touched: Ints) -> Ints:
         """Local nodes of the facets that break on any rank, ascending."""

@@ -41,6 +41,6 @@ class TopologyUpdate:
 
     def _grow(self, split: Split) -> None:
         self._initiation.follow(split)
-        self._elements.grow(split.copies)
+        self._elements.grow(split)
         for each in self._by_node:
             each.grow(split, self._model.nodes.id)

@@ -65,7 +65,7 @@ class Pushes:
         for place, probe in enumerate(self._probes.values()):
             if walls is not None and probe.field.startswith("wall_"):
                 part = self._scene.model.parts.index(probe.part)
-                mine = nodes.owned[walls.nodes] & (nodes.part[walls.nodes] == part)
+                mine = (nodes.owned * nodes.mass_of(part) / nodes.mass)[walls.nodes]
                 columns[:, place] = walls.given[:, self._columns(probe)].sum(axis=1) * mine
         return exact_sums(self._scene.comm, columns)
 

@@ -92,7 +92,7 @@ class Shapes:
     def _ends(self, probe: Probe, axis: int) -> tuple[float, float]:
         """Where the part starts and ends along the axis, m."""
         nodes = self._scene.model.nodes
-        x = nodes.x0[nodes.part == self._scene.model.parts.index(probe.part), axis]
+        x = nodes.x0[nodes.in_part(self._scene.model.parts.index(probe.part)), axis]
         low, high = self._scene.comm.maximum(np.array([-x.min(initial=np.inf), x.max(initial=-np.inf)]))
         return -float(low), float(high)
 

@@ -49,7 +49,7 @@ class NodeSums:
         model, nodes = self._scene.model, self._scene.model.nodes
         part = model.parts.index(probe.part)
         inside = Region.of(probe).holds(nodes.x0.T, model.slack[part])
-        return np.asarray(nodes.owned & (nodes.part == part) & inside)
+        return np.asarray(nodes.owned & nodes.in_part(part) & inside)
 
     def chosen(self, probe: Probe) -> Flags:
         """(nodes,) the nodes of a probe that this rank counts."""
@@ -63,7 +63,7 @@ class NodeSums:
     def _columns(self, probe: Probe, v: Floats) -> tuple[Floats, Floats]:
         """(nodes,) what is added up, and what the sum is divided by."""
         nodes, field = self._scene.model.nodes, kind(probe.field)
-        mass = np.where(self.chosen(probe), nodes.mass, 0.0)
+        mass = np.where(self.chosen(probe), nodes.mass_of(self._scene.model.parts.index(probe.part)), 0.0)
         if field in ("mass", "residual_mass"):
             return mass, mass
         if field == "kinetic_energy":

@@ -8,7 +8,7 @@ import numpy as np
 from conoid.cases.bodies import Loose, MeshFile
 from conoid.cases.placed import Placed
 from conoid.cases.schema import Case
-from conoid.cases.touching import NEAR, Touch, size
+from conoid.cases.touching import NEAR, Touch, bonded, size
 
 from .faces import normals
 from .model import Floats, Ids, Ints
@@ -21,16 +21,17 @@ Surface = tuple[Floats, Ints]
 
 
 def touches(case: Case, surfaces: Mapping[int, Surface]) -> Iterator[Touch]:
-    """The pairs of parts that touch of which at least one has a mesh from a file: ``surfaces`` of these by part.
+    """The pairs of parts that touch without a bond, of which at least one has a mesh from a file: ``surfaces`` of these
+    by part.
 
     Two meshes from files touch where faces have the same corners; with a generated body all faces that lie on it count.
     """
     for (i, one), (j, other) in combinations(surfaces.items(), 2):
-        if area := _matched(one, other):
+        if not bonded(case, i, j) and (area := _matched(one, other)):
             yield Touch(one=i, other=j, area=area)
     for i, surface in surfaces.items():
         for j, part in enumerate(case.parts):
-            if isinstance(part.mesh, MeshFile | Loose):
+            if isinstance(part.mesh, MeshFile | Loose) or bonded(case, i, j):
                 continue
             if area := _lying(surface, Placed(part.mesh, part.turn)):
                 yield Touch(one=min(i, j), other=max(i, j), area=area)

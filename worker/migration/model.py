@@ -1,12 +1,15 @@
 """The model in a parcel, and a model from one."""
 
+from typing import Any
+
 import numpy as np
 
-from conoid.cases.schema import Case
+from conoid.cases.schema import MOST_PARTS, Case
 
 from .. import domain
 from ..ids import located
 from ..parallel.comm import Comm
+from ..shares import Shares, ranks
 from ..state import CHUNK, Bits, Block, Indices, Ints, Model, Nodes, Tets
 from .parcel import Parcel, Table, length, take
 from .route import Arrived
@@ -25,7 +28,23 @@ def keep(model: Model) -> Parcel:
         "slack": model.slack, "rounding": model.rounding, "groups": model.groups, "scale": nodes.scale,
     }  # fmt: skip
     columns = {name: getattr(nodes, name) for name in _NODAL}
-    return Parcel(known, {}, columns, {b.part: _keep_block(b, nodes.id) for b in model.blocks if b.n}, {})
+    tets = {b.part: _keep_block(b, nodes.id) for b in model.blocks if b.n}
+    return Parcel(known, {}, columns, tets, _keep_shares(nodes) if len(nodes.shares.rank) else {})
+
+
+def _keep_shares(nodes: Nodes) -> dict[str, Table]:
+    shares = nodes.shares
+    of = nodes.id[shares.node]
+    table = {"of": of, "key": of * MOST_PARTS + shares.part, "part": shares.part, "mass": shares.mass}
+    return {"shares": table}
+
+
+def _resume_shares(case: Case, parcel: Parcel, nodes: Nodes) -> Shares:
+    rank = ranks(case)
+    if not len(rank):
+        return Shares()
+    table = parcel.rows["shares"]
+    return Shares(nodes.places(table["of"]), np.array(table["part"]), np.array(table["mass"]), rank)
 
 
 def _keep_block(block: Block, ids: Ints) -> Table:
@@ -38,8 +57,9 @@ def _keep_block(block: Block, ids: Ints) -> Table:
 def resume(case: Case, arrived: Arrived, comm: Comm) -> Model:
     """The model of what has arrived, whose tables are put in the order that tets and nodes have in it."""
     parcel, known = arrived.parcel, arrived.parcel.known
-    values = {name: np.ascontiguousarray(parcel.nodes[name]) for name in _NODAL}
+    values: dict[str, Any] = {name: np.ascontiguousarray(parcel.nodes[name]) for name in _NODAL}
     nodes = Nodes(owner=arrived.owner, owned=arrived.owner == comm.rank, scale=known["scale"], **values)
+    nodes.shares = _resume_shares(case, parcel, nodes)
     blocks = []
     for part in sorted(parcel.tets):
         if length(parcel.tets[part]):

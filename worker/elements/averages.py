@@ -1,0 +1,158 @@
+"""The means of the averaged pressure forms where bodies have several materials: one for each material of a node.
+
+A mean over the tets round a node stands for the matter there. Where two materials meet their volume strains differ, as
+the stress across the interface is one: a mean over both would give each the strain of the other, and its pressure with
+it. So a node has a mean for each material of its tets, and a tet takes part in those of its own. Where no node has
+several materials the means are those of the nodes, and their rows are the nodes' rows.
+"""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from conoid.cases.joined import shared_bonds
+from conoid.cases.schema import MOST_PARTS, Case
+
+from ..migration.parcel import Table
+from ..parallel.ownership import Neighbour
+from ..state import Block, Floats, Indices, Ints, Model, Nodes, Tets, extended
+from ..topology import Split
+
+
+def kinds(case: Case) -> Indices:
+    """(parts,) the first part of the same material."""
+    names = [part.material for part in case.parts]
+    return np.array([names.index(name) for name in names], np.int32)
+
+
+class Averages:
+    """The rows of the means of one rank. Whoever holds a node holds all its means."""
+
+    def __init__(self, model: Model, neighbours: list[Neighbour], kinds: Indices) -> None:
+        """``kinds`` (parts,): the part that stands for the material of each."""
+        self._model, self._of, self._kinds = model, neighbours, kinds
+        nodes = model.nodes
+        more = _more(nodes, kinds)
+        self.node: Ints = np.concatenate([np.arange(nodes.n), more[:, 0]])
+        """(rows,) local node."""
+        self.kind: Indices = np.concatenate([kinds[nodes.part], more[:, 1].astype(np.int32)])
+        """(rows,) part that stands for the material."""
+        self._index()
+        for block in model.blocks:
+            block.own_averages = self._rows(block)
+        self.neighbours = [Neighbour(other.rank, self._shared(other.nodes)) for other in neighbours]
+        """Other ranks, and the rows that this one shares with each."""
+
+    @classmethod
+    def of(cls, case: Case, model: Model, neighbours: list[Neighbour]) -> "Averages | None":
+        """Those of a case; None where no bond joins two materials, so that the means are those of the nodes."""
+        found = kinds(case)
+        mixed = any(found[i] != found[j] for _, _, i, j in shared_bonds(case))
+        return cls(model, neighbours, found) if mixed else None
+
+    @property
+    def n(self) -> int:
+        """Number of rows."""
+        return len(self.node)
+
+    @property
+    def further(self) -> Ints:
+        """Rows that are not the first of their nodes at the start."""
+        return np.arange(self._model.nodes.n, self.n)
+
+    def at(self, node: "np.ndarray", part: "np.ndarray | int") -> Ints:
+        """The rows of local nodes for the materials of parts; -1 where there is none."""
+        wanted = np.asarray(node, np.int64) * MOST_PARTS + self._kinds[part]
+        place = np.minimum(np.searchsorted(self._keys, wanted), len(self._keys) - 1)
+        return np.where(self._keys[place] == wanted, self._order[place], -1)
+
+    def grow(self, split: Split) -> Ints:
+        """Takes up the copies of a split, whose tets have them already; returns the rows that the new ones inherit
+        from.
+        """
+        nodes, first = self._model.nodes, split.first
+        copies, (node, part) = split.copies, nodes.of_parts()
+        pairs = np.unique(np.column_stack([node, self._kinds[part]])[node >= first], axis=0)
+        parents = self.at(copies.parents[pairs[:, 0] - first], pairs[:, 1])
+        begin = self.n
+        self.node = np.concatenate([self.node, pairs[:, 0]])
+        self.kind = np.concatenate([self.kind, pairs[:, 1].astype(np.int32)])
+        self._index()
+        for b, block in enumerate(self._model.blocks):
+            mine = split.block == b
+            places, corners = split.place[mine], split.corner[mine]
+            block.averages[places, corners] = self.at(split.node[mine], block.part)
+        for other, of in zip(self.neighbours, self._of, strict=True):
+            held = np.isin(pairs[:, 0], of.nodes)
+            other.nodes = extended(other.nodes, (begin + np.flatnonzero(held)).astype(np.int32))
+        return parents
+
+    def layers(self) -> Iterator[Ints]:
+        """The rows, in groups of which none has a node twice."""
+        left = np.arange(self.n)
+        while len(left):
+            _, first = np.unique(self.node[left], return_index=True)
+            yield left[first]
+            left = np.delete(left, first)
+
+    def of_nodes(self, columns: dict[str, "np.ndarray"]) -> dict[str, "np.ndarray"]:
+        """Those of ``columns`` (rows, ...) of the material of the part that each node stands for: (nodes, ...)."""
+        nodes = self._model.nodes
+        rows = self.at(np.arange(nodes.n), nodes.part)
+        return {name: column[rows] for name, column in columns.items()}
+
+    def keep(self, columns: dict[str, "np.ndarray"]) -> Table:
+        """The rows of a parcel of the means of nodes of several materials: ``columns`` (rows, ...)."""
+        nodes = self._model.nodes
+        node, part = nodes.of_parts()
+        several = np.isin(node, nodes.shares.node)
+        pairs = np.unique(np.column_stack([node, self._kinds[part]])[several], axis=0)
+        rows, of = self.at(pairs[:, 0], pairs[:, 1]), nodes.id[pairs[:, 0]]
+        table = {name: column[rows] for name, column in columns.items()}
+        return {"of": of, "key": of * MOST_PARTS + pairs[:, 1], "kind": pairs[:, 1], **table}
+
+    def resume(self, table: Table, columns: dict[str, "np.ndarray"]) -> dict[str, "np.ndarray"]:
+        """``columns`` (nodes, ...) of a parcel with the rows of ``table`` besides."""
+        rows, found = self.at(self._model.nodes.places(table["of"]), table["kind"]), {}
+        for name, values in columns.items():
+            found[name] = np.concatenate([values, np.zeros((self.n - len(values), *values.shape[1:]), values.dtype)])
+            found[name][rows] = table[name]
+        return found
+
+    def _index(self) -> None:
+        key = self.node * MOST_PARTS + self.kind
+        self._order = np.argsort(key)
+        self._keys = key[self._order]
+
+    def _rows(self, block: Block) -> Tets:
+        return np.ascontiguousarray(self.at(block.tets, block.part), np.uint32)
+
+    def _shared(self, nodes: Indices) -> Indices:
+        """The rows of ``nodes``, in the order of the nodes and then of the materials: the same on both ranks."""
+        mine = np.isin(self.node, nodes)
+        rows = np.flatnonzero(mine)
+        ids = self._model.nodes.id[self.node[rows]]
+        return rows[np.lexsort((self.kind[rows], ids))].astype(np.int32)
+
+
+def _more(nodes: Nodes, kinds: Indices) -> Ints:
+    """(k, 2) nodes and materials besides that of the part that a node stands for."""
+    shares = nodes.shares
+    pairs = np.column_stack([shares.node, kinds[shares.part]]).astype(np.int64)
+    return np.unique(pairs[pairs[:, 1] != kinds[nodes.part[shares.node]]], axis=0)
+
+
+def volumes(averages: "Averages | None", nodes: Nodes, node_volume: Floats, density: Sequence[float]) -> Floats:
+    """(rows,) at the start, m^3: ``node_volume`` (nodes,), and of nodes of several materials that of each, by the
+    ``density`` of the parts, kg/m^3.
+    """
+    if averages is None:
+        return node_volume
+    shares = nodes.shares
+    found = np.concatenate([node_volume, np.zeros(averages.n - nodes.n)])
+    several = np.unique(averages.node[averages.further])
+    mine = np.isin(shares.node, several)
+    rows = averages.at(shares.node[mine], shares.part[mine])
+    found[several] = 0.0
+    np.add.at(found, rows, shares.mass[mine] / np.array(density)[shares.part[mine]])
+    return found

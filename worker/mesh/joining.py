@@ -1,0 +1,83 @@
+"""Parts that bonds join by shared nodes: their nodes at one place become one node, their faces there an interface."""
+
+from collections.abc import Container, Mapping
+
+import numpy as np
+
+from conoid.cases.joined import shared_bonds
+from conoid.cases.schema import Case
+
+from ..errors import InputError
+from ..fracture.connectivity import components
+from .model import Floats, Ids, Ints, Origin
+from .sharing import same_places
+
+_SAME = 1e-9
+"""Of the size of a body: nodes of structured meshes nearer than this are one. Chosen: far above rounding."""
+
+Placed = tuple[int, Origin | None, Floats]
+"""Index of the first node of a part, where its mesh comes from, and its nodes (n, 3), m, as its part turns them."""
+
+
+def joined(case: Case, placed: Mapping[int, Placed], n: int) -> Ids:
+    """(n,) the node that stands for each of the ``n`` nodes of the ``placed`` parts, by their numbers: the first of
+    those that bonds make one of. Raises InputError for a bond without nodes in common.
+    """
+    edges = [np.zeros((0, 2), np.int64)]
+    for k, _, i, j in shared_bonds(case):
+        if i in placed and j in placed:
+            (first, one, x), (second, other, y) = placed[i], placed[j]
+            p, q = _common(one, x, other, y)
+            if not len(p):
+                raise InputError(_apart(case, k))
+            edges.append(np.column_stack([first + p, second + q]))
+    every = np.concatenate(edges)
+    return components(n, every) if len(every) else np.arange(n)
+
+
+def _common(one: Origin | None, x: Floats, other: Origin | None, y: Floats) -> tuple[Ids, Ids]:
+    """Nodes of two parts that are one: those of one number in one file, or, of structured meshes, at one place."""
+    if one is not None and other is not None:
+        return same_places(one, x, other, y)
+    labels = np.column_stack([_lines(np.concatenate([a, b])) for a, b in zip(x.T, y.T, strict=True)])
+    _, at, times = np.unique(labels, axis=0, return_inverse=True, return_counts=True)
+    at, first = at.reshape(-1), np.full(len(times), -1)
+    first[at[: len(x)]] = np.arange(len(x))
+    p = first[at[len(x) :]]
+    return p[p >= 0], np.flatnonzero(p >= 0)
+
+
+def _lines(values: Floats) -> Ids:
+    """(n,) a number for each of some coordinates, the same for those that differ by rounding alone."""
+    order = np.argsort(values, kind="stable")
+    steps = np.diff(values[order], prepend=values[order[:1]])
+    numbers = np.empty(len(values), np.int64)
+    numbers[order] = np.cumsum(steps > _SAME * float(np.ptp(values)))
+    return numbers
+
+
+def require_faces(case: Case, there: Container[int], across: Ints, tet_part: Ints) -> None:
+    """Raises InputError for a bond of parts that are ``there``, by number, without a face in common, and for parts of
+    one body without a bond that have one: ``across`` (tets, 4) of all tets, see ``faces.across``.
+    """
+    tet, face = np.nonzero(across >= 0)
+    pairs = np.column_stack([tet_part[tet], tet_part[across[tet, face] // 4]])
+    found = {(int(i), int(j)) for i, j in np.unique(pairs[pairs[:, 0] < pairs[:, 1]], axis=0)}
+    bonded = {(i, j): k for k, _, i, j in shared_bonds(case) if i in there and j in there}
+    for pair, k in bonded.items():
+        if pair not in found:
+            raise InputError(_apart(case, k))
+    for i, j in sorted(found - bonded.keys()):
+        one, other = case.parts[i].name, case.parts[j].name
+        raise InputError(
+            f"parts: {one!r} and {other!r} have faces of one body in common and no bond; give them a [[bond]] with "
+            f"parts = [{one!r}, {other!r}] and kind = 'shared'"
+        )
+
+
+def _apart(case: Case, k: int) -> str:
+    one, other = case.bond[k].parts
+    return (
+        f"bond[{k}].parts = '{one}, {other}': the meshes of the two have no face in common; let them touch, take both "
+        "from one file in which they share nodes, or set kind = 'tied'"
+    )
