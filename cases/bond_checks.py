@@ -25,7 +25,7 @@ def check_bonds(case: Case) -> Iterator[Problem]:
         elif not unknown:
             yield from _twice(case, i)
             if isinstance(bond, SharedBond):
-                yield from _meshes(parts[bond.parts[0]], parts[bond.parts[1]], (*location, "parts"))
+                yield from _meshes(parts[bond.parts[0]], parts[bond.parts[1]], bond.breaks, (*location, "parts"))
 
 
 def _both(bond: Bonded) -> str:
@@ -54,8 +54,8 @@ def _twice(case: Case, number: int) -> Iterator[Problem]:
             yield problem(("bond", number, "parts"), _both(bond), message)
 
 
-def _meshes(one: Part, other: Part, location: Location) -> Iterator[Problem]:
-    """Parts whose meshes cannot have nodes in common."""
+def _meshes(one: Part, other: Part, breaks: bool, location: Location) -> Iterator[Problem]:
+    """Parts whose meshes cannot have nodes in common, or that cannot come apart."""
     names, pair = f"{one.name}, {other.name}", (one.mesh, other.mesh)
     way = "set kind = 'tied'"
     loose = [part.name for part in (one, other) if isinstance(part.mesh, Loose)]
@@ -69,6 +69,10 @@ def _meshes(one: Part, other: Part, location: Location) -> Iterator[Problem]:
         yield problem(location, names, f"their meshes have two generators; give both the same, or {way}")
     elif one.mesh.generator == "structured" and not all(isinstance(mesh, Box | Plate) for mesh in pair):
         message = f"structured meshes have nodes in common where both are boxes or plates; use gmsh, or {way}"
+        yield problem(location, names, message)
+    worn = [part.name for part in (one, other) if part.erosion is not None]
+    if breaks and worn:
+        message = f"{choices(worn)}: a part that erodes cannot have a bond that breaks; remove erosion or strength"
         yield problem(location, names, message)
     if one.turn != other.turn:
         yield problem(location, names, f"their turns differ, and their nodes do not stay together; {way}")

@@ -1,5 +1,6 @@
 """Which fields of frames a case has, of those that not every case has: ``damage`` and ``fragment``."""
 
+from .joined import cohesive
 from .library import material
 from .schema import Case
 
@@ -12,9 +13,8 @@ def counting(case: Case) -> set[int]:
 
 def damageable(case: Case) -> bool:
     """Whether anything is damaged: by its law, by cohesive facets that let go, or on the way to a strain of erosion."""
-    cohesive = any(part.fracture is not None and part.fracture.model == "cohesive" for part in case.parts)
     strained = any(part.erosion is not None and part.erosion.plastic_strain is not None for part in case.parts)
-    return cohesive or strained or bool(counting(case))
+    return bool(cohesive(case)) or strained or bool(counting(case))
 
 
 def lacking(case: Case) -> set[str]:

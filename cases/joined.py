@@ -1,14 +1,27 @@
 """Bodies of several parts: those that bonds by shared nodes hold together."""
 
-from typing import TYPE_CHECKING
+from typing import Any, Protocol
 
-from .bonds import SharedBond
-
-if TYPE_CHECKING:
-    from .schema import Case
+from .bonds import Bonded, SharedBond
 
 
-def shared_bonds(case: "Case") -> list[tuple[int, SharedBond, int, int]]:
+class Joined(Protocol):
+    """What of a case says which bodies its parts make."""
+
+    @property
+    def parts(self) -> tuple[Any, ...]:
+        """Its parts (schema.Part)."""
+
+    @property
+    def bond(self) -> tuple[Bonded, ...]:
+        """Its bonds."""
+
+    @property
+    def self_contact(self) -> tuple[str, ...]:
+        """The names of the parts that may meet themselves."""
+
+
+def shared_bonds(case: Joined) -> list[tuple[int, SharedBond, int, int]]:
     """The bonds by shared nodes: the place of each in ``bond``, and the numbers of its parts, the lower one first."""
     numbers = {part.name: i for i, part in enumerate(case.parts)}
     found = [(k, bond, sorted(numbers[name] for name in bond.parts)) for k, bond in enumerate(case.bond)
@@ -16,7 +29,7 @@ def shared_bonds(case: "Case") -> list[tuple[int, SharedBond, int, int]]:
     return [(k, bond, one, other) for k, bond, (one, other) in found]
 
 
-def bodies(case: "Case") -> list[int]:
+def bodies(case: Joined) -> list[int]:
     """(parts,) the body of each part: the lowest number of the parts that shared nodes hold together with it."""
     of = list(range(len(case.parts)))
     for _, _, i, j in shared_bonds(case):
@@ -25,7 +38,7 @@ def bodies(case: "Case") -> list[int]:
     return of
 
 
-def breakable(case: "Case") -> list[bool]:
+def breakable(case: Joined) -> list[bool]:
     """(parts,) whether facets of the body of each part may break: those of one of its parts, or a bond between two."""
     of = bodies(case)
     some = {of[i] for i, part in enumerate(case.parts) if part.fracture is not None}
@@ -33,7 +46,13 @@ def breakable(case: "Case") -> list[bool]:
     return [body in some for body in of]
 
 
-def meeting(case: "Case") -> list[bool]:
+def cohesive(case: Joined) -> set[int]:
+    """The parts that may have cohesive facets: of their own, or of a bond."""
+    own = {i for i, part in enumerate(case.parts) if part.fracture is not None and part.fracture.model == "cohesive"}
+    return own.union(*({i, j} for _, bond, i, j in shared_bonds(case) if bond.cohesive))
+
+
+def meeting(case: Joined) -> list[bool]:
     """(parts,) whether the parts of the body of each may meet each other: where it may break, or one of them may meet
     itself. The parts of one body that cannot come apart do not meet.
     """

@@ -1,6 +1,7 @@
 """The stages of a case: what a step may do, and which of it a scene needs. What it does not need is not computed."""
 
 from .boundaries import Wall
+from .joined import cohesive
 from .library import material
 from .schema import Case
 
@@ -17,7 +18,6 @@ def stages(case: Case) -> dict[str, bool]:
     rubbing = [wall.friction for _, wall in case.boundaries_of(Wall)]
     if contact is not None:
         rubbing += [contact.friction, *(pair.friction for pair in contact.pairs)]
-    fracture = [part.fracture for part in case.parts if part.fracture is not None]
     return {
         AVERAGED: case.numerics.pressure != "standard",
         STRENGTH: any(one.strength is not None for one in made),
@@ -27,8 +27,8 @@ def stages(case: Case) -> dict[str, bool]:
         "sharp edges": contact is not None and contact.edges,
         "friction": any(friction > 0.0 for friction in rubbing),
         "restitution": contact is not None and contact.restitution > 0.0,
-        "fracture": bool(fracture),
-        "cohesive facets": any(spec.model == "cohesive" for spec in fracture),
+        "fracture": case.fractures,
+        "cohesive facets": bool(cohesive(case)),
         "erosion": case.erodes,
     }
 

@@ -68,8 +68,8 @@ def quiet(what: str) -> None:
 def assemble(case: schema.Case, folder: Path, say: Say = quiet) -> Whole:
     """Builds the meshes of all parts; ``folder`` is where relative mesh paths start. Raises MeshError, InputError."""
     for index, bond in enumerate(case.bond):
-        if bond.kind == "tied" or bond.breaks:
-            raise InputError(f"bond[{index}]: this version reads tied bonds and those that break and cannot run them")
+        if bond.kind == "tied":
+            raise InputError(f"bond[{index}].kind = {bond.kind!r}: this version reads such bonds and cannot run them")
     facts = Facts(case)
     whole = assembled(case, _built(case, folder, say, facts))
     whole.survey = facts.survey()

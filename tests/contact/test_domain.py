@@ -104,7 +104,7 @@ def faces_received(kind: str, drift: float, ranks: int = 3) -> int:
         crowd.id, crowd.owner = nodes.id, nodes.owner
         slaves = nodes.id[found.flags & nodes.owned]
         sides = Sides(found.faces, found.edges, crowd.take(used), slaves)
-        rules = Rules(kind, ~np.eye(2, dtype=bool), 2e-3, 1e-4, 4e-4)
+        rules = Rules(kind, ~np.eye(2, dtype=bool), 2e-3, 1e-4, 4e-4, np.zeros(2, bool))
         return len(layout.build(sides, rules, 5e-6, np.full(3, drift), nodes, comm).faces.id) - sides.faces.n
 
     return sum(on_ranks(ranks, work))

@@ -69,7 +69,7 @@ class World:
             ), crowd, nodes,
         )  # fmt: skip
         all_nodes: Any = SimpleNamespace(n=4 * SHARDS, places=lambda ids: ids.astype(np.int32))
-        rules, drift = Rules("arbitrary", ALLOWED, 2.0, SKIN, 1.0), self.v[nodes].mean(axis=0)
+        rules, drift = Rules("arbitrary", ALLOWED, 2.0, SKIN, 1.0, ALLOWED.diagonal()), self.v[nodes].mean(axis=0)
         now = layout.build(sides, rules, 1.5, drift, all_nodes, SerialComm())
         if old is not None:
             registration.carry(now, old)

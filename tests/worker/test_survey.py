@@ -83,7 +83,7 @@ def test_every_refusal_is_told_at_once(folder: Path) -> None:
 
 
 SHARED = (
-    r"parts: 'part0' and 'part1' share 3 nodes of 'two.inp', but would be separate bodies that only touch: make one "
+    r"parts: 'part0' and 'part1' share 3 nodes of 'two.inp', but would be separate bodies that only touch: give "
 )
 
 

@@ -156,8 +156,8 @@ class Follower:
             self._scene.edge_edge.add(rows[found].astype(np.int32))
 
     def _meets(self, places: Indices) -> Flags:
-        """(n,) whether the parts of nodes at ``places`` meet themselves."""
-        return np.asarray(self._scene.rules.allowed.diagonal()[self._scene.crowd.part[places]])
+        """(n,) whether the bodies of nodes at ``places`` meet themselves."""
+        return np.asarray(self._scene.rules.itself[self._scene.crowd.part[places]])
 
     def _candidates(self, family: Family) -> None:
         """A copy has the candidates and the normals of its parent, and is pushed by the ranks that push that one."""

@@ -6,7 +6,7 @@ from conoid.cases.joined import bodies, meeting
 from conoid.cases.schema import Case
 
 from ..parallel.comm import Comm
-from ..state import Floats, Nodes
+from ..state import Flags, Floats, Nodes
 
 
 def friction(case: Case) -> Floats:
@@ -27,6 +27,14 @@ def friction(case: Case) -> Floats:
         i, j = (names.index(name) for name in pair.parts)
         mu[i, j] = mu[j, i] = pair.friction
     return mu
+
+
+def itself(case: Case, mu: Floats) -> Flags:
+    """(parts,) whether the body of each part may meet itself: the part, or another one of the body; ``mu`` as
+    ``friction`` gives it.
+    """
+    body = np.array(bodies(case))
+    return np.asarray((~np.isnan(mu) & (body[:, None] == body)).any(axis=1))
 
 
 def lighter(mu: Floats, nodes: Nodes, mobility: Floats, comm: Comm) -> float:

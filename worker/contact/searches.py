@@ -64,12 +64,17 @@ class Searches:
         """Whether there is friction anywhere."""
         return bool(np.nanmax(self.mu, initial=0.0) > 0.0)
 
+    @cached_property
+    def _itself(self) -> Flags:
+        """(parts,) whether the body of each may meet itself."""
+        return pairing.itself(self._case, self.mu)
+
     @property
     def rules(self) -> Rules:
         """How to search."""
         contact, size = self._case.contact, self._exterior.size
         assert contact is not None
-        return Rules(contact.domain, ~np.isnan(self.mu), 2.0 * size, contact.skin * size, HALO * size)
+        return Rules(contact.domain, ~np.isnan(self.mu), 2.0 * size, contact.skin * size, HALO * size, self._itself)
 
     def keep(self, parcel: Parcel) -> None:
         """Adds what pairs have kept: the candidates themselves a search finds again."""

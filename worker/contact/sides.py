@@ -30,6 +30,8 @@ class Rules:
     """Two slots that leave their lines by half of this, each, may meet without being candidates, m."""
     halo: float
     """The same of slots of different ranks, m."""
+    itself: Flags
+    """(parts,) whether the body of each may meet itself."""
 
 
 @dataclass

@@ -46,10 +46,10 @@ def _mass(mesh, e):  # type: ignore[no-untyped-def]
     return mesh.state[(e // CHUNK * mesh.columns + MASS) * CHUNK + e % CHUNK]
 
 
-@njit(types.void(BREAKING, types.int64, CANDIDATES, INTERFACE, MESH, types.int64), cache=True)
-def _fill(out, m, found, shared, mesh, block):  # type: ignore[no-untyped-def]
-    """Row ``m`` from the candidate of that number."""
-    place, face, row = found.place[m], found.face[m], found.shared[m]
+@njit(types.void(BREAKING, types.int64, types.int64, CANDIDATES, INTERFACE, MESH, types.int64), cache=True)
+def _fill(out, m, i, found, shared, mesh, block):  # type: ignore[no-untyped-def]
+    """Row ``m`` from candidate ``i``."""
+    place, face, row = found.place[i], found.face[i], found.shared[i]
     behind, mass = mesh.across[place, face], _mass(mesh, place)
     first = row < 0 or shared.first[row]
     here = 0 if first else 1
@@ -60,22 +60,32 @@ def _fill(out, m, found, shared, mesh, block):  # type: ignore[no-untyped-def]
         out.mass[m] = min(mass, _mass(mesh, there))
     else:
         out.mass[m] = min(mass, shared.mass[row])
+        for k in range(3):
+            out.sides[m, 1 - here, k] = shared.there[row, k]
     out.tets[m, here], out.tets[m, 1 - here] = mesh.id[place], behind // 4
     a, b, c = mesh.tets[place, FACES[face, 0]], mesh.tets[place, FACES[face, 1]], mesh.tets[place, FACES[face, 2]]
     out.nodes[m, 0], out.nodes[m, 1], out.nodes[m, 2] = a, b if first else c, c if first else b
     out.first[m] = first
     for k in range(4):
-        out.traction[m, k] = found.traction[m, k]
+        out.traction[m, k] = found.traction[i, k]
 
 
 @njit(BREAKING(CANDIDATES, INTERFACE, MESH, types.int64), cache=True)
 def _gather(found, shared, mesh, block):  # type: ignore[no-untyped-def]
-    """See ``gathered``; ``block``: index of the body's."""
+    """See ``gathered``; ``block``: index of the body's. A facet between two blocks of this rank is among those of the
+    first side's.
+    """
     n = len(found.place)
     out = BreakingFacets(
         np.empty((n, 2), np.int64), np.empty((n, 3), np.int32), np.full((n, 2, 3), -1, np.int32),
         np.empty(n, np.bool_), np.empty((n, 4)), np.empty(n),
     )  # fmt: skip
-    for m in range(n):
-        _fill(out, m, found, shared, mesh, block)
-    return out
+    m = 0
+    for i in range(n):
+        row = found.shared[i]
+        if row < 0 or shared.first[row] or shared.there[row, 0] < 0:
+            _fill(out, m, i, found, shared, mesh, block)
+            m += 1
+    return BreakingFacets(
+        out.tets[:m], out.nodes[:m], out.sides[:m], out.first[:m], out.traction[:m], out.mass[:m]
+    )  # fmt: skip

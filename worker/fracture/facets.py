@@ -8,7 +8,7 @@ from conoid.cases.schema import Fracture as Spec
 
 from ..ids import among, located, places
 from ..migration.parcel import Table
-from ..state import INTACT, Block, Floats, Indices, Ints
+from ..state import INTACT, Bits, Block, Flags, Floats, Indices, Ints
 from ..topology import Split
 from . import criterion
 from .records import FacetTable, Law, Mesh
@@ -22,25 +22,36 @@ ELSEWHERE = -2
 
 @dataclass
 class Body:
-    """A block that fractures."""
+    """Facets of a block that break by one law: those between its own tets, or those to the tets of another part."""
 
     index: int
     """Of the block among those of the rank."""
     block: Block
     spec: Spec
     tough: Toughness
+    behind: tuple[int, int]
+    """The tets behind the facets have ids from the first on and below the second."""
     mesh: Mesh
     facets: FacetTable
+    """Of the block: the bodies of one have it in common."""
     law: Law
+    own: bool = True
+    """Whether these are facets within the part."""
+
+    def has(self, across: Indices) -> Flags:
+        """Whether faces, by what is ``across`` them, are facets of the body."""
+        return np.asarray((across >= 4 * self.behind[0]) & (across < 4 * self.behind[1]))
+
+    @property
+    def hot(self) -> Bits:
+        """(n,) see Block.hot, where facets are within the part; else (0,)."""
+        return self.block.hot if self.own else self.block.hot[:0]
 
     def set_strengths(self, places: Ints, x0: Floats) -> None:
-        """Of all facets of the tets at ``places`` (k,), Pa; infinite on the surface. ``x0`` (nodes, 3): initial
-        positions.
-        """
-        here, face = np.nonzero(self.block.across[places] >= 0)
+        """Of all its facets of the tets at ``places`` (k,), Pa; ``x0`` (nodes, 3): initial positions."""
+        here, face = np.nonzero(self.has(self.block.across[places]))
         place = places[here]
         area = criterion.areas(self.mesh.tets, place, np.ascontiguousarray(face), x0)
-        self.facets.strength[places] = np.inf
         self.facets.strength[place, face] = self.tough.strengths(facet_ids(self.block, place, face), area)
 
     def follow(self, split: Split, x0: Floats) -> None:
@@ -52,21 +63,35 @@ class Body:
             self.set_strengths(np.unique(split.place[split.block == self.index]).astype(np.int64), x0)
 
 
-def arm(index: int, block: Block, spec: Spec, tough: Toughness, x0: Floats) -> Body:
-    """Makes a block ready to fracture, or to go on; ``x0`` (nodes, 3): initial positions."""
-    block.shear_weight = spec.shear_weight if spec.shear_weight is not None else float(spec.model == "cohesive")
+Terms = tuple[Spec, Toughness, tuple[int, int]]
+"""What decides on facets: how they break, their constants, and between which ids the tets behind them are."""
+
+
+def arm(index: int, block: Block, own: Terms, bonds: list[Terms], x0: Floats) -> list[Body]:
+    """Makes a block ready to fracture, or to go on: the bodies of its ``own`` facets and of those of its ``bonds``;
+    ``x0`` (nodes, 3): initial positions.
+    """
     begins = not len(block.bond)
     if begins:
         block.bond = np.full((block.n, 4), INTACT, np.uint8)
         block.hot = np.zeros(block.n, np.uint8)
-    table = FacetTable(np.empty((block.n, 4)), np.zeros((block.n, 4)), np.zeros((block.n, 4), np.int64))
-    law = Law(block.shear_weight, spec.friction, tough.delay)
-    body = Body(index, block, spec, tough, mesh_of(block), table, law)
-    for start in range(0, block.n, _BATCH):
-        body.set_strengths(np.arange(start, min(start + _BATCH, block.n)), x0)
+    table = FacetTable(np.full((block.n, 4), np.inf), np.zeros((block.n, 4)), np.zeros((block.n, 4), np.int64))
+    mesh, bodies = mesh_of(block), list[Body]()
+    for spec, tough, behind in (own, *bonds):
+        law = Law(shear_weight(spec), spec.friction, tough.delay)
+        bodies.append(Body(index, block, spec, tough, behind, mesh, table, law, own=not bodies))
+    for body in bodies:
+        for start in range(0, block.n, _BATCH):
+            body.set_strengths(np.arange(start, min(start + _BATCH, block.n)), x0)
+    block.shear_weight = max(body.law.weight for body in bodies)
     if begins:
         block.weakest = table.strength.min(axis=1)
-    return body
+    return bodies
+
+
+def shear_weight(spec: Spec) -> float:
+    """Of shear against normal traction: what is given, else 1 of cohesive facets and 0 of others."""
+    return spec.shear_weight if spec.shear_weight is not None else float(spec.model == "cohesive")
 
 
 def mesh_of(block: Block) -> Mesh:

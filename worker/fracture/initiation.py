@@ -88,14 +88,14 @@ class Initiation:
 
     def keep(self, parcel: Parcel) -> None:
         """Adds the clocks to a parcel."""
-        tables = [facets.clocks(body, self._step) for body in self.bodies]
+        tables = [facets.clocks(body, self._step) for body in self.bodies if body.own]
         none = {"tet": np.zeros(0, np.int64), "key": np.zeros(0, np.int64), "since": np.zeros(0)}
         every = {name: np.concatenate([column, *(table[name] for table in tables)]) for name, column in none.items()}
         parcel.rows["fracture.since"] = every
 
     def resume(self, parcel: Parcel) -> None:
         """Takes them back."""
-        for body in self.bodies:
+        for body in (body for body in self.bodies if body.own):
             facets.wind(body, parcel.rows["fracture.since"], self._step)
 
     def free(self) -> None:
@@ -106,7 +106,7 @@ class Initiation:
         """With their clocks; those of a body with nodal tractions are clocked by these."""
         room, rows = self._rooms[k], self.interface.of_body[k]
         step = self._step if body.spec.traction == "tets" else 0
-        where = body.block.hot, self.interface.facets, rows, body.mesh, body.facets, self._model.nodes.x, body.law
+        where = body.hot, self.interface.facets, rows, body.mesh, body.facets, self._model.nodes.x, body.law
         n = criterion.search(room, *where, step, self._clock.t)
         if n > len(room.place):
             room = self._rooms[k] = Candidates.of(2 * n)

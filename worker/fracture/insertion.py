@@ -26,17 +26,29 @@ class Insertion:
 
     def facets(self, b: Breaking, nodes: Nodes, split: Split) -> Facets:
         """Those that break and whose first side is here, at the present positions."""
-        f, block = b.facets, b.body.block
+        f = b.facets
         before = np.concatenate([f.nodes, f.nodes], axis=1)
         after = split.followed_sides(before, nodes.id, f.tets)
         places, faces = f.sides[:, 0, 1:].astype(np.int64).T.copy()
         size = criterion.areas(b.body.mesh.tets, places, faces, nodes.x)
         frequency = 4.0 * self._unused / self.longest**2
         m, stiffness = len(size), 3.0 * f.mass / _SHARES * frequency / size
+        weight = b.body.law.weight
+        along = (frames(nodes.x, before)[:, 0] * f.traction[:, :3]).sum(axis=1)
+        share = shear_share(along, f.traction[:, :3], weight)
         return inserted(
             nodes, before, after, f.tets, f.traction[:, :3], f.traction[:, 3],
-            np.full(m, b.body.tough.energy), np.full(m, block.shear_weight), stiffness, size,
+            b.body.tough.energies(share), np.full(m, weight), stiffness, size,
         )  # fmt: skip
+
+
+def shear_share(along: Floats, traction: Floats, weight: float) -> Floats:
+    """(m,) of shear in the square of the effective traction: w t_s^2 / (<t_n>^2 + w t_s^2); ``along`` (m,) the
+    ``traction`` (m, 3) on the normal, Pa.
+    """
+    shear = weight * np.maximum((traction * traction).sum(axis=1) - along * along, 0.0)
+    whole = np.maximum(along, 0.0) ** 2 + shear
+    return np.asarray(shear / np.where(whole > 0.0, whole, 1.0))
 
 
 def inserted(

@@ -1,4 +1,4 @@
-"""Facets whose two tets are on different ranks: both ranks find the same mean of the tractions of either side.
+"""Facets whose two tets are on different ranks, or in two blocks: both sides find the same mean of the two tractions.
 
 A facet breaks only where one of its tets would break it alone, so two ranks exchange tractions only in steps in which
 such a facet is among those they share. Whether there is one they tell each other with the forces of shared nodes.
@@ -23,23 +23,32 @@ class Interface:
         mine = np.concatenate([np.zeros((0, 5), np.int64), *(_rows(b, body) for b, body in enumerate(bodies))])
         told = comm.swap({other.rank: mine[:, [0, 2]] for other in neighbours}) if comm.size > 1 else {}
         met = {rank: _met(mine, words.reshape(-1, 2)) for rank, words in told.items()}
+        met[comm.rank] = _met(mine, mine[:, [0, 2]])
         table = np.concatenate([np.zeros((0, 6), np.int64), *met.values()])
-        m = len(table)
-        places = {other.rank: k for k, other in enumerate(neighbours)}
+        m, last = len(table), len(neighbours)
+        places = {other.rank: k for k, other in enumerate(neighbours)} | {comm.rank: last}
         of = np.repeat(np.array([places[rank] for rank in met], np.int64), [len(rows) for rows in met.values()])
+        self._inner: Ints = np.flatnonzero(of == last)
+        """Rows of facets between two blocks of this rank."""
+        self._partner = _partners(table[self._inner])
+        """Of each of these the row of its other side, among them."""
         self.facets = InterfaceFacets(
             np.column_stack([table[:, 3], table[:, 0] % 4]).astype(np.int32), table[:, 0] < table[:, 1],
             np.ascontiguousarray(table[:, 5]).view(np.float64), np.zeros((m, 3)), np.zeros((m, 3)),
-            of, np.zeros(len(neighbours), np.int64),
+            of, np.zeros(last + 1, np.int64), np.full((m, 3), -1, np.int32),
         )  # fmt: skip
+        blocks = np.array([body.index for body in bodies], np.int64)[table[self._inner, 4]]
+        here = np.column_stack([blocks, self.facets.sides[self._inner]])
+        self.facets.there[self._inner] = here[self._partner]
         self._bodies = bodies
         self.of_body: list[Ints] = [np.flatnonzero(table[:, 4] == b) for b in range(len(bodies))]
         """For each body the rows of its facets."""
+        self._outer = [rows[of[rows] != last] for rows in self.of_body]
         ends = np.cumsum([0, *map(len, met.values())])
         own, theirs = self.facets.own.view(np.int64), self.facets.theirs.view(np.int64)
         self._exchanges: dict[int, Exchange] = {
             places[rank]: comm.exchange([(rank, own[a:b])], [(rank, theirs[a:b])], Tag.TRACTION)
-            for rank, a, b in zip(met, ends[:-1], ends[1:], strict=True) if b > a
+            for rank, a, b in zip(met, ends[:-1], ends[1:], strict=True) if b > a and rank != comm.rank
         }  # fmt: skip
         """By the place of the neighbour."""
         self.hot = False
@@ -50,15 +59,27 @@ class Interface:
         tet of a shared node has an overstressed face.
         """
         self.facets.hot[:] = 0
-        for body, rows in zip(self._bodies, self.of_body, strict=True):
+        for body, rows in zip(self._bodies, self._outer, strict=True):
             if hot and len(rows):
                 criterion.mark_shared(self.facets, rows, body.mesh, body.block.hot)
-        return self.facets.hot
+        return self.facets.hot[:-1]
 
     def hear(self, words: Ints) -> None:
         """Takes what the neighbours have told."""
-        np.maximum(self.facets.hot, words, out=self.facets.hot)
+        np.maximum(self.facets.hot[:-1], words, out=self.facets.hot[:-1])
         self.hot = bool(self.facets.hot.any())
+
+    def look(self, hot: bool) -> None:
+        """When all tets of the rank are done: which facets between its blocks are overstressed, where some face is,
+        ``hot``.
+        """
+        if len(self._inner):
+            self.facets.hot[-1] = 0
+            for body, rows in zip(self._bodies, self.of_body, strict=True):
+                some = rows[self.facets.there[rows, 0] >= 0]
+                if hot and len(some):
+                    criterion.mark_shared(self.facets, some, body.mesh, body.block.hot)
+            self.hot = bool(self.facets.hot.any())
 
     def exchange(self, x: Floats) -> None:
         """Completes the tractions of both sides at the positions ``x`` (nodes, 3), where some facet is overstressed;
@@ -69,6 +90,7 @@ class Interface:
         for body, rows in zip(self._bodies, self.of_body, strict=True):
             if len(rows):
                 criterion.own_tractions(self.facets, rows, body.mesh, x)
+        self.facets.theirs[self._inner] = self.facets.own[self._inner[self._partner]]
         asked = [exchange for k, exchange in self._exchanges.items() if self.facets.hot[k]]
         for exchange in asked:
             exchange.begin()
@@ -83,8 +105,8 @@ class Interface:
 
 def _rows(index: int, body: Body) -> Ints:
     """(k, 5) own side, other side (4 * tet + face), bits of the mass, place and body of facets with a tet elsewhere."""
-    place, face = np.nonzero(body.mesh.beside == ELSEWHERE)
     block = body.block
+    place, face = np.nonzero((body.mesh.beside == ELSEWHERE) & body.has(block.across))
     own, mass = 4 * block.id[place] + face, block.row(MASS)[place].view(np.int64)
     return np.column_stack([own, block.across[place, face], mass, place, np.full(len(place), index)])
 
@@ -96,3 +118,9 @@ def _met(mine: Ints, theirs: Ints) -> Ints:
     met = theirs[at, 0] == mine[:, 1] if len(theirs) else np.zeros(len(mine), bool)
     rows = np.column_stack([mine[met], theirs[at[met], 1]])
     return np.asarray(rows[np.argsort(rows[:, :2].min(axis=1))])
+
+
+def _partners(table: Ints) -> Ints:
+    """(m,) the row of the other side, of rows (m, 6) (``_met``) of facets both of whose sides are among them."""
+    order = np.argsort(table[:, 0])
+    return np.asarray(order[np.searchsorted(table[order, 0], table[:, 1])])

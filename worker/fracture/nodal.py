@@ -82,7 +82,7 @@ def replace(found: Candidates, shared: InterfaceFacets, body: Body, stress: Floa
     """The tractions of candidates of ``body`` from the ``stress`` (nodes, 6) of their nodes, made as small as the
     effective one of the two tets where they pass it; at the positions ``x`` (nodes, 3).
     """
-    _replace(found, shared, body.mesh, stress, x, body.block.shear_weight, body.spec.friction)
+    _replace(found, shared, body.mesh, stress, x, body.law.weight, body.spec.friction)
 
 
 @njit(types.void(CANDIDATES, INTERFACE, MESH, POINTS, POINTS, types.float64, types.float64), cache=True)

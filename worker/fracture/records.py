@@ -41,22 +41,26 @@ class FacetTable(NamedTuple):
 
 
 class InterfaceFacets(NamedTuple):
-    """Facets whose other tet is on another rank, by rank and id of the facet."""
+    """Facets whose other tet is on another rank, or in another block of this one, by rank and id of the facet; those
+    between blocks have a row for either side."""
 
     sides: Indices
     """(m, 2) place and face of this rank's tet."""
     first: Flags
     """(m,) whether this rank has the tet of smaller id."""
     mass: Floats
-    """(m,) of the other rank's tet, kg."""
+    """(m,) of the other tet, kg."""
     own: Floats
     """(m, 3) traction of this rank's tet on the outward normal of the tet of smaller id, Pa."""
     theirs: Floats
-    """(m, 3) that of the other rank's tet."""
+    """(m, 3) that of the other tet."""
     of: Ints
-    """(m,) index of the other rank among the neighbours."""
+    """(m,) index of the other rank among the neighbours, and behind them for this one."""
     hot: Ints
-    """(neighbours,) 1 where some facet shared with that rank is overstressed on either side, else 0."""
+    """(neighbours + 1,) 1 where some facet shared with that rank is overstressed on either side, else 0; the last one:
+    of facets between two blocks of this rank."""
+    there: Indices
+    """(m, 3) block, place and face of the other tet of a facet between two blocks of this rank, else -1."""
 
 
 class Law(NamedTuple):
@@ -123,7 +127,7 @@ POINTS = _F2
 """Of positions; the others are those of the records."""
 MESH = record(Mesh, types.uint32[:, ::1], _I1, _N2, _N2, types.uint8[:, ::1], types.uint8[::1], _F1, types.int64)
 TABLE = record(FacetTable, _F2, _F2, _I2)
-INTERFACE = record(InterfaceFacets, _N2, _B1, _F1, _F2, _F2, _I1, _I1)
+INTERFACE = record(InterfaceFacets, _N2, _B1, _F1, _F2, _F2, _I1, _I1, _N2)
 LAW = record(Law, types.float64, types.float64, types.float64)
 CANDIDATES = record(Candidates, _I1, _I1, _I1, _F2)
 BREAKING = record(BreakingFacets, _I2, _N2, _N3, _B1, _F2, _F1)

@@ -40,14 +40,10 @@ def warnings(part: Part, tough: Toughness, size: float, safety: float) -> list[s
         "%s breaks at %.4g MPa with %.4g J/m^2: cohesive zone %.3g mm, elements %.3g mm, %.3g to 1",
         part.name, tough.strength * 1e-6, tough.energy, tough.zone * 1e3, size * 1e3, ratio,
     )  # fmt: skip
-    if ratio > _RESOLVED * (1.0 + _ROUNDING):
+    if text := unresolved(tough, size):
         lower = "fracture.resolve = 'strength' keeps it and lowers the strength"
         more = f"fracture.resolution = {1.0 / _RESOLVED:.0f} keeps it and lowers the strength further"
-        told.append(
-            f"elements of {size * 1e3:.3g} mm in a cohesive zone of {tough.zone * 1e3:.3g} mm, "
-            f"{ratio:.3g} to 1, resolved below {_RESOLVED:.2g}: the mesh decides on the energy of fracture; "
-            f"{more if spec.resolve == 'strength' else lower}"
-        )
+        told.append(f"{text}; {more if spec.resolve == 'strength' else lower}")
     drawn = max(*part.stretch.rate, 0.0) if part.stretch is not None else 0.0
     opening = (tough.strength / tough.impedance + drawn * size) * step
     if spec.model == "cohesive" and opening > tough.critical:
@@ -57,6 +53,17 @@ def warnings(part: Part, tough: Toughness, size: float, safety: float) -> list[s
             f"fracture.resolve = 'strength', or numerics.dt_safety below {safety * tough.critical / opening:.2g}"
         )
     return told
+
+
+def unresolved(tough: Toughness, size: float) -> str:
+    """That elements of edge ``size``, m, do not resolve the cohesive zone; nothing where they do."""
+    ratio = size / tough.zone
+    if ratio <= _RESOLVED * (1.0 + _ROUNDING):
+        return ""
+    return (
+        f"elements of {size * 1e3:.3g} mm in a cohesive zone of {tough.zone * 1e3:.3g} mm, "
+        f"{ratio:.3g} to 1, resolved below {_RESOLVED:.2g}: the mesh decides on the energy of fracture"
+    )
 
 
 def told_once(told: dict[str, list[str]]) -> list[str]:

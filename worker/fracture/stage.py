@@ -12,19 +12,18 @@ neither a node of what breaks nor a copy of the surface of a rank that has some 
 
 import numpy as np
 
-from conoid.cases.library import material as find_material
+from conoid.cases.joined import breakable, cohesive
 from conoid.cases.schema import Case
 
 from ..clock import Clock
 from ..contact.stage import Contact
 from ..elements.forms import Elements
-from ..materials.elementary import power
 from ..migration.parcel import Parcel
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour
 from ..state import Ints, Model
 from ..topology import KeptByNode
-from . import facets, resolution
+from . import facets
 from .breaking import Breaking
 from .cohesive import Cohesion
 from .facets import Body
@@ -33,7 +32,7 @@ from .initiation import Initiation
 from .insertion import Insertion
 from .release import Release
 from .separation import Separation
-from .strength import toughness
+from .terms import Terms
 from .update import TopologyUpdate
 
 NOTHING, OVERSTRESSED, BREAKS = range(3)
@@ -62,7 +61,7 @@ class Fracture:
         self._found: list[Breaking] | None = None
         """What breaks in this step; None before that is known."""
         self.cohesion: Cohesion | None = None
-        if any(spec.model == "cohesive" for spec in specs):
+        if cohesive(case):
             self.cohesion = elements.cohesion = Cohesion(work)
             self._release = Release(self.cohesion, model.nodes, neighbours, comm)
 
@@ -84,6 +83,7 @@ class Fracture:
         """
         self.initiation.begin_step()
         hot, self._found, touched[:] = self._elements.hot, None, 0
+        self.initiation.interface.look(hot)
         if self.initiation.smooth:
             return BREAKS if hot else NOTHING
         self._found = self.initiation.breaking(hot)
@@ -137,24 +137,15 @@ class Fracture:
 
     def _armed(self, case: Case) -> tuple[list[Body], float, list[str]]:
         """The bodies, the order of magnitude of the work on a facet, J, and what the user should know of the mesh."""
-        model, bodies, work, safety = self._model, list[Body](), 0.0, case.numerics.dt_safety
-        told: dict[str, list[str]] = {}
-        for index, part in enumerate(case.parts):
-            if part.fracture is None:
-                continue
-            material = find_material(case, part.material)
-            volume = float(model.mean_volumes[index])
-            size = resolution.edge(volume)
-            tough = toughness(material, part.fracture, size)
-            work = max(work, tough.energy * power(volume, 2.0 / 3.0))
-            for text in resolution.warnings(part, tough, size, safety):
-                told.setdefault(text, []).append(part.name)
-            here = [(i, block) for i, block in enumerate(model.blocks) if block.part == index]
-            bodies += [facets.arm(i, block, part.fracture, tough, model.nodes.x0) for i, block in here]
-        return bodies, work, resolution.told_once(told)
+        model, bodies, terms = self._model, list[Body](), Terms(case, self._model)
+        for index, may in enumerate(breakable(case)):
+            here = [(i, block) for i, block in enumerate(model.blocks) if may and block.part == index]
+            for i, block in here:
+                bodies += facets.arm(i, block, terms.own(index), terms.bonds(index), model.nodes.x0)
+        return bodies, terms.work, terms.warnings()
 
     def _break(self, broken: list[Breaking], touched: Ints) -> None:
         split = self.separation.separate(touched)
-        cohesive = [b.take(b.facets.first) for b in broken if b.body.spec.model == "cohesive"]
-        fresh = [self._insertion.facets(b, self._model.nodes, split) for b in cohesive]
+        glued = [b.take(b.facets.first) for b in broken if b.body.spec.model == "cohesive"]
+        fresh = [self._insertion.facets(b, self._model.nodes, split) for b in glued]
         self._update.apply(broken, split, fresh, self.cohesion)

@@ -6,10 +6,13 @@ and with the energy as its area it gives t_c = density * c * energy / strength^2
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
+from conoid.cases.bonds import SharedBond
 from conoid.cases.materials import Brittle, Material, Scatter
 from conoid.cases.schema import Fracture
 
@@ -33,6 +36,8 @@ class Toughness:
     speed: float
     """Of plane waves, m/s."""
     density: float
+    shear_energy: float | None = None
+    """J/m^2, of a bond in shear; None where it is ``energy``."""
 
     @property
     def impedance(self) -> float:
@@ -43,6 +48,16 @@ class Toughness:
     def critical(self) -> float:
         """Opening at which nothing is left, m."""
         return 2.0 * self.energy / self.strength
+
+    def energies(self, share: Floats) -> Floats:
+        """(m,) J/m^2, of facets that break with a ``share`` (m,) of shear in the square of the effective traction.
+
+        On a straight way of opening that is the share of the work that shear does, and the two add up to what breaks
+        the facet by w_n / energy + w_s / shear_energy = 1 (Reeder and Crews 1990, linear; docs/numerics.md, Bonds).
+        """
+        if self.shear_energy is None:
+            return np.full(len(share), self.energy)
+        return np.asarray(1.0 / ((1.0 - share) / self.energy + share / self.shear_energy))
 
     def strengths(self, face: Ints, area: Floats) -> Floats:
         """(n,) strengths, Pa, of facets with these ids and areas, m^2."""
@@ -79,17 +94,47 @@ def toughness(material: Material, spec: Fracture, size: float) -> Toughness:
     """The constants of a part whose tets have the mean edge ``size``, m."""
     brittle = material.brittle
     assert brittle is not None
-    elastic = material.elastic
-    plane = elastic.young / (1.0 - elastic.poisson**2)
-    strength = brittle.strength
+    plane, strength = _plane(material), brittle.strength
     if spec.resolve == "strength":
         strength = min(strength, math.sqrt(_zone(plane, brittle.energy) / (spec.resolution * size)))
-    lame = elastic.young * (1.0 - elastic.poisson) / ((1.0 + elastic.poisson) * (1.0 - 2.0 * elastic.poisson))
-    speed = math.sqrt(lame / material.density)
+    speed = _speed(material)
     return Toughness(
         strength, brittle.energy, _scaled(brittle, strength), spec.delay * material.density * speed * brittle.energy,
         _zone(plane, brittle.energy) / strength**2, speed, material.density,
     )  # fmt: skip
+
+
+UNBREAKABLE = Toughness(math.inf, 0.0, None, 0.0, math.inf, 1.0, 1.0)
+"""Of facets that never break."""
+
+
+def of_bond(bond: SharedBond, materials: Sequence[Material]) -> Toughness:
+    """The constants of a bond between parts of two ``materials``: the zone is that of the softer one."""
+    (strength, _), (energy, shear_energy) = bond.strengths, bond.energies
+    soft = min(materials, key=_plane)
+    return Toughness(
+        strength, energy, None, 0.0, _zone(_plane(soft), energy) / strength**2, _speed(soft), soft.density,
+        shear_energy if shear_energy != energy else None,
+    )  # fmt: skip
+
+
+def terms(bond: SharedBond) -> Fracture:
+    """How the facets of a bond break: at once where they pass, by both strengths, with the energies that are given."""
+    normal, shear = bond.strengths
+    model: Literal["cohesive", "instant"] = "cohesive" if bond.cohesive else "instant"
+    return Fracture(model=model, shear_weight=(normal / shear) ** 2, delay=0.0)
+
+
+def _plane(material: Material) -> float:
+    """E / (1 - nu^2), Pa."""
+    return material.elastic.young / (1.0 - material.elastic.poisson**2)
+
+
+def _speed(material: Material) -> float:
+    """Of plane waves, m/s."""
+    elastic = material.elastic
+    lame = elastic.young * (1.0 - elastic.poisson) / ((1.0 + elastic.poisson) * (1.0 - 2.0 * elastic.poisson))
+    return math.sqrt(lame / material.density)
 
 
 def _zone(plane: float, energy: float) -> float:

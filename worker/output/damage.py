@@ -8,6 +8,7 @@ has.
 import numpy as np
 
 from conoid.cases.fields import counting, damageable
+from conoid.cases.joined import cohesive
 from conoid.cases.schema import Case
 
 from ..fracture.cohesive import Cohesion
@@ -20,15 +21,14 @@ def damage(case: Case, model: Model, cohesion: Cohesion | None, comm: Comm) -> l
     """For each block (n,) the damage of its tets; None where no part can be damaged so. All ranks take part."""
     if not damageable(case):
         return None
-    cohesive = {i for i, part in enumerate(case.parts) if part.fracture and part.fracture.model == "cohesive"}
     limits = {i: p.erosion.plastic_strain for i, p in enumerate(case.parts) if p.erosion and p.erosion.plastic_strain}
-    counted = counting(case)
+    counted, glued = counting(case), cohesive(case)
     held, spent = _facets(cohesion, comm) if cohesion is not None else (np.zeros((0, 2), np.int64), np.zeros(0))
     found = []
     for block in model.blocks:
         values = _strained(block, limits.get(block.part))
         values = np.maximum(values, block.row(DAMAGE)) if block.part in counted else values
-        found.append(np.maximum(values, _broken(block, held, spent)) if block.part in cohesive else values)
+        found.append(np.maximum(values, _broken(block, held, spent)) if block.part in glued else values)
     return found
 
 

@@ -1,0 +1,170 @@
+"""Bonds that break: what it takes, in tension, in shear and in both; where a part fractures besides; any cut."""
+
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+
+from conoid.worker import digest, step
+from conoid.worker.simulation import Simulation
+
+from ..worker.joints import bar, joint
+from ..worker.kernels import FORMS, Form
+from ..worker.simulations import kept_again, on
+
+AREA = 9e-6
+_, PARTS = bar((3, 3, 6), 1e-3, 3e-3, 0.1)
+BOND = {"strength": "20 MPa", "shear_strength": "30 MPa", "energy": "10 J/m^2", "shear_energy": "25 J/m^2"}
+
+
+class Ended(NamedTuple):
+    """What a run has left."""
+
+    spent: float
+    """Of energy in the bond, over its area, J/m^2."""
+    broken: int
+    residual: float
+    digest: str | None
+    fragments: int
+    momentum: tuple[float, float, float]
+
+
+def drawn(x: str, z: str) -> list[dict[str, Any]]:
+    """The lower end stands, the upper one is drawn; nothing moves along y."""
+    below, above = [-1, -1, "0.1 mm"], [-1, -1, "5.9 mm"]
+    return [
+        {"kind": "velocity", "x": 0, "z": 0, "low": [-1, -1, -1], "high": [1, 1, below[2]]},
+        {"kind": "velocity", "x": x, "z": z, "low": above, "high": [1, 1, 1]},
+    ]
+
+
+def run(sim: Simulation) -> Ended:
+    return _run(sim, lambda sim: sim)
+
+
+def _run(sim: Simulation, between: Any) -> Ended:
+    step.prepare(sim)
+    end, residual, half = sim.case.run.end_time, 0.0, True
+    while sim.clock.t < end:
+        if half and sim.clock.t > 0.5 * end:
+            sim, half = between(sim), False
+        before = sim.model.nodes.v.copy()
+        step.first_half(sim)
+        energy = sim.ledger.close(before)
+        residual = max(residual, energy.residual)
+        step.second_half(sim)
+    assert sim.record is not None
+    assert sim.fracture is not None
+    sim.record.look()
+    known = digest.digest(sim.model, sim.comm, sim.elements.nodal)
+    return Ended(
+        (energy.fracture + energy.cohesive) / AREA, sim.fracture.broken, residual, known, sim.record.count,
+        tuple(sim.ledger.momentum.tolist()),
+    )  # fmt: skip
+
+
+def test_a_bond_that_is_pulled_apart_takes_its_energy() -> None:
+    case = joint(("alumina", "steel"), BOND, boundaries=drawn("0 m/s", "2 m/s"), run={"end_time": "3 us"})
+    (ended,) = on(1, case, PARTS, run)
+    assert ended.spent == pytest.approx(10.0, rel=0.02)
+    assert (ended.broken, ended.fragments) == (18, 2)
+    assert ended.residual < 1e-4
+
+
+@pytest.mark.parametrize(("x", "z", "least", "most"), [(1.0, 0.0, 25.0, 25.0), (1.0, 1.0, 10.0, 25.0)])
+def test_a_bond_in_shear_takes_what_the_share_of_shear_makes_of_both_energies(
+    x: float, z: float, least: float, most: float
+) -> None:
+    """All nodes move along one line, so that no facet turns: then the traction that breaks a facet has one direction,
+    and w_n / 10 + w_s / 25 = 1 says what it takes, w_n and w_s the shares of the work of both modes."""
+    slide = {"kind": "velocity", "y": 0, "low": [-1, -1, -1], "high": [1, 1, 1]}
+    if z == 0.0:
+        slide["z"] = 0
+    ends = drawn(f"{2.0 * x} m/s", f"{2.0 * z} m/s")
+    for end in ends if z == 0.0 else ():
+        del end["z"]
+    case = joint(("alumina", "steel"), BOND, boundaries=[slide, *ends], run={"end_time": "4 us"})
+    ((ended, expected),) = on(1, case, PARTS, _with_shares)
+    assert ended.fragments == 2
+    assert ended.spent == pytest.approx(expected, rel=0.02)
+    assert least * 0.999 <= expected <= most * 1.001
+
+
+def _with_shares(sim: Simulation) -> tuple[Ended, float]:
+    """Besides, the mean energy by the tractions that have broken the facets."""
+    found: list[float] = []
+    assert sim.fracture is not None
+    insertion = sim.fracture._insertion
+    made = insertion.facets
+
+    def noted(breaking: Any, *more: Any) -> Any:
+        facets = made(breaking, *more)
+        t, x, nodes = breaking.facets.traction[:, :3], sim.model.nodes.x, breaking.facets.nodes
+        normal = np.cross(x[nodes[:, 1]] - x[nodes[:, 0]], x[nodes[:, 2]] - x[nodes[:, 0]])
+        normal /= np.linalg.norm(normal, axis=1)[:, None]
+        along = (normal * t).sum(axis=1)
+        shear = (2.0 / 3.0) ** 2 * np.maximum((t * t).sum(axis=1) - along**2, 0.0)
+        share = shear / (np.maximum(along, 0.0) ** 2 + shear)
+        found.extend((facets.constants.area / ((1.0 - share) / 10.0 + share / 25.0)).tolist())
+        return facets
+
+    insertion.facets = noted  # type: ignore[method-assign]
+    return run(sim), sum(found) / AREA
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_ranks_and_a_restart_change_no_bit_where_a_bond_breaks(form: Form, tmp_path: Path) -> None:
+    case = joint(
+        ("soda_lime", "steel"), {**BOND, "strength": "8 MPa", "shear_strength": "8 MPa"}, numerics={"pressure": form},
+        boundaries=drawn("3 m/s", "4 m/s"), run={"end_time": "2 us"}, lower={"fracture": {"model": "cohesive"}},
+    )  # fmt: skip
+    (one,) = on(1, case, PARTS, run)
+    assert one.broken >= 18
+    for ranks in (2, 3, 7):
+        assert on(ranks, case, PARTS, run)[0] == one
+    again = on(2, case, PARTS, lambda sim: _run(sim, lambda sim: kept_again(sim, case, tmp_path)))[0]
+    assert again == one
+
+
+def test_a_bond_without_energy_lets_go_at_its_strength_and_one_without_strength_holds() -> None:
+    """Also where both of its parts break."""
+    keys: dict[str, Any] = {"boundaries": drawn("0 m/s", "2 m/s"), "run": {"end_time": "1.5 us"}}
+    (ended,) = on(1, joint(("alumina", "steel"), {"strength": "20 MPa"}, **keys), PARTS, run)
+    assert (ended.broken, ended.fragments, ended.spent) == (18, 2, 0.0)
+    fracture = {"fracture": {"delay": 0}}
+    keys["boundaries"] = drawn("0 m/s", "8 m/s")
+    glass = joint(("soda_lime", "soda_lime"), **keys, lower=fracture, upper=fracture)
+    ((held, between),) = on(1, glass, PARTS, _torn)
+    assert held.broken > 0
+    assert between == 0
+
+
+def _torn(sim: Simulation) -> tuple[Ended, int]:
+    """Besides, how many facets between the two parts have broken."""
+    ended = run(sim)
+    first, block = sim.model.part_starts[1], sim.model.blocks[0]
+    return ended, int((block.bond[block.across // 4 >= first] != 0).sum())
+
+
+def test_what_a_bond_has_let_go_meets_in_contact() -> None:
+    """Pulled apart and pushed back: the parts bear the pressure, and none goes into the other."""
+    course = [[0, 1], ["1.5 us", 1], ["1.6 us", -1], ["5 us", -1]]
+    ends = drawn("0 m/s", "2 m/s")
+    ends[1]["course"] = course
+    case = joint(("alumina", "steel"), {**BOND, "energy": 0, "shear_energy": 0}, boundaries=ends,
+                 run={"end_time": "4 us"})  # fmt: skip
+
+    def gaps(sim: Simulation) -> tuple[Ended, float, float]:
+        ended, nodes = run(sim), sim.model.nodes
+        heights = []
+        for block in sim.model.blocks:
+            own = np.unique(block.tets)
+            own = own[np.abs(nodes.x0[own, 2] - 3e-3) < 1e-9]
+            heights.append(nodes.x[own[np.lexsort(nodes.x0[own, :2].T)], 2])
+        return ended, float((heights[1] - heights[0]).min()), float(nodes.x[:, 2].max() - 6e-3)
+
+    ((ended, gap, pushed),) = on(1, case, PARTS, gaps)
+    assert ended.broken == 18
+    assert pushed < -1e-6
+    assert gap > -2e-8
