@@ -82,9 +82,7 @@ def test_every_refusal_is_told_at_once(folder: Path) -> None:
     ]
 
 
-SHARED = (
-    r"parts: 'part0' and 'part1' share 3 nodes of 'two.inp', but would be separate bodies that only touch: give "
-)
+SHARED = r"parts: 'part0' and 'part1' share 3 nodes of 'two.inp', but would be separate bodies that only touch: give "
 
 
 @pytest.mark.parametrize("contact", ["none", {}])
