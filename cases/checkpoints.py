@@ -17,7 +17,7 @@ import msgspec
 
 from . import layout, whole
 
-FORMAT = 17
+FORMAT = 18
 """Of the files; 17 has the compression that brittle parts have met, and the heat that eroded. Others are not read."""
 MANIFEST, SEAL = "manifest.json", "manifest.sha256"
 _FILE = re.compile(r"rank-[0-9]+\.h5")

@@ -3,7 +3,7 @@
 ::
 
     <run>/fragments/fragments_0012.csv   one line a fragment, those of frame 12
-    <run>/fragments/genealogy.csv        one line a new fragment: frame, whom it broke off from, its label, tets
+    <run>/fragments/genealogy.csv        one line a new fragment: frame, parent, child, tets
 """
 
 import csv
@@ -26,7 +26,8 @@ COLUMNS: dict[str, str] = {
     **{f"high_{i}": "m" for i in _AXES},
     "extent": "m", "new_surface": "m^2",
 }  # fmt: skip
-"""Columns and their units. ``label`` is the smallest global tet id; angular momentum and inertia are about the centre;
+"""Columns and their units. ``label`` is the number of the fragment, from 0 on: the largest piece of a fragment that
+breaks keeps it, by tets, and the others get new ones; angular momentum and inertia are about the centre;
 translation, rotation and deformation share the kinetic energy; ``extent`` is the longest side of the box from low to
 high; ``new_surface`` is the initial area of broken faces, both sides of a crack."""
 _WHOLE = ("label", "tets", "nodes")

@@ -43,7 +43,7 @@ _STRAINED = "#d9dfe6", "#f7d889", "#f49a3d", "#d4432c", "#7c0f34"
 @dataclass(frozen=True)
 class Field:
     """How a field is shown: value times ``factor`` is in ``unit``; ``kind`` is linear, centred on 0, classes, or
-    fragments: a colour each, the largest one grey.
+    fragments: a colour each, muted for what was there at the start.
 
     ``colours`` is a map of matplotlib's, or colours to blend.
     """

@@ -233,8 +233,9 @@ def _add_body(plotter: Any, surface: Any, field: Field, picture: Picture, scale:
         "show_edges": picture.look.edges, "edge_color": INK, "edge_opacity": 0.25,
     }  # fmt: skip
     if scale is None:
-        paint = scales.class_colours if field.kind == "classes" else scales.fragment_colours
-        surface.cell_data["colours"] = paint(surface["shown"])
+        shown, bodies = surface["shown"], max(len(picture.parts), 1)
+        named = scales.class_colours(shown) if field.kind == "classes" else scales.fragment_colours(shown, bodies)
+        surface.cell_data["colours"] = named
         flat = {"smooth_shading": False} if field.kind == "fragments" else {}
         drawn = plotter.add_mesh(surface, **{**look, "scalars": "colours", "rgb": True, **flat})
     else:

@@ -13,8 +13,10 @@ PALETTE = (
 )  # fmt: skip
 NAMED = ("classes", "fragments")
 """Kinds of fields whose values are names."""
-WHOLE = "#c9d3dc"
-"""Of the fragment that is largest to the eye."""
+BODIES = "#c9d3dc", "#d9cbb3", "#b7c9bd", "#c9bddb", "#dcc0c0", "#bcd2d8"
+"""Of what was there at the start: muted, so that what has broken off stands out."""
+_GOLDEN, _KNUTH = np.uint64(0x9E3779B97F4A7C15), np.uint64(2654435761)
+"""2^64 and 2^32 over the golden ratio: multiples of them are far from each other (Knuth, volume 3, 6.4)."""
 _PARTS = 6
 """Parts of a colour bar, at most. Chosen."""
 
@@ -63,11 +65,17 @@ def class_colours(values: Any) -> Any:
     return np.array([rgb(PALETTE[i % len(PALETTE)]) for i in np.asarray(values).astype(int)], np.uint8).reshape(-1, 3)
 
 
-def fragment_colours(values: Any) -> Any:
-    """One colour (n, 3) a fragment, by its name, so that it keeps it from frame to frame; the largest one is grey."""
-    names, which, faces = np.unique(np.asarray(values).astype(np.int64), return_inverse=True, return_counts=True)
-    # splitmix64: neighbouring names get colours that have nothing to do with each other
-    scrambled = (names.astype(np.uint64) + np.uint64(1)) * np.uint64(0x9E3779B97F4A7C15) >> np.uint64(40)
-    colours = np.array([rgb(colour) for colour in PALETTE], np.uint8)[scrambled % np.uint64(len(PALETTE))]
-    colours[np.argmax(faces)] = rgb(WHOLE)
+def fragment_colours(values: Any, bodies: int) -> Any:
+    """One colour (n, 3) a fragment, by its number alone, so that it keeps it: web/colours.js has the same. The first
+    ``bodies`` numbers are of what was there at the start.
+    """
+    numbers, which = np.unique(np.asarray(values).astype(np.int64), return_inverse=True)
+    some = numbers.astype(np.uint64)
+    turn = ((some + np.uint64(1)) * _GOLDEN >> np.uint64(40)).astype(float) / 2.0**24
+    light = 0.55 + 0.14 * ((some * _KNUTH & np.uint64(255)).astype(float) / 255.0 - 0.5)
+    k = (np.array([0.0, 8.0, 4.0]) + 12.0 * turn[:, None]) % 12.0
+    share = light[:, None] - 0.2 * np.maximum(-1.0, np.minimum(np.minimum(k - 3.0, 9.0 - k), 1.0))
+    colours = np.floor(255.0 * share + 0.5).astype(np.uint8)
+    whole = numbers < bodies
+    colours[whole] = np.array([rgb(BODIES[i % len(BODIES)]) for i in numbers[whole]], np.uint8).reshape(-1, 3)
     return colours[which.reshape(-1)]

@@ -105,6 +105,7 @@ class Loop:
         self.sim.comm.sent.since_last()
         if not self._start.resumed:
             step.prepare(self.sim)
+            self._number()
         self._record()
         while True:
             self._attend()
@@ -121,6 +122,13 @@ class Loop:
             step.second_half(sim)
             if self.choice is not None and (said := self.choice.step()):
                 self._tell(messages.Log, level="info", text=said)
+
+    def _number(self) -> None:
+        """Numbers the fragments of the start, where no frame does."""
+        record, run = self.sim.record, self.sim.case.run
+        if record is not None and not run.frames:
+            record.look()
+            record.number()
 
     def _attend(self) -> None:
         """What the ranks have agreed on for this step, and what is to be agreed on for the next one."""
@@ -241,7 +249,8 @@ class Loop:
             path = frames.write(self._folder, index, clock.t, sim.model, sim.comm, damage=damaged)
         else:
             self._counter.find(sim)
-            path = frames.write(self._folder, index, clock.t, sim.model, sim.comm, sim.record.labels, damaged)
+            sim.record.number()
+            path = frames.write(self._folder, index, clock.t, sim.model, sim.comm, sim.record.numbers, damaged)
             sim.record.write(self._folder, index, clock.t)
         self._tell_losses()  # what was written is known from now on
         clock.frame += 1

@@ -23,13 +23,17 @@ function between(share) {
   return a.map((low, i) => Math.round(low + (b[i] - low) * (at % 1)));
 }
 
-// A colour that a fragment keeps from snapshot to snapshot, from its id alone; large ones are not always grey.
-export function ofFragment(id) {
+// Of what was there at the start: muted, so that what has broken off stands out.
+const BODIES = ["#c9d3dc", "#d9cbb3", "#b7c9bd", "#c9bddb", "#dcc0c0", "#bcd2d8"];
+
+// The colour of a fragment, by its number alone: scales.py has the same. The first `bodies` numbers are those of the start.
+export function ofFragment(id, bodies) {
   if (id < 0n) return [140, 146, 152];
+  if (id < BigInt(bodies)) return bytes(BODIES[Number(id) % BODIES.length]);
   const turn = Number((BigInt.asUintN(64, (id + 1n) * 0x9e3779b97f4a7c15n)) >> 40n) / 2 ** 24;
-  const light = 0.5 + 0.16 * (Number((id * 2654435761n) & 255n) / 255 - 0.5);
+  const light = 0.55 + 0.14 * (Number((id * 2654435761n) & 255n) / 255 - 0.5);
   return [0, 8, 4].map((n) => {
     const k = (n + turn * 12) % 12;
-    return Math.round(255 * (light - 0.26 * Math.max(-1, Math.min(k - 3, 9 - k, 1))));
+    return Math.floor(255 * (light - 0.2 * Math.max(-1, Math.min(k - 3, 9 - k, 1))) + 0.5);
   });
 }

@@ -68,18 +68,18 @@ export class View3d {
     uniforms.low.value.fromArray(low);
     uniforms.span.value.fromArray(high.map((value, i) => value - low[i]));
     uniforms.middle.value.fromArray(high.map((value, i) => (value + low[i]) / 2));
-    this.rows(snapshot.arrays);
+    this.rows(snapshot.arrays, snapshot.header.parts.length);
     this.colour(this.by ?? "fragment", this.scale);
     if (!this.aimed) this.aim();
   }
 
-  rows({ fragment_centre: centres, fragment_id: ids }) {
+  rows({ fragment_centre: centres, fragment_id: ids }, bodies) {
     const height = Math.max(1, Math.ceil(ids.length / ROWS_WIDTH));
     const places = new Float32Array(4 * ROWS_WIDTH * height);
     const tints = new Uint8Array(4 * ROWS_WIDTH * height);
     for (let row = 0; row < ids.length; row += 1) {
       places.set(centres.subarray(3 * row, 3 * row + 3), 4 * row);
-      tints.set([...ofFragment(ids[row]), 255], 4 * row);
+      tints.set([...ofFragment(ids[row], bodies), 255], 4 * row);
     }
     this.replace("centres", this.texture(places, ROWS_WIDTH, height));
     this.replace("tints", this.texture(tints, ROWS_WIDTH, height));

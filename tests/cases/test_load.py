@@ -73,7 +73,7 @@ def test_all_errors_at_once() -> None:
         "reference[0].value": "'30 s' has the wrong dimension; expected a length, in a unit such as 'm'",
         "extra": found["extra"],
     }
-    assert found["extra"].startswith("unknown key; known: 'balance', 'boundaries', 'contact'")
+    assert found["extra"].startswith("unknown key; known: 'balance', 'bond', 'boundaries', 'contact'")
 
 
 @pytest.mark.parametrize(

@@ -277,10 +277,10 @@ def test_panels_are_laid_so_that_bodies_are_large() -> None:
 
 
 def test_a_fragment_keeps_its_colour_from_frame_to_frame() -> None:
-    early = scales.fragment_colours([0, 0, 0, 7, 9])
-    late = scales.fragment_colours([0, 0, 0, 9, 11])
-    assert (early[4] == late[3]).all()
-    assert tuple(early[0]) == scales.rgb(scales.WHOLE)
+    early = scales.fragment_colours([0, 0, 0, 7, 9], 2)
+    late = scales.fragment_colours([9, 1, 9, 9, 11], 2)
+    assert (early[4] == late[0]).all()
+    assert [tuple(early[0]), tuple(late[1])] == [scales.rgb(body) for body in scales.BODIES[:2]]
 
 
 def test_cameras_are_read() -> None:

@@ -4,6 +4,7 @@ import itertools
 import math
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -13,7 +14,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from conoid.cases import fragments as tables
-from conoid.worker.fracture import connectivity, fragments
+from conoid.worker.fracture import connectivity, fragments, numbers
 from conoid.worker.mesh.faces import FACES, across
 from conoid.worker.parallel.comm import Comm, SerialComm
 from conoid.worker.state import MASS, Block, Model, Nodes, chunked
@@ -320,35 +321,52 @@ def test_a_spinning_block_has_the_momentum_and_energy_of_its_lumped_masses() -> 
     assert row["new_surface"] == 0.0
 
 
-def test_children_know_their_parents() -> None:
-    """More faces break: every child has one parent, and their tets add up."""
-    early, late = body(17, broken=0.5), body(17, broken=0.5)
-    random = np.random.default_rng(1)
-    tet, face = np.nonzero((late.across >= 0) & (late.bond == 0))
-    chosen = random.uniform(size=len(tet)) < 0.5
-    for t, f in zip(tet[chosen], face[chosen], strict=True):
-        other, its = divmod(int(late.across[t, f]), 4)
-        late.bond[t, f] = late.bond[other, its] = 2
-    gone = random.choice(len(early.tets), 20, replace=False)
-    stays = np.setdiff1d(np.arange(len(early.tets)), gone)
-    old, new = early.labels(), late.labels()
-    expected: dict[tuple[int, int], int] = {}
-    for t in stays:
-        key = (int(old[t]), int(new[t]))
-        expected[key] = expected.get(key, 0) + 1
-    for ranks in RANKS:
-        owner = owners(early, ranks, 4)
+def test_the_largest_piece_of_a_fragment_keeps_its_number() -> None:
+    """Faces break and tets erode, four times: by a plain search, and alike on any number of ranks."""
+    b, random, gone = body(17, broken=0.3), np.random.default_rng(1), np.zeros(0, np.int64)
+    known, following = np.full(len(b.tets), numbers.UNKNOWN), 0
+    for _ in range(4):
+        stays = np.setdiff1d(np.arange(len(b.tets)), gone)
+        labels = b.labels()
+        expected, rows = plainly_numbered(known[stays], labels[stays], following)
+        for ranks in RANKS:
+            owner = owners(b, ranks, 4)
 
-        def work(comm: Comm, owner: Ints = owner) -> Ints | None:
-            mine = np.flatnonzero(owner == comm.rank)
-            left = np.intersect1d(mine, stays)[::-1]
-            return fragments.genealogy((mine, old[mine]), (left, new[left]), comm)
+            def work(
+                comm: Comm, of: Ints = owner[stays], stays: Ints = stays, first: int = following
+            ) -> tuple[Any, ...]:
+                mine = stays[of == comm.rank][::-1]
+                found, family = numbers.numbered(known[mine], b.labels()[mine], first, comm)
+                return mine, found, family.tolist()
 
-        rows = on_ranks(ranks, work)[0]
-        assert rows is not None
-        assert {(p, c): n for p, c, n in rows.tolist()} == expected
-        assert rows.tolist() == sorted(rows.tolist())
-        assert len(np.unique(rows[:, 1])) == len(rows) > len(np.unique(rows[:, 0]))
+            got = np.full(len(b.tets), numbers.UNKNOWN)
+            for mine, found, family in on_ranks(ranks, work):
+                got[mine] = found
+                assert family == rows
+            assert (got[stays] == expected).all()
+        known[stays], following = expected, max(following, int(expected.max()) + 1)
+        tet, face = np.nonzero((b.across >= 0) & (b.bond == 0))
+        chosen = random.uniform(size=len(tet)) < 0.2
+        for t, f in zip(tet[chosen], face[chosen], strict=True):
+            other, its = divmod(int(b.across[t, f]), 4)
+            b.bond[t, f] = b.bond[other, its] = 2
+        gone = np.union1d(gone, random.choice(stays, 5, replace=False))
+    assert following > len(np.unique(known[stays])) > 20
+
+
+def plainly_numbered(before: Ints, labels: Ints, following: int) -> tuple[Ints, list[list[int]]]:
+    """As ``numbers.numbered`` says it, by dictionaries."""
+    common: dict[tuple[int, int], int] = {}
+    for key in zip(before.tolist(), labels.tolist(), strict=True):
+        common[key] = common.get(key, 0) + 1
+    named: dict[int, int] = {}
+    for old in {old for old, _ in common if old >= 0}:
+        named[min(((-tets, label) for (was, label), tets in common.items() if was == old))[1]] = old
+    for label in sorted({label for _, label in common} - set(named)):
+        named[label] = following
+        following += 1
+    rows = sorted([old, named[label], tets] for (old, label), tets in common.items())
+    return np.array([named[label] for label in labels.tolist()]), rows
 
 
 def test_a_table_reads_back_to_the_same_bits(tmp_path: Path) -> None:

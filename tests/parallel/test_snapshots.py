@@ -5,10 +5,12 @@ import hashlib
 import os
 import signal
 import time
+from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import pytest
 
@@ -120,6 +122,28 @@ def test_births_are_those_of_the_genealogy(breaking: Callable[[int, str], Path])
     births = dict(zip(got["fragment_id"].tolist(), got["fragment_birth"].tolist(), strict=True))
     assert births == {label: pytest.approx(born[label], rel=1e-6) for label in births}
     assert len(set(births.values())) > 1
+
+
+def test_a_fragment_keeps_its_number_from_frame_to_frame(breaking: Callable[[int, str], Path]) -> None:
+    """Of the tets that had a number in a frame, most have it in the next one, and no number is used again."""
+    frames, used, kept = sorted((breaking(2, FAST) / layout.FRAMES).glob("*.vtkhdf")), set[int](), 0
+    before: dict[int, int] = {}
+    for path in frames:
+        with h5py.File(path) as file:
+            now = dict(zip(*(file["VTKHDF/CellData"][name][...].tolist() for name in ("tet", "fragment")), strict=True))
+        shares: dict[int, Counter[int]] = {}
+        for tet, number in now.items():
+            if tet in before:
+                shares.setdefault(before[tet], Counter())[number] += 1
+        for old, pieces in shares.items():
+            assert pieces[old] == max(pieces.values())
+        kept += len(shares)
+        assert not (set(now.values()) - set(before.values())) & used
+        used |= set(now.values())
+        before = now
+    assert kept > 1
+    assert used == set(range(len(used)))
+    assert len(used) > 10
 
 
 def test_one_is_made_when_asked_for_and_changes_no_bit(tmp_path: Path, breaking: Callable[[int, str], Path]) -> None:

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from conoid.cases import fragments
+from conoid.client import scales
 from conoid.client.snapshots import Snapshot
 from conoid.worker.snapshots import blob
 
@@ -43,6 +44,12 @@ def ask(tmp_path_factory: pytest.TempPathFactory) -> Ask:
         return json.loads(done.stdout)
 
     return asked
+
+
+def test_fragments_have_the_colours_of_pictures(ask: Ask) -> None:
+    numbers = [0, 1, 2, 3, 7, 8, 9, 100, 12_690, 10**6, *np.random.default_rng(3).integers(0, 2**40, 50).tolist()]
+    script = "data.map((id) => page.ofFragment(BigInt(id), 3))"
+    assert ask("colours.js", script, numbers) == scales.fragment_colours(numbers, 3).tolist()
 
 
 @pytest.fixture(scope="module")

@@ -191,24 +191,6 @@ def _finished(rows: "np.ndarray") -> "np.ndarray":
     return rows
 
 
-def genealogy(before: tuple[Ints, Ints], after: tuple[Ints, Ints], comm: Comm) -> Ints | None:
-    """(k, 3) parent, child and how many tets they have in common, ascending, on rank 0, elsewhere None.
-
-    ``before`` and ``after`` are ids and labels of a rank's tets, of an earlier and a later frame; a tet is on the same
-    rank in both. A fragment keeps its label for as long as its smallest tet stays; tets that have eroded are in no row.
-    """
-    ids, old, new = np.intersect1d(before[0], after[0], assume_unique=True, return_indices=True)
-    found, tets = np.unique(np.column_stack([before[1][old], after[1][new]]), axis=0, return_counts=True)
-    pieces = comm.gather(np.column_stack([found, tets]) if len(ids) else np.zeros((0, 3), np.int64))
-    if pieces is None:
-        return None
-    everything = np.concatenate(pieces)
-    rows, at = np.unique(everything[:, :2], axis=0, return_inverse=True)
-    common = np.zeros(len(rows), np.int64)
-    np.add.at(common, at.reshape(-1), everything[:, 2])
-    return np.column_stack([rows, common])
-
-
 def write(folder: Path, index: int, t: float, parts: list[str], rows: "np.ndarray") -> str:
     """Writes the table of frame ``index`` and returns its path relative to the run's folder; whole or not at all.
 

@@ -1,4 +1,4 @@
-"""What a run keeps of its fragments: a table a frame, and who came from whom."""
+"""What a run keeps of its fragments: numbers that last, a table a frame, and from which each broke off."""
 
 import csv
 from pathlib import Path
@@ -7,10 +7,12 @@ import numpy as np
 
 from conoid.cases import fragments as tables
 
+from ..ids import places
 from ..migration.parcel import Parcel, length
 from ..parallel.comm import Comm
 from ..state import Ints, Model
 from . import connectivity, fragments
+from .numbers import UNKNOWN, numbered
 from .stage import Fracture
 
 
@@ -20,26 +22,30 @@ class Record:
     def __init__(self, model: Model, fracture: Fracture, comm: Comm) -> None:
         self._model, self._fracture, self._comm = model, fracture, comm
         self.labels: list[Ints] = []
-        """For each block (n,) the fragment of each tet when they were last found."""
-        self._before: tuple[Ints, Ints] | None = None
+        """For each block (n,) the fragment of each tet when they were last found, as ``connectivity`` calls it."""
+        self.numbers: list[Ints] = []
+        """For each block (n,) the number of that fragment, of the last frame: the same for as long as it lasts."""
+        self._before: tuple[Ints, Ints] = np.zeros(0, np.int64), np.zeros(0, np.int64)
+        """Ids of tets, ascending, and their numbers in the last frame."""
+        self._family: Ints = np.zeros((0, 3), np.int64)
         self.count = 0
         """Fragments when they were last found."""
+        self.initial = self.next = 0
+        """Fragments at the start, whose numbers are the first ones, and the next number that is free."""
 
     def keep(self, parcel: Parcel) -> None:
-        """Adds the fragments of the last frame to a parcel."""
-        parcel.known["record"] = self.count, self._before is not None
-        if self._before is not None:
-            order = np.argsort(self._before[0])
-            ids, labels = self._before[0][order], self._before[1][order]
+        """Adds the numbers of the last frame to a parcel."""
+        parcel.known["record"] = self.count, self.initial, self.next
+        if self.next:
             for table in parcel.tets.values():
-                table["fragment"] = labels[np.searchsorted(ids, table["id"])]
+                table["fragment"] = self._last(table["id"])
 
     def resume(self, parcel: Parcel) -> None:
         """Takes them back."""
-        self.count, looked = parcel.known["record"]
-        if looked:
+        self.count, self.initial, self.next = parcel.known["record"]
+        if self.next:
             tables = [table for table in parcel.tets.values() if length(table)]
-            self._before = _flat([table["id"] for table in tables]), _flat([table["fragment"] for table in tables])
+            self._remember(_flat([table["id"] for table in tables]), _flat([table["fragment"] for table in tables]))
 
     def look(self) -> None:
         """Finds the fragments as they are."""
@@ -48,16 +54,37 @@ class Record:
         self.labels = connectivity.labels(self._model, held, self._comm)
         self.count = connectivity.count(self._model, self.labels, self._comm)
 
+    def number(self) -> None:
+        """Numbers the fragments that were found last; at frames and at the start alone, which are the same in any run
+        of a case: a number is part of its answer.
+        """
+        ids = _flat([block.id for block in self._model.blocks])
+        found, self._family = numbered(self._last(ids), _flat(self.labels), self.next, self._comm)
+        self.next = max(self.next, 1 + int(self._family[:, 1].max(initial=UNKNOWN)))
+        self.initial = self.initial or self.next
+        self._remember(ids, found)
+        self.numbers = np.split(found, np.cumsum([block.n for block in self._model.blocks])[:-1])
+
+    def of_frame(self) -> list[Ints]:
+        """For each block (n,) the numbers in the last frame of the fragments to which tets belonged."""
+        return [self._last(block.id) for block in self._model.blocks]
+
     def write(self, folder: Path, index: int, t: float) -> None:
         """Writes the table of frame ``index`` and adds to the genealogy."""
-        rows = fragments.table(self._model, self.labels, self._comm)
-        now = _flat([block.id for block in self._model.blocks]), _flat(self.labels)
-        family = fragments.genealogy(self._before, now, self._comm) if self._before is not None else None
-        self._before = now
+        rows = fragments.table(self._model, self.numbers, self._comm)
         if rows is not None:
             fragments.write(folder, index, t, self._model.parts, rows)
-        if family is not None:
-            _append(tables.genealogy(folder), index, family[family[:, 0] != family[:, 1]])
+            born = (self._family[:, 0] != self._family[:, 1]) & (self._family[:, 0] != UNKNOWN)
+            if index:
+                _append(tables.genealogy(folder), index, self._family[born])
+
+    def _last(self, ids: Ints) -> Ints:
+        at = places(self._before[0], ids)
+        return np.where(at >= 0, self._before[1][at], UNKNOWN) if len(self._before[0]) else np.full(len(ids), UNKNOWN)
+
+    def _remember(self, ids: Ints, numbers: Ints) -> None:
+        order = np.argsort(ids)
+        self._before = ids[order], numbers[order]
 
 
 def _flat(columns: list[Ints]) -> Ints:

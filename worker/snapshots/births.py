@@ -18,20 +18,15 @@ class Births:
         self._known: dict[int, float] = {}
         self._read = 0
 
-    def at(self, t: float, labels: Ints, first: Ints) -> Floats:
-        """(g,) s, of fragments ``labels`` at time ``t``: the first frame up to then that has them, or ``t`` itself.
-
-        0 for what was there at the start: the fragments of frame 0, or without frames the ``first`` tets of the parts.
+    def at(self, t: float, numbers: Ints, initial: int) -> Floats:
+        """(g,) s, of fragments ``numbers`` at time ``t``: the first frame up to then that has them, or ``t`` itself; 0
+        for the ``initial`` ones, which were there at the start.
         """
         self._catch_up()
-        self._known = self._known or dict.fromkeys(first.tolist(), 0.0)
-        born = {label: time for label, time in self._known.items() if time <= t}
-        return np.array([born.get(label, t) for label in labels.tolist()])
+        born = {number: time for number, time in self._known.items() if time <= t}
+        return np.array([0.0 if number < initial else born.get(number, t) for number in numbers.tolist()])
 
     def _catch_up(self) -> None:
-        start = fragments.path(self._folder, 0)
-        if not self._known and start.exists():  # before any other frame
-            self._known = {int(row["label"]): 0.0 for row in fragments.read(start)}
         path = fragments.genealogy(self._folder)
         if not path.exists():
             return

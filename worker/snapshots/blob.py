@@ -9,6 +9,7 @@ import numpy as np
 from conoid.cases.snapshot import FIELD, Array, Column, Field, Header, pack, size_of
 
 from ..fracture import connectivity
+from ..fracture.numbers import numbered
 from ..parallel.comm import SerialComm
 from ..state import Floats, Ints, Model
 from . import decimate, outline, table
@@ -44,13 +45,13 @@ class Made:
 
 
 Births = Callable[[Ints], Floats]
-"""(g,) times of birth, s, of fragments with these labels."""
+"""(g,) times of birth, s, of fragments with these numbers."""
 
 
 def made(whole: Whole, told: dict[str, Any], births: Births, budget: Budget) -> Made:
     """The snapshot of a model. ``told``: n, step, t and ranks for the header."""
-    labels = connectivity.labels(whole.model, whole.held, SerialComm())
-    every = table.measured(whole, labels)
+    labels = np.concatenate([np.zeros(0, np.int64), *connectivity.labels(whole.model, whole.held, SerialComm())])
+    every = table.measured(whole, numbered(whole.numbers, labels, whole.next, SerialComm())[0])
     columns, row = table.columns(every, births(every.label))
     values, seen = _fields(whole), outline.find(whole.model, every.of)
     room = budget.bytes - _bytes(columns) - _HEADER * (len(columns) + len(values) + 6)

@@ -15,8 +15,6 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from conoid.cases import layout
 from conoid.cases import whole as whole_file
 
@@ -64,9 +62,9 @@ def _made(folder: Path, task: dict[str, Any], births: Births) -> dict[str, Any]:
     finally:
         for path in paths:
             path.unlink(missing_ok=True)
-    first = np.array([block.id.min() for block in whole.model.blocks], np.int64)
+    initial = whole.initial or whole.model.elements_global  # nothing breaks: all were there
     told = {name: task[name] for name in ("n", "step", "t", "ranks")}
-    made = blob.made(whole, told, lambda labels: births.at(task["t"], labels, first), blob.Budget())
+    made = blob.made(whole, told, lambda numbers: births.at(task["t"], numbers, initial), blob.Budget())
     place = layout.snapshot(folder, task["n"])
     whole_file.write(place, made.data)
     return {

@@ -13,6 +13,7 @@ import numpy as np
 
 from conoid.cases.whole import named
 
+from ..fracture.numbers import UNKNOWN
 from ..ids import located
 from ..state import DAMAGE, MASS, PLASTIC_STRAIN, TEMPERATURE, Block, Floats, Ints, Model, Nodes
 
@@ -22,12 +23,16 @@ Share = dict[str, "np.ndarray"]
 """Arrays by name; those of block k begin with ``k.``."""
 
 
-def copied(model: Model, held: Ints, counting: set[int]) -> Share:
+def copied(
+    model: Model, held: Ints, counting: set[int], numbers: Sequence[Ints] = (), known: Sequence[int] = (0, 0)
+) -> Share:
     """A rank's share. ``held`` (m, 2): ids of tets that a cohesive facet still joins; ``counting``: parts whose law
-    counts damage.
+    counts damage; ``numbers``: for each block of the fragments of its tets in the last frame; ``known``: how many there
+    were at the start, and the next number.
     """
     nodes = model.nodes
     share = {"nodes": nodes.id.copy(), "x": nodes.x.copy(), "v": nodes.v.copy(), "held": held.copy()}
+    share |= {"numbers": np.array(known), **{f"{k}.fragment": each for k, each in enumerate(numbers)}}
     for k, block in enumerate(model.blocks):
         share[f"{k}.part"] = np.array([block.part])
         share[f"{k}.mass"] = block.row(MASS)
@@ -74,6 +79,12 @@ class Whole:
     """(tets,) uint16."""
     rows: dict[str, Floats]
     """(tets,) each of ``ROWS`` that some block has; 0 where it has not."""
+    numbers: Ints
+    """(tets,) of the fragments of the last frame."""
+    initial: int
+    """Fragments at the start, whose numbers are the first ones; 0 where nothing fractures."""
+    next: int
+    """The next number of a fragment."""
 
 
 def joined(shares: Sequence[Share], parts: list[str]) -> Whole:
@@ -87,12 +98,18 @@ def joined(shares: Sequence[Share], parts: list[str]) -> Whole:
     )  # fmt: skip
     gathered = [_block(shares, part, ids) for part in range(len(parts))]
     blocks = [block for block, _ in gathered if block.n]
-    columns = {name: np.concatenate([column[name] for _, column in gathered]) for name in ("mass", "rank", *ROWS)}
+    columns = {
+        name: np.concatenate([column[name] for _, column in gathered]) for name in ("mass", "rank", "fragment", *ROWS)
+    }
     some = {name.partition(".")[2] for share in shares for name in share}
     held = np.concatenate([share["held"] for share in shares])
     total = sum(block.n for block in blocks)
     rows = {name: columns[name] for name in ROWS if name in some}
-    return Whole(Model(nodes, blocks, parts, total, n), held, columns["mass"], columns["rank"], rows)
+    initial, following = shares[0]["numbers"].tolist()
+    return Whole(
+        Model(nodes, blocks, parts, total, n), held, columns["mass"], columns["rank"], rows,
+        columns["fragment"].astype(np.int64), initial, following,
+    )  # fmt: skip
 
 
 def _block(shares: Sequence[Share], part: int, ids: Ints) -> tuple[Block, dict[str, "np.ndarray"]]:
@@ -106,8 +123,8 @@ def _block(shares: Sequence[Share], part: int, ids: Ints) -> tuple[Block, dict[s
     tet = np.concatenate([np.zeros(0, np.int64), *(block["id"] for _, block, _ in found)])
     order = np.argsort(tet)
 
-    def column(name: str, empty: "np.ndarray") -> "np.ndarray":
-        values = [block.get(name, np.zeros(len(block["id"]))) for _, block, _ in found]
+    def column(name: str, empty: "np.ndarray", absent: float = 0.0) -> "np.ndarray":
+        values = [block.get(name, np.full(len(block["id"]), absent)) for _, block, _ in found]
         joint = np.concatenate(values) if values else empty
         return joint[order] if len(joint) else joint
 
@@ -115,6 +132,7 @@ def _block(shares: Sequence[Share], part: int, ids: Ints) -> tuple[Block, dict[s
     corners = [located(ids, nodes)[block["tets"]] for _, block, nodes in found]
     tets = (np.concatenate(corners)[order] if corners else nowhere).astype(np.uint32)
     columns = {name: column(name, np.zeros(0)) for name in ("mass", *ROWS)}
+    columns["fragment"] = column("fragment", np.zeros(0, np.int64), UNKNOWN)
     ranks = np.concatenate([np.zeros(0, np.uint16), *(np.full(len(b["id"]), rank, np.uint16) for rank, b, _ in found)])
     bond = column("bond", nowhere.astype(np.uint8))
     made = Block(

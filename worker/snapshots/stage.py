@@ -74,7 +74,9 @@ class Snapshots:
         began = time.monotonic()
         cohesion = sim.fracture.cohesion if sim.fracture is not None else None
         held = cohesion.facets.tets if cohesion is not None else np.zeros((0, 2), np.int64)
-        self._courier.send(self._task(sim, first=first, ending=ending), copied(sim.model, held, self._counting))
+        known = (sim.record.of_frame(), (sim.record.initial, sim.record.next)) if sim.record is not None else ()
+        given = copied(sim.model, held, self._counting, *known)
+        self._courier.send(self._task(sim, first=first, ending=ending), given)
         self._n += 1
         self._taken = time.monotonic()
         self._took = self._taken - began

@@ -35,9 +35,9 @@ class Table:
     """(g,) longest side of the box round it, m."""
 
 
-def measured(whole: Whole, labels: list[Ints]) -> Table:
-    """The fragments; ``labels``: for each block of each tet."""
-    groups = fragments.Groups(np.concatenate([np.zeros(0, np.int64), *labels]), SerialComm())
+def measured(whole: Whole, labels: Ints) -> Table:
+    """The fragments; ``labels`` (tets,): of each tet, its fragment's."""
+    groups = fragments.Groups(labels, SerialComm())
     nodes, n = whole.model.nodes, len(whole.mass)
     corners = np.concatenate([np.zeros((0, 4), np.int64), *(b.tets for b in whole.model.blocks)]).astype(np.int64).T
     quarter, moment, momentum = whole.mass / 4.0, np.zeros((n, 3)), np.zeros((n, 3))

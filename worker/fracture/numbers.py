@@ -1,0 +1,44 @@
+"""Numbers of fragments: the largest piece of a fragment keeps its number, each other piece gets a new one."""
+
+import numpy as np
+
+from ..ids import places
+from ..parallel.comm import Comm
+from ..state import Ints
+
+UNKNOWN = -1
+"""The number of a tet that has none yet."""
+
+
+def numbered(before: Ints, labels: Ints, first: int, comm: Comm) -> tuple[Ints, Ints]:
+    """(n,) the number of the fragment of each tet, and (k, 3) the number that it had, its number, and how many tets
+    they have in common, ascending; the rows are equal on all ranks, which all take part.
+
+    ``before`` (n,): the numbers that tets had, or UNKNOWN; ``labels`` (n,): any name of the fragment of each; new
+    numbers begin at ``first`` and have the order of the labels. Of pieces with equally many tets the one with the
+    smallest label keeps the number.
+    """
+    rows = _in_common(before, labels, comm)
+    names = np.unique(rows[:, 1])
+    numbers = np.full(len(names), UNKNOWN, np.int64)
+    order = np.lexsort((rows[:, 1], -rows[:, 2], rows[:, 0]))
+    kept = order[np.append(True, np.diff(rows[order, 0]) != 0)[: len(order)]]
+    kept = kept[rows[kept, 0] != UNKNOWN]
+    numbers[places(names, rows[kept, 1])] = rows[kept, 0]
+    new = numbers == UNKNOWN
+    numbers[new] = first + np.arange(new.sum())
+    rows[:, 1] = numbers[places(names, rows[:, 1])]
+    return numbers[places(names, labels)], rows[np.lexsort((rows[:, 1], rows[:, 0]))]
+
+
+def _in_common(before: Ints, labels: Ints, comm: Comm) -> Ints:
+    """(k, 3) numbers, labels and how many tets of all ranks have both."""
+    old, of_old = np.unique(before, return_inverse=True)
+    new, of_new = np.unique(labels, return_inverse=True)
+    both, tets = np.unique(of_old * len(new) + of_new, return_counts=True)
+    mine = np.column_stack([old[both // max(len(new), 1)], new[both % max(len(new), 1)], tets])
+    every = np.concatenate([np.zeros((0, 3), np.int64), *comm.share(mine)])
+    rows, at = np.unique(every[:, :2], axis=0, return_inverse=True)
+    common = np.zeros(len(rows), np.int64)
+    np.add.at(common, at.reshape(-1), every[:, 2])
+    return np.column_stack([rows, common])
