@@ -100,6 +100,48 @@ def test_what_a_killed_server_had_not_verified_is_verified_by_a_word(server: Run
     assert files_of(server.ann) == [sha256]
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_whatever_comes_in_whatever_order_a_whole_file_is_the_right_one(server: Running, seed: int) -> None:
+    """Random pieces of two files, at right and wrong places, with right and wrong bytes, against a book of them."""
+    dice = random.Random(seed)
+    files = [made(size, seed * 10 + size) for size in (400, 700)]
+    book: dict[str, bytes | None] = {}
+    """What has arrived of each; a file that is whole has None."""
+    for _ in range(150):
+        data, sha256 = dice.choice(files)
+        there = book.get(sha256, b"")
+        first = dice.choice([0, len(there or b""), len(there or b""), dice.randrange(len(data))])
+        piece = data[first : first + dice.choice([0, 1, 100, 300, 700])]
+        if dice.random() < 0.1:
+            piece = bytes(len(piece))
+        if dice.random() < 0.03:
+            server.ann.http.delete(f"/v1/files/{sha256}")
+            book.pop(sha256, None)
+            continue
+        span = f"{first}-{first + len(piece) - 1}" if piece else "*"
+        answer = put(server.ann, sha256, piece, f"{span}/{len(data)}")
+        begins = first if piece else len(data)
+        if there is None:
+            expected = 200
+        elif begins != len(there):
+            expected = 409
+        else:
+            arrived = there + piece
+            expected = 200 if len(arrived) < len(data) else 201 if arrived == data else 422
+            book[sha256] = arrived if expected == 200 else None
+            if expected == 422:
+                del book[sha256]
+        assert answer.status_code == expected, answer.text
+        told = server.ann.http.get(f"/v1/files/{sha256}")
+        assert told.status_code == (200 if sha256 in book else 404)
+        if sha256 in book:
+            had = book[sha256]
+            assert (told.json()["whole"], told.json()["offset"]) == (had is None, len(data if had is None else had))
+    for data, sha256 in files:
+        if sha256 in book and book[sha256] is None:
+            assert (server.ann.runs / sent.FOLDER / "ann" / sha256).read_bytes() == data
+
+
 def test_bytes_that_have_another_hash_are_not_kept(server: Running) -> None:
     data, sha256 = made(500)
     put(server.ann, sha256, data[:100], "0-99/500")
