@@ -4,8 +4,10 @@ import copy
 import hashlib
 import os
 import shutil
+import tempfile
+import weakref
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +16,7 @@ from conoid.cases.files import Named, files_of, located
 from conoid.cases.load import CaseError, Problem
 from conoid.cases.problems import problem
 
+from . import one_deck
 from .errors import ClientError
 from .saving import whole as whole_file
 
@@ -30,6 +33,8 @@ class LocalFile:
     path: Path
     sha256: str
     state: State
+    named_in: str = ""
+    """Of a deck that includes others, which is written out as one file at ``path``: the hash of the deck itself."""
 
     @property
     def size(self) -> int:
@@ -52,6 +57,9 @@ class Hashes:
     def __init__(self) -> None:
         """None is known yet."""
         self._known: dict[State, str] = {}
+        self._decks: dict[tuple[Path, State], _Deck] = {}
+        self._place: Path | None = None
+        """Where decks are written out as one file, while this is there."""
 
     def of(self, case: Mapping[str, Any], folder: Path) -> list[LocalFile]:
         """The files that a case in plain data names, from its ``folder`` on; one that is not here and whose hash stands
@@ -69,7 +77,7 @@ class Hashes:
                 said = error.strerror if isinstance(error, OSError) else str(error)
                 problems.append(_wrong(named, "path", named.path, f"{said} ({path.absolute()})"))
             else:
-                if named.sha256 not in {None, found[-1].sha256}:
+                if named.sha256 not in {None, found[-1].sha256, found[-1].named_in or None}:
                     told = f"{named.path!r} has {found[-1].sha256}"
                     problems.append(_wrong(named, "sha256", named.sha256, told))
         if problems:
@@ -77,7 +85,27 @@ class Hashes:
         return found
 
     def _hashed(self, named: Named, path: Path) -> LocalFile:
-        """Raises OSError; IsADirectoryError for what is no regular file, be it behind a link."""
+        """Raises OSError; IsADirectoryError for what is no regular file, be it behind a link; ValueError for a deck
+        that cannot be followed.
+        """
+        itself = self._read(named, path)
+        if not one_deck.includes(path):
+            return itself
+        deck = self._decks.get((path, itself.state))
+        if deck is None or any(state_at(each) != state for each, state in deck.files.items()):
+            deck = self._decks[path, itself.state] = self._written(path)
+        return replace(self._read(named, deck.path), named_in=itself.sha256)
+
+    def _written(self, path: Path) -> "_Deck":
+        """A deck with all that it includes, as one file."""
+        if self._place is None:
+            self._place = Path(tempfile.mkdtemp(prefix="conoid-decks-"))
+            weakref.finalize(self, shutil.rmtree, self._place, True)
+        target = self._place / str(len(self._decks)) / path.name
+        target.parent.mkdir(exist_ok=True)
+        return _Deck(target, {each: state_at(each) for each in one_deck.write(path, target)})
+
+    def _read(self, named: Named, path: Path) -> LocalFile:
         with whole.opened(path) as file:
             state = state_of(file.fileno())
             if state not in self._known:
@@ -85,6 +113,20 @@ class Hashes:
             made = LocalFile(named, path, self._known[state], state)
             made.check(file.fileno())
         return made
+
+
+@dataclass(frozen=True)
+class _Deck:
+    """A deck that was written out, and the states of the files that it was made of."""
+
+    path: Path
+    files: dict[Path, State]
+
+
+def state_at(path: Path) -> State:
+    """Of a file by its path. Raises OSError."""
+    with whole.opened(path) as file:
+        return state_of(file.fileno())
 
 
 def _wrong(named: Named, key: str, value: object, said: str) -> Problem:
