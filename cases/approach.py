@@ -18,8 +18,8 @@ def strangers(case: Case) -> Iterator[Problem]:
     Nothing is said of a case with mesh files, with bodies that turn or stretch, or where more than walls and planes of
     symmetry acts on nodes; nor of a part that others may reach which run into each other before the end.
     """
-    others = [boundary for boundary in case.boundaries if not isinstance(boundary, Wall | Symmetry)]
-    walls = [boundary for boundary in case.boundaries if isinstance(boundary, Wall)]
+    walls = [boundary for boundary in case.boundaries if isinstance(boundary, Wall) and boundary.plain]
+    others = [boundary for boundary in case.boundaries if not isinstance(boundary, Symmetry) and boundary not in walls]
     boxes = [_box(part) for part in case.parts]
     if others or case.contact is None or None in boxes or len(case.parts) + len(walls) < 2:
         return
@@ -78,8 +78,9 @@ def _arrival(part: Part, wall: Wall) -> float:
     """When a body that flies on reaches a wall, s; infinity when it never does."""
     if wall.parts and part.name not in wall.parts:
         return math.inf
-    length = math.hypot(*wall.normal)
-    normal = (wall.normal[0] / length, wall.normal[1] / length, wall.normal[2] / length)
+    way = wall.normal or wall.point
+    length = math.hypot(*way)
+    normal = (way[0] / length, way[1] / length, way[2] / length)
     closing = -sum(n * v for n, v in zip(normal, part.velocity, strict=True))
     if closing <= 0.0 or isinstance(part.mesh, MeshFile):
         return math.inf

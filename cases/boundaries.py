@@ -5,8 +5,8 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from .motion import Spin
-from .tables import Axis, Direction, Model, Name, Point
-from .units import Acceleration, Length, Ratio, Speed, Stress, Time
+from .tables import Axis, Direction, Model, Name, Point, Velocity
+from .units import Acceleration, Length, Mass, Ratio, Speed, Stress, Time
 
 Course = tuple[tuple[Time, Ratio], ...]
 """Times and factors, in this order."""
@@ -30,20 +30,42 @@ class Symmetry(Model):
 
 
 class Wall(Model):
-    """A rigid, fixed half-space: nodes cannot go to the side that ``normal`` points away from."""
+    """A rigid surface that nodes cannot pass: a plane, a cylinder or a sphere; fixed, driven along a ``course``, or
+    free with a ``mass``. It does not turn, and what it stops does not limit the time step.
+    """
 
     kind: Literal["wall"]
     """The kind of boundary."""
     name: Name = "wall"
     """For messages; each wall has its own."""
+    shape: Literal["plane", "cylinder", "sphere"] = "plane"
+    """Of its surface; a cylinder has no ends."""
     point: Point
-    """Any point of the wall's surface."""
-    normal: Direction
-    """Points out of the wall, to the side where bodies are; its length does not count."""
+    """At the start: any point of a plane, any point of the axis of a cylinder, the centre of a sphere."""
+    normal: Direction | None = None
+    """Of a plane: points out of the wall, to the side where bodies are; its length does not count."""
+    axis: Direction | None = None
+    """Of a cylinder: the direction of its axis; its length does not count."""
+    radius: Annotated[Length, Field(gt=0)] | None = None
+    """Of a cylinder or a sphere."""
+    side: Literal["outside", "inside"] = "outside"
+    """Of a cylinder or a sphere: where bodies are, round it or in it."""
+    velocity: Velocity = (0.0, 0.0, 0.0)
+    """How it moves: all the time where it has no ``mass``, and then what it does is work from outside; at the start
+    where it has one."""
+    course: Course = ()
+    """Pairs of a time and a factor of the velocity, as of a prescribed velocity; not with ``mass``."""
+    mass: Annotated[Mass, Field(gt=0)] | None = None
+    """With it the wall is free: it moves by the impulses that it gets, and only by these."""
     parts: tuple[Name, ...] = ()
     """Parts that it stops; all when empty."""
     friction: Annotated[Ratio, Field(ge=0)] = 0.0
     """Coulomb's coefficient."""
+
+    @property
+    def plain(self) -> bool:
+        """Whether it is a plane that never moves."""
+        return self.shape == "plane" and self.mass is None and not any(self.velocity)
 
 
 class Prescribed(Model):

@@ -146,7 +146,7 @@ def _traction(boundary: Traction, location: Location) -> Iterator[Problem]:
     yield from _course(boundary, location)
 
 
-def _course(boundary: Prescribed | Gravity | Traction, location: Location) -> Iterator[Problem]:
+def _course(boundary: Prescribed | Gravity | Traction | Wall, location: Location) -> Iterator[Problem]:
     for k, ((before, _), (after, _)) in enumerate(itertools.pairwise(boundary.course)):
         if not after > before:
             yield problem(
@@ -176,18 +176,37 @@ def check_walls(case: Case) -> Iterator[Problem]:
         if wall.name in seen:
             yield problem(("boundaries", i, "name"), wall.name, "an earlier wall has this name; give each its own")
         seen.add(wall.name)
-        length = math.hypot(*wall.normal)
-        if length == 0.0:
-            yield problem(("boundaries", i, "normal"), "0, 0, 0", "must not be zero")
-        else:
-            yield from _behind(case, i, wall, length)
+        yield from _shape(wall, ("boundaries", i))
+        yield from _course(wall, ("boundaries", i))
+        if wall.normal is not None and any(wall.normal) and wall.shape == "plane":
+            yield from _behind(case, i, wall.point, wall.normal, wall.parts)
 
 
-def _behind(case: Case, number: int, wall: Wall, length: float) -> Iterator[Problem]:
-    normal = (wall.normal[0] / length, wall.normal[1] / length, wall.normal[2] / length)
-    level = sum(n * x for n, x in zip(normal, wall.point, strict=True))
+def _shape(wall: Wall, location: Location) -> Iterator[Problem]:
+    """Keys of a wall that its shape needs, or does not have."""
+    needed = {"plane": ("normal",), "cylinder": ("axis", "radius"), "sphere": ("radius",)}[wall.shape]
+    for key in ("normal", "axis", "radius"):
+        value = getattr(wall, key)
+        if key in needed and value is None:
+            yield problem((*location, key), ..., f"this key is missing; a {wall.shape} needs {choices(needed)}")
+        elif key not in needed and value is not None:
+            yield problem((*location, key), ..., f"a {wall.shape} has no {key}; it needs {choices(needed)}")
+        elif isinstance(value, tuple) and not any(value):
+            yield problem((*location, key), "0, 0, 0", "must not be zero")
+    if wall.shape == "plane" and wall.side == "inside":
+        yield problem((*location, "side"), wall.side, "a plane has no inside; turn its normal round")
+    if wall.course and wall.mass is not None:
+        yield problem((*location, "course"), ..., "a wall with a mass is free; remove course or mass")
+    elif wall.course and not any(wall.velocity):
+        yield problem((*location, "course"), ..., "is a factor of velocity, which is zero")
+
+
+def _behind(case: Case, number: int, point: Vector, way: Vector, parts: tuple[str, ...]) -> Iterator[Problem]:
+    length = math.hypot(*way)
+    normal = (way[0] / length, way[1] / length, way[2] / length)
+    level = sum(n * x for n, x in zip(normal, point, strict=True))
     for part in case.parts:
-        if isinstance(part.mesh, MeshFile) or part.turn is not None or (wall.parts and part.name not in wall.parts):
+        if isinstance(part.mesh, MeshFile) or part.turn is not None or (parts and part.name not in parts):
             continue
         depth = level - lowest_along(part.mesh, normal)
         if depth > GENERATED * max(abs(x) for corner in Placed(part.mesh).bounds() for x in corner):

@@ -17,6 +17,7 @@ from .mesh_checks import check_mesh
 from .overlap import overlaps
 from .probe_checks import check_probes
 from .problems import Location, Problem, dotted, problem
+from .rigid_checks import check_rigid
 from .schema import MOST_PARTS, Case, Contact, Erosion, Part, Reference, Symmetry, Wall
 from .similar import choices, nearest
 
@@ -44,7 +45,8 @@ Read = TypeVar("Read", bound=BaseModel)
 def check(case: Case) -> list[Problem]:
     """Every cross-field problem of a case, in the order of its keys."""
     checks: tuple[Callable[[Case], Iterable[Problem]], ...] = (
-        _materials, _parts, _overlaps, _sectors, check_boundaries, check_walls, check_bonds, _contact, check_probes,
+        _materials, _parts, _overlaps, _sectors, check_boundaries, check_walls, check_bonds, check_rigid, _contact,
+        check_probes,
         _references,
     )  # fmt: skip
     return list(chain.from_iterable(found(case) for found in checks))

@@ -49,9 +49,9 @@ def impact_stresses(case: Case) -> list[float]:
     found = [0.0] * len(bounds)
     for (i, own), (j, other) in itertools.permutations(enumerate(bounds), 2):
         found[i] = max(found[i], apart(*own, *other) / (1.0 / weights[i] + 1.0 / weights[j]))
-    if any(True for _ in case.boundaries_of(Wall)):
-        rest = (0.0, 0.0, 0.0)
-        found = [max(old, z * apart(*own, rest, rest)) for old, z, own in zip(found, weights, bounds, strict=True)]
+    for _, wall in case.boundaries_of(Wall):
+        its = wall.velocity, wall.velocity
+        found = [max(old, z * apart(*own, *its)) for old, z, own in zip(found, weights, bounds, strict=True)]
     return found
 
 

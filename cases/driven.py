@@ -50,16 +50,17 @@ def passing(case: Case) -> Iterator[Problem]:
 def _through_walls(case: Case, driven: list[Driven]) -> Iterator[tuple[int, str]]:
     for j, wall in case.boundaries_of(Wall):
         for body in driven:
-            depth = _behind(body, wall) if not wall.parts or body.part.name in wall.parts else 0.0
+            held = wall.plain and (not wall.parts or body.part.name in wall.parts)
+            depth = _behind(body, wall.point, wall.normal or wall.point) if held else 0.0
             if depth > _TOUCH * _size(body.mesh):
                 message = f"nodes of {body.part.name!r} come {depth:.3g} m behind boundaries[{j}], a wall"
                 yield body.number, f"{message}; walls do not hold nodes that are driven"
 
 
-def _behind(body: Driven, wall: Wall) -> float:
+def _behind(body: Driven, point: Vector, way: Vector) -> float:
     """How far behind a wall the nodes come that are driven, m; minus infinity where there are none."""
-    length, drive = math.hypot(*wall.normal), body.drive
-    normal = wall.normal[0] / length, wall.normal[1] / length, wall.normal[2] / length
+    length, drive = math.hypot(*way), body.drive
+    normal = way[0] / length, way[1] / length, way[2] / length
     low, high = _bounds(body.mesh)
     if drive.low is not None and drive.high is not None:
         (a, b, c), (d, e, f) = map(max, low, drive.low), map(min, high, drive.high)
@@ -69,7 +70,7 @@ def _behind(body: Driven, wall: Wall) -> float:
     lowest = sum(min(n * a, n * b) for n, a, b in zip(normal, low, high, strict=True))
     if _whole(drive):
         lowest = max(lowest, lowest_along(body.mesh, normal))
-    return _dot(normal, wall.point) - lowest - min(_dot(normal, way) for way in body.ways)
+    return _dot(normal, point) - lowest - min(_dot(normal, way) for way in body.ways)
 
 
 def _through_bodies(case: Case, driven: list[Driven]) -> Iterator[tuple[int, str]]:

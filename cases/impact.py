@@ -24,8 +24,6 @@ columns of metal (docs/numerics.md, "Plates under 100 GPa")."""
 PRESSING = 0.1
 """Of the same: above it flat surfaces buckle. Chosen: half of where irregular plates of copper lost their pressure
 (docs/numerics.md, "Ridges under pressure")."""
-_REST: Vector = (0.0, 0.0, 0.0)
-"""The velocity of a wall, m/s."""
 
 
 def wave_speed(made: Material) -> float:
@@ -39,8 +37,8 @@ def impact_speeds(case: Case, walls: bool = True) -> list[float]:
     """
     bounds = [velocities(case, part) for part in case.parts]
     there = Counter(bounds)
-    if walls and any(True for _ in case.boundaries_of(Wall)):
-        there[_REST, _REST] += 1
+    for _, wall in case.boundaries_of(Wall) if walls else ():
+        there[wall.velocity, wall.velocity] += 1
     return [
         max((apart(*own, *other) for other, many in there.items() if other != own or many > 1), default=0.0)
         for own in bounds

@@ -14,7 +14,7 @@ from .similar import choices, meant, nearest
 
 Location = tuple[int | str, ...]
 
-_DISCRIMINATORS = ("shape", "kind", "model")
+_DISCRIMINATORS = ("kind", "shape", "model")
 _LONGEST = 80
 """Characters of a value that are shown: a line of a terminal. Chosen."""
 _MOST = 100
@@ -188,6 +188,7 @@ def _tags_of(model: type[BaseModel]) -> Iterator[str]:
     for key in _DISCRIMINATORS:
         if key in model.model_fields and get_origin(model.model_fields[key].annotation) is Literal:
             yield from get_args(model.model_fields[key].annotation)
+            return
 
 
 def _models_at(location: Location) -> list[type[BaseModel]]:

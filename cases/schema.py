@@ -17,12 +17,14 @@ from .joined import bodies, breakable, meeting
 from .materials import Material
 from .measures import Probe, Reference
 from .motion import Spin, Stretch, Turn
+from .rigid import Flag, Rigid, read_rigid
 from .tables import Count, Model, Name, Positive, Switch, Velocity
 from .units import Ratio, Speed, Temperature, Time
 
 __all__ = [
     "MOST_RANKS", "Around", "Balance", "Bond", "Boundary", "Case", "Contact", "ContactPair", "Erosion", "Fracture",
-    "Gravity", "Numerics", "Part", "Prescribed", "Probe", "Reference", "Rotation", "Run", "Spin", "Stretch", "Symmetry",
+    "Gravity", "Numerics", "Part", "Prescribed", "Probe", "Reference", "Rigid", "Rotation", "Run", "Spin", "Stretch",
+    "Symmetry",
     "Traction", "Turn", "Viscosity", "Wall",
 ]  # fmt: skip
 
@@ -58,6 +60,11 @@ class Part(Model):
     """With this table the part's own tets leave where they are worn out; without it none of its tets ever does."""
     fracture: Fracture | None = None
     """With this table the part breaks; its material must be ``brittle``."""
+    rigid: Annotated[Rigid | None, BeforeValidator(read_rigid), Flag()] = None
+    """``true``, or a table of mass, centre and inertia: the part has six degrees of freedom and no stress. It costs
+    what its surface costs in contact, and does not limit the time step. Gravity acts on it, planes of symmetry and
+    boundaries that drive all of its nodes leave it the motions that they allow: with one component given it may turn
+    about that axis, with more it does not turn."""
 
 
 class ContactPair(Model):
@@ -270,6 +277,11 @@ class Case(Model):
     def fractures(self) -> bool:
         """Whether facets may break."""
         return any(breakable(self))
+
+    @property
+    def rigid(self) -> list[int]:
+        """The numbers of the rigid parts."""
+        return [index for index, part in enumerate(self.parts) if part.rigid is not None]
 
     @property
     def dt_growth(self) -> float:

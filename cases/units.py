@@ -63,6 +63,7 @@ KINDS: dict[Dimension, str] = {
     (1, 0, -2, 0): "an acceleration", _STRESS: "a stress",
     (-3, 1, 0, 0): "a density", (2, 0, -2, -1): "a specific heat", (2, 0, -2, 0): "an energy per mass",
     (2, 0, 0, 0): "an area", (0, 1, -2, 0): "an energy per area",
+    (2, 1, 0, 0): "a moment of inertia",
 }  # fmt: skip
 """What a quantity of a dimension is called."""
 
@@ -181,5 +182,7 @@ Stress = Annotated[float, _reader("Pa"), Written("Pa")]
 Area = Annotated[float, _reader("m^2"), Written("m^2")]
 FractureEnergy = Annotated[float, _reader("J/m^2"), Written("J/m^2")]
 SpecificHeat = Annotated[float, _reader("J/kg/K"), Written("J/kg/K")]
+Mass = Annotated[float, _reader("kg"), Written("kg")]
+Inertia = Annotated[float, _reader("kg*m^2"), Written("kg*m^2")]
 Angle = Annotated[float, _reader("rad"), Written("rad")]
 Ratio = Annotated[float, _reader(""), Written("")]

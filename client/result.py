@@ -241,7 +241,7 @@ class Result:
                 for one in boundaries
                 if one["kind"] == "symmetry" and not one.get("parts")
             ),
-            walls=tuple(Wall(tuple(one["point"]), tuple(one["normal"])) for one in boundaries if one["kind"] == "wall"),
+            walls=tuple(Wall(tuple(one["point"]), tuple(one["normal"])) for one in boundaries if _is_plain(one)),
             parts=tuple(part["name"] for part in case.get("parts", [])),
             title=str(case.get("title") or case.get("name") or ""),
         )
@@ -252,6 +252,12 @@ class Result:
             return {entry["name"]: float(entry["time"]) for entry in json.loads(text)["files"]}
         except (UnfinishedError, ValueError, KeyError, TypeError):
             return {}
+
+
+def _is_plain(boundary: dict[str, Any]) -> bool:
+    """Whether a boundary is a wall that stays where it is, and flat: others are not drawn."""
+    moves = any(boundary.get("velocity") or ()) or boundary.get("mass") is not None
+    return boundary["kind"] == "wall" and boundary.get("shape", "plane") == "plane" and not moves
 
 
 def outcome_of(text: bytes) -> Outcome:

@@ -1,6 +1,7 @@
 """The whole mesh of a case, on rank 0: the parts as they are meshed, turned, moved apart, loaded and set in motion."""
 
 import logging
+import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import partial
@@ -119,7 +120,7 @@ def assembled(case: schema.Case, meshes: Iterable[tuple[int, TetMesh]], overlaps
     return Whole(
         points=x, node_part=part_of_node, tets=t, tet_part=part_of_tet, volumes=volumes,
         across=made.across if case.in_contact or case.fractures else made.across[:0], shares=shares,
-        node_volume=_quarters(t, volumes, len(x)), mass=_quarters(t, masses, len(x)),
+        node_volume=_quarters(t, volumes, len(x)), mass=_weighed(case, _quarters(t, masses, len(x)), part_of_node),
         velocity=velocity, loads=loads, near=near,
         warnings=[
             *warnings, *told, *more, *selection.off_planes(case, x, members, near, known),
@@ -196,6 +197,16 @@ def _place(point: Floats) -> str:
 def _quarters(tets: Indices, values: Floats, n: int) -> Floats:
     """(n,) a quarter of each tet's value summed at its nodes, in the order of the tets."""
     return np.bincount(tets.reshape(-1), np.repeat(values / 4.0, 4), n).astype(np.float64)
+
+
+def _weighed(case: schema.Case, mass: Floats, part: Indices) -> Floats:
+    """(n,) masses of the nodes, kg, of which those of a rigid part add up to what is given for it."""
+    for index in case.rigid:
+        spec = case.parts[index].rigid
+        if spec is not None and spec.mass is not None:
+            some = part == index
+            mass[some] *= spec.mass / math.fsum(mass[some])
+    return mass
 
 
 def _volumes(x: Floats, tets: Indices) -> Floats:

@@ -179,7 +179,8 @@ def _sum_up(
     spent = sim.comm.gather(sim.timers.spent)
     total_cpu = sum(sim.comm.gather(cpu) or [])
     memory = sim.comm.gather(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024)
-    hexdigest = digest.digest(sim.model, sim.comm, sim.elements.nodal)
+    more = sim.walls.words() + (sim.rigid.words() if sim.rigid is not None else b"")
+    hexdigest = digest.digest(sim.model, sim.comm, sim.elements.nodal, more)
     checks = reference.measure(sim, folder, start.thick) if failure is None and not loop.stopped else []
     eroded = start.elements - sim.model.elements_global
     sim.count_nodes()

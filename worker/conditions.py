@@ -13,10 +13,13 @@ from .boundaries import Boundary, SymmetryPlane, driven, mirrored
 from .drivers import Course, Gravity, PrescribedRotation, PrescribedVelocity, Traction
 from .errors import InputError
 from .migration.parcel import Parcel
+from .moving_walls import MovingWalls
 from .parallel.comm import Comm
 from .parallel.ownership import Neighbour
+from .rigid.bodies import of_nodes
 from .state import Flags, Floats, Indices, Load, LoadedFaces, Model, Nodes
 from .surface_pressure import SurfacePressure
+from .wall_shapes import Walls
 from .walls import RigidWalls
 
 AXES = {"x": 0, "y": 1, "z": 2}
@@ -35,14 +38,23 @@ def loads(parcel: Parcel) -> list[Load | LoadedFaces]:
     return found
 
 
+def walls_of(case: schema.Case) -> Walls:
+    """The walls of a case, as they are at the start."""
+    return Walls([spec for _, spec in case.boundaries_of(schema.Wall)])
+
+
 def build(
-    case: schema.Case, model: Model, loads: list[Load | LoadedFaces], neighbours: list[Neighbour], comm: Comm
+    case: schema.Case, model: Model, loads: list[Load | LoadedFaces], neighbours: list[Neighbour], comm: Comm,
+    moving: Walls | None = None,
 ) -> list[Boundary]:  # fmt: skip
     """The boundaries of a case on this rank's nodes: gravity and tractions first, so that what is held stays held;
-    walls last, and they leave alone what has a prescribed motion. ``loads``: of the tractions. All ranks take part.
+    walls last, and they leave alone what has a prescribed motion. ``loads``: of the tractions; ``moving``: the walls
+    of the case, as they move. What acts on rigid parts is in rigid/motion.py, but for planes of symmetry, on which
+    their nodes lie as others do. All ranks take part.
     """
     nodes = model.nodes
-    held = [_held_by(spec, model) for spec in case.boundaries]
+    loose = of_nodes(case, nodes) < 0
+    held = [_held_by(spec, model) & (loose | isinstance(spec, schema.Symmetry)) for spec in case.boundaries]
     boundaries: list[Boundary] = [
         Gravity(_indices(held[i]), np.array(spec.acceleration), Course(spec.course))
         for i, spec in case.boundaries_of(schema.Gravity)
@@ -64,7 +76,8 @@ def build(
             centre, rate = np.array(spec.spin.centre), np.array(spec.spin.rate)
             boundaries.append(PrescribedRotation(_indices(h), centre, rate))
     moved = driven(nodes.n, boundaries)
-    return [*boundaries, *_walls(case, [h & ~moved for h in held], mirrored(nodes.n, boundaries))]
+    planes, stopped = mirrored(nodes.n, boundaries), [h & ~moved for h in held]
+    return [*boundaries, *_walls(case, stopped, planes), *_moving(case, stopped, planes, model, moving, comm)]
 
 
 def start(
@@ -159,20 +172,36 @@ def part_sides(spec: schema.Symmetry, model: Model, comm: Comm) -> Floats:
 
 
 def _walls(case: schema.Case, held: list[Flags], planes: Flags) -> list[Boundary]:
-    found = [(spec, held[index]) for index, spec in case.boundaries_of(schema.Wall)]
-    if not found:
+    found = [(spec, held[index] & spec.plain) for index, spec in case.boundaries_of(schema.Wall)]
+    if not any(spec.plain for spec, _ in found):
         return []
     touched = np.any([h for _, h in found], axis=0)
-    points, normals = np.array([spec.point for spec, _ in found]), np.array([spec.normal for spec, _ in found])
+    points, normals = (
+        np.array([spec.point for spec, _ in found]),
+        np.array([spec.normal or (0, 0, 1) for spec, _ in found], float),
+    )
     which = np.ascontiguousarray(np.array([h[touched] for _, h in found]).T)
     friction = np.array([spec.friction for spec, _ in found])
     return [RigidWalls(_indices(touched), points, normals, which, planes[touched], friction)]
 
 
+def _moving(
+    case: schema.Case, held: list[Flags], planes: Flags, model: Model, walls: Walls | None, comm: Comm
+) -> list[Boundary]:  # fmt: skip
+    """Those that are no fixed planes; all ranks take part."""
+    found = [held[index] & (not spec.plain) for index, spec in case.boundaries_of(schema.Wall)]
+    if all(spec.plain for _, spec in case.boundaries_of(schema.Wall)):
+        return []
+    walls, nodes = walls or walls_of(case), model.nodes
+    touched = np.any(found, axis=0)
+    which = np.ascontiguousarray(np.array([h[touched] for h in found]).T)
+    return [MovingWalls(_indices(touched), nodes.owned[touched], walls, which, planes[touched], comm)]
+
+
 def _refuse_overlaps(case: schema.Case, model: Model, boundaries: list[Boundary], comm: Comm) -> None:
     indices = [index for index, _ in case.boundaries_of(schema.Wall)]
     for walls in boundaries:
-        if isinstance(walls, RigidWalls):
+        if isinstance(walls, RigidWalls | MovingWalls):
             for index, depth in zip(indices, comm.maximum(walls.depths(model.nodes)), strict=True):
                 if depth > GENERATED * model.size:
                     raise InputError(f"boundaries[{index}]: a body starts {depth:.3g} m behind this wall")

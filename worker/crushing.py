@@ -199,7 +199,10 @@ class Crushing:
     def of(cls, case: Case, model: Model, comm: Comm, clock: Clock, team: Team) -> "Crushing | None":
         """None where no part is of such matter."""
         made = [material(case, part.material) for part in case.parts]
-        strengths = [each.brittle.strength if each.brittle and bears_all(each) else 0.0 for each in made]
+        strengths = [
+            each.brittle.strength if each.brittle and bears_all(each) and part.rigid is None else 0.0
+            for each, part in zip(made, case.parts, strict=True)
+        ]
         return cls(model, np.array(strengths), comm, clock, team) if any(strengths) else None
 
     def look(self) -> None:

@@ -8,11 +8,12 @@ from .parallel.comm import Comm
 from .state import VOLUME_FLUX, Floats, Model
 
 
-def digest(model: Model, comm: Comm, nodal: list[Floats]) -> str | None:
+def digest(model: Model, comm: Comm, nodal: list[Floats], more: bytes = b"") -> str | None:
     """Hex digest on rank 0, None elsewhere.
 
-    Positions, velocities, what else the nodes carry (``nodal``), and every row of the tets' state but VOLUME_FLUX:
-    it is scratch, or in a material without a strength the volume, which the positions say.
+    Positions, velocities, what else the nodes carry (``nodal``), every row of the tets' state but VOLUME_FLUX, which is
+    scratch, or in a material without a strength the volume, which the positions say; and what all ranks have alike
+    (``more``).
     """
     nodes, h = model.nodes, hashlib.sha256()
     owned = nodes.owned
@@ -25,6 +26,7 @@ def digest(model: Model, comm: Comm, nodal: list[Floats]) -> str | None:
         for row in range(int(rows[0])):
             if row != VOLUME_FLUX:
                 _add(h, comm, ids, block.row(row) if block else np.zeros(0))
+    h.update(more)
     return h.hexdigest() if comm.rank == 0 else None
 
 

@@ -236,5 +236,6 @@ def block(
         params=models.parameters(material, case.numerics.viscosity, breaks=part.fracture is not None),
         border_chunks=-(-border // CHUNK), temperature=part.temperature, across=across,
         worn=np.zeros(len(ids) if part.erosion is not None else 0, bool), life=wear.life(part.erosion),
+        rigid=part.rigid is not None,
         quiet=np.zeros((-(-len(ids) // CHUNK), 3), np.int64),
     )  # fmt: skip

@@ -33,7 +33,9 @@ from .parallel.comm import Comm
 from .parallel.fixed_point import Columns, Grouped, Table, Tally, exact_sums, totals_and_words
 from .parallel.passes import Pass
 from .parallel.team import TASK, Team
-from .state import WORKS, Floats, Indices, Model, Nodes
+from .rigid.stage import Rigid
+from .state import WORKS, Flags, Floats, Indices, Model, Nodes
+from .wall_shapes import Walls
 
 _NODAL = 10
 """Sums over the nodes (``_of_nodes``), before those of the tets."""
@@ -47,7 +49,7 @@ class Ledger:
 
     def __init__(
         self, model: Model, boundaries: list[Boundary], contact: Contact | None, erosion: Erosion | None,
-        fracture: Fracture | None, comm: Comm, clock: Clock, team: Team,
+        fracture: Fracture | None, undeformed: tuple[Rigid | None, Walls], comm: Comm, clock: Clock, team: Team,
     ) -> None:  # fmt: skip
         """``team``: whose threads go over the nodes."""
         self._of_nodes, self._columns = Pass(team, _of_nodes, *_OF_NODES), np.empty(0)
@@ -58,8 +60,11 @@ class Ledger:
         self._cohesion = fracture.cohesion if fracture is not None else None
         self._comm = comm
         self._clock = clock
-        nodes = model.nodes
-        self.initial = float(self._node_sum(0.5 * nodes.mass * (nodes.v * nodes.v).sum(axis=1)))
+        nodes, (self._rigid, self._walls) = model.nodes, undeformed
+        self.initial = float(self._node_sum(0.5 * nodes.mass * (nodes.v * nodes.v).sum(axis=1), self._counted()))
+        self.initial += self._walls.kinetic()
+        if self._rigid is not None:
+            self.initial += float(self._rigid.kinetic().sum())
         self.worst = 0.0
         """Largest residual so far."""
         self.making = Making(self._rounding())
@@ -102,6 +107,11 @@ class Ledger:
     def close(self, before: Floats) -> Energy:
         """The ledger at time n; ``before`` is v(n-1/2), the model holds v(n+1/2)."""
         sums, of_parts, told = self._added_up(before)
+        if self._rigid is not None:
+            _with_bodies(sums, of_parts, self._rigid)
+        if self._walls.lightness.any():
+            sums[0] += self._walls.kinetic()
+            sums[[3, 4, 5, 7, 8, 9]] += self._walls.momenta()
         node_sums, (work, viscous, plastic, averaged) = sums[:_NODAL], sums[_NODAL : _NODAL + len(WORKS)]
         self.parts = _named(self._model.parts, of_parts[:, 0], of_parts[:, _NODAL] + of_parts[:, _NODAL + 1])
         gone, gone_kinetic, gone_momenta = self._gone(told)
@@ -164,10 +174,15 @@ class Ledger:
         for block in self._model.blocks:
             bulk[block.part] = block.params[BULK] / block.params[DENSITY]
         bulk = self._comm.maximum(bulk)
-        return self._node_sum(0.5 * STRAIN * STRAIN * nodes.mass * bulk[nodes.part])
+        return self._node_sum(0.5 * STRAIN * STRAIN * nodes.mass * bulk[nodes.part], nodes.owned)
 
-    def _node_sum(self, values: Floats) -> float:
-        return float(exact_sums(self._comm, values[self._model.nodes.owned][:, None])[0])
+    def _node_sum(self, values: Floats, counted: Flags) -> float:
+        return float(exact_sums(self._comm, values[counted][:, None])[0])
+
+    def _counted(self) -> Flags:
+        """(nodes,) those that this rank adds up: it owns them, and they are of no rigid body."""
+        nodes = self._model.nodes
+        return nodes.owned if self._rigid is None else nodes.owned & (self._rigid.of_part[nodes.part] < 0)
 
     def _added_up(self, before: Floats) -> tuple[Floats, Floats, dict[str, Floats]]:
         """All that is added up over the ranks, at once: the sums of ``_of_nodes`` and of WORKS, those of each part, and
@@ -179,7 +194,7 @@ class Ledger:
         columns = self._columns[: _NODAL * nodes.n].reshape(_NODAL, nodes.n)
         self._of_nodes.run(
             nodes.n, columns, nodes.x, before, nodes.v, nodes.force, self._clock.shorter / nodes.scale, nodes.stepping,
-            nodes.mass, *self._boundary_work(), nodes.owned,
+            nodes.mass, *self._boundary_work(), self._counted(),
         )  # fmt: skip
         tables: list[Columns] = [
             Grouped(*_by_part(columns, nodes), parts), ElementWork(self._model.blocks, parts), *self._rubbed(parts)
@@ -227,6 +242,8 @@ class Ledger:
     def _friction_work(self, told: dict[str, Floats]) -> float:
         """Energy, J, that friction has taken, of contact and of boundaries."""
         work = self._contact.books.friction_work(told["friction"]) if self._contact is not None else 0.0
+        if self._rigid is not None:
+            work += float(self._rigid.friction_loss.sum())
         return sum(told["boundaries"].tolist(), work)
 
     def _boundary_work(self) -> tuple[Floats, Floats]:
@@ -251,6 +268,16 @@ def _by_part(columns: Floats, nodes: Nodes) -> tuple[Floats, Indices]:
     more = columns[:, shares.node] * shares.fraction
     columns[:, shares.node] = 0.0
     return np.concatenate([columns, more], axis=1).T, np.concatenate([nodes.part, shares.part])
+
+
+def _with_bodies(sums: Floats, of_parts: Floats, rigid: Rigid) -> None:
+    """Adds those of rigid bodies to the sums over the nodes (``_of_nodes``), of all and of each part."""
+    kinetic, momenta = rigid.kinetic(), rigid.momenta()
+    own = np.array([kinetic.sum(), rigid.contact_loss.sum(), rigid.external_work.sum()])
+    sums[:3] += own
+    sums[3:6] += momenta[:3]
+    sums[7:_NODAL] += momenta[3:]
+    of_parts[rigid.bodies.part, 0] += kinetic
 
 
 def _named(parts: list[str], kinetic: Floats, internal: Floats) -> dict[str, PartEnergy]:

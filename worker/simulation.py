@@ -3,6 +3,7 @@
 import math
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -32,6 +33,7 @@ from .migration.parcel import Parcel
 from .migration.route import Arrived
 from .mirrors import Mirrors
 from .motion import Leapfrog
+from .moving_walls import MovingWalls
 from .parallel import fixed_point
 from .parallel.comm import Comm
 from .parallel.ownership import Neighbour
@@ -39,9 +41,13 @@ from .parallel.passes import Ranges
 from .parallel.team import Team, team
 from .probes import Probes
 from .reduction import StepReduction
+from .rigid.bodies import measured
+from .rigid.motion import Held
+from .rigid.stage import Rigid
 from .state import MASS, Floats, Model
 from .timers import Timers, worked
 from .topology import KeptByNode
+from .wall_shapes import Walls
 from .walls import RigidWalls
 
 _SMALLEST_STRAIN = 1e-12
@@ -62,6 +68,8 @@ class Simulation:
     contact: Contact | None
     erosion: Erosion | None
     fracture: Fracture | None
+    rigid: Rigid | None
+    walls: Walls
     clock: Clock
     ledger: Ledger
     probes: Probes
@@ -101,9 +109,9 @@ class Simulation:
         return max(self.reduction.limit, self.contact.limit) if self.contact is not None else self.reduction.limit
 
     @property
-    def pushing(self) -> list[Boundary | Contact]:
+    def pushing(self) -> "list[Boundary | Contact | Rigid]":
         """All that has a ``last_push``."""
-        return [*self.boundaries, *([self.contact] if self.contact is not None else [])]
+        return [*self.boundaries, *(each for each in (self.contact, self.rigid) if each is not None)]
 
     def limiting_id(self) -> int:
         """The tet that holds the time step down, the smallest id when several do; all ranks take part."""
@@ -111,7 +119,9 @@ class Simulation:
         return -int(self.comm.maximum(np.array([-float(self.elements.limiting) if mine else -np.inf]))[0])
 
     def limiting_tet(self) -> str:
-        """The name of that tet; all ranks take part."""
+        """The name of that tet, or of the rigid parts; all ranks take part."""
+        if self.rigid is not None and self.reduction.limit == self.rigid.limit:
+            return "a rigid part"
         first = self.limiting_id()
         part = int(np.searchsorted(self.model.part_starts, first, side="right")) - 1
         return f"tet {first} of {self.model.parts[part]}"
@@ -121,6 +131,8 @@ class Simulation:
         stable = self.clock.stable
         if self.limit > self.reduction.limit:
             return "contact: speed of approach"
+        if self.rigid is not None and self.reduction.limit == self.rigid.limit:
+            return "rigid parts: spin, or no other limit"
         why = "stability" if stable * self.reduction.limit >= 0.999 * self.case.numerics.dt_safety else "growth"
         if self.clock.dt < 0.9 * stable:
             why = "output time"
@@ -160,9 +172,12 @@ def build(case: Case, folder: Path, comm: Comm, say: Say = quiet) -> Simulation:
     """
     model, piece = domain.build(case, folder, comm, say)
     say("setting up the first step")
-    scene = conditions.build(case, model, piece.loads, piece.neighbours, comm)
+    walls = conditions.walls_of(case)
+    scene = conditions.build(case, model, piece.loads, piece.neighbours, comm, walls)
     told = conditions.start(case, model, scene, comm)
-    sim = _assemble(case, model, piece.neighbours, scene, piece.node_volume, comm, Timers(comm, team(case.run.threads)))
+    rigid = _rigid(case, model, walls, comm)
+    timers = Timers(comm, team(case.run.threads))
+    sim = _assemble(case, model, piece.neighbours, scene, (rigid, walls), piece.node_volume, comm, timers)
     sim.warnings = *piece.warnings, *told
     sim.probes.require_tets(case)
     if sim.contact is not None:
@@ -170,35 +185,57 @@ def build(case: Case, folder: Path, comm: Comm, say: Say = quiet) -> Simulation:
     return sim
 
 
+def _rigid(
+    case: Case, model: Model, walls: Walls, comm: Comm, known: dict[str, Any] | None = None
+) -> Rigid | None:  # fmt: skip
+    """The rigid bodies of a case that has some: at the start, or as they are ``known``. All ranks take part. Raises
+    InputError, on every rank alike, where one starts behind a wall.
+    """
+    if not case.rigid:
+        return None
+    if known is None:
+        rigid = Rigid(case, model.nodes, measured(case, model.nodes, comm), walls, comm)
+        rigid.require_front(case, model.size)
+    else:
+        held = [Held.of(case, case.parts[index]) for index in case.rigid]
+        rigid = Rigid(case, model.nodes, Rigid.kept_bodies(known, held), walls, comm)
+        rigid.resume(known)
+    rigid.begin(model.nodes)
+    return rigid
+
+
 def _assemble(
-    case: Case, model: Model, neighbours: list[Neighbour], scene: list[Boundary], node_volume: Floats, comm: Comm,
-    timers: Timers,
+    case: Case, model: Model, neighbours: list[Neighbour], scene: list[Boundary],
+    undeformed: tuple[Rigid | None, Walls], node_volume: Floats, comm: Comm, timers: Timers,
 ) -> Simulation:  # fmt: skip
     """The stages that the case needs, round a model and its boundaries; ``node_volume`` (nodes,): at the start, m^3."""
-    began, run, numerics = worked(comm), case.run, case.numerics
+    began, run, numerics, (rigid, moving) = worked(comm), case.run, case.numerics, undeformed
     threads = team(run.threads)
     clock = Clock(run.end_time, numerics.dt_safety, case.dt_growth, run.frames)
     extremes = _extremes(model, comm)
     contact, erosion = None, None
     if case.in_contact:
-        contact = Contact(case, model, neighbours, scene, comm, clock, timers, threads, extremes[:2])
+        contact = Contact(case, model, neighbours, scene, comm, clock, timers, threads, extremes[:2], rigid)
     if case.erodes:
         erosion = Erosion(case, model, neighbours, contact, scene, comm, clock, extremes)
     if case.boundaries_of(Symmetry):
         scene.append(Mirrors.of(case, model, scene, comm))
     for bound in scene:
         bound.over = Ranges(threads)
+        if isinstance(bound, MovingWalls):
+            bound.measure(*extremes[:2])
     elements = _elements(case, model, neighbours, scene, node_volume, comm, timers, threads)
     fracture = None
     if case.fractures:
         by_node: list[KeptByNode] = [*scene, *(stage for stage in (erosion, contact) if stage is not None)]
         fracture = Fracture(case, model, neighbours, elements, by_node, contact, comm, clock)
-    walls = next((bound for bound in scene if type(bound) is RigidWalls), None)
-    probes = Probes(case, Scene(model, contact, walls, erosion, fracture, clock, comm))
-    ledger = Ledger(model, scene, contact, erosion, fracture, comm, clock, threads)
+    stopping = tuple(bound for bound in scene if isinstance(bound, RigidWalls | MovingWalls))
+    probes = Probes(case, Scene(model, contact, stopping, rigid, erosion, fracture, clock, comm))
+    ledger = Ledger(model, scene, contact, erosion, fracture, (rigid, moving), comm, clock, threads)
     return Simulation(
         case=case, comm=comm, model=model, elements=elements, leapfrog=Leapfrog(threads), boundaries=scene,
-        contact=contact, erosion=erosion, fracture=fracture, clock=clock, ledger=ledger, probes=probes, timers=timers,
+        contact=contact, erosion=erosion, fracture=fracture, rigid=rigid, walls=moving,
+        clock=clock, ledger=ledger, probes=probes, timers=timers,
         record=Record(model, fracture, comm) if fracture is not None else None,
         crushing=Crushing.of(case, model, comm, clock, threads),
         neighbours=neighbours, floor=_force_floor(model, comm),
@@ -214,7 +251,7 @@ def keep(sim: Simulation) -> Parcel:
     pushes = sim.comm.maximum(np.array([each.last_push for each in sim.pushing]))
     parcel.known |= {
         "reduction": sim.reduction.keep(), "clock": sim.clock.keep(), "ledger": sim.ledger.keep(),
-        "probes": sim.probes.keep(), "floor": sim.floor, "last_push": pushes.tolist(),
+        "probes": sim.probes.keep(), "walls": sim.walls.keep(), "floor": sim.floor, "last_push": pushes.tolist(),
     }  # fmt: skip
     for index, bound in enumerate(sim.boundaries):
         bound.keep(parcel, f"boundary{index}")
@@ -229,6 +266,8 @@ def keep(sim: Simulation) -> Parcel:
         sim.record.keep(parcel)
     if sim.crushing is not None:
         parcel.known["crushing"] = sim.crushing.keep()
+    if sim.rigid is not None:
+        parcel.known["rigid"] = sim.rigid.keep()
     return parcel
 
 
@@ -236,8 +275,11 @@ def resume(case: Case, arrived: Arrived, comm: Comm, timers: Timers) -> Simulati
     """Goes on with what has arrived; all ranks take part."""
     parcel, known = arrived.parcel, arrived.parcel.known
     model = model_of.resume(case, arrived, comm)
-    scene = conditions.build(case, model, conditions.loads(parcel), arrived.neighbours, comm)
-    sim = _assemble(case, model, arrived.neighbours, scene, np.ones(model.nodes.n), comm, timers)
+    walls = conditions.walls_of(case)
+    walls.resume(known["walls"])
+    scene = conditions.build(case, model, conditions.loads(parcel), arrived.neighbours, comm, walls)
+    both = _rigid(case, model, walls, comm, known.get("rigid")), walls
+    sim = _assemble(case, model, arrived.neighbours, scene, both, np.ones(model.nodes.n), comm, timers)
     sim.reduction.resume(known["reduction"])
     sim.clock.resume(known["clock"])
     sim.ledger.resume(known["ledger"])

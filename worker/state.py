@@ -287,6 +287,8 @@ class Block:
     """(n,) tets that are about to leave; (0,) where the part does not erode."""
     life: Floats = field(default_factory=lambda: np.zeros(5))
     """What a tet lives through (elements/wear.py)."""
+    rigid: bool = False
+    """Whether the part is rigid: no pass over elements concerns it."""
     seconds: float = 0.0
     """CPU time of the passes over the block so far, where a rank has several."""
     group: Indices = field(default_factory=lambda: np.zeros(0, np.int32))

@@ -23,6 +23,8 @@ and at once f(n+1) from it, so a step begins with forces that are already at han
 
 After the last step 1 to 10 are done once more, and ``end`` takes the velocities at n.
 
+Rigid bodies (rigid/stage.py) and walls that move take part in 2, 6, 8, 9 and 11, and in no other.
+
 What erosion uncovers meets in the same step. 12 and 13 are one pass over each chunk of tets (two with an averaged
 pressure, with the exchange of the nodal volumes between them); 14 is started after the border tets and finished after
 the interior ones, before the criterion. Which facets pass it is found before the reduction, which says whether any rank
@@ -97,6 +99,9 @@ def _before_kick(sim: Simulation, acts: Acts) -> None:
         erosion.note(nodes)
     if contact is not None:
         contact.note(nodes)
+    if sim.rigid is not None:
+        sim.rigid.note()
+    sim.walls.note()
     if erosion is not None:
         erosion.remove(nodes)  # 3: what the tets covered is surface now
     if contact is not None:
@@ -108,12 +113,17 @@ def _after_kick(sim: Simulation, acts: Acts) -> None:
     nodes, dt, t = sim.model.nodes, sim.clock.dt, sim.clock.t
     for boundary in acts.before_contact:
         boundary.apply(nodes, dt, t)  # 6
+    sim.walls.kick(dt, t)
+    if sim.rigid is not None:
+        sim.rigid.kick(nodes, dt, t)
     if sim.erosion is not None:
         sim.erosion.stop_removed(nodes)  # 7
     if sim.contact is not None:
         sim.contact.solve(nodes, dt, t)  # 8
     for boundary in acts.after_contact:
         boundary.apply(nodes, dt, t)  # 9
+    if sim.rigid is not None:
+        sim.rigid.settle(nodes, t)
 
 
 def second_half(sim: Simulation) -> None:
@@ -123,6 +133,9 @@ def second_half(sim: Simulation) -> None:
     sim.leapfrog.move(nodes, clock.dt, clock.shorter / nodes.scale)
     for boundary in sim.acts.moving:
         boundary.after_move(nodes)  # images of debris that passes a symmetry plane
+    sim.walls.move(clock.dt)
+    if sim.rigid is not None:
+        sim.rigid.move(nodes, clock.dt)
     clock.advance()
     if sim.contact is not None:
         own = sim.reduction.own
@@ -155,6 +168,8 @@ def _elements(sim: Simulation, dt: float, fracture: Fracture | None) -> None:
         own.breaking = fracture.find(own.touched)
         sim.timers.switch("exchange")
     own.limit, own.force, own.worn = elements.limit, elements.force, elements.worn
+    if sim.rigid is not None:
+        own.limit = max(own.limit, sim.rigid.limit)
     if sim.erosion is not None:
         own.worn = max(own.worn, sim.erosion.strikes())
     own.nodes = sim.model.nodes_global

@@ -6,6 +6,7 @@ from conoid.cases.joined import bodies, meeting
 from conoid.cases.schema import Case
 
 from ..parallel.comm import Comm
+from ..rigid.stage import Rigid
 from ..state import Flags, Floats, Nodes
 
 
@@ -37,8 +38,9 @@ def itself(case: Case, mu: Floats) -> Flags:
     return np.asarray((~np.isnan(mu) & (body[:, None] == body)).any(axis=1))
 
 
-def lighter(mu: Floats, nodes: Nodes, mobility: Floats, comm: Comm) -> float:
-    """The heaviest node, kg, of the lighter of two parts that meet, over all that do; all ranks take part.
+def lighter(mu: Floats, nodes: Nodes, mobility: Floats, comm: Comm, rigid: Rigid | None = None) -> float:
+    """The heaviest node, kg, of the lighter of two parts that meet, over all that do; of ``rigid`` bodies their whole
+    mass. All ranks take part.
 
     No impulse is more than it times a speed: the lighter body cannot give more. What is held along some direction,
     ``mobility`` (nodes, 3) 0, gives as much as it gets. 0 where no parts meet.
@@ -47,6 +49,8 @@ def lighter(mu: Floats, nodes: Nodes, mobility: Floats, comm: Comm) -> float:
     np.maximum.at(mass, nodes.part, nodes.mass)
     np.maximum.at(held, nodes.part, (mobility <= 0.0).any(axis=1))
     mass, held = comm.maximum(np.stack([mass, held]))
+    if rigid is not None:
+        mass[rigid.bodies.part] = rigid.bodies.mass
     gives = np.where(held > 0.0, np.inf, mass)
     pairs = np.minimum.outer(gives, gives)
     pairs = np.where(np.isinf(pairs), np.maximum.outer(mass, mass), pairs)

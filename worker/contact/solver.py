@@ -1,5 +1,7 @@
 """The impulses of a step: from the active contacts that the narrow phase has found to the velocities v(n+1/2)."""
 
+from typing import Protocol
+
 import numpy as np
 
 from ..parallel.fixed_point import Tally
@@ -22,12 +24,34 @@ _SPARE = 1.25
 and the system clears every page of memory that is new. Chosen: a bar of glass has a quarter more after 400 steps."""
 
 
+class Bodies(Protocol):
+    """Rigid bodies, of which a slot is a node (rigid/rows.py)."""
+
+    active: bool
+    """Whether any rank has an active contact with one."""
+
+    def take_up(self, places: Indices, crowd: Crowd, scale: float) -> None:
+        """Which slots are theirs."""
+
+    def weigh(self, active: ActiveNodes) -> None:
+        """Row weights of these, once all contacts have added theirs; all ranks take part."""
+
+    def give(self, active: ActiveNodes) -> None:
+        """Takes their impulses, and gives them the velocities that the bodies have with these; all ranks take part."""
+
+    def unsettled(self) -> Ints:
+        """See need.py."""
+
+    def of_contact(self, parts: Ints) -> None:
+        """Adds the impulses of the step to those of the ``parts`` (parts, 3), quanta."""
+
+
 class ActiveSet:
     """The active contacts of a rank in a step, and the slots of their nodes."""
 
-    def __init__(self, scale: float, near: Stops, team: Team) -> None:
-        """``scale``: quanta per N s, a power of two; ``near``: walls and planes of symmetry."""
-        self.scale, self.stops = scale, near
+    def __init__(self, scale: float, near: Stops, team: Team, bodies: Bodies | None = None) -> None:
+        """``scale``: quanta per N s, a power of two; ``near``: walls and planes of symmetry; ``bodies``: rigid ones."""
+        self.scale, self.stops, self._bodies = scale, near, bodies
         self.places: Indices = np.zeros(0, np.int32)
         """(slots,) where the nodes of the last step stand in the crowd."""
         self._zones, self._passes = Zones(team.threads), Slots(team)
@@ -51,6 +75,8 @@ class ActiveSet:
         self._fastest = self._loaded(crowd)
         stops.find(room.braced, room.active, self.stops, self.places, crowd.x, crowd.part, crowd.local, loose, size, dt)
         stops.stop(room.active, room.braced)
+        if self._bodies is not None:
+            self._bodies.take_up(self.places, crowd, self.scale)
         self._contacts = ActiveContacts(
             room.row, room.slots, room.reach, found.weights, found.normals, found.wanted, found.friction, found.pair
         )  # fmt: skip
@@ -83,19 +109,23 @@ class ActiveSet:
         room = self._room
         table = self._sets.weigh.set(room.active, self._contacts, room.loaded)
         self._sets.complete(tasks.weigh, table, self._sum, room.active.row_weights, 0, _ROW_WEIGHTS)
+        if self._bodies is not None:
+            self._bodies.weigh(room.active)
 
     def resume(self, kept: Kept, ratio: float) -> None:
         """Begins with ``ratio`` times what contacts have ``kept`` of the step before."""
         room = self._room
         table = self._sets.resume.set(room.active, self._contacts, room.loaded, kept, ratio, self.scale)
         self._sets.complete(tasks.resume, table, self._sum, room.active.moving_words, IMPULSE, 3)
+        if self._bodies is not None:
+            self._bodies.give(room.active)
         self._passes.give.run(len(self.places), room.active, self.scale, False)
         stops.stop(room.active, room.braced)
 
     def sweep(self, many: int) -> None:
         """So many sweeps."""
-        room, scale = self._room, self.scale
-        if self._sets.alone and not len(self._sum.shared):
+        room, scale, bodies = self._room, self.scale, self._bodies
+        if self._sets.alone and not len(self._sum.shared) and (bodies is None or not bodies.active):
             sweeps.sweep_all(
                 room.active, room.loaded, self._contacts, room.braced, len(self.places), self._fastest, scale, many
             )  # fmt: skip
@@ -104,6 +134,8 @@ class ActiveSet:
             ahead = sweeps.momentum(k, many)
             table = self._sets.sweep.set(room.active, self._contacts, room.loaded, self._fastest, ahead, scale)
             self._sets.complete(tasks.sweep, table, self._sum, room.active.moving_words, IMPULSE, 3)
+            if bodies is not None:
+                bodies.give(room.active)
             self._passes.give.run(len(self.places), room.active, scale, k + 1 == many)
             stops.stop(room.active, room.braced)
 
@@ -145,6 +177,9 @@ class ActiveSet:
         self._passes.leave.run(n, state.v, pushes, left, total, room.active, self.places, *some)
         parts += pushes.sum(axis=0)
         unsettled += left[:, :2].sum(axis=0)
+        if self._bodies is not None:
+            self._bodies.of_contact(parts)
+            unsettled += self._bodies.unsettled()
         return bool(left[:, 2].any())
 
     def pushes(self) -> tuple[Indices, Floats]:

@@ -19,6 +19,7 @@ from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour
 from ..parallel.team import Team
 from ..reduction import StepReduction
+from ..rigid.stage import Rigid
 from ..state import Flags, Floats, Indices, Ints, Model, Nodes
 from ..timers import Timers
 from ..topology import Split
@@ -65,17 +66,17 @@ class Contact:
 
     def __init__(
         self, case: Case, model: Model, neighbours: list[Neighbour], bounds: list[Boundary],
-        comm: Comm, clock: Clock, timers: Timers, team: Team, extremes: tuple[float, float],
+        comm: Comm, clock: Clock, timers: Timers, team: Team, extremes: tuple[float, float], rigid: Rigid | None = None,
     ) -> None:  # fmt: skip
-        """``extremes``: largest nodal mass, kg, and speed, m/s, of the scene."""
+        """``extremes``: largest nodal mass, kg, and speed, m/s, of the scene; ``rigid``: its rigid bodies."""
         assert case.contact is not None
         self._fractures, self._comm, self._clock, self._timers = case.fractures, comm, clock, timers
         self.exterior = Exterior(model, neighbours, bounds, case.contact.edges, comm)
         self.searches = Searches(case, model, neighbours, self.exterior, comm, clock)
         largest, speed = extremes
-        mass = pairing.lighter(self.searches.mu, model.nodes, self.exterior.flight.mobility, comm) or largest
+        mass = pairing.lighter(self.searches.mu, model.nodes, self.exterior.flight.mobility, comm, rigid) or largest
         self.books = Books(model.nodes.n, case, mass * speed, mass * speed * speed, team)
-        self._active = ActiveSet(self.books.scale, Stops.of(case, model, comm), team)
+        self._active = ActiveSet(self.books.scale, Stops.of(case, model, comm), team, rigid)
         self._scheme, self.need = _Scheme.of(case), Need(sweeps(case))
         self._detection = Detection(team)
         self.limit = 0.0

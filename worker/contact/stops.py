@@ -51,6 +51,7 @@ class Stops(NamedTuple):
         walls, planes = case.boundaries_of(schema.Wall), case.boundaries_of(schema.Symmetry)
         axes = [np.eye(3)[AXES[plane.axis]] for _, plane in planes]
         heights = [plane.at for _, plane in planes]
+        walls = [(index, wall) for index, wall in walls if wall.plain]
         points = [wall.point for _, wall in walls] + [at * axis for at, axis in zip(heights, axes, strict=True)]
         normals = np.array([wall.normal for _, wall in walls] + axes, float).reshape(-1, 3)
         held = np.zeros((len(points), len(model.parts)))
@@ -58,6 +59,7 @@ class Stops(NamedTuple):
             held[k] = named(wall, model.parts)
         for k, (_, plane) in enumerate(planes, len(walls)):
             held[k] = part_sides(plane, model, comm)
+        held[:, case.rigid] = 0.0  # rigid bodies have their own (rigid/stops.py)
         normals /= np.linalg.norm(normals, axis=1)[:, None]
         friction = np.array([*(wall.friction for _, wall in walls), *(0.0 for _ in planes)])
         mirrors = np.arange(len(points)) >= len(walls)

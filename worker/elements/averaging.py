@@ -55,7 +55,7 @@ class AveragedElements(Elements):
         self._complete = Pass(team, nodal.complete, *nodal.COMPLETE)
         self._project = Pass(team, nodal.project, *nodal.PROJECT)
         for block in model.blocks:
-            block.flat = flat_tets(block, model.nodes.x0)
+            block.flat = flat_tets(block, model.nodes.x0) if not block.rigid else block.flat
 
     @property
     def _kind(self) -> Indices:

@@ -186,7 +186,7 @@ class Elements:
         self._over_blocks(work, means, numbers, border=False)
 
     def _over_blocks(self, work: BlockPass, means: Values, numbers: Values, *, border: bool) -> None:
-        blocks, nodes = self.model.blocks, self.model.nodes
+        blocks, nodes = [block for block in self.model.blocks if not block.rigid], self.model.nodes
         now = cpu_time() if len(blocks) > 1 else 0.0
         for block in blocks:
             first = block.border_chunks if self._neighbours else 0

@@ -6,7 +6,9 @@ from ..clock import Clock
 from ..contact.stage import Contact
 from ..erosion import Erosion
 from ..fracture.stage import Fracture
+from ..moving_walls import MovingWalls
 from ..parallel.comm import Comm
+from ..rigid.stage import Rigid
 from ..state import Floats, Model
 from ..walls import RigidWalls
 
@@ -16,7 +18,8 @@ class Scene(NamedTuple):
 
     model: Model
     contact: Contact | None
-    walls: RigidWalls | None
+    walls: tuple[RigidWalls | MovingWalls, ...]
+    rigid: Rigid | None
     erosion: Erosion | None
     fracture: Fracture | None
     clock: Clock

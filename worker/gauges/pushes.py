@@ -7,8 +7,10 @@ import numpy as np
 from conoid.cases.measures import PUSHES, Probe, kind
 from conoid.cases.schema import Case, Wall
 
+from ..moving_walls import MovingWalls
 from ..parallel.fixed_point import exact_sums
 from ..state import Floats
+from ..walls import RigidWalls
 from .gauge import Scene
 
 _AXES = "xyz"
@@ -60,16 +62,25 @@ class Pushes:
         """(probes,) of those of walls, zero for the others."""
         if not any(probe.field.startswith("wall_") for probe in self._probes.values()):
             return np.zeros(len(self._probes))
-        nodes, walls = self._scene.model.nodes, self._scene.walls
-        columns = np.zeros((0 if walls is None else len(walls.nodes), len(self._probes)))
+        tables = [np.zeros((0, len(self._probes))), *(self._given_by(walls) for walls in self._scene.walls)]
+        found = exact_sums(self._scene.comm, np.concatenate(tables))
         for place, probe in enumerate(self._probes.values()):
-            if walls is not None and probe.field.startswith("wall_"):
-                part = self._scene.model.parts.index(probe.part)
-                mine = (nodes.owned * nodes.mass_of(part) / nodes.mass)[walls.nodes]
-                columns[:, place] = walls.given[:, self._columns(probe)].sum(axis=1) * mine
-        return exact_sums(self._scene.comm, columns)
+            if self._scene.rigid is not None and probe.field.startswith("wall_"):
+                which, part = self._of(probe), self._scene.model.parts.index(probe.part)
+                found[place] += self._scene.rigid.of_walls(which, part)[_AXES.index(probe.field[-1])]
+        return found
 
-    def _columns(self, probe: Probe) -> list[int]:
-        """Of what walls have given: those of its walls along its axis."""
-        axis = _AXES.index(probe.field[-1])
-        return [3 * k + axis for k, name in enumerate(self._names) if probe.wall in (None, name)]
+    def _given_by(self, walls: RigidWalls | MovingWalls) -> Floats:
+        """(n, probes) what they have given each of their nodes, of those that this rank owns, N s."""
+        nodes, columns = self._scene.model.nodes, np.zeros((len(walls.nodes), len(self._probes)))
+        for place, probe in enumerate(self._probes.values()):
+            if probe.field.startswith("wall_"):
+                part, axis = self._scene.model.parts.index(probe.part), _AXES.index(probe.field[-1])
+                mine = (nodes.owned * nodes.mass_of(part) / nodes.mass)[walls.nodes]
+                some = [3 * k + axis for k in self._of(probe)]
+                columns[:, place] = walls.given[:, some].sum(axis=1) * mine
+        return columns
+
+    def _of(self, probe: Probe) -> list[int]:
+        """Which walls a probe is of."""
+        return [k for k, name in enumerate(self._names) if probe.wall in (None, name)]

@@ -1,0 +1,218 @@
+"""Rigid bodies in whole scenes: contact with all, walls, what holds and drives them; books that close."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from conoid.cases import schema
+from conoid.worker import digest, step
+from conoid.worker.mesh.model import TetMesh
+from conoid.worker.simulation import Simulation
+
+from ..contact.bodies import meeting_of, moved, rotation
+from ..worker.kernels import build, run
+from ..worker.meshes import block
+from ..worker.simulations import kept_again, on, tick
+
+Floats = npt.NDArray[np.float64]
+PLATE = block((6, 6, 3), 1e-3)
+BOX = moved(block((2, 2, 2), 1e-3), (2.1e-3, 2.3e-3, 3.02e-3))
+TILTED = moved(block((2, 2, 2), 1e-3), (2.1e-3, 2.3e-3, 3.6e-3), rotation((1.0, 2.0, 0.3), 0.5))
+ABOVE = moved(block((2, 2, 2), 1e-3), (1.9e-3, 2.0e-3, 6.1e-3), rotation((1.0, 0.0, 1.0), 0.3))
+GROUND = schema.Wall(kind="wall", point=(0.0, 0.0, 0.0), normal=(0.0, 0.0, 1.0), friction=0.3)
+RIGID = schema.Rigid()
+
+
+def rigid_case(
+    motions: Sequence[dict[str, Any]], boundaries: Sequence[schema.Boundary] = (), **keys: Any
+) -> schema.Case:
+    """Bodies that meet, with these keys of parts, and boundaries."""
+    contact = keys.pop("contact", {})
+    case = meeting_of(motions, contact, **keys)
+    return case.model_copy(update={"boundaries": tuple(boundaries)})
+
+
+class Seen:
+    """What a run shows at each time."""
+
+    def __init__(self, case: schema.Case, meshes: Sequence[TetMesh], steps: int = -1) -> None:
+        self.energies, self.momenta, self.speeds, self.rates, self.centres = [], [], [], [], []  # type: ignore[var-annotated]
+        self.sim = run(build(case, meshes), self._watch, steps)
+
+    def _watch(self, sim: Simulation, before: Floats) -> None:
+        self.energies.append(sim.ledger.close(before))
+        self.momenta.append(np.concatenate([sim.ledger.momentum, sim.ledger.angular_momentum]))
+        if sim.rigid is not None:
+            bodies = sim.rigid.bodies
+            self.speeds.append(bodies.speed.copy())
+            self.rates.append(bodies.rates(bodies.momentum))
+            self.centres.append(bodies.centre.copy())
+
+    @property
+    def worst(self) -> float:
+        """Largest residual of the energy."""
+        return max(energy.residual for energy in self.energies)
+
+    @property
+    def drift(self) -> float:
+        """Of the linear momentum, over its size."""
+        p: Floats = np.array(self.momenta)[:, :3]
+        return float(np.ptp(p, axis=0).max()) / float(np.abs(p).max())
+
+
+def test_energy_and_momentum_at_the_start_are_those_of_the_mesh() -> None:
+    """Sums over the nodes of a deformable body of the same motion."""
+    motion = {"velocity": (30.0, -20.0, 50.0), "spin": schema.Spin(centre=(1e-3, 0.0, 2e-3), rate=(3e3, 9e3, -5e3))}
+    seen = [Seen(rigid_case([{**motion, **how}], contact=None), [TILTED], 1) for how in ({}, {"rigid": RIGID})]
+    energy, momenta = ([getattr(each, name)[0] for each in seen] for name in ("energies", "momenta"))
+    assert energy[1].initial == pytest.approx(energy[0].initial, rel=1e-13)
+    assert momenta[1] == pytest.approx(momenta[0], rel=1e-9, abs=1e-12 * np.abs(momenta[0]).max())
+
+
+@pytest.mark.parametrize(("mesh", "friction"), [(BOX, 0.0), (TILTED, 0.3)])
+def test_a_rigid_box_hits_a_plate(mesh: TetMesh, friction: float) -> None:
+    """Momentum to round-off, the impulses of both parts to the bit; energy as well as without a rigid body."""
+    motions: list[dict[str, Any]] = [{}, {"rigid": RIGID, "velocity": (0.0, 0.0, -100.0)}]
+    seen = Seen(rigid_case(motions, contact={"friction": friction}, end=6e-6), [PLATE, mesh])
+    assert seen.sim.contact is not None
+    given = seen.sim.contact.books.parts
+    assert (given.sum(axis=0) == 0).all()
+    assert given[1, 2] > 0
+    assert seen.drift < 1e-14
+    assert seen.worst < 1e-4
+    assert seen.speeds[-1][0, 2] > 0.0
+    first, last = seen.energies[0], seen.energies[-1]
+    assert first.kinetic > last.kinetic + last.elastic > 0.5 * first.kinetic
+
+
+def test_rigid_bodies_hit_each_other_as_newton_says() -> None:
+    """The corner of a small cube hits a rod off its centre, with restitution 1: J = 2 v / (1/m + 1/M + d^2 / I) along x
+    for an arm d about y (Goldsmith 1960, Impact, chapter 2).
+    """
+    rod, axis = block((2, 2, 16), 1e-3), (0.0, 1.0, -1.0)
+    cube = TetMesh(
+        (block((2, 2, 2), 1e-3).points - 1e-3) @ rotation(axis, np.arccos(1.0 / np.sqrt(3.0))).T,
+        block((2, 2, 2), 1e-3).tets,
+    )
+    cube = moved(cube, np.array([-1e-5, 1e-3, 13.4e-3]) - cube.points[np.argmax(cube.points[:, 0])])
+    mass, little, speed, arm, inertia = 1.0, 0.25, 20.0, 5.4e-3, (3e-5, 3e-5, 1e-6, 0.0, 0.0, 0.0)
+    motions: list[dict[str, Any]] = [
+        {"rigid": schema.Rigid(mass=mass, centre=(1e-3, 1e-3, 8e-3), inertia=inertia)},
+        {"rigid": schema.Rigid(mass=little), "velocity": (speed, 0.0, 0.0)},
+    ]
+    seen = Seen(rigid_case(motions, contact={"restitution": 1.0}, end=2e-6), [rod, cube])
+    impulse = 2.0 * speed / (1.0 / little + 1.0 / mass + arm**2 / inertia[1])
+    assert seen.speeds[-1][:, 0] == pytest.approx([impulse / mass, speed - impulse / little], rel=1e-3)
+    assert seen.rates[-1][0, 1] == pytest.approx(impulse * arm / inertia[1], rel=1e-3)
+    assert seen.energies[-1].kinetic == pytest.approx(0.5 * little * speed**2, rel=1e-3)
+    assert seen.drift < 1e-14
+
+
+def test_a_rigid_box_lands_flat_and_slides_to_rest() -> None:
+    """On a wall, with friction and gravity: no rotation, no bounce, the way of Coulomb's law: v^2 / (2 mu g)."""
+    gravity = schema.Gravity(kind="gravity", acceleration=(0.0, 0.0, -1e4))
+    case = rigid_case([{"rigid": RIGID, "velocity": (2.0, 0.0, 0.0)}], [GROUND, gravity], contact=None, end=1e-3)
+    seen = Seen(case, [block((3, 3, 3), 1e-3)])
+    way = seen.centres[-1][0] - seen.centres[0][0]
+    assert way == pytest.approx([2.0**2 / (2.0 * 0.3 * 1e4), 0.0, 0.0], rel=5e-3, abs=1e-8)
+    assert np.abs(seen.rates).max() < 0.02
+    end = seen.energies[-1]
+    assert end.kinetic < 1e-6 * end.initial
+    assert end.friction == pytest.approx(end.initial, rel=1e-4)
+    assert seen.worst < 1e-12
+
+
+def test_a_rigid_body_between_a_wall_and_another_one_is_no_cushion() -> None:
+    """A deformable block that falls on a rigid plate on a wall stops at once as on the wall."""
+    falling = moved(block((3, 3, 3), 1e-3), (0.0, 0.0, 1e-3))
+    plate = moved(block((3, 3, 1), 1e-3), (0.0, 0.0, 0.0))
+    motions: list[dict[str, Any]] = [{"rigid": RIGID}, {"velocity": (0.0, 0.0, -20.0)}]
+    seen = Seen(rigid_case(motions, [GROUND], end=1.5e-6), [plate, falling])
+    fixed = rigid_case([{"velocity": (0.0, 0.0, -20.0)}], [GROUND], contact=None, end=1.5e-6)
+    alone = Seen(fixed, [moved(falling, (0.0, 0.0, -1e-3))])
+    assert np.abs(np.array(seen.speeds)[:, 0, 2]).max() < 0.5
+    assert seen.momenta[-1][2] == pytest.approx(alone.momenta[-1][2], rel=0.02)
+
+
+def test_planes_of_symmetry_leave_a_quarter_its_motions() -> None:
+    """A quarter of a box between two planes moves along their line only, and does not turn; half of one turns."""
+    planes = [schema.Symmetry(kind="symmetry", axis=axis) for axis in ("x", "y")]
+    motion = {"rigid": RIGID, "velocity": (0.0, 0.0, -5.0)}
+    seen = Seen(rigid_case([motion], [*planes, GROUND], contact=None, end=1e-4), [moved(BOX, (-2.1e-3, -2.3e-3, 0.0))])
+    assert seen.speeds[0][0] == pytest.approx([0.0, 0.0, -5.0])
+    assert not np.array(seen.rates).any()
+    half = {"rigid": RIGID, "spin": schema.Spin(centre=(1e-3, 1e-3, 1e-3), rate=(2e3, 0.0, 0.0))}
+    turning = Seen(rigid_case([half], planes[:1], contact=None, end=1e-3), [block((2, 2, 2), 1e-3)])
+    assert turning.rates[-1][0] == pytest.approx([2e3, 0.0, 0.0], rel=1e-12)
+    assert turning.worst < 1e-12
+
+
+def test_a_driven_punch_works_from_outside() -> None:
+    """A rigid punch goes into a plate on a wall: the work is in the ledger, the motion is the course."""
+    ramp = ((0.0, 0.0), (0.5e-6, 1.0))
+    drive = schema.Prescribed(kind="velocity", parts=("body1",), x=0.0, y=0.0, z=-50.0, course=ramp)
+    ground = GROUND.model_copy(update={"parts": ("body0",)})
+    seen = Seen(rigid_case([{}, {"rigid": RIGID}], [drive, ground], end=3e-6), [PLATE, BOX])
+    way = seen.centres[-1][0, 2] - seen.centres[0][0, 2]
+    assert way == pytest.approx(-50.0 * (3e-6 - 0.25e-6), rel=1e-9)
+    end = seen.energies[-1]
+    assert end.external > 2.0 * end.kinetic > 0.0
+    assert seen.worst < 1e-4
+
+
+def test_prescribed_rotation_is_exact() -> None:
+    spin = schema.Spin(centre=(1e-3, -2e-3, 0.0), rate=(0.0, 0.0, 2e3))
+    turn = schema.Rotation(kind="rotation", spin=spin)
+    sim = run(build(rigid_case([{"rigid": RIGID}], [turn], contact=None, end=1e-3), [TILTED]))
+    angle = 2e3 * sim.clock.t
+    centre = np.array(spin.centre)
+    exact = centre + (sim.model.nodes.x0 - centre) @ rotation((0.0, 0.0, 1.0), angle).T
+    assert sim.model.nodes.x == pytest.approx(exact, abs=1e-15)
+
+
+RAM = schema.Wall(
+    kind="wall", name="ram", point=(-5e-5, 0.0, 0.0), normal=(1.0, 0.0, 0.0), velocity=(9.0, 0.0, 0.0), mass=1e-3
+)  # fmt: skip
+FALLING: list[dict[str, Any]] = [{"rigid": RIGID, "velocity": (0.0, 0.0, speed)} for speed in (-100.0, -300.0)]
+SCENE = rigid_case([{}, *FALLING], [GROUND, RAM], contact={"friction": 0.3}, end=6e-6)
+"""A plate between a wall and a ram, and two rigid boxes that fall on it and on each other."""
+MESHES = (PLATE, TILTED, ABOVE)
+
+
+def state_of(sim: Simulation) -> tuple[str | None, list[list[float]]]:
+    assert sim.rigid is not None
+    words = sim.walls.words() + sim.rigid.words()
+    return digest.digest(sim.model, sim.comm, [], words), sim.rigid.bodies.speed.tolist()
+
+
+def stepped(sim: Simulation, many: int = 120) -> tuple[str | None, list[list[float]]]:
+    step.prepare(sim)
+    for _ in range(many):
+        tick(sim)
+    return state_of(sim)
+
+
+@pytest.mark.parametrize("ranks", [2, 3, 7])
+def test_any_number_of_ranks_gives_one_answer(ranks: int) -> None:
+    (alone,) = on(1, SCENE, MESHES, stepped)
+    several = on(ranks, SCENE, MESHES, stepped)
+    assert several[0] == alone
+    assert all(speeds == alone[1] for _, speeds in several)
+    assert alone[1][0] != [0.0, 0.0, -100.0]
+
+
+def test_a_run_that_goes_on_ends_with_the_same_bits(tmp_path: Path) -> None:
+    """From a checkpoint in the middle of an impact, of two ranks."""
+
+    def halves(sim: Simulation) -> tuple[str | None, list[list[float]]]:
+        stepped(sim, 70)
+        resumed = kept_again(sim, SCENE, tmp_path)
+        for _ in range(50):
+            tick(resumed)
+        return state_of(resumed)
+
+    assert on(2, SCENE, MESHES, halves)[0] == on(1, SCENE, MESHES, stepped)[0]

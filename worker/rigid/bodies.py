@@ -1,0 +1,159 @@
+"""The state of the rigid bodies of a case, the same on all ranks."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from conoid.cases.schema import Case, Part
+
+from ..parallel.comm import Comm
+from ..parallel.fixed_point import exact_sums
+from ..state import Flags, Floats, Indices, Ints, Nodes
+from . import rotation
+from .motion import Held
+
+STATE = ("centre", "q", "speed", "momentum")
+"""What changes from step to step."""
+
+
+@dataclass
+class Bodies:
+    """One row a body."""
+
+    part: Ints
+    """(b,) which part it is."""
+    mass: Floats
+    """(b,) kg."""
+    origin: Floats
+    """(b, 3) centre of mass at the start, m."""
+    inertia: Floats
+    """(b, 3, 3) about it, along the axes of the case at the start, kg m^2."""
+    reach: Floats
+    """(b,) a power of two above the distance of any node from the centre, m: the quantum of moments is that of impulses
+    times it."""
+    held: list[Held]
+
+    def __post_init__(self) -> None:
+        """At rest, where it starts."""
+        n = len(self.part)
+        self.centre, self.speed, self.momentum = self.origin.copy(), np.zeros((n, 3)), np.zeros((n, 3))
+        """Of mass, m; m/s and, about it, kg m^2/s at mid-step."""
+        self.q = np.tile([1.0, 0.0, 0.0, 0.0], (n, 1))
+        """(b, 4) unit quaternion from the axes of the start, scalar first."""
+        self.inverse = np.array([inverse(tensor) for tensor in self.inertia]).reshape(n, 3, 3)
+        self.rotation, self.compliance = np.empty((n, 3, 3)), np.empty((n, 3, 3))
+        """(b, 3, 3) of the present; inverse of the inertia in space, of the axis alone where it turns about one."""
+        self.free = np.array([each.free for each in self.held]).reshape(n, 3)
+        self.turns = np.array([each.turns for each in self.held]).reshape(n, 3)
+        """(b, 3) 1 along what axes it moves, and turns about, as impulses make it."""
+        self.loose = np.flatnonzero(self.turns.all(axis=1))
+        """Those that turn freely."""
+        self.lightness = self.free / self.mass[:, None]
+        self.pose()
+
+    @property
+    def n(self) -> int:
+        """How many there are."""
+        return len(self.part)
+
+    def pose(self) -> None:
+        """What depends on the orientation."""
+        rotation.turns_of(self.rotation, self.q)
+        rotation.spatial(self.compliance, self.rotation, self.inverse)
+        for b in range(self.n):
+            if self.turns[b].any() and not self.turns[b].all():
+                axis = int(np.argmax(self.turns[b]))
+                self.compliance[b] = 0.0
+                self.compliance[b, axis, axis] = 1.0 / self.about(b)[axis, axis]
+        self.yielding = self.compliance * self.turns[:, :, None]
+        """(b, 3, 3) the same, 0 where something holds the rotation."""
+
+    def about(self, b: int) -> Floats:
+        """(3, 3) inertia of a body in space, kg m^2."""
+        found = np.empty((1, 3, 3))
+        rotation.spatial(found, self.rotation[b : b + 1], self.inertia[b : b + 1])
+        return np.asarray(found[0])
+
+    def rates(self, momentum: Floats) -> Floats:
+        """(b, 3) rotation vectors of angular momenta, rad/s."""
+        return times(self.compliance, momentum)
+
+
+def times(tensors: Floats, vectors: Floats) -> Floats:
+    """(b, 3) products of tensors (b, 3, 3) and vectors, in a fixed order of sums."""
+    parts = tensors * vectors[:, None, :]
+    return np.asarray((parts[..., 0] + parts[..., 1]) + parts[..., 2])
+
+
+def dot(a: Floats, b: Floats) -> Floats:
+    """(b,) scalar products of rows of three."""
+    parts = a * b
+    return np.asarray((parts[:, 0] + parts[:, 1]) + parts[:, 2])
+
+
+def cross(a: Floats, b: Floats) -> Floats:
+    """(3,) vector product."""
+    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+
+
+def inverse(tensor: Floats) -> Floats:
+    """(3, 3) of a symmetric one, by its cofactors."""
+    xx, yy, zz, yz, zx, xy = (float(tensor[i, j]) for i, j in ((0, 0), (1, 1), (2, 2), (1, 2), (2, 0), (0, 1)))
+    a, b, c = yy * zz - yz * yz, zx * yz - xy * zz, xy * yz - yy * zx
+    whole = xx * a + xy * b + zx * c
+    d, e, f = zz * xx - zx * zx, xy * zx - xx * yz, xx * yy - xy * xy
+    return np.asarray(np.array([[a, b, c], [b, d, e], [c, e, f]]) / whole)
+
+
+def of_nodes(case: Case, nodes: Nodes) -> Indices:
+    """(nodes,) which rigid body each node is of, -1 for none."""
+    number = np.full(len(case.parts), -1, np.int32)
+    number[case.rigid] = np.arange(len(case.rigid), dtype=np.int32)
+    return np.asarray(number[nodes.part])
+
+
+def measured(case: Case, nodes: Nodes, comm: Comm) -> Bodies:
+    """The bodies of a case at the start, of its ``nodes`` on all ranks; all take part."""
+    of, held = of_nodes(case, nodes), [Held.of(case, case.parts[index]) for index in case.rigid]
+    found = [_measured(case.parts[i], nodes, of == b, comm) for b, i in enumerate(case.rigid)]
+    masses, centres, tensors, reach = (list(column) for column in zip(*found, strict=True))
+    bodies = Bodies(
+        np.array(case.rigid), np.array(masses), np.array(centres), np.array(tensors), np.array(reach), held
+    )  # fmt: skip
+    for b, index in enumerate(case.rigid):
+        _start(bodies, b, case.parts[index])
+    return bodies
+
+
+def _measured(part: Part, nodes: Nodes, chosen: Flags, comm: Comm) -> tuple[float, Floats, Floats, float]:
+    """Mass, kg, centre, m, inertia about it, kg m^2, and reach, m, of a body that has the nodes ``chosen``."""
+    spec, some = part.rigid, chosen & nodes.owned
+    assert spec is not None
+    m, x = nodes.mass[some], nodes.x[some]
+    total, *first = exact_sums(comm, np.column_stack([m, m[:, None] * x])).tolist()
+    centre = np.array(first) / total if spec.centre is None else np.array(spec.centre)
+    r = x - centre
+    products = [m * r[:, i] * r[:, j] for i, j in ((0, 0), (1, 1), (2, 2), (1, 2), (2, 0), (0, 1))]
+    xx, yy, zz, yz, zx, xy = exact_sums(comm, np.column_stack(products)).tolist()
+    six = (yy + zz, zz + xx, xx + yy, -yz, -zx, -xy) if spec.inertia is None else spec.inertia
+    squares = r * r
+    far = float(comm.maximum(np.array([((squares[:, 0] + squares[:, 1]) + squares[:, 2]).max(initial=0.0)]))[0])
+    return spec.mass or total, centre, tensor_of(six), math.ldexp(1.0, math.frexp(math.sqrt(far))[1])
+
+
+def tensor_of(six: tuple[float, ...]) -> Floats:
+    """(3, 3) of the components xx, yy, zz, yz, zx, xy."""
+    xx, yy, zz, yz, zx, xy = six
+    return np.array([[xx, xy, zx], [xy, yy, yz], [zx, yz, zz]])
+
+
+def _start(bodies: Bodies, b: int, part: Part) -> None:
+    """The motion of a body at the start, as far as what holds it allows."""
+    held, rate, speed = bodies.held[b], np.zeros(3), np.array(part.velocity)
+    if part.spin is not None:
+        rate = np.array(part.spin.rate)
+        speed = speed + cross(rate, bodies.centre[b] - np.array(part.spin.centre))
+    speed, rate = held.begin(speed, rate, bodies.centre[b])
+    bodies.speed[b] = speed
+    bodies.momentum[b] = held.kept(times(bodies.inertia[b : b + 1], rate[None])[0])

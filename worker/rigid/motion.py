@@ -1,0 +1,107 @@
+"""What acts on a rigid body from outside: gravity, planes of symmetry, prescribed motion."""
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from conoid.cases.geometry import AXES
+from conoid.cases.schema import Boundary, Case, Gravity, Part, Prescribed, Rotation, Symmetry
+
+from ..drivers import Course
+from ..state import Floats
+from ..turning import sine_and_cosine
+
+
+@dataclass
+class Held:
+    """Of one body."""
+
+    free: Floats = field(default_factory=lambda: np.ones(3))
+    """(3,) 1 along the axes along which impulses move it."""
+    turns: Floats = field(default_factory=lambda: np.ones(3))
+    """(3,) 1 about the axes about which they turn it: all of them, one, or none."""
+    driven: dict[int, tuple[float, Course]] = field(default_factory=dict)
+    """By axis, the speed that is prescribed, m/s, and its factor."""
+    spin: tuple[Floats, Floats] | None = None
+    """A point of the line that it is turned about, m, and the rotation vector, rad/s."""
+    pulls: list[tuple[Floats, Course]] = field(default_factory=list)
+    """Accelerations, m/s^2."""
+    prescribed: bool = False
+    """Whether any motion is prescribed: walls do not hold it then."""
+
+    @classmethod
+    def of(cls, case: Case, part: Part) -> "Held":
+        """By the boundaries that hold the ``part``."""
+        found = cls()
+        for boundary in case.boundaries:
+            if not boundary.parts or part.name in boundary.parts:
+                found._take(boundary)
+        return found
+
+    def _take(self, boundary: Boundary) -> None:
+        if isinstance(boundary, Gravity):
+            self.pulls.append((np.array(boundary.acceleration), Course(boundary.course)))
+        elif isinstance(boundary, Symmetry):
+            self._fix(AXES.index(boundary.axis), 0.0, Course())
+        elif isinstance(boundary, Prescribed):
+            self.prescribed = True
+            for axis in AXES:
+                speed = getattr(boundary, axis)
+                if speed is not None:
+                    self._fix(AXES.index(axis), speed, Course(boundary.course))
+        elif isinstance(boundary, Rotation):
+            self.prescribed, self.free, self.turns = True, np.zeros(3), np.zeros(3)
+            self.spin = np.array(boundary.spin.centre), np.array(boundary.spin.rate)
+
+    def _fix(self, axis: int, speed: float, course: Course) -> None:
+        """All nodes have this speed along an axis: the body turns about no other one."""
+        self.free[axis] = 0.0
+        self.driven[axis] = speed, course
+        self.turns = self.turns * (np.arange(3) == axis)
+
+    def begin(self, speed: Floats, rate: Floats, centre: Floats) -> tuple[Floats, Floats]:
+        """Velocity of the ``centre``, m/s, and rotation vector, rad/s, at the start."""
+        if self.spin is not None:
+            arm = centre - self.spin[0]
+            return np.cross(self.spin[1], arm), self.spin[1]
+        return self._driven(speed, 0.0, 0.0), rate * self.turns
+
+    def kept(self, momentum: Floats) -> Floats:
+        """(3,) of an angular momentum, what the body may have."""
+        return momentum if self.spin is not None else momentum * self.turns
+
+    def kick(self, speed: Floats, centre: Floats, last_dt: float, dt: float, t: float) -> Floats:
+        """(3,) v*(n+1/2) of v(n-1/2), m/s."""
+        if self.spin is not None:
+            return np.asarray((self.turned(centre, dt) - centre) / dt) if dt > 0.0 else speed
+        gained = speed
+        for acceleration, course in self.pulls:
+            factor = course.mean(t - 0.5 * last_dt, t + 0.5 * dt)
+            gained = gained + 0.5 * (last_dt + dt) * factor * acceleration
+        return self._driven(gained, t, t + dt)
+
+    def _driven(self, speed: Floats, begin: float, end: float) -> Floats:
+        found = np.array(speed)
+        for axis, (given, course) in self.driven.items():
+            found[axis] = given * course.mean(begin, end)
+        return found
+
+    def turned(self, point: Floats, dt: float) -> Floats:
+        """(3,) where the prescribed rotation takes a point in a step ``dt``, s."""
+        assert self.spin is not None
+        axis, sine, cosine = self._angle(dt)
+        arm = point - self.spin[0]
+        across = np.cross(axis, arm)
+        return np.asarray(point + sine * across + (1.0 - cosine) * np.cross(axis, across))
+
+    def half(self, dt: float) -> Floats:
+        """(3,) axis of the prescribed rotation in a step ``dt``, s, times the tangent of half its angle."""
+        axis, sine, cosine = self._angle(dt)
+        return np.asarray(axis * (sine / (1.0 + cosine)))
+
+    def _angle(self, dt: float) -> tuple[Floats, float, float]:
+        assert self.spin is not None
+        rate = self.spin[1]
+        size = math.sqrt(float(rate[0] * rate[0] + rate[1] * rate[1] + rate[2] * rate[2]))
+        return (rate / size, *sine_and_cosine(size * dt)) if size > 0.0 else (rate, 0.0, 1.0)

@@ -1,0 +1,105 @@
+"""Rigid bodies in the sweeps of contact: one node with six degrees of freedom each.
+
+A contact gives integer impulses to slots (contact/sweeps.py), which are completed as those of other nodes are. At the
+rank that owns the node, those of the slots of a rigid body are summed as integers, with their moments about its centre,
+and then over the ranks; the body moves, and its slots with it. So the rows of one body are coupled through its mass and
+inertia, and the sweeps are Jacobi's as they are for shared nodes: the norm
+of a row is bounded by the l1 norm over all rows of the body (``norms``), and no order of contacts or ranks changes a
+bit.
+"""
+
+import numpy as np
+
+from ..contact.active import IMPULSE, MOBILITY, NODES, V
+from ..contact.sweeps import SHARES
+from ..jit import njit, types
+
+WEIGHTS = 8
+"""Words of a body: sums over its slots of |w| |n_i|, of |arm x (|w| |n|)|_i over the reach, of |w|, of |arm| |w|."""
+WORDS = 6
+"""Of an impulse (3), quanta, and a moment (3), quanta times the reach of the body."""
+_F, _F1, _F2, _F3 = types.float64, types.float64[::1], types.float64[:, ::1], types.float64[:, :, ::1]
+_N1, _I2, _B1 = types.int32[::1], types.int64[:, ::1], types.boolean[::1]
+
+
+@njit(types.void(_I2, NODES, _N1, _N1, _F2, _B1, _F1), cache=True)
+def weigh(words, active, slots, body, arms, owned, reach):  # type: ignore[no-untyped-def]
+    """Adds the row weights of ``owned`` (k,) ``slots`` (k,) to the sums of their ``body`` (k,), ``words``
+    (b, WEIGHTS); ``arms`` (k, 3) from its centre, m, ``reach`` (b,) above their lengths, a power of two.
+    """
+    sums = active.row_weights
+    for k in range(len(slots)):
+        if not owned[k]:
+            continue
+        s, b = slots[k], body[k]
+        x, y, z = abs(arms[k, 0]) / reach[b], abs(arms[k, 1]) / reach[b], abs(arms[k, 2]) / reach[b]
+        for i in range(3):
+            words[b, i] += sums[s, i]
+        words[b, 3] += np.int64(np.rint(y * sums[s, 2] + z * sums[s, 1]))
+        words[b, 4] += np.int64(np.rint(z * sums[s, 0] + x * sums[s, 2]))
+        words[b, 5] += np.int64(np.rint(x * sums[s, 1] + y * sums[s, 0]))
+        words[b, 6] += sums[s, 3]
+        words[b, 7] += np.int64(np.rint((x + y + z) * sums[s, 3]))
+
+
+@njit(types.void(NODES, _I2, _N1, _N1, _F2, _F1, _F2, _F3), cache=True, error_model="numpy")
+def norms(active, words, slots, body, arms, reach, lightness, yielding):  # type: ignore[no-untyped-def]
+    """Row weights and mobilities of ``slots``, such that their products are what a row of the contact matrix has at
+    most: sum_i |n_i| Q_i along a normal n, Q of any direction across. ``words``: of all ranks, see ``weigh``;
+    ``lightness`` (b, 3) one over the mass, 1/kg, and ``yielding`` (b, 3, 3) the inverse of the inertia in space, zero
+    where the motion is held.
+    """
+    sums, fixed, moment, along = active.row_weights, active.fixed, np.empty(3), np.empty(3)
+    for k in range(len(slots)):
+        s, b = slots[k], body[k]
+        most, heavy = 0.0, 0.0
+        for j in range(3):
+            row, moment[j] = 0.0, 0.0
+            for i in range(3):
+                row += abs(yielding[b, j, i])
+                moment[j] += abs(yielding[b, j, i]) * (words[b, 3 + i] * reach[b])
+            most, heavy = max(most, row), max(heavy, lightness[b, j])
+        for i in range(3):
+            j, m = (i + 1) % 3, (i + 2) % 3
+            along[i] = lightness[b, i] * words[b, i] + abs(arms[k, m]) * moment[j] + abs(arms[k, j]) * moment[m]
+        arm = abs(arms[k, 0]) + abs(arms[k, 1]) + abs(arms[k, 2])
+        across = heavy * words[b, 6] + arm * most * (words[b, 7] * reach[b])
+        for i in range(3):
+            sums[s, i] = np.int64(np.ceil(along[i] / across * SHARES)) if across > 0.0 else 0
+            fixed[s, MOBILITY + i] = across / SHARES
+        sums[s, 3] = np.int64(SHARES)
+
+
+@njit(types.void(_I2, NODES, _N1, _N1, _F2, _B1, _F1), cache=True)
+def gather(words, active, slots, body, arms, owned, reach):  # type: ignore[no-untyped-def]
+    """Takes the impulses of a sweep from ``slots`` and adds those of ``owned`` ones to ``words`` (b, WORDS) of their
+    bodies.
+    """
+    moving = active.moving_words
+    for k in range(len(slots)):
+        s, b = slots[k], body[k]
+        p, q, r = moving[s, IMPULSE], moving[s, IMPULSE + 1], moving[s, IMPULSE + 2]
+        for i in range(3):
+            moving[s, IMPULSE + i] = 0
+        if owned[k] and p | q | r:
+            x, y, z = arms[k, 0] / reach[b], arms[k, 1] / reach[b], arms[k, 2] / reach[b]
+            words[b, 0] += p
+            words[b, 1] += q
+            words[b, 2] += r
+            words[b, 3] += np.int64(np.rint(y * r - z * q))
+            words[b, 4] += np.int64(np.rint(z * p - x * r))
+            words[b, 5] += np.int64(np.rint(x * q - y * p))
+
+
+@njit(types.void(NODES, _N1, _N1, _F2, _F2, _F2), cache=True)
+def spread(active, slots, body, arms, speed, rate):  # type: ignore[no-untyped-def]
+    """Velocities of ``slots`` as their bodies move, ``speed`` and ``rate`` (b, 3), and the paths that they take."""
+    v, path = active.moving, active.path
+    for k in range(len(slots)):
+        s, b = slots[k], body[k]
+        x, y, z = arms[k, 0], arms[k, 1], arms[k, 2]
+        p = speed[b, 0] + (rate[b, 1] * z - rate[b, 2] * y)
+        q = speed[b, 1] + (rate[b, 2] * x - rate[b, 0] * z)
+        r = speed[b, 2] + (rate[b, 0] * y - rate[b, 1] * x)
+        path[s] += abs(p - v[s, V]) + abs(q - v[s, V + 1]) + abs(r - v[s, V + 2])
+        v[s, V], v[s, V + 1], v[s, V + 2] = p, q, r

@@ -1,0 +1,215 @@
+"""Walls that stop rigid bodies: impulses at the nodes of their surfaces.
+
+The bodies and the walls are the same on all ranks, and so are the nodes here: every rank computes all impulses, one
+after the other (Gauss-Seidel), with no message. Each row asks that its node is not behind its wall at the end of the
+step; impulses never pull, those of friction lie within Coulomb's cone. They are kept through a step, within the sweeps
+of contact and after them, so that a body between a wall and another body gives way to neither.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..jit import njit, record, types
+from ..state import Flags, Floats, Indices, Ints
+from ..wall_shapes import SHAPES, Walls, gap
+from .bodies import Bodies
+
+_NEAR = 2.0
+"""Times what a body moves in a step, from where on a wall is looked at."""
+_CLOSE = 1e-3
+"""Of the reach of a body, the same for what hits it in the step."""
+_MOST, _ENOUGH = 200, 1e-12
+"""Passes over the rows, and the change of an impulse, over the largest, that ends them."""
+
+
+class Rows(NamedTuple):
+    """Nodes of bodies near walls."""
+
+    body: Ints
+    wall: Ints
+    arm: Floats
+    """(m, 3) from the centre of the body, m."""
+    normal: Floats
+    """(m, 3) out of the wall."""
+    least: Floats
+    """(m,) speed along it that takes the node to the wall in the step, m/s."""
+    push: Floats
+    """(m,) impulse along it so far, N s."""
+    rub: Floats
+    """(m, 3) impulse of friction so far, N s."""
+
+    @classmethod
+    def room(cls, n: int) -> "Rows":
+        """For as many."""
+        return cls(
+            np.empty(n, np.int64), np.empty(n, np.int64), np.empty((n, 3)), np.empty((n, 3)), np.empty(n), np.zeros(n),
+            np.zeros((n, 3)),
+        )  # fmt: skip
+
+
+_F, _F1, _F2, _F3 = types.float64, types.float64[::1], types.float64[:, ::1], types.float64[:, :, ::1]
+_I1, _N1 = types.int64[::1], types.int32[::1]
+ROWS = record(Rows, _I1, _I1, _F2, _F2, _F1, _F1, _F2)
+
+
+class BodyStops:
+    """The walls of a case and the bodies that they stop."""
+
+    def __init__(self, walls: Walls, bodies: Bodies, held: Flags, arms: Floats, body: Indices) -> None:
+        """``held`` (walls, b): which stop which; ``arms`` (k, 3) of all nodes of the surfaces at the start, m, each of
+        a ``body`` (k,).
+        """
+        self.walls, self._bodies, self._held, self._arms, self._body = walls, bodies, held, arms, body
+        self._all = Rows.room(len(arms) * walls.n)
+        self._many = 0
+        self.given = np.zeros((walls.n, bodies.n, 3))
+        """(walls, b, 3) what each wall has given each body so far, N s."""
+        self.impulse, self.rubbed = np.zeros((2, bodies.n, 6))
+        """(b, 6) impulse, N s, and moment, N m s, of the step, and what of it is friction."""
+        self.of_walls, self.rubbed_by = np.zeros((2, walls.n, bodies.n, 3))
+        """(walls, b, 3) impulses of the step, and what of them is friction, N s."""
+
+    def begin(self, dt: float) -> None:
+        """The rows of a step, s; the bodies and walls are as they are at n, with their velocities before impulses."""
+        bodies = self._bodies
+        rate = bodies.rates(bodies.momentum)
+        size = np.sqrt((bodies.speed * bodies.speed).sum(axis=1)) + bodies.reach * np.sqrt((rate * rate).sum(axis=1))
+        fastest = float(np.sqrt((self.walls.speed * self.walls.speed).sum(axis=1)).max(initial=0.0))
+        near = _NEAR * dt * (size + fastest) + _CLOSE * bodies.reach
+        self._many = find(
+            self._all, self.walls.shapes, self._held, self._arms, self._body, bodies.rotation, bodies.centre, near, dt
+        )  # fmt: skip
+        self._all.push[:] = 0.0
+        self._all.rub[:] = 0.0
+        self.impulse[:], self.rubbed[:], self.of_walls[:], self.rubbed_by[:] = 0.0, 0.0, 0.0, 0.0
+
+    def stop(self, speed: Floats, rate: Floats) -> None:
+        """Corrects ``speed`` and ``rate`` (b, 3) of the bodies, and those of walls with a mass."""
+        if self._many:
+            walls = self.walls
+            press(
+                self._all, self._many, speed, rate, self._bodies.lightness, self._bodies.yielding, walls.speed,
+                walls.lightness, walls.friction, self.impulse, self.rubbed, self.of_walls, self.rubbed_by,
+            )  # fmt: skip
+
+    def end(self) -> None:
+        """The impulses of the step are given."""
+        self.given += self.of_walls
+
+    def deepest(self) -> Floats:
+        """(walls,) how deep bodies are behind each, m."""
+        rows = Rows.room(len(self._arms) * self.walls.n)
+        bodies = self._bodies
+        many = find(
+            rows, self.walls.shapes, self._held, self._arms, self._body, bodies.rotation, bodies.centre,
+            np.full(bodies.n, 0.0), 1.0,
+        )  # fmt: skip
+        found = np.zeros(self.walls.n)
+        np.maximum.at(found, rows.wall[:many], rows.least[:many])
+        return found
+
+
+@njit(types.int64(ROWS, SHAPES, types.boolean[:, ::1], _F2, _N1, _F3, _F2, _F1, _F), cache=True, error_model="numpy")
+def find(rows, shapes, held, arms, body, rotation, centre, near, dt):  # type: ignore[no-untyped-def]
+    """The nodes less than ``near`` (b,), m, in front of a wall that stops their body; returns how many."""
+    n, arm, normal = 0, np.empty(3), np.empty(3)
+    for k in range(len(body)):
+        b = body[k]
+        for i in range(3):
+            arm[i] = rotation[b, i, 0] * arms[k, 0] + rotation[b, i, 1] * arms[k, 1] + rotation[b, i, 2] * arms[k, 2]
+        for w in range(len(shapes.kind)):
+            if not held[w, b]:
+                continue
+            far = gap(normal, shapes, w, centre[b, 0] + arm[0], centre[b, 1] + arm[1], centre[b, 2] + arm[2])
+            if far >= near[b]:
+                continue
+            rows.body[n], rows.wall[n], rows.least[n] = b, w, -far / dt
+            for i in range(3):
+                rows.arm[n, i], rows.normal[n, i] = arm[i], normal[i]
+            n += 1
+    return n
+
+
+@njit(
+    types.void(ROWS, types.int64, _F2, _F2, _F2, _F3, _F2, _F1, _F1, _F2, _F2, _F3, _F3),
+    cache=True,
+    error_model="numpy",
+)
+def press(  # type: ignore[no-untyped-def]
+    rows, many, speed, rate, lightness, yielding, wall_speed, wall_lightness, friction, impulse, rubbed, given, by
+):
+    """Passes over the rows; adds their impulses to ``impulse`` (b, 6) and to what each wall has ``given``
+    (walls, b, 3), and those of friction to ``rubbed`` and ``by`` as well.
+    """
+    turn, slip, change = np.empty(3), np.empty(3), np.empty(3)
+    for _ in range(_MOST):
+        largest, moved = 0.0, 0.0
+        for r in range(many):
+            b, w = rows.body[r], rows.wall[r]
+            x, y, z = rows.arm[r, 0], rows.arm[r, 1], rows.arm[r, 2]
+            slip[0] = speed[b, 0] + (rate[b, 1] * z - rate[b, 2] * y) - wall_speed[w, 0]
+            slip[1] = speed[b, 1] + (rate[b, 2] * x - rate[b, 0] * z) - wall_speed[w, 1]
+            slip[2] = speed[b, 2] + (rate[b, 0] * y - rate[b, 1] * x) - wall_speed[w, 2]
+            p, q, s = rows.normal[r, 0], rows.normal[r, 1], rows.normal[r, 2]
+            turn[0], turn[1], turn[2] = y * s - z * q, z * p - x * s, x * q - y * p
+            gives, along = wall_lightness[w], 0.0
+            for i in range(3):
+                gives += lightness[b, i] * rows.normal[r, i] * rows.normal[r, i]
+                along += rows.normal[r, i] * slip[i]
+                for j in range(3):
+                    gives += turn[i] * yielding[b, i, j] * turn[j]
+            if not gives > 0.0:
+                continue
+            push = max(0.0, rows.push[r] + (rows.least[r] - along) / gives)
+            more = push - rows.push[r]
+            rows.push[r] = push
+            largest, moved = max(largest, push), max(moved, abs(more))
+            for i in range(3):
+                change[i] = more * rows.normal[r, i]
+            _give(b, w, x, y, z, change, speed, rate, lightness, yielding, wall_speed, wall_lightness, impulse, given)
+            if friction[w] == 0.0 or (push == 0.0 and more == 0.0):
+                continue
+            slip[0] = speed[b, 0] + (rate[b, 1] * z - rate[b, 2] * y) - wall_speed[w, 0]
+            slip[1] = speed[b, 1] + (rate[b, 2] * x - rate[b, 0] * z) - wall_speed[w, 1]
+            slip[2] = speed[b, 2] + (rate[b, 0] * y - rate[b, 1] * x) - wall_speed[w, 2]
+            along, size, soft = 0.0, 0.0, wall_lightness[w]
+            for i in range(3):
+                along += rows.normal[r, i] * slip[i]
+                soft = max(soft, wall_lightness[w] + lightness[b, i])
+            for i in range(3):
+                soft += (x * x + y * y + z * z) * yielding[b, i, i]
+            for i in range(3):
+                slip[i] = rows.rub[r, i] - (slip[i] - along * rows.normal[r, i]) / soft
+                size += slip[i] * slip[i]
+            most = friction[w] * push
+            share = most / np.sqrt(size) if size > most * most else 1.0
+            for i in range(3):
+                change[i] = share * slip[i] - rows.rub[r, i]
+                rows.rub[r, i] = share * slip[i]
+                moved = max(moved, abs(change[i]))
+            _give(b, w, x, y, z, change, speed, rate, lightness, yielding, wall_speed, wall_lightness, impulse, given)
+            for i in range(3):
+                rubbed[b, i] += change[i]
+                by[w, b, i] += change[i]
+            rubbed[b, 3] += y * change[2] - z * change[1]
+            rubbed[b, 4] += z * change[0] - x * change[2]
+            rubbed[b, 5] += x * change[1] - y * change[0]
+        if moved <= _ENOUGH * largest:
+            break
+
+
+@njit(types.void(types.int64, types.int64, _F, _F, _F, _F1, _F2, _F2, _F2, _F3, _F2, _F1, _F2, _F3), cache=True)
+def _give(b, w, x, y, z, change, speed, rate, lightness, yielding, wall_speed, wall_lightness, impulse, given):  # type: ignore[no-untyped-def]
+    """An impulse ``change`` (3,), N s, at an arm of a body, from a wall."""
+    p, q, s = change[0], change[1], change[2]
+    t, u, v = y * s - z * q, z * p - x * s, x * q - y * p
+    impulse[b, 3] += t
+    impulse[b, 4] += u
+    impulse[b, 5] += v
+    for i in range(3):
+        impulse[b, i] += change[i]
+        given[w, b, i] += change[i]
+        speed[b, i] += lightness[b, i] * change[i]
+        rate[b, i] += yielding[b, i, 0] * t + yielding[b, i, 1] * u + yielding[b, i, 2] * v
+        wall_speed[w, i] -= wall_lightness[w] * change[i]
