@@ -44,6 +44,9 @@ BREAKING_OVERHEAD = 2e-3
 """Core seconds that a rank takes for a step in which something breaks, however little: 1 to 4 ms in twelve scenes of
 150 to 24,000 tets."""
 
+RIGID_STEPS = 1000.0
+"""Steps of a run of rigid parts alone, where spin does not ask for more (worker/rigid/stage.py)."""
+
 RANK_BYTES = 280_000_000
 """Memory of a rank without a mesh: the interpreter, the libraries and the kernels of a body alone. Rank 0, which has
 all files, takes 260 MB, and 300 where pyarrow writes a history as Parquet as well; the others take 240."""
@@ -70,7 +73,7 @@ class PartEstimate:
     elements: int | None
     nodes: int | None
     dt: float | None
-    """The time step its smallest tet allows at the start, s."""
+    """The time step its smallest tet allows at the start, s; infinite of a rigid part."""
     bulk: Bulk | None = None
 
 
@@ -108,12 +111,12 @@ def estimate(case: Case, folder: Path | None = None, survey: Survey = Survey()) 
     known = [survey.of(index) for index in range(len(case.parts))]
     sizes = [_size(part, folder, found) for part, found in zip(case.parts, known, strict=True)]
     parts = tuple(_part(case, *each) for each in zip(case.parts, sizes, known, strict=True))
-    dt = _least([part.dt for part in parts])
+    dt = _at_most(case, _least([part.dt for part in parts]))
     shrunk = [
         None if p.dt is None else p.dt / shrinkage(case, q, speed)
         for p, q, speed in zip(parts, case.parts, impact_speeds(case), strict=True)
     ]
-    mean = _least(shrunk)
+    mean = _at_most(case, _least(shrunk))
     steps = None if mean is None else min(math.ceil(case.run.end_time / mean), case.run.max_steps)
     costs = _costs(case, parts, steps, sum(found.faces for found in survey.parts))
     breaking = _breaking(case, parts, steps) if costs else 0.0
@@ -130,6 +133,11 @@ def estimate(case: Case, folder: Path | None = None, survey: Survey = Survey()) 
         dust_bytes=DUST_BYTES * _tets_that_break(case, parts),
         parts=parts,
     )
+
+
+def _at_most(case: Case, dt: float | None) -> float | None:
+    """A step where only rigid parts are, s: a run has so many at least."""
+    return case.run.end_time / RIGID_STEPS if dt == math.inf else dt
 
 
 def _size(part: Part, folder: Path | None, found: Surveyed | None) -> MeshSize | int | None:
@@ -152,13 +160,12 @@ def _part(case: Case, part: Part, size: MeshSize | int | None, found: Surveyed |
         return PartEstimate(part.name, size, None, None)
     made = material(case, part.material)
     slowest = wave_speed(made) * _viscous_factor(case)
+    step = math.inf if part.rigid is not None else case.numerics.dt_safety * size.step_length / slowest
     if isinstance(part.mesh, MeshFile):
         brings = None if found is None else found.bulk
     else:
         brings = bulk(driven(case, part), part.mesh, made.density)
-    return PartEstimate(
-        part.name, size.elements, size.nodes, case.numerics.dt_safety * size.step_length / slowest, brings
-    )
+    return PartEstimate(part.name, size.elements, size.nodes, step, brings)
 
 
 def _viscous_factor(case: Case) -> float:
@@ -244,6 +251,8 @@ def _contact(case: Case, faces: int) -> float:
 
 def _nanoseconds(case: Case, part: Part) -> dict[str, float]:
     """Of a tet and a step, by stage."""
+    if part.rigid is not None:
+        return {}
     made = material(case, part.material)
     turned = any(isinstance(b, Rotation) and (not b.parts or part.name in b.parts) for b in case.boundaries)
     return {

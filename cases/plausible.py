@@ -24,6 +24,7 @@ from .quantities import unit_of_reference
 from .reach import cut_bodies, scant_probes
 from .reference import Schema, definition, json_schema, variants
 from .schema import Case
+from .stiff import stiff
 from .units import QUANTITY
 
 DAY = 86_400.0
@@ -73,6 +74,7 @@ def oddities(case: Case, expected: Estimate) -> list[Problem]:
         *passing(case),
         *unloaded(case),
         *cut_bodies(case),
+        *stiff(case, expected),
         *scant_probes(case, expected),
     ]
 

@@ -13,7 +13,7 @@ TETS, STEPS, AVERAGED, STRENGTH, STATE, CONTACT = (
 
 def stages(case: Case) -> dict[str, bool]:
     """Which of the stages that a case may do without it has, by name. Raises CaseError, unknown material."""
-    made = [material(case, part.material) for part in case.parts]
+    made = [material(case, part.material) for part in case.parts if part.rigid is None]
     contact = case.contact if case.in_contact else None
     rubbing = [wall.friction for _, wall in case.boundaries_of(Wall)]
     if contact is not None:
@@ -30,6 +30,7 @@ def stages(case: Case) -> dict[str, bool]:
         "fracture": case.fractures,
         "cohesive facets": bool(cohesive(case)),
         "erosion": case.erodes,
+        "rigid parts": bool(case.rigid),
     }
 
 

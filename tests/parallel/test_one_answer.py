@@ -39,6 +39,7 @@ SHORT = {
     "plastic_wave": "1.5 us",
     "plate_stack": "3.5 us",
     "plugging_weldox": "3 us",
+    "rigid_ball": "0.45 us",
     "shock_copper": "0.5 us",
     "shock_tungsten": "0.3 us",
     "sliding_block": "1.4 ms",

@@ -9,6 +9,7 @@ import numpy.typing as npt
 import pytest
 
 from conoid.cases import schema
+from conoid.cases.messages import Energy
 from conoid.worker import digest, step
 from conoid.worker.mesh.model import TetMesh
 from conoid.worker.simulation import Simulation
@@ -40,7 +41,11 @@ class Seen:
     """What a run shows at each time."""
 
     def __init__(self, case: schema.Case, meshes: Sequence[TetMesh], steps: int = -1) -> None:
-        self.energies, self.momenta, self.speeds, self.rates, self.centres = [], [], [], [], []  # type: ignore[var-annotated]
+        self.energies: list[Energy] = []
+        self.momenta: list[Floats] = []
+        self.speeds: list[Floats] = []
+        self.rates: list[Floats] = []
+        self.centres: list[Floats] = []
         self.sim = run(build(case, meshes), self._watch, steps)
 
     def _watch(self, sim: Simulation, before: Floats) -> None:
@@ -127,15 +132,16 @@ def test_a_rigid_box_lands_flat_and_slides_to_rest() -> None:
 
 
 def test_a_rigid_body_between_a_wall_and_another_one_is_no_cushion() -> None:
-    """A deformable block that falls on a rigid plate on a wall stops at once as on the wall."""
-    falling = moved(block((3, 3, 3), 1e-3), (0.0, 0.0, 1e-3))
-    plate = moved(block((3, 3, 1), 1e-3), (0.0, 0.0, 0.0))
-    motions: list[dict[str, Any]] = [{"rigid": RIGID}, {"velocity": (0.0, 0.0, -20.0)}]
-    seen = Seen(rigid_case(motions, [GROUND], end=1.5e-6), [plate, falling])
-    fixed = rigid_case([{"velocity": (0.0, 0.0, -20.0)}], [GROUND], contact=None, end=1.5e-6)
-    alone = Seen(fixed, [moved(falling, (0.0, 0.0, -1e-3))])
-    assert np.abs(np.array(seen.speeds)[:, 0, 2]).max() < 0.5
-    assert seen.momenta[-1][2] == pytest.approx(alone.momenta[-1][2], rel=0.02)
+    """A block that falls on a light rigid plate on a wall, and on one of 1000 t without: to 1 % of its speed."""
+    falling, plate = moved(block((3, 3, 3), 1e-3), (0.0, 0.0, 1e-3)), block((3, 3, 1), 1e-3)
+    ends = []
+    for how, walls in ((RIGID, [GROUND]), (schema.Rigid(mass=1e6), [])):
+        motions: list[dict[str, Any]] = [{"rigid": how}, {"velocity": (0.0, 0.0, -20.0)}]
+        seen = Seen(rigid_case(motions, walls, end=1.5e-6), [plate, falling])
+        nodes = seen.sim.model.nodes
+        ends.append(nodes.v[nodes.part == 1])
+        assert np.abs(np.array(seen.speeds)[:, 0, 2]).max() < 0.01
+    assert ends[0][:, 2] == pytest.approx(ends[1][:, 2], abs=0.2)
 
 
 def test_planes_of_symmetry_leave_a_quarter_its_motions() -> None:
@@ -170,7 +176,7 @@ def test_prescribed_rotation_is_exact() -> None:
     sim = run(build(rigid_case([{"rigid": RIGID}], [turn], contact=None, end=1e-3), [TILTED]))
     angle = 2e3 * sim.clock.t
     centre = np.array(spin.centre)
-    exact = centre + (sim.model.nodes.x0 - centre) @ rotation((0.0, 0.0, 1.0), angle).T
+    exact = centre + (sim.model.nodes.x0 - centre) @ rotation((0.0, 0.0, 1.0), -angle).T
     assert sim.model.nodes.x == pytest.approx(exact, abs=1e-15)
 
 

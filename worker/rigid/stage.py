@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from conoid.cases.estimate import RIGID_STEPS
 from conoid.cases.region import GENERATED
 from conoid.cases.schema import Case, Wall
 
@@ -26,8 +27,6 @@ from .stops import BodyStops
 _TURN = 0.1
 """rad that a body may turn in a step. Chosen: the phase of a tumbling body is then off by a thousandth of a turn each
 turn, and a node leaves its chord by a thousandth of the arm."""
-_STEPS = 1000.0
-"""Steps of a run in which nothing else limits them. Chosen."""
 _SMALL = 16
 """Bits of an impulse that do not count in what is unsettled (contact/held.py)."""
 _KEPT = ("contact_loss", "external_work", "friction_loss", "_later", "_before")
@@ -53,7 +52,7 @@ class Rigid:
         self._changed: Ints = np.zeros((n, rows.WORDS), np.int64)
         self.last_dt = self.last_push = 0.0
         """Of the last step, and when contact or a wall last pushed, s."""
-        self._least = _STEPS / case.run.end_time if len(case.rigid) == len(case.parts) else 0.0
+        self._least = RIGID_STEPS / case.run.end_time if len(case.rigid) == len(case.parts) else 0.0
         self._start, self._rate = np.zeros((2, n, 3)), np.zeros((n, 3))
         self.active = False
         """Whether a contact of this step, on any rank, has a node of a rigid body."""
@@ -107,7 +106,7 @@ class Rigid:
 
     @property
     def limit(self) -> float:
-        """One over the longest step, 1/s: none turns by more than _TURN; with rigid parts alone there are _STEPS."""
+        """One over the longest step, 1/s: none turns by more than _TURN; rigid parts alone take RIGID_STEPS."""
         rate = self.bodies.rates(self.bodies.momentum)
         return max(float(np.sqrt(dot(rate, rate)).max(initial=0.0)) / _TURN, self._least)
 

@@ -1,0 +1,141 @@
+"""Walls that move or are round: momentum to the bit, energy, and what theory says."""
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from conoid.cases import schema
+from conoid.cases.materials import Elastic, Material
+from conoid.cases.messages import Energy
+from conoid.worker.moving_walls import MovingWalls
+from conoid.worker.simulation import Simulation
+
+from ..contact.ranks import on_ranks
+from ..worker.kernels import build, run, scene
+from ..worker.meshes import block
+
+Floats = npt.NDArray[np.float64]
+DENSITY, YOUNG, SIZE = 8000.0, 200e9, (3e-3, 3e-3, 12e-3)
+THIN = Material(density=DENSITY, elastic=Elastic(young=YOUNG, poisson=0.0))
+"""A bar of it has plane waves of the speed sqrt(E / density)."""
+BAR = block((3, 3, 12), 1e-3)
+MASS = DENSITY * SIZE[0] * SIZE[1] * SIZE[2]
+PLANE: dict[str, Any] = {"kind": "wall", "point": (0.0, 0.0, 0.0), "normal": (0.0, 0.0, 1.0)}
+
+
+class Seen:
+    """What a bar and its first wall show at each time."""
+
+    def __init__(
+        self, walls: list[schema.Wall], end: float, speed: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    ) -> None:
+        case = scene(THIN, end=end, velocity=speed, boundaries=tuple(walls))
+        self.energies: list[Energy] = []
+        self.momenta: list[Floats] = []
+        self.speeds: list[Floats] = []
+        self.times: list[float] = []
+        self.sim = run(build(case, [BAR]), self._watch)
+
+    def _watch(self, sim: Simulation, before: Floats) -> None:
+        self.energies.append(sim.ledger.close(before))
+        self.momenta.append(sim.ledger.momentum.copy())
+        self.speeds.append(sim.walls.speed[0].copy())
+        self.times.append(sim.clock.t)
+
+    @property
+    def worst(self) -> float:
+        return max(energy.residual for energy in self.energies)
+
+
+def test_a_wall_with_a_mass_is_stopped_by_a_bar() -> None:
+    """Its speed falls as exp(-Z A t / M) until the wave comes back (Goldsmith 1960, Impact, chapter 3, on rigid masses
+    that hit rods); momentum to round-off, and the wall's own to the bit of its quanta.
+    """
+    mass, speed, wave = 0.3 * MASS, 20.0, float(np.sqrt(YOUNG / DENSITY))
+    seen = Seen([schema.Wall(**PLANE, velocity=(0.0, 0.0, speed), mass=mass)], 4e-6)
+    rate = DENSITY * wave * SIZE[0] * SIZE[1] / mass
+    times, speeds = np.array(seen.times), np.array(seen.speeds)[:, 2]
+    later = times > 0.3e-6  # the first layer of nodes has been taken along
+    assert speeds[later] == pytest.approx(speed * np.exp(-rate * times[later]), abs=0.04 * speed)
+    momenta = np.array(seen.momenta)
+    assert np.ptp(momenta, axis=0).max() < 1e-14 * mass * speed
+    assert seen.worst < 1e-4
+    (walls,) = (bound for bound in seen.sim.boundaries if isinstance(bound, MovingWalls))
+    quanta = np.rint(walls.given * walls.scale)
+    assert (quanta == walls.given * walls.scale).all()
+    assert quanta.sum(axis=0)[2] / walls.scale == pytest.approx(mass * (speed - speeds[-1]), rel=1e-12)
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.2])
+def test_a_light_wall_is_stable(friction: float) -> None:
+    """A thousandth of the mass of the nodes that it hits: the wall ends as fast as they are, and no energy is made."""
+    wall = schema.Wall(**PLANE, velocity=(3.0, 0.0, 20.0), mass=1e-3 * MASS / 13, friction=friction)
+    seen = Seen([wall], 2e-6)
+    assert max(energy.kinetic + energy.elastic for energy in seen.energies) <= 1.0001 * seen.energies[0].initial
+    assert abs(seen.speeds[-1][2]) < 1.0
+    assert np.ptp(np.array(seen.momenta), axis=0).max() < 1e-13 * 1e-3 * MASS
+
+
+def test_a_driven_wall_works_from_outside() -> None:
+    """Its course is followed exactly, what it gives is external work, and nothing is lost where it begins at rest."""
+    course = ((0.0, 0.0), (5e-6, 1.0), (10e-6, 0.0))
+    seen = Seen([schema.Wall(**PLANE, velocity=(0.0, 0.0, 20.0), course=course)], 12e-6)
+    assert seen.sim.walls.shapes.point[0] == pytest.approx([0.0, 0.0, 100e-6], abs=1e-15)
+    end = seen.energies[-1]
+    assert end.external == pytest.approx(end.kinetic + end.elastic, rel=1e-4)
+    assert abs(end.contact) < 1e-4 * end.external
+    assert seen.momenta[-1][2] > 0.0
+
+
+def test_a_driven_wall_is_a_fixed_one_seen_from_a_train() -> None:
+    """A bar at rest that a wall hits at 20 m/s, and one that hits a fixed wall at -20 m/s."""
+    moving = Seen([schema.Wall(**PLANE, velocity=(0.0, 0.0, 20.0), friction=0.1)], 5e-6)
+    fixed = Seen([schema.Wall(**PLANE, friction=0.1)], 5e-6, (0.0, 0.0, -20.0))
+    shift = np.array([0.0, 0.0, 20.0 * 5e-6])
+    assert moving.sim.model.nodes.x == pytest.approx(fixed.sim.model.nodes.x + shift, abs=1e-12)
+    assert moving.energies[-1].elastic == pytest.approx(fixed.energies[-1].elastic, rel=1e-6)
+    assert moving.energies[-1].contact == pytest.approx(fixed.energies[-1].contact, rel=1e-6)
+
+
+ROUND = {
+    "on a cylinder": schema.Wall(
+        kind="wall", shape="cylinder", point=(1.5e-3, 0.0, -5e-3), axis=(0.0, 1.0, 0.0), radius=5e-3
+    ),
+    "on a sphere": schema.Wall(kind="wall", shape="sphere", point=(1.5e-3, 1.5e-3, -5e-3), radius=5e-3),
+    "in a cylinder": schema.Wall(
+        kind="wall", shape="cylinder", point=(1.5e-3, 0.0, 7.5e-3), axis=(0.0, 1.0, 0.0), radius=8e-3, side="inside"
+    ),
+    "in a sphere": schema.Wall(
+        kind="wall", shape="sphere", point=(1.5e-3, 1.5e-3, 7.5e-3), radius=8e-3, side="inside", friction=0.2
+    ),
+}
+
+
+@pytest.mark.parametrize("name", ROUND)
+def test_no_node_ends_behind_a_round_wall(name: str) -> None:
+    """After each step, to what the surface curves along the way of a step; the books close."""
+    wall = ROUND[name]
+    seen = Seen([wall], 8e-6, (0.0, 0.0, -50.0))
+    radius, side = wall.radius or 0.0, 1.0 if wall.side == "outside" else -1.0
+    away = seen.sim.model.nodes.x - np.array(wall.point)
+    if wall.shape == "cylinder":
+        away[:, 1] = 0.0
+    gaps = side * (np.linalg.norm(away, axis=1) - radius)
+    assert gaps.min() > -1e-5 * radius
+    assert seen.momenta[-1][2] > 0.9 * seen.momenta[0][2]  # which is negative
+    assert np.array([energy.contact for energy in seen.energies]).min() > -1e-9
+    assert seen.worst < 1e-4
+
+
+def test_a_wall_with_a_mass_is_the_same_on_any_number_of_ranks() -> None:
+    wall = schema.Wall(**PLANE, velocity=(3.0, 0.0, 20.0), mass=0.1 * MASS, friction=0.2)
+    case = scene(THIN, end=1.0, boundaries=(wall,))
+
+    def ended(comm: Any) -> bytes:
+        return run(build(case, [BAR], comm), steps=60).walls.words()
+
+    alone = on_ranks(1, ended)
+    assert on_ranks(3, ended) == alone * 3
+    assert len(alone[0]) == 48
