@@ -34,6 +34,7 @@ from .parallel.fixed_point import Columns, Grouped, Table, Tally, exact_sums, to
 from .parallel.passes import Pass
 from .parallel.team import TASK, Team
 from .rigid.stage import Rigid
+from .rigid.sums import add_undeformed, energy_of
 from .state import WORKS, Flags, Floats, Indices, Model, Nodes
 from .wall_shapes import Walls
 
@@ -60,11 +61,9 @@ class Ledger:
         self._cohesion = fracture.cohesion if fracture is not None else None
         self._comm = comm
         self._clock = clock
-        nodes, (self._rigid, self._walls) = model.nodes, undeformed
+        nodes, self._undeformed, self._rigid = model.nodes, undeformed, undeformed[0]
         self.initial = float(self._node_sum(0.5 * nodes.mass * (nodes.v * nodes.v).sum(axis=1), self._counted()))
-        self.initial += self._walls.kinetic()
-        if self._rigid is not None:
-            self.initial += float(self._rigid.kinetic().sum())
+        self.initial += energy_of(*undeformed)
         self.worst = 0.0
         """Largest residual so far."""
         self.making = Making(self._rounding())
@@ -107,11 +106,7 @@ class Ledger:
     def close(self, before: Floats) -> Energy:
         """The ledger at time n; ``before`` is v(n-1/2), the model holds v(n+1/2)."""
         sums, of_parts, told = self._added_up(before)
-        if self._rigid is not None:
-            _with_bodies(sums, of_parts, self._rigid)
-        if self._walls.lightness.any():
-            sums[0] += self._walls.kinetic()
-            sums[[3, 4, 5, 7, 8, 9]] += self._walls.momenta()
+        add_undeformed(sums[:_NODAL], of_parts, *self._undeformed)
         node_sums, (work, viscous, plastic, averaged) = sums[:_NODAL], sums[_NODAL : _NODAL + len(WORKS)]
         self.parts = _named(self._model.parts, of_parts[:, 0], of_parts[:, _NODAL] + of_parts[:, _NODAL + 1])
         gone, gone_kinetic, gone_momenta = self._gone(told)
@@ -268,16 +263,6 @@ def _by_part(columns: Floats, nodes: Nodes) -> tuple[Floats, Indices]:
     more = columns[:, shares.node] * shares.fraction
     columns[:, shares.node] = 0.0
     return np.concatenate([columns, more], axis=1).T, np.concatenate([nodes.part, shares.part])
-
-
-def _with_bodies(sums: Floats, of_parts: Floats, rigid: Rigid) -> None:
-    """Adds those of rigid bodies to the sums over the nodes (``_of_nodes``), of all and of each part."""
-    kinetic, momenta = rigid.kinetic(), rigid.momenta()
-    own = np.array([kinetic.sum(), rigid.contact_loss.sum(), rigid.external_work.sum()])
-    sums[:3] += own
-    sums[3:6] += momenta[:3]
-    sums[7:_NODAL] += momenta[3:]
-    of_parts[rigid.bodies.part, 0] += kinetic
 
 
 def _named(parts: list[str], kinetic: Floats, internal: Floats) -> dict[str, PartEnergy]:

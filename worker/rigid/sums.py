@@ -1,0 +1,32 @@
+"""What rigid bodies and walls with a mass add to the sums of the ledger."""
+
+import numpy as np
+
+from ..state import Floats
+from ..wall_shapes import Walls
+from .stage import Rigid
+
+
+def energy_of(rigid: Rigid | None, walls: Walls) -> float:
+    """Kinetic, J."""
+    return walls.kinetic() + (float(rigid.kinetic().sum()) if rigid is not None else 0.0)
+
+
+def add_undeformed(sums: Floats, of_parts: Floats, rigid: Rigid | None, walls: Walls) -> None:
+    """Adds to ``sums`` (10,) over the nodes (energy.py): kinetic energy, loss by contact and work from outside, J,
+    momentum, kg m/s, what unequal steps have taken, and angular momentum, kg m^2/s; to those of each part, ``of_parts``
+    (parts, .), the kinetic energy.
+    """
+    if rigid is None and not walls.lightness.any():
+        return
+    momenta = np.zeros(6) if rigid is None else rigid.momenta()
+    if walls.lightness.any():
+        sums[0] += walls.kinetic()
+        momenta = momenta + walls.momenta()
+    if rigid is not None:
+        kinetic = rigid.kinetic()
+        of_parts[rigid.bodies.part, 0] += kinetic
+        sums[0] += kinetic.sum()
+        sums[1] += rigid.contact_loss.sum()
+        sums[2] += rigid.external_work.sum()
+    sums[[3, 4, 5, 7, 8, 9]] += momenta
