@@ -1,5 +1,7 @@
 """What is read of mesh files before a run: numbers of the mesh as its part places it, every refusal, shared nodes."""
 
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -149,3 +151,9 @@ def test_a_box_in_which_a_file_has_nothing_is_refused(folder: Path) -> None:
         "boundaries[0]: no face of the meshes that it is for lies in its region",
         "boundaries[1]: no node of the meshes that it is for lies in its region",
     ]
+
+
+def test_the_program_names_the_cache_of_kernels_before_numba_is_imported() -> None:
+    """Numba asks for it when it is imported; what the program imports at its head must not import it."""
+    asked = "import sys, conoid.worker.survey; sys.exit('numba' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", asked], check=False).returncode == 0

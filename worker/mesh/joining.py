@@ -8,7 +8,6 @@ from conoid.cases.joined import shared_bonds
 from conoid.cases.schema import Case
 
 from ..errors import InputError
-from ..fracture.connectivity import components
 from .model import Floats, Ids, Ints, Origin
 from .sharing import same_places
 
@@ -32,6 +31,8 @@ def joined(case: Case, placed: Mapping[int, Placed], n: int) -> Ids:
                 raise InputError(_apart(case, k))
             edges.append(np.column_stack([first + p, second + q]))
     every = np.concatenate(edges)
+    from ..fracture.connectivity import components  # numba must know where its kernels are before it is imported
+
     return components(n, every) if len(every) else np.arange(n)
 
 
