@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from .bodies import Box, Loose, MeshFile, Plate
+from .bodies import Box, Cylinder, Loose, MeshFile, Plate, Sphere, Tube
 from .bonds import Bonded, SharedBond
 from .problems import Location, Problem, problem
 from .schema import Case, Part
@@ -69,6 +69,11 @@ def _meshes(one: Part, other: Part, breaks: bool, location: Location) -> Iterato
         yield problem(location, names, f"their meshes have two generators; give both the same, or {way}")
     elif one.mesh.generator == "structured" and not all(isinstance(mesh, Box | Plate) for mesh in pair):
         message = f"structured meshes have nodes in common where both are boxes or plates; use gmsh, or {way}"
+        yield problem(location, names, message)
+    elif one.mesh.generator == "gmsh" and not all(
+        isinstance(mesh, Box | Plate | Cylinder | Tube | Sphere) for mesh in pair
+    ):
+        message = f"boxes, plates, cylinders, tubes and spheres are meshed together; take both from a file, or {way}"
         yield problem(location, names, message)
     worn = [part.name for part in (one, other) if part.erosion is not None]
     if breaks and worn:

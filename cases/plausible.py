@@ -16,6 +16,7 @@ from .driven import passing
 from .estimate import Estimate
 from .idle import unloaded
 from .impact import impact_speeds, wave_speed
+from .joined import bodies
 from .library import material
 from .materials import Material
 from .overlap import grazes
@@ -23,7 +24,7 @@ from .problems import Location, Problem, problem
 from .quantities import unit_of_reference
 from .reach import cut_bodies, scant_probes
 from .reference import Schema, definition, json_schema, variants
-from .schema import Case
+from .schema import Case, Part
 from .stiff import stiff
 from .units import QUANTITY
 
@@ -60,6 +61,12 @@ def doubts(data: Mapping[str, Any], case: Case, expected: Estimate) -> list[Prob
     return [*bare_numbers(data), *oddities(case, expected)]
 
 
+def _apart(case: Case) -> list[tuple[int, Part]]:
+    """The parts that are bodies of their own, by number: shapes that are meshed together do not overlap."""
+    of = bodies(case)
+    return [(i, part) for i, part in enumerate(case.parts) if of.count(of[i]) == 1]
+
+
 def oddities(case: Case, expected: Estimate) -> list[Problem]:
     """Those that do not depend on how the case is written."""
     return [
@@ -69,7 +76,7 @@ def oddities(case: Case, expected: Estimate) -> list[Problem]:
         *_shocks(case),
         *crushed(case),
         *damped(case),
-        *grazes(enumerate(case.parts), case.contact),
+        *grazes(_apart(case), case.contact),
         *strangers(case),
         *passing(case),
         *unloaded(case),

@@ -11,6 +11,7 @@ import numpy as np
 
 from conoid.cases import schema
 from conoid.cases.bodies import Mesh, MeshFile, Symmetric
+from conoid.cases.joined import bodies
 from conoid.cases.library import material as find_material
 from conoid.cases.survey import Survey
 
@@ -20,6 +21,7 @@ from .errors import InputError
 from .facts import Facts
 from .hashing import uniform
 from .mesh.build import build as build_mesh
+from .mesh.build import build_together
 from .mesh.faces import FACES, across, normals
 from .mesh.model import TetMesh
 from .pieces import UNSEEN
@@ -79,12 +81,23 @@ def assemble(case: schema.Case, folder: Path, say: Say = quiet) -> Whole:
 
 def _built(case: schema.Case, folder: Path, say: Say, facts: Facts) -> Iterator[tuple[int, TetMesh]]:
     """The meshes of all parts by their numbers; those from files are measured."""
+    joint = dict[int, TetMesh]()
     for index, part in enumerate(case.parts):
-        meshing = f"meshing {part.name}, part {index + 1} of {len(case.parts)}"
-        mesh = build_mesh(_asked(part), folder, key=f"parts[{index}].mesh", made=partial(say, meshing))
+        said = partial(say, f"meshing {part.name}, part {index + 1} of {len(case.parts)}")
+        key = f"parts[{index}].mesh"
+        if index not in joint and len(group := _together(case, index)) > 1:
+            joint |= zip(group, build_together([_asked(case.parts[i]) for i in group], key, made=said), strict=True)
+        mesh = joint.get(index) or build_mesh(_asked(part), folder, key=key, made=said)
         if isinstance(part.mesh, MeshFile):
             facts.take(index, mesh)
         yield index, mesh
+
+
+def _together(case: schema.Case, index: int) -> list[int]:
+    """The parts that gmsh meshes together with one: those of its body that it makes."""
+    body = bodies(case)
+    made = [not isinstance(part.mesh, MeshFile) and part.mesh.generator == "gmsh" for part in case.parts]
+    return [i for i, of in enumerate(body) if of == body[index] and made[i]] if made[index] else []
 
 
 def _asked(part: schema.Part) -> Mesh:

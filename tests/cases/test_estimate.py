@@ -59,7 +59,7 @@ UNSTRUCTURED = [
 STEPS = {
     "elastic_bar_wall": 2660, "elastic_bar_confined": 2750, "plastic_wave": 1620, "plastic_bar_wave": 2470,
     "shock_copper": 741, "shock_tungsten": 998, "spinning_cube": 4892, "free_spin": 6859, "bar_on_bar": 890,
-    "crossed_bars": 3590, "dissimilar_bars": 410, "hertz_spheres": 18458, "newton_cradle": 1930,
+    "bonded_tile": 736, "crossed_bars": 3590, "dissimilar_bars": 410, "hertz_spheres": 18458, "newton_cradle": 1930,
     "plate_stack": 300, "rigid_ball": 4897, "sliding_block": 3558,
     "taylor_42crmo4": 8998, "taylor_copper": 21529, "taylor_copper_split": 20091, "demo": 8998,
     "fast_fragment": 168, "long_rod": 13442,

@@ -131,6 +131,27 @@ def test_dissimilar_bars() -> None:
     losses_stay_below_the_closing_of_the_end_layers("dissimilar_bars", 1e-3)
 
 
+def test_bonded_tile() -> None:
+    """The pulse is in the probes alone while it is averaged, and the bond is torn by its reflection at the free end."""
+    moduli = [young * (1 - nu) / ((1 + nu) * (1 - 2 * nu)) for young, nu in ((370e9, 0.22), (73e9, 0.33))]
+    (c1, c2), (z1, z2) = zip(
+        *((math.sqrt(m / rho), math.sqrt(m * rho)) for m, rho in zip(moduli, (3900.0, 2770.0), strict=True)),
+        strict=True,
+    )
+    tile, backing = (reference("bonded_tile", f"{part}_stress") for part in ("tile", "backing"))
+    through = 2 * z1 * z2 / (z1 + z2) * 5.0
+    assert tile.value == pytest.approx(-z1 * 5.0, rel=1e-4)
+    assert backing.value == pytest.approx(-through, rel=1e-4)
+    assert tile.tolerance <= 0.01 * -tile.value
+    assert backing.tolerance <= 0.01 * -backing.value
+    assert 2.5e-3 / c1 < tile.since
+    assert (tile.until or 1.0) < (8e-3 - 2.5e-3) / c1
+    assert 4e-3 / c1 + 2e-3 / c2 < backing.since
+    assert (backing.until or 1.0) < 4e-3 / c1 + 0.4e-6 + 1e-3 / c2
+    bond = load("bonded_tile").bond[0]
+    assert 2 * z2 / (z1 + z2) * (z1 * 5.0 - through) < bond.strengths[0] < 2 * z1 / (z1 + z2) * through
+
+
 def test_hertz_spheres() -> None:
     radius, closing, poisson = 10e-3, 2.0, 0.3
     mass = DENSITY * 4 / 3 * math.pi * radius**3 / 2

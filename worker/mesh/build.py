@@ -6,7 +6,7 @@ import importlib.metadata
 import importlib.util
 import os
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from functools import cache
 from pathlib import Path
 
@@ -15,7 +15,7 @@ from conoid.cases.bodies import Mesh, MeshFile
 from conoid.cases.files import located
 
 from ..errors import MeshError
-from .child import Limits, run_child
+from .child import Limits, beside, run_child
 from .model import TetMesh, check
 from .order import morton_ordered
 from .store import load, save
@@ -47,6 +47,49 @@ def build(
     return found
 
 
+def build_together(
+    meshes: Sequence[Mesh], key: str = "parts", limits: Limits | None = None, made: Callable[[], None] = lambda: None
+) -> list[TetMesh]:
+    """The tets of generated ``meshes`` that have the nodes of their interfaces in common (mesh/together.py), as
+    ``build`` makes those of one; ``key``: of all of them, for messages. Raises MeshError.
+    """
+    _need_gmsh(key)
+    asked = "\n".join((_maker(), *(mesh.model_dump_json() for mesh in meshes)))
+    target = cache_folder() / f"{hashlib.sha256(asked.encode()).hexdigest()}.npz"
+    found = _loaded(target, len(meshes))
+    if found is None:
+        made()
+        with _writable(target) as place:
+            run_child(meshes, None, place, key, limits or Limits())
+            found = _loaded(place, len(meshes))
+    if found is None:
+        raise MeshError(f"{key}: the mesh process left no meshes in {target.parent}")
+    return found
+
+
+def _loaded(target: Path, count: int) -> list[TetMesh] | None:
+    found = [load(beside(target, k)) for k in range(count)]
+    some = [mesh for mesh in found if mesh is not None]
+    return some if len(some) == count else None
+
+
+@contextlib.contextmanager
+def _writable(target: Path) -> Iterator[Path]:
+    """The place itself, or one of that name in a folder that goes afterwards: a cache that cannot be written costs
+    time, not the run.
+    """
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        tempfile.TemporaryFile(dir=target.parent).close()
+    except OSError:
+        with tempfile.TemporaryDirectory(prefix="conoid-mesh-") as apart:
+            yield Path(apart) / target.name
+        return
+    yield target
+    with contextlib.suppress(OSError):
+        _trim(target.parent)
+
+
 def cache_folder() -> Path:
     """Where meshes are kept: below ``CONOID_CACHE_DIR``, else ``~/.cache/conoid``."""
     root = os.environ.get("CONOID_CACHE_DIR")
@@ -54,17 +97,8 @@ def cache_folder() -> Path:
 
 
 def _make_and_keep(mesh: Mesh, source: Path | None, target: Path, key: str, limits: Limits) -> TetMesh:
-    """A cache that cannot be written costs time, not the run."""
-    try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        tempfile.TemporaryFile(dir=target.parent).close()
-    except OSError:
-        with tempfile.TemporaryDirectory(prefix="conoid-mesh-") as apart:
-            return _make(mesh, source, Path(apart) / target.name, key, limits)
-    made = _make(mesh, source, target, key, limits)
-    with contextlib.suppress(OSError):
-        _trim(target.parent)
-    return made
+    with _writable(target) as place:
+        return _make(mesh, source, place, key, limits)
 
 
 def _make(mesh: Mesh, source: Path | None, target: Path, key: str, limits: Limits) -> TetMesh:

@@ -14,6 +14,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
@@ -60,15 +61,18 @@ class Limits:
         )
 
 
-def run_child(mesh: Mesh, source: Path | None, target: Path, key: str, limits: Limits) -> None:
-    """Makes ``mesh`` (reads ``source`` when it is a file) in a child process, which leaves it in ``target``.
+def run_child(mesh: Mesh | Sequence[Mesh], source: Path | None, target: Path, key: str, limits: Limits) -> None:
+    """Makes ``mesh`` (reads ``source`` when it is a file) in a child process, which leaves it in ``target``; several
+    are meshed together, and left in ``beside(target, k)``.
 
     Raises MeshError with the child's own line, or with the limit that it broke; StoppedError where the run was asked to
     stop: launchers tell all processes of a rank.
     """
     limits = limits.allowed()
     request = {
-        "mesh": mesh.model_dump(mode="json"),
+        "mesh": [each.model_dump(mode="json") for each in mesh]
+        if isinstance(mesh, Sequence)
+        else mesh.model_dump(mode="json"),
         "source": None if source is None else str(source),
         "target": str(target),
         "key": key,
@@ -136,8 +140,11 @@ def main() -> int:
     limit(limits)
     key, target = str(request["key"]), Path(request["target"])
     try:
-        mesh: Mesh = TypeAdapter[Mesh](Mesh).validate_python(request["mesh"])
-        perform(mesh, key, request["source"], target)
+        if isinstance(request["mesh"], list):
+            perform_together(TypeAdapter(list[Mesh]).validate_python(request["mesh"]), key, target)
+        else:
+            mesh: Mesh = TypeAdapter[Mesh](Mesh).validate_python(request["mesh"])
+            perform(mesh, key, request["source"], target)
     except InputError as error:
         text = str(error)
         return _told(text if text.startswith(key) else f"{key}: {text}", ExitCode.BAD_INPUT)
@@ -163,6 +170,23 @@ def perform(mesh: Mesh, key: str, source: str | None, target: Path) -> None:
 
         made = check(unstructured(mesh, key))
     save(morton_ordered(made), target)
+
+
+def beside(target: Path, k: int) -> Path:
+    """Where mesh ``k`` of several that are meshed together goes."""
+    return target.with_name(f"{target.stem}-{k}{target.suffix}")
+
+
+def perform_together(meshes: list[Mesh], key: str, target: Path) -> None:
+    """Makes generated meshes that have the nodes of their interfaces in common, and stores each."""
+    from .model import check
+    from .order import morton_ordered
+    from .store import save
+    from .together import together
+
+    made = together([mesh for mesh in meshes if not isinstance(mesh, MeshFile)], key, target.stem)
+    for k, mesh in enumerate(made):
+        save(morton_ordered(check(mesh)), beside(target, k))
 
 
 def limit(limits: Limits) -> None:

@@ -32,7 +32,7 @@ def unstructured(body: Generated, key: str = "mesh") -> TetMesh:
     low, high = block(body)
     scale = scale_of(max(b - a for a, b in zip(low, high, strict=True)))
     with session(OPTIONS) as gmsh:
-        _draw(gmsh, body, scale)
+        draw(gmsh, body, scale)
         gmsh.model.occ.synchronize()
         set_size(gmsh, body.element_size, body.grading, Frame(centre(body), body.axis, scale))
         gmsh.model.mesh.generate(3)
@@ -44,7 +44,7 @@ def unstructured(body: Generated, key: str = "mesh") -> TetMesh:
     return TetMesh(to_space(body, mesh.points * scale), mesh.tets)
 
 
-def _draw(gmsh: Any, body: Generated, scale: float) -> None:
+def draw(gmsh: Any, body: Generated, scale: float) -> None:
     """The body in its frame, lengths over ``scale``: gmsh's tolerances are absolute."""
     if isinstance(body, Plate | Cylinder | Tube | Sphere) and body.aligned and body.sector != "quarter":
         _draw_quarters(gmsh, body, scale)
@@ -64,7 +64,7 @@ def _draw_quarters(gmsh: Any, body: Plate | Cylinder | Tube | Sphere, scale: flo
     axis, most of which smoothing leaves near them.
     """
     occ = gmsh.model.occ
-    _draw(gmsh, body.model_copy(update={"sector": "quarter"}), scale)
+    draw(gmsh, body.model_copy(update={"sector": "quarter"}), scale)
     made = occ.getEntities(3)
     for normal in ((0, 1), (1, 0))[: 1 if body.sector == "half" else 2]:
         images = occ.copy(made)
