@@ -37,7 +37,7 @@ def together(bodies: Sequence[Generated], key: str, name: str) -> list[TetMesh]:
     for body in bodies:
         refuse_impossible(body, key)
     corners = np.array([bounds(body) for body in bodies])
-    scale = 2.0 ** round(math.log2(float(np.ptp(corners.reshape(-1, 3), axis=0).max())))
+    scale = math.ldexp(1.0, math.frexp(float(np.ptp(corners.reshape(-1, 3), axis=0).max()))[1])
     with session(OPTIONS) as gmsh:
         drawn = [_drawn(gmsh, body, scale) for body in bodies]
         volumes = _fragments(gmsh.model.occ, drawn, key)
