@@ -36,7 +36,7 @@ def _keys(bond: Bonded, location: Location) -> Iterator[Problem]:
     if not bond.breaks:
         given = (("shear_strength", bond.shear_strength), ("energy", bond.energy), ("shear_energy", bond.shear_energy))
         for key, value in given:
-            if key in bond.model_fields_set and value is not None:
+            if value:
                 yield problem((*location, key), value, "a bond without strength never breaks; give strength too")
         return
     normal, shear = bond.energies

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from conoid.cases import library, load, reference
+from conoid.cases import files, library, load, reference
 from conoid.cases.page import page
 
 from . import tables
@@ -73,14 +73,22 @@ def copy_case(
     name: Annotated[str, typer.Argument(metavar="NAME", help="A shipped case.", autocompletion=complete_cases)],
     out: OutOption = None,
 ) -> None:
-    """Copy a shipped case here, to change it, with the schema beside it by which editors complete its keys."""
-    text = load.shipped_path(name).read_text(encoding="utf-8")
+    """Copy a shipped case here, to change it, with the files that it names, and the schema beside it by which editors
+    complete its keys.
+    """
+    shipped = load.shipped_path(name)
+    text = shipped.read_text(encoding="utf-8")
     target = out or Path(f"{name}.toml")
     if target.suffix != ".toml":
         raise UsageError(f"--out = {str(target)!r}: the name of a case file ends in .toml")
-    if target.exists():
-        raise ClientError(f"{target} is there already; name another file with --out")
+    named = {file.path: target.with_name(file.path) for file in files.files_of(load.toml_data(text))}
+    for each in (target, *named.values()):
+        if each.exists():
+            raise ClientError(f"{each} is there already; name another file with --out")
     save_text(target, text.replace(f"{reference.LINE} ../{reference.FILE}", f"{reference.LINE} ./{reference.FILE}", 1))
     echo(str(target))
+    for path, copy in named.items():
+        save_text(copy, shipped.with_name(path).read_bytes())
+        echo(str(copy))
     save_text(target.with_name(reference.FILE), reference.schema_text())
     echo(str(target.with_name(reference.FILE)))

@@ -25,6 +25,8 @@ class Made:
     rigid: bool = False
     temperature: str | float | None = None
     """At the start."""
+    held: str = ""
+    """Axes along which a rigid body does not move; it does not turn either."""
 
 
 @dataclass

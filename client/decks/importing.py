@@ -18,6 +18,11 @@ from .account import Account, Entry
 from .dialects import Dialect, dialect_of
 from .toml import bare, toml
 
+_ERODING = (
+    "parts that erode lose tets by volume and by time step as well, with the defaults of parts[].erosion, and nodes "
+    "without tets go on as particles until they strike"
+)
+
 
 @dataclass(frozen=True)
 class Imported:
@@ -54,6 +59,8 @@ def read_deck(path: Path, wanted: str | None = None, kind: str | None = None) ->
     account = dialect.account
     account.close()
     data = draft.data()
+    if any("erosion" in part for part in data["parts"]):
+        account.remarks.append(_ERODING)
     refusals = account.refusals()
     if not data["parts"]:
         refusals.append("the deck has no part of solids")

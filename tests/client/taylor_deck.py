@@ -54,13 +54,12 @@ def lsdyna_text(size: float, end: str = "8.0E-5") -> str:
 
 
 def abaqus_text(size: float, end: str = "8.0E-5") -> str:
-    """The input file for Abaqus/Explicit; the wall is the plane of its end nodes, which Abaqus cannot name a wall."""
+    """The input file for Abaqus/Explicit; the end of the bar is held on the plane of the wall."""
     made = mesh(size)
     nodes = "\n".join(f"{n}, {x:.9f}, {y:.9f}, {z:.9f}" for n, x, y, z in points(made))
     tets = "\n".join(f"{n}, " + ", ".join(str(c + 1) for c in tet) for n, tet in enumerate(made.tets.tolist(), 1))
-    return _ABAQUS.format(
-        end=end, nodes=nodes, tets=tets, x=rows(plane(made, 0), 0, ", "), y=rows(plane(made, 1), 0, ", ")
-    )
+    x, y, z = (rows(plane(made, axis), 0, ", ") for axis in range(3))
+    return _ABAQUS.format(end=end, nodes=nodes, tets=tets, x=x, y=y, z=z)
 
 
 _LSDYNA = """*KEYWORD
@@ -130,6 +129,8 @@ Taylor bar of copper, a quarter, 227 m/s
 {x}
 *NSET, NSET=YSYM
 {y}
+*NSET, NSET=ZSYM
+{z}
 *SOLID SECTION, ELSET=ROD, MATERIAL=COPPER
 *MATERIAL, NAME=COPPER
 *DENSITY
@@ -142,6 +143,7 @@ Taylor bar of copper, a quarter, 227 m/s
 *BOUNDARY
 XSYM, XSYMM
 YSYM, YSYMM
+ZSYM, ZSYMM
 *INITIAL CONDITIONS, TYPE=VELOCITY
 ALL, 1, 0.
 ALL, 2, 0.

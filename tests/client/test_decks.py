@@ -213,3 +213,50 @@ def test_the_list_of_a_deck_is_data_as_well() -> None:
     assert {each["fate"] for each in told["keywords"]} == {"taken", "left"}
     step = next(each for each in told["keywords"] if each["keyword"] == "*CONTROL_TIMESTEP")
     assert [each["kind"] for each in step["details"]] == ["differs", "left"]
+
+
+# Features of public decks ---------------------------------------------------------------------------------------------
+
+PUBLIC: dict[str, tuple[str, str, tuple[str, ...]]] = {
+    "nodes that hold themselves": (
+        "a.k", lsdyna(*STEEL).replace("           0.000\n", "           0.000       3\n"), ()
+    ),
+    "a mesh that is generated": ("a.inp", abaqus("*Density\n7.85e-9,\n*Elastic\n2.1e5, 0.3").replace(
+        "*Element,", "*Ngen\n1, 2, 1\n*Nfill\n1, 2\n*Element,"
+    ), ("*NGEN: makes or moves nodes", "*NFILL: makes or moves nodes")),
+    "units of single options, groups of groups": ("a_0000.rad", radioss(
+        "/UNIT/3", "other", r20("kg", "mm", "ms"), "/MAT/ELAST/1/3", "steel", "7.85E-6", r20(2.1e2, 0.3),
+    ), ("units of its own (unit_ID) are not taken over",)),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("what", PUBLIC)
+def test_features_of_public_decks(tmp_path: Path, what: str) -> None:
+    name, text, told = PUBLIC[what]
+    found = read(tmp_path, name, text, None if name.endswith(".rad") else "mm,t,s")
+    assert len(found.refusals) == len(told)
+    assert all(any(words in line for line in found.refusals) for words in told), found.refusals
+
+
+def test_nodes_that_hold_themselves_are_a_plane_of_symmetry(tmp_path: Path) -> None:
+    found = read(tmp_path, *PUBLIC["nodes that hold themselves"][:2])
+    assert bare(found.data)["boundaries"] == [{"kind": "symmetry", "axis": "z", "at": "0 mm"}]
+
+
+@pytest.mark.parametrize(
+    ("codes", "held"),
+    [((), {}), ((1, 7, 7), {"x": "0 mm/s", "y": "0 mm/s", "z": "0 mm/s"}), ((1, 4, 7), {"x": "0 mm/s", "y": "0 mm/s"})],
+)
+def test_a_rigid_body_is_rigid_and_held_as_its_material_says(
+    tmp_path: Path, codes: tuple[int, ...], held: dict[str, str]
+) -> None:
+    found = read(tmp_path, "a.k", lsdyna("*MAT_RIGID", row(1, "7.85E-9", 2.1e5, 0.3), row(*codes)))
+    assert found.refusals == []
+    data = bare(found.data)
+    assert data["parts"][0]["rigid"] is True
+    assert [{key: each.get(key) for key in held} for each in data.get("boundaries", [])] == [held] * bool(held)
+
+
+def test_a_rigid_body_that_turns_about_one_axis_alone_refuses(tmp_path: Path) -> None:
+    found = read(tmp_path, "a.k", lsdyna("*MAT_RIGID", row(1, "7.85E-9", 2.1e5, 0.3), row(1, 3, 4)))
+    assert any("CON1 = 3" in line for line in found.refusals)

@@ -28,7 +28,6 @@ name = "bar"
 material = "metal"
 mesh = {{ shape = "file", path = "bar.{kind}", unit = "1 mm", group = "{group}" }}
 velocity = ["0 m/s", "0 m/s", "-227 m/s"]
-{wall}
 [[boundaries]]
 kind = "symmetry"
 axis = "x"
@@ -37,10 +36,12 @@ axis = "x"
 kind = "symmetry"
 axis = "y"
 
+{wall}
 [run]
 end_time = "6 us"
 frames = {frames}
 """
+PLANE = '[[boundaries]]\nkind = "symmetry"\naxis = "z"\n'
 
 
 def digest(folder: Path, case: Path, ranks: int) -> str:
@@ -53,7 +54,7 @@ def digest(folder: Path, case: Path, ranks: int) -> str:
 
 @pytest.mark.parametrize(
     ("kind", "text", "group", "wall", "frames"),
-    [("inp", abaqus_text(SIZE, END), "ROD", "", 20)],
+    [("inp", abaqus_text(SIZE, END), "ROD", PLANE, 20)],
     ids=["abaqus"],
 )
 def test_an_imported_taylor_bar_is_the_one_written_by_hand(

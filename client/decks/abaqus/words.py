@@ -47,6 +47,10 @@ REFUSED: dict[str, str] = {
     "FIELD": "fields that are given", "IMPORT": "a state of another analysis",
     "INCLUDE": "write what it includes into the file: the mesh is read of one file",
     "PARAMETER": "values that are computed; write them out",
+    **dict.fromkeys(
+        ("NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY", "SYSTEM", "IMPERFECTION"),
+        "makes or moves nodes and elements in a way that is not followed; write them out",
+    ),
     "STATIC": "no step of *DYNAMIC, EXPLICIT", "HEAT TRANSFER": "no step of *DYNAMIC, EXPLICIT",
     "FREQUENCY": "no step of *DYNAMIC, EXPLICIT", "ANNEAL": "no step of *DYNAMIC, EXPLICIT",
     "DAMPING": "damping of bodies: there is none here",

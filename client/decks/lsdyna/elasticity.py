@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from ..laws import shear_of, young_of
+from ..laws import young_of
 from ..units import DENSITY, SPEED, STRESS, System
 from .fields import Fields
 
@@ -29,7 +29,7 @@ def elastic(fields: Fields, context: Context) -> dict[str, Any]:
     young, poisson = fields.real("E"), fields.real("PR")
     density = context.system.quantity(fields.real("RO"), DENSITY)
     if context.eos is not None:
-        return with_eos(fields, context, shear_of(young, poisson))
+        context.eos.entry.leave("the law of its material takes the pressure from E and PR")
     return {"density": density, "elastic": {"young": context.stress(young), "poisson": poisson}}
 
 

@@ -1,7 +1,7 @@
 """What moves, holds and stops bodies in an LS-DYNA deck."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -122,6 +122,20 @@ def restraint(scene: Scene, block: Block, options: frozenset[str], entry: Entry)
             scene.holds.append(Hold(chosen, entry, speeds))
         else:
             entry.leave("no translation is held")
+
+
+_TC = {1: "x", 2: "y", 3: "z", 4: "xy", 5: "yz", 6: "xz", 7: "xyz"}
+"""Translations that the codes TC of ``*NODE`` hold (the manual, volume I)."""
+
+
+def hold_nodes(scene: Scene, held: Sequence[tuple[int, set[int], Entry]]) -> None:
+    """Nodes that ``*NODE`` itself holds, by their code."""
+    for code, nodes, entry in held:
+        if code not in _TC:
+            entry.remark("refused", f"TC = {code}", "a code of translations from 1 to 7 is expected")
+            continue
+        chosen = Chosen(f"nodes with TC = {code}", nodes=lambda nodes=nodes: nodes)  # type: ignore[misc]
+        scene.holds.append(Hold(chosen, entry, dict.fromkeys(_TC[code], 0.0)))
 
 
 def _single(number: int) -> Chosen:

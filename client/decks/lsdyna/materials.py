@@ -137,10 +137,18 @@ def _mat_power(fields: Fields, context: Context) -> Made:
     return Made({**elastic(fields, context), "strength": law}, failing(fields.real("EPSF")))
 
 
+_TRANSLATIONS = {4.0: "xy", 5.0: "yz", 6.0: "xz", 7.0: "xyz"}
+"""Codes CON1 of ``*MAT_RIGID`` with two axes or three."""
+
+
 def _mat_rigid(fields: Fields, context: Context) -> Made:
     fields.forgive("N COUPLE M ALIAS", "coupling with other programs")
     fields.forgive("LCO A2 A3 V1 V2 V3", "directions of local axes, of output and constraints")
-    return Made(elastic(fields, context), rigid=True)
+    code = fields.real("CON1")
+    held = _TRANSLATIONS.get(code, "") if fields.real("CMO") == 1.0 and fields.real("CON2") == 7.0 else ""
+    if fields.real("CMO") and not held:
+        fields.refuse("CMO CON1 CON2", "global axes (1), translations 4 to 7 and all rotations (7) are taken over")
+    return Made(elastic(fields, context), rigid=True, held=held)
 
 
 _LAWS: dict[str, Callable[[Fields, Context], Made]] = {

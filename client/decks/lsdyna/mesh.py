@@ -33,11 +33,25 @@ def _point(block: Block, card: Card) -> tuple[int, Point]:
     return block.whole(card, number, "nid"), (x, y, z)
 
 
+def held_of(block: Block) -> dict[int, set[int]]:
+    """Nodes that ``*NODE`` itself holds, by the code of the translations (TC). Raises CardError."""
+    found: dict[int, set[int]] = {}
+    start = sum(max(width, block.least) for width in _NODE[:4])
+    for card in block.filled():
+        text = card.text
+        if text.count(",") < 4 if "," in text else not text[start:].strip(" 0"):
+            continue
+        number, _, _, _, code, _ = block.fields(card, *_NODE)
+        if block.whole(card, code, "tc"):
+            found.setdefault(block.whole(card, code, "tc"), set()).add(block.whole(card, number, "nid"))
+    return found
+
+
 def read_nodes(path: Path) -> dict[str, set[int]]:
     """Nodes of each part with solids, by its number as text. Raises CardError."""
     nodes: dict[str, set[int]] = {}
     for block in Deck(path, without=("NODE",)).blocks():
-        if block.name.startswith("ELEMENT_SOLID"):
+        if block.name == "ELEMENT_SOLID":
             _solids(block, nodes)
     return nodes
 

@@ -10,7 +10,7 @@ from ..account import Account, Entry
 from ..bonds import Tie, join
 from ..contacts import Meeting, meet
 from ..draft import Body, Draft, Made
-from ..holds import Holding
+from ..holds import Hold, Holding
 from ..naming import Names
 from ..start import begin
 from ..topology import Topology
@@ -20,7 +20,7 @@ from . import control, loads, materials, sets
 from .elasticity import Context
 from .fields import Fields, numbers
 from .layouts import LAYOUTS, NUMBERS
-from .mesh import parts_of, read_nodes, read_points
+from .mesh import held_of, parts_of, read_nodes, read_points
 from .named import Numbered
 from .words import LEFT, REFUSED, reason
 
@@ -38,12 +38,16 @@ class LsDyna:
         self.path, self.account = path, Account()
         self._blocks: list[tuple[Block, Entry]] = []
         self._solid: set[str] = set()
-        deck = Deck(path, without=("NODE",))
+        self._held: list[tuple[int, set[int], Entry]] = []
+        deck = Deck(path)
         for block in deck.blocks():
             entry = self._open(block)
-            if block.name.startswith("ELEMENT_SOLID"):
+            if block.name == "ELEMENT_SOLID":
                 self._solid |= parts_of(block)
-            elif block.name not in _MESH:
+            elif block.name == "NODE":
+                for code, nodes in held_of(block).items():
+                    self._held.append((code, nodes, entry))
+            else:
                 self._blocks.append((block, entry))
         for block in deck.followed:
             self._open(block)
@@ -60,7 +64,7 @@ class LsDyna:
 
     def _open(self, block: Block) -> Entry:
         entry = self.account.open(f"*{block.name}", block.number, block.file)
-        if block.name in _MESH or block.name.startswith("ELEMENT_SOLID"):
+        if block.name in _MESH:
             entry.take("parts[].mesh")
         elif why := reason(block.name, LEFT):
             entry.leave(why)
@@ -172,6 +176,13 @@ class LsDyna:
         self._ties: list[Tie] = []
         for block, entry in self._blocks:
             self._guarded(self._load, block, entry)
+        loads.hold_nodes(self._scene, self._held)
+        for body in self._bodies:
+            found = self._draft.material_of(body.material)
+            if found is not None and found[1].held:
+                entry = self._materials[int(body.material.partition("/")[0])][1].entry
+                held = dict.fromkeys(found[1].held, 0.0)
+                self._scene.holds.append(Hold(named.part(int(body.key)), entry, held))
         begin(self._draft, self._topology, self._bodies, self._scene.starts)
         for body in self._bodies:
             self._draft.add_part(body, names)
@@ -203,7 +214,7 @@ class LsDyna:
             materials.erode(self._eroding.get(int(number)) or self._eroding.get(0), made)
             label = title or next(body.title for body in self._bodies if body.material == key)
             self._draft.add_material(key, label, made, fields.entry)
-            if state is not None and made.material:
+            if state is not None and made.material and not state.entry.reasons:
                 state.entry.take(f"materials.{(self._draft.material_of(key) or ('?', made))[0]}.eos")
 
     def _load(self, block: Block, entry: Entry) -> None:
