@@ -189,9 +189,9 @@ def wall_time(case: Case, caps: Limits) -> float | None:
     return min(asked) if asked else None
 
 
-def later(code: str, detail: str) -> ServiceError:
+def later(code: str, detail: str, hint: str | None = None) -> ServiceError:
     """429: the user has as much as he may have; less, later."""
-    return ServiceError(429, code, detail, retryable=True, headers={"Retry-After": "60"})
+    return ServiceError(429, code, detail, hint=hint, retryable=True, headers={"Retry-After": "60"})
 
 
 def check_output(kept: int, quota: Quota) -> None:

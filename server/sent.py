@@ -141,15 +141,18 @@ class SentFiles:
 
     def _check_room(self, owner: str, total: int) -> None:
         rules, there = self._rules, self.of(owner)
+        hint = f"a file that no run has goes {rules.age} after it was last asked for, or with DELETE /v1/files/SHA256"
         if total > rules.size:
             told = f"the file has {size(total)}; this server allows {size(rules.size)}"
             raise ServiceError(413, "too_large", told)
         if len(there) >= rules.number:
-            raise later("file_quota", f"you have sent {len(there)} files; this server keeps {rules.number} of a user")
+            raise later(
+                "file_quota", f"you have sent {len(there)} files; this server keeps {rules.number} of a user", hint
+            )
         sent = sum(each.size for each in there)
         if sent + total > rules.bytes:
             told = f"the file has {size(total)}, and your files {size(sent)}; this server allows {size(rules.bytes)}"
-            raise later("file_quota", told)
+            raise later("file_quota", told, hint)
         left = self.left(owner)
         if left is not None and total > left:
             told = f"the file has {size(total)}, and you may have {size(max(0, left))} more on disk: remove some runs"
