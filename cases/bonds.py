@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from .tables import Model, Name, Positive
-from .units import FractureEnergy, Stress
+from .units import FractureEnergy, Length, Stress
 
 
 class Bonded(Model):
@@ -57,10 +57,19 @@ class SharedBond(Bonded):
 
 
 class TiedBond(Bonded):
-    """Two parts whose meshes do not match at the interface: nodes of one are tied to faces of the other."""
+    """Two parts whose meshes do not match at the interface: the nodes of the one with the smaller faces there are tied
+    to faces of the other, and lie on them from the start. Where it breaks, tension and shear take their shares of
+    ``1 / G = (1 - B) / energy + B / shear_energy``, B the share of the work that is done in shear. What has opened
+    closes without resistance and carries tension again where it was widest; what has slid stays where it is. Contact
+    sees no pair of the two that the bond ties, and what has come apart.
+    """
 
     kind: Literal["tied"]
     """The meshes of the two have no nodes in common."""
+    gap: Annotated[Length, Field(ge=0)] | None = None
+    """Largest distance between faces that are bonded; by default a tenth of the smaller face, the square root of twice
+    its area. The nodes of the one part are moved by it onto the other. What is further apart is not bonded, and a
+    warning counts it."""
 
 
 Bond = Annotated[SharedBond | TiedBond, Field(discriminator="kind")]

@@ -65,7 +65,7 @@ class Energy(msgspec.Struct, kw_only=True, frozen=True):
     eroded: float = 0.0
     """Elastic energy of tets that were taken out, and kinetic energy of nodes that left with them."""
     fracture: float = 0.0
-    """By cohesive facets, for good."""
+    """By cohesive facets and by tied bonds, for good."""
     cohesive: float = 0.0
     """What the closing of cohesive facets would give back."""
     stepping: float = 0.0

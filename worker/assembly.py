@@ -16,6 +16,8 @@ from conoid.cases.library import material as find_material
 from conoid.cases.survey import Survey
 
 from . import selection, surface_pressure
+from .bonds import interface
+from .bonds.pieces import Pieces
 from .contact import overlap, pairing
 from .errors import InputError
 from .facts import Facts
@@ -57,6 +59,8 @@ class Whole:
     velocity: Floats
     loads: list[Load | LoadedFaces]
     """Of the tractions of the case."""
+    tied: Pieces
+    """Of the bonds of meshes that do not match."""
     near: Nearness
     warnings: list[str]
     """What the user should know of the meshes, and of what the boundaries of the case select of them."""
@@ -70,9 +74,6 @@ def quiet(what: str) -> None:
 
 def assemble(case: schema.Case, folder: Path, say: Say = quiet) -> Whole:
     """Builds the meshes of all parts; ``folder`` is where relative mesh paths start. Raises MeshError, InputError."""
-    for index, bond in enumerate(case.bond):
-        if bond.kind == "tied":
-            raise InputError(f"bond[{index}].kind = {bond.kind!r}: this version reads such bonds and cannot run them")
     facts = Facts(case)
     whole = assembled(case, _built(case, folder, say, facts))
     whole.survey = facts.survey()
@@ -119,6 +120,10 @@ def assembled(case: schema.Case, meshes: Iterable[tuple[int, TetMesh]], overlaps
         warnings.append(f"contact: {UNSEEN}")
     elif case.in_contact:
         x = _apart(case, made)
+    tied = Pieces.none()
+    if overlaps and interface.tied_pairs(case):
+        joined = interface.find(case, x, t, part_of_tet, made.across < 0)
+        x, tied, warnings = joined.x, joined.pieces, [*warnings, *joined.warnings]
     volumes = _volumes(x, t)
     masses = volumes * np.array([find_material(case, part.material).density for part in case.parts])[part_of_tet]
     shares = _shares(case, made, masses)
@@ -134,7 +139,7 @@ def assembled(case: schema.Case, meshes: Iterable[tuple[int, TetMesh]], overlaps
         points=x, node_part=part_of_node, tets=t, tet_part=part_of_tet, volumes=volumes,
         across=made.across if case.in_contact or case.fractures else made.across[:0], shares=shares,
         node_volume=_quarters(t, volumes, len(x)), mass=_weighed(case, _quarters(t, masses, len(x)), part_of_node),
-        velocity=velocity, loads=loads, near=near,
+        velocity=velocity, loads=loads, tied=tied, near=near,
         warnings=[
             *warnings, *told, *more, *selection.off_planes(case, x, members, near, known),
             *selection.compared(case, [*found, *driven]), *mixed,
@@ -161,7 +166,10 @@ def _apart(case: schema.Case, made: Stacked) -> Floats:
     x, tets, body, part, exposed = made.points, made.tets, made.body, made.part_of_body, made.across < 0
     tet, face = np.nonzero(exposed)
     faces = tets[tet[:, None], FACES[face]]
-    allowed = made.any_of_body(~np.isnan(pairing.friction(case))[part[:, None], part])
+    meets = ~np.isnan(pairing.friction(case))
+    for _, one, two in interface.tied_pairs(case):
+        meets[one, two] = meets[two, one] = False
+    allowed = made.any_of_body(meets[part[:, None], part])
     surface = overlap.Surface(faces, body[faces[:, 0]], exposed)
     before, out_of = x, np.full(len(x), -1, np.int32)
     if case.contact.overlap == "push":

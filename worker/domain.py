@@ -19,6 +19,7 @@ from conoid.cases.warned import warned
 
 from . import assembly
 from .assembly import Say, Whole
+from .bonds.pieces import Pieces
 from .elements import wear
 from .errors import InputError
 from .materials import models
@@ -63,6 +64,8 @@ class Piece:
     loads: list[Load | LoadedFaces]
     """Of the tractions of the case, on all nodes that this rank holds; of those that follow the surface the faces of
     its tets."""
+    tied: Pieces
+    """Of the bonds of meshes that do not match, of all ranks."""
     tet_ids: Ints
     tet_part: Indices
     tets: Indices
@@ -147,7 +150,7 @@ def _piece(
     return Piece(
         nodes.astype(np.int64), whole.node_part[nodes], home[nodes], home[nodes] == rank, whole.points[nodes],
         whole.velocity[nodes], whole.mass[nodes], whole.node_volume[nodes], whole.shares.of_nodes(local),
-        [load.here(nodes, ids) for load in whole.loads],
+        [load.here(nodes, ids) for load in whole.loads], whole.tied,
         ids.astype(np.int64),
         whole.tet_part[ids], local[tets], whole.volumes[ids],
         whole.across[ids] if len(whole.across) else whole.across, np.any(shared[tets], axis=1),

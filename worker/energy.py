@@ -18,6 +18,7 @@ import numpy as np
 from conoid.cases.messages import Energy, PartEnergy
 from conoid.cases.schema import Run
 
+from .bonds.stage import Bonds
 from .boundaries import Boundary
 from .clock import Clock
 from .contact.stage import Contact
@@ -49,14 +50,15 @@ class Ledger:
     """Sums the accounts of all ranks; the first call sets the initial energy."""
 
     def __init__(
-        self, model: Model, boundaries: list[Boundary], contact: Contact | None, erosion: Erosion | None,
-        fracture: Fracture | None, undeformed: tuple[Rigid | None, Walls], comm: Comm, clock: Clock, team: Team,
+        self, model: Model, boundaries: list[Boundary], contact: Contact | None, bonds: Bonds | None,
+        erosion: Erosion | None, fracture: Fracture | None, undeformed: tuple[Rigid | None, Walls], comm: Comm,
+        clock: Clock, team: Team,
     ) -> None:  # fmt: skip
         """``team``: whose threads go over the nodes."""
         self._of_nodes, self._columns = Pass(team, _of_nodes, *_OF_NODES), np.empty(0)
         self._model = model
         self._boundaries = boundaries
-        self._contact = contact
+        self._contact, self._bonds = contact, bonds
         self._erosion = erosion
         self._cohesion = fracture.cohesion if fracture is not None else None
         self._comm = comm
@@ -122,6 +124,7 @@ class Ledger:
             lost, cohesive, whole = self._cohesion.energies(told["open"], told["facets"])
             self._taken = max(self._taken, lost)
             self.unpaid = max(self.unpaid, (self._taken - lost) / whole if whole > 0.0 else 0.0)
+        lost += sum(told["bonds"].tolist())
         inside = elastic + plastic_sum + viscous_sum + averaging
         total = kinetic_sum + inside + loss_sum + eroded + lost + cohesive + stepping
         friction = self._friction_work(told)
@@ -195,13 +198,17 @@ class Ledger:
             Grouped(*_by_part(columns, nodes), parts), ElementWork(self._model.blocks, parts), *self._rubbed(parts)
         ]  # fmt: skip
         rubbed = len(tables) - 2
+        bound = rubbed
+        if self._bonds is not None:
+            tables.append(Table(np.where(nodes.owned, self._bonds.loss, 0.0)[:, None], parts))
+            bound += 1
         if self._cohesion is not None:
             tables.append(Table(self._cohesion.columns(), parts))
         tallies = self._tallies()
         words = np.concatenate([np.zeros(0, np.int64), *(tally.words.reshape(-1) for tally in tallies.values())])
         sums, of_parts, words = totals_and_words(self._comm, tables, words)
         booked = sums[_NODAL + len(WORKS) :]
-        told = {"boundaries": booked[:rubbed], "open": booked[rubbed:]}
+        told = {"boundaries": booked[:rubbed], "bonds": booked[rubbed:bound], "open": booked[bound:]}
         for name, tally in tallies.items():
             told[name] = tally.valued(words[: tally.words.size].reshape(2, -1))
             words = words[tally.words.size :]
@@ -250,6 +257,8 @@ class Ledger:
             _add(loss, external, boundary.nodes, boundary.contact_loss, boundary.external_work)
         if contact is not None:
             external += contact.books.external_work
+        if self._bonds is not None:
+            external += self._bonds.external
         return loss, external
 
 

@@ -52,6 +52,8 @@ class Fields:
         """A checkpoint is asked for."""
         self.snapshot = False
         """A snapshot of the fragments is due."""
+        self.apart = False
+        """A tied node has come apart from the faces that it was tied to (bonds/stage.py)."""
         self.nodes = 0
         """All nodes; a rank knows of those that have separated elsewhere since the last reduction when this is done."""
 
@@ -140,4 +142,4 @@ class StepReduction(Fields):
         begins with a search.
         """
         self.stop = 0
-        self.report = self.groups = self.stray = self.grown = self.checkpoint = self.snapshot = False
+        self.report = self.groups = self.stray = self.grown = self.checkpoint = self.snapshot = self.apart = False

@@ -12,9 +12,13 @@ from conoid.cases.schema import Case, Symmetry
 
 from . import conditions, domain
 from .assembly import Say, quiet
+from .bonds.interface import tied_pairs
+from .bonds.pieces import Pieces
+from .bonds.stage import Bonds
 from .boundaries import Acts, Boundary
 from .clock import Clock
 from .contact.stage import Contact
+from .contact.tied import Tied
 from .crushing import Crushing
 from .elements.averages import Averages, volumes
 from .elements.averaging import AveragedElements
@@ -66,6 +70,8 @@ class Simulation:
     boundaries: list[Boundary]
     """In the order in which they act."""
     contact: Contact | None
+    bonds: Bonds | None
+    """Of meshes that do not match."""
     erosion: Erosion | None
     fracture: Fracture | None
     rigid: Rigid | None
@@ -159,6 +165,8 @@ class Simulation:
             self.contact.free()
         for bound in self.boundaries:
             bound.free()
+        if self.bonds is not None:
+            self.bonds.free()
 
     def next_scale(self) -> float:
         """The scale for the next sum of forces."""
@@ -177,7 +185,7 @@ def build(case: Case, folder: Path, comm: Comm, say: Say = quiet) -> Simulation:
     told = conditions.start(case, model, scene, comm)
     rigid = _rigid(case, model, walls, comm)
     timers = Timers(comm, team(case.run.threads))
-    sim = _assemble(case, model, piece.neighbours, scene, (rigid, walls), piece.node_volume, comm, timers)
+    sim = _assemble(case, model, piece.neighbours, scene, (rigid, walls), piece.node_volume, comm, timers, piece.tied)
     sim.warnings = *piece.warnings, *told
     sim.probes.require_tets(case)
     if sim.contact is not None:
@@ -207,8 +215,11 @@ def _rigid(
 def _assemble(
     case: Case, model: Model, neighbours: list[Neighbour], scene: list[Boundary],
     undeformed: tuple[Rigid | None, Walls], node_volume: Floats, comm: Comm, timers: Timers,
+    tied: Pieces,
 ) -> Simulation:  # fmt: skip
-    """The stages that the case needs, round a model and its boundaries; ``node_volume`` (nodes,): at the start, m^3."""
+    """The stages that the case needs, round a model and its boundaries; ``node_volume`` (nodes,): at the start, m^3;
+    ``tied``: of the bonds, of a run that begins.
+    """
     began, run, numerics, (rigid, moving) = worked(comm), case.run, case.numerics, undeformed
     threads = team(run.threads)
     clock = Clock(run.end_time, numerics.dt_safety, case.dt_growth, run.frames)
@@ -218,6 +229,11 @@ def _assemble(
         contact = Contact(case, model, neighbours, scene, comm, clock, timers, threads, extremes[:2], rigid)
     if case.erodes:
         erosion = Erosion(case, model, neighbours, contact, scene, comm, clock, extremes)
+    bonds = None
+    if tied_pairs(case):
+        bonds = Bonds(case, model, tied, scene, comm, clock, threads, extremes[0] * extremes[1])
+    if contact is not None and bonds is not None:
+        contact.detection.tied = Tied(bonds)
     if case.boundaries_of(Symmetry):
         scene.append(Mirrors.of(case, model, scene, comm))
     for bound in scene:
@@ -227,14 +243,14 @@ def _assemble(
     elements = _elements(case, model, neighbours, scene, node_volume, comm, timers, threads)
     fracture = None
     if case.fractures:
-        by_node: list[KeptByNode] = [*scene, *(stage for stage in (erosion, contact) if stage is not None)]
+        by_node: list[KeptByNode] = [*scene, *(stage for stage in (erosion, contact, bonds) if stage is not None)]
         fracture = Fracture(case, model, neighbours, elements, by_node, contact, comm, clock)
     stopping = tuple(bound for bound in scene if isinstance(bound, RigidWalls | MovingWalls))
     probes = Probes(case, Scene(model, contact, stopping, rigid, erosion, fracture, clock, comm))
-    ledger = Ledger(model, scene, contact, erosion, fracture, (rigid, moving), comm, clock, threads)
+    ledger = Ledger(model, scene, contact, bonds, erosion, fracture, (rigid, moving), comm, clock, threads)
     return Simulation(
         case=case, comm=comm, model=model, elements=elements, leapfrog=Leapfrog(threads), boundaries=scene,
-        contact=contact, erosion=erosion, fracture=fracture, rigid=rigid, walls=moving,
+        contact=contact, bonds=bonds, erosion=erosion, fracture=fracture, rigid=rigid, walls=moving,
         clock=clock, ledger=ledger, probes=probes, timers=timers,
         record=Record(model, fracture, comm) if fracture is not None else None,
         crushing=Crushing.of(case, model, comm, clock, threads),
@@ -259,6 +275,8 @@ def keep(sim: Simulation) -> Parcel:
         sim.erosion.keep(parcel)
     if sim.contact is not None:
         sim.contact.keep(parcel)
+    if sim.bonds is not None:
+        sim.bonds.keep(parcel)
     sim.elements.keep(parcel)
     if sim.fracture is not None:
         sim.fracture.keep(parcel)
@@ -279,7 +297,8 @@ def resume(case: Case, arrived: Arrived, comm: Comm, timers: Timers) -> Simulati
     walls.resume(known["walls"])
     scene = conditions.build(case, model, conditions.loads(parcel), arrived.neighbours, comm, walls)
     both = _rigid(case, model, walls, comm, known.get("rigid")), walls
-    sim = _assemble(case, model, arrived.neighbours, scene, both, np.ones(model.nodes.n), comm, timers)
+    ones, none = np.ones(model.nodes.n), Pieces.none()
+    sim = _assemble(case, model, arrived.neighbours, scene, both, ones, comm, timers, none)
     sim.reduction.resume(known["reduction"])
     sim.clock.resume(known["clock"])
     sim.ledger.resume(known["ledger"])
@@ -293,6 +312,8 @@ def resume(case: Case, arrived: Arrived, comm: Comm, timers: Timers) -> Simulati
         sim.erosion.resume(parcel)
     if sim.contact is not None:
         sim.contact.resume(parcel)
+    if sim.bonds is not None:
+        sim.bonds.resume(parcel)
     sim.elements.resume(parcel)
     if sim.fracture is not None:
         sim.fracture.resume(parcel)

@@ -11,7 +11,7 @@ and at once f(n+1) from it, so a step begins with forces that are already at han
  5  cohesive facets let go; velocities                     f(n); v(n-1/2) -> v*(n+1/2)
  6  gravity, tractions, symmetry, prescribed motion        v*(n+1/2)
  7  erosion: removed nodes stop                            v*(n+1/2)
- 8  contact: impulses of active contacts                   v*(n+1/2)
+ 8  contact: impulses of active contacts; tied bonds       v*(n+1/2)
  9  walls, mirror images behind symmetry planes            v*(n+1/2) -> v(n+1/2)
 10  output at time n: ledger, probes, frames               x(n), stress(n)
 11  positions; debris past a plane becomes its image       x(n) -> x(n+1)
@@ -38,7 +38,7 @@ import numpy as np
 from . import failed
 from .boundaries import Acts
 from .errors import PhysicsError
-from .fracture.stage import NOTHING, OVERSTRESSED, Fracture
+from .fracture.stage import BREAKS, NOTHING, OVERSTRESSED, Fracture
 from .parallel import fixed_point
 from .simulation import Simulation
 from .state import Floats
@@ -92,7 +92,7 @@ def between(sim: Simulation, before: Floats) -> Floats:
 
 def _before_kick(sim: Simulation, acts: Acts) -> None:
     """2 to 4, with v(n-1/2)."""
-    nodes, erosion, contact = sim.model.nodes, sim.erosion, sim.contact
+    nodes, erosion, contact, bonds = sim.model.nodes, sim.erosion, sim.contact, sim.bonds
     for boundary in acts.noting:
         boundary.note(nodes)  # 2: half of the impulse times v(n-1/2)
     if erosion is not None:
@@ -103,7 +103,12 @@ def _before_kick(sim: Simulation, acts: Acts) -> None:
         sim.rigid.note()
     sim.walls.note()
     if erosion is not None:
+        removes = erosion.due
         erosion.remove(nodes)  # 3: what the tets covered is surface now
+        if bonds is not None and removes:
+            bonds.follow()
+    if bonds is not None:
+        bonds.note(nodes)  # 2, of the nodes that are tied now
     if contact is not None:
         contact.search_if_due(nodes)  # 4: candidate pairs of the surface as it is now
 
@@ -118,8 +123,12 @@ def _after_kick(sim: Simulation, acts: Acts) -> None:
         sim.rigid.kick(nodes, dt, t)
     if sim.erosion is not None:
         sim.erosion.stop_removed(nodes)  # 7
+    if sim.bonds is not None:
+        sim.bonds.predict(nodes)  # 8: contact sees bodies that hold together
     if sim.contact is not None:
         sim.contact.solve(nodes, dt, t)  # 8
+    if sim.bonds is not None:
+        sim.bonds.solve(nodes, touched=sim.contact is not None)  # 8
     for boundary in acts.after_contact:
         boundary.apply(nodes, dt, t)  # 9
     if sim.rigid is not None:
@@ -147,6 +156,8 @@ def second_half(sim: Simulation) -> None:
         sim.timers.switch("fracture")
         # 15: facets break, nodes separate, f(n+1) goes with them
         sim.fracture.advance(sim.reduction.breaking, sim.reduction.touched)
+        if sim.bonds is not None and sim.reduction.breaking == BREAKS:
+            sim.bonds.follow()
     sim.timers.switch("rest")
 
 
@@ -172,6 +183,7 @@ def _elements(sim: Simulation, dt: float, fracture: Fracture | None) -> None:
         own.limit = max(own.limit, sim.rigid.limit)
     if sim.erosion is not None:
         own.worn = max(own.worn, sim.erosion.strikes())
+    own.apart = sim.bonds is not None and sim.bonds.apart
     own.nodes = sim.model.nodes_global
     reduction.begin(sim.comm)
     if fracture is None:
@@ -184,6 +196,8 @@ def _elements(sim: Simulation, dt: float, fracture: Fracture | None) -> None:
         sim.contact.agree(reduction)
     if sim.erosion is not None:
         sim.erosion.decide(reduction.worn)
+    if sim.bonds is not None and reduction.apart:
+        sim.bonds.follow()
     if fixed_point.outgrown(reduction.force, scale):
         sim.scale = fixed_point.scale_for(reduction.force)
         sim.timers.switch("elements")

@@ -13,7 +13,7 @@ from ..contact.ranks import on_ranks
 
 REALS = ("limit", "force", "approach")
 NUMBERS = ("stop", "worn", "breaking", "nodes")
-FLAGS = ("report", "groups", "opening", "stray", "search", "grown", "checkpoint", "snapshot")
+FLAGS = ("apart", "report", "groups", "opening", "stray", "search", "grown", "checkpoint", "snapshot")
 
 
 def _words(record: Fields) -> list[int]:

@@ -17,6 +17,7 @@ from .narrow_phase import HASTY, Step
 from .node_face import nearest
 from .scene import Scene
 from .tasks import CONTACTS_OF_A_TASK, CRACKS_OF_A_TASK, FAMILIES_OF_A_TASK, PAIRS_OF_A_TASK, SLOTS_OF_A_TASK
+from .tied import Tied
 
 _KINEMATIC = 2.0
 """One over the share of a tet's altitude that anything may pass in a step."""
@@ -71,6 +72,8 @@ class Detection:
     """Finds the active contacts of a rank, by the threads of its ``team``."""
 
     def __init__(self, team: Team) -> None:
+        self.tied: Tied | None = None
+        """The bonds of the scene."""
         self.found = Detected.nothing()
         """What the last step has found here."""
         pairs, some = PAIRS_OF_A_TASK, CONTACTS_OF_A_TASK
@@ -118,6 +121,8 @@ class Detection:
         stray = _renewed(now, together)
         step = Step.of(crowd.x, crowd.v, crowd.part, mu, give, ahead.dt, now.step_room)
         step = step.followed(beyond, HASTY * ahead.size, ahead.rebound, now.face_table())
+        if self.tied is not None:
+            step = step._replace(tied=self.tied.bits(crowd))
         now.active.begin(len(now.node_face), len(now.edge_edge), 3 * len(now.cracks))
         for block, corners in surface.narrow():
             self._corners(now, block, corners, surface.cracks, step)

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..jit import njit, types
 from .geometry import VECTOR, at, beyond, cross, distance, dot, lowest_height, minus, segments
-from .narrow_phase import CONTACT_ROWS, DEEP, DEEP_SELF, EDGES, NEAR, PAIRS, STEP, needed
+from .narrow_phase import CONTACT_ROWS, DEEP, DEEP_SELF, EDGES, NEAR, PAIRS, STEP, bonded, needed
 
 _PARALLEL = 1e-3
 """Sine of the angle below which edges are left to nodes and faces. Ridges may pass each other through a gap that is as
@@ -131,6 +131,8 @@ def edge_edge(out, base, pairs, edges, step, course, end, first, stop):  # type:
             continue
         active[tested] = first + p
         tested += 1
+        if len(step.tied) > 0 and bonded(step, a, b, c, d):
+            continue
         if not np.isnan(until[p]):  # left alone while it cannot meet
             if np.isnan(speed[p]):
                 speed[p] = _fastest(course, a, b, c, d)

@@ -13,6 +13,7 @@ from ..cache_lines import cache_lines
 from ..jit import njit, record, types
 from ..state import Flags, Floats, Indices, Ints
 from .geometry import at, cross, dot, minus
+from .tied import NOTHING
 
 NEAR = 0.02
 """Of the size of a face: a gap that is watched although it does not close by itself."""
@@ -89,6 +90,8 @@ class Step(NamedTuple):
     least: Floats
     """(slots,) square of the least altitude of a node in the tets of its exposed faces, m^2; (0,) without ``beyond``.
     """
+    tied: Ints
+    """(slots,) the bonds that tie each, as bits: nodes that one ties do not meet; (0,) without bonds (tied.py)."""
 
     @classmethod
     def of(
@@ -97,7 +100,7 @@ class Step(NamedTuple):
         """A step ``dt`` from ``x`` on; ``room``: see step_room."""
         places = (step_room(len(x)) if room is None else room)[: max(len(x), _FEWEST)]
         _place(places, x, v, dt)
-        return cls(places[:, :3], v, places[:, 3:6], part, mu, give, dt, 0.0, 0.0, 1.0, np.empty(0))
+        return cls(places[:, :3], v, places[:, 3:6], part, mu, give, dt, 0.0, 0.0, 1.0, np.empty(0), NOTHING)
 
     def followed(self, beyond: float, hasty: float, rebound: float, faces: "FaceTable") -> "Step":
         """And a step of up to ``beyond`` that may follow, see there."""
@@ -178,9 +181,9 @@ class EdgeTable(NamedTuple):
 _N1, _N2, _I1, _B1, _B2 = (
     types.int32[::1], types.int32[:, ::1], types.int64[::1], types.boolean[::1], types.boolean[:, ::1],
 )  # fmt: skip
-_F1, _F2 = types.float64[::1], types.float64[:, ::1]
+_F1, _F2, _I = types.float64[::1], types.float64[:, ::1], types.int64
 CONTACT_ROWS = record(ContactRows, _N2, _F2, _F2, _F1, _F1, _N1)
-STEP = record(Step, types.float64[:, :], _F2, types.float64[:, :], _N1, _F2, *(5 * [types.float64]), _F1)
+STEP = record(Step, types.float64[:, :], _F2, types.float64[:, :], _N1, _F2, *(5 * [types.float64]), _F1, _I1)
 PAIRS = record(Pairs, _N2, _F1, _F1, _B1, _N1, _N1)
 SLOTS = record(SlotTable, _F2, _B1, _N1, _F1, _F2, _B1)
 FACES = record(FaceTable, _N2, _F1, _I1, _B1, _F1, _B1)
@@ -194,6 +197,13 @@ def needed(gap0, gap1, speed, give, dt):  # type: ignore[no-untyped-def]
     """
     back = give * min(max(-gap0, 0.0) / dt, max(-speed, 0.0))
     return (min(gap0, 0.0) - gap1) / dt + back
+
+
+@njit(types.boolean(STEP, _I, _I, _I, _I), cache=True)
+def bonded(step, a, b, c, d):  # type: ignore[no-untyped-def]
+    """Whether one bond ties four slots, of two parts."""
+    tied, part = step.tied, step.part
+    return tied[a] & tied[b] & tied[c] & tied[d] != 0 and not part[a] == part[b] == part[c] == part[d]
 
 
 @njit("void(float64[:, ::1], float64[:, ::1], float64[:, ::1], float64)", cache=True)

@@ -10,7 +10,7 @@ from ..jit import njit, types
 from .beside import RIM, TOUCHING, facing, in_front, outside, plane, reaches_over
 from .geometry import VECTOR, at, beyond, distance, dot, foot, height, minus, off
 from .haste import fastest_of, haste
-from .narrow_phase import CONTACT_ROWS, DEEP, DEEP_SELF, FACES, NEAR, PAIRS, SLOTS, STEP, needed
+from .narrow_phase import CONTACT_ROWS, DEEP, DEEP_SELF, FACES, NEAR, PAIRS, SLOTS, STEP, bonded, needed
 
 _ROUND = 0.01
 """Of the size of a face: added to the distance at which a pair may meet."""
@@ -166,6 +166,8 @@ def node_face(out, depth, base, pairs, slots, faces, step, end, first, stop):  #
         p = active[q]
         s, f = rows[p, 0], rows[p, 1]
         i, j, k = corners[f, 0], corners[f, 1], corners[f, 2]
+        if len(step.tied) > 0 and bonded(step, s, i, j, k):
+            continue
         m = plane(faces, ahead, f)
         gap1 = dot(m, minus(at(ahead, s), at(ahead, i)))
         reach = DEEP_SELF if part[s] == part[i] else DEEP

@@ -78,7 +78,7 @@ class Contact:
         self.books = Books(model.nodes.n, case, mass * speed, mass * speed * speed, team)
         self._active = ActiveSet(self.books.scale, Stops.of(case, model, comm), team, rigid)
         self._scheme, self.need = _Scheme.of(case), Need(sweeps(case))
-        self._detection = Detection(team)
+        self.detection = Detection(team)
         self.limit = 0.0
         """One over the step in which no node of any rank passes more than half of a tet that it meets, 1/s."""
         self.last_push = 0.0
@@ -177,7 +177,7 @@ class Contact:
     @property
     def found(self) -> Detected:
         """What the last step has found here."""
-        return self._detection.found
+        return self.detection.found
 
     @property
     def approach(self) -> float:
@@ -239,9 +239,9 @@ class Contact:
         if (now := self.searches.scene) is None:
             return False
         with self._timers.phase("contact"):
-            self._detection.take(now, state)
+            self.detection.take(now, state)
             ahead = Ahead(0.0, self._clock.dt, self.exterior.size, 1.0 + self._scheme.restitution)
-            found = self._detection.detect(now, self.exterior, self.searches.mu, 0.0, ahead, True, together=False)
+            found = self.detection.detect(now, self.exterior, self.searches.mu, 0.0, ahead, True, together=False)
             self.limit = float(self._comm.maximum(np.array([found.approach]))[0])
         return self.limit > 0.0
 
@@ -254,11 +254,11 @@ class Contact:
     def _push(self, now: Scene, state: Nodes, dt: float, t: float) -> None:
         crowd, books, active = now.crowd, self.books, self._active
         now.messages.copies.begin(state)
-        self._detection.take(now, state)
+        self.detection.take(now, state)
         now.messages.copies.finish(crowd.x, crowd.v, now.slots.before)
         give = PUSH_OUT if books.account.settle(books.agreed) else 0.0
         self._meet(now, give, dt)
-        self._detection.retarget(now, self._scheme.restitution, give)
+        self.detection.retarget(now, self._scheme.restitution, give)
         shared = now.messages.company.agree(now.active, crowd.local)
         surface = self.exterior
         active.begin(now.active, crowd, surface.flight.loose, shared, surface.size, dt)
@@ -293,7 +293,7 @@ class Contact:
         if step % self._scheme.looks == 0:
             self.exterior.sharpen(now, self._scheme.sharp)
         ahead = Ahead(dt, self._clock.longest, self.exterior.size, 1.0 + self._scheme.restitution)
-        self._detection.detect(now, self.exterior, self.searches.mu, give, ahead, redraw, self.found.stray)
+        self.detection.detect(now, self.exterior, self.searches.mu, give, ahead, redraw, self.found.stray)
 
     def free(self) -> None:
         """Gives the messages back to MPI."""

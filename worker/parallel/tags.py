@@ -41,6 +41,11 @@ class Tag(IntEnum):
     (fracture/release.py)."""
     LOAD = 21
     """Sums of the forces of a pressure that follows the surface, in every step (surface_pressure.py)."""
+    BOND = 22
+    """Sums of the impulses of a sweep at tied nodes, in every step with bonds of meshes that do not match
+    (bonds/layout.py)."""
+    BONDED = 23
+    """Positions and velocities of tied nodes that are not held, likewise (bonds/layout.py)."""
     SWAP = 90
     """Words of which the receiver learns the number first (parallel/mpi.py)."""
     TRADE = 91

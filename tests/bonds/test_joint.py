@@ -1,0 +1,133 @@
+"""Bodies that tied bonds hold together: waves, energy, momentum; joints that are torn, and what meets again."""
+
+import numpy as np
+import pytest
+
+from conoid.worker.contact import inside
+from conoid.worker.simulation import Simulation
+
+from . import scenes
+from .scenes import BOND, SYMMETRY, area, block, built, moved, run, start
+
+PULL = '\n[[boundaries]]\nkind = "traction"\npressure = "-100 MPa"\n' + scenes.EVERYWHERE.format(low=19.9e-3, high=1)
+PROBE = """
+[[probes]]
+name = "stress"
+part = "below"
+field = "stress_zz"
+low = [0, 0, -2e-3]
+high = [1, 1, 0]
+"""
+
+
+def pulled(parts: str) -> tuple[np.ndarray, Simulation, float, float]:
+    """Time, s, and stress under the interface, Pa, of a bar that is pulled at its upper end; its simulation, and at the
+    end its energy residual and the share of the work from outside that the bond has taken.
+    """
+    sim = built(start(8e-6) + parts + PULL + SYMMETRY + PROBE)
+    told = list[tuple[float, float]]()
+    end = run(sim, lambda: told.append((sim.clock.t, sim.probes.measure()[0])))
+    return np.array(told), sim, end.residual, abs(end.fracture) / end.external
+
+
+@pytest.fixture(scope="module")
+def whole() -> np.ndarray:
+    return pulled(block("below", (0, 0, -20), (4, 4, 20), 1))[0]
+
+
+def plateau(told: np.ndarray) -> float:
+    return float(told[told[:, 0] > 5.5e-6, 1].mean())
+
+
+def arrival(told: np.ndarray) -> float:
+    """When half of the traction has come, s."""
+    k = int(np.argmax(told[:, 1] > 50e6))
+    return float(np.interp(50e6, told[k - 1 : k + 1, 1], told[k - 1 : k + 1, 0]))
+
+
+def test_a_bar_of_two_like_meshes_is_one_bar(whole: np.ndarray) -> None:
+    told, _, residual, taken = pulled(
+        block("below", (0, 0, -20), (4, 4, 0), 1) + block("above", (0, 0, 0), (4, 4, 20), 1) + BOND
+    )
+    np.testing.assert_allclose(told[:, 1], whole[:, 1], rtol=0.0, atol=100.0)  # 1e-6 of the traction
+    assert residual < 1e-5
+    assert taken < 1e-9
+
+
+@pytest.mark.parametrize(("below", "above"), [(1.0, 0.77), (0.77, 1.0), (1.0, 0.5)])
+def test_a_wave_passes_meshes_that_do_not_match(below: float, above: float, whole: np.ndarray) -> None:
+    parts = block("below", (0, 0, -20), (4, 4, 0), below) + block("above", (0, 0, 0), (4, 4, 20), above)
+    told, sim, residual, taken = pulled(parts + BOND)
+    assert plateau(told) == pytest.approx(plateau(whole), rel=0.01)
+    assert arrival(told) == pytest.approx(arrival(whole), rel=0.01)
+    assert residual < 1e-5
+    assert taken < 1e-9
+    assert sim.ledger.momentum[2] == pytest.approx(100e6 * 16e-6 * sim.clock.t, rel=1e-12)
+
+
+def test_a_spinning_joint_keeps_its_momenta() -> None:
+    motion = "velocity = [3, 4, 50]\nspin = { centre = [0, 0, 0], rate = [900, 0, 5000] }"
+    parts = [block("below", (0, 0, -4), (4, 4, 0), 2, motion), block("above", (1, 1, 0), (5, 4, 4), 1.3, motion)]
+    sim = built(start(30e-6, 0.3) + "[contact]\n" + "".join(parts) + BOND)
+    told: list[np.ndarray] = []
+
+    def look() -> None:
+        if sim.clock.step % 20 == 1:
+            sim.ledger.close(sim.model.nodes.v)
+            told.append(np.concatenate([sim.ledger.momentum, sim.ledger.angular_momentum]))
+
+    end = run(sim, look)
+    linear, angular = np.split(np.array(told), 2, axis=1)
+    assert np.abs(linear - linear[0]).max() < 1e-14 * np.abs(linear[0]).max()
+    assert np.abs(angular - angular[0]).max() < 1e-9 * np.abs(angular[0]).max()
+    assert abs(end.fracture) < 1e-9 * end.kinetic
+    assert end.contact == 0.0, "no contact within the joint"
+
+
+@pytest.mark.parametrize(
+    ("way", "energy"), [((0.0, 0.0, 5.0), 2000.0), ((5.0, 0.0, 0.0), 4000.0), ((3.0, 2.0, 3.6), 2670.0)]
+)
+def test_a_joint_that_is_torn_takes_its_energy(way: tuple[float, float, float], energy: float) -> None:
+    """Peeled off, sheared, and both: G A within 2 %."""
+    law = 'strength = "50 MPa"\nshear_strength = "70 MPa"\nenergy = "2 kJ/m^2"\nshear_energy = "4 kJ/m^2"\n'
+    parts = block("below", (0, 0, -4), (8, 8, 0), 2) + block("above", (0, 0, 0), (8, 8, 4), 1.3)
+    drives = moved(3.9e-3, 1, way) + moved(-1, -3.9e-3, (0.0, 0.0, 0.0))
+    sim = built(start(40e-6) + parts + BOND + law + drives)
+    assert area(sim) == pytest.approx(64e-6, rel=1e-12)
+    end = run(sim)
+    assert sim.bonds is not None
+    assert sim.bonds.tied == 0
+    assert end.fracture == pytest.approx(energy * 64e-6, rel=0.02)
+    assert end.residual < 1e-4
+
+
+def test_what_was_torn_apart_meets_again() -> None:
+    course = 'course = [["0 us", 1], ["6 us", 1], ["8 us", -2]]'
+    parts = block("below", (0, 0, -6), (8, 8, 0), 2) + block("above", (0.7, 0.7, 0), (7.3, 7.3, 6), 1.3)
+    law = 'strength = "30 MPa"\nenergy = "100 J/m^2"\n'
+    drives = moved(5.9e-3, 1, (0.0, 0.0, 5.0), course) + moved(-1, -5.9e-3, (0.0, 0.0, 0.0))
+    sim = built(start(16e-6, 0.3) + "[contact]\n" + parts + BOND + law + drives)
+    assert sim.contact is not None
+    torn: list[tuple[float, float]] = []
+    bonds, contact = sim.bonds, sim.contact
+    assert bonds is not None
+
+    def look() -> None:
+        if sim.clock.step % 10 == 0 and sim.clock.t < 7e-6:
+            torn.append((bonds.tied, float(np.abs(contact.impulses()).max())))
+
+    run(sim, look)
+    assert torn[0][0] == 36
+    assert torn[-1] == (0, 0.0), "torn, and contact has done nothing so far"
+    assert contact.impulses()[1, 2] > 0.0
+    assert inside.look(contact, sim.model, None, sim.comm).nodes == 0
+
+
+def test_a_bond_that_breaks_at_once_gives_no_energy_back() -> None:
+    parts = block("below", (0, 0, -4), (4, 4, 0), 2) + block("above", (0, 0, 0), (4, 4, 4), 1.3)
+    drives = moved(3.9e-3, 1, (1.0, 0.0, 5.0)) + moved(-1, -3.9e-3, (0.0, 0.0, 0.0))
+    sim = built(start(10e-6) + parts + BOND + 'strength = "50 MPa"\n' + drives)
+    end = run(sim)
+    assert sim.bonds is not None
+    assert sim.bonds.tied == 0
+    assert 0.0 <= end.fracture < 0.2 * end.external

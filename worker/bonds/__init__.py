@@ -1,0 +1,1 @@
+"""Bonds of meshes that do not match: nodes of one surface tied to faces of another."""

@@ -1,0 +1,141 @@
+"""What two triangles have in common when one is projected onto the plane of the other, and integrals over it.
+
+The master triangle is projected along the normal of the slave triangle; the common polygon is cut out of the slave
+triangle by the three lines of the other one (Sutherland and Hodgman 1974) and divided into triangles from its first
+corner. The shape functions of both are linear there, and their products are quadratic: three points in the middles of
+the sides integrate them exactly.
+"""
+
+import numpy as np
+
+from ..jit import njit, types
+
+_MOST = 9
+"""Corners of a triangle that is cut by three lines, at most six, and room."""
+OPPOSED = -0.5
+"""Largest cosine between the normals of two faces that are bonded: 60 degrees. Chosen."""
+_F1, _F2, _F3, _N2, _I = (
+    types.float64[::1], types.float64[:, ::1], types.float64[:, :, ::1], types.int32[:, ::1], types.int64,
+)  # fmt: skip
+
+
+@njit(types.boolean(_F2, _F2, types.int32[::1]), cache=True, error_model="numpy")
+def _frame(frame, x, face):  # type: ignore[no-untyped-def]
+    """Rows of ``frame``: two unit vectors in the plane of a face, and its normal; False where it has no area."""
+    for i in range(3):
+        frame[0, i] = x[face[1], i] - x[face[0], i]
+        frame[1, i] = x[face[2], i] - x[face[0], i]
+    across, along = 0.0, 0.0
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        frame[2, i] = frame[0, j] * frame[1, k] - frame[0, k] * frame[1, j]
+        across += frame[2, i] * frame[2, i]
+        along += frame[0, i] * frame[0, i]
+    if not across > 0.0:
+        return False
+    for i in range(3):
+        frame[2, i] /= np.sqrt(across)
+        frame[0, i] /= np.sqrt(along)
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        frame[1, i] = frame[2, j] * frame[0, k] - frame[2, k] * frame[0, j]
+    return True
+
+
+@njit(types.void(_F2, _F2, _F2, types.int32[::1], _I), cache=True)
+def _project(flat, frame, x, face, origin):  # type: ignore[no-untyped-def]
+    """Corners of a face in the frame of another one, whose first corner is ``origin``: along it twice, and above."""
+    for k in range(3):
+        for a in range(3):
+            flat[k, a] = 0.0
+            for i in range(3):
+                flat[k, a] += frame[a, i] * (x[face[k], i] - x[origin, i])
+
+
+@njit(types.void(_F1, _F2, types.float64, types.float64), cache=True, error_model="numpy")
+def _shares(shares, flat, p, q):  # type: ignore[no-untyped-def]
+    """Area coordinates of a point of the plane in a triangle."""
+    e, f = flat[1, 0] - flat[0, 0], flat[1, 1] - flat[0, 1]
+    g, h = flat[2, 0] - flat[0, 0], flat[2, 1] - flat[0, 1]
+    area, r, s = e * h - f * g, p - flat[0, 0], q - flat[0, 1]
+    shares[1], shares[2] = (r * h - s * g) / area, (e * s - f * r) / area
+    shares[0] = 1.0 - shares[1] - shares[2]
+
+
+@njit(_I(_F2, _F2, _I, _F2), cache=True, error_model="numpy")
+def _cut(polygon, room, n, flat):  # type: ignore[no-untyped-def]
+    """Cuts off what of the ``polygon`` of ``n`` corners is outside of a triangle that runs clockwise; returns how many
+    corners are left.
+    """
+    for k in range(3):
+        a, b = (k + 1) % 3, k
+        e, f = flat[b, 0] - flat[a, 0], flat[b, 1] - flat[a, 1]
+        m = 0
+        for j in range(n):
+            i = (j + 1) % n
+            inner = e * (polygon[j, 1] - flat[a, 1]) - f * (polygon[j, 0] - flat[a, 0])
+            other = e * (polygon[i, 1] - flat[a, 1]) - f * (polygon[i, 0] - flat[a, 0])
+            if inner >= 0.0:
+                room[m, 0], room[m, 1] = polygon[j, 0], polygon[j, 1]
+                m += 1
+            if (inner >= 0.0) != (other >= 0.0):
+                share = inner / (inner - other)
+                for c in range(2):
+                    room[m, c] = polygon[j, c] + share * (polygon[i, c] - polygon[j, c])
+                m += 1
+        n = m
+        for j in range(n):
+            polygon[j, 0], polygon[j, 1] = room[j, 0], room[j, 1]
+    return n
+
+
+@njit(types.void(_F1, _F2, _F3, _F3, _F3, _F2, _N2, _N2, _N2), cache=True, error_model="numpy")
+def common(area, far, own, both, corner, x, slaves, masters, pairs):  # type: ignore[no-untyped-def]
+    """Of each of the ``pairs`` (p, 2) of a slave and a master face: the ``area`` (p,) that they have in common, m^2;
+    ``far`` (p, 2): the least and the largest height of the master over the slave there, m; the integrals over it of the
+    products of the shape functions of the slave's corners, ``own`` (p, 3, 3), and of the slave's with the master's,
+    ``both``, m^2; and the area coordinates in the master of the slave's corners, ``corner``.
+    """
+    frame, other, slave, flat = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+    polygon, room = np.empty((_MOST, 2)), np.empty((_MOST, 2))
+    mine, theirs = np.empty(3), np.empty(3)
+    for p in range(len(pairs)):
+        s, m = slaves[pairs[p, 0]], masters[pairs[p, 1]]
+        area[p], far[p, 0], far[p, 1] = 0.0, np.inf, -np.inf
+        for i in range(3):
+            for j in range(3):
+                own[p, i, j], both[p, i, j], corner[p, i, j] = 0.0, 0.0, -1.0
+        if not (_frame(frame, x, s) and _frame(other, x, m)):
+            continue
+        facing = 0.0
+        for i in range(3):
+            facing += frame[2, i] * other[2, i]
+        if not facing <= OPPOSED:
+            continue
+        _project(slave, frame, x, s, s[0])
+        _project(flat, frame, x, m, s[0])
+        for k in range(3):
+            polygon[k, 0], polygon[k, 1] = slave[k, 0], slave[k, 1]
+            _shares(theirs, flat, slave[k, 0], slave[k, 1])
+            for j in range(3):
+                corner[p, k, j] = theirs[j]
+        n = _cut(polygon, room, 3, flat)
+        for k in range(1, n - 1):
+            e, f = polygon[k, 0] - polygon[0, 0], polygon[k, 1] - polygon[0, 1]
+            g, h = polygon[k + 1, 0] - polygon[0, 0], polygon[k + 1, 1] - polygon[0, 1]
+            part = 0.5 * (e * h - f * g)
+            if not part > 0.0:
+                continue
+            area[p] += part
+            for q in range(3):
+                a, b = (0, k, k + 1)[q], (k, k + 1, 0)[q]
+                u, w = 0.5 * (polygon[a, 0] + polygon[b, 0]), 0.5 * (polygon[a, 1] + polygon[b, 1])
+                _shares(mine, slave, u, w)
+                _shares(theirs, flat, u, w)
+                height = 0.0
+                for i in range(3):
+                    height += theirs[i] * flat[i, 2]
+                    for j in range(3):
+                        own[p, i, j] += part / 3.0 * mine[i] * mine[j]
+                        both[p, i, j] += part / 3.0 * mine[i] * theirs[j]
+                far[p, 0], far[p, 1] = min(far[p, 0], height), max(far[p, 1], height)

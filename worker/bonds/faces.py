@@ -1,0 +1,68 @@
+"""The faces of a bonded interface where they are now: which corners they have, and which are left."""
+
+import numpy as np
+
+from ..mesh.faces import FACES
+from ..parallel.comm import Comm
+from ..state import Flags, Ints, Model
+
+
+class Faces:
+    """Faces by their names, 4 * global tet id + local face, on one rank."""
+
+    def __init__(self, names: Ints, model: Model) -> None:
+        """``names``: ascending, the same on all ranks."""
+        self.names, self._model = names, model
+        self.corners: Ints = np.full((len(names), 3), -1)
+        """(f, 3) global ids of the corners, -1 for faces that are gone; as of the last ``follow``, on all ranks."""
+        self._block, self._place = np.full((2, len(names)), -1)
+
+    def changed(self) -> bool:
+        """Whether a face of this rank has other corners, or is gone."""
+        lost = (self._block >= 0) & ~self._stay()
+        here = (self._block >= 0) & ~lost
+        return bool(lost.any() or (self._here(here) != self.corners[here]).any())
+
+    def follow(self, comm: Comm) -> None:
+        """Takes the corners as they are; all ranks take part."""
+        self._locate(~self._stay())
+        here = self._block >= 0
+        rows = np.column_stack([np.flatnonzero(here), self._here(here)])
+        every = comm.join(rows).reshape(-1, 4)
+        self.corners = np.full((len(self.names), 3), -1)
+        self.corners[every[:, 0]] = every[:, 1:]
+
+    def here(self, names: Ints) -> Flags:
+        """Which faces are of tets of this rank."""
+        return np.asarray(self._block[np.searchsorted(self.names, names)] >= 0)
+
+    def of(self, names: Ints) -> Ints:
+        """(k, 3) corners of faces."""
+        return self.corners[np.searchsorted(self.names, names)]
+
+    def _stay(self) -> Flags:
+        """Which faces are where they were found; False for those that are not here."""
+        found = np.zeros(len(self.names), bool)
+        for b, block in enumerate(self._model.blocks):
+            some = np.flatnonzero((self._block == b) & (self._place < block.n))
+            found[some] = block.id[self._place[some]] == self.names[some] // 4
+        return found
+
+    def _locate(self, some: Flags) -> None:
+        self._block[some] = self._place[some] = -1
+        for b, block in enumerate(self._model.blocks):
+            tets = self.names[some] // 4
+            order = np.argsort(block.id[: block.n], kind="stable")
+            at = np.minimum(np.searchsorted(block.id[order], tets), max(block.n - 1, 0))
+            found = block.id[order[at]] == tets if block.n else np.zeros(len(tets), bool)
+            rows = np.flatnonzero(some)[found]
+            self._block[rows], self._place[rows] = b, order[at[found]]
+
+    def _here(self, some: Flags) -> Ints:
+        """(k, 3) corners of faces of this rank."""
+        corners = np.empty((len(self.names), 3), np.int64)
+        for b, block in enumerate(self._model.blocks):
+            rows = np.flatnonzero(some & (self._block == b))
+            tets = block.tets[self._place[rows]]
+            corners[rows] = self._model.nodes.id[tets[np.arange(len(rows))[:, None], FACES[self.names[rows] % 4]]]
+        return corners[some]

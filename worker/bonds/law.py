@@ -1,0 +1,120 @@
+r"""What a bond that may break carries: a traction within an ellipse that shrinks as the bond opens.
+
+    (<t_n> / s_n)^2 + (|t_s| / s_s)^2 <= (1 - D)^2,   dD = d(delta) / delta_c,   delta_c = 2 G / |T|,
+
+with the traction T at which the bond breaks in the present direction and the energy G that it takes per area,
+1 / G = (1 - B) / G_n + B / G_s, B the share of the work that is done in shear. So the traction falls linearly with the
+opening delta, and an opening in one direction takes G in all. Up to the strength nothing opens. What has opened closes
+without resistance, carries pressure once it is closed, and carries tension again where it was widest: no energy is
+stored in it, and none comes back. What has slid stays where it is.
+"""
+
+import numpy as np
+
+from ..contact.geometry import at, cross, dot, minus
+from ..jit import njit, types
+from .records import (
+    BREAKS,
+    DAMAGE,
+    ENERGY,
+    LAST,
+    NORMAL,
+    OPENING,
+    PUSH,
+    ROWS,
+    SHEAR_ENERGY,
+    SHEAR_STRENGTH,
+    SPEED,
+    STRENGTH,
+    WIDEST,
+)
+from .records import NODES as _NODES
+
+_FULL = 1.0 - 1e-6
+"""Of the ellipse: a traction beyond this opens the bond."""
+_F, _I = types.float64, types.int64
+_VECTOR = types.UniTuple(_F, 3)  # type: ignore[no-untyped-call]
+
+
+@njit(_VECTOR(_VECTOR, _VECTOR, _VECTOR, _F, _F, _F, _F, _F, _F, _F), cache=True, error_model="numpy")
+def project(push, speed, out, closed, play, step, normal_limit, shear_limit, dt, stiff):  # type: ignore[no-untyped-def]
+    """The impulse ``push`` of a row, changed by ``step`` kg times what is left of the relative ``speed``, and brought
+    into the ellipse of the largest impulses across and along. ``out``: normal out of the slave.
+
+    ``closed``: by how much the bond may close, and ``play``: open, m, before it resists; ``dt``: of the step ahead, s;
+    ``stiff``: share of the strength that is left.
+    """
+    along, opening = dot(push, out), -dot(speed, out)
+    x = push[0] - along * out[0] - step * (speed[0] + opening * out[0])
+    y = push[1] - along * out[1] - step * (speed[1] + opening * out[1])
+    z = push[2] - along * out[2] - step * (speed[2] + opening * out[2])
+    pulled, pressed = along + step * (opening - play / dt), along + step * (opening + closed / dt)
+    along = pulled if pulled > 0.0 else min(pressed, 0.0)
+    size = (max(along, 0.0) / normal_limit) ** 2 + (x * x + y * y + z * z) / shear_limit**2
+    factor = stiff / np.sqrt(size) if size > stiff * stiff else 1.0
+    along = factor * along if along > 0.0 else along
+    return along * out[0] + factor * x, along * out[1] + factor * y, along * out[2] + factor * z
+
+
+@njit(_VECTOR(ROWS, _NODES, _I), cache=True, error_model="numpy")
+def normal(rows, nodes, r):  # type: ignore[no-untyped-def]
+    """The mean normal of the slave faces at the node of row ``r``."""
+    x, face = nodes.x, rows.face
+    p, q, w = 0.0, 0.0, 0.0
+    for s in range(rows.side[r], rows.side[r + 1]):
+        o = at(x, face[s, 0])
+        n = cross(minus(at(x, face[s, 1]), o), minus(at(x, face[s, 2]), o))
+        p, q, w = p + n[0], q + n[1], w + n[2]
+    length = np.sqrt(p * p + q * q + w * w)
+    return p / length, q / length, w / length
+
+
+@njit(_I(ROWS, _NODES, _F, _F, _I, _I), cache=True, error_model="numpy")
+def open_bonds(rows, nodes, mean_dt, dt, first, stop):  # type: ignore[no-untyped-def]
+    """Takes the relative velocities of the rows from ``first`` to ``stop`` at the end of the step, opens those whose
+    traction is at its limit by them; returns how many have come apart.
+
+    ``mean_dt``: over which impulses act, ``dt``: of the step ahead, s.
+    """
+    v, state, laws, apart = nodes.v, rows.state, rows.laws, 0
+    for r in range(first, stop):
+        if state[r, DAMAGE] >= 1.0:
+            continue
+        for i in range(3):
+            speed = v[rows.node[r], i]
+            for e in range(rows.begin[r], rows.begin[r + 1]):
+                speed -= rows.weight[e] * v[rows.master[e], i]
+            state[r, SPEED + i] = speed
+            state[r, LAST + i] = state[r, PUSH + i]
+        b = rows.bond[r]
+        if laws[b, BREAKS] == 0.0:
+            continue
+        along, opening, work, shear = 0.0, 0.0, 0.0, 0.0
+        for i in range(3):
+            along += state[r, PUSH + i] * state[r, NORMAL + i]
+            opening -= state[r, SPEED + i] * state[r, NORMAL + i]
+        for i in range(3):
+            slide = state[r, PUSH + i] - along * state[r, NORMAL + i]
+            shear += slide * slide
+            work -= slide * state[r, SPEED + i]
+        across = max(along, 0.0)
+        work += across * opening
+        force, tension = mean_dt * rows.area[r], across * across
+        size = np.sqrt(tension / (force * laws[b, STRENGTH]) ** 2 + shear / (force * laws[b, SHEAR_STRENGTH]) ** 2)
+        full = size > 0.0 and size >= _FULL * (1.0 - state[r, DAMAGE])
+        if full and laws[b, ENERGY] == 0.0:
+            state[r, DAMAGE] = 1.0
+        elif full:
+            mixed = shear / (tension + shear)
+            energy = 1.0 / ((1.0 - mixed) / laws[b, ENERGY] + mixed / laws[b, SHEAR_ENERGY])
+            length = np.sqrt(tension + shear)
+            critical = 2.0 * energy * size * force / length
+            state[r, DAMAGE] = min(state[r, DAMAGE] + max(dt * work / length, 0.0) / critical, 1.0)
+        if state[r, DAMAGE] > 0.0:
+            state[r, OPENING] = max(state[r, OPENING] + dt * opening, 0.0)
+            state[r, WIDEST] = max(state[r, WIDEST], state[r, OPENING])
+        if state[r, DAMAGE] >= 1.0:
+            apart += 1
+            for i in range(3):
+                state[r, PUSH + i] = state[r, LAST + i] = 0.0
+    return apart

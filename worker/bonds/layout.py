@@ -1,0 +1,211 @@
+"""The part of the tied rows that one rank has: those of the nodes that it owns, and the nodes that they push.
+
+The table of a rank has the nodes of its rows, and the tied and master nodes that it holds: another rank may push those.
+Positions and velocities of what it does not hold come from their owners, sums of impulses go to all ranks that have the
+node in their tables. Every rank knows all rows (rows.py), so who has what is told once, when the rows change.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..parallel.comm import Comm, Exchange
+from ..parallel.tags import Tag
+from ..state import Flags, Floats, Indices, Ints, Nodes
+from .records import BREAKS, KEPT, NORMAL, STATE, TiedNodes, TiedRows
+from .rows import Rows
+
+_SETTLED = 1e-7
+"""Of what a step changes of the impulses, that its sweeps leave. Chosen: the energy that the bond takes is less than
+1e-9 of what passes it then (docs/numerics.md)."""
+_SLOWEST = 0.02
+"""Least bound of the smallest eigenvalue of the rows over the largest one: 60 sweeps. Chosen: tied nodes that are held
+have none."""
+_WORDS = 6
+"""Position and velocity."""
+
+
+@dataclass
+class Layout:
+    """What the sweeps of a rank work on."""
+
+    rows: TiedRows
+    nodes: TiedNodes
+    number: Ints
+    """(r,) which of all rows each is."""
+    held: Indices
+    """(h,) places in the table of the nodes that this rank holds."""
+    local: Indices
+    """(h,) their local indices."""
+    sweeps: int
+    """In a step."""
+    momentum: float
+    """How far an impulse goes on as it has changed."""
+    messages: "Messages"
+
+
+def momentum(least: float) -> tuple[float, int]:
+    """Of the impulses, and how many sweeps leave _SETTLED; ``least``: the smallest eigenvalue of the rows over the
+    largest, at least. With q its root impulses go on by (1 - q) / (1 + q), and a sweep leaves 1 - q (Nesterov 2004,
+    2.2.1).
+    """
+    root, sweeps, left = math.sqrt(max(least, _SLOWEST)), 1, 1.0
+    while left > _SETTLED:
+        left, sweeps = left * (1.0 - root), sweeps + 1
+    return (1.0 - root) / (1.0 + root), sweeps
+
+
+def laid_out(
+    rows: Rows, states: Floats, laws: Floats, nodes: Nodes, mobility: Floats, planes: Flags, comm: Comm
+) -> Layout:  # fmt: skip
+    """The layout of ``rows`` with their ``states`` (r, KEPT); ``mobility`` (nodes, 3): 1/kg; ``planes`` (nodes, 3):
+    what planes of symmetry hold. All ranks take part.
+    """
+    place = nodes.places(rows.node)
+    mine = (place >= 0) & nodes.owned[place]
+    entries, sides = mine[rows.row], mine[rows.side]
+    every = np.unique(np.concatenate([rows.node, rows.master, rows.face.reshape(-1)]))
+    own = [rows.node[mine], rows.master[entries]]
+    ids = np.unique(np.concatenate([every[nodes.places(every) >= 0], *own, rows.face[sides].reshape(-1)]))
+    local = nodes.places(ids)
+    held = np.flatnonzero(local >= 0).astype(np.int32)
+    table = np.zeros((len(ids), 3))
+    table[held] = mobility[local[held]]
+    pushed = np.isin(ids, np.concatenate(own))
+    messages = Messages.of(ids, pushed, local, nodes, comm)
+    messages.copy(table, np.zeros((len(ids), 3)))
+    least, inverse = _norms(rows, mine, ids, table, planes[place[mine]], comm)
+    tied = _rows(rows, mine, ids, inverse, states, laws)
+    share, sweeps = momentum(least)
+    place = local[held].astype(np.int32)
+    return Layout(tied, _nodes(tied, ids, table), np.flatnonzero(mine), held, place, sweeps, share, messages)
+
+
+def _norms(
+    rows: Rows, mine: Flags, ids: Ints, table: Floats, planes: Flags, comm: Comm
+) -> tuple[float, Floats]:  # fmt: skip
+    """A bound of the smallest eigenvalue of all rows over the largest, and (r, 3) one over the bounds of the l1 norms
+    of those of this rank, kg: sum_k |w_k| S_k / m_k, S_k the sum of |w_k| over all rows. 0 where nothing moves, and
+    across ``planes`` (r, 3) of symmetry that the tied node lies on: with the mirror image of the master it does not
+    leave it.
+    """
+    known = np.unique(np.concatenate([rows.node, rows.master]))
+    sums = np.bincount(np.searchsorted(known, rows.master), np.abs(rows.weight), len(known))
+    sums += np.bincount(np.searchsorted(known, rows.node), minlength=len(known))
+    entries = mine[rows.row]
+    at, row = np.searchsorted(ids, rows.master[entries]), (np.cumsum(mine) - 1)[rows.row[entries]]
+    weight = np.abs(rows.weight[entries]) * sums[np.searchsorted(known, rows.master[entries])]
+    node = np.searchsorted(ids, rows.node[mine])
+    first, norm = table[node], np.empty((len(node), 3))
+    for i in range(3):
+        norm[:, i] = np.bincount(row, weight * table[at, i], len(node))
+    norm += first * sums[np.searchsorted(known, rows.node[mine])][:, None]
+    norm[planes] = 0.0
+    moves = (norm > 0.0) & (first > 0.0)
+    worst = np.where(moves, norm / np.where(first > 0.0, first, 1.0), 1.0).max(initial=1.0)
+    worst = float(comm.maximum(np.array([worst]))[0])
+    return 1.0 / worst, np.where(norm > 0.0, 1.0 / np.where(norm > 0.0, norm, 1.0), 0.0)
+
+
+def _rows(rows: Rows, mine: Flags, ids: Ints, inverse: Floats, states: Floats, laws: Floats) -> TiedRows:
+    entries, sides = mine[rows.row], mine[rows.side]
+    n, again = int(mine.sum()), np.cumsum(mine) - 1
+    begin, side = (np.searchsorted(again[of], np.arange(n + 1)) for of in (rows.row[entries], rows.side[sides]))
+    state = np.zeros((n, STATE))
+    state[:, :KEPT], state[:, NORMAL] = states[mine], 1.0
+    bond = rows.bond[mine].astype(np.int32)
+    breaks = laws[bond, BREAKS] != 0.0
+    least = np.where(inverse > 0.0, inverse, np.inf).min(axis=1, initial=np.inf)
+    inverse[breaks] = np.where(inverse > 0.0, least[:, None], 0.0)[breaks]
+    return TiedRows(
+        np.searchsorted(ids, rows.node[mine]).astype(np.int32), begin.astype(np.int64),
+        np.searchsorted(ids, rows.master[entries]).astype(np.int32), rows.weight[entries], rows.area[mine], inverse,
+        bond, laws, side.astype(np.int64), np.searchsorted(ids, rows.face[sides]).astype(np.int32), state,
+        np.zeros((n, 3)), np.zeros((n, 3), np.int64),
+    )  # fmt: skip
+
+
+def _nodes(rows: TiedRows, ids: Ints, mobility: Floats) -> TiedNodes:
+    """The table, and the entries of each node: those of masters, and NaN where it is the tied one."""
+    n = len(ids)
+    of = np.repeat(np.arange(len(rows.node)), np.diff(rows.begin))
+    at = np.concatenate([rows.master, rows.node])
+    row = np.concatenate([of, np.arange(len(rows.node))]).astype(np.int32)
+    share = np.concatenate([rows.weight, np.full(len(rows.node), np.nan)])
+    order = np.argsort(at, kind="stable")
+    first = np.searchsorted(at[order], np.arange(n + 1)).astype(np.int64)
+    x, v = np.zeros((2, n, 3))
+    words, total = np.zeros((2, n, 3), np.int64)
+    return TiedNodes(x, v, mobility, words, total, first, row[order], share[order])
+
+
+@dataclass
+class Messages:
+    """Between ranks, in every step."""
+
+    sums: Exchange
+    copies: Exchange
+    sends: Indices
+    """Places in the table of what others are sent of the sums, rank after rank; ``receives``, what they send."""
+    receives: Indices
+    gives: Indices
+    """The same of copies of nodes."""
+    takes: Indices
+    buffers: tuple[Ints, Ints, Ints, Ints]
+    """Of the sums out and in, and of the copies."""
+
+    @classmethod
+    def of(cls, ids: Ints, pushed: Flags, local: Indices, nodes: Nodes, comm: Comm) -> "Messages":
+        """For the table ``ids`` with the ``local`` indices; ``pushed`` by rows of this rank. All ranks take part."""
+        owned = (local >= 0) & nodes.owned[local]
+        tables = comm.share((ids, pushed, local >= 0, owned))
+        kinds: list[list[tuple[int, Ints]]] = [[], [], [], []]
+        for rank, (theirs, their_pushed, their_held, their_owned) in enumerate(tables):
+            if rank == comm.rank:
+                continue
+            _, here, there = np.intersect1d(ids, theirs, assume_unique=True, return_indices=True)
+            for kind, some in zip(
+                kinds,
+                (pushed[here], their_pushed[there], owned[here] & ~their_held[there],
+                 their_owned[there] & (local[here] < 0)),
+                strict=True,
+            ):  # fmt: skip
+                if some.any():
+                    kind.append((rank, here[some]))
+        places = [np.concatenate([np.zeros(0, np.int64), *(at for _, at in kind)]).astype(np.int32) for kind in kinds]
+        out, into = (np.zeros((len(at), 3), np.int64) for at in places[:2])
+        sent, got = (np.zeros((len(at), _WORDS), np.int64) for at in places[2:])
+        sums = comm.exchange(_parts(kinds[0], out), _parts(kinds[1], into), Tag.BOND)
+        copies = comm.exchange(_parts(kinds[2], sent), _parts(kinds[3], got), Tag.BONDED)
+        return cls(sums, copies, places[0], places[1], places[2], places[3], (out, into, sent, got))
+
+    @property
+    def alone(self) -> bool:
+        """Whether no other rank pushes or has nodes of the table."""
+        return not (len(self.sends) or len(self.receives) or len(self.gives) or len(self.takes))
+
+    def copy(self, x: Floats, v: Floats) -> None:
+        """Takes rows of ``x`` and ``v`` (n, 3) of nodes that are not held here from their owners."""
+        out, into = self.buffers[2], self.buffers[3]
+        out[:, :3], out[:, 3:] = x[self.gives].view(np.int64), v[self.gives].view(np.int64)
+        self.copies.begin()
+        self.copies.finish()
+        x[self.takes], v[self.takes] = into[:, :3].copy().view(np.float64), into[:, 3:].copy().view(np.float64)
+
+    def complete(self, words: Ints) -> None:
+        """Adds to the sums ``words`` (n, 3) what rows of other ranks have given."""
+        self.buffers[0][:] = words[self.sends]
+        self.sums.begin()
+        self.sums.finish()
+        np.add.at(words, self.receives, self.buffers[1])
+
+    def free(self) -> None:
+        """Gives them back to MPI."""
+        self.sums.free()
+        self.copies.free()
+
+
+def _parts(kind: list[tuple[int, Ints]], words: Ints) -> list[tuple[int, Ints]]:
+    ends = np.cumsum([0, *(len(at) for _, at in kind)])
+    return [(rank, words[a:b]) for (rank, _), a, b in zip(kind, ends[:-1], ends[1:], strict=True)]

@@ -1,0 +1,70 @@
+"""Rows of tied nodes: each node, the nodes that it is tied to, and their weights; from the pieces of the interface."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..state import Flags, Floats, Ints
+from .pieces import Pieces
+
+_NOTHING = 1e-12
+"""Of the area of a row: a weight below this is rounding."""
+
+
+@dataclass
+class Rows:
+    """By bond and node."""
+
+    bond: Ints
+    """(r,) number of the bond."""
+    node: Ints
+    """(r,) global id of the tied node."""
+    area: Floats
+    """(r,) of the interface that belongs to it, m^2."""
+    row: Ints
+    """(e,) row of each weight, ascending."""
+    master: Ints
+    """(e,) global id of the node that it is of."""
+    weight: Floats
+    """(e,) those of a row add up to one."""
+    side: Ints
+    """(s,) row of each slave face at its node."""
+    face: Ints
+    """(s, 3) global ids of its corners."""
+
+    def take(self, chosen: Flags) -> "Rows":
+        """Some of them."""
+        again, entries, sides = np.cumsum(chosen) - 1, chosen[self.row], chosen[self.side]
+        return Rows(
+            self.bond[chosen], self.node[chosen], self.area[chosen], again[self.row[entries]], self.master[entries],
+            self.weight[entries], again[self.side[sides]], self.face[sides],
+        )  # fmt: skip
+
+
+def assembled(pieces: Pieces, slaves: Ints, masters: Ints) -> Rows:
+    """The rows of ``pieces`` whose faces have the corners ``slaves`` and ``masters`` (p, 3), global ids."""
+    p, many = len(pieces), int(max(slaves.max(initial=0), masters.max(initial=0))) + 1
+    key = np.repeat(pieces.bond[:, None] * many + slaves, 3, axis=1).reshape(-1)
+    other, value = np.tile(masters, (1, 3)).reshape(-1), pieces.weights.reshape(-1)
+    names, of = np.unique(key, return_inverse=True)
+    area = np.bincount(of, value, len(names))
+    some = area > _NOTHING * area.max(initial=0.0)
+    renumbered = np.cumsum(some) - 1
+    kept = some[of]
+    entry, at = np.unique(renumbered[of[kept]] * many + other[kept], return_inverse=True)
+    row, master = entry // many, entry % many
+    weight = np.bincount(at, value[kept], len(entry)) / area[some][row]
+    large = np.abs(weight) > _NOTHING
+    weight = weight[large] / np.bincount(row[large], weight[large], int(some.sum()))[row[large]]
+    side, face = _sides(pieces, slaves, names[some], many) if p else (row[:0], slaves[:0])
+    return Rows(names[some] // many, names[some] % many, area[some], row[large], master[large], weight, side, face)
+
+
+def _sides(pieces: Pieces, slaves: Ints, names: Ints, many: int) -> tuple[Ints, Ints]:
+    """The slave faces at the node of each row."""
+    _, first = np.unique(np.column_stack([pieces.bond, pieces.slave]), axis=0, return_index=True)
+    key = (pieces.bond[first, None] * many + slaves[first]).reshape(-1)
+    at = np.minimum(np.searchsorted(names, key), max(len(names) - 1, 0))
+    here = np.flatnonzero(names[at] == key) if len(names) else at[:0]
+    order = here[np.argsort(at[here], kind="stable")]
+    return at[order], slaves[first][order // 3]

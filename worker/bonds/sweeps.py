@@ -1,0 +1,163 @@
+"""Impulses that keep tied nodes where they are tied: Jacobi sweeps whose order does not matter.
+
+A row asks for no relative velocity between its node s and the point of the master, v_s - sum_j W_j v_j = 0, along
+all axes. Its impulse J acts on s, and -W_j J on the others: in quanta, the tied node gets minus what the others get, so
+that momentum stays as it is. A sweep corrects every impulse by the speed that is left over a bound of the l1 norm of
+its row, and the impulse goes on as it has changed (Nesterov 1983 for a strongly convex problem): the convergence is
+that of layout.momentum. A row that may break is brought back to what its bond carries (law.py) in every sweep.
+
+A pass over rows makes the impulses, a pass over nodes adds them up by the rows of each node: neither writes what
+another task of it reads, and sums are of integers.
+"""
+
+import numpy as np
+
+from ..jit import njit, types
+from ..parallel.arguments import reader
+from ..parallel.team import TASK
+from . import law
+from .records import (
+    BREAKS,
+    DAMAGE,
+    LAST,
+    NODES,
+    NORMAL,
+    OPENING,
+    PUSH,
+    ROWS,
+    SHEAR_STRENGTH,
+    STRENGTH,
+    WIDEST,
+)
+
+_F1 = types.float64[::1]
+_F, _I, _F2, _I2, _N1 = types.float64, types.int64, types.float64[:, ::1], types.int64[:, ::1], types.int32[::1]
+TASK_SIZE = 256
+"""Rows or nodes of a task. Chosen: some 20 us of work, of which a region of threads costs 2."""
+ACT = ROWS, NODES, _F, _F, _F, _F
+GIVE = ROWS, NODES, _F
+MOVE = NODES, _F
+_act, _give, _move = reader(*ACT), reader(*GIVE), reader(*MOVE)
+
+
+@njit(types.void(ROWS, NODES, _F, _F, _F, _F, _I, _I), cache=True, error_model="numpy")
+def act(rows, nodes, ahead, mean_dt, dt, scale, first, stop):  # type: ignore[no-untyped-def]
+    """Corrects the impulses of the rows from ``first`` to ``stop``; ``ahead``: how far each goes on as it has changed;
+    ``mean_dt``: over which impulses act, ``dt``: of the step ahead, s; ``scale``: quanta per N s.
+    """
+    v, state, laws, inverse, change, own = nodes.v, rows.state, rows.laws, rows.inverse, rows.change, rows.own
+    node, begin, master, weight = rows.node, rows.begin, rows.master, rows.weight
+    for r in range(first, stop):
+        s = node[r]
+        p, q, w = v[s, 0], v[s, 1], v[s, 2]
+        for e in range(begin[r], begin[r + 1]):
+            p -= weight[e] * v[master[e], 0]
+            q -= weight[e] * v[master[e], 1]
+            w -= weight[e] * v[master[e], 2]
+        b, old = rows.bond[r], (state[r, PUSH], state[r, PUSH + 1], state[r, PUSH + 2])
+        if state[r, DAMAGE] >= 1.0:
+            push = 0.0, 0.0, 0.0
+        elif laws[b, BREAKS] == 0.0:
+            push = old[0] - inverse[r, 0] * p, old[1] - inverse[r, 1] * q, old[2] - inverse[r, 2] * w
+        else:
+            out, force = (state[r, NORMAL], state[r, NORMAL + 1], state[r, NORMAL + 2]), mean_dt * rows.area[r]
+            most, opening = (force * laws[b, STRENGTH], force * laws[b, SHEAR_STRENGTH]), state[r, OPENING]
+            play, stiff = state[r, WIDEST] - opening, 1.0 - state[r, DAMAGE]
+            step = max(inverse[r, 0], inverse[r, 1], inverse[r, 2])
+            push = law.project(old, (p, q, w), out, opening, play, step, most[0], most[1], dt, stiff)
+        for i in range(3):
+            plain = push[i] if inverse[r, i] > 0.0 else 0.0
+            new = plain + ahead * (plain - state[r, LAST + i])
+            change[r, i] = new - old[i]
+            state[r, PUSH + i], state[r, LAST + i], own[r, i] = new, plain, 0
+            for e in range(begin[r], begin[r + 1]):
+                own[r, i] += np.int64(np.rint(weight[e] * change[r, i] * scale))
+
+
+@njit(types.void(ROWS, NODES, _F, _F, _I, _I), cache=True)
+def resume(rows, nodes, ratio, scale, first, stop):  # type: ignore[no-untyped-def]
+    """The rows from ``first`` to ``stop`` begin with ``ratio`` times their last impulses, and with the normals of
+    their faces as they are.
+    """
+    state, laws, begin = rows.state, rows.laws, rows.begin
+    for r in range(first, stop):
+        if laws[rows.bond[r], BREAKS] != 0.0 and state[r, DAMAGE] < 1.0:
+            out = law.normal(rows, nodes, r)
+            for i in range(3):
+                state[r, NORMAL + i] = out[i]
+        for i in range(3):
+            state[r, PUSH + i] *= ratio
+            rows.change[r, i] = state[r, LAST + i] = state[r, PUSH + i]
+            rows.own[r, i] = 0
+            for e in range(begin[r], begin[r + 1]):
+                rows.own[r, i] += np.int64(np.rint(rows.weight[e] * rows.change[r, i] * scale))
+
+
+@njit(types.void(ROWS, NODES, _F, _I, _I), cache=True)
+def give(rows, nodes, scale, first, stop):  # type: ignore[no-untyped-def]
+    """Adds up what the rows of this rank give to the nodes from ``first`` to ``stop``, in quanta."""
+    words, share, row, change, own = nodes.words, nodes.share, nodes.row, rows.change, rows.own
+    for a in range(first, stop):
+        for i in range(3):
+            words[a, i] = 0
+        for k in range(nodes.first[a], nodes.first[a + 1]):
+            r = row[k]
+            for i in range(3):
+                if np.isnan(share[k]):
+                    words[a, i] += own[r, i]
+                else:
+                    words[a, i] -= np.int64(np.rint(share[k] * change[r, i] * scale))
+
+
+@njit(types.void(NODES, _F, _I, _I), cache=True)
+def move(nodes, scale, first, stop):  # type: ignore[no-untyped-def]
+    """Turns the impulses of all ranks on the nodes from ``first`` to ``stop`` into velocities."""
+    v, words, total, mobility = nodes.v, nodes.words, nodes.total, nodes.mobility
+    for a in range(first, stop):
+        for i in range(3):
+            v[a, i] += words[a, i] * (mobility[a, i] / scale)
+            total[a, i] += words[a, i]
+
+
+@njit(types.void(ROWS, NODES, _F, _F, _F, _F, _I), cache=True)
+def sweep_all(rows, nodes, ahead, mean_dt, dt, scale, many):  # type: ignore[no-untyped-def]
+    """``many`` sweeps of all rows, none of whose nodes another rank pushes."""
+    for k in range(many):
+        act(rows, nodes, ahead if k + 1 < many else 0.0, mean_dt, dt, scale, 0, len(rows.node))
+        give(rows, nodes, scale, 0, len(nodes.v))
+        move(nodes, scale, 0, len(nodes.v))
+
+
+@njit(TASK, cache=True)
+def act_task(table, first, stop, thread):  # type: ignore[no-untyped-def]
+    """``act``."""
+    rows, nodes, ahead, mean_dt, dt, scale = _act(table)
+    act(rows, nodes, ahead, mean_dt, dt, scale, first, stop)
+
+
+@njit(TASK, cache=True)
+def give_task(table, first, stop, thread):  # type: ignore[no-untyped-def]
+    """``give``."""
+    rows, nodes, scale = _give(table)
+    give(rows, nodes, scale, first, stop)
+
+
+@njit(TASK, cache=True)
+def move_task(table, first, stop, thread):  # type: ignore[no-untyped-def]
+    """``move``."""
+    nodes, scale = _move(table)
+    move(nodes, scale, first, stop)
+
+
+@njit(types.void(_F1, _F1, _N1, _F2, _I2, _F2, _F), cache=True)
+def book(loss, external, local, before, total, mobility, scale):  # type: ignore[no-untyped-def]
+    """Half of the work of the impulses ``total`` (n, 3) at ``local`` (n,) nodes with the velocities ``before``
+    (n, 3): taken by the bonds, and from outside where a velocity is held.
+    """
+    for k in range(len(local)):
+        a = local[k]
+        for i in range(3):
+            work = 0.5 * before[k, i] * (total[k, i] / scale)
+            loss[a] -= work
+            if mobility[k, i] == 0.0:
+                external[a] -= work
