@@ -46,8 +46,7 @@ def check(case: Case) -> list[Problem]:
     """Every cross-field problem of a case, in the order of its keys."""
     checks: tuple[Callable[[Case], Iterable[Problem]], ...] = (
         _materials, _parts, _overlaps, _sectors, check_boundaries, check_walls, check_bonds, check_rigid, _contact,
-        check_probes,
-        _references,
+        check_probes, _fields, _references,
     )  # fmt: skip
     return list(chain.from_iterable(found(case) for found in checks))
 
@@ -228,6 +227,16 @@ def _window(case: Case, reference: Reference, location: Location) -> Iterator[Pr
     if reference.until is not None and not reference.since < reference.until <= end * (1 + ROUNDING):
         message = f"must be above since, {reference.since} s, and not above run.end_time, {end} s"
         yield problem((*location, "until"), reference.until, message)
+
+
+def _fields(case: Case) -> Iterator[Problem]:
+    fields = case.run.fields
+    for k, name in enumerate(fields):
+        if name in fields[:k]:
+            yield problem(("run", "fields", k), name, "is there twice; remove one of them")
+    if "contact_pressure" in fields and not (case.in_contact or case.boundaries_of(Wall)):
+        location = ("run", "fields", fields.index("contact_pressure"))
+        yield problem(location, "contact_pressure", "nothing of the case meets anything, no part and no wall")
 
 
 def _unique(names: list[str], key: str) -> Iterator[Problem]:

@@ -1,4 +1,6 @@
-"""Which fields of frames a case has, of those that not every case has: ``damage`` and ``fragment``."""
+"""Which fields of frames a case has, of those that not every case has: ``damage``, ``fragment``, and those that
+``run.fields`` asks for.
+"""
 
 from .joined import cohesive
 from .library import material
@@ -18,6 +20,8 @@ def damageable(case: Case) -> bool:
 
 
 def lacking(case: Case) -> set[str]:
-    """Those of the two that no frame of the case has."""
-    there = {"damage": damageable(case), "fragment": case.fractures}
+    """Those of them that no frame of the case has."""
+    asked = {name: name in case.run.fields for name in ("density", "strain_rate", "contact_pressure")}
+    there = {"damage": damageable(case), "fragment": case.fractures, **asked}
+    there["effective_strain"] = "strain" in case.run.fields
     return {name for name, has in there.items() if not has}

@@ -161,6 +161,8 @@ class Numerics(Model):
 Scale = Annotated[Ratio, Field(gt=0)]
 
 
+FrameField = Literal["density", "strain", "strain_rate", "contact_pressure"]
+
 MOST_RANKS, MOST_THREADS, MOST_PARTS = 4096, 256, 256
 """Of a run, of a case. Chosen: far beyond what has been run."""
 
@@ -184,6 +186,14 @@ class Run(Model):
     frames: Annotated[Count, Field(ge=0, le=100_000)] = 20
     """Number of frames, evenly spaced to the end; the initial state is frame 0 (0: none are written). A step ends at
     each, so another number makes other steps: what shatters then breaks otherwise, as by another ``dt_safety``."""
+    fields: tuple[FrameField, ...] = ()
+    """Fields of frames besides those that every frame has. ``density``: of the tets as they are. ``strain``: the
+    logarithmic strain ln V (Hencky) between the start and the present shape of each tet, six components, and
+    ``effective_strain``, sqrt(2/3 e' : e') of its deviator; where the axes of the strain do not turn, that is the
+    integral of the rate that other explicit codes store, with shear components of tensors. ``strain_rate``:
+    sqrt(2/3 d' : d') of the rate of deformation d, of the velocities in the frame. ``contact_pressure`` of nodes: what
+    contact and walls have given a node since the frame before, along the normal of its share of the surface that is
+    pushed (a third of each face that is met at less than 60 degrees), over that area and time; 0 in the first frame."""
     samples: Annotated[Count, Field(ge=1, le=1_000_000)] = 500
     """Number of lines of history.csv, evenly spaced."""
     snapshots: Annotated[Count, Field(ge=0, le=100_000)] = 100

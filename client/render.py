@@ -130,6 +130,9 @@ def _with_field(mesh: Any, name: str, cells: bool) -> Any:
         _require(mesh.point_data, "velocity")
         bare.point_data["shown"] = np.linalg.norm(mesh.point_data["velocity"], axis=1) * factor
         return bare.point_data_to_cell_data() if cells else bare
+    if name in mesh.point_data:
+        bare.point_data["shown"] = np.asarray(mesh.point_data[name]) * factor
+        return bare.point_data_to_cell_data() if cells else bare
     _require(mesh.cell_data, name)
     values = np.asarray(mesh.cell_data[name])
     bare.cell_data["shown"] = values if FIELDS[name].kind in scales.NAMED else values * factor

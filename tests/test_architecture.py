@@ -323,8 +323,8 @@ and what fuses or reorders sums of products."""
 TELLS = {
     "worker/contact/common_volume.py", "worker/contact/inside.py", "worker/contact/overlap.py",
     "worker/fracture/fragments.py", "worker/gauges/shapes.py", "worker/groups.py", "worker/job.py", "worker/meter.py",
-    "worker/output/frames.py", "worker/penetration.py", "worker/reference.py", "worker/snapshots/decimate.py",
-    "worker/snapshots/table.py",
+    "worker/output/fields.py", "worker/output/frames.py", "worker/penetration.py", "worker/reference.py",
+    "worker/snapshots/decimate.py", "worker/snapshots/table.py",
 }  # fmt: skip
 """They report, refuse and balance; what they compute is in no answer, but for parts that are pushed apart at the start
 (docs/numerics.md)."""

@@ -182,7 +182,8 @@ def _walls(case: schema.Case, held: list[Flags], planes: Flags) -> list[Boundary
     )
     which = np.ascontiguousarray(np.array([h[touched] for _, h in found]).T)
     friction = np.array([spec.friction for spec, _ in found])
-    return [RigidWalls(_indices(touched), points, normals, which, planes[touched], friction)]
+    tells = "contact_pressure" in case.run.fields
+    return [RigidWalls(_indices(touched), points, normals, which, planes[touched], friction, tells)]
 
 
 def _moving(

@@ -26,6 +26,7 @@ from .output.damage import damage
 from .output.history import History
 from .output.journal import Journal
 from .output.losses import Losses
+from .output.wanted import wanted
 from .pace import Pace
 from .parallel.choice import Choice
 from .signals import Signals
@@ -245,12 +246,13 @@ class Loop:
         self._tell_losses()
         cohesion = sim.fracture.cohesion if sim.fracture is not None else None
         damaged = damage(sim.case, sim.model, cohesion, sim.comm)
+        more = wanted(sim, index)
         if sim.record is None:
-            path = frames.write(self._folder, index, clock.t, sim.model, sim.comm, damage=damaged)
+            path = frames.write(self._folder, index, clock.t, sim.model, sim.comm, None, damaged, more)
         else:
             self._counter.find(sim)
             sim.record.number()
-            path = frames.write(self._folder, index, clock.t, sim.model, sim.comm, sim.record.numbers, damaged)
+            path = frames.write(self._folder, index, clock.t, sim.model, sim.comm, sim.record.numbers, damaged, more)
             sim.record.write(self._folder, index, clock.t)
         self._tell_losses()  # what was written is known from now on
         clock.frame += 1

@@ -32,8 +32,9 @@ class RigidWalls(Boundary):
 
     def __init__(
         self, nodes: Indices, points: Floats, normals: Floats, held: Flags, mirrored: Flags | None = None,
-        friction: Floats | None = None,
+        friction: Floats | None = None, tells: bool = False,
     ) -> None:  # fmt: skip
+        """``tells``: whether somebody will ask what they have given since the last time."""
         super().__init__(nodes)
         self._friction = np.zeros(len(points)) if friction is None else friction
         self._rubbed = np.zeros((len(nodes) if self._friction.any() else 0, 3))
@@ -47,9 +48,18 @@ class RigidWalls(Boundary):
         self.given = np.zeros((len(nodes), 3 * len(points)))
         """(n, 3 walls) what each wall has given each node so far, N s."""
         self._kept = (*KEPT, "given")
+        if tells:
+            self._told = self.given.copy()
+            self._kept = (*self._kept, "_told")
         if self._friction.any():
             self.friction_loss = np.zeros(len(nodes))
             self._kept = (*self._kept, "friction_loss", "_rubbed")
+
+    def since_told(self) -> Floats:
+        """(n, 3) what the walls have given each node since this was last asked, N s."""
+        found = (self.given - self._told).reshape(len(self.given), -1, 3).sum(axis=1)
+        self._told[:] = self.given
+        return np.asarray(found)
 
     def held_components(self) -> Bits:
         return free(self.nodes)

@@ -47,14 +47,23 @@ def test_what_breaks_is_the_same_on_any_number_of_ranks(name: str, ranks: int, b
     assert (other.overlapping, other.overlap) == (first.overlapping, first.overlap)
     assert (many / layout.HISTORY).read_bytes() == (one / layout.HISTORY).read_bytes()
     fields = frame_fields(one)
-    assert {"damage", "principal_stress", "stress"} <= fields.keys()
+    assert {
+        "damage",
+        "principal_stress",
+        "stress",
+        "contact_pressure",
+        "strain",
+        "density",
+        "strain_rate",
+    } <= fields.keys()
     assert fields == frame_fields(many)
 
 
 def frame_fields(folder: Path) -> dict[str, bytes]:
-    """The fields of the tets in the last frame, but for their rank."""
+    """The fields of the tets and nodes in the last frame, but for the rank."""
     with h5py.File(sorted((folder / layout.FRAMES).glob("*.vtkhdf"))[-1]) as file:
-        return {name: values[...].tobytes() for name, values in file["VTKHDF/CellData"].items() if name != "rank"}
+        groups = [file["VTKHDF"][group] for group in ("CellData", "PointData")]
+        return {name: each[...].tobytes() for data in groups for name, each in data.items() if name != "rank"}
 
 
 @pytest.mark.parametrize("name", [pytest.param(name, marks=marks(name)) for name in SCENES])

@@ -37,6 +37,8 @@ class Books:
         """(parts, 3) impulses so far, quanta."""
         self.pairs = np.zeros((parts, parts, 3) if asked else (0, 0, 3), np.int64)
         """(parts, parts, 3) impulses so far that each has got from each, quanta; (0, 0, 3) where nobody asks."""
+        self.pressed = np.zeros((nodes if "contact_pressure" in case.run.fields else 0, 3), np.int64)
+        """(nodes, 3) impulses since the frame before, quanta; (0, 3) where nobody asks."""
         self.open: Ints = np.zeros((0, 3), np.int64)
         """(nodes, 3) impulses of the last step, quanta, of a run that goes on here; (0, 3) once they are booked."""
 
@@ -46,6 +48,8 @@ class Books:
         parcel.nodes["contact.external_work"] = self.external_work
         parcel.sums["contact.parts"], parcel.sums["contact.friction"] = self.parts, self.friction.words
         parcel.sums["contact.account"], parcel.sums["contact.pairs"] = self.account.words, self.pairs
+        if len(self.pressed):
+            parcel.nodes["contact.pressed"] = self.pressed
         total = np.array(self.open) if len(self.open) else np.zeros((len(self.contact_loss), 3), np.int64)
         if scene is not None:
             total[scene.own.local] = scene.slots.total[scene.own.slots]
@@ -57,12 +61,16 @@ class Books:
         self.external_work = np.array(parcel.nodes["contact.external_work"])
         self.account.resume(parcel.sums["contact.account"], known)
         self.parts, self.friction.words = parcel.sums["contact.parts"], parcel.sums["contact.friction"]
+        if "contact.pressed" in parcel.nodes:
+            self.pressed = np.array(parcel.nodes["contact.pressed"])
         self.pairs, self.open = parcel.sums["contact.pairs"], parcel.nodes["contact.total"]
 
     def grow(self, copies: int) -> None:
         """Takes up copies of nodes; what has been booked stays with their parents."""
         self.contact_loss = extended(self.contact_loss, np.zeros(copies))
         self.external_work = extended(self.external_work, np.zeros(copies))
+        if len(self.pressed):
+            self.pressed = extended(self.pressed, np.zeros((copies, 3), np.int64))
 
     @staticmethod
     def friction_work(friction: Floats) -> float:
@@ -79,6 +87,11 @@ class Books:
     def between(self, comm: Comm) -> Floats:
         """(parts, parts, 3) what each part has got from each by contact so far, N s; all ranks take part."""
         return np.asarray(comm.sum(self.pairs) / self.scale)
+
+    def press(self, scene: Scene) -> None:
+        """Adds the impulses of the step to those since the frame before, where somebody asks."""
+        if len(self.pressed):
+            self.pressed[scene.own.local] += scene.slots.total[scene.own.slots]
 
     def due(self) -> None:
         """The second half of the work of the last impulses is due: friction's as well."""

@@ -273,6 +273,7 @@ class Contact:
         if active.leave(crowd, now.slots.total, state, books.parts, self.need.unsettled):
             self.last_push = t
         shared.free()
+        books.press(now)
         books.book(now, active.places)
 
     def _resume(self, give: float) -> float:

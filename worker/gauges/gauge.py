@@ -33,7 +33,7 @@ class Gauge(Protocol):
         """The present values by the number of the probe; ``v`` (nodes, 3): velocities now, m/s."""
 
     def keep(self) -> Any:
-        """What it remembers, equal on all ranks."""
+        """What it remembers, equal on all ranks: numbers and arrays in lists."""
 
     def resume(self, known: Any) -> None:
         """Takes it back."""

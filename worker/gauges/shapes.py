@@ -35,10 +35,10 @@ class Shapes:
         return {k: self._of(k, probe) for k, probe in self._probes.items()}
 
     def keep(self) -> Any:
-        return self._start
+        return [self._start.get(k) for k in self._probes]
 
     def resume(self, known: Any) -> None:
-        self._start = known
+        self._start = {k: own for k, own in zip(self._probes, known, strict=True) if own is not None}
 
     def _of(self, k: int, probe: Probe) -> float:
         if probe.field == "penetration":

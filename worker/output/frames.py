@@ -26,7 +26,7 @@ from ..state import (
     Ints,
     Model,
 )
-from . import hdf5
+from . import fields, hdf5
 
 _TETRA = 10
 """VTK_TETRA, the type of a cell (vtkCellType.h)."""
@@ -42,9 +42,11 @@ def von_mises(deviator: Floats) -> Floats:
 
 UNITS = {
     "velocity": "m/s", "displacement": "m", "pressure": "Pa", "mises": "Pa", "stress": "Pa", "principal_stress": "Pa",
-    "temperature": "K", "plastic_strain": "1", "damage": "1",
+    "temperature": "K", "plastic_strain": "1", "damage": "1", "density": "kg/m^3", "strain": "1",
+    "effective_strain": "1", "strain_rate": "1/s", "contact_pressure": "Pa",
 }  # fmt: skip
 """Of each field, an attribute ``unit`` of its data set; names and numbers have none."""
+_NOTHING = fields.Wanted()
 _ORDER = [0, 1, 2, 5, 3, 4]
 """Of the components of a stress as VTK has them, xx, yy, zz, xy, yz, zx, in ours (CONVENTIONS.md)."""
 
@@ -78,11 +80,14 @@ def _cells(block: Block, rank: int, fragment: Ints | None, damage: Floats | None
     return cells if fragment is None else {**cells, "fragment": fragment}
 
 
-def _share(model: Model, rank: int, labels: list[Ints] | None, damage: list[Floats] | None) -> dict[str, Any]:
+def _share(
+    model: Model, rank: int, labels: list[Ints] | None, damage: list[Floats] | None, wanted: fields.Wanted
+) -> dict[str, Any]:
     """What this rank gives to a frame."""
     nodes = model.nodes
     cells = [
         _cells(block, rank, None if labels is None else each, None if damage is None else share)
+        | {name: own.astype(np.float32) for name, own in fields.of_tets(wanted.names, block, nodes).items()}
         for block, each, share in _by_block(model, labels, damage)
     ]
     return {
@@ -90,6 +95,7 @@ def _share(model: Model, rank: int, labels: list[Ints] | None, damage: list[Floa
         "points": nodes.x,
         "velocity": nodes.v.astype(np.float32),
         "displacement": (nodes.x - nodes.x0).astype(np.float32),
+        "impulses": wanted.impulses,
         "tets": np.concatenate([nodes.id[b.tets] for b in model.blocks] or [np.zeros((0, 4), np.int64)]),
         "cells": {name: np.concatenate([c[name] for c in cells]) for name in cells[0]},
     }
@@ -111,20 +117,21 @@ def _by_block(
 
 def write(
     folder: Path, index: int, t: float, model: Model, comm: Comm, labels: list[Ints] | None = None,
-    damage: list[Floats] | None = None,
+    damage: list[Floats] | None = None, wanted: fields.Wanted = _NOTHING,
 ) -> str | None:  # fmt: skip
     """Writes frame ``index``; on rank 0 returns its path relative to the run's folder, elsewhere None.
 
-    ``labels``: for each block the fragment of each tet, where there are any; ``damage``: its damage, likewise.
+    ``labels``: for each block the fragment of each tet, where there are any; ``damage``: its damage, likewise;
+    ``wanted``: what else the case asks for.
     """
-    pieces = comm.gather(_share(model, comm.rank, labels, damage))
+    pieces = comm.gather(_share(model, comm.rank, labels, damage, wanted))
     if pieces is None:
         return None
     path = layout.frame(folder, index)
     path.parent.mkdir(exist_ok=True)
     beside = path.with_suffix(".part")
     with hdf5.created(beside) as file:
-        _write_grid(file, pieces, model.nodes_global)
+        _write_grid(file, pieces, model.nodes_global, wanted.passed)
         file.attrs["time"], file.attrs["time_unit"] = t, "s"
         file["VTKHDF/FieldData/time"] = np.array([t])
         file["VTKHDF/FieldData/time"].attrs["unit"] = "s"
@@ -133,7 +140,7 @@ def write(
     return str(path.relative_to(folder))
 
 
-def _write_grid(file: "h5py.File", pieces: list[dict[str, Any]], total: int) -> None:
+def _write_grid(file: "h5py.File", pieces: list[dict[str, Any]], total: int, passed: float) -> None:
     root = file.create_group("VTKHDF", track_order=True)
     root.attrs["Version"] = (2, 3)
     root.attrs.create("Type", b"UnstructuredGrid", dtype=h5py.string_dtype("ascii", 16))
@@ -142,6 +149,10 @@ def _write_grid(file: "h5py.File", pieces: list[dict[str, Any]], total: int) -> 
     order = np.argsort(cells["tet"])
     tets = np.concatenate([p["tets"] for p in pieces])[order]
     n = len(tets)
+    if pieces[0]["impulses"] is not None:
+        impulses = _by_id(pieces, "impulses", total)
+        pressure = fields.contact_pressure(point_data["points"], tets, impulses, passed)
+        point_data["contact_pressure"] = pressure.astype(np.float32)
     root["NumberOfPoints"], root["NumberOfCells"] = np.array([total]), np.array([n])
     root["NumberOfConnectivityIds"] = np.array([4 * n])
     root.create_dataset("Points", data=point_data.pop("points"), **_PACKING).attrs["unit"] = "m"
@@ -155,11 +166,11 @@ def _write_grid(file: "h5py.File", pieces: list[dict[str, Any]], total: int) -> 
 
 
 def _add(root: "h5py.Group", path: str, values: "np.ndarray") -> None:
-    """A field with its unit, and of a stress its components."""
+    """A field with its unit, and of a tensor its components."""
     name, stored = path.partition("/")[2], root.create_dataset(path, data=values, **_PACKING)
     if name in UNITS:
         stored.attrs["unit"] = UNITS[name]
-    if name == "stress":
+    if name in ("stress", "strain"):
         stored.attrs["components"] = "xx yy zz xy yz zx"
 
 

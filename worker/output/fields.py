@@ -1,0 +1,105 @@
+"""Fields of frames that a case asks for (``run.fields``): density, strain, strain rate, contact pressure.
+
+They are made of positions and velocities alone, but for the impulses of contact since the frame before. Bits are those
+of a tet or a node by itself: neither ranks nor the order of tets matter.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..mesh.faces import boundary_faces, normals
+from ..state import MASS, Block, Floats, Ints, Nodes
+
+_ORDER = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))
+"""Of the components, as VTK has them."""
+
+
+_FACING = 0.5
+"""Cosine of the angle between an impulse and the inward normal of a face that it pushes, at least. Chosen: above it are
+impulses with friction up to a coefficient of 1.7 on a flat face, below it the sides of an edge of 90 degrees up to 0.6.
+"""
+
+
+class Wanted(NamedTuple):
+    """What a frame has besides."""
+
+    names: tuple[str, ...] = ()
+    """Of ``cases.schema.FrameField``."""
+    impulses: Floats | None = None
+    """(nodes, 3) what contact and walls have given each node since the frame before, N s."""
+    passed: float = 0.0
+    """Time since the frame before, s; 0 for the first one."""
+
+
+def of_tets(names: tuple[str, ...], block: Block, nodes: Nodes) -> dict[str, Floats]:
+    """The fields of the tets of a block."""
+    found: dict[str, Floats] = {}
+    edges = _edges(nodes.x, block)
+    if "density" in names:
+        mass = block.row(MASS) if block.has(MASS) else np.zeros(block.n)
+        found["density"] = mass / (_determinant(edges) / 6.0)
+    if "strain" in names:
+        strain = logarithmic(_product(np.swapaxes(edges, 1, 2), _inverse_transposed(_edges(nodes.x0, block))))
+        found["strain"] = np.stack([strain[:, i, j] for i, j in _ORDER], axis=1)
+        found["effective_strain"] = effective(strain)
+    if "strain_rate" in names:
+        gradient = _product(np.swapaxes(_edges(nodes.v, block), 1, 2), _inverse_transposed(edges))
+        found["strain_rate"] = effective(0.5 * (gradient + np.swapaxes(gradient, 1, 2)))
+    return found
+
+
+def logarithmic(F: Floats) -> Floats:
+    """(n, 3, 3) strains ln V of deformation gradients F = V R (n, 3, 3): 1/2 ln of the eigenvalues of F F^T, on its
+    axes (Hencky). Of tets that are turned inside out, as of their mirror images.
+    """
+    squares, axes = np.linalg.eigh(_product(F, np.swapaxes(F, 1, 2)))
+    logarithms = 0.5 * np.log(np.maximum(squares, np.finfo(float).tiny))
+    return _product(axes * logarithms[:, None, :], np.swapaxes(axes, 1, 2))
+
+
+def effective(strain: Floats) -> Floats:
+    """(n,) sqrt(2/3 e' : e') of the deviators e' of strains or their rates (n, 3, 3)."""
+    mean = (strain[:, 0, 0] + strain[:, 1, 1] + strain[:, 2, 2]) / 3.0
+    deviator = strain - mean[:, None, None] * np.eye(3)
+    return np.asarray(np.sqrt(2.0 / 3.0 * (deviator * deviator).sum(axis=(1, 2))))
+
+
+def contact_pressure(x: Floats, tets: Ints, impulses: Floats, passed: float) -> Floats:
+    """(nodes,) mean pressure of contact on the nodes of the surface, Pa: of the ``impulses`` (nodes, 3), N s, over the
+    time ``passed``, s, what is along the normal of the share of the surface that a node has in what is pushed, over
+    that area. A share is a third of each face; pushed is a face that the impulse meets at less than 60 degrees from its
+    normal, so that the sides of an edge do not count. 0 inside of bodies and of nodes without such a face.
+    """
+    faces, share = boundary_faces(tets.astype(np.int32)), np.zeros((len(x), 3))
+    outward = normals(x, faces) / 6.0
+    size = np.sqrt((outward * outward).sum(axis=1))
+    for corner in faces.T:
+        push = impulses[corner]
+        against = -(outward * push).sum(axis=1) > _FACING * size * np.sqrt((push * push).sum(axis=1))
+        np.add.at(share, corner[against], outward[against])
+    squared, push = (share * share).sum(axis=1), -(impulses * share).sum(axis=1)
+    over = squared * passed
+    return np.asarray(np.divide(push, over, out=np.zeros(len(x)), where=over > 0.0))
+
+
+def _edges(values: Floats, block: Block) -> Floats:
+    """(n, 3, 3) differences of nodal values (nodes, 3) from the first node of each tet to the others, a row each."""
+    corners = values[block.tets]
+    return np.asarray(corners[:, 1:] - corners[:, :1])
+
+
+def _determinant(rows: Floats) -> Floats:
+    return np.asarray((rows[:, 0] * np.cross(rows[:, 1], rows[:, 2])).sum(axis=1))
+
+
+def _inverse_transposed(rows: Floats) -> Floats:
+    """(n, 3, 3) inverses, transposed, by cofactors."""
+    a, b, c = rows[:, 0], rows[:, 1], rows[:, 2]
+    cofactors = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=1)
+    return np.asarray(cofactors / _determinant(rows)[:, None, None])
+
+
+def _product(a: Floats, b: Floats) -> Floats:
+    """(n, 3, 3) products of matrices, in a fixed order of sums."""
+    return a[:, :, 0, None] * b[:, None, 0] + a[:, :, 1, None] * b[:, None, 1] + a[:, :, 2, None] * b[:, None, 2]

@@ -1,0 +1,29 @@
+"""What a frame has besides what every frame has, where the case asks for it."""
+
+import numpy as np
+
+from ..simulation import Simulation
+from ..state import Floats
+from ..walls import RigidWalls
+from .fields import Wanted
+
+
+def wanted(sim: Simulation, index: int) -> Wanted:
+    """Of frame ``index``; it is asked once a frame."""
+    run = sim.case.run
+    return Wanted(run.fields, _impulses(sim), run.end_time / run.frames if index else 0.0)
+
+
+def _impulses(sim: Simulation) -> Floats | None:
+    """(nodes, 3) what contact and walls have given each node since this was last asked, N s; None where no frame has a
+    contact pressure.
+    """
+    if "contact_pressure" not in sim.case.run.fields:
+        return None
+    found = np.zeros((sim.model.nodes.n, 3))
+    if sim.contact is not None:
+        found += sim.contact.books.pressed / sim.contact.books.scale
+        sim.contact.books.pressed[:] = 0
+    for walls in (bound for bound in sim.boundaries if isinstance(bound, RigidWalls)):
+        found[walls.nodes] += walls.since_told()
+    return found
