@@ -88,17 +88,16 @@ class Books:
         """(parts, parts, 3) what each part has got from each by contact so far, N s; all ranks take part."""
         return np.asarray(comm.sum(self.pairs) / self.scale)
 
-    def press(self, scene: Scene) -> None:
-        """Adds the impulses of the step to those since the frame before, where somebody asks."""
-        if len(self.pressed):
-            self.pressed[scene.own.local] += scene.slots.total[scene.own.slots]
-
     def due(self) -> None:
         """The second half of the work of the last impulses is due: friction's as well."""
         self.friction.words[:, 1] = 0
 
-    def book(self, scene: Scene, places: Indices) -> None:
-        """Half of the work of the last impulses, at the ``places`` of the scene, with the velocities in ``before``."""
+    def book(self, scene: Scene, places: Indices, *, fresh: bool = False) -> None:
+        """Half of the work of the last impulses, at the ``places`` of the scene, with the velocities in ``before``.
+        Those that are ``fresh`` go to the impulses since the frame before, where somebody asks for these.
+        """
+        if fresh and len(self.pressed):
+            self.pressed[scene.own.local] += scene.slots.total[scene.own.slots]
         self._book.run(
             len(places), self.contact_loss, self.external_work, places, scene.crowd.local, scene.slots.before,
             scene.slots.total, scene.crowd.mobility, self.scale,

@@ -273,8 +273,7 @@ class Contact:
         if active.leave(crowd, now.slots.total, state, books.parts, self.need.unsettled):
             self.last_push = t
         shared.free()
-        books.press(now)
-        books.book(now, active.places)
+        books.book(now, active.places, fresh=True)
 
     def _resume(self, give: float) -> float:
         """The step over the one before: what impulses of the same pairs are worth now. Without restitution none while
