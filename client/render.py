@@ -38,6 +38,8 @@ class Shot:
     """The drawn surface of one frame, with the field as ``shown``, and its time in s."""
 
     surface: Any
+    outline: Any
+    """Lines along the sharp edges of the bodies and of their fragments, but those of sections."""
     time: float | None
     bounds: Any
     """(3, 2) lowest and highest coordinates of the whole body, m."""
@@ -82,7 +84,7 @@ def _shots(picture: Picture) -> tuple[Picture, list[Shot]]:
         mesh, time = _read(path)
         bounds = np.reshape(mesh.bounds, (3, 2))
         picture = camera.settled(picture, bounds)
-        shots.append(Shot(_surface(mesh, picture), time, bounds))
+        shots.append(Shot(_surface(mesh, picture), _outline(mesh, picture), time, bounds))
     return picture, shots
 
 
@@ -122,6 +124,20 @@ def _surface(mesh: Any, picture: Picture) -> Any:
     return surface
 
 
+def _outline(mesh: Any, picture: Picture) -> Any:
+    """Of the uncut body: where a section cuts tets, the faces that they have in common do not match any more."""
+    bare = pv.UnstructuredGrid(mesh.cells, mesh.celltypes, np.asarray(mesh.points, dtype=float))
+    surface, length = bare.extract_surface(algorithm="dataset_surface"), float(mesh.length)
+    lines = surface.extract_feature_edges(
+        _BEND, boundary_edges=True, feature_edges=True, manifold_edges=False, non_manifold_edges=False
+    )
+    for plane in picture.sections:
+        lines = _clipped(lines, plane, (picture.camera or camera.FROM)[plane.axis])
+    for mirror in picture.mirrors:
+        lines = _reflected(lines, mirror, length)
+    return lines
+
+
 def _with_field(mesh: Any, name: str, cells: bool) -> Any:
     """The mesh with ``name`` as cell or point data ``shown``, in the unit of the picture, and nothing else."""
     factor = FIELDS[name].factor
@@ -148,13 +164,17 @@ def _cut(mesh: Any, plane: Mirror, side: float, extent: Any) -> Any:
     """Without what lies between the plane and the camera, which is on this side of it; ``extent``: of the whole body
     across the plane, m.
     """
-    normal, origin = np.zeros(3), np.zeros(3)
-    normal[plane.axis], origin[plane.axis] = (1.0 if side >= 0.0 else -1.0), plane.at
-    left = mesh.clip(normal=normal, origin=origin)
+    left = _clipped(mesh, plane, side)
     if left.n_cells == 0:
         axis, (low, high) = "xyz"[plane.axis], extent
         raise _beyond(axis, plane.at, low, high)
     return left
+
+
+def _clipped(mesh: Any, plane: Mirror, side: float) -> Any:
+    normal, origin = np.zeros(3), np.zeros(3)
+    normal[plane.axis], origin[plane.axis] = (1.0 if side >= 0.0 else -1.0), plane.at
+    return mesh.clip(normal=normal, origin=origin)
 
 
 def _require_sections(picture: Picture, bounds: Any) -> None:
@@ -171,10 +191,10 @@ def _beyond(axis: str, at: float, low: float, high: float) -> LookError:
 
 
 def _reflected(surface: Any, mirror: Mirror, length: float) -> Any:
-    """The surface and its image, joined without the faces that lie in the plane."""
+    """The surface, or lines on it, and its image, joined without what lies in the plane."""
     points = np.asarray(surface.points)
     near = np.abs(points[:, mirror.axis] - mirror.at) < 1e-6 * length
-    faces = surface.regular_faces
+    faces = surface.regular_faces if surface.n_lines == 0 else surface.lines.reshape(-1, 3)[:, 1:]
     outer = surface.extract_cells(np.flatnonzero(~near[faces].all(axis=1)))
     image = outer.copy()
     image.points[:, mirror.axis] = 2.0 * mirror.at - image.points[:, mirror.axis]
@@ -195,6 +215,9 @@ def _image(shots: Sequence[Shot], picture: Picture, scale: Scale, every: Sequenc
     for place, shot in enumerate(shots):
         plotter.subplot(*laid.panel(place))
         drawn = _add_body(plotter, shot.surface, field, picture, scale)
+        if shot.outline.n_cells and not (picture.look.raw or picture.look.edges):
+            width = max(1.0, picture.look.size[1] / 900)
+            plotter.add_mesh(shot.outline, color=INK, line_width=width, opacity=0.5, lighting=False)
         _set_camera(plotter, laid.eye)
         if not picture.out.lower().endswith(".gif"):  # a second a picture
             _add_shade(plotter, laid.eye.deep)
@@ -244,20 +267,9 @@ def _add_body(plotter: Any, surface: Any, field: Field, picture: Picture, scale:
     else:
         colours = field.colours if isinstance(field.colours, str) else scales.blend(field.colours)
         drawn = plotter.add_mesh(surface, cmap=colours, clim=scale[:2], **look)
-    if not (raw or picture.look.edges):
-        _add_outline(plotter, surface, picture.look.size[1])
     for wall in picture.walls:
         _add_wall(plotter, surface, wall)
     return drawn
-
-
-def _add_outline(plotter: Any, surface: Any, height: int) -> None:
-    """Thin lines along the sharp edges of the bodies and of their fragments."""
-    lines = surface.extract_feature_edges(
-        _BEND, boundary_edges=True, feature_edges=True, manifold_edges=False, non_manifold_edges=False
-    )
-    if lines.n_cells:
-        plotter.add_mesh(lines, color=INK, line_width=max(1.0, height / 900), opacity=0.5, lighting=False)
 
 
 def _add_shade(plotter: Any, deep: float) -> None:
