@@ -12,7 +12,7 @@ def check_rigid(case: Case) -> Iterator[Problem]:
     for i in case.rigid:
         part = case.parts[i]
         yield from _part(part, ("parts", i))
-        if part.name in case.self_contact:
+        if case.contact is not None and part.name in (case.contact.self_contact or ()):
             message = f"{part.name!r} is rigid and cannot meet itself; remove it"
             yield problem(("contact", "self_contact"), part.name, message)
     yield from _boundaries(case)

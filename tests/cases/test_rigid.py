@@ -1,0 +1,90 @@
+"""Keys of rigid parts and of walls: what is refused, in one line, and which part could be rigid."""
+
+from typing import Any
+
+import pytest
+
+from conoid.cases.estimate import estimate
+from conoid.cases.load import CaseError, apply_overrides, parse_case
+from conoid.cases.plausible import oddities
+
+BALL = {"shape": "sphere", "centre": [0, 0, "5.1 mm"], "radius": "5 mm", "element_size": "1 mm"}
+PAD = {"shape": "box", "low": ["-9 mm", "-9 mm", "-9 mm"], "high": ["9 mm", "9 mm", 0], "element_size": "2 mm"}
+WALL = "boundaries=[{kind='wall', point=[0, 0, '-9 mm'], normal=[0, 0, 1]}]"
+
+
+def scene(*overrides: str) -> dict[str, Any]:
+    """A rigid ball above a pad of rubber, as plain data."""
+    parts = [
+        {"name": "ball", "material": "steel", "mesh": BALL, "rigid": True, "velocity": [0, 0, "-5 m/s"]},
+        {"name": "pad", "material": "rubber", "mesh": PAD},
+    ]
+    rubber = {"density": "1100 kg/m^3", "elastic": {"young": "5 MPa", "poisson": 0.45}}
+    data = {"name": "pad", "materials": {"rubber": rubber}, "run": {"end_time": "1 ms"}, "parts": parts}
+    return apply_overrides(data, overrides)
+
+
+INERTIA = "parts[0].rigid={{mass='4 g', inertia=[{}]}}"
+
+
+@pytest.mark.parametrize(
+    ("override", "line"),
+    [
+        ("parts[0].erosion={}", "parts[0].erosion: a rigid part has no stress"),
+        ("parts[0].stretch={rate=[1, 0, 0]}", "parts[0].stretch: a rigid part has no stress"),
+        ("parts[0].jitter=1", "parts[0].jitter = 1.0: a rigid part moves as one"),
+        ("contact={self_contact=['ball']}", "contact.self_contact = 'ball': 'ball' is rigid and cannot meet itself"),
+        ("parts[0].rigid={centre=[0, 0, 0]}", "parts[0].rigid.centre: needs rigid.inertia"),
+        ("parts[0].rigid={mass='1 m'}", "a mass"),
+        ("parts[0].rigid={mass=0}", "greater than 0"),
+        (INERTIA.format("1, 1, -1, 0, 0, 0"), "must be positive definite"),
+        (INERTIA.format("1, 1, 1, 0, 0, 1.1"), "must be positive definite"),
+        (INERTIA.format("1, 1, 2.1, 0, 0, 0"), "above the sum of the other two"),
+        ("boundaries=[{kind='traction', pressure=1}]", "acts on the rigid part 'ball', which takes no traction"),
+        ("boundaries=[{kind='velocity', x=0, low=[0, 0, 0], high=[1, 1, 1]}]", "drives a box of the rigid part 'ball'"),
+        ("bond=[{kind='tied', parts=['ball', 'pad']}]", "bond[0].parts = 'ball': is rigid"),
+        ("boundaries=[{kind='wall', point=[0, 0, -1]}]", "boundaries[0].normal: this key is missing; a plane needs"),
+        ("boundaries=[{kind='wall', shape='sphere', point=[0, 0, -1], normal=[0, 0, 1], radius=1}]", "has no normal"),
+        (
+            "boundaries=[{kind='wall', shape='cylinder', point=[0, 0, -1], axis=[0, 0, 0], radius=1}]",
+            "must not be zero",
+        ),
+        ("boundaries=[{kind='wall', shape='cylinder', point=[0, 0, -1], radius=1}]", "boundaries[0].axis: this key is"),
+        (WALL.replace("}", ", mass=1, velocity=[0, 0, 1], course=[[0, 1]]}"), "remove course or mass"),
+        (WALL.replace("}", ", course=[[0, 1]]}"), "is a factor of velocity, which is zero"),
+        (WALL.replace("}", ", side='inside'}"), "a plane has no inside"),
+    ],
+)
+def test_a_slip_is_one_line(override: str, line: str) -> None:
+    with pytest.raises(CaseError) as caught:
+        parse_case(scene(override))
+    assert line in str(caught.value)
+    assert len(str(caught.value).splitlines()) == 1
+
+
+def test_a_plate_and_its_turned_tensor_are_bodies() -> None:
+    """A moment may be the sum of the other two, and a tensor may have products."""
+    for six in ("1, 1, 2, 0, 0, 0", "1.5, 1.5, 1, 0, 0, 0.5"):
+        assert parse_case(scene(INERTIA.format(six))).parts[0].rigid is not None
+    assert parse_case(scene("parts[0].rigid=false")).parts[0].rigid is None
+
+
+def test_a_rigid_part_costs_no_tets_and_no_steps_before_a_run() -> None:
+    rigid, soft = (estimate(parse_case(scene(*how))) for how in ((), ("parts[0].rigid=false",)))
+    assert rigid.dt is not None
+    assert soft.dt is not None
+    assert rigid.dt > 10.0 * soft.dt
+    assert rigid.costs["tets"] < soft.costs["tets"]
+
+
+def test_a_stiff_part_could_be_rigid() -> None:
+    """Steel on rubber, not steel on steel; a rigid one is told nothing."""
+
+    def told(*overrides: str) -> list[str]:
+        case = parse_case(scene(*overrides))
+        return [str(each) for each in oddities(case, estimate(case)) if "rigid = true" in str(each)]
+
+    (line,) = told("parts[0].rigid=false")
+    assert line.startswith("parts[0].rigid: is 318 times as stiff against waves as all that 'ball' meets")
+    assert told() == []
+    assert told("parts[0].rigid=false", "parts[1].material=steel") == []
