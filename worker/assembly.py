@@ -137,7 +137,7 @@ def assembled(case: schema.Case, meshes: Iterable[tuple[int, TetMesh]], overlaps
     velocity, mixed = _velocities(case, x, part_of_node, shares)
     return Whole(
         points=x, node_part=part_of_node, tets=t, tet_part=part_of_tet, volumes=volumes,
-        across=made.across if case.in_contact or case.fractures else made.across[:0], shares=shares,
+        across=made.across, shares=shares,
         node_volume=_quarters(t, volumes, len(x)), mass=_weighed(case, _quarters(t, masses, len(x)), part_of_node),
         velocity=velocity, loads=loads, tied=tied, near=near,
         warnings=[

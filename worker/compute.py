@@ -13,6 +13,7 @@ from conoid.cases import messages
 from conoid.cases.checkpoints import Manifest
 from conoid.cases.compression import borne
 from conoid.cases.history import of_parts
+from conoid.cases.joined import bodies
 from conoid.cases.outcome import Made, Measured, Outcome, Sharing
 from conoid.cases.quantities import FIELD_UNITS
 from conoid.cases.run import State
@@ -184,11 +185,11 @@ def _sum_up(
     checks = reference.measure(sim, folder, start.thick) if failure is None and not loop.stopped else []
     eroded = start.elements - sim.model.elements_global
     sim.count_nodes()
-    fragments = len(sim.model.parts)
+    body = np.array(bodies(sim.case))
+    fragments, labels = len(np.unique(body)), [np.full(block.n, body[block.part]) for block in sim.model.blocks]
     if sim.record is not None:
         sim.record.look()
-        fragments = sim.record.count
-    labels = sim.record.labels if sim.record else None
+        fragments, labels = sim.record.count, sim.record.labels
     inside = look(sim.contact, sim.model, labels, sim.comm) if sim.contact else None
     common = common_volume.measure(sim.contact, sim.model, labels, sim.comm) if sim.contact else None
     compressed = sim.crushing.found() if sim.crushing is not None else []

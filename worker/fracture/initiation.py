@@ -23,15 +23,20 @@ class Initiation:
     """Finds the facets that break on one rank, and keeps the clocks of the delayed criterion."""
 
     def __init__(
-        self, model: Model, bodies: list[Body], specs: list[Fracture], stars: dict[int, Stars],
+        self, model: Model, bodies: list[Body], specs: dict[int, Fracture], stars: dict[int, Stars],
         neighbours: list[Neighbour], comm: Comm, clock: Clock,
     ) -> None:  # fmt: skip
-        """``specs``: of all parts that fracture, here or not; ``stars``: by index of the block. All ranks take part."""
+        """``specs``: of all parts that fracture, by number, here or not; ``stars``: by index of the block. All ranks take
+        part.
+        """
         self._model, self._neighbours, self._comm, self._clock = model, neighbours, comm, clock
         self.bodies = bodies
-        self.smooth = any(spec.traction == "nodes" for spec in specs)
+        smooth = [part for part, spec in specs.items() if spec.traction == "nodes"]
+        self._averaged = [[part] for part in smooth] if len(model.nodes.shares.rank) else [smooth]
+        """Parts with nodal tractions, together as far as none of them has a node in common with another."""
+        self.smooth = bool(smooth)
         """Whether some part wants nodal tractions."""
-        self.one_by_one = any(spec.order == "local_maximum" for spec in specs)
+        self.one_by_one = any(spec.order == "local_maximum" for spec in specs.values())
         self._stars = stars
         self.interface = Interface(bodies, neighbours, comm)
         heaviest = np.zeros(len(model.parts))
@@ -115,15 +120,21 @@ class Initiation:
 
     def _smoothed(self, found: list[tuple[Body, Candidates]]) -> list[tuple[Body, Candidates]]:
         """With tractions from nodal stress where the part asks for that; all ranks take part."""
-        nodes, some = self._model.nodes, [pair for pair in found if pair[0].spec.traction == "nodes"]
+        left = dict[int, Candidates]()
+        for parts in self._averaged:
+            left |= self._of_nodes([(body, each) for body, each in found if body.own and body.block.part in parts])
+        return [(body, left.get(body.index, each) if body.own else each) for body, each in found]
+
+    def _of_nodes(self, some: list[tuple[Body, Candidates]]) -> dict[int, Candidates]:
+        """By the block what is left of the candidates of bodies with nodal tractions."""
+        nodes, left = self._model.nodes, dict[int, Candidates]()
         wanted = np.zeros(nodes.n, bool)
         for body, each in some:
             wanted[body.block.tets[each.place[each.shared < 0]]] = True
         chosen = [(body, self._stars[body.index]) for body, _ in some]
         stress = nodal.stresses(chosen, wanted, nodes, self._heaviest, self._neighbours, self._comm)
-        left = {}
         for body, each in some:
             nodal.replace(each, self.interface.facets, body, stress, nodes.x)
             n = criterion.clock(each, len(each.place), body.facets, body.law, self._step, self._clock.t)
             left[body.index] = each.first(n)
-        return [(body, left.get(body.index, each)) for body, each in found]
+        return left

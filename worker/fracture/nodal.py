@@ -37,20 +37,20 @@ def stresses(
     the shared nodes of these bodies; zero at others.
 
     ``heaviest`` (parts,): mass of the heaviest tet of each part on all ranks, kg. Sums are in quanta of that and of the
-    part's strength. All ranks take part.
+    part's strength; so no two of the bodies have a node in common. All ranks take part.
     """
-    sums, strength = np.zeros((nodes.n, 7), np.int64), np.zeros(len(heaviest))
+    sums, strength = np.zeros((nodes.n, 7), np.int64), np.zeros(nodes.n)
     for other in neighbours:
         wanted[other.nodes] = True
     for body, star in bodies:
-        k = body.block.part
-        strength[k] = body.tough.strength
-        some = np.flatnonzero(wanted & (nodes.part == k))
+        held, own = star.count[: nodes.n] > 0, body.tough.strength
+        strength[held] = own
+        per_mass = _QUANTA / heaviest[body.block.part]
         _add(
-            sums, some, star.first, star.count, star.pool, body.mesh, _QUANTA / strength[k], _QUANTA / heaviest[k]
+            sums, np.flatnonzero(wanted & held), star.first, star.count, star.pool, body.mesh, _QUANTA / own, per_mass
         )  # fmt: skip
     complete(comm, neighbours, sums, Tag.NODAL_STRESS)
-    return np.asarray(sums[:, :6] / np.maximum(sums[:, 6:], 1) * strength[nodes.part][:, None])
+    return np.asarray(sums[:, :6] / np.maximum(sums[:, 6:], 1) * strength[:, None])
 
 
 @njit(

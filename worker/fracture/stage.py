@@ -51,7 +51,7 @@ class Fracture:
         bodies, work, self.warnings = self._armed(case)
         meshes = {body.index: body.mesh for body in bodies}
         self.separation = Separation(model, neighbours, meshes, comm)
-        specs = [part.fracture for part in case.parts if part.fracture is not None]
+        specs = {i: part.fracture for i, part in enumerate(case.parts) if part.fracture is not None}
         self.initiation = Initiation(model, bodies, specs, self.separation.stars, neighbours, comm, clock)
         handover = Handover(model, meshes, neighbours, comm)
         self._update = TopologyUpdate(model, elements, self.initiation, by_node, handover, contact)

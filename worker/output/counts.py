@@ -11,6 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from conoid.cases.joined import bodies
+
 from ..ids import located, unique
 from ..jit import njit
 from ..parallel.comm import Comm
@@ -55,7 +57,7 @@ class Counter:
         ranks.
         """
         model, record = sim.model, sim.record
-        fragments = record.count if record is not None and record.count else len(model.parts)
+        fragments = record.count if record is not None and record.count else len(set(bodies(sim.case)))
         now = model.elements_global, model.nodes_global, cuts, fragments, self._found
         if now == self._told:
             return None
