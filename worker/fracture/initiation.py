@@ -26,8 +26,8 @@ class Initiation:
         self, model: Model, bodies: list[Body], specs: dict[int, Fracture], stars: dict[int, Stars],
         neighbours: list[Neighbour], comm: Comm, clock: Clock,
     ) -> None:  # fmt: skip
-        """``specs``: of all parts that fracture, by number, here or not; ``stars``: by index of the block. All ranks take
-        part.
+        """``specs``: of all parts that fracture, by number, here or not; ``stars``: by index of the block. All ranks
+        take part.
         """
         self._model, self._neighbours, self._comm, self._clock = model, neighbours, comm, clock
         self.bodies = bodies
