@@ -34,8 +34,6 @@ class Initiation:
         smooth = [part for part, spec in specs.items() if spec.traction == "nodes"]
         self._averaged = [[part] for part in smooth] if len(model.nodes.shares.rank) else [smooth]
         """Parts with nodal tractions, together as far as none of them has a node in common with another."""
-        self.smooth = bool(smooth)
-        """Whether some part wants nodal tractions."""
         self.one_by_one = any(spec.order == "local_maximum" for spec in specs.values())
         self._stars = stars
         self.interface = Interface(bodies, neighbours, comm)
@@ -48,6 +46,11 @@ class Initiation:
         """Of each body; what a step finds lies there until the next."""
         self._step = 1
         """Number of the step; those of the clocks begin with 1."""
+
+    @property
+    def smooth(self) -> bool:
+        """Whether some part wants nodal tractions."""
+        return any(self._averaged)
 
     def begin_step(self) -> None:
         """The clock of a facet that is not overstressed in this step stops."""
