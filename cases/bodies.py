@@ -200,7 +200,9 @@ class Shards(Loose):
 
 
 class MeshFile(Model):
-    """A mesh made elsewhere: gmsh .msh 4.1 or 2.2, or Abaqus .inp. ``unit`` is the length unit of its coordinates."""
+    """A mesh made elsewhere: gmsh .msh 4.1 or 2.2, Abaqus .inp, LS-DYNA .k, .key or .dyn, Radioss .rad. ``unit`` is the
+    length unit of its coordinates.
+    """
 
     shape: Literal["file"]
     """The kind of body."""
@@ -211,7 +213,8 @@ class MeshFile(Model):
     """Length of 1 in the file: ``"1 mm"``."""
     group: str | None = None
     """Of elements: a physical group of gmsh by its name or number; of Abaqus an element set, ``Bar-1.Set-1`` (a set of
-    an instance or a part), an instance or a part. All when absent. docs/meshes.md has what is read of a file."""
+    an instance or a part), an instance or a part; of LS-DYNA and Radioss a part, a set or a subset. All when absent.
+    docs/meshes.md has what is read of a file."""
     second_order: Literal["auto", "corners", "eight"] = "auto"
     """Tets of 10 nodes as the tets of their 4 corners, or as eight tets of 4 nodes each. ``auto`` is ``eight`` where
     the corners alone would lose more than a thousandth of the volume, else ``corners``; a warning says which."""

@@ -103,6 +103,7 @@ def _comes(case: Case, part: Part, axis: int, way: float) -> bool:
 def _two_drives(case: Case) -> Iterator[Problem]:
     """Two boundaries that drive the whole of a part, each in its own way; the worker looks at the nodes of boxes."""
     drives = [(i, each) for i, each in enumerate(case.boundaries) if isinstance(each, Rotation) or _whole(each)]
+    drives = [(i, each) for i, each in drives if getattr(each, "on", None) is None]
     names = [part.name for part in case.parts]
     for (i, first), (j, second) in itertools.combinations(drives, 2):
         shared = [name for name in names if all(not each.parts or name in each.parts for each in (first, second))]
@@ -114,7 +115,7 @@ def _two_drives(case: Case) -> Iterator[Problem]:
 
 
 def _whole(boundary: object) -> bool:
-    return isinstance(boundary, Prescribed) and boundary.low is None and boundary.high is None
+    return isinstance(boundary, Prescribed) and boundary.low is None and boundary.high is None and boundary.on is None
 
 
 def _prescribed(boundary: Prescribed, location: Location) -> Iterator[Problem]:

@@ -14,6 +14,7 @@ from .geometry import AXES, centre, cut_directions, whole_bounds
 from .library import library
 from .materials import Material, Strength
 from .mesh_checks import check_mesh
+from .on import check_ons
 from .overlap import overlaps
 from .probe_checks import check_probes
 from .problems import Location, Problem, dotted, problem
@@ -45,8 +46,8 @@ Read = TypeVar("Read", bound=BaseModel)
 def check(case: Case) -> list[Problem]:
     """Every cross-field problem of a case, in the order of its keys."""
     checks: tuple[Callable[[Case], Iterable[Problem]], ...] = (
-        _materials, _parts, _overlaps, _sectors, check_boundaries, check_walls, check_bonds, check_rigid, _contact,
-        check_probes, _fields, _references,
+        _materials, _parts, _overlaps, _sectors, check_boundaries, check_ons, check_walls, check_bonds, check_rigid,
+        _contact, check_probes, _fields, _references,
     )  # fmt: skip
     return list(chain.from_iterable(found(case) for found in checks))
 

@@ -118,7 +118,7 @@ def _drives(drive: Prescribed, part: Part) -> bool:
 
 
 def _whole(drive: Prescribed) -> bool:
-    return drive.low is None and drive.high is None
+    return drive.low is None and drive.high is None and drive.on is None
 
 
 def _ways(case: Case, drives: list[Prescribed], part: Part) -> Iterator[Vector]:

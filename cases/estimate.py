@@ -254,7 +254,7 @@ def _nanoseconds(case: Case, part: Part) -> dict[str, float]:
     if part.rigid is not None:
         return {}
     made = material(case, part.material)
-    turned = any(isinstance(b, Rotation) and (not b.parts or part.name in b.parts) for b in case.boundaries)
+    turned = any(b.on is None and (not b.parts or part.name in b.parts) for _, b in case.boundaries_of(Rotation))
     return {
         TETS: NANOSECONDS["tet"], AVERAGED: NANOSECONDS.get(case.numerics.pressure, 0.0),
         STRENGTH: made.strength.nanoseconds if made.strength is not None and not turned else 0.0,

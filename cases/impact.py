@@ -63,7 +63,7 @@ def velocities(case: Case, part: Part) -> tuple[Vector, Vector]:
     for _, drive in case.boundaries_of(Prescribed):
         if not drive.parts or part.name in drive.parts:
             given = [_given(drive, factor, speeds) for factor in _extremes(drive.course) for speeds in found]
-            found = given if drive.low is None and drive.high is None else [*found, *given]
+            found = given if drive.low is None and drive.high is None and drive.on is None else [*found, *given]
     least, most = ([pick(each) for each in zip(*found, strict=True)] for pick in (min, max))
     return _shifted(least, -part.jitter), _shifted(most, part.jitter)
 

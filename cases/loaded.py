@@ -86,7 +86,9 @@ def _loads(case: Case) -> list[Load]:
 
 
 def parts_of(case: Case, spec: Traction | Prescribed) -> list[Part]:
-    """Those that a boundary is for."""
+    """Those that a boundary is for: where it is on a set and names none, all that have a mesh from a file."""
+    if spec.on is not None and not spec.parts:
+        return [part for part in case.parts if isinstance(part.mesh, MeshFile)]
     return [part for part in case.parts if not spec.parts or part.name in spec.parts]
 
 

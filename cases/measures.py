@@ -2,7 +2,7 @@
 
 from typing import Annotated, Literal
 
-from .tables import Axis, Model, Name, Point, Positive
+from .tables import Axis, Model, Name, Point, Positive, SetName
 from .units import QUANTITY, Length, Time, Written
 
 ProbeField = Literal[
@@ -90,6 +90,9 @@ class Probe(Model):
     """Lowest corner of the box; with ``high``. Of means and sums; without it, the whole part."""
     high: Point | None = None
     """Highest corner of the box; with ``low``."""
+    on: SetName | None = None
+    """Of means: a set of nodes or a surface of the mesh file of the part, by name (docs/meshes.md): the tets that have
+    a node of it. With a box those that are in both."""
     beyond: Beyond | None = None
     """Of sums and of what is behind a target: the side of a plane, ``{ axis = "z", at = "8 mm" }``."""
     axis: Axis | None = None

@@ -16,7 +16,7 @@ def check_mesh(mesh: Mesh, location: Location) -> Iterator[Problem]:
     """Every problem of a mesh that stands at ``location``."""
     if isinstance(mesh, MeshFile):
         if "://" in mesh.path or not mesh.path.strip():
-            yield problem((*location, "path"), mesh.path, "expected the path of a .msh or .inp file")
+            yield problem((*location, "path"), mesh.path, "expected the path of a mesh file")
         return
     yield from _grading(mesh, location)
     wrong = list(check_form(mesh, location))

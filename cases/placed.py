@@ -63,7 +63,7 @@ def _turned(point: Vector, turn: Turn | None, sense: float = 1.0) -> Vector:
 def driven(case: Case, part: Part) -> Part:
     """A part as it moves where a boundary turns it."""
     for _, boundary in case.boundaries_of(Rotation):
-        if not boundary.parts or part.name in boundary.parts:
+        if boundary.on is None and (not boundary.parts or part.name in boundary.parts):
             return part.model_copy(update={"velocity": (0.0, 0.0, 0.0), "spin": boundary.spin, "stretch": None})
     return part
 

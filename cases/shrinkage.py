@@ -66,7 +66,7 @@ def _shocked(case: Case, part: Part, made: Material, speed: float, flattened: fl
 
 def _on_part(case: Case, part: Part) -> list[Traction]:
     loads = [load for _, load in case.boundaries_of(Traction)]
-    return [load for load in loads if not load.parts or part.name in load.parts]
+    return [load for load in loads if load.on is None and (not load.parts or part.name in load.parts)]
 
 
 def _imploded(case: Case, part: Part, made: Material, load: Traction) -> float:

@@ -10,6 +10,8 @@ from .units import Length, Speed, usable
 
 Axis = Literal["x", "y", "z"]
 Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]{0,63}$")]
+SetName = Annotated[str, Field(min_length=1, max_length=200)]
+"""Of a set in a mesh file, which may have blanks and any letters."""
 Point = tuple[Length, Length, Length]
 Velocity = tuple[Speed, Speed, Speed]
 Positive = Field(gt=0)

@@ -22,6 +22,7 @@ from .contact import overlap, pairing
 from .errors import InputError
 from .facts import Facts
 from .hashing import uniform
+from .marks import Marks, marks
 from .mesh.build import build as build_mesh
 from .mesh.build import build_together
 from .mesh.faces import FACES, across, normals
@@ -62,6 +63,8 @@ class Whole:
     tied: Pieces
     """Of the bonds of meshes that do not match."""
     near: Nearness
+    marks: Ints
+    """(nodes,) see state.Nodes."""
     warnings: list[str]
     """What the user should know of the meshes, and of what the boundaries of the case select of them."""
     survey: Survey
@@ -132,16 +135,17 @@ def assembled(case: schema.Case, meshes: Iterable[tuple[int, TetMesh]], overlaps
     members = shares.members(part_of_node)
     near = selection.nearness(case, x, members, t, part_of_tet)
     known = selection.settled(case, made.part_of_body)
-    loads, found, told = _loads(case, x, members, (t, part_of_tet), near, known)
-    driven, more = _driven(case, x, members, near, known)
+    marked = marks(case, made.read, len(x))
+    loads, found, told = _loads(case, x, members, (t, part_of_tet), near, known, marked)
+    driven, more = _driven(case, x, members, near, known, marked)
     velocity, mixed = _velocities(case, x, part_of_node, shares)
     return Whole(
         points=x, node_part=part_of_node, tets=t, tet_part=part_of_tet, volumes=volumes,
         across=made.across, shares=shares,
         node_volume=_quarters(t, volumes, len(x)), mass=_weighed(case, _quarters(t, masses, len(x)), part_of_node),
-        velocity=velocity, loads=loads, tied=tied, near=near,
+        velocity=velocity, loads=loads, tied=tied, near=near, marks=marked.nodes,
         warnings=[
-            *warnings, *told, *more, *selection.off_planes(case, x, members, near, known),
+            *warnings, *marked.told, *told, *more, *selection.off_planes(case, x, members, near, known),
             *selection.compared(case, [*found, *driven]), *mixed,
         ],
         survey=Survey(),
@@ -271,7 +275,13 @@ def _mean_velocities(case: schema.Case, v: Floats, x: Floats, shares: Shares) ->
 
 
 def _loads(
-    case: schema.Case, x: Floats, members: Members, of_tets: tuple[Indices, Indices], near: Nearness, known: list[bool]
+    case: schema.Case,
+    x: Floats,
+    members: Members,
+    of_tets: tuple[Indices, Indices],
+    near: Nearness,
+    known: list[bool],
+    marked: Marks,
 ) -> tuple[list[Load | LoadedFaces], list[Selected], list[str]]:
     """The tractions of the case: a third of the force on each face for each of its nodes, in the order of the tets, or
     the faces that a pressure follows; what they act on, and warnings; ``of_tets``: (m, 4), and their parts (m,). Those
@@ -287,10 +297,11 @@ def _loads(
             none = np.zeros(0, np.int64)
             loads.append(_load(spec, none, np.zeros((0, 3), np.int64), np.zeros((0, 3))))
             continue
-        selected, chosen = selection.counted(case, index, x, members, (faces, tet_part[tet]), near)
+        selected, chosen = selection.counted(case, index, x, members, (faces, tet_part[tet]), near, marked)
         loaded = faces[chosen]
         if not len(loaded):
             where = "its box and its parts" if spec.cylinder is None else "its cylinder, its box and its parts"
+            where = where if spec.on is None else f"whether the faces of {spec.on!r} are on the surface, and its box"
             raise InputError(f"boundaries[{index}]: acts on no face; check {where}")
         found.append(selected)
         took = np.isin(np.arange(len(case.parts)), tet_part[tet[chosen]])
@@ -312,12 +323,12 @@ def _load(spec: schema.Traction, tets: Ints, faces: Ints, outward: Floats) -> Lo
 
 
 def _driven(
-    case: schema.Case, x: Floats, members: Members, near: Nearness, known: list[bool]
+    case: schema.Case, x: Floats, members: Members, near: Nearness, known: list[bool], marked: Marks
 ) -> tuple[list[Selected], list[str]]:
     """What the boxes of prescribed velocities that are ``known`` hold, and warnings."""
     found, told = list[Selected](), list[str]()
     for index in (index for index, _ in case.boundaries_of(schema.Prescribed) if known[index]):
-        selected, held = selection.counted(case, index, x, members, selection.NO_FACES, near)
+        selected, held = selection.counted(case, index, x, members, selection.NO_FACES, near, marked)
         found.append(selected)
         if held.any():
             took = np.isin(np.arange(len(case.parts)), members[1][held[members[0]]])

@@ -6,9 +6,10 @@ import numpy as np
 
 from conoid.cases import schema
 from conoid.cases.drives import REST, clash, motions
+from conoid.cases.on import bits
 from conoid.cases.region import GENERATED
 
-from . import selection
+from . import marks, selection
 from .boundaries import Boundary, SymmetryPlane, driven, mirrored
 from .drivers import Course, Gravity, PrescribedRotation, PrescribedVelocity, Traction
 from .errors import InputError
@@ -54,7 +55,7 @@ def build(
     """
     nodes = model.nodes
     loose = of_nodes(case, nodes) < 0
-    held = [_held_by(spec, model) & (loose | isinstance(spec, schema.Symmetry)) for spec in case.boundaries]
+    held = [_held_by(case, spec, model) & (loose | isinstance(spec, schema.Symmetry)) for spec in case.boundaries]
     boundaries: list[Boundary] = [
         Gravity(_indices(held[i]), np.array(spec.acceleration), Course(spec.course))
         for i, spec in case.boundaries_of(schema.Gravity)
@@ -89,7 +90,7 @@ def start(
     Raises InputError, on every rank alike, for a boundary that holds no node, two that drive a node in two ways, a body
     that starts behind a wall or through a symmetry plane, and motion prescribed across one.
     """
-    held = [_held_by(spec, model) for spec in case.boundaries]
+    held = [_held_by(case, spec, model) for spec in case.boundaries]
     known = [True] * len(held) if known is None else known
     counts = comm.sum(np.array([int(each.sum()) for each in held], np.int64))
     beside = _beside(case, model, comm)
@@ -132,12 +133,13 @@ def _stopped(
     ]  # fmt: skip
 
 
-def _held_by(spec: schema.Boundary, model: Model) -> Flags:
+def _held_by(case: schema.Case, spec: schema.Boundary, model: Model) -> Flags:
     """(n,) the nodes that a boundary acts on."""
-    nodes = model.nodes
+    nodes, on_set = model.nodes, isinstance(spec, schema.Prescribed | schema.Rotation) and spec.on is not None
+    marked = marks.held(nodes.marks, bits(case)[str(getattr(spec, "on", ""))]) if on_set else np.True_
     if isinstance(spec, schema.Prescribed):
-        return selection.held(spec, model.parts, nodes.x0, nodes.of_parts(), model.slack)
-    chosen = _of_parts(spec, model)
+        return selection.held(spec, model.parts, nodes.x0, nodes.of_parts(), model.slack) & marked
+    chosen = _of_parts(spec, model) & marked
     if isinstance(spec, schema.Symmetry):
         chosen &= heights(spec, model) == 0.0
     return chosen

@@ -9,6 +9,7 @@ from conoid.cases.loaded import Load
 from conoid.cases.schema import Case, Prescribed, Traction
 
 from . import selection
+from .marks import marks
 from .mesh.faces import FACES, across
 from .mesh.joining import Placed, joined
 from .mesh.model import TetMesh
@@ -22,10 +23,10 @@ def loads(case: Case, meshes: Meshes) -> Iterator[Load]:
     """Of each boundary that is for parts with these meshes and for no others, as the run will count it. Raises
     InputError for bonds without nodes in common.
     """
-    names, body = [part.name for part in case.parts], bodies(case)
+    body = bodies(case)
     for number, spec in enumerate(case.boundaries):
         if isinstance(spec, Traction | Prescribed):
-            chosen = np.flatnonzero(selection.named(spec, names)).tolist()
+            chosen = np.flatnonzero(selection.meant(case, spec)).tolist()
             if chosen and all(index in meshes for index in chosen):
                 with_them = {body[index] for index in chosen}
                 yield _load(case, number, {i: mesh for i, mesh in meshes.items() if body[i] in with_them})
@@ -43,8 +44,10 @@ def _load(case: Case, number: int, meshes: Meshes) -> Load:
     members = np.unique(np.column_stack([t.reshape(-1), np.repeat(of, 4)]), axis=0).T
     near = selection.nearness(case, x, (members[0], members[1]), t, of)
     tet, face = np.nonzero(across(t) < 0)
+    nodes = {i: (mesh, stands[placed[i][0] + np.arange(len(mesh.points))]) for i, mesh in meshes.items()}
+    marked = marks(case, nodes, len(x), number)
     found, _ = selection.counted(
-        case, number, x, (members[0], members[1]), (t[tet[:, None], FACES[face]], of[tet]), near
+        case, number, x, (members[0], members[1]), (t[tet[:, None], FACES[face]], of[tet]), near, marked
     )
     if isinstance(case.boundaries[number], Traction):
         return Load(number, area=found.area, faces=found.faces, exact=True)

@@ -89,6 +89,8 @@ class Piece:
     slack: Floats
     rounding: Floats
     """(parts,) see state.Model."""
+    marks: Ints
+    """(nodes,) see state.Nodes."""
     warnings: list[str]
     """See Whole."""
 
@@ -155,7 +157,7 @@ def _piece(
         whole.tet_part[ids], local[tets], whole.volumes[ids],
         whole.across[ids] if len(whole.across) else whole.across, np.any(shared[tets], axis=1),
         grouped[0][nodes], grouped[1][ids], grouped[2], neighbours, totals, *parts, float(np.abs(whole.points).max()),
-        whole.near.slack, whole.near.rounding, whole.warnings,
+        whole.near.slack, whole.near.rounding, whole.marks[nodes] if len(whole.marks) else whole.marks, whole.warnings,
     )  # fmt: skip
 
 
@@ -201,7 +203,7 @@ def _model(case: schema.Case, piece: Piece) -> Model:
         id=piece.node_ids, part=piece.node_part, owner=piece.node_owner, owned=piece.owned, x0=piece.points.copy(),
         x=piece.points, v=piece.velocity, mass=piece.mass, force=np.zeros(piece.points.shape, np.int64),
         stepping=np.zeros(len(piece.mass)),
-        group=piece.node_group, shares=piece.shares,
+        group=piece.node_group, marks=piece.marks, shares=piece.shares,
     )  # fmt: skip
     blocks = [_block(case, piece, index) for index in range(len(case.parts)) if (piece.tet_part == index).any()]
     return Model(

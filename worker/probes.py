@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from conoid.cases.measures import BEYOND, PUSHES, SHAPES, SUMS, kind
+from conoid.cases.on import bits
 from conoid.cases.region import Region
 from conoid.cases.schema import Case, Probe
 
@@ -17,6 +18,7 @@ from .gauges.gauge import Gauge, Scene
 from .gauges.pushes import Pushes
 from .gauges.shapes import Shapes
 from .gauges.sums import NodeSums
+from .marks import held
 from .output.frames import von_mises
 from .parallel.fixed_point import Ragged, exact_totals
 from .state import (
@@ -107,7 +109,7 @@ class Probes:
         model = scene.model
         centres = [_centres(block, model) for block in model.blocks] if self._means else []
         self._chosen = {
-            k: [_inside(case.probes[k], block, model, x) for block, x in zip(model.blocks, centres, strict=True)]
+            k: [_inside(case, case.probes[k], block, model, x) for block, x in zip(model.blocks, centres, strict=True)]
             for k in self._means
         }
         """Global ids of the tets that each mean has in each block."""
@@ -131,8 +133,10 @@ class Probes:
             if self._comm.rank == 0:
                 log.info("probes[%d] has %d %ss", k, count, what)
             if count == 0:
+                probe = case.probes[k]
+                both = "" if probe.on is None else f" and a node in {probe.on!r}"
                 raise InputError(
-                    f"probes[{k}]: no {what} of part {case.probes[k].part!r} has {where} between low and high"
+                    f"probes[{k}]: no {what} of part {probe.part!r} has {where} between low and high{both}"
                 )
 
     def keep(self) -> list[Any]:
@@ -193,8 +197,10 @@ def _centres(block: Block, model: Model) -> Floats:
     return np.array([x[block.tets].sum(axis=1) for x in model.nodes.x0.T.copy()]) / 4.0
 
 
-def _inside(probe: Probe, block: Block, model: Model, centres: Floats) -> "np.ndarray":
+def _inside(case: Case, probe: Probe, block: Block, model: Model, centres: Floats) -> "np.ndarray":
     if model.parts[block.part] != probe.part:
         return np.zeros(0, np.int64)
     inside = np.full(block.n, True) & Region.of(probe).holds(centres, model.slack[block.part])
+    if probe.on is not None:
+        inside &= held(model.nodes.marks, bits(case)[probe.on])[block.tets].any(axis=1)
     return np.asarray(block.id[inside])

@@ -7,8 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from conoid.cases import loaded, region, schema
+from conoid.cases.bodies import MeshFile
+from conoid.cases.on import bits
 from conoid.cases.region import Region
 
+from .marks import Marks
 from .mesh.faces import normals
 from .state import Flags, Floats, Indices, Ints
 
@@ -61,8 +64,15 @@ def named(spec: schema.Boundary, parts: Sequence[str]) -> Flags:
 
 def settled(case: schema.Case, there: Container[int]) -> list[bool]:
     """Of each boundary, whether all parts that it is for are among those that are ``there``, by number."""
-    names = [part.name for part in case.parts]
-    return [all(index in there for index in np.flatnonzero(named(spec, names)).tolist()) for spec in case.boundaries]
+    return [all(index in there for index in np.flatnonzero(meant(case, spec)).tolist()) for spec in case.boundaries]
+
+
+def meant(case: schema.Case, spec: schema.Boundary) -> Flags:
+    """(parts,) the parts that a boundary is for: where it is on a set and names none, those with a mesh from a file."""
+    found = named(spec, [part.name for part in case.parts])
+    if getattr(spec, "on", None) is not None and not spec.parts:
+        found &= np.array([isinstance(part.mesh, MeshFile) for part in case.parts])
+    return found
 
 
 def inside(spec: schema.Prescribed | schema.Traction, x: Floats, part: Indices, near: Floats) -> Flags:
@@ -124,6 +134,8 @@ def missed(
     for name, some in zip([each.name for each in case.parts], took, strict=True):
         if name in spec.parts and not some:
             yield f"boundaries[{number}]: acts on nothing of part {name!r}, which it names"
+    if spec.on is not None:
+        return
     nodes, part = members
     chosen = np.flatnonzero(named(spec, [each.name for each in case.parts])[part])
     at, of = x[nodes[chosen]], part[chosen]
@@ -139,18 +151,29 @@ def missed(
 
 
 def counted(
-    case: schema.Case, number: int, x: Floats, members: Members, faces: tuple[Indices, Indices], near: Nearness
+    case: schema.Case,
+    number: int,
+    x: Floats,
+    members: Members,
+    faces: tuple[Indices, Indices],
+    near: Nearness,
+    marked: Marks,
 ) -> tuple[Selected, Flags]:
     """What boundary ``number`` selects of nodes (n, 3), and of exposed ``faces``, (m, 3) and their parts (m,); which
-    nodes of a velocity, or faces of a traction, that are.
+    nodes of a velocity, or faces of a traction, that are. ``marked``: of the nodes.
     """
     spec, names = case.boundaries[number], [each.name for each in case.parts]
     assert isinstance(spec, schema.Prescribed | schema.Traction)
     found = held(spec, names, x, members, near.slack)
+    bit = None if spec.on is None else bits(case)[spec.on]
+    if bit is not None and isinstance(spec, schema.Prescribed):
+        found &= marked.holds(bit)
     nodes, (corners, of) = int(found.sum()), faces
     if isinstance(spec, schema.Prescribed):
         return Selected(number, nodes), found
-    chosen: Flags = np.asarray(found[corners].all(axis=1) & named(spec, names)[of])
+    chosen: Flags = np.asarray(found[corners].all(axis=1) & meant(case, spec)[of])
+    if bit is not None:
+        chosen &= marked.chosen(bit, corners, of)
     area = float(0.5 * np.linalg.norm(normals(x, corners[chosen]), axis=1).sum())
     return Selected(number, nodes, int(chosen.sum()), area), chosen
 

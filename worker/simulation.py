@@ -263,7 +263,7 @@ def _assemble(
 def keep(sim: Simulation) -> Parcel:
     """All that this rank must remember between two steps; all ranks take part."""
     sim.count_nodes()
-    parcel = model_of.keep(sim.model)
+    parcel = model_of.keep(sim.model, sim.case)
     pushes = sim.comm.maximum(np.array([each.last_push for each in sim.pushing]))
     parcel.known |= {
         "reduction": sim.reduction.keep(), "clock": sim.clock.keep(), "ledger": sim.ledger.keep(),

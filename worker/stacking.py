@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from conoid.cases.on import ons
 from conoid.cases.schema import Case
 
 from .errors import MeshError
@@ -38,6 +39,8 @@ class Stacked:
     across: Indices
     """(m, 4) see state.Block; (0, 4) where nobody asks."""
     warnings: list[str]
+    read: dict[int, tuple[TetMesh, Ints]]
+    """Meshes from files by parts, and where their nodes are among all; where the case is on sets."""
 
     def any_of_body(self, allowed: Flags) -> Flags:
         """(bodies, bodies) who meets whom: whatever meets a part of a body meets the body; ``allowed``: by parts of
@@ -54,6 +57,7 @@ def stacked(case: Case, meshes: Iterable[tuple[int, TetMesh]], overlaps: bool) -
     """
     points, tets, tet_part, node_part, told = [], [], [], [], list[str]()
     bodies, part_of_body, placed, n = [], list[int](), dict[int, Placed](), 0
+    read, on_sets = dict[int, tuple[TetMesh, Ints]](), bool(ons(case))
     for index, mesh in meshes:
         piece, said = pieces(case, index, mesh, overlaps)
         told += said
@@ -61,6 +65,8 @@ def stacked(case: Case, meshes: Iterable[tuple[int, TetMesh]], overlaps: bool) -
         part_of_body += [index] * (int(piece.max(initial=0)) + 1)
         points.append(turned(mesh.points, case.parts[index].turn))
         placed[index] = n, mesh.origin, points[-1]
+        if on_sets and mesh.origin is not None:
+            read[index] = mesh, n + np.arange(len(mesh.points))
         tets.append(mesh.tets.astype(np.int64) + n)
         node_part.append(np.full(len(mesh.points), index, np.int32))
         tet_part.append(np.full(len(mesh.tets), index, np.int32))
@@ -70,7 +76,7 @@ def stacked(case: Case, meshes: Iterable[tuple[int, TetMesh]], overlaps: bool) -
     made = Stacked(
         np.concatenate(points), np.concatenate(tets).astype(np.int32), np.concatenate(tet_part),
         np.concatenate(node_part), np.concatenate(bodies), np.array(part_of_body), np.arange(len(part_of_body)),
-        np.zeros((0, 4), np.int32), told,
+        np.zeros((0, 4), np.int32), told, read,
     )  # fmt: skip
     several = _join(made, joined(case, placed, n))
     if several or case.in_contact or case.fractures:
@@ -90,6 +96,8 @@ def _join(made: Stacked, stands: Ints) -> bool:
     edges = np.column_stack([made.body, made.body[stands]])
     made.stands = components(len(made.part_of_body), np.unique(edges, axis=0))
     made.body = made.stands[made.body].astype(np.int32)
-    made.tets = np.searchsorted(kept, stands)[made.tets].astype(np.int32)
+    places = np.searchsorted(kept, stands)
+    made.tets = places[made.tets].astype(np.int32)
+    made.read = {part: (mesh, places[nodes]) for part, (mesh, nodes) in made.read.items()}
     made.points, made.node_part, made.body = made.points[kept], made.node_part[kept], made.body[kept]
     return True

@@ -131,6 +131,9 @@ class Nodes:
     """Quanta per newton of ``force`` as it stands."""
     group: Indices = field(default_factory=lambda: np.zeros(0, np.int32))
     """(n,) see Model.groups; copies stay in that of their parents. (0,) where nobody asks."""
+    marks: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
+    """(n,) the sets of mesh files that each is in, a bit each (marks.py); copies are where their parents are. (0,)
+    where the case is on none."""
     shares: Shares = field(default_factory=Shares)
     """Of nodes of several parts."""
     _inherited: Rooms = field(
@@ -182,6 +185,8 @@ class Nodes:
             room[n:m] = column
         if len(self.group):
             self.group = extended(self.group, self.group[copies.parents])
+        if len(self.marks):
+            self.marks = extended(self.marks, self.marks[copies.parents])
         self._inherited.take(self, m)
         self._given.take(self, m)
 

@@ -42,7 +42,10 @@ def surveyed(case: Case, folder: Path, compiled: bool = True) -> Survey:
         facts.take(index, mesh)
         if mesh.origin is not None:
             placed.append((index, mesh.origin, turned(mesh.points, part.turn)))
-    loads = list(counting.loads(case, meshes))
+    try:
+        loads = list(counting.loads(case, meshes))
+    except ConoidError as error:
+        return Survey(parts=facts.parts, refused=[*refused, str(error)])
     refused += [*shared_nodes(case, placed), *counting.empty(case, loads)]
     if refused:
         return Survey(parts=facts.parts, loads=loads, refused=refused)

@@ -126,7 +126,7 @@ def test_second_order_tets_are_read_either_way(folder: Path) -> None:
 
 def test_another_kind_of_file_is_refused(tmp_path: Path) -> None:
     (tmp_path / "rod.stl").write_text("solid")
-    with pytest.raises(MeshError, match=r"'rod.stl': expected a file name that ends in .msh or .inp"):
+    with pytest.raises(MeshError, match=r"'rod.stl': expected a file name that ends in .msh, .inp, .k, "):
         read("rod.stl", tmp_path)
 
 

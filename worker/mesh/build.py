@@ -39,7 +39,7 @@ def build(
     name = _content(mesh, source, key) + ".npz"
     cached = cache_folder()
     found = load(cached / name)
-    if found is None:
+    if found is None or _changed(found):
         made()
         return _make_and_keep(mesh, source, cached / name, key, limits or Limits())
     with contextlib.suppress(OSError):
@@ -88,6 +88,18 @@ def _writable(target: Path) -> Iterator[Path]:
     yield target
     with contextlib.suppress(OSError):
         _trim(target.parent)
+
+
+def _changed(mesh: TetMesh) -> bool:
+    """Whether a file that the one of a mesh includes is another one now, or gone."""
+    for path, digest in mesh.origin.included if mesh.origin is not None else ():
+        try:
+            with whole.opened(path) as file:
+                if hashlib.file_digest(file, "sha256").hexdigest() != digest:
+                    return True
+        except OSError:
+            return True
+    return False
 
 
 def cache_folder() -> Path:

@@ -40,11 +40,13 @@ class Origin:
     """Where a mesh from a file comes from."""
 
     file: str
-    """sha256 of the bytes of the file."""
+    """sha256 of the bytes of the file, and of those that it includes."""
     nodes: Ids
     """(n,) a number of each node that no other node of the file has."""
     notes: tuple[str, ...] = ()
     """What of the file is not in the mesh, or is taken otherwise than one might think, a line each."""
+    included: tuple[tuple[str, str], ...] = ()
+    """Path and sha256 of each further file that was read for it."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,6 +1,7 @@
 """From the elements of a file to a mesh of tets: one for all formats."""
 
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 
@@ -28,6 +29,8 @@ class Content:
     """Elements with a volume, by places in these arrays; the order of places decides how faces are cut."""
     named: list[Named] = field(default_factory=list)
     notes: tuple[str, ...] = ()
+    included: tuple[Path, ...] = ()
+    """Other files that were read for it."""
 
 
 @dataclass(frozen=True, eq=False)

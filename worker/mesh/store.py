@@ -39,13 +39,15 @@ def load(path: Path) -> TetMesh | None:
 def _of_file(origin: Origin | None) -> dict[str, Any]:
     if origin is None:
         return {}
-    return {"sha256": np.array(origin.file), "nodes": origin.nodes, "notes": np.array(origin.notes, np.str_)}
+    arrays = {"sha256": np.array(origin.file), "nodes": origin.nodes, "notes": np.array(origin.notes, np.str_)}
+    return arrays | {"included": np.array(origin.included, np.str_).reshape(-1, 2)}
 
 
 def _origin(arrays: Mapping[str, NDArray[Any]]) -> Origin | None:
     if "sha256" not in arrays:
         return None
-    return Origin(str(arrays["sha256"]), arrays["nodes"], tuple(map(str, arrays["notes"])))
+    included = tuple((str(path), str(digest)) for path, digest in arrays["included"])
+    return Origin(str(arrays["sha256"]), arrays["nodes"], tuple(map(str, arrays["notes"])), included)
 
 
 def _of_sets(sets: tuple[NodeSet, ...]) -> dict[str, Any]:

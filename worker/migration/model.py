@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from conoid.cases.on import ons
 from conoid.cases.schema import MOST_PARTS, Case
 
 from .. import domain
@@ -19,7 +20,7 @@ _OF_TETS = ("across", "bond", "weakest", "worn")
 """Columns that a block has where the scene needs them."""
 
 
-def keep(model: Model) -> Parcel:
+def keep(model: Model, case: Case) -> Parcel:
     """A parcel with the nodes and tets of this rank."""
     nodes = model.nodes
     known = {
@@ -27,7 +28,7 @@ def keep(model: Model) -> Parcel:
         "part_starts": model.part_starts, "mean_volumes": model.mean_volumes, "size": model.size,
         "slack": model.slack, "rounding": model.rounding, "groups": model.groups, "scale": nodes.scale,
     }  # fmt: skip
-    columns = {name: getattr(nodes, name) for name in _NODAL}
+    columns = {name: getattr(nodes, name) for name in (*_NODAL, *(["marks"] if ons(case) else []))}
     tets = {b.part: _keep_block(b, nodes.id) for b in model.blocks if b.n}
     return Parcel(known, {}, columns, tets, _keep_shares(nodes) if len(nodes.shares.rank) else {})
 
@@ -57,7 +58,9 @@ def _keep_block(block: Block, ids: Ints) -> Table:
 def resume(case: Case, arrived: Arrived, comm: Comm) -> Model:
     """The model of what has arrived, whose tables are put in the order that tets and nodes have in it."""
     parcel, known = arrived.parcel, arrived.parcel.known
-    values: dict[str, Any] = {name: np.ascontiguousarray(parcel.nodes[name]) for name in _NODAL}
+    values: dict[str, Any] = {
+        name: np.ascontiguousarray(parcel.nodes[name]) for name in (*_NODAL, "marks") if name in parcel.nodes
+    }
     nodes = Nodes(owner=arrived.owner, owned=arrived.owner == comm.rank, scale=known["scale"], **values)
     nodes.shares = _resume_shares(case, parcel, nodes)
     blocks = []

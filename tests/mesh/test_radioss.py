@@ -1,0 +1,144 @@
+"""The reader of Radioss starter decks: two styles, parts and subsets, groups and surfaces, and what it refuses."""
+
+import math
+from pathlib import Path
+from random import Random
+
+import numpy as np
+import pytest
+
+from conoid.cases.bodies import MeshFile
+from conoid.worker.errors import MeshError
+from conoid.worker.mesh.cells import WEDGE6
+from conoid.worker.mesh.lookup import meant
+from conoid.worker.mesh.model import TetMesh
+from conoid.worker.mesh.read import read
+
+from .decks import Split, nodes_of, parts
+from .mixtures import Mixture, mixture
+
+
+def starter(truth: Mixture, split: Split, random: Random) -> str:
+    """HyperMesh or the examples of OpenRadioss: columns of names as comments, wedges as /PENTA6 or as bricks."""
+    text = [
+        "#RADIOSS STARTER",
+        "/BEGIN",
+        "lump",
+        "      2022         0",
+        " " * 18 + "kg" + " " * 18 + "mm",
+        "/UNIT/1",
+        "unit",
+    ]
+    text += ["/NODE", "#  node_ID" + " " * 19 + "X"] if random.random() < 0.5 else ["/NODE"]
+    text += [f"{k:10d}" + "".join(f"{x:20.12g}" for x in point) for k, point in enumerate(truth.points, 1)]
+    wedges = random.random() < 0.5
+    for part, numbers in split.items():
+        own = [n for n in numbers if wedges and truth.elements[n][0] is WEDGE6]
+        text += [f"/BRICK/{part}"] if len(own) < len(numbers) else []
+        text += ["".join(f"{n:10d}" for n in (n, *nodes_of(truth, n))) for n in numbers if n not in own]
+        text += [f"/PENTA6/{part}"] if own else []
+        text += ["".join(f"{k:10d}" for k in (n, *(node + 1 for node in truth.elements[n][1]))) for n in own]
+        text += [f"/PART/{part}", f"piece {part}", f"{1:10d}{1:10d}{3:10d}"]
+    text += ["/SUBSET/3", "all of it", "/MAT/ELAST/1", "steel", "/GRNOD/NODE/5", "CLAMP"]
+    some = list(range(1, len(truth.points) + 1, 2))
+    text += ["".join(f"{n:10d}" for n in some[k : k + 10]) for k in range(0, len(some), 10)]
+    return "\n".join([*text, "/SURF/PART/EXT/6", "SKIN", "".join(f"{n:10d}" for n in split), "/END", "more"])
+
+
+def taken(path: Path, group: str | None = None) -> TetMesh:
+    return read(MeshFile(shape="file", path=path.name, unit=1.0, group=group), path, "mesh")
+
+
+def test_starter_decks_have_the_volume_of_their_parts(tmp_path: Path) -> None:
+    for seed in range(20):
+        random, truth = Random(seed), mixture(seed)
+        split, path = parts(truth, random), tmp_path / f"r{seed}_0000.rad"
+        path.write_text(starter(truth, split, random))
+        volumes = truth.volumes()
+        for group, numbers in (
+            (None, volumes),
+            ("all of it", volumes),
+            *((f"piece {p}", each) for p, each in split.items()),
+        ):
+            expected = math.fsum(volumes[number] for number in numbers)
+            assert taken(path, group).volumes().sum() == pytest.approx(expected, rel=1e-6), f"{seed} {group}"
+        mesh = taken(path)
+        clamp, skin = meant(mesh.sets, "clamp"), meant(mesh.sets, "SKIN")
+        assert clamp is not None
+        assert skin is not None
+        assert skin.faces is not None
+        assert (len(clamp.nodes), len(skin.faces)) == (len(range(0, len(truth.points), 2)), len(truth.surface()))
+
+
+def row(*numbers: int) -> str:
+    return "".join(f"{n:10d}" for n in numbers) + "\n"
+
+
+NODES = "/NODE\n" + "".join(
+    f"{k:10d}{x:20g}{y:20g}{z:20g}\n"
+    for k, (x, y, z) in enumerate([(x, y, z) for z in (0, 1, 2) for y in (0, 1) for x in (0, 1)], 1)
+)
+BRICKS = f"/BRICK/1\n{row(10, 1, 2, 4, 3, 5, 6, 8, 7)}/BRICK/2\n{row(20, 5, 6, 8, 7, 9, 10, 12, 11)}"
+PARTS = f"/PART/1\nlower\n{row(1, 1, 7)}/PART/2\nupper\n{row(1, 1, 8)}/SUBSET/7\nboth\n{row(8)}/SUBSET/8\nhigh\n"
+TWO = NODES + BRICKS + PARTS
+
+
+@pytest.mark.parametrize(
+    ("more", "name", "many", "faces"),
+    [
+        (f"/GRNOD/PART/1\ngrip\n{row(2)}", "grip", 8, None),
+        (f"/GRNOD/SUBSET/1\n\n{row(8)}", "1", 8, None),
+        (f"/GRNOD/GENE/1\n\n{row(1, 3, 9, 12)}", "nodes:1", 7, None),
+        (f"/GRNOD/GRNOD/2\ng\n{row(1, -3)}/GRNOD/NODE/1\na\n{row(1, 2, 3)}/GRNOD/NODE/3\nb\n{row(3)}", "g", 2, None),
+        (f"/SURF/SEG/1\ntop\n{row(1, 9, 10, 12, 11)}", "top", 4, 2),
+        (f"/SURF/SEG/1\ntop\n{row(1, 9, 10, 12)}{row(2, 9, 12, 11, 11)}", "top", 4, 2),
+        (f"/SURF/SURF/4\nall\n{row(1)}/SURF/PART/1\nx\n{row(1, 2)}", "all", 12, 20),
+    ],
+)
+def test_groups_and_surfaces_are_read(more: str, name: str, many: int, faces: int | None, tmp_path: Path) -> None:
+    (tmp_path / "two_0000.rad").write_text(TWO + more)
+    found = meant(taken(tmp_path / "two_0000.rad").sets, name)
+    assert found is not None
+    assert (len(found.nodes), found.faces if found.faces is None else len(found.faces)) == (many, faces)
+
+
+@pytest.mark.parametrize(
+    ("group", "expected"), [("both", 2.0), ("high", 1.0), ("2", 1.0), ("subset:8", 1.0), (None, 2.0)]
+)
+def test_a_part_or_a_subset_is_chosen(group: str | None, expected: float, tmp_path: Path) -> None:
+    (tmp_path / "two.rad").write_text(TWO)
+    assert taken(tmp_path / "two.rad", group).volumes().sum() == pytest.approx(expected)
+
+
+def test_tets_are_read_in_one_line_and_in_two(tmp_path: Path) -> None:
+    corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    edges = ((0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3))
+    points = [*corners, *((corners[a] + corners[b]) / 2 for a, b in edges)]
+    nodes = "/NODE\n" + "".join(f"{k:10d}{x:20g}{y:20g}{z:20g}\n" for k, (x, y, z) in enumerate(points, 1))
+    for text in (f"/TETRA4/1\n{row(1, 1, 2, 3, 4)}", f"/TETRA10/1\n{row(1)}{row(*range(1, 11))}"):
+        (tmp_path / "tet.rad").write_text(nodes + text)
+        assert taken(tmp_path / "tet.rad").volumes().sum() == pytest.approx(1 / 6)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (TWO.replace(row(10, 1, 2, 4, 3, 5, 6, 8, 7), row(10, 5, 6, 8, 7, 1, 2, 4, 3)), r"hexahedron 10 \(line 15\)"),
+        (TWO.replace(row(20, 5, 6, 8, 7, 9, 10, 12, 11), row(20, 5, 6, 8, 7)), "line 17: an element of /BRICK with 4"),
+        (TWO.replace(row(20, 5)[:-1], row(10, 5)[:-1]), "element 10 is defined twice"),
+        (TWO.replace("        12", "        13", 1), r"hexahedron 20 \(line 17\) uses node 12, which is not defined"),
+        (TWO.replace("/NODE\n", "/NODE/3\n"), "line 1: /NODE/3: nodes in a unit of their own are not read"),
+        (f"#include mesh.inc\n{TWO}", "line 1: #include is not followed"),
+        (f"{TWO}/TRANSFORM/TRA/1\n", "line 29: /TRANSFORM is not followed"),
+        (f"{TWO}/NODES\n", "line 29: the keyword /NODES is not known; it could change the mesh"),
+        (f"{TWO}/PART/1\n", "line 29: /PART/1 is defined twice"),
+        (f"{TWO}/SPHCEL/1\n{row(30, 1)}", "1 lines of /SPHCEL, whose elements are not read"),
+        (TWO.replace("1" + " " * 19 + "0", "1" + " " * 19 + "x"), "line 2: .* has no three coordinates"),
+        ("hello\n", "line 1: 'hello' stands before the first keyword"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_read_is_refused_with_its_line(text: str, said: str, tmp_path: Path) -> None:
+    (tmp_path / "two.rad").write_text(text)
+    with pytest.raises(MeshError, match=rf"^mesh\.path = 'two.rad': {said}") as raised:
+        taken(tmp_path / "two.rad")
+    assert "\n" not in str(raised.value)

@@ -1,0 +1,45 @@
+"""The keywords of LS-DYNA, by what they mean to a mesh (Keyword User's Manual, volumes I to III)."""
+
+from collections.abc import Container
+
+from conoid.cases.cards import Block
+
+from ...errors import MeshError
+
+
+def _words(text: str) -> frozenset[str]:
+    return frozenset(text.split())
+
+
+SOLIDS = {"": 8, "ORTHO": 8, "DOF": 8, "H20": 20, "H27": 27}
+"""Options of ``*ELEMENT_SOLID`` that are read, and the nodes of an element."""
+FURTHER = {"ORTHO": 2, "DOF": 1}
+"""Cards that these have behind the nodes."""
+REFUSED = (
+    "NODE_TRANSFORM", "NODE_MERGE", "NODE_REFLECT", "PART_DUPLICATE", "PART_MOVE", "PART_STACKED", "ELEMENT_GENERATE",
+    "ELEMENT_SOLID", "ELEMENT_BLANKING", "STRUCTURED_MESH", "ALE_STRUCTURED_MESH", "MESH", "IGA",
+)  # fmt: skip
+"""Beginnings of keywords that make, move or join nodes and elements in ways that are not followed here."""
+VOLUMES = ("ELEMENT_TSHELL", "ELEMENT_SPH", "ELEMENT_LANCING")
+"""Elements with a volume, or particles, that are not read."""
+JOINING = ("CONSTRAINED", "CONTACT", "RIGIDWALL", "RIGID", "ELEMENT_MASS", "ELEMENT_INERTIA")
+"""Beginnings of keywords that join bodies, hold them, or give them mass. None of it is done here."""
+FAMILIES = _words(
+    """
+    AIRBAG ALE BATTERY BOUNDARY CASE CHEMISTRY CESE COMMENT COMPONENT CONSTRAINED CONTACT CONTROL CPM DAMPING DATABASE
+    DEFINE DEFORMABLE DEM DUALCESE EF ELEMENT EM END EOS FATIGUE FREQUENCY HOURGLASS ICFD INITIAL INTEGRATION INTERFACE
+    KEYWORD LOAD LSO MAT MODULE NODE PARAMETER PART PARTICLE PERTURBATION RAIL RIGID RIGIDWALL RVE SECTION SENSOR SET
+    STOCHASTIC TERMINATION TITLE UNIT USER
+    """
+)
+"""First words of keywords. One that is not listed is an error: it could make or move nodes."""
+
+
+def refuse(block: Block, read: Container[str]) -> None:
+    """MeshError for a keyword that is not ``read`` and could change the mesh."""
+    if block.name in read:
+        return
+    if block.name.startswith(REFUSED):
+        raise MeshError(f"{block.place()}: *{block.name} is not followed; write the nodes and elements out")
+    if block.name.partition("_")[0] not in FAMILIES:
+        raise MeshError(f"{block.place()}: the keyword *{block.name} is not known; it could change the mesh")

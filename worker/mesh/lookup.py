@@ -1,0 +1,54 @@
+"""The set of a mesh file that a case means by a name."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..errors import MeshError
+from .model import NodeSet
+
+_KINDS = {"nodes": False, "surface": True}
+"""Words before a colon that say which of two kinds is meant."""
+_SHOWN = 20
+"""Names in a message. Chosen: three lines of a terminal."""
+
+
+def meant(sets: Sequence[NodeSet], name: str) -> NodeSet | None:
+    """The set; None where there is none of this name. Several that are the same are one, and those without a node of
+    the mesh are no others. Raises MeshError for a name that means two things.
+    """
+    found = _called(sets, name)
+    if not found and (kind := name.partition(":"))[0] in _KINDS:
+        found = [each for each in _called(sets, kind[2]) if (each.faces is not None) == _KINDS[kind[0]]]
+    here = sorted((each for each in found if len(each.nodes)), key=lambda each: each.faces is None)
+    for other in here[1:]:
+        if not _same(here[0], other):
+            kinds = {each.faces is None for each in here}
+            way = f"write 'nodes:{name}' or 'surface:{name}'" if len(kinds) == 2 else "write its owner, a dot and it"
+            raise MeshError(f"means {len(here)} sets that differ; {way}")
+    return next(iter(here or found), None)
+
+
+def _called(sets: Sequence[NodeSet], name: str) -> list[NodeSet]:
+    """By name; of each kind in another case where none is called exactly so."""
+    found = list[NodeSet]()
+    for surfaces in (True, False):
+        kind = [each for each in sets if (each.faces is not None) == surfaces]
+        exact = [each for each in kind if name in each.names]
+        found += exact or [each for each in kind if name.casefold() in (word.casefold() for word in each.names)]
+    return found
+
+
+def _same(one: NodeSet, other: NodeSet) -> bool:
+    if not np.array_equal(one.nodes, other.nodes):
+        return False
+    if one.faces is None or other.faces is None:
+        return True
+    ours, theirs = (np.unique(np.sort(each, axis=1), axis=0) for each in (one.faces, other.faces))
+    return np.array_equal(ours, theirs)
+
+
+def known(sets: Sequence[NodeSet]) -> str:
+    """The names that there are, for messages."""
+    names = list(dict.fromkeys(each.names[0] for each in sets))
+    return ", ".join([*names[:_SHOWN], *(["..."] if len(names) > _SHOWN else [])]) or "none"

@@ -1,0 +1,1 @@
+"""Radioss starter decks: blocks, what the deck defines, groups and surfaces, and the mesh that is chosen of it."""

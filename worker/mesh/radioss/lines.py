@@ -1,0 +1,109 @@
+"""The text of a Radioss starter deck: blocks that begin with ``/``, and their lines.
+
+Rules of the Altair Radioss Reference Guide, "Starter input": a line that begins with ``/`` is a keyword, its words
+divided by ``/``; one that begins with ``#`` or ``$`` is a comment; fields are 10 columns wide for whole numbers and 20
+for others.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from conoid.cases.included import lines
+from conoid.cases.problems import shown
+
+from ...errors import MeshError
+
+NUMBER, REAL = 10, 20
+"""Columns of a whole number and of another one."""
+_LARGEST = 2**53
+"""Whole numbers are below it."""
+
+
+@dataclass
+class Block:
+    """A keyword: its words in upper case, the line where it stands, and the lines below it with their numbers."""
+
+    words: list[str]
+    line: int
+    rows: list[tuple[int, str]] = field(default_factory=list)
+
+    @property
+    def kind(self) -> str:
+        """The words before the first number: ``GRNOD/NODE``."""
+        names = [word for word in self.words if not word.isdecimal()]
+        return "/".join(names)
+
+    @property
+    def id(self) -> int:
+        """The first number among the words. Raises MeshError where there is none."""
+        found = next((word for word in self.words if word.isdecimal()), None)
+        if found is None or not 0 < int(found) < _LARGEST:
+            raise MeshError(f"line {self.line}: /{'/'.join(self.words)} has no number")
+        return int(found)
+
+    def titled(self) -> tuple[str, list[tuple[int, str]]]:
+        """The title, which is the first line, and the lines below it that are not empty."""
+        title = self.rows[0][1].strip() if self.rows else ""
+        return title, [(number, text) for number, text in self.rows[1:] if text.strip()]
+
+
+def blocks(path: Path) -> Iterator[Block]:
+    """All of a deck up to ``/END``. Raises MeshError."""
+    block: Block | None = None
+    try:
+        for number, text in lines(path):
+            if text[:8].lower() == "#include":
+                raise MeshError(f"line {number}: #include is not followed; write the nodes and elements out")
+            if text.startswith(("#", "$")):
+                continue
+            if text.startswith("/"):
+                if block is not None:
+                    yield block
+                block = Block([word.strip().upper() for word in text.strip().strip("/").split("/")], number)
+                if block.words == ["END"]:
+                    return
+            elif block is not None:
+                block.rows.append((number, text))
+            elif text.strip():
+                raise MeshError(f"line {number}: {shown(text.strip())} stands before the first keyword")
+    except ValueError as error:
+        raise error if isinstance(error, MeshError) else MeshError(str(error)) from None
+    if block is None:
+        raise MeshError("the file has no keyword; this is no starter deck")
+    yield block
+
+
+def wholes(line: int, text: str) -> list[int]:
+    """The whole numbers of a line of fields of 10 columns; 0 for an empty one. Raises MeshError."""
+    if "\t" in text:
+        raise MeshError(f"line {line}: a tab among fields of fixed widths; write blanks")
+    items = [text[k : k + NUMBER].strip() for k in range(0, len(text.rstrip()), NUMBER)]
+    for item in items:
+        if (item and not item.removeprefix("-").isdecimal()) or len(item) > NUMBER:
+            raise MeshError(f"line {line}: {shown(item)} is not a whole number (fields have 10 columns)")
+    return [int(item or 0) for item in items]
+
+
+def number(line: int, text: str, what: str) -> int:
+    """A number of a node, an element or a part, which is above 0. Raises MeshError."""
+    found = wholes(line, text[:NUMBER])
+    if not found or not 0 < found[0] < _LARGEST:
+        raise MeshError(f"line {line}: {shown(text[:NUMBER].strip())} is no number of {what}; the first one is 1")
+    return found[0]
+
+
+def point(line: int, text: str) -> list[float]:
+    """Three coordinates in fields of 20 columns behind the number of a node. Raises MeshError."""
+    items = [text[k : k + REAL].strip() for k in range(NUMBER, NUMBER + 3 * REAL, REAL)]
+    if "\t" in text or text[NUMBER + 3 * REAL :].strip():
+        raise MeshError(f"line {line}: a node has a number of 10 columns and three coordinates of 20")
+    try:
+        if any("_" in item for item in items):
+            raise ValueError
+        return [float(item.translate(_D)) if item else 0.0 for item in items]
+    except ValueError:
+        raise MeshError(f"line {line}: {shown(text.strip())} has no three coordinates (fields of 20 columns)") from None
+
+
+_D = str.maketrans("dD", "ee")

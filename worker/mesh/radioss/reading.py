@@ -1,0 +1,181 @@
+"""The elements that a case takes from a Radioss starter deck: all with a volume, or those of a part or a subset."""
+
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from ...errors import MeshError
+from ..cells import HEX8, TET4, TET10, WEDGE6, Cells, Form, Kind, cells, sides
+from ..model import Ids
+from ..named import placed, refuse_repeated
+from ..sets import Named, surface
+from ..solid import Content
+from .deck import KNOWN, Deck, Group
+
+_KINDS = {"BRICK": HEX8, "TETRA4": TET4, "TETRA10": TET10, "PENTA6": WEDGE6, "BRIC20": Kind(Form.HEXAHEDRON, 20)}
+_DEEPEST = 20
+"""Groups within groups, and subsets within subsets. Chosen: nobody has more than five."""
+
+
+def read_radioss(path: Path, group: str | None, key: str) -> Content:
+    """The elements of a starter deck that have a volume, all or those that ``group`` names, and its groups of nodes and
+    surfaces as sets.
+
+    ``group`` is a part, or a subset with those within it, by title or number; a number alone is that of a part, where
+    there is one. Raises MeshError, with the number of the line where there is one.
+    """
+    deck = Deck(path)
+    numbers = np.array(deck.nodes, np.int64)
+    order = np.argsort(numbers, kind="stable")
+    reader = _Reader(deck, numbers[order])
+    refuse_repeated("node", reader.tags)
+    refuse_repeated("element", np.concatenate([_NONE, *(each.numbers for each in reader.cells)]))
+    wanted = None if group is None else reader.parts(group, key)
+    chosen = [each.of(np.isin(of, wanted)) if wanted is not None else each for each, of in reader.both()]
+    if group is None and deck.volumes:
+        word, many = deck.volumes.most_common(1)[0]
+        raise MeshError(f"{many} lines of /{word}, whose elements are not read; choose a part without them by group")
+    named, told = reader.named()
+    points = np.array(deck.points).reshape(-1, 3)[order]
+    return Content(reader.tags, points, chosen, named, (*_notes(deck, chosen), *told))
+
+
+_NONE = np.zeros(0, np.int64)
+
+
+class _Reader:
+    """The arrays of a deck, and what its groups mean."""
+
+    def __init__(self, deck: Deck, tags: Ids) -> None:
+        self.deck, self.tags = deck, tags
+        self.cells = [self._cells(word) for word in deck.solids]
+        self.of = [np.array(rows.parts, np.int64) for rows in deck.solids.values()]
+
+    def _cells(self, word: str) -> Cells:
+        rows = self.deck.solids[word]
+        arrays = (np.array(each, np.int64) for each in (rows.numbers, rows.nodes, rows.lines))
+        made = cells(_KINDS[word], *arrays)
+        return cells(made.kind, made.numbers, placed(self.tags, made.nodes, made.called), made.lines)
+
+    def both(self) -> Iterator[tuple[Cells, Ids]]:
+        """Elements and their parts."""
+        return zip(self.cells, self.of, strict=True)
+
+    def parts(self, group: str, key: str) -> Ids:
+        """The parts that a name means. Raises MeshError for none, or for two things that differ."""
+        word, colon, name = group.partition(":")
+        kinds = [word] if colon and word in ("part", "subset") else ["part", "subset"]
+        name = name if len(kinds) == 1 and colon else group
+        found = [each for kind in kinds for each in self._called(kind, name)]
+        if name.isdecimal() and found:
+            found = found[:1]
+        if not found:
+            known = [title or str(n) for n, title in self.deck.titles.items()]
+            known += [f"subset:{title or n}" for n, (title, _) in self.deck.subsets.items()]
+            raise MeshError(f"{key}.group = {group!r}: no such part or subset; known: {', '.join(known) or 'none'}")
+        if any(set(each) != set(found[0]) for each in found[1:]):
+            way = f"write 'part:{name}' or 'subset:{name}', or its number"
+            raise MeshError(f"{key}.group = {group!r}: the title of several parts or subsets, which differ; {way}")
+        return np.array(sorted(found[0]), np.int64)
+
+    def _called(self, kind: str, name: str) -> list[set[int]]:
+        if kind == "part":
+            known = {int(each): "" for of in self.of for each in np.unique(of)} | self.deck.titles
+            return [{number} for number in _named(known, name)]
+        titles = {number: title for number, (title, _) in self.deck.subsets.items()}
+        return [self.within(number) for number in _named(titles, name)]
+
+    def within(self, subset: int, depth: int = 0) -> set[int]:
+        """The parts of a subset and of those within it. Raises MeshError."""
+        if subset not in self.deck.subsets or depth > _DEEPEST:
+            raise MeshError(f"the subset {subset} {'is not defined' if depth <= _DEEPEST else 'is within itself'}")
+        own = {part for part, of in self.deck.subset_of.items() if of == subset}
+        return own.union(*(self.within(each, depth + 1) for each in self.deck.subsets[subset][1]))
+
+    def named(self) -> tuple[list[Named], list[str]]:
+        """Groups of nodes and surfaces, and what of them is not read."""
+        found, told = list[Named](), list[str]()
+        for (word, number), group in self.deck.groups.items():
+            names = tuple(filter(None, (group.title, str(number))))
+            try:
+                if word == "GRNOD":
+                    found.append(Named(names, self._nodes(number)))
+                else:
+                    found.append(surface(names, self._faces(number), free="SEG" not in group.kind))
+            except MeshError as error:
+                told.append(f"a group is not read: {error}")
+        return found, told
+
+    def _group(self, word: str, number: int, depth: int) -> Group:
+        group = self.deck.groups.get((word, number))
+        if group is None or depth > _DEEPEST:
+            raise MeshError(f"/{word} {number} {'is not defined' if group is None else 'is within itself'}")
+        if group.kind not in KNOWN:
+            raise MeshError(f"/{group.kind}/{number} is a kind that is not followed")
+        return group
+
+    def _nodes(self, number: int, depth: int = 0) -> Ids:
+        """Places of the nodes of a group; a number below zero takes away."""
+        group, found = self._group("GRNOD", number, depth), np.zeros(len(self.tags), bool)
+        for _, row in group.rows:
+            if group.kind == "GRNOD/GENE":
+                for first, last in zip(row[::2], row[1::2], strict=False):
+                    found |= (self.tags >= first) & (self.tags <= last) & (first > 0)
+                continue
+            for each in filter(None, row):
+                found[self._some(group.kind.partition("/")[2], abs(each), depth)] = each > 0
+        return np.flatnonzero(found).astype(np.int64)
+
+    def _some(self, kind: str, number: int, depth: int) -> Ids:
+        if kind in ("NODE", "NODENS"):
+            return np.flatnonzero(self.tags == number)
+        if kind == "GRNOD":
+            return self._nodes(number, depth + 1)
+        if kind == "SURF":
+            return np.concatenate([_NONE, *(each.ravel() for each in self._faces(number, depth + 1))])
+        parts = sorted({number} if kind == "PART" else self.within(number))
+        return np.concatenate([_NONE, *(each.nodes[np.isin(of, parts)].ravel() for each, of in self.both())])
+
+    def _faces(self, number: int, depth: int = 0) -> list[Ids]:
+        """Corners (n, 3) and (n, 4) of the faces of a surface: of parts all that their elements have."""
+        group, found = self._group("SURF", number, depth), list[Ids]()
+        if group.kind == "SURF/SEG":
+            rows = [(line, [*row[1:], 0, 0, 0, 0][:4]) for line, row in group.rows]
+            corners = np.array([row for _, row in rows], np.int64).reshape(-1, 4)
+            corners[:, 3] = np.where(corners[:, 3] == 0, corners[:, 2], corners[:, 3])
+            return [placed(self.tags, corners, lambda k: f"line {rows[k][0]}: a segment")]
+        for each in (each for _, row in group.rows for each in row if each):
+            if each < 0:
+                raise MeshError(f"/{group.kind}/{number} takes a part away, which is not followed")
+            if group.kind == "SURF/SURF":
+                found += self._faces(each, depth + 1)
+                continue
+            parts = sorted({each} if "PART" in group.kind else self.within(each))
+            for some, of in self.both():
+                chosen = some.corners[np.isin(of, parts)]
+                found += [chosen[:, side] for side in sides(some.kind.form)]
+        return found
+
+
+def _named(titles: dict[int, str], name: str) -> list[int]:
+    exact = [number for number, title in titles.items() if name in (title, str(number))]
+    return exact or [number for number, title in titles.items() if title.casefold() == name.casefold()]
+
+
+def _notes(deck: Deck, chosen: list[Cells]) -> Iterator[str]:
+    """What of the deck is not in the mesh, or is taken otherwise, in a line each."""
+    if deck.passed:
+        yield f"elements that carry no volume are skipped: {_listed(deck.passed)}"
+    if deck.volumes:
+        yield f"elements that cannot be read are outside of the group: {_listed(deck.volumes)}"
+    if deck.joining:
+        yield f"keywords that join, hold or load bodies are passed over: {_listed(deck.joining)}"
+    for each in chosen:
+        if each.kind.nodes > 10 and len(each.numbers):
+            yield f"{len(each.numbers):,} hexahedra of {each.kind.nodes} nodes are taken by their corners"
+
+
+def _listed(counts: Counter[str]) -> str:
+    return ", ".join(f"{many} /{word}" for word, many in sorted(counts.items()))
