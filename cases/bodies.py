@@ -200,8 +200,8 @@ class Shards(Loose):
 
 
 class MeshFile(Model):
-    """A mesh made elsewhere: gmsh .msh 4.1 or 2.2, Abaqus .inp, LS-DYNA .k, .key or .dyn, Radioss .rad. ``unit`` is the
-    length unit of its coordinates.
+    """A mesh made elsewhere: gmsh .msh 4.1 or 2.2, Abaqus .inp, LS-DYNA .k, .key or .dyn, Radioss .rad, VTK
+    .vtu. ``unit`` is the length unit of its coordinates.
     """
 
     shape: Literal["file"]

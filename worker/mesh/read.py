@@ -21,6 +21,7 @@ from .msh.reading import read_msh
 from .radioss.reading import read_radioss
 from .scale import scaled
 from .solid import Content, solid
+from .vtu.reading import read_vtu
 
 
 def read(file: MeshFile, path: Path, key: str = "mesh") -> TetMesh:
@@ -31,6 +32,7 @@ def read(file: MeshFile, path: Path, key: str = "mesh") -> TetMesh:
     readers: dict[str, Callable[[Path, str | None, str], Content]] = {
         ".msh": read_msh, ".inp": read_inp, ".k": read_keyword, ".key": read_keyword, ".dyn": read_keyword,
         ".rad": read_radioss,
+        ".vtu": read_vtu,
     }  # fmt: skip
     if path.suffix.lower() not in readers:
         raise MeshError(f"{key}.path = {file.path!r}: expected a file name that ends in {', '.join(readers)}")

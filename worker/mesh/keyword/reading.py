@@ -39,8 +39,8 @@ def read_keyword(path: Path, group: str | None, key: str) -> solid.Content:
     content = _content(deck, tags, every)
     refuse_repeated("element", content.numbers)
     wanted = np.ones(len(content.numbers), bool) if group is None else content.chosen(group, key)
-    ends = np.cumsum([len(each.numbers) for each in every])[:-1]
-    chosen = [each.of(some) for each, some in zip(every, np.split(wanted, ends), strict=True)]
+    ends = np.cumsum([len(each.numbers) for each in every])
+    chosen = [each.of(some) for each, some in zip(every, np.split(wanted, ends)[:-1], strict=True)]
     if group is None and deck.volumes:
         name, many = deck.volumes.most_common(1)[0]
         raise MeshError(f"{many} cards of *{name}, whose elements are not read; choose a part without them by group")
