@@ -2,9 +2,10 @@
 
 from collections.abc import Iterator
 
+from .on import parts
 from .problems import Location, Problem, problem
 from .rigid import tensor_problems
-from .schema import Case, Part, Prescribed, Traction
+from .schema import Case, Part, Prescribed, Rotation, Traction
 
 
 def check_rigid(case: Case) -> Iterator[Problem]:
@@ -39,13 +40,18 @@ def _part(part: Part, location: Location) -> Iterator[Problem]:
 
 
 def _boundaries(case: Case) -> Iterator[Problem]:
-    names = [case.parts[i].name for i in case.rigid]
+    rigid = [case.parts[i] for i in case.rigid]
     for k, boundary in enumerate(case.boundaries):
-        held = [name for name in names if not boundary.parts or name in boundary.parts]
+        on_set = isinstance(boundary, Prescribed | Rotation | Traction) and boundary.on is not None
+        meant = parts(case, boundary) if isinstance(boundary, Prescribed | Rotation | Traction) and on_set else rigid
+        held = [part.name for part in rigid if (not boundary.parts or part.name in boundary.parts) and part in meant]
         if not held:
             continue
         if isinstance(boundary, Traction):
             message = f"acts on the rigid part {held[0]!r}, which takes no traction; name the other parts in parts"
+            yield problem(("boundaries", k), ..., message)
+        elif on_set:
+            message = f"drives a set of the rigid part {held[0]!r}; drive all of it, without on"
             yield problem(("boundaries", k), ..., message)
         elif isinstance(boundary, Prescribed) and boundary.low is not None:
             message = f"drives a box of the rigid part {held[0]!r}; drive all of it, without low and high"

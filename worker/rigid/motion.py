@@ -35,7 +35,7 @@ class Held:
         """By the boundaries that hold the ``part``."""
         found = cls()
         for boundary in case.boundaries:
-            if not boundary.parts or part.name in boundary.parts:
+            if getattr(boundary, "on", None) is None and (not boundary.parts or part.name in boundary.parts):
                 found._take(boundary)
         return found
 
