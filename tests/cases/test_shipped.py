@@ -18,6 +18,8 @@ from conoid.cases.schema import Case, Prescribed, Reference
 from .one_dimension import broken_rod
 
 NAMES = sorted(shipped())
+OF_FILES = ["imported_taylor"]
+"""Cases whose mesh is read from a file, which nothing of the contract opens."""
 TAYLOR = ["demo", "taylor_42crmo4", "taylor_copper", "taylor_copper_split"]
 
 
@@ -43,7 +45,7 @@ def test_a_shipped_case_is_sound_and_explains_itself(name: str) -> None:
     assert parse_json(resolved_json(case)).model_copy(update={"materials": case.materials}) == case
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", [name for name in NAMES if name not in OF_FILES])
 def test_a_shipped_case_runs_in_minutes(name: str) -> None:
     cost = estimate(load(name)).core_seconds
     assert cost is not None

@@ -1,6 +1,6 @@
 """Writes the deck of the shipped case ``imported_taylor``: a quarter of the copper Taylor bar, in mm, t, s.
 
-``python -m tests.client.taylor_deck cases/shipped/imported_taylor.k`` makes it again; ``.inp`` is the same for Abaqus.
+``python -m tests.client.taylor_deck cases/shipped/imported_taylor.inp`` makes it again; ``.k`` is the same for LS-DYNA.
 """
 
 import sys

@@ -8,11 +8,13 @@ from typing import Any
 
 import pytest
 
+from conoid.cases.load import shipped_path
 from conoid.client.decks.importing import Imported, lines, read_deck, report
 from conoid.client.decks.toml import bare
 from conoid.client.errors import UsageError
 
 from .deck_texts import DECKS, FOLDER, abaqus, lsdyna, r20, radioss, read, row
+from .taylor_deck import abaqus_text
 
 UNITS = {"cae_taylor.inp": "mm,s,t"}
 STEEL = ("*MAT_ELASTIC", row(1, "7.85E-9", 210000.0, 0.3))
@@ -260,3 +262,11 @@ def test_a_rigid_body_is_rigid_and_held_as_its_material_says(
 def test_a_rigid_body_that_turns_about_one_axis_alone_refuses(tmp_path: Path) -> None:
     found = read(tmp_path, "a.k", lsdyna("*MAT_RIGID", row(1, "7.85E-9", 2.1e5, 0.3), row(1, 3, 4)))
     assert any("CON1 = 3" in line for line in found.refusals)
+
+
+def test_the_shipped_case_is_what_the_import_makes_of_its_deck() -> None:
+    case = shipped_path("imported_taylor")
+    written = tomllib.loads(case.read_text(encoding="utf-8"))
+    found = read_deck(case.with_suffix(".inp"), "mm,t,s")
+    assert bare(found.data) == {key: value for key, value in written.items() if key not in ("description", "reference")}
+    assert case.with_suffix(".inp").read_text(encoding="utf-8") == abaqus_text(1.08e-3)

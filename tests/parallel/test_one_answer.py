@@ -34,6 +34,7 @@ SHORT = {
     "glass_ball_jh2": "2 us",
     "glass_steel_demo": "4 us",
     "hertz_spheres": "0.2 us",
+    "imported_taylor": "1.5 us",
     "long_rod": "2 us",
     "newton_cradle": "2 us",
     "plastic_bar_wave": "1.5 us",
