@@ -70,8 +70,9 @@ class Walls:
         return self.shapes.point.copy(), self.speed.copy()
 
     def resume(self, known: tuple[Floats, Floats]) -> None:
-        """Takes it back."""
-        self.shapes.point[:], self.speed[:] = known
+        """Takes it back; of no wall a checkpoint has arrays without rows."""
+        point, speed = known
+        self.shapes.point[:], self.speed[:] = np.reshape(point, (-1, 3)), np.reshape(speed, self.speed.shape)
 
     def words(self) -> bytes:
         """Of the digest: of those that move."""
