@@ -8,7 +8,7 @@ import pytest
 from conoid.cases import layout
 from conoid.cases.outcome import from_json
 
-from ..client.taylor_deck import abaqus_text
+from ..client.taylor_deck import abaqus_text, lsdyna_text
 from .launching import command, ended
 
 SIZE, END = 1.6e-3, "6.0E-6"
@@ -41,6 +41,7 @@ axis = "y"
 end_time = "6 us"
 frames = {frames}
 """
+WALL = '[[boundaries]]\nkind = "wall"\npoint = ["0 m", "0 m", "0 m"]\nnormal = [0, 0, 1]\n'
 PLANE = '[[boundaries]]\nkind = "symmetry"\naxis = "z"\n'
 
 
@@ -54,8 +55,8 @@ def digest(folder: Path, case: Path, ranks: int) -> str:
 
 @pytest.mark.parametrize(
     ("kind", "text", "group", "wall", "frames"),
-    [("inp", abaqus_text(SIZE, END), "ROD", PLANE, 20)],
-    ids=["abaqus"],
+    [("k", lsdyna_text(SIZE, END), "1", WALL, 2), ("inp", abaqus_text(SIZE, END), "ROD", PLANE, 20)],
+    ids=["lsdyna", "abaqus"],
 )
 def test_an_imported_taylor_bar_is_the_one_written_by_hand(
     tmp_path: Path, kind: str, text: str, group: str, wall: str, frames: int
