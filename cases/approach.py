@@ -3,11 +3,11 @@
 import math
 from collections.abc import Iterator
 
-from .bodies import MeshFile
 from .geometry import Vector, lowest_along
 from .placed import Placed
 from .problems import Problem, problem
 from .schema import Case, Part, Symmetry, Wall
+from .solids import Measured
 
 Bounds = tuple[Vector, Vector]
 
@@ -56,7 +56,7 @@ def _gap(box: Bounds, other: Bounds) -> float:
 
 
 def _box(part: Part) -> Bounds | None:
-    if isinstance(part.mesh, MeshFile) or part.spin is not None or part.stretch is not None or part.jitter > 0.0:
+    if isinstance(part.mesh, Measured) or part.spin is not None or part.stretch is not None or part.jitter > 0.0:
         return None
     return Placed(part.mesh, part.turn).bounds()
 
@@ -82,7 +82,7 @@ def _arrival(part: Part, wall: Wall) -> float:
     length = math.hypot(*way)
     normal = (way[0] / length, way[1] / length, way[2] / length)
     closing = -sum(n * v for n, v in zip(normal, part.velocity, strict=True))
-    if closing <= 0.0 or isinstance(part.mesh, MeshFile):
+    if closing <= 0.0 or isinstance(part.mesh, Measured):
         return math.inf
     level = sum(n * x for n, x in zip(normal, wall.point, strict=True))
     return 0.0 if part.turn is not None else max(0.0, (lowest_along(part.mesh, normal) - level) / closing)

@@ -4,7 +4,7 @@ import itertools
 import math
 from collections.abc import Iterator
 
-from .bodies import Box, Loose, MeshFile, Plate, Tube
+from .bodies import Box, Loose, Plate, Tube
 from .drives import clash
 from .geometry import Vector, index, lowest_along
 from .idle import idle
@@ -14,6 +14,7 @@ from .problems import Location, Problem, problem
 from .region import GENERATED
 from .schema import Case, Gravity, Part, Prescribed, Rotation, Symmetry, Traction, Wall
 from .similar import choices, nearest
+from .solids import Measured
 
 ROUNDING = 1e-9
 """Of a length or a time: two numbers that agree to this were meant to be equal. Chosen far above the rounding of
@@ -43,7 +44,7 @@ def _out_of_reach(case: Case, number: int) -> Iterator[Problem]:
     """
     boundary = case.boundaries[number]
     parts = [part for part in case.parts if not boundary.parts or part.name in boundary.parts]
-    known = {part.name: Placed(part.mesh, part.turn) for part in parts if not isinstance(part.mesh, MeshFile | Loose)}
+    known = {part.name: Placed(part.mesh, part.turn) for part in parts if not isinstance(part.mesh, Measured | Loose)}
     if not known or len(known) < len(parts):
         return
     bodies = [body.bounds() for body in known.values()]
@@ -207,7 +208,7 @@ def _behind(case: Case, number: int, point: Vector, way: Vector, parts: tuple[st
     normal = (way[0] / length, way[1] / length, way[2] / length)
     level = sum(n * x for n, x in zip(normal, point, strict=True))
     for part in case.parts:
-        if isinstance(part.mesh, MeshFile) or part.turn is not None or (parts and part.name not in parts):
+        if isinstance(part.mesh, Measured) or part.turn is not None or (parts and part.name not in parts):
             continue
         depth = level - lowest_along(part.mesh, normal)
         if depth > GENERATED * max(abs(x) for corner in Placed(part.mesh).bounds() for x in corner):

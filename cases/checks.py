@@ -7,9 +7,10 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
-from .bodies import MeshFile
+from .bodies import Mesh
 from .bond_checks import check_bonds
 from .boundary_checks import ROUNDING, check_boundaries, check_walls
+from .combined import cut_by
 from .geometry import AXES, centre, cut_directions, whole_bounds
 from .library import library
 from .materials import Material, Strength
@@ -21,6 +22,7 @@ from .problems import Location, Problem, dotted, problem
 from .rigid_checks import check_rigid
 from .schema import MOST_PARTS, Case, Contact, Erosion, Part, Reference, Symmetry, Wall
 from .similar import choices, nearest
+from .solids import Measured, Solid
 
 NEEDED: dict[str, frozenset[str]] = {
     "extent": frozenset({"part", "axis"}),
@@ -110,10 +112,9 @@ def _parts(case: Case) -> Iterator[Problem]:
         if part.erosion is not None:
             yield from _erosion(part.erosion, part.material, law, ("parts", i, "erosion"))
         yield from _fracture(part, known[part.material], ("parts", i, "fracture"))
-        if part.turn is not None and not isinstance(part.mesh, MeshFile) and part.mesh.sector != "full":
-            yield problem(
-                ("parts", i, "turn"), ..., f"a {part.mesh.sector} of a body cannot be turned; model all of it"
-            )
+        sector = getattr(part.mesh, "sector", "full")
+        if part.turn is not None and sector != "full":
+            yield problem(("parts", i, "turn"), ..., f"a {sector} of a body cannot be turned; model all of it")
 
 
 def _erosion(spec: Erosion, name: str, law: Strength | None, location: Location) -> Iterator[Problem]:
@@ -147,16 +148,22 @@ def _sectors(case: Case) -> Iterator[Problem]:
     """The planes along which a half or quarter body was cut need their symmetry boundary."""
     for i, part in enumerate(case.parts):
         mesh = part.mesh
-        if isinstance(mesh, MeshFile):
-            continue
-        for d in cut_directions(mesh, mesh.axis):
-            at, low = centre(mesh)[d], whole_bounds(mesh)[0][d]
-            if low < at and not any(_holds(boundary, part, d, at) for boundary in case.boundaries):
+        for d, at in _cuts(mesh):
+            if not any(_holds(boundary, part, d, at) for boundary in case.boundaries):
                 message = (
                     f"needs a boundary with kind = 'symmetry', axis = {AXES[d]!r}, at = {at:g} "
                     f"for part {part.name!r}, or sector = 'full'"
                 )
-                yield problem(("parts", i, "mesh", "sector"), mesh.sector, message)
+                yield problem(("parts", i, "mesh", "sector"), getattr(mesh, "sector", ...), message)
+
+
+def _cuts(mesh: Mesh) -> Iterator[tuple[int, float]]:
+    """The planes at which a body is cut: their directions, and where they stand, m."""
+    if isinstance(mesh, Solid):
+        yield from ((d, mesh.centre[d]) for d in cut_by(mesh.sector, mesh.axis))
+    elif not isinstance(mesh, Measured):
+        whole, at = whole_bounds(mesh)[0], centre(mesh)
+        yield from ((d, at[d]) for d in cut_directions(mesh, mesh.axis) if whole[d] < at[d])
 
 
 def _holds(boundary: object, part: Part, direction: int, at: float) -> bool:

@@ -5,7 +5,6 @@ from collections.abc import Iterator
 from itertools import chain, combinations, islice, pairwise
 from typing import NamedTuple
 
-from .bodies import MeshFile
 from .boundaries import Course, Prescribed, Wall
 from .drives import motions
 from .geometry import AXES, Generated, Vector, bounds, index, lowest_along
@@ -13,6 +12,7 @@ from .loaded import near
 from .placed import Placed
 from .problems import Problem, problem
 from .schema import Case, Part
+from .solids import Measured
 
 _TIMES = 200
 """Times up to the end at which is looked. Chosen: a millisecond for the way of a body."""
@@ -108,7 +108,7 @@ def _driven(case: Case) -> Iterator[Driven]:
     for number, drive in case.boundaries_of(Prescribed):
         for part in case.parts:
             mesh, steady = part.mesh, part.turn is None and part.spin is None and part.stretch is None
-            if steady and not isinstance(mesh, MeshFile) and _drives(drive, part):
+            if steady and not isinstance(mesh, Measured) and _drives(drive, part):
                 drives = [drive, *(each for each in whole if _drives(each, part))]
                 yield Driven(number, drive, part, mesh, list(_ways(case, drives, part)))
 

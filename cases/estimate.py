@@ -10,6 +10,7 @@ from pathlib import Path
 
 from .bodies import MeshFile
 from .clock_time import ClockTime, clock_time
+from .combined import combined_size
 from .files import located
 from .geometry import bounds
 from .impact import driven_together, impact_speeds, wave_speed
@@ -18,6 +19,7 @@ from .mesh_size import MeshSize, mesh_size, surface_faces
 from .placed import Bulk, bulk, driven
 from .schema import Case, Part, Rotation
 from .shrinkage import shrinkage
+from .solids import Combination, Measured
 from .stages import AVERAGED, CONTACT, STATE, STEPS, STRENGTH, TETS
 from .survey import Survey, Surveyed
 
@@ -144,9 +146,11 @@ def _size(part: Part, folder: Path | None, found: Surveyed | None) -> MeshSize |
     """What is known of a part's mesh: sizes, the number of tets only, or nothing."""
     if found is not None:
         return MeshSize(found.elements, found.nodes, found.step_length)
-    if not isinstance(part.mesh, MeshFile):
+    if not isinstance(part.mesh, Measured):
         return mesh_size(part.mesh)
-    if folder is None:
+    if isinstance(part.mesh, Combination):
+        return combined_size(part.mesh)
+    if folder is None or not isinstance(part.mesh, MeshFile):
         return None
     path = located(part.mesh.path, part.mesh.sha256, folder)
     try:
@@ -161,7 +165,7 @@ def _part(case: Case, part: Part, size: MeshSize | int | None, found: Surveyed |
     made = material(case, part.material)
     slowest = wave_speed(made) * _viscous_factor(case)
     step = math.inf if part.rigid is not None else case.numerics.dt_safety * size.step_length / slowest
-    if isinstance(part.mesh, MeshFile):
+    if isinstance(part.mesh, Measured):
         brings = None if found is None else found.bulk
     else:
         brings = bulk(driven(case, part), part.mesh, made.density)
@@ -226,7 +230,7 @@ def broken_share(case: Case, part: Part, speed: float) -> float:
     1 of mesh files.
     """
     made, body = material(case, part.material), bounds(part.mesh)
-    if made.brittle is None or body is None or isinstance(part.mesh, MeshFile):
+    if made.brittle is None or body is None or isinstance(part.mesh, Measured):
         return 1.0
     length = max(high - low for low, high in zip(*body, strict=True))
     own = [abs(rate) for motion in (part.stretch, part.spin) if motion is not None for rate in motion.rate]
@@ -245,7 +249,7 @@ def _contact(case: Case, faces: int) -> float:
     """Nanoseconds of contact in a step; ``faces``: of the parts from mesh files, as far as they are known."""
     if not case.in_contact:
         return 0.0
-    faces += sum(surface_faces(part.mesh) for part in case.parts if not isinstance(part.mesh, MeshFile))
+    faces += sum(surface_faces(part.mesh) for part in case.parts if not isinstance(part.mesh, Measured))
     return faces * FACE_NANOSECONDS["erosion" if case.erodes else "contact"]
 
 

@@ -4,8 +4,9 @@ import math
 from collections.abc import Callable
 
 from . import ring
-from .bodies import Box, Cylinder, Mesh, MeshFile, Plate, Primitive, RingSector, Shards, Sphere, Tube, TwoTets
+from .bodies import Box, Cylinder, Mesh, Plate, Primitive, RingSector, Shards, Sphere, Tube, TwoTets
 from .profile import Revolved, profile
+from .solids import Measured
 from .tables import Axis
 
 Vector = tuple[float, float, float]
@@ -105,8 +106,8 @@ def tets(mesh: TwoTets | Shards) -> int:
 
 
 def bounds(mesh: Mesh) -> tuple[Vector, Vector] | None:
-    """Lowest and highest coordinates of what is modelled, m; None for a mesh file."""
-    if isinstance(mesh, MeshFile):
+    """Lowest and highest coordinates of what is modelled, m; None where only the mesh tells."""
+    if isinstance(mesh, Measured):
         return None
     low, high = map(list, whole_bounds(mesh))
     if isinstance(mesh, RingSector):

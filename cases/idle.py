@@ -2,13 +2,13 @@
 
 from collections.abc import Iterator
 
-from .bodies import MeshFile
 from .boundaries import Prescribed, Traction
 from .loaded import block_faces, loads, parts_of, planes_of
 from .placed import Placed
 from .problems import Problem, problem
 from .region import Region
 from .schema import Case, Part
+from .solids import Measured
 
 
 def idle(case: Case, number: int) -> Iterator[Problem]:
@@ -23,7 +23,7 @@ def idle(case: Case, number: int) -> Iterator[Problem]:
 
 def _empty(part: Part, spec: Traction | Prescribed) -> bool:
     """Whether a boundary is sure to find nothing of a part in its box."""
-    if isinstance(part.mesh, MeshFile):
+    if isinstance(part.mesh, Measured):
         return False
     body, region = Placed(part.mesh, part.turn), Region.of(spec)
     planes = planes_of(body, region)

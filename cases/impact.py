@@ -6,13 +6,13 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from .bodies import MeshFile
 from .boundaries import Course, Prescribed, Rotation, Traction, Wall
 from .geometry import Vector
 from .library import material
 from .materials import Material
 from .placed import Placed, driven, velocity
 from .schema import Case, Part
+from .solids import Measured
 
 FEW, MANY, FULL, MOST = 5, 10, 40, 80
 """Sweeps of contact in a step: the fewest, also where bodies meet fast, also for rubble that is driven and with
@@ -54,7 +54,7 @@ def velocities(case: Case, part: Part) -> tuple[Vector, Vector]:
     """Bounds of the velocities, m/s, that nodes of a part start with or are driven with; a mesh file neither turns nor
     stretches here.
     """
-    if isinstance(part.mesh, MeshFile):
+    if isinstance(part.mesh, Measured):
         found = [part.velocity]
     else:
         moving, (low, high) = driven(case, part), Placed(part.mesh, part.turn).bounds()

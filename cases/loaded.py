@@ -5,7 +5,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from .bodies import Box, Cylinder, Loose, MeshFile, Plate, RingSector, Sphere, Tube
+from .bodies import Box, Cylinder, Loose, Plate, RingSector, Sphere, Tube
 from .boundaries import Prescribed, Traction
 from .geometry import Generated, Vector, surface, volume
 from .mesh_size import FACES_PER_SURFACE, grid, mesh_size, surface_faces
@@ -14,6 +14,7 @@ from .profile import Revolved, profile
 from .region import Region, slack
 from .schema import Case, Part
 from .sheets import sheets
+from .solids import Measured
 
 _FINEST = 60
 """Patches along a side of a surface, at most. Chosen: a tenth of a second for a body."""
@@ -116,7 +117,7 @@ def _reached(case: Case, spec: Traction | Prescribed) -> list[Placed] | None:
     """
     region, found = Region.of(spec), list[Placed]()
     for part in parts_of(case, spec):
-        if isinstance(part.mesh, MeshFile):
+        if isinstance(part.mesh, Measured):
             return None
         body = Placed(part.mesh, part.turn)
         if not region.everything:

@@ -3,22 +3,26 @@
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-from .bodies import Box, Loose, Mesh, MeshFile, Plate, Primitive
+from .bodies import Box, Loose, Mesh, Plate
 from .files import located
 from .form_checks import check_form
 from .geometry import AXES, across, cut_directions, index, thinnest
+from .measured_checks import check_grading, check_measured, files_in
 from .mesh_size import Row, grid, slit_lines
 from .problems import Location, Problem, problem
+from .solids import Measured
 from .tables import Axis
 
 
 def check_mesh(mesh: Mesh, location: Location) -> Iterator[Problem]:
     """Every problem of a mesh that stands at ``location``."""
-    if isinstance(mesh, MeshFile):
-        if "://" in mesh.path or not mesh.path.strip():
-            yield problem((*location, "path"), mesh.path, "expected the path of a mesh file")
+    if isinstance(mesh, Measured):
+        yield from check_measured(mesh, location)
         return
-    yield from _grading(mesh, location)
+    yield from check_grading(mesh, location)
+    if mesh.grading is not None and mesh.generator == "structured":
+        message = "the structured generator has one element size; remove grading, or use gmsh"
+        yield problem((*location, "grading"), ..., message)
     wrong = list(check_form(mesh, location))
     yield from wrong
     if wrong:
@@ -37,10 +41,12 @@ def check_mesh(mesh: Mesh, location: Location) -> Iterator[Problem]:
 
 
 def missing_files(parts: Iterable[Mesh], folder: Path) -> Iterator[Problem]:
-    """Mesh files of the ``parts`` that are not where the case says, from its ``folder`` on."""
+    """Files of the ``parts`` that are not where the case says, from its ``folder`` on."""
     for i, mesh in enumerate(parts):
-        if isinstance(mesh, MeshFile) and not (path := located(mesh.path, mesh.sha256, folder)).is_file():
-            yield problem(("parts", i, "mesh", "path"), mesh.path, f"no such file ({path.absolute()})")
+        for place, file in files_in(mesh):
+            path = located(file.path, file.sha256, folder)
+            if not path.is_file():
+                yield problem(("parts", i, "mesh", *place, "path"), file.path, f"no such file ({path.absolute()})")
 
 
 def _slit(mesh: Box | Plate, location: Location) -> Iterator[Problem]:
@@ -78,16 +84,3 @@ def _between(row: Row, x: float) -> bool:
 
 def _on_plane(row: Row, x: float) -> bool:
     return row.place(x) == round(row.place(x))
-
-
-def _grading(mesh: Primitive, location: Location) -> Iterator[Problem]:
-    if mesh.grading is None:
-        return
-    grading, location = mesh.grading, (*location, "grading")
-    if mesh.generator == "structured":
-        yield problem(location, ..., "the structured generator has one element size; remove grading, or use gmsh")
-    if grading.near >= grading.far:
-        yield problem((*location, "near"), grading.near, f"must be below far, {grading.far} m")
-    if grading.far_size < mesh.element_size:
-        message = f"must not be below the element size, {mesh.element_size} m"
-        yield problem((*location, "far_size"), grading.far_size, message)

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 
-from .bodies import Box, Cylinder, Grading, Plate, RingSector, Shards, Sphere, Tube, TwoTets
+from .bodies import Box, Cylinder, Plate, RingSector, Shards, Sphere, Tube, TwoTets
 from .geometry import (
     Generated,
     Vector,
@@ -19,6 +19,7 @@ from .geometry import (
     tets,
     volume,
 )
+from .grading import Grading
 from .profile import Revolved, tips
 
 TETS_PER_VOLUME, TETS_PER_SURFACE = 5.55, 1.42

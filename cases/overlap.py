@@ -4,12 +4,13 @@ import math
 from collections.abc import Iterable, Iterator
 from itertools import combinations, islice, permutations
 
-from .bodies import Cylinder, Loose, MeshFile, RingSector, Sphere, Tube
+from .bodies import Cylinder, Loose, RingSector, Sphere, Tube
 from .geometry import Generated, Vector
 from .placed import Placed, lattice
 from .problems import Problem, problem
 from .profile import Revolved, profile
 from .schema import Contact, Part
+from .solids import Measured
 
 _POINTS = 12
 """Points a direction at which two bodies are looked at, in the box that both reach into. Chosen: thinner slices than a
@@ -30,7 +31,7 @@ def overlaps(parts: Iterable[tuple[int, Part]], contact: Contact | None) -> Iter
     solid = [
         (i, part, body, body.bounds())
         for i, part in parts
-        if not isinstance(part.mesh, MeshFile | Loose) and (not contact.parts or part.name in contact.parts)
+        if not isinstance(part.mesh, Measured | Loose) and (not contact.parts or part.name in contact.parts)
         for body in [Placed(_core(part.mesh), part.turn)]
     ]
     near = ((a, b, box) for a, b in combinations(solid, 2) if (box := _common(a[3], b[3])) is not None)

@@ -51,16 +51,19 @@ def page() -> str:
 def tables(whole: Schema) -> list[Table]:
     """Every table of a case in the order of the keys, each at its first place."""
     found: dict[int, Table] = {}
-    for table in _below(Table("", "", whole), whole):
-        found.setdefault(id(table.schema), table)
+    _collect(found, Table("", "", whole), whole)
     return list(found.values())
 
 
-def _below(table: Table, whole: Schema) -> Iterator[Table]:
-    yield table
+def _collect(found: dict[int, Table], table: Table, whole: Schema) -> None:
+    """Adds a table and those below it; what combinations are made of may be combinations again."""
+    if (known := found.get(id(table.schema))) is not None:
+        found[id(table.schema)] = min(known, table, key=lambda each: len(each.path))
+        return
+    found[id(table.schema)] = table
     for key, schema in table.schema["properties"].items():
         for path, inner in _tables_in(f"{table.path}.{key}".removeprefix("."), schema, whole):
-            yield from _below(Table(path, _tag(inner), inner), whole)
+            _collect(found, Table(path, _tag(inner), inner), whole)
 
 
 def _tables_in(path: str, schema: Schema, whole: Schema) -> Iterator[tuple[str, Schema]]:

@@ -79,13 +79,15 @@ def from_pydantic(error: ValidationError, data: Mapping[str, Any]) -> list[Probl
     At most a hundred, since looking for a similar name takes time.
     """
     details = error.errors(include_url=False, include_context=True)
-    own = (detail for detail in details if not _follows_from_others(detail))
+    places = [detail["loc"] for detail in details]
+    own = (detail for detail in details if not _follows_from_others(detail, places))
     return [_translate(detail, data) for detail in islice(own, _MOST)]
 
 
-def _follows_from_others(detail: ErrorDetails) -> bool:
-    """A list whose entries are all in error is called too short as well."""
-    return detail["type"] == "too_short" and bool(detail["input"])
+def _follows_from_others(detail: ErrorDetails, places: Iterable[Location]) -> bool:
+    """A list whose entries are in error is called too short as well; ``places``: of all errors."""
+    own = detail["loc"]
+    return detail["type"] == "too_short" and any(len(other) > len(own) and other[: len(own)] == own for other in places)
 
 
 def _translate(detail: ErrorDetails, data: Mapping[str, Any]) -> Problem:
@@ -112,7 +114,8 @@ def _translate(detail: ErrorDetails, data: Mapping[str, Any]) -> Problem:
         case "model_type" | "model_attributes_type" | "dict_type":
             return problem(location, value, "expected a table of keys")
         case "too_short":
-            return problem(location, ..., "at least one is needed")
+            least = context["min_length"]
+            return problem(location, ..., "at least one is needed" if least == 1 else f"at least {least} are needed")
         case "too_long":
             many, most = context["actual_length"], context["max_length"]
             return problem(location, ..., f"{many} are too many; allowed: up to {most}")

@@ -3,12 +3,13 @@
 import math
 from collections.abc import Iterator
 
-from .bodies import Loose, MeshFile
+from .bodies import Loose
 from .estimate import Estimate
 from .geometry import index, volume
 from .placed import Placed
 from .problems import Problem, problem
 from .schema import Case, Symmetry
+from .solids import Measured
 
 _TOUCH = 1e-9
 """Of the size of a body: a plane that is no deeper in it lies on its surface. Far above rounding, far below any tet."""
@@ -23,7 +24,7 @@ def cut_bodies(case: Case) -> Iterator[Problem]:
     for number, plane in case.boundaries_of(Symmetry):
         d = index(plane.axis)
         for part in case.parts:
-            if isinstance(part.mesh, MeshFile | Loose) or part.turn is not None:
+            if isinstance(part.mesh, Measured | Loose) or part.turn is not None:
                 continue
             if plane.parts and part.name not in plane.parts:
                 continue
@@ -40,7 +41,7 @@ def scant_probes(case: Case, expected: Estimate) -> Iterator[Problem]:
     sizes = {part.name: (part, size) for part, size in zip(case.parts, expected.parts, strict=True)}
     for i, probe in enumerate(case.probes):
         part, size = sizes[probe.part]
-        if probe.low is None or probe.high is None or isinstance(part.mesh, MeshFile) or part.mesh.grading is not None:
+        if probe.low is None or probe.high is None or isinstance(part.mesh, Measured) or part.mesh.grading is not None:
             continue
         box = zip(probe.low, probe.high, *Placed(part.mesh, part.turn).bounds(), strict=True)
         inside = math.prod(max(0.0, min(b, high) - max(a, low)) for a, b, low, high in box)

@@ -7,9 +7,10 @@ take numbers, or arrays of one shape.
 from collections.abc import Iterable
 from typing import Any, NamedTuple
 
-from .bodies import Mesh, MeshFile
+from .bodies import Mesh
 from .boundaries import Around, Prescribed, Traction
 from .measures import Probe
+from .solids import Measured
 from .tables import Point
 
 NEAR, MOST = 0.01, 0.1
@@ -27,7 +28,7 @@ def rounding(mesh: Mesh, edge: float, reach: float) -> float:
 
     ``edge``: shortest edge of the part, m; ``reach``: its largest coordinate, m.
     """
-    share = FILE if isinstance(mesh, MeshFile) else GENERATED
+    share = FILE if isinstance(mesh, Measured) else GENERATED
     return min(share * reach, MOST * edge)
 
 

@@ -4,13 +4,14 @@ import math
 from collections.abc import Sequence
 from itertools import pairwise
 
-from .bodies import MeshFile, Tube
+from .bodies import Tube
 from .boundaries import Around, Course, Traction
 from .geometry import AXES, bounds
 from .impact import wave_speed
 from .library import material
 from .materials import Material
 from .schema import Case, Part, Symmetry
+from .solids import Measured
 
 DEEPEST, DEEPEST_ERODING = 12.0, 4.0
 """The mean time step of a crushed body is never taken to be smaller than the initial one over this: the flattest tets
@@ -51,7 +52,7 @@ def _shocked(case: Case, part: Part, made: Material, speed: float, flattened: fl
     shock moves at u = speed / 2, and waves there go about 2 S u faster than c0. Meanwhile a tet that erodes flattens
     up to the strain at which it leaves; later those are gone.
     """
-    body = None if isinstance(part.mesh, MeshFile) else bounds(part.mesh)
+    body = None if isinstance(part.mesh, Measured) else bounds(part.mesh)
     if part.erosion is None:
         return min(DEEPEST, flattened)
     later = min(DEEPEST_ERODING, flattened)
@@ -113,7 +114,7 @@ def slenderness(case: Case) -> float:
     """
     most = 1.0
     for part in case.parts:
-        body = None if isinstance(part.mesh, MeshFile) else bounds(part.mesh)
+        body = None if isinstance(part.mesh, Measured) else bounds(part.mesh)
         if body is None:
             return SLENDER
         wide, broad, length = sorted(high - low for low, high in zip(*body, strict=True))
@@ -123,7 +124,7 @@ def slenderness(case: Case) -> float:
 
 def _confined(case: Case, part: Part) -> bool:
     """Whether planes of symmetry hold a part on both sides in two directions."""
-    body = None if isinstance(part.mesh, MeshFile) else bounds(part.mesh)
+    body = None if isinstance(part.mesh, Measured) else bounds(part.mesh)
     if body is None:
         return False
     planes = [

@@ -7,12 +7,13 @@ from itertools import combinations, islice
 
 import msgspec
 
-from .bodies import Loose, MeshFile
+from .bodies import Loose
 from .geometry import Vector
 from .placed import Placed
 from .problems import Problem, problem
 from .schema import Case
 from .sheets import sheets
+from .solids import Measured
 
 NEAR = 1e-6
 """Of the size of a body: faces nearer than this coincide. Chosen: far above rounding, below any gap."""
@@ -37,7 +38,7 @@ def touching(case: Case) -> list[Touch]:
     bodies = [
         (i, Placed(part.mesh, part.turn))
         for i, part in enumerate(case.parts)
-        if not isinstance(part.mesh, MeshFile | Loose)
+        if not isinstance(part.mesh, Measured | Loose)
     ]
     near = (((i, j), (a, b)) for (i, a), (j, b) in combinations(bodies, 2) if _reach(a, b) and not bonded(case, i, j))
     found = [Touch(one=i, other=j, area=_common(*sorted(both, key=size))) for (i, j), both in islice(near, _PAIRS)]

@@ -13,13 +13,13 @@ from typing import Any
 import msgspec
 
 from conoid.cases import survey
-from conoid.cases.bodies import MeshFile
 from conoid.cases.estimate import Estimate, estimate
 from conoid.cases.load import CaseError, parse_case
 from conoid.cases.mesh_checks import missing_files
 from conoid.cases.plausible import bare_numbers
 from conoid.cases.problems import Problem, problem
 from conoid.cases.schema import Case
+from conoid.cases.solids import Measured
 from conoid.cases.survey import Survey
 from conoid.cases.touching import Touch
 from conoid.cases.touching import touching as touches
@@ -63,12 +63,12 @@ def examine(data: Mapping[str, Any], folder: Path) -> Examination:
 
 def _survey(case: Case, folder: Path) -> tuple[Survey, list[Problem]]:
     """What the mesh files hold; a warning for each of them where nothing here can read it."""
-    files = [(i, part.mesh) for i, part in enumerate(case.parts) if isinstance(part.mesh, MeshFile)]
+    files = [(i, part.mesh) for i, part in enumerate(case.parts) if isinstance(part.mesh, Measured)]
     if not files:
         return Survey(), []
     if not survey.installed():
         cure = "was not read: the solver is not installed here (pip install 'conoid[worker]')"
-        return Survey(), [problem(("parts", i, "mesh", "path"), mesh.path, cure) for i, mesh in files]
+        return Survey(), [problem(("parts", i, "mesh"), getattr(mesh, "path", ...), cure) for i, mesh in files]
     asked = survey.question(case.model_dump(mode="json"), folder)
     ended = subprocess.run([sys.executable, "-m", survey.PROGRAM], input=asked, capture_output=True, check=False)
     try:

@@ -5,13 +5,14 @@ from collections.abc import Callable, Sequence
 
 from rich.table import Table
 
-from conoid.cases.bodies import MeshFile
+from conoid.cases.bodies import Mesh, MeshFile
 from conoid.cases.estimate import Estimate
 from conoid.cases.figures import UNKNOWN, alike, count, crew, duration, exact, percent, si, size, vectors
 from conoid.cases.library import material
 from conoid.cases.loaded import Load
 from conoid.cases.placed import Bulk
 from conoid.cases.schema import Boundary, Case, Traction
+from conoid.cases.solids import Cad
 from conoid.cases.stages import without
 from conoid.cases.survey import Survey
 from conoid.cases.touching import Touch
@@ -70,16 +71,24 @@ def parts_table(case: Case, expected: Estimate) -> Table:
 
 
 def files_table(case: Case, survey: Survey) -> Table:
-    """What was read of mesh files: the volumes and the smallest altitude of a tet, which decides the time step."""
+    """What was measured of mesh files, combinations and CAD: the volumes, and the smallest altitude of a tet, which
+    decides the time step."""
     right = ("nodes", "volume", "smallest altitude")
-    made = table("part", "file", "group", *right, right=right, wide=("file",))
+    made = table("part", "from", "group", *right, right=right, wide=("from",))
     for each in survey.parts:
         part = case.parts[each.part]
-        assert isinstance(part.mesh, MeshFile)
         volume = exact(1e9 * each.mass / material(case, part.material).density, "mm^3")
-        group = part.mesh.group or "all tets"
-        made.add_row(part.name, part.mesh.path, group, count(each.nodes), volume, si(each.altitude, "m"))
+        made.add_row(part.name, *_source(part.mesh), count(each.nodes), volume, si(each.altitude, "m"))
     return made
+
+
+def _source(mesh: Mesh) -> tuple[str, str]:
+    """Of which file a mesh is, or which combination, and which part of the file."""
+    if isinstance(mesh, MeshFile):
+        return mesh.path, mesh.group or "all tets"
+    if isinstance(mesh, Cad):
+        return mesh.path, ", ".join(map(str, mesh.solids)) or "all solids"
+    return getattr(mesh, "path", mesh.shape), UNKNOWN
 
 
 def touching_table(case: Case, touches: Sequence[Touch]) -> Table:

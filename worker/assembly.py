@@ -10,9 +10,10 @@ from pathlib import Path
 import numpy as np
 
 from conoid.cases import schema
-from conoid.cases.bodies import Mesh, MeshFile, Symmetric
+from conoid.cases.bodies import Mesh, Symmetric
 from conoid.cases.joined import bodies
 from conoid.cases.library import material as find_material
+from conoid.cases.solids import Measured
 from conoid.cases.survey import Survey
 
 from . import selection, surface_pressure
@@ -92,7 +93,7 @@ def _built(case: schema.Case, folder: Path, say: Say, facts: Facts) -> Iterator[
         if index not in joint and len(group := _together(case, index)) > 1:
             joint |= zip(group, build_together([_asked(case.parts[i]) for i in group], key, made=said), strict=True)
         mesh = joint.get(index) or build_mesh(_asked(part), folder, key=key, made=said)
-        if isinstance(part.mesh, MeshFile):
+        if isinstance(part.mesh, Measured):
             facts.take(index, mesh)
         yield index, mesh
 

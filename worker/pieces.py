@@ -4,9 +4,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from conoid.cases.bodies import MeshFile
 from conoid.cases.figures import counted
 from conoid.cases.schema import Case
+from conoid.cases.solids import Measured
 
 from .contact import overlap, pairing
 from .errors import InputError
@@ -29,7 +29,7 @@ def pieces(case: Case, index: int, mesh: TetMesh, overlaps: bool) -> tuple[Indic
     volume in common: it would be there twice.
     """
     whole = np.zeros(len(mesh.points), np.int32)
-    if not isinstance(case.parts[index].mesh, MeshFile):
+    if not isinstance(case.parts[index].mesh, Measured):
         return whole, []
     sides = np.concatenate([mesh.tets[:, [0, k]] for k in (1, 2, 3)])
     first, of = np.unique(components(len(mesh.points), sides), return_inverse=True)

@@ -8,9 +8,9 @@ import sys
 from pathlib import Path
 
 from conoid.cases import survey
-from conoid.cases.bodies import MeshFile
 from conoid.cases.load import parse_case
 from conoid.cases.schema import Case
+from conoid.cases.solids import Measured
 from conoid.cases.survey import Survey
 
 from . import compile as ahead
@@ -31,7 +31,7 @@ def surveyed(case: Case, folder: Path, compiled: bool = True) -> Survey:
     """
     facts, refused, placed, meshes = Facts(case), list[str](), list[Placed](), dict[int, TetMesh]()
     for index, part in enumerate(case.parts):
-        if not isinstance(part.mesh, MeshFile):
+        if not isinstance(part.mesh, Measured):
             continue
         try:
             mesh = build(part.mesh, folder, key=f"parts[{index}].mesh")

@@ -131,19 +131,19 @@ def test_a_file_must_have_the_checksum_that_is_asked_for(tmp_path: Path) -> None
 def test_a_child_that_takes_too_long_is_stopped(tmp_path: Path) -> None:
     start = time.perf_counter()
     with pytest.raises(MeshError, match=r"mesh: not ready after 1 s and stopped"):
-        run_child(BAR.model_copy(update={"element_size": 6e-5}), None, tmp_path / "m.npz", "mesh", Limits(wall=1))
+        run_child(BAR.model_copy(update={"element_size": 6e-5}), {}, tmp_path / "m.npz", "mesh", Limits(wall=1))
     assert time.perf_counter() - start < 5
     assert list(tmp_path.iterdir()) == []
 
 
 def test_a_child_that_computes_too_long_is_stopped(tmp_path: Path) -> None:
     with pytest.raises(MeshError, match="took more than 1 s of CPU time"):
-        run_child(BAR.model_copy(update={"element_size": 5e-5}), None, tmp_path / "m.npz", "mesh", Limits(cpu=1))
+        run_child(BAR.model_copy(update={"element_size": 5e-5}), {}, tmp_path / "m.npz", "mesh", Limits(cpu=1))
 
 
 def test_a_child_that_wants_too_much_memory_is_stopped(tmp_path: Path) -> None:
     with pytest.raises(MeshError, match=r"^mesh: .*memory") as raised:
-        run_child(BAR, None, tmp_path / "m.npz", "mesh", Limits(memory=150 * 2**20))
+        run_child(BAR, {}, tmp_path / "m.npz", "mesh", Limits(memory=150 * 2**20))
     assert "\n" not in str(raised.value)
 
 
@@ -152,7 +152,7 @@ def test_a_child_that_is_told_to_stop_has_not_failed(tmp_path: Path, monkeypatch
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     (tmp_path / "sitecustomize.py").write_text("import os; os.kill(os.getpid(), 15)")
     with pytest.raises(StoppedError, match="stopped on request") as raised:
-        run_child(BAR, None, tmp_path / "m.npz", "mesh", Limits())
+        run_child(BAR, {}, tmp_path / "m.npz", "mesh", Limits())
     assert (raised.value.state, raised.value.exit_code) == ("cancelled", 4)
 
 
@@ -163,7 +163,7 @@ def test_the_child_gets_no_secrets(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     (tmp_path / "sitecustomize.py").write_text(
         f"import os; open({str(tmp_path / 'seen')!r}, 'w').write(' '.join(os.environ.values()))"
     )
-    run_child(BAR, None, tmp_path / "m.npz", "mesh", Limits())
+    run_child(BAR, {}, tmp_path / "m.npz", "mesh", Limits())
     assert "hunter2" not in (tmp_path / "seen").read_text()
 
 

@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 from pydantic import TypeAdapter
 
-from conoid.cases.bodies import Box, Cylinder, Grading, Mesh, MeshFile, Sphere
+from conoid.cases.bodies import Box, Cylinder, Mesh, Sphere
 from conoid.cases.geometry import Generated, bounds, centre, cut_directions, volume
+from conoid.cases.grading import Grading
+from conoid.cases.solids import Measured
 from conoid.worker.errors import MeshError
 from conoid.worker.mesh.faces import areas, boundary_faces
 from conoid.worker.mesh.model import REGULAR_STEP, TetMesh, check
@@ -29,7 +31,7 @@ SHAPES: dict[str, dict[str, Any]] = {
 def body(shape: str, **more: Any) -> Generated:
     request = {"shape": shape, "generator": "structured", "element_size": 0.2, **SHAPES[shape], **more}
     made: Mesh = TypeAdapter[Mesh](Mesh).validate_python(request)
-    assert not isinstance(made, MeshFile)
+    assert not isinstance(made, Measured)
     return made
 
 

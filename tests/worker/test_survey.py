@@ -14,6 +14,7 @@ from conoid.cases.load import parse_case
 from conoid.worker.assembly import assemble
 from conoid.worker.errors import MeshError
 from conoid.worker.mesh.child import Limits, perform
+from conoid.worker.mesh.sources import Sources
 from conoid.worker.survey import surveyed
 
 TWO = """*NODE
@@ -36,8 +37,8 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Two tets of 18 mm^3 with a common face. Files are read in this process, which takes a tenth of the time."""
     monkeypatch.setenv("CONOID_CACHE_DIR", str(tmp_path))
 
-    def read(mesh: Mesh, source: Path | None, target: Path, key: str, limits: Limits) -> None:
-        perform(mesh, key, str(source), target)
+    def read(mesh: Mesh, sources: Sources, target: Path, key: str, limits: Limits) -> None:
+        perform(mesh, key, sources, target)
 
     monkeypatch.setattr("conoid.worker.mesh.build.run_child", read)
     (tmp_path / "two.inp").write_text(TWO)

@@ -16,6 +16,7 @@ from conoid.client.examination import examine
 from conoid.worker import simulation
 from conoid.worker.errors import ConoidError
 from conoid.worker.mesh.child import Limits, perform
+from conoid.worker.mesh.sources import Sources
 from conoid.worker.mesh.structured import structured
 from conoid.worker.parallel.comm import SerialComm
 from conoid.worker.survey import surveyed
@@ -65,8 +66,8 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Files are read in this process, which takes a tenth of the time."""
     monkeypatch.setenv("CONOID_CACHE_DIR", str(tmp_path / "cache"))
 
-    def read(mesh: Mesh, source: Path | None, target: Path, key: str, limits: Limits) -> None:
-        perform(mesh, key, str(source), target)
+    def read(mesh: Mesh, sources: Sources, target: Path, key: str, limits: Limits) -> None:
+        perform(mesh, key, sources, target)
 
     monkeypatch.setattr("conoid.worker.mesh.build.run_child", read)
     monkeypatch.setattr("conoid.client.examination._survey", lambda made, place: (surveyed(made, place), []))

@@ -4,20 +4,23 @@ import contextlib
 import hashlib
 import importlib.metadata
 import importlib.util
+import json
 import os
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from functools import cache
 from pathlib import Path
+from typing import Any
 
-from conoid.cases import whole
+from conoid.cases import geometry, profile, ring
 from conoid.cases.bodies import Mesh, MeshFile
-from conoid.cases.files import located
+from conoid.cases.files import files_of
 
 from ..errors import MeshError
 from .child import Limits, beside, run_child
 from .model import TetMesh, check
 from .order import morton_ordered
+from .sources import Sources, digests, sources
 from .store import load, save
 from .structured import structured
 
@@ -33,7 +36,7 @@ def build(
     ``folder`` is where a relative path of a mesh file starts, ``key`` that of the mesh in its case, for messages.
     What needs gmsh, and every file, is handled by a child process within ``limits``. Raises MeshError.
     """
-    source = _source(mesh, folder, key) if isinstance(mesh, MeshFile) else None
+    source = sources(mesh, folder, key)
     if not isinstance(mesh, MeshFile) and mesh.generator == "gmsh":
         _need_gmsh(key)
     name = _content(mesh, source, key) + ".npz"
@@ -60,7 +63,7 @@ def build_together(
     if found is None:
         made()
         with _writable(target) as place:
-            run_child(meshes, None, place, key, limits or Limits())
+            run_child(meshes, {}, place, key, limits or Limits())
             found = _loaded(place, len(meshes))
     if found is None:
         raise MeshError(f"{key}: the mesh process left no meshes in {target.parent}")
@@ -108,12 +111,12 @@ def cache_folder() -> Path:
     return (Path(root) if root else Path.home() / ".cache" / "conoid") / "meshes"
 
 
-def _make_and_keep(mesh: Mesh, source: Path | None, target: Path, key: str, limits: Limits) -> TetMesh:
+def _make_and_keep(mesh: Mesh, source: Sources, target: Path, key: str, limits: Limits) -> TetMesh:
     with _writable(target) as place:
         return _make(mesh, source, place, key, limits)
 
 
-def _make(mesh: Mesh, source: Path | None, target: Path, key: str, limits: Limits) -> TetMesh:
+def _make(mesh: Mesh, source: Sources, target: Path, key: str, limits: Limits) -> TetMesh:
     if not isinstance(mesh, MeshFile) and mesh.generator == "structured":
         made = morton_ordered(check(structured(mesh, key)))
         save(made, target)
@@ -125,49 +128,37 @@ def _make(mesh: Mesh, source: Path | None, target: Path, key: str, limits: Limit
     return found
 
 
-def _source(mesh: MeshFile, folder: Path, key: str) -> Path:
-    """The file itself; MeshError when it is not there, or not the one that was meant."""
-    if "://" in mesh.path:
-        raise MeshError(f"{key}.path = {mesh.path!r}: expected a file, not an address")
-    path = located(mesh.path, mesh.sha256, folder)
-    if not path.is_file():
-        raise MeshError(f"{key}.path = {mesh.path!r}: no such file ({path.absolute()})")
-    return path.absolute()
-
-
 def _need_gmsh(key: str) -> None:
     if importlib.util.find_spec("gmsh") is None:
         cure = "pip install 'conoid[mesh]', or use generator = 'structured'"
         raise MeshError(f"{key}: gmsh is not installed here; {cure}")
 
 
-def _content(mesh: Mesh, source: Path | None, key: str) -> str:
-    """sha256 over everything that decides the mesh: what is asked for, the file's bytes, our source, the versions."""
-    digest = hashlib.sha256("\n".join((_maker(), mesh.model_dump_json(exclude={"path", "sha256"}))).encode())
-    if source is not None and isinstance(mesh, MeshFile):
-        file = _file_digest(source, mesh, key)
-        digest.update(f"{source.suffix.lower()} {file}".encode())
-    return digest.hexdigest()
+def _content(mesh: Mesh, found: Sources, key: str) -> str:
+    """sha256 over everything that decides the mesh: what is asked for, the files' bytes, our source, the versions."""
+    asked = mesh.model_dump(mode="json")
+    for file in files_of({"parts": [{"mesh": asked}]}):
+        _forget(asked, file.table[3:])
+    lines = [_maker(), json.dumps(asked), *digests(mesh, found, key)]
+    return hashlib.sha256("\n".join(lines).encode()).hexdigest()
 
 
-def _file_digest(source: Path, mesh: MeshFile, key: str) -> str:
-    try:
-        with whole.opened(source) as file:
-            found = hashlib.file_digest(file, "sha256").hexdigest()
-    except OSError as error:
-        raise MeshError(f"{key}.path = {mesh.path!r}: {error.strerror}") from error
-    if mesh.sha256 is not None and mesh.sha256 != found:
-        raise MeshError(f"{key}.sha256 = {mesh.sha256!r}: {mesh.path!r} has {found}")
-    return found
+def _forget(asked: Any, place: tuple[int | str, ...]) -> None:
+    """Where a file is and which it should be decides nothing: its bytes do."""
+    for step in place:
+        asked = asked[step]
+    asked.update(path="", sha256=None)
 
 
 @cache
 def _maker() -> str:
     """The sources of this package, and of what it computes with, and the versions of what it calls."""
-    sources, here = hashlib.sha256(), Path(__file__).parent
-    for path in [*sorted(here.rglob("*.py")), *(here.parent / f"{name}.py" for name in ("hashing", "turning"))]:
-        sources.update(path.name.encode() + path.read_bytes())
-    return " ".join([sources.hexdigest(), *_versions("gmsh", "numpy")])
+    text, here = hashlib.sha256(), Path(__file__).parent
+    formulas = [Path(str(module.__file__)) for module in (geometry, profile, ring)]
+    used = [*formulas, *(here.parent / f"{name}.py" for name in ("hashing", "turning"))]
+    for path in [*sorted(here.rglob("*.py")), *used]:
+        text.update(path.name.encode() + path.read_bytes())
+    return " ".join([text.hexdigest(), *_versions("gmsh", "numpy")])
 
 
 def _versions(*packages: str) -> Iterator[str]:

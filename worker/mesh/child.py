@@ -22,9 +22,11 @@ from pydantic import TypeAdapter
 
 from conoid.cases.bodies import Mesh, MeshFile
 from conoid.cases.run import ExitCode
+from conoid.cases.solids import Measured
 
 from ..errors import InputError, MeshError, StoppedError
 from ..signals import REQUESTS
+from .sources import Sources
 
 _PASSED_ON = ("HOME", "LANG", "LC_ALL", "LD_LIBRARY_PATH", "PATH", "PYTHONPATH", "TMPDIR", "VIRTUAL_ENV")
 """The environment variables that the child gets."""
@@ -61,8 +63,8 @@ class Limits:
         )
 
 
-def run_child(mesh: Mesh | Sequence[Mesh], source: Path | None, target: Path, key: str, limits: Limits) -> None:
-    """Makes ``mesh`` (reads ``source`` when it is a file) in a child process, which leaves it in ``target``; several
+def run_child(mesh: Mesh | Sequence[Mesh], sources: Sources, target: Path, key: str, limits: Limits) -> None:
+    """Makes ``mesh`` (of the files in ``sources``) in a child process, which leaves it in ``target``; several
     are meshed together, and left in ``beside(target, k)``.
 
     Raises MeshError with the child's own line, or with the limit that it broke; StoppedError where the run was asked to
@@ -73,7 +75,7 @@ def run_child(mesh: Mesh | Sequence[Mesh], source: Path | None, target: Path, ke
         "mesh": [each.model_dump(mode="json") for each in mesh]
         if isinstance(mesh, Sequence)
         else mesh.model_dump(mode="json"),
-        "source": None if source is None else str(source),
+        "sources": {named: str(path) for named, path in sources.items()},
         "target": str(target),
         "key": key,
         "limits": asdict(limits),
@@ -129,6 +131,8 @@ def _reason(key: str, code: int, errors: str, limits: Limits) -> str:
     if -code in (signal.SIGXCPU, signal.SIGKILL):
         return f"{key}: took more than {limits.cpu} s of CPU time, or was killed; is the mesh too fine?"
     how = f"was ended by {signal.Signals(-code).name}" if code < 0 else f"ended with code {code}"
+    if -code == signal.SIGALRM:
+        return f"{key}: its file keeps OpenCASCADE for more than two minutes; is it damaged?"
     memory = limits.memory / 2**30
     return f"{key}: the mesh process {how} (memory limit {memory:.3g} GiB): {lines[-1] if lines else 'it said nothing'}"
 
@@ -144,7 +148,7 @@ def main() -> int:
             perform_together(TypeAdapter(list[Mesh]).validate_python(request["mesh"]), key, target)
         else:
             mesh: Mesh = TypeAdapter[Mesh](Mesh).validate_python(request["mesh"])
-            perform(mesh, key, request["source"], target)
+            perform(mesh, key, {named: Path(path) for named, path in request["sources"].items()}, target)
     except InputError as error:
         text = str(error)
         return _told(text if text.startswith(key) else f"{key}: {text}", ExitCode.BAD_INPUT)
@@ -155,7 +159,7 @@ def main() -> int:
     return ExitCode.SUCCEEDED
 
 
-def perform(mesh: Mesh, key: str, source: str | None, target: Path) -> None:
+def perform(mesh: Mesh, key: str, sources: Sources, target: Path) -> None:
     """Makes or reads, checks, orders and stores. Imports gmsh and numpy only now, within the limits."""
     from .model import check
     from .order import morton_ordered
@@ -164,7 +168,11 @@ def perform(mesh: Mesh, key: str, source: str | None, target: Path) -> None:
     if isinstance(mesh, MeshFile):
         from .read import read
 
-        made = read(mesh, Path(source or mesh.path), key)
+        made = read(mesh, sources[key], key)
+    elif isinstance(mesh, Measured):
+        from .occ.solids import measured
+
+        made = check(measured(mesh, sources, key))
     else:
         from .unstructured import unstructured
 
@@ -184,7 +192,7 @@ def perform_together(meshes: list[Mesh], key: str, target: Path) -> None:
     from .store import save
     from .together import together
 
-    made = together([mesh for mesh in meshes if not isinstance(mesh, MeshFile)], key, target.stem)
+    made = together([mesh for mesh in meshes if not isinstance(mesh, Measured)], key, target.stem)
     for k, mesh in enumerate(made):
         save(morton_ordered(check(mesh)), beside(target, k))
 

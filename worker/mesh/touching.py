@@ -5,9 +5,10 @@ from itertools import combinations
 
 import numpy as np
 
-from conoid.cases.bodies import Loose, MeshFile
+from conoid.cases.bodies import Loose
 from conoid.cases.placed import Placed
 from conoid.cases.schema import Case
+from conoid.cases.solids import Measured
 from conoid.cases.touching import NEAR, Touch, bonded, size
 
 from .faces import normals
@@ -31,7 +32,7 @@ def touches(case: Case, surfaces: Mapping[int, Surface]) -> Iterator[Touch]:
             yield Touch(one=i, other=j, area=area)
     for i, surface in surfaces.items():
         for j, part in enumerate(case.parts):
-            if isinstance(part.mesh, MeshFile | Loose) or bonded(case, i, j):
+            if isinstance(part.mesh, Measured | Loose) or bonded(case, i, j):
                 continue
             if area := _lying(surface, Placed(part.mesh, part.turn)):
                 yield Touch(one=min(i, j), other=max(i, j), area=area)

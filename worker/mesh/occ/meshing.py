@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from ...errors import MeshError
 from ..gmsh_session import named_mesh
 from ..model import REGULAR_STEP, TetMesh
 from ..smooth import smoothed
@@ -12,13 +13,15 @@ from .sliding import Sliding
 
 WANTED = 0.75
 """Step lengths below this share of a regular tet's with edge ``element_size`` are raised where possible."""
+_OTHERS = ({"Mesh.Algorithm3D": 1}, {"Mesh.Algorithm3D": 1, "Mesh.Algorithm": 1})
+"""What is tried where gmsh fails: its Delaunay mesher in place of HXT, then triangles by MeshAdapt as well."""
 
 
 def meshed(gmsh: Any, frame: Frame, element_size: float, cuts: int) -> TetMesh:
     """The tets of the current model, m, in space. The first ``cuts`` directions of the frame are those across which it
     is cut at 0.
     """
-    gmsh.model.mesh.generate(3)
+    _generate(gmsh)
     found = named_mesh(gmsh)
     mesh = found.mesh
     if mesh.volumes().sum() < 0:
@@ -27,3 +30,20 @@ def meshed(gmsh: Any, frame: Frame, element_size: float, cuts: int) -> TetMesh:
     wanted = WANTED * REGULAR_STEP * frame.length(element_size)
     mesh = smoothed(TetMesh(points, mesh.tets), sliding, wanted)
     return TetMesh(frame.to_space(mesh.points), mesh.tets)
+
+
+def _generate(gmsh: Any) -> None:
+    """Tets in every volume; by another of gmsh's meshers where one fails. MeshError where all do."""
+    for n, options in enumerate(({}, *_OTHERS)):
+        for name, value in options.items():
+            gmsh.option.setNumber(name, value)
+        try:
+            gmsh.model.mesh.generate(3)
+        except Exception:
+            if n == len(_OTHERS):
+                raise
+        else:
+            if all(len(gmsh.model.mesh.getElements(*volume)[0]) for volume in gmsh.model.getEntities(3)):
+                return
+        gmsh.model.mesh.clear()
+    raise MeshError("gmsh leaves a volume without tets; is the surface of it damaged, or element_size too large?")

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from conoid.cases.bodies import Grading
+from conoid.cases.grading import Grading
 
 from .frame import Frame
 

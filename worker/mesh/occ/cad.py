@@ -1,0 +1,159 @@
+"""Solids of STEP and BREP files, through gmsh's OpenCASCADE kernel.
+
+The bytes that were checked are copied into the child's own empty folder and read from there: a name in them leads to no
+other file.
+"""
+
+import re
+import signal
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+from conoid.cases.figures import si
+from conoid.cases.operands import CadForm
+from conoid.cases.similar import choices
+
+from ...errors import MeshError
+from .draw import Solids
+from .frame import Frame
+from .printed import said
+from .step import length_units, solids_in
+
+MOST_BYTES = 256 * 2**20
+"""Of a file. Chosen: text of an assembly of thousands of parts; OpenCASCADE takes some ten times as much memory."""
+_MILLIMETRE = Fraction(1, 1000)
+"""The unit in which OpenCASCADE is asked to read STEP files, whatever unit they are in."""
+_SYNTAX = b"Incorrect Syntax"
+"""What OpenCASCADE prints, and goes on."""
+_BREP, _BREP_END = b"CASCADE Topology V", re.compile(rb"\*\s*[+-]\d+ \d+\s*$")
+"""How a BREP file begins, within its first lines, and ends: the last shape, and the one that all others make."""
+_READING = 120
+"""Seconds that OpenCASCADE may take to read a file: damaged ones can keep it for ever. Chosen."""
+
+
+def imported(gmsh: Any, form: CadForm, path: Path, frame: Frame, head: str) -> Solids:
+    """The chosen solids of a file in the frame of the model. MeshError, which begins with ``head``."""
+    occ = gmsh.model.occ
+    every, unit = _read(gmsh, form, path, head)
+    chosen = _chosen(gmsh, form, every, head)
+    others = [each for each in every if each not in chosen]
+    if others:
+        occ.remove(others, recursive=True)
+    if form.heal:
+        chosen = [each for each in occ.healShapes(chosen)[:] if each[0] == 3]
+    _place(occ, chosen, float(unit / Fraction(repr(frame.scale))), frame)
+    occ.synchronize()
+    return chosen
+
+
+def size_of(gmsh: Any, form: CadForm, path: Path, head: str) -> float:
+    """The largest extent of the chosen solids of a file, m, where they are in the file."""
+    gmsh.model.add("size")
+    every, unit = _read(gmsh, form, path, head)
+    chosen = _chosen(gmsh, form, every, head)
+    boxes = [gmsh.model.occ.getBoundingBox(*each) for each in chosen]
+    gmsh.model.remove()
+    extents = (max(box[d + 3] for box in boxes) - min(box[d] for box in boxes) for d in range(3))
+    return float(unit) * float(max(extents))
+
+
+def _place(occ: Any, solids: Solids, factor: float, frame: Frame) -> None:
+    """From the coordinates of the file into the frame: a body is where its file has it."""
+    if factor != 1.0:
+        occ.dilate(solids, 0, 0, 0, factor, factor, factor)
+    steps = -("xyz".index(frame.axis) + 1) % 3
+    if steps:
+        occ.rotate(solids, 0, 0, 0, 1, 1, 1, steps * 2.0943951023931953)
+    away = frame.place((0.0, 0.0, 0.0))
+    if any(away):
+        occ.translate(solids, *away)
+
+
+def _read(gmsh: Any, form: CadForm, path: Path, head: str) -> tuple[Solids, Fraction]:
+    """All solids of a file, in the order of it, and the length of 1, m."""
+    data = _bytes(path, head)
+    if data.lstrip().startswith(b"ISO-10303-21;"):
+        kind, unit = "step", _step_unit(form, data, head)
+    elif _BREP in data[:200]:
+        kind, unit = "brep", _brep_unit(form, data, head)
+    else:
+        raise MeshError(f"{head}: neither a STEP file (it begins with ISO-10303-21;) nor a BREP file of OpenCASCADE")
+    copy = Path(f"solids.{kind}")
+    copy.write_bytes(data)
+    gmsh.option.setString("Geometry.OCCTargetUnit", "MM")
+    gmsh.option.setNumber("Geometry.OCCImportLabels", 1)
+    try:
+        signal.alarm(_READING)
+        with said() as text:
+            found = gmsh.model.occ.importShapes(str(copy), highestDimOnly=True, format=kind)
+    except Exception as error:
+        raise MeshError(f"{head}: OpenCASCADE cannot read the {kind.upper()} file ({error})") from error
+    finally:
+        signal.alarm(0)
+        copy.unlink()
+    if _SYNTAX in text:
+        raise MeshError(f"{head}: the STEP file is damaged: OpenCASCADE finds incorrect syntax in it")
+    gmsh.model.occ.synchronize()
+    solids = [each for each in found if each[0] == 3]
+    if kind == "step" and 0 < len(solids) < (said_to_be := solids_in(data)):
+        raise MeshError(f"{head}: {said_to_be - len(solids)} of {said_to_be} solids of the STEP file are not closed")
+    if not solids:
+        raise MeshError(f"{head}: there is no solid in the file; save a closed body, no surfaces")
+    return solids, unit
+
+
+def _bytes(path: Path, head: str) -> bytes:
+    try:
+        size = path.stat().st_size
+        if size > MOST_BYTES:
+            raise MeshError(f"{head}: {size / 2**20:.0f} MiB are too many; allowed: up to {MOST_BYTES // 2**20}")
+        return path.read_bytes()
+    except OSError as error:
+        raise MeshError(f"{head}: {error.strerror}") from error
+
+
+def _step_unit(form: CadForm, data: bytes, head: str) -> Fraction:
+    """OpenCASCADE turns the units of the file into the one that it is asked for."""
+    said = length_units(data, head)
+    if form.unit is not None and any(abs(float(unit) - form.unit) > 1e-9 * form.unit for unit in said):
+        units = choices(sorted(si(float(unit), "m") for unit in said))
+        raise MeshError(f"{head}: unit = {si(form.unit, 'm')}, but the STEP file says {units}; remove or mend the key")
+
+    return _MILLIMETRE
+
+
+def _brep_unit(form: CadForm, data: bytes, head: str) -> Fraction:
+    if not _BREP_END.search(data[-200:]):
+        raise MeshError(f"{head}: the BREP file is cut off, or binary: it does not end as a text does")
+    if form.unit is None:
+        raise MeshError(f"{head}: a BREP file does not say in which unit it is; give the key unit, as '1 mm'")
+    return Fraction(repr(form.unit))
+
+
+def _chosen(gmsh: Any, form: CadForm, solids: Solids, head: str) -> Solids:
+    if not form.solids:
+        return solids
+    names = [_names(gmsh.model.getEntityName(*each)) for each in solids]
+    chosen = Solids()
+    for wanted in form.solids:
+        if isinstance(wanted, int):
+            found = solids[wanted - 1 : wanted]
+        else:
+            found = [each for each, known in zip(solids, names, strict=True) if wanted in known]
+        if not found:
+            raise MeshError(f"{head}: solids: {wanted!r} is not in the file, which has {_listed(solids, names)}")
+        chosen += [each for each in found if each not in chosen]
+    return chosen
+
+
+def _names(label: str) -> list[str]:
+    """By which a solid may be called: its label, ``Shapes/Bullet/Core``, and every end and part of it."""
+    steps = label.split("/")
+    return [*("/".join(steps[n:]) for n in range(len(steps))), *steps[1:]]
+
+
+def _listed(solids: Solids, names: list[list[str]]) -> str:
+    told = [repr(known[-1]) if known[-1] else str(n) for n, known in enumerate(names, 1)]
+    more = ", ..." if len(told) > 20 else ""
+    return f"{len(solids)} solids: {', '.join(told[:20])}{more}"

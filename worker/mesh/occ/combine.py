@@ -1,0 +1,78 @@
+"""Operands drawn into the frame of a model and combined there."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from conoid.cases.combined import box_of
+from conoid.cases.operands import CadForm, CombinedForm, DifferenceForm, Operand, UnionForm
+
+from ...errors import MeshError
+from ..sources import Sources
+from . import draw
+from .cad import imported, size_of
+from .draw import Solids
+from .frame import Frame
+
+AnyForm = Operand | CadForm | CombinedForm
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """What is drawn into the current model of ``gmsh``, in ``frame``; files are found in ``sources``.
+
+    Several parts can be drawn into one model, each by ``solids``: what that returns are the part's volumes, and
+    ``occ.fragment`` of all of them, with its map from old to new volumes, makes their meshes meet.
+    """
+
+    gmsh: Any
+    frame: Frame
+    sources: Sources
+
+    def solids(self, form: AnyForm, key: str) -> Solids:
+        """The volumes of a form that stands at ``key`` in its case, turned as it says; none where nothing is left."""
+        occ = self.gmsh.model.occ
+        if isinstance(form, CombinedForm):
+            made = self._combined(form, key)
+        elif isinstance(form, CadForm):
+            made = imported(self.gmsh, form, self.sources[key], self.frame, f"{key}.path = {form.path!r}")
+        else:
+            made = draw.drawn(occ, form, self.frame)
+        draw.turn(occ, made, getattr(form, "turn", None), self.frame)
+        return made
+
+    def _combined(self, form: CombinedForm, key: str) -> Solids:
+        occ = self.gmsh.model.occ
+        parts = [self.solids(each, f"{key}.of[{n}]") for n, each in enumerate(form.of)]
+        first, rest = parts[0], [solid for part in parts[1:] for solid in part]
+        if isinstance(form, UnionForm):
+            every = [*first, *rest]
+            return _three(occ.fuse(every[:1], every[1:])) if len(every) > 1 else every
+        if first and isinstance(form, DifferenceForm):
+            return _three(occ.cut(first, rest)) if rest else first
+        for part in parts[1:]:
+            if not (first and part):
+                occ.remove([*first, *part], recursive=True)
+                first = []
+            else:
+                first = _three(occ.intersect(first, part))
+        return first
+
+
+def _three(made: Any) -> Solids:
+    """The volumes of what a boolean operation returns."""
+    return [each for each in made[0] if each[0] == 3]
+
+
+def extent(gmsh: Any, form: AnyForm, sources: Sources, key: str) -> float:
+    """About the largest extent of a form, m, from which lengths are scaled: more than it has, rather than less."""
+    if isinstance(form, CadForm):
+        return size_of(gmsh, form, sources[key], f"{key}.path = {form.path!r}")
+    if isinstance(form, CombinedForm):
+        found = [extent(gmsh, each, sources, f"{key}.of[{n}]") for n, each in enumerate(form.of)]
+        if isinstance(form, DifferenceForm):
+            return found[0]
+        return max(found) if isinstance(form, UnionForm) else min(found)
+    box = box_of(form)
+    if box is None:
+        raise MeshError(f"{key}: this shape has no box")
+    return max(b - a for a, b in zip(*box, strict=True))

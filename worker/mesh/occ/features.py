@@ -1,0 +1,43 @@
+"""Edges and rounds of a model that are smaller than its elements: tets there are as small."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from conoid.cases.figures import si
+
+from .frame import Frame
+
+_SHORT = 0.5
+"""Of the element size: edges below it are told. Chosen: a tet there has half the time step."""
+
+
+def small_features(gmsh: Any, element_size: float, frame: Frame) -> Iterator[str]:
+    """A line each of short edges, and of fillets that the elements are too large for."""
+    least = _SHORT * frame.length(element_size)
+    lengths = [gmsh.model.occ.getMass(*each) for each in gmsh.model.getEntities(1)]
+    short = [length for length in lengths if 1e-12 < length < least]
+    if short:
+        yield (
+            f"{len(short)} of {len(lengths)} edges are shorter than half of element_size, the shortest "
+            f"{si(min(short) * frame.scale, 'm')}: tets there are as small and hold the time step down"
+        )
+    every = [_radius(gmsh, tag) for _, tag in gmsh.model.getEntities(2)]
+    radii = [radius for radius in every if radius < frame.length(element_size)]
+    if radii:
+        yield (
+            f"{len(radii)} of {len(every)} faces are round with a radius below element_size, the smallest "
+            f"{si(min(radii) * frame.scale, 'm')}: they become flat or angular"
+        )
+
+
+def _radius(gmsh: Any, tag: int) -> float:
+    """Smallest radius of curvature in the middle of a face; infinite of a plane."""
+    if gmsh.model.getType(2, tag) == "Plane":
+        return float("inf")
+    low, high = gmsh.model.getParametrizationBounds(2, tag)
+    middle = 0.5 * (np.asarray(low) + np.asarray(high))
+    most, least = (float(curvature[0]) for curvature in gmsh.model.getPrincipalCurvatures(tag, middle)[:2])
+    largest = max(abs(most), abs(least))
+    return 1.0 / largest if largest else float("inf")

@@ -1,0 +1,22 @@
+"""What a library prints on its own standard output."""
+
+import os
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+
+@contextmanager
+def said() -> Iterator[bytearray]:
+    """The bytes that this process prints within the block, once it is over; they go nowhere else."""
+    text = bytearray()
+    with tempfile.TemporaryFile() as file:
+        before = os.dup(1)
+        os.dup2(file.fileno(), 1)
+        try:
+            yield text
+        finally:
+            os.dup2(before, 1)
+            os.close(before)
+            file.seek(0)
+            text += file.read()

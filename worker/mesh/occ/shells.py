@@ -1,0 +1,102 @@
+"""The closed surfaces that a surface of triangles is made of: outer ones, and those of cavities, which face inwards."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..model import Floats
+
+Triangles = NDArray[np.int64]
+
+_LOOKED_AT = 64
+"""Facets of a shell from which one looks whether it lies in others. Chosen."""
+_IN = 1e-6
+"""Of the extent of the surface: how far within its own shell the point is from which one looks."""
+
+
+@dataclass(frozen=True)
+class Surface:
+    """``points`` (n, 3) in units of the file, ``faces`` (k, 3), ``shell`` (n,) which closed surface a point is of."""
+
+    points: Floats
+    faces: Triangles
+    shell: Triangles
+
+    def volume(self) -> float:
+        """What lies within, cubic units; cavities are left out."""
+        return _volume(self.points[self.faces])
+
+    def corners(self, shell: int) -> Floats:
+        """(k, 3, 3) corners of the facets of a shell."""
+        found: Floats = self.points[self.faces[self.shell[self.faces[:, 0]] == shell]]
+        return found
+
+    def volumes(self) -> list[float]:
+        """Of each shell, cubic units; below 0 of a cavity."""
+        return [_volume(self.corners(shell)) for shell in range(int(self.shell.max()) + 1)]
+
+
+def shells(n: int, faces: Triangles) -> Triangles:
+    """(n,) the number of the closed surface that each point is of, from 0: by the least point that it is joined to."""
+    least = np.arange(n)
+    while True:
+        known = least.copy()
+        np.minimum.at(least, faces.ravel(), np.repeat(least[faces].min(axis=1), 3))
+        least = least[least]
+        if np.array_equal(known, least):
+            return np.unique(least, return_inverse=True)[1].reshape(-1)
+
+
+def nested(surface: Surface) -> list[list[int]]:
+    """The shells of each body: the outer one, and those of its cavities."""
+    volumes = surface.volumes()
+    outer = [shell for shell, volume in enumerate(volumes) if volume > 0.0]
+    bodies = {shell: [shell] for shell in outer}
+    for shell, volume in enumerate(volumes):
+        if volume <= 0.0:
+            point = surface.corners(shell)[0].mean(axis=0)
+            round_it = [each for each in outer if _winds(surface.corners(each), point)]
+            bodies[min(round_it, key=lambda each: volumes[each])].append(shell)
+    return list(bodies.values())
+
+
+def astray(surface: Surface) -> Floats | None:
+    """A point of a shell that lies where it may not: an outer one in another body, a cavity in none. None where all
+    are right; facets are looked at here and there.
+    """
+    volumes = surface.volumes()
+    if len(volumes) == 1:
+        return None
+    every = [surface.corners(shell) for shell in range(len(volumes))]
+    inwards = _IN * float(np.ptp(surface.points, axis=0).max())
+    for shell, corners in enumerate(every):
+        seen = corners[:: max(1, len(corners) // _LOOKED_AT)]
+        normals = np.cross(seen[:, 1] - seen[:, 0], seen[:, 2] - seen[:, 0])
+        lengths = np.sqrt((normals**2).sum(axis=1, keepdims=True))
+        points = seen.mean(axis=1) - inwards * normals / np.maximum(lengths, 1e-300)
+        for point in points:
+            others = (_winding(each, point) for n, each in enumerate(every) if n != shell)
+            if sum(map(round, others)) != (0 if volumes[shell] > 0.0 else 1):
+                return np.asarray(point)
+    return None
+
+
+def _volume(corners: Floats) -> float:
+    a, b, c = corners.transpose(1, 0, 2)
+    return float((a * np.cross(b, c)).sum() / 6.0)
+
+
+def _winds(corners: Floats, point: Floats) -> bool:
+    return round(_winding(corners, point)) != 0
+
+
+def _winding(corners: Floats, point: Floats) -> float:
+    """How often a shell goes round a point: its solid angle (van Oosterom and Strackee 1983, IEEE Trans. Biomed. Eng.
+    30, 125) over 4 pi."""
+    a, b, c = (corners - point).transpose(1, 0, 2)
+    p, q, r = (np.sqrt((x * x).sum(axis=1)) for x in (a, b, c))
+    over = (a * np.cross(b, c)).sum(axis=1)
+    under = p * q * r + (a * b).sum(axis=1) * r + (b * c).sum(axis=1) * p + (c * a).sum(axis=1) * q
+    return 2.0 * float(np.arctan2(over, under).sum()) / (4.0 * math.pi)

@@ -1,0 +1,114 @@
+"""Combinations of shapes, solids of CAD files and closed surfaces, as tets."""
+
+import hashlib
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from conoid.cases.combined import cut_by
+from conoid.cases.grading import Grading
+from conoid.cases.solids import Cad, Combination, Measured, Meshed, Solid, Stl
+
+from ...errors import MeshError
+from ..gmsh_session import OPTIONS, session
+from ..model import MAX_TETS, Origin, TetMesh
+from ..sources import Sources
+from .combine import Drawing, extent
+from .draw import Solids
+from .features import small_features
+from .frame import Frame, scale_of
+from .meshing import meshed
+from .sizes import set_size
+from .stl import read_stl
+from .surface import enclose
+
+_TETS_PER_CUBE = 6.0
+"""Tets in a volume of element_size^3."""
+
+
+@dataclass(frozen=True)
+class _Made:
+    mesh: TetMesh
+    notes: list[str]
+
+
+def measured(mesh: Measured, sources: Sources, key: str) -> TetMesh:
+    """The mesh of a body whose sizes nothing tells before. MeshError, naming ``key``, where there is none."""
+    if isinstance(mesh, Stl):
+        made = _of_surface(mesh, sources, key)
+    elif isinstance(mesh, Cad | Combination):
+        made = _of_solid(mesh, sources, key)
+    else:
+        raise MeshError(f"{key}: gmsh does not draw this")
+    points = made.mesh.points
+    name = hashlib.sha256(points.tobytes() + made.mesh.tets.tobytes()).hexdigest()
+    return replace(made.mesh, origin=Origin(name, np.arange(len(points), dtype=np.int64), tuple(made.notes)))
+
+
+def _of_solid(mesh: Cad | Combination, sources: Sources, key: str) -> _Made:
+    with session(OPTIONS) as gmsh:
+        frame = Frame(mesh.centre, mesh.axis, scale_of(extent(gmsh, mesh, sources, key)))
+        drawing = Drawing(gmsh, frame, sources)
+        solids = joined(gmsh.model.occ, sector(gmsh.model.occ, drawing.solids(mesh, key), mesh), key)
+        if not solids:
+            raise MeshError(f"{key}: nothing is left of it; check sizes and places of its shapes")
+        gmsh.model.occ.synchronize()
+        notes = list(small_features(gmsh, mesh.element_size, frame))
+        _refuse_too_many(gmsh, solids, mesh, frame, key)
+        set_size(gmsh, mesh.element_size, mesh.grading, frame)
+        made = meshed(gmsh, frame, mesh.element_size, len(cut_by(mesh.sector, mesh.axis)))
+    return _Made(made, [f"{key}: {note}" for note in notes])
+
+
+def _of_surface(mesh: Stl, sources: Sources, key: str) -> _Made:
+    surface = read_stl(sources[key], f"{key}.path = {mesh.path!r}")
+    low, high = surface.points.min(axis=0) * mesh.unit, surface.points.max(axis=0) * mesh.unit
+    frame = Frame((0.0, 0.0, 0.0), "z", scale_of(float((high - low).max())))
+    _refuse_volume(surface.volume() * mesh.unit**3, mesh.element_size, mesh.grading, key)
+    with session(OPTIONS) as gmsh:
+        enclose(gmsh, surface, mesh.unit / frame.scale, mesh.edge_angle)
+        set_size(gmsh, mesh.element_size, mesh.grading, frame)
+        made = meshed(gmsh, frame, mesh.element_size, 0)
+    return _Made(made, [])
+
+
+def sector(occ: Any, solids: Solids, mesh: Solid) -> Solids:
+    """What is on the positive sides of the planes at which a solid is cut."""
+    cuts = cut_by(mesh.sector, mesh.axis)
+    if not cuts or not solids:
+        return solids
+    boxes = [occ.getBoundingBox(*each) for each in solids]
+    reach = 2.0 * max(abs(x) for box in boxes for x in box) + 1.0
+    low = [0.0 if d < len(cuts) else -reach for d in range(3)]
+    side = [(3, occ.addBox(*low, *(reach - x for x in low)))]
+    kept: Solids = occ.intersect(solids, side)[0]
+    return kept
+
+
+def joined(occ: Any, solids: Solids, key: str) -> Solids:
+    """Solids with faces in common where they touch: their meshes have nodes in common there. MeshError where one lies
+    in another.
+    """
+    if len(solids) < 2:
+        return solids
+    before = sum(occ.getMass(*each) for each in solids)
+    made = [each for each in occ.fragment(solids, [])[0] if each[0] == 3]
+    after = sum(occ.getMass(*each) for each in made)
+    if after < before * (1.0 - 1e-6):
+        share = (before - after) / before
+        raise MeshError(f"{key}: its solids overlap each other: {share:.2g} of their volume is there twice")
+    return made
+
+
+def _refuse_too_many(gmsh: Any, solids: Solids, mesh: Meshed, frame: Frame, key: str) -> None:
+    volume = sum(gmsh.model.occ.getMass(*each) for each in solids) * frame.scale**3
+    _refuse_volume(volume, mesh.element_size, mesh.grading, key)
+
+
+def _refuse_volume(volume: float, size: float, grading: Grading | None, key: str) -> None:
+    tets = _TETS_PER_CUBE * volume / size**3
+    if grading is None and tets > MAX_TETS:
+        raise MeshError(f"{key}.element_size = {size:g} m: about {tets:.2g} tets; at most {MAX_TETS:,} are allowed")
+    if not volume > 0.0:
+        raise MeshError(f"{key}: the body has no volume")

@@ -1,0 +1,67 @@
+"""What the text of a STEP file (ISO 10303-21) says: whether it is whole, in which unit it is, what it refers to."""
+
+import re
+from fractions import Fraction
+
+from ...errors import MeshError
+
+_TEXT = re.compile(rb"'(?:[^']|'')*'|/\*.*?\*/", re.DOTALL)
+"""Strings and comments, which may hold anything."""
+_UNITS = re.compile(rb"GLOBAL_UNIT_ASSIGNED_CONTEXT\s*\(\s*\(([^)]*)\)")
+_NAME = re.compile(rb"#(\d+)")
+_DEFINED = re.compile(rb"[;\s]#(\d+)\s*=")
+_SOLID = re.compile(rb"=\s*(?:MANIFOLD_SOLID_BREP|BREP_WITH_VOIDS|FACETED_BREP)\s*\(")
+_SI = re.compile(rb"SI_UNIT\s*\(\s*(?:\.(\w+)\.|\$)\s*,\s*\.METRE\.\s*\)")
+_BASED = re.compile(rb"CONVERSION_BASED_UNIT\s*\([^,]*,\s*#(\d+)\s*\)")
+_MEASURE = re.compile(rb"LENGTH_MEASURE\s*\(\s*([-+0-9.Ee]+)\s*\)\s*,\s*#(\d+)")
+_ELSEWHERE = re.compile(rb"\b(DOCUMENT_FILE|EXTERNAL_SOURCE|EXTERNALLY_DEFINED_\w+)\s*\(|;\s*(REFERENCE)\s*;")
+"""What stands for geometry of other files: documents (AP 203, 214, 242), and the section of edition 3."""
+_PREFIXES = {
+    b"EXA": 18, b"PETA": 15, b"TERA": 12, b"GIGA": 9, b"MEGA": 6, b"KILO": 3, b"HECTO": 2, b"DECA": 1, b"": 0,
+    b"DECI": -1, b"CENTI": -2, b"MILLI": -3, b"MICRO": -6, b"NANO": -9, b"PICO": -12,
+}  # fmt: skip
+
+
+def length_units(data: bytes, head: str) -> set[Fraction]:
+    """The lengths of 1 in the file, m: of each of its contexts. MeshError, which begins with ``head``, where the file
+    is cut off, damaged or refers to others.
+    """
+    if not data.rstrip().endswith(b"END-ISO-10303-21;"):
+        raise MeshError(f"{head}: the STEP file is cut off: it does not end with END-ISO-10303-21;")
+    text = _TEXT.sub(b"''", data)
+    if found := _ELSEWHERE.search(text):
+        what = (found[1] or found[2]).decode()
+        raise MeshError(f"{head}: the STEP file refers to other files ({what}), which are not read; save all in one")
+    if lost := set(_NAME.findall(text)) - set(_DEFINED.findall(text)):
+        raise MeshError(f"{head}: the STEP file is damaged: #{min(map(int, lost))} is used and not defined")
+    names = {name for found in _UNITS.finditer(text) for name in _NAME.findall(found[1])}
+    units = {unit for name in names if (unit := _length(text, name, 0)) is not None}
+    if not units:
+        raise MeshError(f"{head}: the STEP file does not say in which unit of length it is")
+    return units
+
+
+def solids_in(data: bytes) -> int:
+    """How many solids the file defines; an assembly may have one of them more than once."""
+    return len(_SOLID.findall(_TEXT.sub(b"''", data)))
+
+
+def _entity(text: bytes, name: bytes) -> bytes:
+    found = re.search(rb"#" + name + rb"\s*=\s*([^;]*);", text)
+    return found[1] if found else b""
+
+
+def _length(text: bytes, name: bytes, depth: int) -> Fraction | None:
+    """The unit that an entity stands for, m; None where it is none of length. An inch is based on another unit."""
+    entity = _entity(text, name)
+    if found := _SI.search(entity):
+        power = _PREFIXES.get(found[1] or b"", 0)
+        return Fraction(10) ** power
+    based = _BASED.search(entity)
+    if based is None or b"LENGTH_UNIT" not in entity or depth > 8:
+        return None
+    measure = _MEASURE.search(_entity(text, based[1]))
+    base = None if measure is None else _length(text, measure[2], depth + 1)
+    if measure is None or base is None:
+        return None
+    return Fraction(measure[1].decode().rstrip(".") or "0") * base

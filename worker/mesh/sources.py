@@ -1,0 +1,56 @@
+"""The files that a mesh is made of: where they are, and which bytes they have."""
+
+import hashlib
+from collections.abc import Mapping
+from pathlib import Path
+
+from conoid.cases import whole
+from conoid.cases.bodies import Mesh
+from conoid.cases.files import located
+from conoid.cases.measured_checks import File, files_in
+from conoid.cases.operands import Place
+from conoid.cases.problems import dotted
+
+from ..errors import MeshError
+
+Sources = Mapping[str, Path]
+"""Absolute paths by the key of the table that names the file, ``parts[0].mesh.of[1]``."""
+
+
+def sources(mesh: Mesh, folder: Path, key: str) -> dict[str, Path]:
+    """The files of the mesh at ``key`` whose case is in ``folder``. MeshError where one is not there."""
+    return {named: _there(file, folder, named) for named, file in _named(mesh, key)}
+
+
+def digests(mesh: Mesh, found: Sources, key: str) -> list[str]:
+    """How each file ends and its sha256; MeshError where one is not the file that was meant."""
+    return [f"{found[named].suffix.lower()} {_digest(found[named], file, named)}" for named, file in _named(mesh, key)]
+
+
+def _named(mesh: Mesh, key: str) -> list[tuple[str, File]]:
+    return [(below(key, place), file) for place, file in files_in(mesh)]
+
+
+def below(key: str, place: Place) -> str:
+    """The key of a table below another one."""
+    return f"{key}.{dotted(place)}" if place else key
+
+
+def _there(file: File, folder: Path, key: str) -> Path:
+    if "://" in file.path:
+        raise MeshError(f"{key}.path = {file.path!r}: expected a file, not an address")
+    path = located(file.path, file.sha256, folder)
+    if not path.is_file():
+        raise MeshError(f"{key}.path = {file.path!r}: no such file ({path.absolute()})")
+    return path.absolute()
+
+
+def _digest(source: Path, file: File, key: str) -> str:
+    try:
+        with whole.opened(source) as opened:
+            found = hashlib.file_digest(opened, "sha256").hexdigest()
+    except OSError as error:
+        raise MeshError(f"{key}.path = {file.path!r}: {error.strerror}") from error
+    if file.sha256 is not None and file.sha256 != found:
+        raise MeshError(f"{key}.sha256 = {file.sha256!r}: {file.path!r} has {found}")
+    return found
