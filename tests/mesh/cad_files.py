@@ -87,7 +87,7 @@ def binary(facets: Facets) -> bytes:
 def text(facets: Facets) -> str:
     """An STL file as text."""
     corners = "\n".join(
-        "facet normal 0 0 0\nouter loop\n" + "".join(f"vertex {x:.9g} {y:.9g} {z:.9g}\n" for x, y, z in each)
+        "facet normal 0 0 0\nouter loop\n" + "".join(f"vertex {x:.17g} {y:.17g} {z:.17g}\n" for x, y, z in each)
         + "endloop\nendfacet" for each in facets
     )  # fmt: skip
     return f"solid x\n{corners}\nendsolid x\n"

@@ -5,6 +5,8 @@ their normals, the products of an edge of each, and across their edges in the pl
 Manocha 1996, SIGGRAPH, 171).
 """
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -36,7 +38,7 @@ def _near(corners: Floats, deep: float) -> Pairs:
     """(k, 2) pairs whose boxes overlap, each once, found by the cells that the boxes reach into."""
     low, high = corners.min(axis=1), corners.max(axis=1)
     start, extent = low.min(axis=0), float((high.max(axis=0) - low.min(axis=0)).max())
-    many = max(1, round(0.5 * len(corners) ** 0.5))
+    many = max(1, math.isqrt(len(corners)) // 2)
     while True:
         first, last = (np.floor((x - start) / extent * many).clip(0, many - 1).astype(np.int64) for x in (low, high))
         counts = (last - first + 1).prod(axis=1)
