@@ -101,7 +101,7 @@ def _built(case: schema.Case, folder: Path, say: Say, facts: Facts) -> Iterator[
 def _together(case: schema.Case, index: int) -> list[int]:
     """The parts that gmsh meshes together with one: those of its body that it makes."""
     body = bodies(case)
-    made = [not isinstance(part.mesh, MeshFile) and part.mesh.generator == "gmsh" for part in case.parts]
+    made = [not isinstance(part.mesh, Measured) and part.mesh.generator == "gmsh" for part in case.parts]
     return [i for i, of in enumerate(body) if of == body[index] and made[i]] if made[index] else []
 
 
