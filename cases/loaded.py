@@ -5,7 +5,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from .bodies import Box, Cylinder, Loose, Plate, RingSector, Sphere, Tube
+from .bodies import Box, Cylinder, Loose, MeshFile, Plate, RingSector, Sphere, Tube
 from .boundaries import Prescribed, Traction
 from .geometry import Generated, Vector, surface, volume
 from .mesh_size import FACES_PER_SURFACE, grid, mesh_size, surface_faces

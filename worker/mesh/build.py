@@ -12,7 +12,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from conoid.cases import geometry, profile, ring
+from conoid.cases import geometry, profile, ring, whole
 from conoid.cases.bodies import Mesh, MeshFile
 from conoid.cases.files import files_of
 
