@@ -56,7 +56,7 @@ def _length(text: bytes, name: bytes, depth: int) -> Fraction | None:
     entity = _entity(text, name)
     if found := _SI.search(entity):
         power = _PREFIXES.get(found[1] or b"", 0)
-        return Fraction(10) ** power
+        return Fraction(f"1e{power}")
     based = _BASED.search(entity)
     if based is None or b"LENGTH_UNIT" not in entity or depth > 8:
         return None
