@@ -1,9 +1,10 @@
 """What became of a deck, keyword by keyword: taken over, left out, or a reason to refuse the import."""
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
+T = TypeVar("T")
 Fate = Literal["taken", "left", "refused"]
 Remark = Literal["left", "differs", "refused"]
 """Of a part of a keyword that is taken over: a value that is left out, one that means something else here, or one
@@ -110,6 +111,11 @@ class Account:
             if not each.decided:
                 each.refuse("this keyword is not known here; it may change the answer")
 
+    def without(self, solid: Iterable[str], parts: Collection[str]) -> None:
+        """Numbers of parts that have solids, and those that are defined: solids of others are in no body."""
+        if lost := sorted({number for number in solid if number not in parts}, key=int):
+            self.general.append(f"solids of the part {', '.join(lost)} would be lost: the deck does not define it")
+
     def of(self, fate: Fate) -> list[Entry]:
         """The keywords of one fate."""
         return [each for each in self.entries if each.fate == fate]
@@ -117,3 +123,10 @@ class Account:
     def refusals(self) -> list[str]:
         """Every reason why the import is refused, a line each."""
         return [*self.general, *(line for each in self.entries for line in each.refusals())]
+
+
+def once(known: Collection[T], number: T, what: str) -> T:
+    """A number that nothing of its kind has yet. Raises ValueError."""
+    if number in known:
+        raise ValueError(f"the {what} {number} is defined twice")
+    return number

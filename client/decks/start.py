@@ -41,6 +41,9 @@ def begin(draft: Draft, topology: Topology, bodies: Sequence[Body], starts: Sequ
 
 
 def _give(draft: Draft, body: Body, start: Start) -> None:
+    if body.spin or (any(start.rate) and body.velocity is not None):
+        why = f"{body.name} has a velocity from before; which of them holds where one turns is not taken over"
+        start.entry.remark("refused", start.chosen.what, why)
     old = body.velocity or (0.0, 0.0, 0.0)
     x, y, z = (start.velocity.get(axis, old[axis]) for axis in range(3))
     body.velocity = (x, y, z)

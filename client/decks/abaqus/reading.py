@@ -221,7 +221,10 @@ class Abaqus:
                 raise InpError(f"the node set {name[:60]!r} is not defined")
             return found
 
-        return Chosen(f"node set {name}", nodes=nodes, on=None if name.strip().isdigit() else name.strip().strip('"'))
+        on = None if name.strip().isdigit() else name.strip().strip('"')
+        if on is not None and any(each.key("NAME") == joined(last) for each in self.of("SURFACE")):
+            on = f"nodes:{on}"
+        return Chosen(f"node set {name}", nodes=nodes, on=on)
 
     def _scopes(self, each: Keyword) -> set[str]:
         """Instances in which a set may be named."""

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from conoid.cases.cards import Block
+from conoid.cases.cards import Block, Card
 
 from ..account import Entry
 from ..contacts import Meeting
@@ -28,7 +28,7 @@ Surface = Callable[[int, int, Entry], frozenset[str]]
 
 def contact(block: Block, name: str, options: frozenset[str], entry: Entry, surface: Surface) -> Meeting:
     """A contact by its three cards; bodies of a single one meet each other and themselves. Raises ValueError."""
-    fields = Fields(block, entry, trimmed(block.cards)[bool(options & {"ID", "TITLE"}) :], _LAYOUT)
+    fields = Fields(block, entry, _behind(block, options, entry), _LAYOUT)
     fields.forgive("SPR MPR PENCHK VC VDC SFS SFM SST MST SFST SFMT VSF", "stiffness and output of the penalty method")
     fields.refuse("SBOXID MBOXID", "boxes are not taken over")
     fields.refuse("BT", "the contact begins later; here it is there from the start on")
@@ -52,6 +52,15 @@ def contact(block: Block, name: str, options: frozenset[str], entry: Entry, surf
         fields.more.clear()
     fields.rest("refused")
     return Meeting(one, other, max(still, 0.0), entry)
+
+
+def _behind(block: Block, options: frozenset[str], entry: Entry) -> list[Card]:
+    """The cards behind a title and those of the option MPP: one, and a second one that begins with ``&``."""
+    cards = trimmed(block.cards)[bool(options & {"ID", "TITLE"}) :]
+    if "MPP" not in options or not cards:
+        return cards
+    entry.remark("left", f"line {cards[0].number}", "how the other code divides the work of contact")
+    return cards[1 + (len(cards) > 1 and cards[1].text.lstrip().startswith("&")) :]
 
 
 def termination(block: Block, entry: Entry) -> float:

@@ -37,6 +37,13 @@ class Scene:
     holds: list[Hold] = field(default_factory=list)
     walls: list[Stop] = field(default_factory=list)
 
+    def lasting(self, number: int) -> Course:
+        """The curve of a number, which must not end before the run does. Raises ValueError."""
+        found = self.curve(number)
+        if found and found[-1][0] < self.end < float("inf"):
+            raise ValueError(f"the curve ends at {found[-1][0]:g}, before the end of the run at {self.end:g}")
+        return found
+
 
 # Velocities at the start ----------------------------------------------------------------------------------------------
 
@@ -150,7 +157,7 @@ def motion(scene: Scene, block: Block, options: frozenset[str], entry: Entry) ->
         if axis is None:
             raise ValueError(f"DOF = {fields.text('DOF')} is not 1, 2 or 3: motions along x, y and z are taken over")
         scale, kind = fields.nonzero("SF", 1.0), fields.whole("VAD")
-        curve = tuple((time, scale * value) for time, value in scene.curve(fields.whole("LCID")))
+        curve = tuple((time, scale * value) for time, value in scene.lasting(fields.whole("LCID")))
         if 0.0 < fields.real("DEATH") < scene.end:
             fields.refuse("DEATH", "the motion ends before the run does; here it lasts")
         fields.refuse("BIRTH", "the motion begins later; here it is from the start on")
@@ -203,7 +210,7 @@ def body_load(scene: Scene, block: Block, options: frozenset[str], entry: Entry)
     fields.forgive("XC YC ZC", "a centre of rotation, of no meaning for a translation")
     (axis,) = options & {"X", "Y", "Z"}
     scale = fields.nonzero("SF", 1.0)
-    curve = tuple((time, -scale * value) for time, value in scene.curve(fields.whole("LCID")))
+    curve = tuple((time, -scale * value) for time, value in scene.lasting(fields.whole("LCID")))
     most, course = velocity_course(curve, scene.end)
     pull = [most if axis == each else 0.0 for each in "XYZ"]
     table: dict[str, Any] = {"kind": "gravity", "acceleration": scene.draft.vector(pull, ACCELERATION)}

@@ -32,15 +32,30 @@ class Numbered:
         """The node set of a number; 0 is everything. Raises ValueError."""
         if number == 0:
             return Chosen("everything", bodies=frozenset(self.topology.bodies))
+        found = self._node_set(number, entry)
+        if found.everything:
+            return Chosen(f"node set {number}", bodies=frozenset(self.topology.bodies))
+        on = f"nodes:{number}" if number in self.segments else str(number)
+        return Chosen(f"node set {number}", nodes=partial(self._members, found), on=on)
+
+    def _node_set(self, number: int, entry: Entry, within: tuple[int, ...] = ()) -> sets.NodeSet:
+        """The node set of a number, with those that it is made of in it. Raises ValueError."""
         found = self.node_sets.get(number)
         if found is None:
             raise ValueError(f"the node set {number} is not defined")
+        if number in within:
+            raise ValueError(f"the node set {number} has itself among its members")
         if found.odd:
             raise ValueError(f"the node set {number}: {found.odd}")
         found.entry.take(f"of {entry.keyword}, {entry.place}")
-        if found.everything:
-            return Chosen(f"node set {number}", bodies=frozenset(self.topology.bodies))
-        return Chosen(f"node set {number}", nodes=partial(self._members, found), on=str(number))
+        for other in sorted(found.sets):
+            one = self._node_set(other, found.entry, (*within, number))
+            found.everything |= one.everything
+            found.nodes |= one.nodes
+            found.parts |= one.parts
+            found.ranges += one.ranges
+        found.sets.clear()
+        return found
 
     def _members(self, found: sets.NodeSet) -> set[int]:
         every = self.topology.of
@@ -82,7 +97,7 @@ class Numbered:
         raise ValueError(f"a surface of the type {kind} is not followed; 0, 2, 3, 4 and 5 are")
 
     def _of_nodes(self, number: int, kind: int, entry: Entry) -> frozenset[str]:
-        found = (self.segments if kind == 0 else self.node_sets).get(number)
+        found = self.segments.get(number) if kind == 0 else self._node_set(number, entry)
         if found is None or found.odd:
             raise ValueError(f"the set {number}: {found.odd if found else 'it is not defined'}")
         found.entry.take(f"of {entry.keyword}, {entry.place}")

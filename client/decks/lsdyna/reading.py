@@ -6,7 +6,7 @@ from pathlib import Path
 
 from conoid.cases.cards import Block, CardError, Deck
 
-from ..account import Account, Entry
+from ..account import Account, Entry, once
 from ..bonds import Tie, join
 from ..contacts import Meeting, meet
 from ..draft import Body, Draft, Made
@@ -86,9 +86,9 @@ class LsDyna:
             title, cards = sets.titled(block, options)
             fields = Fields(block, entry, cards, LAYOUTS[plain])
             if plain.startswith("EOS"):
-                self._states[fields.whole("EOSID")] = fields
+                self._states[once(self._states, fields.whole("EOSID"), "equation of state")] = fields
             else:
-                self._materials[fields.whole("MID")] = plain, fields, title
+                self._materials[once(self._materials, fields.whole("MID"), "material")] = plain, fields, title
         elif name == "MAT_ADD_EROSION":
             layout = (
                 "MID EXCL MXPRES MNEPS EFFEPS VOLEPS NUMFIP NCS",
@@ -99,12 +99,13 @@ class LsDyna:
         elif name.startswith("MAT_"):
             card = sets.titled(block, options)[1][:1]
             fields = Fields(block, entry, card, ("MID RO",))
-            self._materials[fields.whole("MID")] = plain, fields, sets.titled(block, options)[0]
+            number = once(self._materials, fields.whole("MID"), "material")
+            self._materials[number] = plain, fields, sets.titled(block, options)[0]
         elif name.startswith(("SET_NODE", "SET_SEGMENT", "SET_PART")):
             self._set(block, entry)
         elif name == "DEFINE_CURVE":
             number, curve = sets.curve(block, options, entry)
-            self._numbered.curves[number] = curve, entry
+            self._numbered.curves[once(self._numbered.curves, number, "curve")] = curve, entry
         elif block.name in ("PART", "PART_CONTACT"):
             self._parts(block, entry)
         elif name == "TITLE" or block.name == "TITLE":
@@ -115,13 +116,13 @@ class LsDyna:
         name, options = block.parted(_SETS)
         if name == "SET_NODE":
             found = sets.node_set(block, options, entry)
-            self._numbered.node_sets[found.number] = found
+            self._numbered.node_sets[once(self._numbered.node_sets, found.number, "node set")] = found
         elif name == "SET_SEGMENT":
             found = sets.segment_set(block, options, entry)
-            self._numbered.segments[found.number] = found
+            self._numbered.segments[once(self._numbered.segments, found.number, "set of segments")] = found
         elif name == "SET_PART" and not options - {"LIST", "TITLE"}:
             cards = sets.titled(block, options)[1]
-            number = Fields(block, entry, cards, ("SID",)).whole("SID")
+            number = once(self._numbered.part_sets, Fields(block, entry, cards, ("SID",)).whole("SID"), "part set")
             self._numbered.part_sets[number] = set(numbers(block, cards[1:], "pid")), entry
         else:
             entry.refuse(f"*{block.name} is not followed")
@@ -140,6 +141,7 @@ class LsDyna:
                 fields.whole("MID")
                 entry.remark("left", f"part {number}", "no solid is of it")
                 continue
+            once([body.key for body in self._bodies], number, "part")
             material = f"{fields.whole('MID')}/{eos}" if eos else str(fields.whole("MID"))
             self._bodies.append(Body(number, title.text.strip(), material, number, entry))
         if len(cards) < 2:
@@ -162,6 +164,7 @@ class LsDyna:
         """The case, in units of ``system``."""
         self._draft = Draft(self.path, system, self.account)
         self._draft.title = self.title
+        self.account.without(self._solid, [body.key for body in self._bodies])
         self._topology = Topology(
             [body.key for body in self._bodies], partial(read_nodes, self.path), partial(read_points, self.path)
         )

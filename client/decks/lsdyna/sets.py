@@ -20,6 +20,8 @@ class NodeSet:
     entry: Entry
     nodes: set[int] = field(default_factory=set)
     parts: set[int] = field(default_factory=set)
+    sets: set[int] = field(default_factory=set)
+    """Other sets of nodes (``_ADD``)."""
     ranges: list[range] = field(default_factory=list)
     """Numbers from one to another, whether there are such nodes or not."""
     everything: bool = False
@@ -49,7 +51,9 @@ def node_set(block: Block, options: frozenset[str], entry: Entry) -> NodeSet:
             if last < first:
                 raise block.error(rest[0], f"no numbers lead from {first} to {last}")
             found.ranges.append(range(first, last + 1))
-    elif options - {"TITLE", "LIST", "ADD"}:
+    elif "ADD" in options and not options - {"TITLE", "ADD"}:
+        found.sets.update(numbers(block, rest, "sid"))
+    elif options - {"TITLE", "LIST"}:
         found.odd = f"*{block.name} is not followed"
     else:
         found.nodes.update(numbers(block, rest, "nid"))

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from conoid.cases.cards import CardError
 
-from ..account import Account, Entry
+from ..account import Account, Entry, once
 from ..bonds import Tie, join
 from ..contacts import Meeting, meet
 from ..draft import Body, Draft, Made
@@ -86,9 +86,10 @@ class Radioss:
         elif word in ("MAT", "EOS", "FAIL"):
             self._law(option, entry)
         elif word in ("GRNOD", "GRPART", "SURF"):
+            once([number for kind, number in self._groups if kind == word], option.number(), f"group /{word}")
             self._groups[word, option.number()] = option, entry
         elif word == "FUNCT":
-            self._curves[option.number()] = option, entry
+            self._curves[once(self._curves, option.number(), "function")] = option, entry
 
     def _begin(self, option: Option, entry: Entry) -> None:
         """Title, version, and the units of the input and of the work."""
@@ -109,6 +110,7 @@ class Radioss:
             fields.whole("MAT")
             entry.leave("no solid is of it")
             return
+        once([body.key for body in self._bodies], number, "part")
         self._bodies.append(Body(number, title, str(fields.whole("MAT")), number, entry))
 
     def _law(self, option: Option, entry: Entry) -> None:
@@ -127,7 +129,7 @@ class Radioss:
             if kind != "GRUNEISEN":
                 entry.refuse(REFUSED["EOS"])
         else:
-            self._mats[option.number()] = kind, fields, title
+            self._mats[once(self._mats, option.number(), "material")] = kind, fields, title
 
     def weighed(self) -> Iterator[Weighed]:
         """Densities of the materials, to tell the units by."""
@@ -145,6 +147,7 @@ class Radioss:
         self._draft = draft = Draft(self.path, system, self.account)
         draft.name = draft.name.removesuffix("_0000")
         draft.title = self.title
+        self.account.without(self._solid, [body.key for body in self._bodies])
         self._topology = Topology(
             [body.key for body in self._bodies], partial(read_nodes, self.path), partial(read_points, self.path)
         )
@@ -240,8 +243,10 @@ class Radioss:
 
     # What options name ------------------------------------------------------------------------------------------------
 
-    def _nodes(self, number: int, entry: Entry) -> Chosen:
-        """A group of nodes. Raises ValueError."""
+    def _nodes(self, number: int, entry: Entry, within: tuple[int, ...] = ()) -> Chosen:
+        """A group of nodes, ``within`` others. Raises ValueError."""
+        if number in within:
+            raise ValueError(f"the group of nodes {number} is within itself")
         found = self._groups.get(("GRNOD", number))
         if found is None:
             raise ValueError(f"the group of nodes {number} is not defined")
@@ -249,12 +254,15 @@ class Radioss:
         what, kind = f"node group {number}", option.words[1]
         own.take(f"of {entry.keyword}, {entry.place}")
         items = numbers(option.rows[1:], "node")
+        if any(item < 0 for item in items):
+            raise ValueError(f"the group of nodes {number} takes some away by numbers below 0, which is not followed")
         if kind == "PART":
             return Chosen(what, bodies=frozenset(map(str, items)))
         if kind == "NODE":
-            return Chosen(what, nodes=lambda: set(items), on=str(number))
+            on = f"nodes:{number}" if ("SURF", number) in self._groups else str(number)
+            return Chosen(what, nodes=lambda: set(items), on=on)
         if kind == "GRNOD":
-            groups = [self._nodes(item, entry) for item in items]
+            groups = [self._nodes(item, entry, (*within, number)) for item in items]
             return Chosen(what, nodes=lambda: set().union(*(self._topology.nodes(each) for each in groups)))
         raise ValueError(f"the group of nodes {number} is a /GRNOD/{kind}; NODE, PART and GRNOD are followed")
 

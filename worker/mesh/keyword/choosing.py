@@ -83,6 +83,8 @@ class Content:
         if word == "part":
             titles = dict.fromkeys(np.unique(self.parts).tolist(), "") | titles
         exact = [number for number, title in titles.items() if name in (title, str(number))]
+        if word == "part":
+            exact = [number for number in exact if str(number) == name] or exact
         alike = exact or [number for number, title in titles.items() if name.casefold() == title.casefold()]
         return [(f"the {word} {number}", self._elements(word, number)) for number in alike]
 

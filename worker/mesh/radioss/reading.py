@@ -160,7 +160,8 @@ class _Reader:
 
 
 def _named(titles: dict[int, str], name: str) -> list[int]:
-    exact = [number for number, title in titles.items() if name in (title, str(number))]
+    exact = [number for number in titles if str(number) == name]
+    exact = exact or [number for number, title in titles.items() if title == name]
     return exact or [number for number, title in titles.items() if title.casefold() == name.casefold()]
 
 

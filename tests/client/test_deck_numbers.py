@@ -1,0 +1,136 @@
+"""What decks name by numbers: sets of sets, numbers that two things have, numbers that nothing has."""
+
+from pathlib import Path
+
+import pytest
+
+from conoid.cases.bodies import MeshFile
+from conoid.client.decks.toml import bare
+from conoid.worker.mesh.read import read as read_mesh
+
+from .deck_texts import abaqus, lsdyna, r20, radioss, read, row
+
+STEEL = ("*MAT_ELASTIC", row(1, "7.85E-9", 210000.0, 0.3))
+HELD = "*BOUNDARY_SPC_SET"
+OTHER = "".join(f"{n:8}" for n in (2, 7, 1, 2, 3, 4, 4, 4, 4, 4))
+
+
+def test_a_set_of_sets_has_their_nodes(tmp_path: Path) -> None:
+    """Its members are sets: the deck has no nodes 51 and 52."""
+    sets = ("*SET_NODE_LIST", row(51), row(1, 2), "*SET_NODE", row(52), row(3, 4), "*SET_NODE_ADD", row(9), row(51, 52))
+    found = read(tmp_path, "a.k", lsdyna(*STEEL, *sets, HELD, row(9, 0, 1, 1, 1)))
+    assert found.refusals == []
+    (held,) = bare(found.data["boundaries"])
+    assert held == {"kind": "velocity", "x": "0 mm/s", "y": "0 mm/s", "z": "0 mm/s"}
+    again = ("*SET_NODE_ADD", row(9), row(9))
+    (told,) = read(tmp_path, "b.k", lsdyna(*STEEL, *again, HELD, row(9, 0, 1, 1, 1))).refusals
+    assert "the node set 9 has itself among its members" in told
+
+
+@pytest.mark.parametrize("code", ["lsdyna", "abaqus", "radioss"])
+def test_a_set_of_nodes_is_told_from_a_surface_of_its_name(tmp_path: Path, code: str) -> None:
+    if code == "lsdyna":
+        sets = ("*SET_NODE_LIST", row(5), row(1, 2), "*SET_SEGMENT", row(5), row(1, 2, 3, 3))
+        found = read(tmp_path, "a.k", lsdyna(*STEEL, *sets, HELD, row(5, 0, 1, 1, 1)))
+    elif code == "abaqus":
+        model = "*Nset, nset=five\n1, 2\n*Surface, name=Five\nbody, S1\n*Boundary\nfive, 1, 3"
+        found = read(tmp_path, "a.inp", abaqus("*Density\n7.85e-9,\n*Elastic\n2.1e5, 0.3", model=model))
+    else:
+        groups = (
+            "/GRNOD/NODE/5",
+            "some",
+            row(1, 2),
+            "/SURF/PART/5",
+            "skin",
+            row(1),
+            "/BCS/1",
+            "held",
+            row("111 000", 0, 5),
+        )
+        law = ("/MAT/ELAST/1", "steel", "7.85E-9", r20(2.1e5, 0.3))
+        found = read(tmp_path, "a_0000.rad", radioss(*law, *groups), None)
+    assert found.refusals == []
+    (held,) = bare(found.data["boundaries"])
+    assert held["on"] == ("nodes:five" if code == "abaqus" else "nodes:5")
+
+
+TWICE = {
+    "material 1": (*STEEL, *STEEL),
+    "node set 3": (*STEEL, "*SET_NODE", row(3), row(1), "*SET_NODE_LIST", row(3), row(2)),
+    "curve 4": (*STEEL, *("*DEFINE_CURVE", row(4), r20(0.0, 1.0)) * 2),
+    "part 1": (*STEEL, "*PART", "again", row(1, 1, 1)),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("what", TWICE)
+def test_a_number_that_two_have_refuses(tmp_path: Path, what: str) -> None:
+    told = read(tmp_path, "a.k", lsdyna(*TWICE[what])).refusals
+    assert any(f"the {what} is defined twice" in line for line in told), told
+
+
+def test_solids_of_a_part_that_is_not_defined_refuse(tmp_path: Path) -> None:
+    found = read(tmp_path, "a.k", lsdyna(*STEEL, "*ELEMENT_SOLID", OTHER))
+    assert found.refusals == ["solids of the part 7 would be lost: the deck does not define it"]
+
+
+def test_the_cards_of_the_option_mpp_are_not_those_of_the_contact(tmp_path: Path) -> None:
+    cards = (row(0, 0, 5, 5), row(0.3, 0.3), row(1.0, 1.0))
+    for more in ((row(0, 200, 0, 3, 2, 1.0005),), (row(0, 200), "&        0         0         0")):
+        found = read(tmp_path, "a.k", lsdyna(*STEEL, "*CONTACT_AUTOMATIC_SINGLE_SURFACE_MPP", *more, *cards))
+        assert found.refusals == []
+        assert found.data["contact"]["friction"] == 0.3
+
+
+def test_a_curve_that_ends_early_refuses_where_it_is_constant_as_well(tmp_path: Path) -> None:
+    curve = ("*DEFINE_CURVE", row(1), r20(0.0, 5.0), r20(0.001, 5.0))
+    told = read(tmp_path, "a.k", lsdyna(*STEEL, *curve, "*BOUNDARY_PRESCRIBED_MOTION_RIGID", row(1, 3, 0, 1))).refusals
+    assert any("the curve ends at 0.001" in line for line in told)
+
+
+def test_a_second_velocity_of_a_body_that_turns_refuses(tmp_path: Path) -> None:
+    turn = ("*INITIAL_VELOCITY_GENERATION", row(1, 2, 100.0), row(0, 0, 0, 0, 0, 1))
+    push = ("*INITIAL_VELOCITY_GENERATION", row(1, 2, 0.0, 5.0), row(0))
+    for cards in ((*turn, *push), (*push, *turn)):
+        assert any("a velocity from before" in line for line in read(tmp_path, "a.k", lsdyna(*STEEL, *cards)).refusals)
+
+
+def test_groups_within_themselves_and_that_take_away_refuse(tmp_path: Path) -> None:
+    law = ("/MAT/ELAST/1", "steel", "7.85E-9", r20(2.1e5, 0.3))
+    for group, told in (
+        (("/GRNOD/GRNOD/5", "g", row(5)), "is within itself"),
+        (("/GRNOD/NODE/5", "g", row(1, -2)), "below 0"),
+    ):
+        found = read(tmp_path, "a_0000.rad", radioss(*law, *group, "/BCS/1", "held", row("111 000", 0, 5)), None)
+        assert any(told in line for line in found.refusals), found.refusals
+
+
+def starter(points: list[str]) -> str:
+    """Two tets of a Radioss deck; the part 1 is called 2, the part 2 is called 1."""
+    units = r20("Mg", "mm", "s")
+    return "\n".join((
+        "#RADIOSS STARTER", "/BEGIN", "b", row(2021, 0), units, units, "/PART/1", "2", row(1, 1), "/PART/2", "1",
+        row(1, 1), "/NODE", *points, "/TETRA4/1", row(1, 1, 2, 3, 4), "/TETRA4/2", row(2, 5, 6, 7, 8), "/END", "",
+    ))  # fmt: skip
+
+
+def keywords(points: list[str]) -> str:
+    """The same as a keyword deck."""
+    first, second = (
+        "".join(f"{n:8}" for n in ids) for ids in ((1, 1, 1, 2, 3, 4, *(4,) * 4), (2, 2, 5, 6, 7, 8, *(8,) * 4))
+    )
+    return "\n".join((
+        "*KEYWORD", "*PART", "2", row(1, 1, 1), "*PART", "1", row(2, 1, 1), "*NODE", *points, "*ELEMENT_SOLID", first,
+        second, "*END", "",
+    ))  # fmt: skip
+
+
+@pytest.mark.parametrize("ending", ["k", "rad"])
+def test_a_number_means_the_part_of_that_number_not_of_that_title(tmp_path: Path, ending: str) -> None:
+    path = tmp_path / f"a.{ending}"
+    corners = [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)]
+    points = [*corners, *((2.0 * x + 5.0, 2.0 * y, 2.0 * z) for x, y, z in corners)]
+    first, width = (8, 16) if ending == "k" else (10, 20)
+    rows = [f"{i:{first}}{x:{width}}{y:{width}}{z:{width}}" for i, (x, y, z) in enumerate(points, 1)]
+    path.write_text(keywords(rows) if ending == "k" else starter(rows))
+    files = [MeshFile(shape="file", path=path.name, unit=1.0, group=name) for name in ("1", "2")]
+    assert [read_mesh(file, path).points.max() for file in files] == [1.0, 7.0]
