@@ -17,7 +17,9 @@ ProbeField = Literal[
 ]  # fmt: skip
 SUMS = ("mass", "momentum", "kinetic_energy", "centre", "centre_velocity", "residual_velocity", "residual_mass")
 """Fields that are sums over nodes, without their components."""
-BEYOND = ("residual_velocity", "residual_mass", "fragment_velocity", "fragment_mass")
+FRAGMENTS = ("fragment_velocity", "fragment_mass")
+"""Fields of the heaviest fragment beyond a plane."""
+BEYOND = ("residual_velocity", "residual_mass", *FRAGMENTS)
 """Fields of what lies beyond a plane."""
 SHAPES = ("penetration", "hole_diameter", "hole_width", "cone_angle")
 """Fields that are lengths and angles of a body, round or along a line."""
@@ -55,10 +57,12 @@ class Probe(Model):
     push it with. ``contact_impulse`` and ``wall_impulse``, N s, are the same since the start. All hold the whole last
     step of a run, of which its last velocities hold half.
 
-    Sums over the nodes of the part that start in the box, with the velocities of the line's time: ``mass``,
-    ``momentum``, ``kinetic_energy`` (the ledger's has products of two steps, and differs by the order of the step
-    squared), ``centre`` and ``centre_velocity``, position and velocity of the centre of mass. With ``beyond`` only of
-    nodes that are on that side of a plane at that time. Nodes without tets count until they leave.
+    Sums over the nodes of the part that start in the box and are in the set ``on``, with the velocities of the line's
+    time: ``mass``, ``momentum``, ``kinetic_energy`` (the ledger's has products of two steps, and differs by the order
+    of the step squared), ``centre`` and ``centre_velocity``, position and velocity of the centre of mass. With
+    ``beyond`` only of nodes that are on that side of a plane at that time. Nodes without tets count until they
+    leave. Of a rigid part as a whole they are those of the body, with the inertia and the centre that it has; of some
+    of its nodes sums over these.
 
     Behind a target: ``residual_mass`` is the mass of the part ``beyond`` a plane, ``residual_velocity`` its mass-mean
     velocity along the axis of the plane, positive away from it, and 0 where nothing is there. ``fragment_mass`` and
@@ -91,8 +95,8 @@ class Probe(Model):
     high: Point | None = None
     """Highest corner of the box; with ``low``."""
     on: SetName | None = None
-    """Of means: a set of nodes or a surface of the mesh file of the part, by name (docs/meshes.md): the tets that have
-    a node of it. With a box those that are in both."""
+    """Of means and sums: a set of nodes or a surface of the mesh file of the part, by name (docs/meshes.md): of means
+    the tets that have a node of it, of sums its nodes. With a box those that are in both."""
     beyond: Beyond | None = None
     """Of sums and of what is behind a target: the side of a plane, ``{ axis = "z", at = "8 mm" }``."""
     axis: Axis | None = None

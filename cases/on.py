@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 from .bodies import MeshFile
 from .boundaries import Prescribed, Rotation, Traction
-from .measures import BEYOND, PUSHES, SHAPES, SUMS, Probe, kind
+from .measures import FRAGMENTS, PUSHES, SHAPES, Probe, kind
 from .problems import Location, Problem, problem
 from .schema import Case, Part
 
@@ -46,7 +46,9 @@ def check_ons(case: Case) -> Iterator[Problem]:
             yield problem((*location, "on"), spec.on, f"a mesh from a file has sets; that of {generated[0]!r} is not")
         elif not parts(case, spec):
             yield problem((*location, "on"), spec.on, "a mesh from a file has sets; no part of the case has one")
-        if isinstance(spec, Probe) and kind(spec.field) in (*PUSHES, *SUMS, *BEYOND, *SHAPES):
-            yield problem((*location, "on"), spec.on, f"is of means alone; {spec.field!r} is none; remove on")
+        if isinstance(spec, Probe) and kind(spec.field) in (*PUSHES, *FRAGMENTS, *SHAPES):
+            yield problem(
+                (*location, "on"), spec.on, f"is of means and sums alone; {spec.field!r} is neither; remove on"
+            )
     if len(bits(case)) > MOST:
         yield problem(("boundaries",), ..., f"they and the probes are on {len(bits(case))} sets; allowed are {MOST}")

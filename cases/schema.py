@@ -62,9 +62,10 @@ class Part(Model):
     """With this table the part breaks; its material must be ``brittle``."""
     rigid: Annotated[Rigid | None, BeforeValidator(read_rigid), Flag()] = None
     """``true``, or a table of mass, centre and inertia: the part has six degrees of freedom and no stress. It costs
-    what its surface costs in contact, and does not limit the time step. Gravity acts on it, planes of symmetry and
-    boundaries that drive all of its nodes leave it the motions that they allow: with one component given it may turn
-    about that axis, with more it does not turn."""
+    what its surface costs in contact, and does not limit the time step. Gravity acts on it; planes of symmetry on
+    which it has nodes, and boundaries that drive all of its nodes, leave it the motions that they allow: with one
+    component given it may turn about that axis, with more it does not turn. A plane of symmetry beside which it starts
+    is a wall without friction for it, with the ``restitution`` of contact."""
 
 
 class ContactPair(Model):

@@ -18,7 +18,7 @@ from .moving_walls import MovingWalls
 from .parallel.comm import Comm
 from .parallel.ownership import Neighbour
 from .rigid.bodies import of_nodes
-from .state import Flags, Floats, Indices, Load, LoadedFaces, Model, Nodes
+from .state import Flags, Floats, Indices, Ints, Load, LoadedFaces, Model, Nodes
 from .surface_pressure import SurfacePressure
 from .wall_shapes import Walls
 from .walls import RigidWalls
@@ -40,8 +40,33 @@ def loads(parcel: Parcel) -> list[Load | LoadedFaces]:
 
 
 def walls_of(case: schema.Case) -> Walls:
-    """The walls of a case, as they are at the start."""
-    return Walls([spec for _, spec in case.boundaries_of(schema.Wall)])
+    """The walls of a case, as they are at the start. Where parts are rigid, two follow for each plane of symmetry,
+    above and below it: there a body that starts beside the plane meets its mirror image.
+    """
+    planes = case.boundaries_of(schema.Symmetry) if case.rigid else []
+    images = [_image(spec, sign) for _, spec in planes for sign in (1.0, -1.0)]
+    return Walls([*(spec for _, spec in case.boundaries_of(schema.Wall)), *images])
+
+
+def _image(plane: schema.Symmetry, sign: float) -> schema.Wall:
+    """The plane as a wall that holds what is above it, or below."""
+    along = np.eye(3)[AXES[plane.axis]]
+    return schema.Wall(
+        kind="wall", name="image", point=tuple((plane.at * along).tolist()), normal=tuple((sign * along).tolist())
+    )
+
+
+def bodies_beside(case: schema.Case, model: Model, comm: Comm) -> Ints:
+    """(planes, parts) 1 for a rigid part that starts above a plane of symmetry that holds it, without a node on it, -1
+    for one below, 0 for all others. All ranks take part.
+    """
+    planes, nodes = case.boundaries_of(schema.Symmetry), model.nodes
+    found = np.zeros((len(planes), len(model.parts)), np.int64)
+    for row, (_, spec) in zip(found, planes, strict=True):
+        on = np.zeros(len(model.parts))
+        on[nodes.part[_of_parts(spec, model) & (heights(spec, model) == 0.0)]] = 1.0
+        row[:] = np.where(comm.maximum(on) > 0.0, 0.0, part_sides(spec, model, comm))
+    return found
 
 
 def build(
@@ -197,7 +222,8 @@ def _moving(
         return []
     walls, nodes = walls or walls_of(case), model.nodes
     touched = np.any(found, axis=0)
-    which = np.ascontiguousarray(np.array([h[touched] for h in found]).T)
+    which = np.zeros((np.count_nonzero(touched), walls.n), bool)
+    which[:, : len(found)] = np.array([h[touched] for h in found]).T
     return [MovingWalls(_indices(touched), nodes.owned[touched], walls, which, planes[touched], comm)]
 
 

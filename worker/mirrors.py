@@ -16,6 +16,7 @@ from .conditions import AXES, part_sides, sides
 from .jit import njit
 from .migration.parcel import Parcel
 from .parallel.comm import Comm
+from .rigid.bodies import of_nodes
 from .state import Bits, Flags, Floats, Indices, Ints, Model, Nodes, extended
 
 _TOGETHER = 64
@@ -54,7 +55,7 @@ class Mirrors(Boundary):
     @classmethod
     def of(cls, case: Case, model: Model, bounds: list[Boundary], comm: Comm) -> Self:
         """All symmetry planes of a case, and the nodes that start beside them or may come there without tets; those of
-        prescribed motion are left alone. All ranks take part.
+        prescribed motion, and of rigid parts, are left alone. All ranks take part.
         """
         specs, of = [spec for _, spec in case.boundaries_of(Symmetry)], model.nodes.part
         axes, at = np.array([AXES[spec.axis] for spec in specs]), np.array([spec.at for spec in specs])
@@ -62,7 +63,7 @@ class Mirrors(Boundary):
         body = np.column_stack([part_sides(spec, model, comm)[of] for spec in specs])
         wears = np.array([part.erosion is not None for part in case.parts])[of]
         loose = np.where((held == 0.0) & wears[:, None], body, held)
-        some = loose.any(axis=1) & ~driven(model.nodes.n, bounds)
+        some = loose.any(axis=1) & ~driven(model.nodes.n, bounds) & (of_nodes(case, model.nodes) < 0)
         back = case.contact.restitution if case.contact is not None else 0.0
         return cls(np.flatnonzero(some).astype(np.int32), axes, at, held[some], back, loose[some])
 

@@ -123,8 +123,9 @@ class Probes:
         """Where the values of each begin."""
 
     def require_tets(self, case: Case) -> None:
-        """Raises InputError, on every rank alike, when a mean holds no tet, or a sum over a box no node."""
-        boxes = [k for k, probe in enumerate(case.probes) if kind(probe.field) in SUMS and probe.low is not None]
+        """Raises InputError, on every rank alike, when a mean holds no tet, or a sum over a box or a set no node."""
+        some = [k for k, probe in enumerate(case.probes) if kind(probe.field) in SUMS]
+        boxes = [k for k in some if case.probes[k].low is not None or case.probes[k].on is not None]
         tets = [sum(len(ids) for ids in self._chosen[k]) for k in self._means]
         nodes = [int(self._sums.started(case.probes[k]).sum()) for k in boxes]
         counts = self._comm.sum(np.array([*tets, *nodes], np.int64)).tolist()
@@ -135,6 +136,8 @@ class Probes:
             if count == 0:
                 probe = case.probes[k]
                 both = "" if probe.on is None else f" and a node in {probe.on!r}"
+                if what == "node":
+                    both = "" if probe.on is None else f" and is in {probe.on!r}"
                 raise InputError(
                     f"probes[{k}]: no {what} of part {probe.part!r} has {where} between low and high{both}"
                 )

@@ -201,12 +201,15 @@ def _rigid(
     """
     if not case.rigid:
         return None
+    beside = conditions.bodies_beside(case, model, comm)
+    planes = np.array([index for index, _ in case.boundaries_of(Symmetry)], np.int64)
+    held = [Held.of(case, case.parts[index], planes[beside[:, index] != 0].tolist()) for index in case.rigid]
     if known is None:
-        rigid = Rigid(case, model.nodes, measured(case, model.nodes, comm), walls, comm)
+        bodies = measured(case, model.nodes, held, comm)
+        rigid = Rigid(case, model.nodes, bodies, walls, beside, comm)
         rigid.require_front(case, model.size)
     else:
-        held = [Held.of(case, case.parts[index]) for index in case.rigid]
-        rigid = Rigid(case, model.nodes, Rigid.kept_bodies(known, held), walls, comm)
+        rigid = Rigid(case, model.nodes, Rigid.kept_bodies(known, held), walls, beside, comm)
         rigid.resume(known)
     rigid.begin(model.nodes)
     return rigid

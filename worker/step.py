@@ -82,6 +82,8 @@ def end(sim: Simulation, before: Floats) -> None:
     nodes.v[:] = between(sim, before)
     if sim.erosion is not None:
         nodes.v[sim.erosion.removed] = 0.0
+    if sim.rigid is not None:
+        sim.rigid.share = 0.5 * sim.clock.last_dt / sim.clock.mean_dt
 
 
 def between(sim: Simulation, before: Floats) -> Floats:

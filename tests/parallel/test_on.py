@@ -46,14 +46,20 @@ name = "end"
 part = "bar"
 field = "velocity_x"
 TIP
+[[probes]]
+name = "push"
+part = "bar"
+field = "momentum_x"
+LAST
 """
 MANY = next(seed for seed in range(100) if len({kind for kind, _ in mixture(seed).elements.values()}) == 3)
 """A mixture that has all three kinds of elements."""
-SETS = {"CLAMP": 'on = "clamp"', "END": 'on = "END"', "TIP": 'on = "TIP"'}
+SETS = {"CLAMP": 'on = "clamp"', "END": 'on = "END"', "TIP": 'on = "TIP"', "LAST": 'on = "TIP"'}
 BOXES = {
     "CLAMP": 'low = [0, 0, 0]\nhigh = [0, "2 mm", "2 mm"]',
     "END": 'low = ["10 mm", 0, 0]\nhigh = ["10 mm", "2 mm", "2 mm"]',
     "TIP": 'low = ["9 mm", 0, 0]\nhigh = ["10 mm", "2 mm", "2 mm"]',
+    "LAST": 'low = ["10 mm", 0, 0]\nhigh = ["10 mm", "2 mm", "2 mm"]',
 }
 
 MIXED = """

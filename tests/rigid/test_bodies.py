@@ -11,6 +11,7 @@ import pytest
 from conoid.cases import schema
 from conoid.cases.messages import Energy
 from conoid.worker import digest, step
+from conoid.worker.errors import PhysicsError
 from conoid.worker.mesh.model import TetMesh
 from conoid.worker.simulation import Simulation
 
@@ -157,6 +158,34 @@ def test_planes_of_symmetry_leave_a_quarter_its_motions() -> None:
     assert turning.worst < 1e-12
 
 
+@pytest.mark.parametrize("restitution", [0.0, 0.5])
+def test_a_body_beside_a_plane_of_symmetry_meets_its_image(restitution: float) -> None:
+    """The plane does not hold it before; a corner hits it, and its point comes off with that share of its speed."""
+    plane = schema.Symmetry(kind="symmetry", axis="x")
+    motion = {"rigid": RIGID, "velocity": (-30.0, 5.0, 0.0)}
+    case = rigid_case([motion], [plane], contact={"restitution": restitution}, end=8e-5)
+    seen = Seen(case, [TILTED])
+    assert seen.speeds[1][0] == pytest.approx([-30.0, 5.0, 0.0], rel=1e-12)
+    hit = int(np.argmax(np.any(np.array(seen.rates)[:, 0] != 0.0, axis=1)))
+    nodes = seen.sim.model.nodes
+    assert 0 < hit < len(seen.rates) - 1
+    assert nodes.x[:, 0].min() > -1e-7
+    assert seen.speeds[hit][0, 0] > -30.0
+    arm = TILTED.points[np.argmin(TILTED.points[:, 0])] - seen.centres[0][0]
+    speed, rate = seen.speeds[hit + 1][0], seen.rates[hit + 1][0]
+    assert speed[0] + rate[1] * arm[2] - rate[2] * arm[1] == pytest.approx(30.0 * restitution, abs=0.1)
+    assert seen.worst < 1e-12
+
+
+def test_walls_that_close_on_a_rigid_body_end_the_run() -> None:
+    driven = schema.Wall(
+        kind="wall", name="lid", point=(0.0, 0.0, 2.001e-3), normal=(0.0, 0.0, -1.0), velocity=(0.0, 0.0, -1.0)
+    )
+    case = rigid_case([{"rigid": RIGID}], [GROUND, driven], contact=None, end=1e-4)
+    with pytest.raises(PhysicsError, match="rigid part 'body0' has no way out of a wall"):
+        Seen(case, [block((2, 2, 2), 1e-3)])
+
+
 def test_a_driven_punch_works_from_outside() -> None:
     """A rigid punch goes into a plate on a wall: the work is in the ledger, the motion is the course."""
     ramp = ((0.0, 0.0), (0.5e-6, 1.0))
@@ -209,6 +238,32 @@ def test_any_number_of_ranks_gives_one_answer(ranks: int) -> None:
     assert several[0] == alone
     assert all(speeds == alone[1] for _, speeds in several)
     assert alone[1][0] != [0.0, 0.0, -100.0]
+
+
+def test_two_threads_give_the_answer_of_one() -> None:
+    """On one rank and on two."""
+    threaded = SCENE.model_copy(update={"run": SCENE.run.model_copy(update={"threads": 2})})
+    (alone,) = on(1, SCENE, MESHES, stepped)
+    assert on(1, threaded, MESHES, stepped) == [alone]
+    assert on(2, threaded, MESHES, stepped)[0] == alone
+
+
+def test_probes_of_a_whole_body_have_its_inertia_and_centre() -> None:
+    """1/2 M V^2 + 1/2 w I w, M V, c and V; those of some of its nodes are sums over these."""
+    fields = ["kinetic_energy", "momentum_y", "centre_z", "centre_velocity_x", "mass"]
+    probes = [schema.Probe(name=field, part="body0", field=field) for field in fields]  # type: ignore[arg-type]
+    everywhere = {"low": (-1.0, -1.0, -1.0), "high": (1.0, 1.0, 1.0)}
+    probes.append(schema.Probe(name="nodes", part="body0", field="kinetic_energy", **everywhere))  # type: ignore[arg-type]
+    rigid = schema.Rigid(mass=0.5, centre=(2e-3, 3e-3, 4e-3), inertia=(1e-6, 2e-6, 2.5e-6, 0.0, 0.0, 0.0))
+    motion = {"rigid": rigid, "velocity": (3.0, 4.0, 5.0), "spin": schema.Spin(centre=(0, 0, 0), rate=(0, 0, 2e3))}
+    case = rigid_case([motion], contact=None, end=1e-4).model_copy(update={"probes": tuple(probes)})
+    sim = Seen(case, [TILTED], 0).sim
+    found, nodes = sim.probes.measure(), sim.model.nodes
+    v = np.array([3.0 - 2e3 * 3e-3, 4.0 + 2e3 * 2e-3, 5.0])
+    energy = 0.25 * float((v * v).sum()) + 0.5 * 2.5e-6 * 4e6
+    assert found[:5] == pytest.approx([energy, 0.5 * v[1], 4e-3, v[0], 0.5], rel=1e-12)
+    assert found[5] == pytest.approx(0.5 * (nodes.mass[:, None] * nodes.v * nodes.v).sum(), rel=1e-12)
+    assert found[5] != pytest.approx(energy, rel=0.1)
 
 
 def test_a_run_that_goes_on_ends_with_the_same_bits(tmp_path: Path) -> None:

@@ -109,5 +109,5 @@ def test_generated_parts_have_no_sets(tmp_path: Path) -> None:
         )
     assert str(raised.value).splitlines() == [
         "boundaries[0].on = 'CLAMP': a mesh from a file has sets; that of 'box' is not",
-        "probes[0].on = 'TIP': is of means alone; 'contact_force_x' is none; remove on",
+        "probes[0].on = 'TIP': is of means and sums alone; 'contact_force_x' is neither; remove on",
     ]

@@ -6,9 +6,11 @@ from typing import Any
 import numpy as np
 
 from conoid.cases.measures import SUMS, Beyond, Probe, kind
+from conoid.cases.on import bits
 from conoid.cases.region import Region
 from conoid.cases.schema import Case
 
+from ..marks import held
 from ..parallel.fixed_point import exact_sums
 from ..state import Flags, Floats
 from .gauge import Scene
@@ -30,13 +32,14 @@ class NodeSums:
     """The sums of a case on this rank. They have no memory."""
 
     def __init__(self, case: Case, scene: Scene) -> None:
-        self._scene = scene
+        self._scene, self._bits = scene, bits(case)
         self._probes = {k: probe for k, probe in enumerate(case.probes) if kind(probe.field) in SUMS}
 
     def measure(self, v: Floats) -> dict[int, float]:
         columns = [column for probe in self._probes.values() for column in self._columns(probe, v)]
         sums = iter(exact_sums(self._scene.comm, np.column_stack(columns)).tolist())
-        return {k: _value(probe, next(sums), next(sums)) for k, probe in self._probes.items()}
+        found = {k: _value(probe, next(sums), next(sums)) for k, probe in self._probes.items()}
+        return found | self._of_bodies(v)
 
     def keep(self) -> Any:
         return None
@@ -45,10 +48,12 @@ class NodeSums:
         pass
 
     def started(self, probe: Probe) -> Flags:
-        """(nodes,) the nodes that started in the box of a probe, of those that this rank counts."""
+        """(nodes,) the nodes that started in the box of a probe and are in its set, of those that this rank counts."""
         model, nodes = self._scene.model, self._scene.model.nodes
         part = model.parts.index(probe.part)
         inside = Region.of(probe).holds(nodes.x0.T, model.slack[part])
+        if probe.on is not None:
+            inside = inside & held(nodes.marks, self._bits[probe.on])
         return np.asarray(nodes.owned & nodes.in_part(part) & inside)
 
     def chosen(self, probe: Probe) -> Flags:
@@ -59,6 +64,20 @@ class NodeSums:
         if probe.beyond is not None:
             found &= ahead(probe.beyond, nodes.x) > 0.0
         return np.asarray(found)
+
+    def _of_bodies(self, v: Floats) -> dict[int, float]:
+        """Of probes of whole rigid parts, which may have another inertia and centre than their nodes."""
+        found: dict[int, float] = {}
+        rigid, clock = self._scene.rigid, self._scene.clock
+        if rigid is None:
+            return found
+        between = 0.5 * clock.last_dt / clock.mean_dt if v is not self._scene.model.nodes.v else rigid.share
+        for k, probe in self._probes.items():
+            body = int(rigid.of_part[self._scene.model.parts.index(probe.part)])
+            whole = probe.low is None and probe.on is None and probe.beyond is None
+            if body >= 0 and whole and kind(probe.field) != "mass":
+                found[k] = rigid.quantity(body, kind(probe.field), _AXES.find(probe.field[-1]), between)
+        return found
 
     def _columns(self, probe: Probe, v: Floats) -> tuple[Floats, Floats]:
         """(nodes,) what is added up, and what the sum is divided by."""

@@ -113,9 +113,9 @@ def of_nodes(case: Case, nodes: Nodes) -> Indices:
     return np.asarray(number[nodes.part])
 
 
-def measured(case: Case, nodes: Nodes, comm: Comm) -> Bodies:
-    """The bodies of a case at the start, of its ``nodes`` on all ranks; all take part."""
-    of, held = of_nodes(case, nodes), [Held.of(case, case.parts[index]) for index in case.rigid]
+def measured(case: Case, nodes: Nodes, held: list[Held], comm: Comm) -> Bodies:
+    """The bodies of a case at the start, of its ``nodes`` on all ranks, and what acts on each; all take part."""
+    of = of_nodes(case, nodes)
     found = [_measured(case.parts[i], nodes, of == b, comm) for b, i in enumerate(case.rigid)]
     masses, centres, tensors, reach = (list(column) for column in zip(*found, strict=True))
     bodies = Bodies(

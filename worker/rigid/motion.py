@@ -1,6 +1,7 @@
 """What acts on a rigid body from outside: gravity, planes of symmetry, prescribed motion."""
 
 import math
+from collections.abc import Collection
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -31,10 +32,12 @@ class Held:
     """Whether any motion is prescribed: walls do not hold it then."""
 
     @classmethod
-    def of(cls, case: Case, part: Part) -> "Held":
-        """By the boundaries that hold the ``part``."""
+    def of(cls, case: Case, part: Part, beside: Collection[int] = ()) -> "Held":
+        """By the boundaries that hold the ``part``, without the planes of symmetry that it starts ``beside``."""
         found = cls()
-        for boundary in case.boundaries:
+        for index, boundary in enumerate(case.boundaries):
+            if index in beside:
+                continue
             if getattr(boundary, "on", None) is None and (not boundary.parts or part.name in boundary.parts):
                 found._take(boundary)
         return found

@@ -22,6 +22,7 @@ from ..state import Floats, Indices, Ints, Nodes
 from ..wall_shapes import Walls
 from . import rotation, rows
 from .bodies import STATE, Bodies, dot, of_nodes, times
+from .stopped import stopped
 from .stops import BodyStops
 
 _TURN = 0.1
@@ -36,8 +37,12 @@ _KEPT = ("contact_loss", "external_work", "friction_loss", "_later", "_before")
 class Rigid:
     """The rigid bodies of a case on one rank; every rank has all of them."""
 
-    def __init__(self, case: Case, nodes: Nodes, bodies: Bodies, walls: Walls, comm: Comm) -> None:
-        """All ranks take part."""
+    def __init__(
+        self, case: Case, nodes: Nodes, bodies: Bodies, walls: Walls, beside: Ints, comm: Comm
+    ) -> None:  # fmt: skip
+        """``beside``: (planes, parts) the side of a plane of symmetry on which a body starts beside it, 1 or -1; all
+        ranks take part.
+        """
         self.bodies, self._comm = bodies, comm
         self._take(case, nodes)
         n = bodies.n
@@ -54,9 +59,13 @@ class Rigid:
         """Of the last step, and when contact or a wall last pushed, s."""
         self._least = RIGID_STEPS / case.run.end_time if len(case.rigid) == len(case.parts) else 0.0
         self._start, self._rate = np.zeros((2, n, 3)), np.zeros((n, 3))
+        self.share = 1.0
+        """How much of the last change of the motion the velocities of the nodes have: less at the end of a run."""
         self.active = False
         """Whether a contact of this step, on any rank, has a node of a rigid body."""
-        self.stops = BodyStops(walls, bodies, *_surfaces(case, nodes, bodies, walls, comm))
+        self.stops = BodyStops(
+            walls, bodies, *stopped(case, nodes, bodies, beside, comm), _restitution(case, walls), _names(case)
+        )
 
     def _take(self, case: Case, nodes: Nodes) -> None:
         """The nodes that are here."""
@@ -71,7 +80,7 @@ class Rigid:
 
     def require_front(self, case: Case, size: float) -> None:
         """Raises InputError for a wall behind which a body starts, by more than rounding of the ``size``, m."""
-        for (index, _), depth in zip(case.boundaries_of(Wall), self.stops.deepest().tolist(), strict=True):
+        for (index, _), depth in zip(case.boundaries_of(Wall), self.stops.deepest().tolist(), strict=False):
             if depth > GENERATED * size:
                 raise InputError(f"boundaries[{index}]: a body starts {depth:.3g} m behind this wall")
 
@@ -139,7 +148,7 @@ class Rigid:
         """After contact and walls: v(n+1/2) of the bodies and their nodes, and half of the work that it took."""
         bodies, stops = self.bodies, self.stops
         stops.stop(bodies.speed, self._rate)
-        stops.end()
+        stops.end(bodies.speed, self._rate, self.last_dt, t)
         impulse = self._impulse() + stops.impulse
         given = impulse[:, 3:] * bodies.turns
         bodies.momentum = bodies.momentum + given
@@ -270,6 +279,19 @@ class Rigid:
         linear = bodies.mass * dot(speed, bodies.speed)
         return np.asarray(0.5 * (linear + dot(momentum, bodies.rates(bodies.momentum))))
 
+    def quantity(self, body: int, field: str, axis: int, share: float) -> float:
+        """Kinetic energy, J, or a component of ``momentum``, ``centre`` or ``centre_velocity`` of a body, with this
+        ``share`` of the change that the last impulses have made.
+        """
+        bodies, (speed, momentum) = self.bodies, self._before
+        if field == "centre":
+            return float(bodies.centre[body, axis])
+        v = speed + share * (bodies.speed - speed)
+        spin = momentum + share * (bodies.momentum - momentum)
+        if field == "kinetic_energy":
+            return float(0.5 * (bodies.mass * dot(v, v) + dot(spin, bodies.rates(spin)))[body])
+        return float(v[body, axis] * (bodies.mass[body] if field == "momentum" else 1.0))
+
     def momenta(self) -> Floats:
         """(6,) momentum, kg m/s, and angular momentum about the origin, kg m^2/s, of all bodies at n."""
         bodies, (speed, momentum) = self.bodies, self._before
@@ -280,21 +302,13 @@ class Rigid:
         return np.concatenate([p.sum(axis=0), about.sum(axis=0)])
 
 
-def _surfaces(
-    case: Case, nodes: Nodes, bodies: Bodies, walls: Walls, comm: Comm
-) -> tuple["np.ndarray", Floats, Indices]:
-    """Which walls (walls, b) stop which bodies, and of all nodes of these, on all ranks, the arms at the start, m, and
-    the body: by ascending id. All ranks take part.
-    """
-    specs = [spec for _, spec in case.boundaries_of(Wall)]
-    names = [case.parts[index].name for index in bodies.part.tolist()]
-    held = np.array([[not spec.parts or name in spec.parts for name in names] for spec in specs], bool)
-    held = held.reshape(walls.n, bodies.n) & ~np.array([each.prescribed for each in bodies.held])
-    of = of_nodes(case, nodes)
-    some = held.any(axis=0)[of] & (of >= 0) & nodes.owned if walls.n else np.zeros(nodes.n, bool)
-    mine = np.column_stack([nodes.id[some], of[some], nodes.x0[some].view(np.int64)])
-    told = comm.join(mine.reshape(-1)).reshape(-1, 5)
-    told = told[np.argsort(told[:, 0])]
-    body = np.ascontiguousarray(told[:, 1].astype(np.int32))
-    arms = np.ascontiguousarray(told[:, 2:]).view(np.float64) - bodies.origin[body]
-    return held, np.ascontiguousarray(arms), body
+def _restitution(case: Case, walls: Walls) -> Floats:
+    """(walls,) of planes of symmetry that of contact; of walls none."""
+    found = np.zeros(walls.n)
+    if case.contact is not None:
+        found[len(case.boundaries_of(Wall)) :] = case.contact.restitution
+    return found
+
+
+def _names(case: Case) -> list[str]:
+    return [case.parts[index].name for index in case.rigid]

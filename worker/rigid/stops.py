@@ -10,15 +10,16 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..errors import PhysicsError
 from ..jit import njit, record, types
 from ..state import Flags, Floats, Indices, Ints
 from ..wall_shapes import SHAPES, Walls, gap
-from .bodies import Bodies
+from .bodies import Bodies, dot
 
 _NEAR = 2.0
 """Times what a body moves in a step, from where on a wall is looked at."""
 _CLOSE = 1e-3
-"""Of the reach of a body, the same for what hits it in the step."""
+"""Of the reach of a body, the same for what hits it in the step, and the depth behind a wall that ends a run."""
 _MOST, _ENOUGH = 200, 1e-12
 """Passes over the rows, and the change of an impulse, over the largest, that ends them."""
 
@@ -56,10 +57,14 @@ ROWS = record(Rows, _I1, _I1, _F2, _F2, _F1, _F1, _F2)
 class BodyStops:
     """The walls of a case and the bodies that they stop."""
 
-    def __init__(self, walls: Walls, bodies: Bodies, held: Flags, arms: Floats, body: Indices) -> None:
+    def __init__(
+        self, walls: Walls, bodies: Bodies, held: Flags, arms: Floats, body: Indices, restitution: Floats,
+        names: list[str],
+    ) -> None:  # fmt: skip
         """``held`` (walls, b): which stop which; ``arms`` (k, 3) of all nodes of the surfaces at the start, m, each of
-        a ``body`` (k,).
+        a ``body`` (k,); ``restitution`` (walls,); ``names`` (b,) of the parts.
         """
+        self._restitution, self._names = restitution, names
         self.walls, self._bodies, self._held, self._arms, self._body = walls, bodies, held, arms, body
         self._all = Rows.room(len(arms) * walls.n)
         self._many = 0
@@ -80,6 +85,8 @@ class BodyStops:
         self._many = find(
             self._all, self.walls.shapes, self._held, self._arms, self._body, bodies.rotation, bodies.centre, near, dt
         )  # fmt: skip
+        if self._restitution.any():
+            self._rebound(bodies.speed, rate)
         self._all.push[:] = 0.0
         self._all.rub[:] = 0.0
         self.impulse[:], self.rubbed[:], self.of_walls[:], self.rubbed_by[:] = 0.0, 0.0, 0.0, 0.0
@@ -93,9 +100,35 @@ class BodyStops:
                 walls.lightness, walls.friction, self.impulse, self.rubbed, self.of_walls, self.rubbed_by,
             )  # fmt: skip
 
-    def end(self) -> None:
-        """The impulses of the step are given."""
+    def _rebound(self, speed: Floats, rate: Floats) -> None:
+        """Of rows whose nodes would be behind, the speed that restitution asks for, m/s."""
+        wall, least, along = self._all.wall[: self._many], self._all.least[: self._many], self._along(speed, rate)
+        back = -self._restitution[wall] * along
+        least[:] = np.where((along < least) & (self._restitution[wall] > 0.0), np.maximum(least, back), least)
+
+    def _along(self, speed: Floats, rate: Floats) -> Floats:
+        """(rows,) speed of each node out of its wall, m/s."""
+        rows, n = self._all, self._many
+        b, r, w = rows.body[:n], rows.arm[:n], rate[rows.body[:n]]
+        turning = [w[:, i] * r[:, j] - w[:, j] * r[:, i] for i, j in ((1, 2), (2, 0), (0, 1))]
+        v = speed[b] + np.stack(turning, axis=1) - self.walls.speed[rows.wall[:n]]
+        return dot(v, rows.normal[:n])
+
+    def end(self, speed: Floats, rate: Floats, dt: float, t: float) -> None:
+        """The impulses of the step ``dt``, s, at ``t``, s, are given. Raises PhysicsError, on all ranks, where they
+        leave a node behind its wall.
+        """
         self.given += self.of_walls
+        if self._many:
+            body = self._all.body[: self._many]
+            depth = dt * (self._all.least[: self._many] - self._along(speed, rate)) / self._bodies.reach[body]
+            worst = int(depth.argmax())
+            if depth[worst] > _CLOSE:
+                raise PhysicsError(
+                    f"at t = {t:.6g} s rigid part {self._names[body[worst]]!r} has no way out of a wall: it is between "
+                    "walls that close, or a plane of symmetry or a velocity holds it; let the walls stop before, or "
+                    "give one a mass"
+                )
 
     def deepest(self) -> Floats:
         """(walls,) how deep bodies are behind each, m."""

@@ -1,0 +1,39 @@
+"""Which rigid bodies each wall stops, and the nodes of their surfaces."""
+
+import numpy as np
+
+from conoid.cases.schema import Case, Symmetry, Wall
+
+from ..parallel.comm import Comm
+from ..state import Flags, Floats, Indices, Ints, Nodes
+from .bodies import Bodies, of_nodes
+
+
+def stopped(case: Case, nodes: Nodes, bodies: Bodies, beside: Ints, comm: Comm) -> tuple[Flags, Floats, Indices]:
+    """Which walls (walls, b), and behind them the two sides of each plane of symmetry, stop which bodies, and of all
+    nodes of these, on all ranks, the arms at the start, m, and the body: by ascending id. ``beside`` (planes, parts):
+    the side on which a body starts, 1 or -1. All ranks take part.
+    """
+    held = np.concatenate([_by_walls(case, bodies), _by_planes(case, bodies, beside)])
+    held &= np.array([not each.prescribed for each in bodies.held], bool)
+    of = of_nodes(case, nodes)
+    some = np.asarray(held.any(axis=0))[of] & (of >= 0) & nodes.owned
+    mine = np.column_stack([nodes.id[some], of[some], nodes.x0[some].view(np.int64)])
+    told = comm.join(mine.reshape(-1)).reshape(-1, 5)
+    told = told[np.argsort(told[:, 0])]
+    body = np.ascontiguousarray(told[:, 1].astype(np.int32))
+    arms = np.ascontiguousarray(told[:, 2:]).view(np.float64) - bodies.origin[body]
+    return held, np.ascontiguousarray(arms), body
+
+
+def _by_walls(case: Case, bodies: Bodies) -> Flags:
+    specs = [spec for _, spec in case.boundaries_of(Wall)]
+    names = [case.parts[index].name for index in bodies.part.tolist()]
+    held = np.array([[not spec.parts or name in spec.parts for name in names] for spec in specs], bool)
+    return held.reshape(len(specs), bodies.n)
+
+
+def _by_planes(case: Case, bodies: Bodies, beside: Ints) -> Flags:
+    """The side above each plane, then that below."""
+    side = beside[:, bodies.part]
+    return np.stack([side > 0, side < 0], axis=1).reshape(2 * len(case.boundaries_of(Symmetry)), bodies.n)
