@@ -155,7 +155,7 @@ def _size(part: Part, folder: Path | None, found: Surveyed | None) -> MeshSize |
     path = located(part.mesh.path, part.mesh.sha256, folder)
     try:
         return path.stat().st_size // FILE_BYTES.get(path.suffix, FILE_BYTES[".msh"])
-    except OSError:
+    except (OSError, ValueError):  # a name with a null byte
         return None
 
 

@@ -134,3 +134,35 @@ def test_a_number_means_the_part_of_that_number_not_of_that_title(tmp_path: Path
     path.write_text(keywords(rows) if ending == "k" else starter(rows))
     files = [MeshFile(shape="file", path=path.name, unit=1.0, group=name) for name in ("1", "2")]
     assert [read_mesh(file, path).points.max() for file in files] == [1.0, 7.0]
+
+
+INSTANCES = (
+    "*Part, name=P\n*Node\n1, 0, 0, 0\n2, 1, 0, 0\n3, 0, 1, 0\n4, 0, 0, 1\n"
+    "*Element, type=C3D4, elset=All\n1, 1, 2, 3, 4\n"
+    "*Solid Section, elset=All, material=M\n,\n*End Part\n*Assembly, name=A\n*Instance, name=one, part=P\n"
+    "*End Instance\n*Instance, name=two, part=P\n0, 0, 5\n*End Instance\n{sets}*End Assembly\n"
+    "*Material, name=M\n*Density\n7.85e-9,\n"
+    "*Elastic\n2.1e5, 0.3\n*Step\n*Dynamic, Explicit\n, 1e-5\n*End Step\n"
+)
+RIGID = {
+    "*Rigid Body, ref node=1, elset=one.All\n": [True, False],
+    "*Elset, elset=All, instance=two\n1,\n*Rigid Body, ref node=1, elset=All\n": [False, True],
+    "*Elset, elset=both\none.All, two.All\n*Rigid Body, ref node=1, elset=both\n": [True, True],
+    "*Rigid Body, ref node=1, elset=three.All\n": None,
+}
+
+
+@pytest.mark.parametrize("sets", RIGID)
+def test_the_bodies_of_one_instance_are_rigid_where_the_deck_names_one(tmp_path: Path, sets: str) -> None:
+    found = read(tmp_path, "a.inp", INSTANCES.format(sets=sets))
+    if RIGID[sets] is None:
+        assert any("*RIGID BODY" in line for line in found.refusals)
+    else:
+        assert found.refusals == []
+        assert [bare(part).get("rigid", False) for part in found.data["parts"]] == RIGID[sets]
+
+
+def test_a_surface_of_a_set_that_is_not_there_refuses(tmp_path: Path) -> None:
+    pair = "*Surface, name=S\nnothing, S1\n*Contact Pair, interaction=I\nS, S\n*Surface Interaction, name=I\n"
+    told = read(tmp_path, "a.inp", abaqus("*Density\n7.85e-9,\n*Elastic\n2.1e5, 0.3", model=pair)).refusals
+    assert any("of the set 'nothing', which has no elements" in line for line in told), told

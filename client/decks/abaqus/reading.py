@@ -167,8 +167,8 @@ class Abaqus:
     def _rigid(self, bodies: list[Body]) -> None:
         """``*RIGID BODY, ELSET=``: a section of solids is rigid."""
         for each in self.of("RIGID BODY"):
-            wanted = each.key("ELSET").rpartition(".")[2]
-            found = [body for body in bodies if body.key.endswith(f"|{wanted}")] if wanted else []
+            wanted = self._of_elements(each)
+            found = [body for body in bodies if body.key in wanted]
             if not found:
                 each.entry.refuse(REFUSED["RIGID BODY"])
                 continue
@@ -177,6 +177,17 @@ class Abaqus:
             for body in found:
                 body.rigid = True
             each.entry.take("parts[].rigid")
+
+    def _of_elements(self, each: Keyword) -> set[str]:
+        """Keys of the bodies all of whose elements its set has; none where it has others, or some of a body."""
+        name = each.get("ELSET") or ""
+        if each.scope:
+            owners = {each.scope, *(one for one, made in self.instances.items() if made.key("PART") == each.scope)}
+            return {f"{owner}|{joined(name)}" for owner in owners}
+        wanted = self.mesh.named(name, "element_sets") or set()
+        parts = {key: self.mesh.body(*key.split("|"))[0] for key in self.topology.bodies}
+        found = {key for key, elements in parts.items() if elements and elements <= wanted}
+        return found if wanted == set().union(*(parts[key] for key in found)) else set()
 
     def _guarded(self, loads: Loads, each: Keyword, end: float) -> None:
         try:
@@ -245,7 +256,10 @@ class Abaqus:
             raise InpError(f"the surface {name[:60]!r} is not defined, or has no elements")
         if any(not one for one in sets):
             return frozenset(self.topology.bodies)
-        wanted = set().union(*(self.mesh.named(one, "element_sets") or set() for one in sets))
+        members = {one: self.mesh.named(one, "element_sets") for one in sets}
+        if lost := [one for one, elements in members.items() if not elements]:
+            raise InpError(f"the surface {name[:60]!r} is of the set {lost[0][:60]!r}, which has no elements")
+        wanted = set().union(*(elements or () for elements in members.values()))
         pairs = {key: key.partition("|") for key in self.topology.bodies}
         found = {
             key for key, (scope, _, elset) in pairs.items() if not self.mesh.body(scope, elset)[0].isdisjoint(wanted)
