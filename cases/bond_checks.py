@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 from .bodies import Box, Cylinder, Loose, MeshFile, Plate, Sphere, Tube
 from .bonds import Bonded, SharedBond
+from .joined import breakable, shared_bonds
 from .problems import Location, Problem, problem
 from .schema import Case, Part
 from .similar import choices, nearest
@@ -11,6 +12,12 @@ from .similar import choices, nearest
 
 def check_bonds(case: Case) -> Iterator[Problem]:
     """Every problem of the bonds of a case."""
+    found = list(_each(case))
+    yield from found or _wearing(case)
+
+
+def _each(case: Case) -> Iterator[Problem]:
+    """Those of one bond, or of two of the same parts."""
     parts = {part.name: part for part in case.parts}
     for i, bond in enumerate(case.bond):
         location: Location = ("bond", i)
@@ -26,6 +33,19 @@ def check_bonds(case: Case) -> Iterator[Problem]:
             yield from _twice(case, i)
             if isinstance(bond, SharedBond):
                 yield from _meshes(parts[bond.parts[0]], parts[bond.parts[1]], bond.breaks, (*location, "parts"))
+
+
+def _wearing(case: Case) -> Iterator[Problem]:
+    """Parts that erode in a body of which another part breaks."""
+    breaks = breakable(case)
+    for k, _, one, other in shared_bonds(case):
+        worn = [case.parts[i].name for i in (one, other) if case.parts[i].erosion is not None and breaks[i]]
+        if worn:
+            message = (
+                f"{choices(worn)}: a part that erodes cannot be of one body with parts or bonds that break; remove "
+                "erosion or fracture, or set kind = 'tied'"
+            )
+            yield problem(("bond", k, "parts"), _both(case.bond[k]), message)
 
 
 def _both(bond: Bonded) -> str:

@@ -41,6 +41,8 @@ Say = Callable[[str], None]
 """Reports what the start is doing."""
 _JITTER = 0x6A697474
 """Seed of the random velocities of the start."""
+_ALIKE = 1e-6
+"""Of the larger of two velocities: they differ by rounding."""
 
 
 @dataclass
@@ -126,7 +128,8 @@ def assembled(case: schema.Case, meshes: Iterable[tuple[int, TetMesh]], overlaps
         x = _apart(case, made)
     tied = Pieces.none()
     if overlaps and interface.tied_pairs(case):
-        joined = interface.find(case, x, t, part_of_tet, made.across < 0)
+        exposed = (made.across if len(made.across) else across(t)) < 0
+        joined = interface.find(case, x, t, part_of_tet, exposed)
         x, tied, warnings = joined.x, joined.pieces, [*warnings, *joined.warnings]
     volumes = _volumes(x, t)
     masses = volumes * np.array([find_material(case, part.material).density for part in case.parts])[part_of_tet]
@@ -140,6 +143,7 @@ def assembled(case: schema.Case, meshes: Iterable[tuple[int, TetMesh]], overlaps
     loads, found, told = _loads(case, x, members, (t, part_of_tet), near, known, marked)
     driven, more = _driven(case, x, members, near, known, marked)
     velocity, mixed = _velocities(case, x, part_of_node, shares)
+    mixed += _parted(case, x, t, tied)
     return Whole(
         points=x, node_part=part_of_node, tets=t, tet_part=part_of_tet, volumes=volumes,
         across=made.across, shares=shares,
@@ -273,6 +277,21 @@ def _mean_velocities(case: schema.Case, v: Floats, x: Floats, shares: Shares) ->
     np.add.at(v, shares.node[odd], weight * own[odd])
     names = " and ".join(repr(case.parts[i].name) for i in np.unique(shares.part[odd]))
     return [f"bond: {len(nodes)} nodes of {names} would start at two velocities, and start at their mean by mass"]
+
+
+def _parted(case: schema.Case, x: Floats, tets: Indices, tied: Pieces) -> list[str]:
+    """Warnings of ``tied`` parts that start with other velocities than each other where they are bonded."""
+    told = []
+    for k, one, two in interface.tied_pairs(case):
+        places = x[np.unique(interface.corners(tied.slave[tied.bond == k], tets))]
+        u, v = (velocities(case.parts[i], places) for i in (one, two))
+        if (most := float(np.abs(u - v).max(initial=0.0))) > _ALIKE * float(np.abs([u, v]).max(initial=0.0)):
+            told.append(
+                f"bond[{k}]: {case.parts[one].name!r} and {case.parts[two].name!r} start at two velocities where they "
+                f"are tied, up to {most:.3g} m/s from each other: the bond takes the energy of that in the first step, "
+                "or breaks"
+            )
+    return told
 
 
 def _loads(

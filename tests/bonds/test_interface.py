@@ -110,6 +110,10 @@ def test_what_is_too_far_is_refused_or_counted() -> None:
     assert len(rows.node) == 25
     with pytest.raises(InputError, match=r"bond\[0\]\.parts: no faces of 'below' and 'above' lie face to face"):
         rows_of(one, on_top((4, 4, 2), 1, gap=9.0))
+    beside = on_top((4, 4, 2), 1)
+    beside.points[:, 0] += 4.0
+    with pytest.raises(InputError, match="'below' and 'above' touch in a line or a point only"):
+        rows_of(one, beside)
     tilted = on_top((4, 4, 2), 1)
     tilted.points[:, 2] += 0.2 * tilted.points[:, 0]
     _, found, *_ = rows_of(one, tilted, "gap = 0.3")

@@ -58,6 +58,8 @@ def test_a_bond_has_one_strength_and_one_energy_in_both_modes_by_default() -> No
          "bond[0].parts = 'tile, backing': a mesh of a file and one that is generated have no nodes in common"),
         ({}, ["parts[1].mesh={shape='two_tets', element_size=1}"],
          "bond[0].parts = 'tile, backing': 'backing': loose tets share no node with other parts; set kind = 'tied'"),
+        ({}, ["parts[0].fracture={model='cohesive'}", "parts[1].erosion={volume=[0.5, 2]}"],
+         "bond[0].parts = 'tile, backing': 'backing': a part that erodes cannot be of one body with parts or bonds"),
     ],
 )  # fmt: skip
 def test_a_slip_is_one_line(bond: dict[str, Any], overrides: list[str], line: str) -> None:

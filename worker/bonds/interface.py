@@ -213,15 +213,15 @@ def _collocate(weights: Floats, cut: _Cut, some: Flags, lumped: Floats) -> None:
 
 def _settle(x: Floats, pieces: Pieces, tets: Indices) -> None:
     """Moves the slave nodes to the places on the master that they are tied to."""
-    rows = assembled(pieces, _corners(pieces.slave, tets), _corners(pieces.master, tets))
+    rows = assembled(pieces, corners(pieces.slave, tets), corners(pieces.master, tets))
     where = np.zeros((len(rows.node), 3))
     for i in range(3):
         where[:, i] = np.bincount(rows.row, rows.weight * x[rows.master, i], len(rows.node))
     x[rows.node] = where
 
 
-def _corners(names: Ints, tets: Indices) -> Ints:
-    """(p, 3) nodes of faces."""
+def corners(names: Ints, tets: Indices) -> Ints:
+    """(p, 3) nodes of faces, by their names."""
     return np.asarray(tets[names // 4][np.arange(len(names))[:, None], FACES[names % 4]].astype(np.int64))
 
 
@@ -261,6 +261,8 @@ def _nothing(bond: int, spec: TiedBond, cut: _Cut, limit: Floats | float) -> str
     if not len(cut.area):
         return f"bond[{bond}].parts: no faces of {one!r} and {two!r} lie face to face; move the parts to each other"
     least = float(cut.distance.min())
+    if least <= float(np.max(limit)):
+        return f"bond[{bond}].parts: {one!r} and {two!r} touch in a line or a point only; a bond needs faces in common"
     return (
         f"bond[{bond}].gap{_worded(limit)}: the nearest faces of {one!r} and {two!r} are {least:.3g} m apart; move the "
         "parts to each other, or raise it"

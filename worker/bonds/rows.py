@@ -47,7 +47,7 @@ def assembled(pieces: Pieces, slaves: Ints, masters: Ints) -> Rows:
     key = np.repeat(pieces.bond[:, None] * many + slaves, 3, axis=1).reshape(-1)
     other, value = np.tile(masters, (1, 3)).reshape(-1), pieces.weights.reshape(-1)
     names, of = np.unique(key, return_inverse=True)
-    area = np.bincount(of, value, len(names))
+    area = np.bincount(of, value, len(names)).astype(np.float64)  # whole numbers where there is none
     some = area > _NOTHING * area.max(initial=0.0)
     renumbered = np.cumsum(some) - 1
     kept = some[of]

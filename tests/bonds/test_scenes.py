@@ -1,0 +1,45 @@
+"""Tied bonds in scenes of little else: no contact, an interface that erodes as a whole, two velocities at the start."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from conoid.cases import load
+from conoid.worker.assembly import assemble
+
+from .scenes import BOND, block, built, moved, run, start
+
+DRIVEN = moved(0.9e-3, 1.1e-3, (0.0, 0.0, 50.0))
+HELD = moved(-1.1e-3, -0.9e-3, (0.0, 0.0, 0.0))
+
+
+def joint(more: str = "", below: str = "") -> str:
+    """Two blocks of a cubic millimetre, bonded."""
+    lower, upper = block("below", (0, 0, -1), (1, 1, 0), 1, below), block("above", (0, 0, 0), (1, 1, 1), 0.5)
+    return start(2e-6) + lower + upper + BOND + more
+
+
+def test_bonds_need_no_contact() -> None:
+    met, free = built(joint(DRIVEN)), built('contact = "none"\n' + joint(DRIVEN))
+    for sim in (met, free):
+        run(sim)
+    assert free.contact is None
+    assert np.ptp(free.model.nodes.v[:, 2]) > 10.0
+    np.testing.assert_array_equal(free.model.nodes.x, met.model.nodes.x)
+
+
+def test_an_interface_that_has_eroded_ties_nothing() -> None:
+    soft = 'strength = { model = "linear_hardening", yield_stress = 1e6 }\n[numerics]'
+    sim = built(joint(DRIVEN + HELD, "erosion = { plastic_strain = 0.001 }").replace("[numerics]", soft))
+    assert sim.bonds is not None
+    assert sim.bonds.tied == 9
+    energy = run(sim)
+    assert (sim.model.elements_global, sim.bonds.tied) == (48, 0)
+    assert abs(energy.residual) < 1e-3
+
+
+@pytest.mark.parametrize(("velocity", "told"), [("velocity = [0, 0, 3]", 1), ("", 0)])
+def test_bonded_parts_of_two_velocities_are_told(velocity: str, told: int) -> None:
+    found = assemble(load.parse_toml(joint(below=velocity)), Path()).warnings
+    assert sum("'below' and 'above' start at two velocities where they are tied, up to 3" in w for w in found) == told
