@@ -14,6 +14,7 @@ from conoid.cases.figures import rough
 from conoid.cases.load import parse_case, toml_data
 from conoid.cases.plausible import doubts
 from conoid.cases.reference import json_schema
+from conoid.cases.solids import Cad
 from conoid.client.cli import app
 from conoid.client.result import Result
 
@@ -26,6 +27,19 @@ def test_the_pieces_are_a_sound_case() -> None:
     case = parse_case(data)
     assert [doubt.key for doubt in doubts(data, case, estimate(case))] == ["materials.alumina.strength"]
     jsonschema.Draft202012Validator(json_schema()).validate(data)
+
+
+def test_the_pieces_of_the_bullet_stand_in_its_case() -> None:
+    """And its file has the solids that it names."""
+    folder = Path(__file__).parents[2] / "docs" / "bullet"
+    text, case = (folder.parent / "bullet.md").read_text(), (folder / "bullet_tile.toml").read_text()
+    pieces = re.findall(r"```toml\n(.*?)```", text, re.DOTALL)
+    assert len(pieces) == 3
+    assert all(piece in case for piece in pieces)
+    parts = parse_case(toml_data(case)).parts
+    solids = [solid for part in parts if isinstance(part.mesh, Cad) for solid in part.mesh.solids]
+    assert solids == ["core", "jacket"]
+    assert all(f"PRODUCT('{solid}'," in (folder / "bullet.step").read_text() for solid in solids)
 
 
 def test_what_it_shows_is_what_is_printed(quiet_home: Path) -> None:
