@@ -211,9 +211,12 @@ def _in_ring(mesh: RingSector, x: float, y: float) -> bool:
 
 
 def thinnest(mesh: Generated) -> float:
-    """The smallest extent of the body, m: the wall of a tube, the diameter of a ball, the larger end of a cone."""
+    """The smallest extent of the body, m: the wall of a tube, the diameter of a ball, the larger end of a cone, the
+    outer arc of a ring sector."""
     low, high = bounds(mesh) or ((0.0,) * 3, (0.0,) * 3)
     extents = [b - a for a, b in zip(low, high, strict=True)]
+    if isinstance(mesh, RingSector):
+        extents += [mesh.radius * (end - begin) for begin, end in ring.angles(mesh)]
     if isinstance(mesh, Tube | RingSector):
         return min(*extents, mesh.radius - mesh.inner_radius)
     return min(extents)

@@ -145,6 +145,7 @@ def test_half_and_quarter_are_shares_of_the_whole(name: str) -> None:
         ("cap", {"height": 1.4}, "height = 1.4: must be below the diameter, 1.4 m"),
         ("ring", {"inner_radius": 0.7}, "inner_radius = 0.7: must be below the radius, 0.7 m"),
         ("ring", {"angle": "360 deg"}, "angle = '360 deg': "),
+        ("ring", {"angle": "1e-6 deg"}, "element_size = 0.1: must not be above the smallest extent"),
     ],
 )
 def test_sizes_that_do_not_fit_are_refused_in_one_line(name: str, change: dict[str, Any], said: str) -> None:
