@@ -19,6 +19,11 @@ class Meeting:
     friction: float
     entry: Entry
 
+    @property
+    def meets(self) -> bool:
+        """Whether there are bodies on both sides."""
+        return bool(self.one) and self.other != frozenset()
+
     def pairs(self) -> set[tuple[str, str]]:
         """Pairs of different bodies that meet, each in order."""
         every = itertools.combinations(self.one, 2) if self.other is None else itertools.product(self.one, self.other)
@@ -27,6 +32,10 @@ class Meeting:
 
 def meet(draft: Draft, bodies: Sequence[Body], meetings: Sequence[Meeting]) -> None:
     """The table ``contact``; none where nothing meets, as in the deck."""
+    for each in meetings:
+        if not each.meets:
+            each.entry.leave("one of its surfaces has no part of the case: nothing meets")
+    meetings = [each for each in meetings if each.meets]
     if not meetings:
         if len(bodies) > 1:
             draft.account.remarks.append('the deck has no contact: contact = "none", bodies pass through each other')

@@ -166,3 +166,11 @@ def test_a_surface_of_a_set_that_is_not_there_refuses(tmp_path: Path) -> None:
     pair = "*Surface, name=S\nnothing, S1\n*Contact Pair, interaction=I\nS, S\n*Surface Interaction, name=I\n"
     told = read(tmp_path, "a.inp", abaqus("*Density\n7.85e-9,\n*Elastic\n2.1e5, 0.3", model=pair)).refusals
     assert any("of the set 'nothing', which has no elements" in line for line in told), told
+
+
+def test_a_contact_with_a_part_that_has_no_solids_is_left_out(tmp_path: Path) -> None:
+    contact = ("*CONTACT_AUTOMATIC_SURFACE_TO_SURFACE", row(1, 9, 3, 3), row(0.2, 0.2), row(1.0))
+    found = read(tmp_path, "a.k", lsdyna(*STEEL, *contact))
+    (entry,) = [each for each in found.account.entries if each.keyword.startswith("*CONTACT")]
+    assert (entry.fate, found.data.get("contact")) == ("left", "none")
+    assert "nothing meets" in entry.reasons[0]
