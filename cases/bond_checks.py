@@ -4,7 +4,8 @@ from collections.abc import Iterator
 
 from .bodies import Box, Cylinder, Loose, MeshFile, Plate, Sphere, Tube
 from .bonds import Bonded, SharedBond
-from .joined import breakable, shared_bonds
+from .boundaries import Gravity
+from .joined import bodies, breakable, shared_bonds
 from .problems import Location, Problem, problem
 from .schema import Case, Part
 from .similar import choices, nearest
@@ -13,7 +14,7 @@ from .similar import choices, nearest
 def check_bonds(case: Case) -> Iterator[Problem]:
     """Every problem of the bonds of a case."""
     found = list(_each(case))
-    yield from found or _wearing(case)
+    yield from found or (*_wearing(case), *_pulled(case))
 
 
 def _each(case: Case) -> Iterator[Problem]:
@@ -46,6 +47,19 @@ def _wearing(case: Case) -> Iterator[Problem]:
                 "erosion or fracture, or set kind = 'tied'"
             )
             yield problem(("bond", k, "parts"), _both(case.bond[k]), message)
+
+
+def _pulled(case: Case) -> Iterator[Problem]:
+    """Gravity on some parts of a body alone: a node of the interface has one acceleration for all of its mass."""
+    body = bodies(case)
+    for k, spec in enumerate(case.boundaries):
+        if isinstance(spec, Gravity) and spec.parts:
+            some = {of for part, of in zip(case.parts, body, strict=True) if part.name in spec.parts}
+            left = [part.name for part, of in zip(case.parts, body, strict=True)
+                    if of in some and part.name not in spec.parts]  # fmt: skip
+            if left:
+                message = f"bonds make one body of these and {choices(left)}, with nodes in common; name all of its parts"
+                yield problem(("boundaries", k, "parts"), ", ".join(spec.parts), message)
 
 
 def _both(bond: Bonded) -> str:

@@ -122,7 +122,7 @@ class Gravity(Model):
     """Pairs of a time and a factor of the acceleration: linear in between, constant before the first and after the
     last. Without them it is constant from the first moment on, and what stood free begins to bounce."""
     parts: tuple[Name, ...] = ()
-    """Parts that it acts on; all when empty."""
+    """Parts that it acts on; all when empty. Of a body that bonds of the kind ``shared`` make, all parts or none."""
 
 
 class Around(Model):

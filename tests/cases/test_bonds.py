@@ -60,12 +60,19 @@ def test_a_bond_has_one_strength_and_one_energy_in_both_modes_by_default() -> No
          "bond[0].parts = 'tile, backing': 'backing': loose tets share no node with other parts; set kind = 'tied'"),
         ({}, ["parts[0].fracture={model='cohesive'}", "parts[1].erosion={volume=[0.5, 2]}"],
          "bond[0].parts = 'tile, backing': 'backing': a part that erodes cannot be of one body with parts or bonds"),
+        ({}, ['boundaries=[{kind="gravity", acceleration=[0, 0, -10], parts=["tile"]}]'],
+         "boundaries[0].parts = 'tile': bonds make one body of these and 'backing', with nodes in common; name all"),
     ],
 )  # fmt: skip
 def test_a_slip_is_one_line(bond: dict[str, Any], overrides: list[str], line: str) -> None:
     found = said(bond, *overrides)
     assert len(found) == 1
     assert found[0].startswith(line)
+
+
+def test_gravity_acts_on_one_of_two_tied_parts() -> None:
+    pulled = 'boundaries=[{kind="gravity", acceleration=[0, 0, -10], parts=["tile"]}]'
+    assert parse_case(joint({"kind": "tied"}, pulled)).boundaries
 
 
 def test_groups_of_a_file_can_be_bonded() -> None:
