@@ -58,7 +58,7 @@ def _pulled(case: Case) -> Iterator[Problem]:
             left = [part.name for part, of in zip(case.parts, body, strict=True)
                     if of in some and part.name not in spec.parts]  # fmt: skip
             if left:
-                message = f"bonds make one body of these and {choices(left)}, with nodes in common; name all of its parts"
+                message = f"bonds make one body of these and {choices(left)}, with nodes in common; name all"
                 yield problem(("boundaries", k, "parts"), ", ".join(spec.parts), message)
 
 
