@@ -45,6 +45,8 @@ class Boundary(ABC):
         """(n,) energy lost by impact on the boundary, J."""
         self.external_work = np.zeros(len(nodes))
         """(n,) work done on the body from outside, J."""
+        self.given: Floats | None = None
+        """(n, 3 walls) what each wall has given each node so far, N s; none of what is no wall."""
         self.friction_loss: Floats | None = None
         """(n,) what of ``contact_loss`` friction has taken, J; none where there is no friction."""
         self.last_push = 0.0
@@ -75,6 +77,9 @@ class Boundary(ABC):
         """``note`` with an account of the work of its impulses, J; ``factor``: a half with its sign there."""
         table = self._notes.set(state.v, self.nodes, self._before, self._impulse, account, factor)
         self.over.run(impulses.note, table, len(self.nodes))
+
+    def measure(self, mass: float, speed: float) -> None:  # noqa: B027 (most add up no integers of their own)
+        """The quanta, by the largest nodal ``mass``, kg, and ``speed``, m/s, of the scene."""
 
     def mirror(self, vectors: Floats) -> None:  # noqa: B027 (most boundaries mirror nothing)
         """Takes what the mirror image cancels out of the means of ``vectors`` (nodes, 3) over the tets of its nodes."""

@@ -179,11 +179,14 @@ def _case(options: argparse.Namespace, comm: Comm) -> tuple[Case, list[str]]:
     return found
 
 
+def _file(name: str) -> Path:
+    """The file of a case, which may be a shipped one. Raises CaseError."""
+    path = Path(name)
+    return load.shipped_path(name) if not path.exists() and not path.suffix else path
+
+
 def _read(options: argparse.Namespace, ranks: int) -> tuple[Case, list[str]]:
-    path = Path(options.case)
-    if not path.exists() and not path.suffix:
-        path = load.shipped_path(options.case)
-    data = load.apply_overrides(load.read_data(path), options.set)
+    data = load.apply_overrides(load.read_data(_file(options.case)), options.set)
     there = {"run.ranks": ranks} | ({} if options.threads is None else {"run.threads": options.threads})
     return load.parse_case(load.apply_overrides(data, there)), [str(each) for each in bare_numbers(data)]
 
@@ -212,7 +215,7 @@ def _compute(
     ready_kernels(comm, journal)
     from . import compute
 
-    meshes = Path(options.case).resolve().parent
+    meshes = _file(options.case).resolve().parent  # where the files begin that it names
     return compute.compute(case, meshes, options.out, comm, journal, signals, began, options.restart, options.use)
 
 

@@ -48,7 +48,7 @@ class MovingWalls(Boundary):
         self.scale = self._weight = 1.0
         """Quanta per N s, and per kg."""
         n, w = len(nodes), walls.n
-        self.given = np.zeros((n, 3 * w))
+        self.given: Floats = np.zeros((n, 3 * w))
         """(n, 3 walls) what each wall has given each node so far, N s."""
         self._step, self._rubbed = np.zeros((2, n, 3 * w))
         """(n, 3 walls) the same in the last step, and what of it is friction."""

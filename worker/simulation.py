@@ -37,7 +37,6 @@ from .migration.parcel import Parcel
 from .migration.route import Arrived
 from .mirrors import Mirrors
 from .motion import Leapfrog
-from .moving_walls import MovingWalls
 from .parallel import fixed_point
 from .parallel.comm import Comm
 from .parallel.ownership import Neighbour
@@ -52,7 +51,6 @@ from .state import MASS, Floats, Model
 from .timers import Timers, worked
 from .topology import KeptByNode
 from .wall_shapes import Walls
-from .walls import RigidWalls
 
 _SMALLEST_STRAIN = 1e-12
 """Forces of a smaller strain than this need no finer quantum. Chosen: its stress in steel is 0.2 Pa."""
@@ -241,14 +239,13 @@ def _assemble(
         scene.append(Mirrors.of(case, model, scene, comm))
     for bound in scene:
         bound.over = Ranges(threads)
-        if isinstance(bound, MovingWalls):
-            bound.measure(*extremes[:2])
+        bound.measure(*extremes[:2])
     elements = _elements(case, model, neighbours, scene, node_volume, comm, timers, threads)
     fracture = None
     if case.fractures:
         by_node: list[KeptByNode] = [*scene, *(stage for stage in (erosion, contact, bonds) if stage is not None)]
         fracture = Fracture(case, model, neighbours, elements, by_node, contact, comm, clock)
-    stopping = tuple(bound for bound in scene if isinstance(bound, RigidWalls | MovingWalls))
+    stopping = tuple(bound for bound in scene if bound.given is not None)
     probes = Probes(case, Scene(model, contact, stopping, rigid, erosion, fracture, clock, comm))
     ledger = Ledger(model, scene, contact, bonds, erosion, fracture, (rigid, moving), comm, clock, threads)
     return Simulation(

@@ -45,7 +45,7 @@ class RigidWalls(Boundary):
         self._held = held
         self._pushed = False
         self._pushes = Arguments(*_PUSH)
-        self.given = np.zeros((len(nodes), 3 * len(points)))
+        self.given: Floats = np.zeros((len(nodes), 3 * len(points)))
         """(n, 3 walls) what each wall has given each node so far, N s."""
         self._kept = (*KEPT, "given")
         if tells:

@@ -12,9 +12,9 @@ from conoid.cases.messages import Energy
 from conoid.worker.moving_walls import MovingWalls
 from conoid.worker.simulation import Simulation
 
-from ..contact.ranks import on_ranks
 from ..worker.kernels import build, run, scene
 from ..worker.meshes import block
+from ..worker.simulations import on
 
 Floats = npt.NDArray[np.float64]
 DENSITY, YOUNG, SIZE = 8000.0, 200e9, (3e-3, 3e-3, 12e-3)
@@ -133,9 +133,10 @@ def test_a_wall_with_a_mass_is_the_same_on_any_number_of_ranks() -> None:
     wall = schema.Wall(**PLANE, velocity=(3.0, 0.0, 20.0), mass=0.1 * MASS, friction=0.2)
     case = scene(THIN, end=1.0, boundaries=(wall,))
 
-    def ended(comm: Any) -> bytes:
-        return run(build(case, [BAR], comm), steps=60).walls.words()
+    def ended(sim: Simulation) -> bytes:
+        walls: bytes = run(sim, steps=60).walls.words()
+        return walls
 
-    alone = on_ranks(1, ended)
-    assert on_ranks(3, ended) == alone * 3
+    alone = on(1, case, [BAR], ended)
+    assert on(3, case, [BAR], ended) == alone * 3
     assert len(alone[0]) == 48

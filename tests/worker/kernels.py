@@ -18,7 +18,7 @@ from conoid.worker.boundaries import Boundary
 from conoid.worker.materials import law
 from conoid.worker.mesh.model import TetMesh
 from conoid.worker.parallel import fixed_point
-from conoid.worker.parallel.comm import Comm, SerialComm
+from conoid.worker.parallel.comm import SerialComm
 from conoid.worker.simulation import Simulation
 
 from . import formulas
@@ -75,11 +75,11 @@ def scene(material: materials.Material = STEEL, form: Form = "standard", end: fl
     )  # fmt: skip
 
 
-def build(case: schema.Case, meshes: Iterable[TetMesh], comm: Comm | None = None) -> Simulation:
-    """The simulation of a case whose parts have these meshes."""
+def build(case: schema.Case, meshes: Iterable[TetMesh]) -> Simulation:
+    """The simulation of a case whose parts have these meshes, on one rank; ``simulations.on`` has several."""
     ready = iter(meshes)
     with patch.object(assembly, "build_mesh", lambda *_, **__: next(ready)):
-        return simulation.build(case, Path(), comm or SerialComm())
+        return simulation.build(case, Path(), SerialComm())
 
 
 def whole_of(mesh: TetMesh, case: schema.Case | None = None) -> assembly.Whole:

@@ -2,15 +2,14 @@
 
 from typing import Any, NamedTuple, Protocol
 
+from ..boundaries import Boundary
 from ..clock import Clock
 from ..contact.stage import Contact
 from ..erosion import Erosion
 from ..fracture.stage import Fracture
-from ..moving_walls import MovingWalls
 from ..parallel.comm import Comm
 from ..rigid.stage import Rigid
 from ..state import Floats, Model
-from ..walls import RigidWalls
 
 
 class Scene(NamedTuple):
@@ -18,7 +17,7 @@ class Scene(NamedTuple):
 
     model: Model
     contact: Contact | None
-    walls: tuple[RigidWalls | MovingWalls, ...]
+    walls: tuple[Boundary, ...]
     rigid: Rigid | None
     erosion: Erosion | None
     fracture: Fracture | None

@@ -7,10 +7,9 @@ import numpy as np
 from conoid.cases.measures import PUSHES, Probe, kind
 from conoid.cases.schema import Case, Wall
 
-from ..moving_walls import MovingWalls
+from ..boundaries import Boundary
 from ..parallel.fixed_point import exact_sums
 from ..state import Floats
-from ..walls import RigidWalls
 from .gauge import Scene
 
 _AXES = "xyz"
@@ -70,7 +69,7 @@ class Pushes:
                 found[place] += self._scene.rigid.of_walls(which, part)[_AXES.index(probe.field[-1])]
         return found
 
-    def _given_by(self, walls: RigidWalls | MovingWalls) -> Floats:
+    def _given_by(self, walls: Boundary) -> Floats:
         """(n, probes) what they have given each of their nodes, of those that this rank owns, N s."""
         nodes, columns = self._scene.model.nodes, np.zeros((len(walls.nodes), len(self._probes)))
         for place, probe in enumerate(self._probes.values()):
@@ -78,6 +77,7 @@ class Pushes:
                 part, axis = self._scene.model.parts.index(probe.part), _AXES.index(probe.field[-1])
                 mine = (nodes.owned * nodes.mass_of(part) / nodes.mass)[walls.nodes]
                 some = [3 * k + axis for k in self._of(probe)]
+                assert walls.given is not None
                 columns[:, place] = walls.given[:, some].sum(axis=1) * mine
         return columns
 

@@ -23,7 +23,7 @@ def small_features(gmsh: Any, element_size: float, frame: Frame) -> Iterator[str
             f"{len(short)} of {len(lengths)} edges are shorter than half of element_size, the shortest "
             f"{si(min(short) * frame.scale, 'm')}: tets there are as small and hold the time step down"
         )
-    every = [_radius(gmsh, tag) for _, tag in gmsh.model.getEntities(2)]
+    every = [_radius(gmsh, number) for _, number in gmsh.model.getEntities(2)]
     radii = [radius for radius in every if radius < frame.length(element_size)]
     if radii:
         yield (
@@ -32,12 +32,12 @@ def small_features(gmsh: Any, element_size: float, frame: Frame) -> Iterator[str
         )
 
 
-def _radius(gmsh: Any, tag: int) -> float:
+def _radius(gmsh: Any, number: int) -> float:
     """Smallest radius of curvature in the middle of a face; infinite of a plane."""
-    if gmsh.model.getType(2, tag) == "Plane":
+    if gmsh.model.getType(2, number) == "Plane":
         return float("inf")
-    low, high = gmsh.model.getParametrizationBounds(2, tag)
+    low, high = gmsh.model.getParametrizationBounds(2, number)
     middle = 0.5 * (np.asarray(low) + np.asarray(high))
-    most, least = (float(curvature[0]) for curvature in gmsh.model.getPrincipalCurvatures(tag, middle)[:2])
+    most, least = (float(curvature[0]) for curvature in gmsh.model.getPrincipalCurvatures(number, middle)[:2])
     largest = max(abs(most), abs(least))
     return 1.0 / largest if largest else float("inf")

@@ -33,14 +33,14 @@ class Sliding:
         directions are those across which the body is cut at 0. And the points, put exactly there.
         """
         entity, nearest = np.full(len(tags), -1, np.int32), list[Nearest]()
-        for dimension, tag in gmsh.model.getEntities():
+        for dimension, number in gmsh.model.getEntities():
             if dimension == 3:
                 continue
-            nodes = np.asarray(gmsh.model.mesh.getNodes(dimension, tag)[0], np.int64)
+            nodes = np.asarray(gmsh.model.mesh.getNodes(dimension, number)[0], np.int64)
             place = np.searchsorted(tags, nodes[np.isin(nodes, tags)])
             entity[place] = -2 if dimension == 0 else len(nearest)
             if dimension:
-                nearest.append(_nearest(gmsh, dimension, tag))
+                nearest.append(_nearest(gmsh, dimension, number))
         points, held = points.copy(), np.zeros(points.shape, bool)
         for direction in range(cuts):
             on = np.abs(points[:, direction]) < NEAR
@@ -59,21 +59,21 @@ class Sliding:
         return np.where(self.held[node], start, places)
 
 
-def _nearest(gmsh: Any, dimension: int, tag: int) -> Nearest:
-    kind = gmsh.model.getType(dimension, tag)
+def _nearest(gmsh: Any, dimension: int, number: int) -> Nearest:
+    kind = gmsh.model.getType(dimension, number)
     if kind == "Plane":
-        return _flat(gmsh, tag)
-    return lambda places: np.asarray(gmsh.model.getClosestPoint(dimension, tag, places.ravel())[0], np.float64).reshape(
-        -1, 3
-    )
+        return _flat(gmsh, number)
+    return lambda places: np.asarray(
+        gmsh.model.getClosestPoint(dimension, number, places.ravel())[0], np.float64
+    ).reshape(-1, 3)
 
 
-def _flat(gmsh: Any, tag: int) -> Nearest:
+def _flat(gmsh: Any, number: int) -> Nearest:
     """A plane needs no search: the point at the middle of its parameters, and its normal."""
-    low, high = gmsh.model.getParametrizationBounds(2, tag)
+    low, high = gmsh.model.getParametrizationBounds(2, number)
     middle = 0.5 * (np.asarray(low) + np.asarray(high))
-    origin = np.asarray(gmsh.model.getValue(2, tag, middle), np.float64)
-    normal = np.asarray(gmsh.model.getNormal(tag, middle), np.float64)
+    origin = np.asarray(gmsh.model.getValue(2, number, middle), np.float64)
+    normal = np.asarray(gmsh.model.getNormal(number, middle), np.float64)
 
     def nearest(places: Floats) -> Floats:
         away = ((places - origin) * normal).sum(axis=1)
