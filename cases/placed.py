@@ -105,8 +105,11 @@ class Bulk:
 
 
 def bulk(part: Part, mesh: Generated, density: float) -> Bulk:
-    """What ``part`` with the generated ``mesh`` brings along; motion other than of the whole from points inside."""
-    body, mass = Placed(mesh, part.turn), density * geometry.volume(mesh)
+    """What ``part`` with the generated ``mesh`` brings along, with the mass that is given for it; motion
+    other than of the whole from points inside.
+    """
+    given = part.rigid.mass if part.rigid is not None else None
+    body, mass = Placed(mesh, part.turn), given or density * geometry.volume(mesh)
     moving = part.spin is not None or part.stretch is not None
     speeds = [velocity(part, point) for point in body.points()] if moving else [part.velocity]
     squares = [math.fsum(c * c for c in v) for v in speeds]

@@ -221,10 +221,11 @@ def _moving(
     if all(spec.plain for _, spec in case.boundaries_of(schema.Wall)):
         return []
     walls, nodes = walls or walls_of(case), model.nodes
+    tells = "contact_pressure" in case.run.fields
     touched = np.any(found, axis=0)
     which = np.zeros((np.count_nonzero(touched), walls.n), bool)
     which[:, : len(found)] = np.array([h[touched] for h in found]).T
-    return [MovingWalls(_indices(touched), nodes.owned[touched], walls, which, planes[touched], comm)]
+    return [MovingWalls(_indices(touched), nodes.owned[touched], walls, which, planes[touched], comm, tells)]
 
 
 def _refuse_overlaps(case: schema.Case, model: Model, boundaries: list[Boundary], comm: Comm) -> None:

@@ -39,6 +39,8 @@ def _measured(case: Case, index: int, mesh: TetMesh, surface: Surface) -> Survey
     volumes = mesh.volumes()
     quarters = np.repeat(volumes / 4.0, 4)
     masses = material(case, part.material).density * np.bincount(mesh.tets.reshape(-1), quarters, len(points))
+    if part.rigid is not None and part.rigid.mass is not None:
+        masses *= part.rigid.mass / float(masses.sum())
     v = velocities(part, points)
     squares = (v * v).sum(axis=1)
     low, high, momentum = points.min(axis=0), points.max(axis=0), (masses[:, None] * v).sum(axis=0)

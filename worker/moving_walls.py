@@ -40,9 +40,11 @@ class MovingWalls(Boundary):
     after_contact = True
 
     def __init__(
-        self, nodes: Indices, owned: Flags, walls: Walls, held: Flags, planes: Flags, comm: Comm
+        self, nodes: Indices, owned: Flags, walls: Walls, held: Flags, planes: Flags, comm: Comm, tells: bool = False,
     ) -> None:  # fmt: skip
-        """``owned`` (n,); ``planes`` (n, 3): components that planes of symmetry hold."""
+        """``owned`` (n,); ``planes`` (n, 3): components that planes of symmetry hold; ``tells``: whether somebody will
+        ask what they have given since the last time.
+        """
         super().__init__(nodes)
         self.walls, self._owned, self._held, self._mirrored, self._comm = walls, owned, held, planes, comm
         self.scale = self._weight = 1.0
@@ -54,12 +56,21 @@ class MovingWalls(Boundary):
         """(n, 3 walls) the same in the last step, and what of it is friction."""
         self.friction_loss = np.zeros(n)
         self._kept = (*KEPT, "given", "friction_loss", "_step", "_rubbed")
+        if tells:
+            self._told = self.given.copy()
+            self._kept = (*self._kept, "_told")
         self._pushed = False
         self._arguments, self._books = Arguments(*_PUSH), Arguments(*_BOOK)
 
     def measure(self, mass: float, speed: float) -> None:
         """The quanta, by the largest nodal ``mass``, kg, and ``speed``, m/s, of the scene."""
         self.scale, self._weight = scale_for(mass * speed), scale_for(mass)
+
+    def since_told(self) -> Floats:
+        """(n, 3) what the walls have given each node since this was last asked, N s."""
+        found = (self.given - self._told).reshape(len(self.given), -1, 3).sum(axis=1)
+        self._told[:] = self.given
+        return np.asarray(found)
 
     def held_components(self) -> Bits:
         return free(self.nodes)

@@ -6,6 +6,7 @@ import pytest
 
 from conoid.cases.estimate import estimate
 from conoid.cases.load import CaseError, apply_overrides, parse_case
+from conoid.cases.placed import bulk
 from conoid.cases.plausible import oddities
 
 BALL = {"shape": "sphere", "centre": [0, 0, "5.1 mm"], "radius": "5 mm", "element_size": "1 mm"}
@@ -22,6 +23,13 @@ def scene(*overrides: str) -> dict[str, Any]:
     rubber = {"density": "1100 kg/m^3", "elastic": {"young": "5 MPa", "poisson": 0.45}}
     data = {"name": "pad", "materials": {"rubber": rubber}, "run": {"end_time": "1 ms"}, "parts": parts}
     return apply_overrides(data, overrides)
+
+
+def test_a_mass_that_is_given_is_the_one_that_is_told() -> None:
+    """Momentum and energy, by which a user sees what hits, are those of that mass."""
+    case = parse_case(scene("parts[0].rigid={mass='2 kg'}"))
+    found = bulk(case.parts[0], case.parts[0].mesh, 7850.0)  # type: ignore[arg-type]
+    assert (found.mass, found.momentum, found.energy) == (2.0, (0.0, 0.0, -10.0), 25.0)
 
 
 INERTIA = "parts[0].rigid={{mass='4 g', inertia=[{}]}}"

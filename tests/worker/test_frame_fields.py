@@ -75,16 +75,22 @@ def test_a_body_that_turns_has_no_strain(tmp_path: Path) -> None:
     assert found["strain_rate"].max() < 1e4 * 1e-3
 
 
-def test_the_pressure_of_contact_carries_the_weight(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("upper", "wall"), [({}, {}), ({"rigid": schema.Rigid()}, {"mass": 1e9})], ids=["deformable", "rigid"]
+)
+def test_the_pressure_of_contact_carries_the_weight(
+    upper: dict[str, Any], wall: dict[str, Any], tmp_path: Path
+) -> None:
     """On one rank and on three the same bits. A block that lies on another, which lies on a wall, pressed by an
-    acceleration and damped: the mean over the time between two frames; the run goes on from a checkpoint.
+    acceleration and damped: the mean over the time between two frames; the run goes on from a checkpoint. The
+    upper one may be rigid, and the wall one that could move.
     """
     base = block((3, 3, 1), 1e-3, shake=0.0)
     boundaries: tuple[dict[str, Any], ...] = (
-        {"kind": "wall", "point": (0.0, 0.0, 0.0), "normal": (0.0, 0.0, 1.0)},
+        {"kind": "wall", "point": (0.0, 0.0, 0.0), "normal": (0.0, 0.0, 1.0), **wall},
         {"kind": "gravity", "acceleration": (0.0, 0.0, -1e6)},
     )
-    case = meeting_of([{}, {}], end=1e-4, boundaries=boundaries, viscosity={"linear": 1.0})
+    case = meeting_of([{}, upper], end=1e-4, boundaries=boundaries, viscosity={"linear": 1.0})
     case = asking(case, ALL)
     meshes = [base, moved(base, (0.0, 0.0, 1e-3))]
     weight = 7850.0 * 9e-9 * 1e6

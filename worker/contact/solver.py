@@ -45,6 +45,9 @@ class Bodies(Protocol):
     def of_contact(self, parts: Ints) -> None:
         """Adds the impulses of the step to those of the ``parts`` (parts, 3), quanta."""
 
+    def add_pressed(self, pressed: Ints) -> None:
+        """Adds them to those of this rank's nodes, ``pressed`` (nodes, 3), quanta."""
+
 
 class ActiveSet:
     """The active contacts of a rank in a step, and the slots of their nodes."""
@@ -181,6 +184,11 @@ class ActiveSet:
             self._bodies.of_contact(parts)
             unsettled += self._bodies.unsettled()
         return bool(left[:, 2].any())
+
+    def press(self, pressed: Ints) -> None:
+        """Adds the impulses of rigid bodies in the step to ``pressed`` (nodes, 3), quanta, where somebody asks."""
+        if self._bodies is not None and len(pressed):
+            self._bodies.add_pressed(pressed)
 
     def pushes(self) -> tuple[Indices, Floats]:
         """Which contacts have asked for an impulse in the step, and (k, 4) their impulses along the normal, and of

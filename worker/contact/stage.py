@@ -260,8 +260,7 @@ class Contact:
         self._meet(now, give, dt)
         self.detection.retarget(now, self._scheme.restitution, give)
         shared = now.messages.company.agree(now.active, crowd.local)
-        surface = self.exterior
-        active.begin(now.active, crowd, surface.flight.loose, shared, surface.size, dt)
+        active.begin(now.active, crowd, self.exterior.flight.loose, shared, self.exterior.size, dt)
         active.weigh()
         kept = Kept(now.node_face.kept, self.exterior.cracks.kept.reshape(-1, 4))
         active.resume(kept, self._resume(give))
@@ -274,6 +273,7 @@ class Contact:
             self.last_push = t
         shared.free()
         books.book(now, active.places, fresh=True)
+        active.press(books.pressed)
 
     def _resume(self, give: float) -> float:
         """The step over the one before: what impulses of the same pairs are worth now. Without restitution none while

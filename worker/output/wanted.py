@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from ..moving_walls import MovingWalls
 from ..simulation import Simulation
 from ..state import Floats
 from ..walls import RigidWalls
@@ -24,6 +25,6 @@ def _impulses(sim: Simulation) -> Floats | None:
     if sim.contact is not None:
         found += sim.contact.books.pressed / sim.contact.books.scale
         sim.contact.books.pressed[:] = 0
-    for walls in (bound for bound in sim.boundaries if isinstance(bound, RigidWalls)):
+    for walls in (bound for bound in sim.boundaries if isinstance(bound, RigidWalls | MovingWalls)):
         found[walls.nodes] += walls.since_told()
     return found

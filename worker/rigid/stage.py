@@ -14,7 +14,7 @@ from conoid.cases.estimate import RIGID_STEPS
 from conoid.cases.region import GENERATED
 from conoid.cases.schema import Case, Wall
 
-from ..contact.active import ActiveNodes
+from ..contact.active import IMPULSE, ActiveNodes
 from ..contact.records import Crowd
 from ..errors import InputError
 from ..parallel.comm import Comm
@@ -59,6 +59,7 @@ class Rigid:
         """Of the last step, and when contact or a wall last pushed, s."""
         self._least = RIGID_STEPS / case.run.end_time if len(case.rigid) == len(case.parts) else 0.0
         self._start, self._rate = np.zeros((2, n, 3)), np.zeros((n, 3))
+        self._tells = "contact_pressure" in case.run.fields
         self.share = 1.0
         """How much of the last change of the motion the velocities of the nodes have: less at the end of a run."""
         self.active = False
@@ -226,6 +227,8 @@ class Rigid:
         at = places[self._slots]
         self._slot_arms = np.ascontiguousarray(crowd.x[at] - self.bodies.centre[self._of_slots])
         self._owned = crowd.owner[at] == self._comm.rank
+        self._slot_nodes = crowd.local[at]
+        self._slot_impulses = np.zeros((len(at), 3), np.int64)
         self._scale = scale
 
     def weigh(self, active: ActiveNodes) -> None:
@@ -243,6 +246,8 @@ class Rigid:
         if not self.active:
             return
         bodies, words = self.bodies, np.zeros((self.bodies.n, rows.WORDS), np.int64)
+        if self._tells:
+            self._slot_impulses += active.moving_words[self._slots, IMPULSE : IMPULSE + 3]
         rows.gather(words, active, self._slots, self._of_slots, self._slot_arms, self._owned, bodies.reach)
         self._changed = self._comm.sum(words) if self._comm.size > 1 else words
         self._total += self._changed
@@ -251,6 +256,11 @@ class Rigid:
         self._rate[:] = self._start[1] + times(bodies.yielding, impulse[:, 3:])
         self.stops.stop(bodies.speed, self._rate)
         rows.spread(active, self._slots, self._of_slots, self._slot_arms, bodies.speed, self._rate)
+
+    def add_pressed(self, pressed: Ints) -> None:
+        """Adds the impulses of contact of the step to those of this rank's nodes, ``pressed`` (nodes, 3), quanta."""
+        mine = np.flatnonzero(self._slot_nodes >= 0)
+        pressed[self._slot_nodes[mine]] += self._slot_impulses[mine]
 
     def unsettled(self) -> Ints:
         """(2,) l1 norms of what the last sweep has changed of the bodies' impulses and moments, and of these
