@@ -7,6 +7,7 @@ import pytest
 
 from conoid.cases import load
 from conoid.worker.assembly import assemble
+from conoid.worker.errors import InputError
 
 from .scenes import BOND, block, built, moved, run, start
 
@@ -43,3 +44,18 @@ def test_an_interface_that_has_eroded_ties_nothing() -> None:
 def test_bonded_parts_of_two_velocities_are_told(velocity: str, told: int) -> None:
     found = assemble(load.parse_toml(joint(below=velocity)), Path()).warnings
     assert sum("'below' and 'above' start at two velocities where they are tied, up to 3" in w for w in found) == told
+
+
+@pytest.mark.parametrize("third", ["shared", "tied", ""])
+def test_three_parts_of_one_body_have_a_bond_at_each_interface(third: str) -> None:
+    """Two of them without one would come apart there, and not meet."""
+    corners = {"a": ((0, 0, 0), (2, 1, 1)), "b": ((0, 0, 1), (1, 1, 2)), "c": ((1, 0, 1), (2, 1, 2))}
+    blocks = "".join(block(name, *both, 0.5) for name, both in corners.items())
+    bonds = [("a", "b", "shared"), ("b", "c", "shared"), *([("a", "c", third)] if third else [])]
+    made = "".join(f'\n[[bond]]\nparts = ["{i}", "{j}"]\nkind = "{kind}"\n' for i, j, kind in bonds)
+    case = load.parse_toml(start(1e-7) + blocks + made)
+    if third:
+        assemble(case, Path())
+    else:
+        with pytest.raises(InputError, match="'a' and 'c' have faces of one body in common and no bond; give them"):
+            assemble(case, Path())

@@ -1,10 +1,11 @@
 """Parts that bonds join by shared nodes: their nodes at one place become one node, their faces there an interface."""
 
 from collections.abc import Container, Mapping
+from itertools import combinations
 
 import numpy as np
 
-from conoid.cases.joined import shared_bonds
+from conoid.cases.joined import bodies, shared_bonds
 from conoid.cases.schema import Case
 
 from ..errors import InputError
@@ -33,7 +34,35 @@ def joined(case: Case, placed: Mapping[int, Placed], n: int) -> Ids:
     every = np.concatenate(edges)
     from ..fracture.connectivity import components  # numba must know where its kernels are before it is imported
 
-    return components(n, every) if len(every) else np.arange(n)
+    if not len(every):
+        return np.arange(n)
+    stands = np.asarray(components(n, every))
+    _refuse_open(case, placed, stands)
+    return stands
+
+
+def _refuse_open(case: Case, placed: Mapping[int, Placed], stands: Ids) -> None:
+    """Raises InputError for two parts of one body without a bond that lie face to face: they would come apart there,
+    and do not meet in contact. ``stands``: see ``joined``.
+    """
+    body = bodies(case)
+    numbers = {part.name: i for i, part in enumerate(case.parts)}
+    every = {(min(i, j), max(i, j)) for i, j in ([numbers[name] for name in bond.parts] for bond in case.bond)}
+    for i, j in combinations(sorted(placed), 2):
+        if body[i] == body[j] and (i, j) not in every:
+            (first, one, x), (second, other, y) = placed[i], placed[j]
+            p, q = _common(one, x, other, y)
+            if _wide(x[p[stands[first + p] != stands[second + q]]]):
+                raise InputError(_unbonded(case, i, j))
+
+
+def _wide(x: Floats) -> bool:
+    """Whether some points (n, 3) are neither one nor on one line."""
+    if len(x) < 3:
+        return False
+    d = x - x[0]
+    far = d[int(np.argmax((d * d).sum(axis=1)))]
+    return bool((np.cross(d, far) ** 2).sum(axis=1).max() > _SAME * float((far * far).sum()) ** 2)
 
 
 def _common(one: Origin | None, x: Floats, other: Origin | None, y: Floats) -> tuple[Ids, Ids]:
@@ -69,11 +98,15 @@ def require_faces(case: Case, there: Container[int], across: Ints, tet_part: Int
         if pair not in found:
             raise InputError(_apart(case, k))
     for i, j in sorted(found - bonded.keys()):
-        one, other = case.parts[i].name, case.parts[j].name
-        raise InputError(
-            f"parts: {one!r} and {other!r} have faces of one body in common and no bond; give them a [[bond]] with "
-            f"parts = [{one!r}, {other!r}] and kind = 'shared'"
-        )
+        raise InputError(_unbonded(case, i, j))
+
+
+def _unbonded(case: Case, i: int, j: int) -> str:
+    one, other = case.parts[i].name, case.parts[j].name
+    return (
+        f"parts: {one!r} and {other!r} have faces of one body in common and no bond; give them a [[bond]] with "
+        f"parts = [{one!r}, {other!r}] and kind = 'shared'"
+    )
 
 
 def _apart(case: Case, k: int) -> str:
