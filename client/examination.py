@@ -61,6 +61,12 @@ def examine(data: Mapping[str, Any], folder: Path) -> Examination:
     return Examination(case, expected, odd, found, touching)
 
 
+def _named(part: int, mesh: Any) -> tuple[tuple[str | int, ...], object]:
+    """The key of the file of a part, or of its mesh where that has several, and the value."""
+    path = getattr(mesh, "path", None)
+    return (("parts", part, "mesh"), ...) if path is None else (("parts", part, "mesh", "path"), path)
+
+
 def _survey(case: Case, folder: Path) -> tuple[Survey, list[Problem]]:
     """What the mesh files hold; a warning for each of them where nothing here can read it."""
     files = [(i, part.mesh) for i, part in enumerate(case.parts) if isinstance(part.mesh, Measured)]
@@ -68,7 +74,7 @@ def _survey(case: Case, folder: Path) -> tuple[Survey, list[Problem]]:
         return Survey(), []
     if not survey.installed():
         cure = "was not read: the solver is not installed here (pip install 'conoid[worker]')"
-        return Survey(), [problem(("parts", i, "mesh"), getattr(mesh, "path", ...), cure) for i, mesh in files]
+        return Survey(), [problem(*_named(i, mesh), cure) for i, mesh in files]
     asked = survey.question(case.model_dump(mode="json"), folder)
     ended = subprocess.run([sys.executable, "-m", survey.PROGRAM], input=asked, capture_output=True, check=False)
     try:
