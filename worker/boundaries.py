@@ -132,6 +132,27 @@ class Boundary(ABC):
         """Takes up copies of the nodes at the places ``at``; they stand behind all nodes."""
 
 
+class Stopping(Boundary):
+    """Walls: they stop nodes, and add up the impulses that they give."""
+
+    after_contact = True
+
+    def __init__(self, nodes: Indices, walls: int, *, tells: bool) -> None:
+        """So many ``walls``; ``tells``: whether ``since_told`` will be called."""
+        super().__init__(nodes)
+        self.given: Floats = np.zeros((len(nodes), 3 * walls))
+        self._kept = (*KEPT, "given")
+        if tells:
+            self._told = self.given.copy()
+            self._kept = (*self._kept, "_told")
+
+    def since_told(self) -> Floats:
+        """(n, 3) what the walls have given each node since this was last asked, N s."""
+        found = (self.given - self._told).reshape(len(self.given), -1, 3).sum(axis=1)
+        self._told[:] = self.given
+        return np.asarray(found)
+
+
 class SymmetryPlane(Boundary):
     """Nodes that start on a plane across an axis have no velocity along it, while they have tets: these are mirrored,
     and hold the node on the plane. A node without tets and its images are particles (mirrors.py).

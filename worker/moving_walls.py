@@ -13,7 +13,7 @@ same on any number of ranks and threads.
 
 import numpy as np
 
-from .boundaries import KEPT, Boundary, free, mirrored
+from .boundaries import KEPT, Boundary, Stopping, free, mirrored
 from .jit import njit, types
 from .migration.parcel import Parcel
 from .parallel.arguments import Arguments, reader
@@ -34,10 +34,8 @@ _LINE = 16
 to one cache line."""
 
 
-class MovingWalls(Boundary):
+class MovingWalls(Stopping):
     """``held`` (n, w): which of the ``walls`` hold which node; fixed planes hold none here."""
-
-    after_contact = True
 
     def __init__(
         self, nodes: Indices, owned: Flags, walls: Walls, held: Flags, planes: Flags, comm: Comm, tells: bool = False,
@@ -45,32 +43,21 @@ class MovingWalls(Boundary):
         """``owned`` (n,); ``planes`` (n, 3): components that planes of symmetry hold; ``tells``: whether somebody will
         ask what they have given since the last time.
         """
-        super().__init__(nodes)
+        super().__init__(nodes, walls.n, tells=tells)
         self.walls, self._owned, self._held, self._mirrored, self._comm = walls, owned, held, planes, comm
         self.scale = self._weight = 1.0
         """Quanta per N s, and per kg."""
         n, w = len(nodes), walls.n
-        self.given: Floats = np.zeros((n, 3 * w))
-        """(n, 3 walls) what each wall has given each node so far, N s."""
         self._step, self._rubbed = np.zeros((2, n, 3 * w))
         """(n, 3 walls) the same in the last step, and what of it is friction."""
         self.friction_loss = np.zeros(n)
-        self._kept = (*KEPT, "given", "friction_loss", "_step", "_rubbed")
-        if tells:
-            self._told = self.given.copy()
-            self._kept = (*self._kept, "_told")
+        self._kept = (*self._kept, "friction_loss", "_step", "_rubbed")
         self._pushed = False
         self._arguments, self._books = Arguments(*_PUSH), Arguments(*_BOOK)
 
     def measure(self, mass: float, speed: float) -> None:
         """The quanta, by the largest nodal ``mass``, kg, and ``speed``, m/s, of the scene."""
         self.scale, self._weight = scale_for(mass * speed), scale_for(mass)
-
-    def since_told(self) -> Floats:
-        """(n, 3) what the walls have given each node since this was last asked, N s."""
-        found = (self.given - self._told).reshape(len(self.given), -1, 3).sum(axis=1)
-        self._told[:] = self.given
-        return np.asarray(found)
 
     def held_components(self) -> Bits:
         return free(self.nodes)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from .boundaries import KEPT, Boundary, free, mirrored
+from .boundaries import KEPT, Boundary, Stopping, free, mirrored
 from .impulses import book
 from .jit import njit, types
 from .migration.parcel import Parcel
@@ -18,7 +18,7 @@ ACROSS = 1e-12
 lies along a plane and cannot push the node. Chosen far above rounding (1e-32) and below any angle that is meant."""
 
 
-class RigidWalls(Boundary):
+class RigidWalls(Stopping):
     """No node ends the step behind a wall: an impulse along its normal stops the node there, never pulls. Another along
     the wall takes what the node has of speed there, with as much of that impulse at most as Coulomb's ``friction`` (w,)
     allows.
@@ -28,14 +28,12 @@ class RigidWalls(Boundary):
     wall that is not at right angles to a plane pushes the nodes on it along it, and the plane takes the rest.
     """
 
-    after_contact = True
-
     def __init__(
         self, nodes: Indices, points: Floats, normals: Floats, held: Flags, mirrored: Flags | None = None,
         friction: Floats | None = None, tells: bool = False,
     ) -> None:  # fmt: skip
         """``tells``: whether somebody will ask what they have given since the last time."""
-        super().__init__(nodes)
+        super().__init__(nodes, len(points), tells=tells)
         self._friction = np.zeros(len(points)) if friction is None else friction
         self._rubbed = np.zeros((len(nodes) if self._friction.any() else 0, 3))
         """(n, 3) impulse of friction of the last step, N s; (0, 3) where there is no friction."""
@@ -45,21 +43,9 @@ class RigidWalls(Boundary):
         self._held = held
         self._pushed = False
         self._pushes = Arguments(*_PUSH)
-        self.given: Floats = np.zeros((len(nodes), 3 * len(points)))
-        """(n, 3 walls) what each wall has given each node so far, N s."""
-        self._kept = (*KEPT, "given")
-        if tells:
-            self._told = self.given.copy()
-            self._kept = (*self._kept, "_told")
         if self._friction.any():
             self.friction_loss = np.zeros(len(nodes))
             self._kept = (*self._kept, "friction_loss", "_rubbed")
-
-    def since_told(self) -> Floats:
-        """(n, 3) what the walls have given each node since this was last asked, N s."""
-        found = (self.given - self._told).reshape(len(self.given), -1, 3).sum(axis=1)
-        self._told[:] = self.given
-        return np.asarray(found)
 
     def held_components(self) -> Bits:
         return free(self.nodes)
