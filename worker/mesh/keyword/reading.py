@@ -1,6 +1,5 @@
 """The elements that a case takes from an LS-DYNA keyword deck: all solids, or those of a part or a set."""
 
-from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -9,7 +8,7 @@ import numpy as np
 from conoid.cases.cards import CardError
 
 from ...errors import MeshError
-from .. import solid
+from .. import omitted, solid
 from ..cells import HEX8, TET4, TET10, Cells, Form, Kind, cells
 from ..model import Ids
 from ..named import placed, refuse_repeated
@@ -103,18 +102,7 @@ def _segments(content: Content, number: int, depth: int = 0) -> Iterator[Ids]:
 
 def _notes(deck: Deck, chosen: list[Cells]) -> Iterator[str]:
     """What of the deck is not in the mesh, or is taken otherwise, in a line each."""
-    if deck.passed:
-        yield f"elements that carry no volume are skipped: {_listed(deck.passed)}"
-    if deck.volumes:
-        yield f"elements that cannot be read are outside of the group: {_listed(deck.volumes)}"
-    if deck.joining:
-        yield f"keywords that join, hold or load bodies are passed over: {_listed(deck.joining)}"
+    yield from omitted.notes(deck.passed, deck.volumes, deck.joining, "*")
     if deck.held:
         yield f"constraints of nodes (TC, RC of *NODE) are passed over: {deck.held} nodes"
-    for each in chosen:
-        if each.kind.nodes > 10 and len(each.numbers):
-            yield f"{len(each.numbers):,} hexahedra of {each.kind.nodes} nodes are taken by their corners"
-
-
-def _listed(counts: Counter[str]) -> str:
-    return ", ".join(f"{many} *{name}" for name, many in sorted(counts.items()))
+    yield from omitted.by_corners(chosen)

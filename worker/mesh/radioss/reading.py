@@ -1,12 +1,12 @@
 """The elements that a case takes from a Radioss starter deck: all with a volume, or those of a part or a subset."""
 
-from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
 from ...errors import MeshError
+from .. import omitted
 from ..cells import HEX8, TET4, TET10, WEDGE6, Cells, Form, Kind, cells, sides
 from ..model import Ids
 from ..named import placed, refuse_repeated
@@ -167,16 +167,5 @@ def _named(titles: dict[int, str], name: str) -> list[int]:
 
 def _notes(deck: Deck, chosen: list[Cells]) -> Iterator[str]:
     """What of the deck is not in the mesh, or is taken otherwise, in a line each."""
-    if deck.passed:
-        yield f"elements that carry no volume are skipped: {_listed(deck.passed)}"
-    if deck.volumes:
-        yield f"elements that cannot be read are outside of the group: {_listed(deck.volumes)}"
-    if deck.joining:
-        yield f"keywords that join, hold or load bodies are passed over: {_listed(deck.joining)}"
-    for each in chosen:
-        if each.kind.nodes > 10 and len(each.numbers):
-            yield f"{len(each.numbers):,} hexahedra of {each.kind.nodes} nodes are taken by their corners"
-
-
-def _listed(counts: Counter[str]) -> str:
-    return ", ".join(f"{many} /{word}" for word, many in sorted(counts.items()))
+    yield from omitted.notes(deck.passed, deck.volumes, deck.joining, "/")
+    yield from omitted.by_corners(chosen)
