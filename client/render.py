@@ -17,7 +17,7 @@ from PIL import Image
 
 from conoid.cases.figures import exacts, number
 
-from . import camera, scales, sheet
+from . import camera, hues, scales, sheet
 from .camera import Camera
 from .captions import INK, PAPER, Scale, add_side, add_title
 from .errors import LookError, ViewError
@@ -151,7 +151,11 @@ def _with_field(mesh: Any, name: str, cells: bool) -> Any:
         return bare.point_data_to_cell_data() if cells else bare
     _require(mesh.cell_data, name)
     values = np.asarray(mesh.cell_data[name])
-    bare.cell_data["shown"] = values if FIELDS[name].kind in scales.NAMED else values * factor
+    if FIELDS[name].kind in scales.NAMED:
+        bare.cell_data["shown"] = values
+        bare.cell_data["part"] = mesh.cell_data.get("part", np.zeros(mesh.n_cells, int))
+        return bare
+    bare.cell_data["shown"] = values * factor
     return bare if cells else bare.cell_data_to_point_data()
 
 
@@ -260,7 +264,8 @@ def _add_body(plotter: Any, surface: Any, field: Field, picture: Picture, scale:
     }  # fmt: skip
     if scale is None:
         shown, bodies = surface["shown"], max(len(picture.parts), 1)
-        named = scales.class_colours(shown) if field.kind == "classes" else scales.fragment_colours(shown, bodies)
+        fragments = field.kind == "fragments"
+        named = hues.of_fragments(shown, surface["part"], bodies) if fragments else hues.of_names(shown)
         surface.cell_data["colours"] = named
         flat = {"smooth_shading": False} if field.kind == "fragments" else {}
         drawn = plotter.add_mesh(surface, **{**look, "scalars": "colours", "rgb": True, **flat})

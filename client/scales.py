@@ -1,4 +1,4 @@
-"""The colours of a picture: the ends of the colour bar, at round numbers, and colours for names; numpy only."""
+"""The scale of a picture: the ends of the colour bar, at round numbers, and its colours; numpy only."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -8,15 +8,8 @@ import numpy as np
 from .errors import ViewError
 from .pictures import Field, Look
 
-PALETTE = (
-    "#4c78a8", "#f58518", "#54a24b", "#e45756", "#72b7b2", "#b279a2", "#eeca3b", "#9d755d", "#ff9da6", "#bab0ac",
-)  # fmt: skip
 NAMED = ("classes", "fragments")
 """Kinds of fields whose values are names."""
-BODIES = "#c9d3dc", "#d9cbb3", "#b7c9bd", "#c9bddb", "#dcc0c0", "#bcd2d8"
-"""Of what was there at the start: muted, so that what has broken off stands out."""
-_GOLDEN, _KNUTH = np.uint64(0x9E3779B97F4A7C15), np.uint64(2654435761)
-"""2^64 and 2^32 over the golden ratio: multiples of them are far from each other (Knuth, volume 3, 6.4)."""
 _PARTS = 6
 """Parts of a colour bar, at most. Chosen."""
 
@@ -58,24 +51,3 @@ def rounded(low: float, high: float) -> tuple[float, float, int]:
     first, last = np.floor(low / step + 1e-9), np.ceil(high / step - 1e-9)
     last = max(last, first + 1)
     return float(first * step), float(last * step), int(last - first) + 1
-
-
-def class_colours(values: Any) -> Any:
-    """One colour (n, 3) for each number of a part or rank."""
-    return np.array([rgb(PALETTE[i % len(PALETTE)]) for i in np.asarray(values).astype(int)], np.uint8).reshape(-1, 3)
-
-
-def fragment_colours(values: Any, bodies: int) -> Any:
-    """One colour (n, 3) a fragment, by its number alone, so that it keeps it: web/colours.js has the same. The first
-    ``bodies`` numbers are of what was there at the start.
-    """
-    numbers, which = np.unique(np.asarray(values).astype(np.int64), return_inverse=True)
-    some = numbers.astype(np.uint64)
-    turn = ((some + np.uint64(1)) * _GOLDEN >> np.uint64(40)).astype(float) / 2.0**24
-    light = 0.55 + 0.14 * ((some * _KNUTH & np.uint64(255)).astype(float) / 255.0 - 0.5)
-    k = (np.array([0.0, 8.0, 4.0]) + 12.0 * turn[:, None]) % 12.0
-    share = light[:, None] - 0.2 * np.maximum(-1.0, np.minimum(np.minimum(k - 3.0, 9.0 - k), 1.0))
-    colours = np.floor(255.0 * share + 0.5).astype(np.uint8)
-    whole = numbers < bodies
-    colours[whole] = np.array([rgb(BODIES[i % len(BODIES)]) for i in numbers[whole]], np.uint8).reshape(-1, 3)
-    return colours[which.reshape(-1)]

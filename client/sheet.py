@@ -9,7 +9,7 @@ import numpy as np
 
 from conoid.cases.figures import exacts
 
-from . import camera, scales
+from . import camera, hues
 from .camera import Camera
 from .pictures import Picture
 
@@ -84,7 +84,4 @@ def legend(values: Sequence[Any], picture: Picture) -> list[list[str]]:
     """Names and colours of the parts or ranks that there are."""
     present = np.unique(np.concatenate([np.asarray(each).astype(int) for each in values]))[:_NAMES]
     names = picture.parts if picture.field == "part" else []
-    return [
-        [names[i] if i < len(names) else f"{picture.field} {i}", scales.PALETTE[i % len(scales.PALETTE)]]
-        for i in present
-    ]
+    return [[names[i] if i < len(names) else f"{picture.field} {i}", hues.css(hues.of_names(i)[0])] for i in present]

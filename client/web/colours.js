@@ -1,19 +1,26 @@
-// Colours of the view: one for each of many, and a scale from low to high that grey prints and the colour blind keep apart.
+// Colours of the view: a hue for each part, variations of it for the fragments of the part (hues.py has the same function),
+// and a scale from low to high that grey prints and the colour blind keep apart.
 
-const NAMED = ["#3b7dd8", "#e07b39", "#2aa198", "#c2334a", "#8e6bd1", "#7f9f2f", "#d05a8c", "#5c6977", "#e0a32e", "#4fae7b"];
+// Degrees in OKLCH of the first parts.
+const HUES = [252, 70, 165, 15, 305, 120, 205, 345];
+// 2^64 over the powers of 1.2207, the root of g^4 = g + 1: their multiples fill a cube evenly (Roberts 2018, R3).
+const STEPS = [0xd1b54a32d192ed03n, 0xabc98388fb8fac03n, 0x8cb92ba72f3d8dd7n];
+// Lightness and chroma of a part by name, and of what is whole: muted, so that what has broken off stands out.
+const [STRONG, MUTED] = [[0.66, 0.12], [0.84, 0.045]];
+const DARKER = 0.13; // Lightness between a part and the one that has its hue again.
+const REST = [140, 146, 152]; // Of the fragments that have no row of their own, number -1.
+
 // Of the viridis scale (van der Walt and Smith 2015, CC0), at equal distances, without its darkest part.
 const SCALE = ["#355f8d", "#2a788e", "#21918c", "#22a884", "#44bf70", "#7ad151", "#bddf26", "#fde725"];
 
 const bytes = (hex) => [1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16));
 
-// Of the number of a rank or a part.
-export const named = (number) => NAMED[number % NAMED.length];
 export const SCALE_CSS = `linear-gradient(90deg, ${SCALE.join(", ")})`;
 
 // 256 colours as RGBA bytes: of numbers from 0 on, or of a scale.
 export function map(scale) {
   const out = new Uint8Array(4 * 256);
-  for (let i = 0; i < 256; i += 1) out.set([...(scale ? between(i / 255) : bytes(named(i))), 255], 4 * i);
+  for (let i = 0; i < 256; i += 1) out.set([...(scale ? between(i / 255) : ofName(i)), 255], 4 * i);
   return out;
 }
 
@@ -23,17 +30,31 @@ function between(share) {
   return a.map((low, i) => Math.round(low + (b[i] - low) * (at % 1)));
 }
 
-// Of what was there at the start: muted, so that what has broken off stands out.
-const BODIES = ["#c9d3dc", "#d9cbb3", "#b7c9bd", "#c9bddb", "#dcc0c0", "#bcd2d8"];
+// [r, g, b] of a rank or a part by its number from 0 on, and the same for a style.
+export const ofName = (number) => rgb(STRONG[0] - DARKER * (Math.floor(number / HUES.length) % 3), STRONG[1], HUES[number % HUES.length]);
+export const named = (number) => `#${ofName(number).map((byte) => byte.toString(16).padStart(2, "0")).join("")}`;
 
-// The colour of a fragment, by its number alone: scales.py has the same. The first `bodies` numbers are those of the start.
-export function ofFragment(id, bodies) {
-  if (id < 0n) return [140, 146, 152];
-  if (id < BigInt(bodies)) return bytes(BODIES[Number(id) % BODIES.length]);
-  const turn = Number((BigInt.asUintN(64, (id + 1n) * 0x9e3779b97f4a7c15n)) >> 40n) / 2 ** 24;
-  const light = 0.55 + 0.14 * (Number((id * 2654435761n) & 255n) / 255 - 0.5);
-  return [0, 8, 4].map((n) => {
-    const k = (n + turn * 12) % 12;
-    return Math.floor(255 * (light - 0.2 * Math.max(-1, Math.min(k - 3, 9 - k, 1))) + 0.5);
+// [r, g, b] of the fragment `id` (BigInt) where it belongs to `part`. The first `bodies` numbers are of what was there at the start.
+export function ofFragment(id, part, bodies) {
+  if (id < 0n) return REST;
+  const hue = HUES[part % HUES.length];
+  if (id < BigInt(bodies)) return rgb(...MUTED, hue);
+  const [first, second, third] = STEPS.map((step) => Number(BigInt.asUintN(64, (id + 1n) * step) >> 40n) / 2 ** 24);
+  return rgb(0.5 + 0.28 * first, 0.06 + 0.085 * second, hue + 44 * (third - 0.5));
+}
+
+// sRGB of a colour in OKLCH (Ottosson 2020), the hue in degrees.
+function rgb(light, chroma, hue) {
+  const [a, b] = [chroma * Math.cos(hue * (Math.PI / 180)), chroma * Math.sin(hue * (Math.PI / 180))];
+  const long = (light + 0.3963377774 * a + 0.2158037573 * b) ** 3;
+  const medium = (light - 0.1055613458 * a - 0.0638541728 * b) ** 3;
+  const short = (light - 0.0894841775 * a - 1.291485548 * b) ** 3;
+  return [
+    4.0767416621 * long - 3.3077115913 * medium + 0.2309699292 * short,
+    -1.2684380046 * long + 2.6097574011 * medium - 0.3413193965 * short,
+    -0.0041960863 * long - 0.7034186147 * medium + 1.707614701 * short,
+  ].map((linear) => {
+    const share = Math.min(1, Math.max(0, linear));
+    return Math.floor(255 * (share <= 0.0031308 ? 12.92 * share : 1.055 * share ** (1 / 2.4) - 0.055) + 0.5);
   });
 }

@@ -73,13 +73,15 @@ export class View3d {
     if (!this.aimed) this.aim();
   }
 
-  rows({ fragment_centre: centres, fragment_id: ids }, bodies) {
+  rows({ fragment_centre: centres, fragment_id: ids, triangles, triangle_part: parts, vertex_fragment: of }, bodies) {
+    const part = new Uint8Array(ids.length);
+    for (let i = parts.length - 1; i >= 0; i -= 1) part[of[triangles[3 * i]]] = parts[i];
     const height = Math.max(1, Math.ceil(ids.length / ROWS_WIDTH));
     const places = new Float32Array(4 * ROWS_WIDTH * height);
     const tints = new Uint8Array(4 * ROWS_WIDTH * height);
     for (let row = 0; row < ids.length; row += 1) {
       places.set(centres.subarray(3 * row, 3 * row + 3), 4 * row);
-      tints.set([...ofFragment(ids[row], bodies), 255], 4 * row);
+      tints.set([...ofFragment(ids[row], part[row], bodies), 255], 4 * row);
     }
     this.replace("centres", this.texture(places, ROWS_WIDTH, height));
     this.replace("tints", this.texture(tints, ROWS_WIDTH, height));

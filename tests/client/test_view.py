@@ -13,7 +13,7 @@ import pytest
 from matplotlib.image import imread
 from PIL import Image
 
-from conoid.client import camera, pictures, scales
+from conoid.client import camera, hues, pictures
 from conoid.client.errors import LookError, UnfinishedError, ViewError
 from conoid.client.frame import require_whole
 from conoid.client.pictures import FIELDS, Look, Mirror, Picture, Scene, direction, explain, mirrors, reason
@@ -276,11 +276,14 @@ def test_panels_are_laid_so_that_bodies_are_large() -> None:
     assert camera.panels(4, (1.0, 1.0), (1000.0, 1000.0)) == 2
 
 
-def test_a_fragment_keeps_its_colour_from_frame_to_frame() -> None:
-    early = scales.fragment_colours([0, 0, 0, 7, 9], 2)
-    late = scales.fragment_colours([9, 1, 9, 9, 11], 2)
+def test_a_fragment_keeps_its_colour_and_a_part_its_hue() -> None:
+    early = hues.of_fragments([0, 0, 0, 7, 9], [0, 0, 0, 0, 1], 2)
+    late = hues.of_fragments([9, 1, 9, 9, 11], [1, 1, 1, 1, 1], 2)
     assert (early[4] == late[0]).all()
-    assert [tuple(early[0]), tuple(late[1])] == [scales.rgb(body) for body in scales.BODIES[:2]]
+    assert len(np.unique(late, axis=0)) == 3
+    pieces = hues.of_fragments(range(2, 2000), [1] * 1998, 2).astype(int)
+    assert len(np.unique(pieces, axis=0)) > 1950
+    assert (pieces[:, 0] > pieces[:, 2]).all(), "pieces of the second part are between red and yellow"
 
 
 def test_cameras_are_read() -> None:

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from conoid.cases import fragments
-from conoid.client import scales
+from conoid.client import hues
 from conoid.client.snapshots import Snapshot
 from conoid.worker.snapshots import blob
 
@@ -46,10 +46,13 @@ def ask(tmp_path_factory: pytest.TempPathFactory) -> Ask:
     return asked
 
 
-def test_fragments_have_the_colours_of_pictures(ask: Ask) -> None:
-    numbers = [0, 1, 2, 3, 7, 8, 9, 100, 12_690, 10**6, *np.random.default_rng(3).integers(0, 2**40, 50).tolist()]
-    script = "data.map((id) => page.ofFragment(BigInt(id), 3))"
-    assert ask("colours.js", script, numbers) == scales.fragment_colours(numbers, 3).tolist()
+def test_parts_and_fragments_have_the_colours_of_pictures(ask: Ask) -> None:
+    random = np.random.default_rng(3)
+    numbers = [-1, 0, 1, 2, 3, 7, 8, 9, 100, 12_690, 10**6, *random.integers(0, 2**40, 500).tolist()]
+    parts = random.integers(0, 30, len(numbers)).tolist()
+    script = "data[0].map((id, i) => page.ofFragment(BigInt(id), data[1][i], 3))"
+    assert ask("colours.js", script, [numbers, parts]) == hues.of_fragments(numbers, parts, 3).tolist()
+    assert ask("colours.js", "data.map(page.ofName)", parts) == hues.of_names(parts).tolist()
 
 
 @pytest.fixture(scope="module")

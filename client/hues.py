@@ -1,0 +1,71 @@
+"""Colours for names: a hue for each part, and variations of it for the fragments of the part; numpy only.
+
+web/colours.js has the same function: page, report and pictures show the same fragment in the same colour.
+"""
+
+from typing import Any, TypeAlias
+
+import numpy as np
+
+Array: TypeAlias = "np.ndarray[Any, np.dtype[np.float64]]"
+Bytes: TypeAlias = "np.ndarray[Any, np.dtype[np.uint8]]"
+
+HUES = np.array([252.0, 70.0, 165.0, 15.0, 305.0, 120.0, 205.0, 345.0])
+"""Degrees in OKLCH of the first parts. Chosen: the first two are kept apart by the colour blind."""
+_STEPS = tuple(np.uint64(step) for step in (0xD1B54A32D192ED03, 0xABC98388FB8FAC03, 0x8CB92BA72F3D8DD7))
+"""2^64 over the powers of 1.2207, the root of g^4 = g + 1: their multiples fill a cube evenly (Roberts 2018, R3)."""
+_STRONG, _MUTED = (0.66, 0.12), (0.84, 0.045)
+"""Lightness and chroma of a part by name, and of what is whole: muted, so that what has broken off stands out."""
+_DARKER = 0.13
+"""Lightness between a part and the one that has its hue again."""
+REST = (140, 146, 152)
+"""Of the fragments that have no row of their own, number -1."""
+
+
+def of_names(numbers: Any) -> Bytes:
+    """(n, 3) the colours of parts or ranks by their numbers from 0 on."""
+    found = np.asarray(numbers).astype(int).reshape(-1)
+    light = _STRONG[0] - _DARKER * (found // len(HUES) % 3)
+    return rgb(light, np.full(len(found), _STRONG[1]), HUES[found % len(HUES)])
+
+
+def of_fragments(numbers: Any, parts: Any, bodies: int) -> Bytes:
+    """(n, 3) the colours of fragments with these ``numbers`` where they belong to these ``parts``, both (n,).
+
+    The first ``bodies`` numbers are of what was there at the start.
+    """
+    pairs = np.stack([np.asarray(numbers).astype(np.int64).reshape(-1), np.asarray(parts).astype(np.int64).reshape(-1)])
+    (number, part), which = np.unique(pairs, axis=1, return_inverse=True)
+    first, second, third = ((number.astype(np.uint64) + np.uint64(1)) * step >> np.uint64(40) for step in _STEPS)
+    whole = number < bodies
+    light = np.where(whole, _MUTED[0], 0.50 + 0.28 * _share(first))
+    chroma = np.where(whole, _MUTED[1], 0.06 + 0.085 * _share(second))
+    colours = rgb(light, chroma, HUES[part % len(HUES)] + np.where(whole, 0.0, 44.0 * (_share(third) - 0.5)))
+    colours[number < 0] = REST
+    return colours[which.reshape(-1)]
+
+
+def _share(bits: Any) -> Array:
+    """24 bits as a number from 0 to 1."""
+    return np.asarray(bits.astype(np.float64) / 2.0**24)
+
+
+def rgb(light: Any, chroma: Any, hue: Any) -> Bytes:
+    """(n, 3) sRGB of colours in OKLCH (Ottosson 2020), each (n,); the hue in degrees."""
+    angle = np.asarray(hue) * (np.pi / 180.0)
+    a, b = chroma * np.cos(angle), chroma * np.sin(angle)
+    long = (light + 0.3963377774 * a + 0.2158037573 * b) ** 3
+    medium = (light - 0.1055613458 * a - 0.0638541728 * b) ** 3
+    short = (light - 0.0894841775 * a - 1.2914855480 * b) ** 3
+    linear = np.stack([
+        4.0767416621 * long - 3.3077115913 * medium + 0.2309699292 * short,
+        -1.2684380046 * long + 2.6097574011 * medium - 0.3413193965 * short,
+        -0.0041960863 * long - 0.7034186147 * medium + 1.7076147010 * short,
+    ], axis=-1).clip(0.0, 1.0)  # fmt: skip
+    curved = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1.0 / 2.4) - 0.055)
+    return np.floor(255.0 * curved + 0.5).astype(np.uint8)
+
+
+def css(colour: Any) -> str:
+    """Three bytes as ``#4c78a8``."""
+    return "#" + "".join(f"{int(byte):02x}" for byte in colour)
