@@ -1,17 +1,16 @@
-// Which page is shown: sign in, the list of runs, one run, or two of them.
+// Which page is shown, and the form to sign in.
 
-import { Problem, call, refused, token } from "./api.js";
-import { duration, h, meter, moment, pill } from "./figures.js";
+import { Problem, call, token } from "./api.js";
+import { h } from "./figures.js";
 import { offer } from "./libraries.js";
-import { FINAL } from "./live.js";
 import { PairPage } from "./pair.js";
-import { named } from "./place.js";
+import { place } from "./place.js";
 import { RunPage } from "./run.js";
+import { RunsPage } from "./runs.js";
 
 const page = document.getElementById("page");
 const who = document.getElementById("who");
 const leave = document.getElementById("leave");
-const MOST_ASKED = 8; // A list tells no progress; this many running ones are asked for theirs.
 let shown = null;
 
 function show(next) {
@@ -41,84 +40,17 @@ function signIn(told = "") {
   field.focus();
 }
 
-// The list -------------------------------------------------------------------------------------------------------------
-
-class RunsPage {
-  constructor() {
-    this.body = h("tbody");
-    this.note = h("p.hint", { hidden: "" });
-    const head = h("thead", {}, h("tr", {}, ["run", "state", "progress", "ranks", "submitted", "compare"].map((name) => h("th", { scope: "col" }, name))));
-    this.marked = []; // Ids of runs to be compared, the last two.
-    this.compare = h("button.quiet", { type: "button", disabled: "", onclick: () => { location.hash = `#/compare/${this.marked.map(encodeURIComponent).join("/")}`; } }, "Compare two");
-    this.table = h("table.runs", {}, head, this.body);
-    this.element = h("div", {}, h("div.card-head", {}, h("h1", {}, "Runs"), h("span.note", {}, this.compare)), h("div.card", {}, this.table, this.note));
-    document.title = "Conoid";
-    this.read();
-    this.timer = setInterval(() => document.hidden || this.read(), 3000);
-  }
-
-  close() {
-    clearInterval(this.timer);
-    this.closed = true;
-  }
-
-  async read() {
-    try {
-      const { runs, next } = await call("v1/runs?limit=100");
-      await Promise.all(runs.filter((run) => run.state === "running").slice(0, MOST_ASKED).map(async (run) => {
-        Object.assign(run, await call(`v1/runs/${encodeURIComponent(run.id)}`));
-      }));
-      if (!this.closed) this.draw(runs, next);
-    } catch (error) {
-      if (this.closed) return;
-      if (error instanceof Problem && error.status === 401) signIn("The server does not accept this token any more.");
-      else this.say(h("span.problem", {}, refused(error) ? error.message : `No answer from the server: ${error.message}`));
-    }
-  }
-
-  say(...children) {
-    this.note.hidden = !children.length;
-    this.note.replaceChildren(...children);
-  }
-
-  mark(id) {
-    this.marked = this.marked.includes(id) ? this.marked.filter((one) => one !== id) : [...this.marked, id].slice(-2);
-    this.compare.disabled = this.marked.length !== 2;
-    for (const box of this.body.querySelectorAll("[data-marks]")) box.checked = this.marked.includes(box.dataset.marks);
-  }
-
-  draw(runs, next) {
-    const focused = document.activeElement?.dataset?.marks;
-    this.body.replaceChildren(...runs.map((run) => row(run, this.marked.includes(run.id), () => this.mark(run.id))));
-    if (focused) this.body.querySelector(`[data-marks="${CSS.escape(focused)}"]`)?.focus();
-    this.table.hidden = !runs.length;
-    if (next) this.say(`The newest ${runs.length} are shown; `, h("code", {}, "conoid ls --limit 1000"), " lists more.");
-    else if (runs.length) this.say();
-    else this.say("No runs yet. Submit one: ", h("code", {}, "conoid submit taylor_copper"));
-  }
-}
-
-function row(run, marked, mark) {
-  const link = `#/runs/${encodeURIComponent(run.id)}`;
-  const open = () => { location.hash = link; };
-  const share = run.state === "succeeded" ? 1 : run.progress ? run.progress.t / run.progress.end_time : 0;
-  const took = FINAL.has(run.state) && run.started ? ` · ${duration(run.finished - run.started)}` : "";
-  const box = h("input", { type: "checkbox", "data-marks": run.id, "aria-label": `compare ${run.name} ${run.id}`, checked: marked && "", onchange: mark });
-  return h("tr", { onclick: open },
-    h("td", {}, h("a.name", { href: link }, run.name), h("span.id", {}, run.id)),
-    h("td", { title: run.message || run.reason }, pill(run.state)),
-    h("td.bar", { style: { minWidth: "120px" } }, meter(run.state, share)),
-    h("td.ranks-of", {}, run.threads > 1 ? `${run.ranks}x${run.threads}` : String(run.ranks)),
-    h("td.right.when", {}, moment(run.submitted) + took),
-    h("td.mark", { onclick: (event) => event.stopPropagation() }, box));
-}
-
 // Where we are ---------------------------------------------------------------------------------------------------------
 
+const PAGES = {
+  runs: () => new RunsPage(() => signIn("The server does not accept this token any more.")),
+  run: ([run]) => new RunPage(run),
+  compare: (runs) => new PairPage(runs),
+};
+
 function route() {
-  const runs = named(location.hash);
-  if (runs.length === 2) show(new PairPage(runs));
-  else show(runs.length ? new RunPage(runs[0]) : new RunsPage());
+  const { page: name, names } = place(location.hash);
+  show((PAGES[name] ?? PAGES.runs)(names));
 }
 
 // A server with tokens is not asked before there is one.

@@ -1,4 +1,5 @@
-// The runs that an address names: none for the list, one, or two to be compared.
+// What an address shows: `#/` the runs, `#/runs/ID` one, `#/compare/ID/ID/…` several, `#/sweeps/NAME` a sweep, `#/new` a
+// new run; behind a `?` there may be more.
 
 // What stands in an address as text; null for what cannot be read.
 function decoded(word) {
@@ -9,8 +10,17 @@ function decoded(word) {
   }
 }
 
-export function named(hash) {
-  const found = /^#\/runs\/([^/]+)$/.exec(hash) ?? /^#\/compare\/([^/]+)\/([^/]+)$/.exec(hash);
-  const runs = (found?.slice(1) ?? []).map(decoded);
-  return runs.includes(null) ? [] : runs;
+// How many names each page has, at least and at most.
+const NAMES = { runs: [0, 1], compare: [2, Infinity], sweeps: [1, 1], new: [0, 0] };
+
+// { page, names, query }: "runs", "run", "compare", "sweep" or "new", and which; an address that cannot be read is that
+// of the runs.
+export function place(hash) {
+  const [path, search = ""] = hash.replace(/^#\/?/, "").split("?", 2);
+  const [page, ...words] = path.split("/").filter((word) => word !== "");
+  const names = words.map(decoded);
+  const [least, most] = Object.hasOwn(NAMES, page) ? NAMES[page] : [0, -1];
+  const known = names.length >= least && names.length <= most && !names.includes(null);
+  const shown = known ? { runs: names.length ? "run" : "runs", sweeps: "sweep" }[page] ?? page : "runs";
+  return { page: shown, names: known ? names : [], query: new URLSearchParams(search) };
 }

@@ -216,7 +216,12 @@ def test_a_distribution_in_bins_is_summed_from_the_largest(ask: Ask) -> None:
 
 def test_an_address_that_cannot_be_read_is_the_list(ask: Ask) -> None:
     found = {
-        "": [], "#/": [], "#/runs/abc": ["abc"], "#/runs/a%20b": ["a b"], "#/compare/a/b": ["a", "b"],
-        "#/runs/%E0": [], "#/runs/%": [], "#/runs/%zz": [], "#/compare/a/%E0%A4%A": [], "#/runs/a/b": [],
+        "": ["runs"], "#/": ["runs"], "#/runs": ["runs"], "#/runs/abc": ["run", "abc"], "#/runs/a%20b": ["run", "a b"],
+        "#/compare/a/b": ["compare", "a", "b"], "#/compare/a/b/c/d": ["compare", "a", "b", "c", "d"],
+        "#/sweeps/s": ["sweep", "s"], "#/new": ["new"], "#/new?from=abc": ["new"], "#/compare/a": ["runs"],
+        "#/runs/%E0": ["runs"], "#/runs/%": ["runs"], "#/runs/%zz": ["runs"], "#/compare/a/%E0%A4%A": ["runs"],
+        "#/runs/a/b": ["runs"], "#/toString/a": ["runs"], "#/constructor": ["runs"],
     }  # fmt: skip
-    assert ask("place.js", "data.map(page.named)", list(found)) == list(found.values())
+    script = "data.map((hash) => { const { page: shown, names } = page.place(hash); return [shown, ...names]; })"
+    assert ask("place.js", script, list(found)) == list(found.values())
+    assert ask("place.js", "page.place('#/new?from=a%20b').query.get('from')") == "a b"
