@@ -8,7 +8,8 @@ const MOST_RANKS = 24;
 
 export class Ranks {
   constructor() {
-    this.element = h("section.card.half");
+    this.element = h("div");
+    this.note = h("span.note");
   }
 
   draw({ load }) {
@@ -21,8 +22,8 @@ export class Ranks {
       return [h("span.who", {}, `rank ${rank}`), h("div.stack", {}, pieces), h("span.busy", {}, `${percent(share(rank), 0)} busy${rank in helped ? `, its threads ${percent(helped[rank], 0)}` : ""}`)];
     });
     const more = totals.length - MOST_RANKS;
+    this.note.textContent = more > 0 ? `${totals.length} ranks, the first ${MOST_RANKS} shown` : "";
     this.element.replaceChildren(
-      h("div.card-head", {}, h("h2", {}, "Load of each rank"), more > 0 ? h("span.note", {}, `${totals.length} ranks, the first ${MOST_RANKS} shown`) : ""),
       totals.length ? h("div.ranks", {}, rows) : h("p.hint", {}, "waiting for the first numbers"),
       totals.length ? legend(GROUPS.filter((name) => groups[name]).map((name) => [name === "waiting" ? "waiting for other ranks" : name, name])) : "");
   }
@@ -30,29 +31,31 @@ export class Ranks {
 
 // One balance event at a time: why, what each rank had and what it should have now, what it cost and what cuts have saved.
 export class Balances {
-  constructor(live) {
-    this.live = live;
-    this.place = null;
-    this.element = h("section.card.half", { hidden: "", "aria-label": "balance events", tabindex: -1 });
+  // `onOpen` brings the card of the events before the reader.
+  constructor(live, onOpen) {
+    Object.assign(this, { live, onOpen, place: null });
+    this.element = h("div");
+    this.title = h("span", {}, "Balance events");
+    this.beside = h("span.note");
   }
 
   open(place) {
     this.place = place;
     this.draw();
-    this.element.focus();
+    this.onOpen();
   }
 
   draw() {
     const { balances } = this.live;
-    this.element.hidden = !balances.length;
     const place = Math.min(balances.length - 1, this.place ?? balances.length - 1);
     if (!balances.length || this.drawn === `${place}/${balances.length}`) return;
     this.drawn = `${place}/${balances.length}`;
     const event = balances[place];
     const step = (words_, to) => h("button.quiet", { type: "button", disabled: to < 0 || to >= balances.length ? "" : false, onclick: () => this.open(to) }, words_);
     const entry = (name, value) => h("div", {}, h("dt", {}, name), h("dd", {}, value));
+    this.title.textContent = `Balance ${place + 1} of ${balances.length}`;
+    this.beside.replaceChildren(step("Earlier", place - 1), " ", step("Later", place + 1));
     this.element.replaceChildren(
-      h("div.card-head", {}, h("h2", {}, `Balance ${place + 1} of ${balances.length}`), h("span.note", {}, step("Earlier", place - 1), " ", step("Later", place + 1))),
       h("p.told", {}, event.cause),
       h("dl.facts", {}, entry("time", si(event.t, "s")), entry("tets moved", count(event.tets)), entry("nodes moved", count(event.nodes)),
         entry("cost", si(event.cost, "s")), entry("saved before", si(event.saved, "s"))),
@@ -77,7 +80,7 @@ export class Logs {
     Object.assign(this, { live, tab: "messages", ranks: 0, logged: "" });
     this.tabs = h("div.tabs", { role: "tablist", "aria-label": "log of", onkeydown: (event) => this.key(event) });
     this.lines = h("pre.log", { id: "log-lines", tabindex: 0, role: "tabpanel", "aria-label": "log" });
-    this.element = h("section.card.half", {}, h("div.card-head", {}, h("h2", {}, "Log"), this.tabs), this.lines);
+    this.element = h("section.card.logs", {}, h("div.card-head", {}, h("h2", {}, "Log"), this.tabs), this.lines);
   }
 
   get names() { return ["messages", ...Array.from({ length: this.ranks }, (_, rank) => String(rank)), "launcher"]; }
@@ -127,11 +130,11 @@ const COLUMNS = ["quantity", "computed", "expected", "tolerance", "result", "sou
 const cell = (what, column, text) => h(what, { role: "cell", "data-name": COLUMNS[column] }, text);
 
 export function checksTable(checks) {
-  return [h("div.card-head", {}, h("h2", {}, "Against the reference")), h("div.scroll", { tabindex: 0 }, h("table.checks.stacked", { role: "table" },
+  return h("div.scroll", { tabindex: 0 }, h("table.checks.stacked", { role: "table" },
     h("thead", { role: "rowgroup" }, h("tr", { role: "row" }, COLUMNS.map((name) => h("th", { scope: "col", role: "columnheader" }, name)))),
     h("tbody", { role: "rowgroup" }, checks.map((check) => h("tr", { role: "row" },
       cell("td", 0, check.name),
       exacts([check.value, check.expected, check.tolerance], check.unit).map((text, i) => cell("td.number", 1 + i, i < 2 ? text : `± ${text}`)),
       cell(`td.${check.pass ? "good" : "bad"}`, 4, check.pass ? "agrees" : "differs"),
-      cell("td.hint", 5, check.source ?? ""))))))];
+      cell("td.hint", 5, check.source ?? ""))))));
 }

@@ -2,19 +2,21 @@
 
 import { call, messages, refused } from "./api.js";
 import { Body } from "./body.js";
-import { alike, count, counted, duration, fixed, h, large, meter, percent, pill, rough, si } from "./figures.js";
+import { Cards } from "./cards.js";
+import { counted, fixed, h, percent, si } from "./figures.js";
+import { Headline } from "./headline.js";
 import { fill, readPlan } from "./history.js";
 import { FINAL, Live } from "./live.js";
+import { Numbers, residual } from "./numbers.js";
 import { Balances, Logs, Ranks, checksTable } from "./panels.js";
-import { card, plots } from "./plots.js";
+import { plots } from "./plots.js";
 
 const CHARTS_EVERY = 500; // ms; the head and the bars are drawn with every message.
-const OLD = 5; // s without a message or the server after which the age of the numbers is shown.
 const pause = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 
 export class RunPage {
   constructor(run) {
-    Object.assign(this, { live: new Live(run), info: {}, outcome: null, abort: new AbortController(), connection: ["waiting", "connecting"], due: false, plotted: 0 });
+    Object.assign(this, { live: new Live(run), info: {}, outcome: null, abort: new AbortController(), connection: ["waiting", "connecting"], due: false, plotted: 0, busy: new Set() });
     this.path = `v1/runs/${encodeURIComponent(run)}`;
     this.build();
     this.timer = setInterval(() => this.later(), 1000);
@@ -25,33 +27,47 @@ export class RunPage {
     this.abort.abort();
     clearInterval(this.timer);
     this.body.close();
-    for (const [chart] of Object.values(this.charts).filter(Array.isArray)) chart.close();
+    for (const [, [chart]] of this.drawn) chart.close();
   }
 
   build() {
     const { live } = this;
-    this.head = h("div.card");
-    this.checks = h("div.card.wide", { hidden: "" });
+    this.head = new Headline((verb) => this.ask(verb));
+    this.numbers = new Numbers();
     this.notes = { energy: h("span.note"), residual: h("span.note"), imbalance: h("span.note"), counts: h("span.note") };
-    this.ranks = new Ranks();
-    this.balances = new Balances(live);
     this.logs = new Logs(live);
     this.charts = plots(live, (place) => this.balances.open(place));
     this.body = new Body(live.run, (snapshot) => {
       this.charts.snapshot = snapshot;
       this.charts.sizes[0].draw(true);
     });
-    const plot = (name) => {
-      const [chart, title, beside] = this.charts[name];
-      return card(title, h("span.beside", {}, beside, this.notes[name]), chart.element);
-    };
-    this.buttons = ["checkpoint", "snapshot", "cancel"].map((verb) =>
-      h(verb === "cancel" ? "button.stop" : "button.quiet", { type: "button", onclick: ({ currentTarget }) => this.ask(verb, currentTarget) }, verb[0].toUpperCase() + verb.slice(1)));
-    this.element = h("div", {}, this.head, h("div.cards", {}, this.body.element, this.checks,
-      this.ranks.element, plot("imbalance"), this.balances.element, plot("counts"), plot("sizes"), plot("energy"), plot("residual"),
-      plot("heat"), plot("dt"), plot("contact"), this.logs.element));
+    this.empty = h("section.card.empty-stage", { "aria-label": "the body" });
+    this.fillCards();
+    this.element = h("div.work", {}, this.head.element,
+      h("div.bench", {}, h("div.stage", {}, this.body.element, this.empty),
+        h("aside.now", { "aria-label": "now" }, this.numbers.element, this.cards.beside, this.logs.element)),
+      this.cards.grid, this.cards.shelf);
     this.draw();
   }
+
+  // The cards in their order: reference numbers, every chart that there is, ranks and cuts.
+  fillCards() {
+    this.cards = new Cards("energy");
+    this.checks = h("div");
+    this.ranks = new Ranks();
+    this.balances = new Balances(this.live, () => this.cards.open("balances"));
+    const add = (name, title, beside, content) => this.cards.add(name, title, beside, content);
+    add("checks", "Against the reference", "", this.checks);
+    for (const [name, [chart, title, beside]] of this.drawn) add(name, title, h("span.beside", {}, beside, this.notes[name]), chart.element);
+    add("ranks", "Load of each rank", this.ranks.note, this.ranks.element);
+    add("balances", this.balances.title, this.balances.beside, this.balances.element).setAttribute("aria-label", "balance events");
+    this.cards.show("checks", false);
+    this.cards.show("balances", false);
+    this.cards.place();
+  }
+
+  // [name, [chart, …]] of all charts.
+  get drawn() { return Object.entries(this.charts).filter(([, made]) => Array.isArray(made)); }
 
   // Messages -----------------------------------------------------------------------------------------------------
 
@@ -105,9 +121,10 @@ export class RunPage {
     this.outcome = this.info.outcome ?? null;
   }
 
-  async ask(verb, button) {
+  async ask(verb) {
     if (verb === "cancel" && !confirm("Cancel this run?")) return;
-    button.disabled = true;
+    this.busy.add(verb);
+    this.later();
     try {
       await call(`${this.path}:${verb}`, { method: "POST" });
       this.cancelling ||= verb === "cancel";
@@ -115,7 +132,7 @@ export class RunPage {
     } catch (error) {
       this.notice = error.message;
     }
-    button.disabled = this.cancelling;
+    if (!this.cancelling) this.busy.delete(verb);
     this.later();
   }
 
@@ -146,10 +163,13 @@ export class RunPage {
   draw() {
     const { live } = this;
     this.drawHead();
+    this.numbers.draw(live, this.info);
     this.ranks.draw(live);
     this.balances.draw();
+    this.cards.show("balances", live.balances.length > 0);
     this.logs.draw(this.info.ranks ?? 0);
     this.body.update(live.snapshots);
+    this.drawStage();
     this.drawChecks();
     this.drawNotes();
     if (performance.now() - this.plotted > CHARTS_EVERY && live.seq !== this.charted) {
@@ -161,7 +181,7 @@ export class RunPage {
 
   // After the frame that has the news in the head and the bars.
   drawCharts() {
-    if (!this.abort.signal.aborted) for (const [chart] of Object.values(this.charts).filter(Array.isArray)) chart.draw(FINAL.has(this.live.state));
+    if (!this.abort.signal.aborted) for (const [, [chart]] of this.drawn) chart.draw(FINAL.has(this.live.state));
   }
 
   drawNotes() {
@@ -175,59 +195,24 @@ export class RunPage {
   }
 
   drawHead() {
-    const { live, info } = this;
+    const { live, connection, notice, busy } = this;
     const state = this.cancelling && !FINAL.has(live.state) ? "stopping" : live.state;
-    const waits = live.state === "queued" ? info.reason : "";
-    const told = [live.cause, live.message, waits, this.notice].filter((text) => text && text !== live.state).join(" · ");
-    const old = !FINAL.has(live.state) && live.age > OLD ? `numbers ${duration(live.age)} old` : "";
-    const [checkpoint, snapshot, cancel] = this.buttons;
-    const shown = FINAL.has(state) ? [] : state === "running" ? [checkpoint, snapshot, cancel] : [cancel];
-    this.head.replaceChildren(
-      h("div.run-head", {},
-        h("div.titles", {}, h("h1", {}, info.title || info.name || live.run), h("div.sub", {}, live.run)),
-        h("div.side", {}, h(`span.link.${this.connection[0] || "over"}`, { role: "status" }, [this.connection[1], old].filter(Boolean).join(", ")), pill(state), shown)),
-      h("div.progress", {}, meter(state, live.fraction), h("b", {}, percent(live.fraction))),
-      told ? h("p.told", {}, told) : "",
-      this.facts());
-  }
-
-  facts() {
-    const { live } = this;
-    const { progress, counts, started, load } = live;
-    const entry = (name, value, note, broad) =>
-      h(broad ? "div.broad" : "div", {}, h("dt", {}, name), h("dd", {}, value, note ? h("small", {}, ` ${note}`) : null));
-    return h("dl.facts", {},
-      entry("time", ...(progress ? timed(live.fraction * progress.end_time, progress.end_time) : ["–"])),
-      entry("time left", FINAL.has(live.state) ? "–" : duration(progress?.eta)),
-      entry("elapsed", duration(live.elapsed)),
-      entry("step", count(progress?.step)),
-      entry("dt", si(progress?.dt || live.ledger.findLast(({ dt }) => dt > 0)?.dt, "s")),
-      entry("dt held by", progress?.limiter || "–", "", true),
-      entry("imbalance", load ? fixed(load.imbalance) : "–"),
-      entry("residual", progress ? residual(progress.energy.residual) : "–"),
-      entry("updates a second", large(progress?.updates_per_second)),
-      entry("elements", count(counts?.elements ?? started?.elements)),
-      entry("nodes", count(counts?.nodes ?? started?.nodes)),
-      entry("shared nodes", count(counts?.shared)),
-      entry("fragments", count(counts?.fragments)),
-      counts?.particles ? entry("particles", count(counts.particles)) : "");
+    this.head.draw(live, this.info, { connection, state, notice, busy });
   }
 
   drawChecks() {
     const checks = this.outcome?.reference ?? [];
     if (!checks.length || this.checks.childElementCount) return;
-    this.checks.hidden = false;
-    this.checks.append(...checksTable(checks));
+    this.checks.append(checksTable(checks));
+    this.cards.show("checks", true);
   }
-}
 
-// The time so far and "of …" the end, in one unit.
-function timed(now, end) {
-  const [first, last] = alike([now, end], "s");
-  return [first, `of ${last}`];
-}
-
-function residual(value) {
-  const tone = value < 1e-3 ? "good" : value < 1e-2 ? "warn" : "bad";
-  return h(`span.${tone}`, {}, rough(value));
+  // Until there is a snapshot the place of the body says why.
+  drawStage() {
+    const { state, snapshots } = this.live;
+    this.empty.hidden = snapshots.length > 0;
+    if (this.empty.hidden) return;
+    const told = FINAL.has(state) ? "This run has left no snapshot." : "The body is shown here with the first snapshot.";
+    this.empty.replaceChildren(h("p.hint", {}, told));
+  }
 }

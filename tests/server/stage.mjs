@@ -9,6 +9,8 @@ import { pathToFileURL } from "node:url";
 class Element {
   constructor(tag) { Object.assign(this, { tag, children: [], style: {}, dataset: {}, options: [], classList: { add() {} }, hidden: false }); }
   append(...children) { this.children.push(...children); }
+  insertBefore(child, next) { this.children.splice(next ? this.children.indexOf(next) : this.children.length, 0, child); }
+  remove() {}
   replaceChildren(...children) { this.children = children; }
   setAttribute(name, value) { this[name] = value; }
   set textContent(value) { this.children = [value]; }

@@ -1,0 +1,47 @@
+// The head of a run: its title, its state, whether its messages arrive, what can be asked of it, how far it is.
+
+import { duration, h, meter, percent, pill } from "./figures.js";
+import { FINAL } from "./live.js";
+
+const OLD = 5; // s without a message or the server after which the age of the numbers is shown.
+
+export class Headline {
+  // `ask(verb)` asks the server for a checkpoint or a snapshot, or cancels.
+  constructor(ask) {
+    this.title = h("h1");
+    this.sub = h("div.sub");
+    this.link = h("span.link", { role: "status" });
+    this.state = h("span");
+    this.told = h("p.told", { hidden: "" });
+    this.progress = h("div.progress");
+    this.buttons = ["checkpoint", "snapshot", "cancel"].map((verb) =>
+      h(verb === "cancel" ? "button.stop" : "button.quiet", { type: "button", "data-verb": verb, onclick: () => ask(verb) }, verb[0].toUpperCase() + verb.slice(1)));
+    this.element = h("header.head", {},
+      h("div.run-head", {}, h("div.titles", {}, this.title, this.sub), h("div.side", {}, this.link, this.state, this.buttons)),
+      this.progress, this.told);
+  }
+
+  // `connection` is [kind, words]; `busy` has the verbs that are asked for just now.
+  draw(live, info, { connection: [kind, words], state, notice, busy }) {
+    const over = FINAL.has(state);
+    const old = !over && live.age > OLD ? `numbers ${duration(live.age)} old` : "";
+    say(this.title, info.title || info.name || live.run);
+    say(this.sub, [info.name !== info.title && info.name, live.run].filter(Boolean).join(" · "));
+    say(this.link, [words, old].filter(Boolean).join(", "));
+    this.link.className = `link ${kind || "over"}`;
+    if (this.shown !== state) this.state.replaceChildren(pill(this.shown = state));
+    this.progress.replaceChildren(meter(state, live.fraction), h("b", {}, percent(live.fraction)));
+    const told = [live.cause, live.message, live.state === "queued" && info.reason, notice].filter((text) => text && text !== live.state).join(" · ");
+    say(this.told, told);
+    this.told.hidden = !told;
+    for (const button of this.buttons) {
+      button.hidden = over || (button.dataset.verb !== "cancel" && state !== "running");
+      button.disabled = kind !== "live" || busy.has(button.dataset.verb);
+    }
+  }
+}
+
+// A text that is the same is left alone: what is marked with the pointer stays marked.
+function say(element, text) {
+  if (element.said !== text) element.textContent = element.said = text;
+}

@@ -1,0 +1,63 @@
+// The numbers of a run: the five that matter now, and all others.
+
+import { alike, count, duration, fixed, h, large, moment, rough, si } from "./figures.js";
+import { FINAL } from "./live.js";
+import { fold } from "./remember.js";
+
+const entry = (name, value, note) =>
+  h("div", {}, h("dt", {}, name), h("dd", {}, h("span.value", {}, value), note ? h("small", {}, note) : null));
+
+export class Numbers {
+  constructor() {
+    this.strip = h("dl.facts.strip");
+    this.rest = h("dl.facts");
+    this.element = h("section.card", { "aria-label": "numbers" }, this.strip, fold("numbers", false, "All numbers", this.rest));
+  }
+
+  draw(live, info) {
+    this.strip.replaceChildren(...five(live));
+    this.rest.replaceChildren(...others(live, info));
+  }
+}
+
+// Time and time left, dt and what holds it, residual, fragments, imbalance.
+function five(live) {
+  const { progress, counts, load, state } = live;
+  const over = FINAL.has(state);
+  const left = over ? `took ${duration(live.elapsed)}` : progress ? `${duration(progress.eta)} left` : "";
+  return [
+    entry("time", progress ? timed(live.fraction * progress.end_time, progress.end_time) : "–", left),
+    entry("dt", si(progress?.dt || live.ledger.findLast(({ dt }) => dt > 0)?.dt, "s"), progress?.limiter && `held by ${progress.limiter}`),
+    entry("residual", progress ? residual(progress.energy.residual) : "–"),
+    entry("fragments", count(counts?.fragments)),
+    entry("imbalance", load ? fixed(load.imbalance) : "–"),
+  ];
+}
+
+function others(live, info) {
+  const { progress, counts, started } = live;
+  return [
+    entry("elapsed", duration(live.elapsed)),
+    entry("step", count(progress?.step)),
+    entry("updates a second", large(progress?.updates_per_second)),
+    entry("elements", count(counts?.elements ?? started?.elements)),
+    entry("nodes", count(counts?.nodes ?? started?.nodes)),
+    entry("shared nodes", count(counts?.shared)),
+    counts?.particles ? entry("particles", count(counts.particles)) : "",
+    entry("ranks × threads", info.ranks ? `${info.ranks} × ${info.threads ?? 1}` : "–"),
+    entry("submitted", info.submitted ? moment(info.submitted) : "–"),
+    info.finished ? entry("ended", moment(info.finished)) : "",
+    ...Object.entries(info.labels ?? {}).map(([name, value]) => entry(name, value)),
+  ].filter(Boolean);
+}
+
+// The time so far and "of …" the end, in one unit.
+function timed(now, end) {
+  const [first, last] = alike([now, end], "s");
+  return first === last ? last : `${first} of ${last}`;
+}
+
+export function residual(value) {
+  const tone = value < 1e-3 ? "good" : value < 1e-2 ? "warn" : "bad";
+  return h(`span.${tone}`, {}, rough(value));
+}
