@@ -100,6 +100,10 @@ class Progress(Message, frozen=True):
     """Empty where there is one part alone."""
     worst_residual: float | None = None
     """The largest of any ledger line so far, of which some lie between two messages."""
+    sampled: float | None = None
+    """Simulated time of the line of the history that has ``energy``, ``parts`` and ``probes``, s."""
+    probes: dict[str, float | None] = {}
+    """By name, in SI; None where a probe has no value."""
 
 
 class Load(Message, frozen=True):

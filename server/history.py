@@ -12,9 +12,11 @@ from pathlib import Path
 
 import msgspec
 
+from conoid.cases import layout
 from conoid.cases.messages import Snapshot, Status
 from conoid.cases.run import State
 
+from .columns import Columns
 from .journal import Tail, seq_of
 
 _SAMPLES = 4096
@@ -71,6 +73,8 @@ class History:
 
     def __post_init__(self) -> None:
         self.lock = threading.Lock()
+        self.columns = Columns(self.path.with_name(layout.HISTORY))
+        """Of the time history beside the journal; they catch up by themselves, under the same lock."""
         self._tail = Tail(self.path)
         self._progress = self._counts = self._snapshot = b""
         self._every, self._reports, self._size = 1, 0, 0

@@ -77,6 +77,8 @@ class Loop:
         self._parts: dict[str, PartEnergy] = {}
         self.measured: list[float] = []
         """Of the probes, at the last line of the history."""
+        self._sampled: float | None = None
+        """Time of that line, s."""
         self.stopped = 0
         self.warnings: list[str] = []
         """What the steps have given reason for; equal on all ranks."""
@@ -219,7 +221,7 @@ class Loop:
     def _look(self, before: Floats, *, ending: bool) -> None:
         """A line of the history: ledger, momenta and probes at time n; ``ending``: after the last step."""
         sim, clock = self.sim, self.sim.clock
-        self.energy, self._parts = sim.ledger.close(before), sim.ledger.parts
+        self.energy, self._parts, self._sampled = sim.ledger.close(before), sim.ledger.parts, clock.t
         if ending:
             step.end(sim, before)
         if sim.crushing is not None:
@@ -295,7 +297,7 @@ class Loop:
             self._tell(
                 messages.Progress, end_time=sim.case.run.end_time, dt=clock.dt, limiter=limiter,
                 eta=self._pace.left(sim.case.run.end_time - clock.t), energy=self.energy,
-                worst_residual=sim.ledger.worst,
+                worst_residual=sim.ledger.worst, sampled=self._sampled, probes=self._probes(),
                 updates_per_second=(self.updates - self._reported_updates) / elapsed, parts=self._parts,
             )  # fmt: skip
         self._tell(
@@ -303,6 +305,10 @@ class Loop:
             projected=projected, **told,
         )  # fmt: skip
         self._asking.reported, self._reported_updates = now, self.updates
+
+    def _probes(self) -> dict[str, float | None]:
+        names = (probe.name for probe in self.sim.case.probes)
+        return {name: None if math.isnan(value) else value for name, value in zip(names, self.measured, strict=True)}
 
     def _record(self) -> None:
         """Loads of groups to the journal; all ranks take part."""

@@ -18,6 +18,7 @@ EXAMPLES: list[messages.AnyMessage] = [
     messages.Progress(
         run="r", seq=3, step=7, t=1e-6, end_time=1e-3, dt=1e-9, limiter="tet 3 of rod: sound", eta=3.0, energy=ENERGY,
         updates_per_second=1e7, parts={"rod": messages.PartEnergy(kinetic=1.0, internal=9.0)},
+        sampled=9e-7, probes={"push": 1.5, "hole": None},
     ),
     messages.Load(run="r", seq=4, phases={"forces": [0.1, 0.2]}, imbalance=4 / 3),
     messages.Balance(

@@ -43,6 +43,11 @@ kind = "wall"
 point = ["0 mm", "0 mm", "0 mm"]
 normal = [0, 0, 1]
 
+[[probes]]
+name = "push"
+part = "rod"
+field = "wall_force_z"
+
 [run]
 end_time = "{end_time}"
 ranks = 2
@@ -122,6 +127,19 @@ def test_from_http_to_a_result_live(ann: User) -> None:
     assert course["last"] == len(events)
     assert course["snapshots"] == listed
     assert course["series"]["step"][-1] == seen["outcome"]["steps"]
+    _are_lines_of_the_history(ann, run, [event for event in events if event["type"] == "progress"])
+
+
+def _are_lines_of_the_history(ann: User, run: str, told: list[dict[str, Any]]) -> None:
+    """What a report tells of probes and energy is a line of history.csv, at the time that it says."""
+    values = ann.http.get(f"/v1/runs/{run}/columns", params={"name": "*", "points": 8192}).json()["values"]
+    names = list(told[-1]["probes"])
+    assert names
+    assert told[-1]["sampled"] == values["t"][-1]
+    for report in told:
+        at = values["t"].index(report["sampled"])
+        assert report["probes"] == {name: values[name][at] for name in names}
+        assert report["energy"]["kinetic"] == values["kinetic"][at]
 
 
 def test_cancel(ann: User) -> None:
