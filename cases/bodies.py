@@ -74,7 +74,7 @@ class Symmetric(Primitive):
     aligned: bool | None = None
     """Whether a half or a whole is meshed as quarters that have faces in common, with ``generator = "gmsh"``: the tets
     at the axis are those of a quarter then, else up to twice as large. By default where the part erodes: the hole of a
-    rod is as deep in a whole as in a quarter (docs/numerics.md)."""
+    rod is as deep in a whole as in a quarter (docs/theory/erosion.md)."""
 
 
 class Plate(PlateForm, Symmetric):
@@ -187,13 +187,13 @@ class MeshFile(Measured):
     """The kind of body."""
     path: str
     """Of the file; a relative one begins in the folder of the case. Commands that hand the case to a server send the
-    file with it: there the path is a name, and ``sha256`` says which file is meant (docs/meshes.md)."""
+    file with it: there the path is a name, and ``sha256`` says which file is meant (docs/howto/meshes.md)."""
     unit: Annotated[Length, Positive]
     """Length of 1 in the file: ``"1 mm"``."""
     group: str | None = None
     """Of elements: a physical group of gmsh by its name or number; of Abaqus an element set, ``Bar-1.Set-1`` (a set of
     an instance or a part), an instance or a part; of LS-DYNA and Radioss a part, a set or a subset. All when absent.
-    docs/meshes.md has what is read of a file."""
+    docs/howto/meshes.md has what is read of a file."""
     second_order: Literal["auto", "corners", "eight"] = "auto"
     """Tets of 10 nodes as the tets of their 4 corners, or as eight tets of 4 nodes each. ``auto`` is ``eight`` where
     the corners alone would lose more than a thousandth of the volume, else ``corners``; a warning says which."""

@@ -91,8 +91,8 @@ class Prescribed(Model):
     z: Speed | None = None
     """Velocity along z; without it the nodes are free along z."""
     on: SetName | None = None
-    """A set of nodes or a surface of the mesh file of its parts, by name (docs/meshes.md): its nodes move so. With a
-    box those that are in both."""
+    """A set of nodes or a surface of the mesh file of its parts, by name (docs/howto/meshes.md): its nodes move so.
+    With a box those that are in both."""
     course: Course = ()
     """Pairs of a time and a factor of the velocity: linear in between, constant before the first and after the last.
     Without them the velocity is constant. ``[["0 us", 0], ["2 us", 1]]`` is a ramp."""
@@ -108,7 +108,8 @@ class Rotation(Model):
     spin: Spin
     """The line that they turn about, and how fast."""
     on: SetName | None = None
-    """A set of nodes or a surface of the mesh file of its parts, by name (docs/meshes.md): its nodes alone turn."""
+    """A set of nodes or a surface of the mesh file of its parts, by name (docs/howto/meshes.md): its nodes alone
+    turn."""
 
 
 class Gravity(Model):
@@ -174,8 +175,8 @@ class Traction(Model):
     cylinder: Around | None = None
     """``{ axis = "z", radius = "5 mm" }`` is the bore of a tube with this inner radius; with a box, what is in both."""
     on: SetName | None = None
-    """A surface of the mesh file of its parts, by name (docs/meshes.md), or a set of nodes: the exposed faces all of
-    whose nodes are in it. With a box or a cylinder what is in both."""
+    """A surface of the mesh file of its parts, by name (docs/howto/meshes.md), or a set of nodes: the exposed faces all
+    of whose nodes are in it. With a box or a cylinder what is in both."""
 
 
 Boundary = Annotated[Symmetry | Wall | Prescribed | Rotation | Gravity | Traction, Field(discriminator="kind")]

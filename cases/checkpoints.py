@@ -1,4 +1,4 @@
-"""Checkpoints on disk: which ones a run's folder has, and which of them are whole (docs/checkpoints.md).
+"""Checkpoints on disk: which ones a run's folder has, and which of them are whole (docs/reference/checkpoints.md).
 
 ::
 

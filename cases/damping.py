@@ -8,7 +8,7 @@ from .problems import Problem, problem
 from .schema import Case
 
 WORDS = "damps elastic motion (a free ball of 6,400 tets loses 15 % of its energy in ten periods)"
-"""tests/verification/test_pressure_modes.py; why: docs/numerics.md, Pressure forms."""
+"""tests/verification/test_pressure_modes.py; why: docs/theory/elements.md, Pressure forms."""
 
 
 def damped(case: Case) -> Iterator[Problem]:

@@ -35,9 +35,9 @@ START = 2.0
 
 BROKEN_NANOSECONDS = 15_000.0
 """Core time per tet and step of a body that has turned to dust whose pieces touch each other: 3 to 14 us in the ten
-hard cases that break without being driven (docs/accuracy.md: CPU s less what an estimate has without dust, by steps and
-tets that may break), 10 to 20 us in a plate of glass under an eroding cylinder, on aluminium, with friction. It is 7 us
-a broken facet, of which dust has two a tet."""
+hard cases that break without being driven (docs/verification/accuracy.md: CPU s less what an estimate has without dust,
+by steps and tets that may break), 10 to 20 us in a plate of glass under an eroding cylinder, on aluminium, with
+friction. It is 7 us a broken facet, of which dust has two a tet."""
 PRESSED_NANOSECONDS = 26_000.0
 """The same of dust that is held together and pressed, where every tet meets all round it and sweeps are many: a plug of
 glass under a ram (tests/bench/press.py) took 17,000 to 20,000 on one rank, a block of 3,600 tets between walls, into
@@ -54,15 +54,15 @@ RANK_BYTES = 280_000_000
 all files, takes 260 MB, and 300 where pyarrow writes a history as Parquet as well; the others take 240."""
 STAGE_BYTES = {"contact": 20_000_000, "fracture": 30_000_000}
 """What the kernels and tables of a stage take of a rank besides: bar_on_bar had 276 MB in all, the tile of
-docs/tutorial.md before it breaks 301 MB."""
+docs/tutorial/first_case.md before it breaks 301 MB."""
 TET_BYTES = {"tet": 330, "nodal": 110, "split": 140, "strength": 50, "facets": 130}
-"""Memory a tet, its share of the nodes included, at its peak while the model is set up (docs/bench.md)."""
+"""Memory a tet, its share of the nodes included, at its peak while the model is set up (docs/performance/bench.md)."""
 DUST_BYTES = 20_000
 """Memory a tet besides, of a body that has turned to dust: copies of nodes, surface, candidate pairs and tables that
 they are made of. Measured are peaks of a rank where half of the facets were broken, less what it takes before: 12 to 16
-kB in glass_steel_demo and glass_ball_cohesive, 15 and 20 kB in tiles of 16,800 and 4,200 tets (docs/tutorial.md),
-18 kB in cases/hard/wedge_glass.toml; bars of glass of which a quarter of the facets was broken, glass_steel_bar with
-9,000 and 39,000 tets, had 7 and 5 kB."""
+kB in glass_steel_demo and glass_ball_cohesive, 15 and 20 kB in tiles of 16,800 and 4,200 tets
+(docs/tutorial/first_case.md), 18 kB in cases/hard/wedge_glass.toml; bars of glass of which a quarter of the facets was
+broken, glass_steel_bar with 9,000 and 39,000 tets, had 7 and 5 kB."""
 FILE_BYTES = {".msh": 42, ".inp": 48}
 """Bytes of a text mesh file a tet, its share of the node lines included."""
 

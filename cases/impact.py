@@ -16,14 +16,14 @@ from .solids import Measured
 
 FEW, MANY, FULL, MOST = 5, 10, 40, 80
 """Sweeps of contact in a step: the fewest, also where bodies meet fast, also for rubble that is driven and with
-restitution, and the most; what more are good for: docs/numerics.md, "Contact", "Driven rubble", "Sweeps by need" and
-"Restitution"."""
+restitution, and the most; what more are good for: docs/theory/contact.md, "Contact", "Driven rubble", "Sweeps by need"
+and "Restitution"."""
 FAST = 0.2
 """Of the wave speed of what is met: above it there are MANY sweeps. Chosen: below half of where few were too few for
-columns of metal (docs/numerics.md, "Plates under 100 GPa")."""
+columns of metal (docs/theory/contact.md, "Plates under 100 GPa")."""
 PRESSING = 0.1
 """Of the same: above it flat surfaces buckle. Chosen: half of where irregular plates of copper lost their pressure
-(docs/numerics.md, "Ridges under pressure")."""
+(docs/theory/contact.md, "Ridges under pressure")."""
 
 
 def wave_speed(made: Material) -> float:

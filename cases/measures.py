@@ -95,8 +95,8 @@ class Probe(Model):
     high: Point | None = None
     """Highest corner of the box; with ``low``."""
     on: SetName | None = None
-    """Of means and sums: a set of nodes or a surface of the mesh file of the part, by name (docs/meshes.md): of means
-    the tets that have a node of it, of sums its nodes. With a box those that are in both."""
+    """Of means and sums: a set of nodes or a surface of the mesh file of the part, by name (docs/howto/meshes.md): of
+    means the tets that have a node of it, of sums its nodes. With a box those that are in both."""
     beyond: Beyond | None = None
     """Of sums and of what is behind a target: the side of a plane, ``{ axis = "z", at = "8 mm" }``."""
     axis: Axis | None = None

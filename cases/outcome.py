@@ -137,7 +137,7 @@ class Outcome(msgspec.Struct, kw_only=True, frozen=True):
     """The rest of it: in regions, whose tasks the threads of a rank share; with one thread, what more could share."""
     projected: dict[int, dict[str, list[float]]] = {}
     """By number of threads: seconds per phase, without the waiting, that each rank would take with so many threads; of
-    a run that was asked for it (docs/scaling.md)."""
+    a run that was asked for it (docs/performance/scaling.md)."""
     sharing: "Sharing | None" = None
     """Of what these follow."""
     helped: list[float] = []

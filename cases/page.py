@@ -1,4 +1,5 @@
-"""The keys of a case for people: docs/case.md, made from the JSON schema, one table of keys a table of the case."""
+"""The keys of a case for people: docs/reference/case.md, made from the JSON schema, one table of keys a table of the
+case."""
 
 import json
 import textwrap
@@ -14,7 +15,7 @@ _HEAD = """# The keys of a case
 
 A case is one TOML (or JSON) file. `make reference` makes this page from the texts of the models in `cases/`; `conoid
 schema` prints the same as JSON schema, and `conoid validate CASE` tells everything that is wrong with a case at once.
-A first case, step by step: [tutorial.md](tutorial.md).
+A first case, step by step: [first_case.md](../tutorial/first_case.md).
 
 **Quantities** are text with a unit, such as `"210 m/s"` or `"7850 kg/m^3"`. A bare number is taken in the SI unit that
 stands with the key; `conoid validate` warns of each that is not 0. In SI units all lie between 1e-30 and 1e30, or are

@@ -179,7 +179,8 @@ class Run(Model):
     """Threads of each MPI process that share its work. The answer does not depend on it. A run takes ``ranks`` times
     ``threads`` cores; more threads than cores make it slower."""
     profile: Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]{0,32}$")] = ""
-    """Where a batch system runs it: a profile of the site (docs/cluster.md). The submitter's choice comes before it."""
+    """Where a batch system runs it: a profile of the site (docs/howto/cluster.md). The submitter's choice comes before
+    it."""
     cut_scale: tuple[Scale, Scale, Scale] = (1.0, 1.0, 1.0)
     """Positions are multiplied by this before the mesh is cut for the ranks: no cut is made across a direction that is
     short then. Small along the way of an impact, every rank gets a share of where it happens. The answer does not

@@ -8,7 +8,8 @@
           16 to 16+H  the header, JSON, filled up with spaces
           from there  the arrays, each at a multiple of 8, where the header says; little-endian
 
-Vertices belong to one fragment each, so that fragments can be drawn apart. ``docs/snapshots.md`` has the arrays.
+Vertices belong to one fragment each, so that fragments can be drawn apart. ``docs/reference/snapshots.md`` has the
+arrays.
 """
 
 from collections.abc import Mapping

@@ -1,7 +1,7 @@
 """The loads of a run under another balance policy, without the solver: what cuts would have cost and saved.
 
 A run tells now and then what each group of tets costs (worker/groups.py). Which rank has which group follows from
-cuts, as in the run: first by tets, then by the loads of the moment. See docs/balance.md.
+cuts, as in the run: first by tets, then by the loads of the moment. See docs/performance/balance.md.
 """
 
 from collections.abc import Iterable, Iterator, Sequence

@@ -19,7 +19,9 @@ OutOption = Annotated[Path | None, typer.Option("--out", help="Write to this fil
 
 
 def schema(
-    as_page: Annotated[bool, typer.Option("--page", help="As a page for people (docs/case.md), in Markdown.")] = False,
+    as_page: Annotated[
+        bool, typer.Option("--page", help="As a page for people (docs/reference/case.md), in Markdown.")
+    ] = False,
     out: OutOption = None,
 ) -> None:
     """Print the keys of a case: as JSON schema, for editors, or as a page with unit, range, default and meaning."""

@@ -1,4 +1,4 @@
-"""A snapshot of the fragments of a run, as numpy sees it; docs/snapshots.md has its arrays."""
+"""A snapshot of the fragments of a run, as numpy sees it; docs/reference/snapshots.md has its arrays."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING

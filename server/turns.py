@@ -2,7 +2,7 @@
 
 An answer that computes nothing takes 0.5 to 0.8 ms of the event loop, and a GET that reads a file waits for the loop
 ten times. If all requests that have arrived began in one turn of the loop, a user with 40 connections would make each
-of these waits 20 ms or more for everybody else (docs/load.md, "Beside an attacker").
+of these waits 20 ms or more for everybody else (docs/reference/load.md, "Beside an attacker").
 """
 
 import asyncio

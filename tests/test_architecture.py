@@ -173,7 +173,7 @@ def test_limits_of_large_classes_are_what_they_have(name: str) -> None:
     assert MOST_ATTRIBUTES < len(attributes(found)) == LARGE[name]
 
 
-PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/*.md")])
+PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md")])
 KNOWN = [f"/{name_of(path)}" for path in [*SOURCES, *TESTS]]
 MODULE_IN_PROSE = re.compile(rf"`((?:{'|'.join(HOUSES)}|tests)(?:/\w+)+)`")
 PATTERNS = {"cases/laws/NAME.py", "worker/materials/NAME.py"}
@@ -327,7 +327,7 @@ TELLS = {
     "worker/snapshots/decimate.py", "worker/snapshots/table.py",
 }  # fmt: skip
 """They report, refuse and balance; what they compute is in no answer, but for parts that are pushed apart at the start
-(docs/numerics.md)."""
+(docs/theory/sums.md)."""
 POWERS_OF_TWO, REFUSES, WINDS = "worker/mesh/occ/frame.py", "worker/mesh/frame.py", "worker/mesh/occ/shells.py"
 """A scale that is rounded; a size in a message; how often a surface goes round a point, which is rounded."""
 

@@ -4,8 +4,8 @@ Kinetic energy is the form that the leapfrog step conserves together with the tr
 1/2 m v(n-1/2) . v(n+1/2) for equal steps, and with the steps dt- before n and dt+ after it, seen from before,
 1/2 m v(n-1/2) . v(n+1/2) + 1/4 (dt- - dt+) v(n-1/2) . f(n). Seen from after it is less by
 1/4 (dt- - dt+) f(n) . (v(n-1/2) - v(n+1/2)): an error of the method, booked node by node as ``stepping``
-(docs/numerics.md, Time integration). Work of the stress is summed tet by tet from stress and strain rate, not from
-nodal forces, so the residual compares two independent accounts.
+(docs/theory/time_integration.md, Time integration). Work of the stress is summed tet by tet from stress and strain
+rate, not from nodal forces, so the residual compares two independent accounts.
 
 The sums over nodes and tets are made part by part, in the quanta of the whole: those of the whole are the sums of the
 same integers, so that their bits do not know of parts, and what each part has costs no further pass.

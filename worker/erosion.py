@@ -52,8 +52,8 @@ from .topology import Split
 GATHERED = 10
 """Steps in which worn tets are gathered. Chosen: every removal calls for mean normals and tests of all pairs."""
 UNDECIDED = 0.25
-"""Share of ``erosion.damage`` from which on a warning says that nothing has left. Chosen: a punch of docs/numerics.md,
-Erosion, leaves damage of 0.42 in a plate, and plugs it where the tets are smaller."""
+"""Share of ``erosion.damage`` from which on a warning says that nothing has left. Chosen: a punch of
+docs/theory/erosion.md, Erosion, leaves damage of 0.42 in a plate, and plugs it where the tets are smaller."""
 
 
 class Erosion:

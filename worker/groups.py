@@ -1,6 +1,6 @@
 """Loads of parts of the mesh, told now and then: what another balance policy would have done follows from them.
 
-``conoid replay-balance`` reads them (docs/balance.md). A group is a fixed set of tets, cut out at the
+``conoid replay-balance`` reads them (docs/performance/balance.md). A group is a fixed set of tets, cut out at the
 start, and of nodes and their copies; it goes with them from rank to rank. Counts are integers and the same for any
 number of ranks, but for candidates of edges and cracks whose nodes lie on other ranks.
 """

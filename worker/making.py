@@ -11,9 +11,9 @@ stepping  the time integration                        its magnitude: an error ei
 ========  ==========================================  =============================================
 
 ``elastic`` is not judged: with an equation of state that sees heat it is below zero in hot matter that has expanded
-(docs/numerics.md, Time integration). Where such matter erodes, its elastic energy goes to ``eroded`` and its heat stays
-in ``plastic`` and ``viscous``: so ``eroded`` may be below zero by that heat, and no more. No line is judged while the
-largest energy is that of rounding.
+(docs/theory/time_integration.md, Time integration). Where such matter erodes, its elastic energy goes to ``eroded`` and
+its heat stays in ``plastic`` and ``viscous``: so ``eroded`` may be below zero by that heat, and no more. No line is
+judged while the largest energy is that of rounding.
 """
 
 import math
@@ -103,7 +103,7 @@ class Making:
 
 
 def _cure(name: str, share: float, safety: float) -> str:
-    """What helps, as far as it is derived and measured (docs/numerics.md, Energy that a line makes)."""
+    """What helps, as far as it is derived and measured (docs/theory/energy.md, Energy that a line makes)."""
     if name == STEPPING:
         wanted = safety * math.sqrt(0.5 * TOLD / share)
         return f"; it falls with the square of the step: numerics.dt_safety = {wanted:.2g} would leave half a per cent"

@@ -42,7 +42,7 @@ def import_deck(
     or why it did not. Parts have their mesh from the deck itself. Where a case would answer wrong in silence without
     something that Conoid lacks, the import is refused and names it: --anyway writes the case all the same.
     Units are given, named by a Radioss deck, or told from a material with the density of steel.
-    docs/import.md has what is taken over.
+    docs/howto/import.md has what is taken over.
     """
     target = out or deck.with_suffix(".toml")
     if target.suffix != ".toml":

@@ -1,4 +1,4 @@
-// A snapshot of the fragments: from bytes (docs/snapshots.md) to what the view draws and the tables show.
+// A snapshot of the fragments: from bytes (docs/reference/snapshots.md) to what the view draws and the tables show.
 
 const MAGIC = "CONOSNAP";
 const VERSION = 1;

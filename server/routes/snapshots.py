@@ -1,4 +1,4 @@
-"""Snapshots of the fragments of a run (docs/snapshots.md)."""
+"""Snapshots of the fragments of a run (docs/reference/snapshots.md)."""
 
 from typing import Annotated, Any
 
@@ -42,7 +42,7 @@ def listing(run: OwnedRun, service: ServiceOf, if_none_match: Known = "") -> Res
 async def content(
     request: Request, run: OwnedRun, service: ServiceOf, n: Number, if_none_match: Known = ""
 ) -> Response:
-    """One snapshot, as docs/snapshots.md has it; its ETag is its sha256, and it never changes."""
+    """One snapshot, as docs/reference/snapshots.md has it; its ETag is its sha256, and it never changes."""
     told = await service.lanes.run(_told, service, run, n)
     headers = {"ETag": f'"{told.sha256}"', "Cache-Control": "private, max-age=31536000, immutable"}
     if download.is_known(headers["ETag"], if_none_match):

@@ -1,4 +1,5 @@
-"""``make bench``: speed, growth, start-up, speed against error, telemetry. The figures stand in docs/bench.md."""
+"""``make bench``: speed, growth, start-up, speed against error, telemetry. The figures stand in
+docs/performance/bench.md."""
 
 from conoid.worker.kernels import use_cache
 

@@ -1,4 +1,4 @@
-"""``make accuracy``: writes docs/accuracy.md, every row of the catalogue with what was measured.
+"""``make accuracy``: writes docs/verification/accuracy.md, every row of the catalogue with what was measured.
 
 ``ACCURACY=quick`` leaves out studies of minutes, and says so in the book; a part can be named: shipped, tests, hard.
 What each part found is kept in build/accuracy; the book is written anew from all parts there are, and with ``write``
@@ -141,8 +141,8 @@ def main(arguments: Sequence[str]) -> int:
         (OUT / f"{name}.json").write_text(json.dumps(part, indent=1), encoding="utf-8")
     parts = {name: json.loads((OUT / f"{name}.json").read_text()) for name in PARTS if (OUT / f"{name}.json").is_file()}
     text, failed = pages.book(catalogue(), parts)
-    (ROOT / "docs" / "accuracy.md").write_text(text, encoding="utf-8")
-    print(f"docs/accuracy.md: {failed} rows fail")
+    (ROOT / "docs" / "verification" / "accuracy.md").write_text(text, encoding="utf-8")
+    print(f"docs/verification/accuracy.md: {failed} rows fail")
     return 0
 
 

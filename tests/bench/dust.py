@@ -1,7 +1,7 @@
 """What has broken under a shock: does contact alone hold its pressure, and with how many sweeps?
 
 ``python -m tests.bench.dust``: a flyer on a target of the same brittle material, between planes of symmetry, so that
-nothing can go aside. Tables are in docs/numerics.md, "Dust under pressure".
+nothing can go aside. Tables are in docs/theory/contact.md, "Dust under pressure".
 """
 
 import math

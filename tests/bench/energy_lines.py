@@ -1,5 +1,5 @@
 """``python -m tests.bench.energy_lines [NAME]...``: every hard and every shipped case, with the line of the ledger that
-has made most energy, its share and its limit; writes docs/energy_lines.md.
+has made most energy, its share and its limit; writes docs/verification/energy_lines.md.
 
 Each case is a run of one rank without frames. What has been measured stays in build/energy_lines, a file a case, and is
 not measured again there; the cheap cases come first. ``write`` writes the page of what there is.
@@ -22,7 +22,7 @@ from conoid.cases.suite import suite
 from .table import Cell, table
 
 ROOT = Path(__file__).parents[2]
-OUT, PAGE = ROOT / "build" / "energy_lines", ROOT / "docs" / "energy_lines.md"
+OUT, PAGE = ROOT / "build" / "energy_lines", ROOT / "docs" / "verification" / "energy_lines.md"
 _QUIET = ("run.ranks=1", "run.frames=0", "run.snapshots=0", "run.checkpoint_every=none")
 _COLUMNS = ("case", "state", "worst line", "made", "at, s", "limit", "residual", "tets", "steps", "estimated", "CPU s")
 
@@ -122,7 +122,7 @@ def page(found: Sequence[Row]) -> str:
         "Written by `python -m tests.bench.energy_lines`: every hard and every shipped case, one rank, with the line "
         "of the ledger that has made most energy at any time, as a share of the largest energy until then, and its "
         "limit, `run.made_limit`, and the steps beside what `conoid validate` expects. How it is counted: "
-        "[numerics.md](numerics.md), \"Energy that a line makes\".",
+        "[theory/energy.md](../theory/energy.md), \"Energy that a line makes\".",
         f"{len(found)} of {len(known)} cases; {sum(r.bad for r in found)} succeeded above the limit."
         + (f" Not measured: {', '.join(left)}." if left else ""),
         *(["\n".join(wrong)] if wrong else []),

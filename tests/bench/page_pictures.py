@@ -1,7 +1,7 @@
 """Pictures of the page: ``python -m tests.bench.page_pictures RUN``, where RUN is the folder of a run that has ended.
 
-docs/page.png is the body on its page. ``--all FOLDER`` makes others to be looked at: whole pages, light and dark, on a
-phone, with 16 ranks (a run that no solver has made), and the list of runs.
+docs/pictures/page.png is the body on its page. ``--all FOLDER`` makes others to be looked at: whole pages, light and
+dark, on a phone, with 16 ranks (a run that no solver has made), and the list of runs.
 """
 
 import argparse
@@ -15,7 +15,7 @@ from tests.server.visitor import SHOWN, Site, sign_in
 
 from .page_scene import lay, take
 
-OUT = Path(__file__).parents[2] / "docs" / "page.png"
+OUT = Path(__file__).parents[2] / "docs" / "pictures" / "page.png"
 _OF_16 = "1k0aaaaaaaaaaaaaaaaaaa"
 _WINDOW, _PHONE = (1280, 720), (390, 844)
 _LOOKS = (("light", _WINDOW, False), ("dark", _WINDOW, True), ("phone", _PHONE, False), ("phone dark", _PHONE, True))

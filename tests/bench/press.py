@@ -3,7 +3,7 @@
 ``python -m tests.bench.press [SWEEPS ...]``: a quarter of a glass cylinder in a bore of steel is pressed by a ram
 through a hole of half its width. What it breaks into is held by contact alone, in chains from the ram to the walls: for
 as long as the ram moves, where it is driven at 60 m/s, and until it has stopped, where it flies at 200 m/s; that with
-tets of half the size as well. The tables are in docs/numerics.md, "Driven rubble" and "Sweeps by need".
+tets of half the size as well. The tables are in docs/theory/contact.md, "Driven rubble" and "Sweeps by need".
 """
 
 import sys

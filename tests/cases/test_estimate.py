@@ -172,7 +172,7 @@ def test_what_may_break_may_cost_more() -> None:
     bar = estimate(read_case(shipped_path("glass_steel_bar")))
     assert whole.breaking == 0.0
     assert bar.core_seconds is not None
-    measured = 2 * 184.0  # s of two ranks: docs/bench.md
+    measured = 2 * 184.0  # s of two ranks: docs/performance/bench.md
     assert bar.core_seconds < measured < 1.1 * (bar.core_seconds + bar.breaking)
 
 
@@ -181,7 +181,7 @@ HARD = {
     "ball_into_stack": 2.4, "stretched_bar": 2.2, "tile": 2.3, "wedge": 3.5, "scissors": 3.8, "slit": 1.2,
     "pressed_on_a_slope": 1.8, "bursting_ring": 12.8, "joint_of_two_glasses": 7.0,
 }  # fmt: skip
-"""CPU s of steps that the hard cases that break took (docs/accuracy.md)."""
+"""CPU s of steps that the hard cases that break took (docs/verification/accuracy.md)."""
 
 
 @pytest.mark.parametrize("hard", [hard for hard in suite() if hard.name in HARD], ids=lambda hard: hard.name)
@@ -313,7 +313,7 @@ HARD_STEPS = {
     "flying_debris": 241,
     "needle": 1088,
 }
-"""Steps that hard cases were seen to take whose step falls most (docs/energy_lines.md)."""
+"""Steps that hard cases were seen to take whose step falls most (docs/verification/energy_lines.md)."""
 
 
 @pytest.mark.parametrize(("name", "steps"), HARD_STEPS.items())

@@ -26,7 +26,9 @@ def keys(schema: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
             yield f"{name}.{key}", each
 
 
-@pytest.mark.parametrize(("path", "text"), [("docs/case.md", page.page()), (f"cases/{FILE}", reference.schema_text())])
+@pytest.mark.parametrize(
+    ("path", "text"), [("docs/reference/case.md", page.page()), (f"cases/{FILE}", reference.schema_text())]
+)
 def test_what_is_committed_is_what_make_reference_makes(path: str, text: str) -> None:
     assert (ROOT / path).read_text(encoding="utf-8") == text, "run: make reference"
 

@@ -578,7 +578,7 @@ def test_the_depth_of_the_long_rod_is_that_of_a_rod_which_erodes() -> None:
 def test_what_the_theory_gives_beside_the_long_rod(
     strength: float, resistance: float, depths: tuple[float, ...]
 ) -> None:
-    """The numbers of docs/long_rod.md, mm."""
+    """The numbers of docs/verification/long_rod.md, mm."""
     found = [1e3 * alekseevskii_tate(speed, strength, resistance) for speed in (1057.0, 1301.0, 1566.4)]
     assert found == pytest.approx(depths, abs=0.2)
 

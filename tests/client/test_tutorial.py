@@ -18,7 +18,7 @@ from conoid.cases.solids import Cad
 from conoid.client.cli import app
 from conoid.client.result import Result
 
-TEXT = (Path(__file__).parents[2] / "docs" / "tutorial.md").read_text(encoding="utf-8")
+TEXT = (Path(__file__).parents[2] / "docs" / "tutorial" / "first_case.md").read_text(encoding="utf-8")
 CASE = "\n".join(re.findall(r"```toml\n(.*?)```", TEXT, re.DOTALL))
 
 
@@ -31,7 +31,7 @@ def test_the_pieces_are_a_sound_case() -> None:
 
 def test_the_pieces_of_the_bullet_stand_in_its_case() -> None:
     """And its file has the solids that it names."""
-    folder = Path(__file__).parents[2] / "docs" / "bullet"
+    folder = Path(__file__).parents[2] / "docs" / "tutorial" / "bullet"
     text, case = (folder.parent / "bullet.md").read_text(), (folder / "bullet_tile.toml").read_text()
     pieces = re.findall(r"```toml\n(.*?)```", text, re.DOTALL)
     assert len(pieces) == 3

@@ -1,6 +1,6 @@
 """Cracks that run: never faster than surface waves (V27), their start and branches (E4), what they take (V28, V29).
 
-The slow tests are runs of the bench of cracks; its tables are in docs/bench.md.
+The slow tests are runs of the bench of cracks; its tables are in docs/performance/bench.md.
 """
 
 import math
@@ -142,7 +142,7 @@ def test_a_random_mesh_has_no_direction_and_no_flat_tets() -> None:
 @pytest.fixture(scope="module")
 def plates() -> list[cracks.Run]:
     """Five meshes without directions: which of them branch is chance, so they are judged together. A step a hundredth
-    shorter moves the branches of one by 9 mm and 11 us (docs/bench.md, Cracks).
+    shorter moves the branches of one by 9 mm and 11 us (docs/performance/bench.md, Cracks).
     """
     return [cracks.watch(plan) for plan in cracks.RANDOM]
 

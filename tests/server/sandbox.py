@@ -86,7 +86,7 @@ def environment(unit: Unit) -> dict[str, str]:
 
 
 def _install(state: Path) -> None:
-    """/var/lib/conoid and /opt/conoid: where docs/site.md has them."""
+    """/var/lib/conoid and /opt/conoid: where docs/howto/site.md has them."""
     for place, source in (("/var/lib/conoid", state), ("/opt/conoid", Path(sys.prefix))):
         held = os.open(source, os.O_PATH)
         _mount("tmpfs", os.path.dirname(place), 0, "tmpfs", "mode=755")

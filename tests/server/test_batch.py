@@ -1,4 +1,4 @@
-"""A run as a job of Slurm without a server: the commands of docs/cluster.md, followed."""
+"""A run as a job of Slurm without a server: the commands of docs/howto/cluster.md, followed."""
 
 import hashlib
 import json

@@ -82,7 +82,7 @@ def url(place: Place) -> Iterator[str]:
 
 
 def token(place: Place) -> str:
-    """For Ann, made by the command of docs/site.md."""
+    """For Ann, made by the command of docs/howto/site.md."""
     serve = ["/opt/conoid/bin/python", "-m", "conoid.server", "--runs", "/var/lib/conoid/runs"]
     told = subprocess.run(
         place.command(*serve, "token", "add", "ann"), check=True, capture_output=True, text=True

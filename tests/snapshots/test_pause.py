@@ -1,4 +1,4 @@
-"""How far apart snapshots are: what they may cost (docs/snapshots.md)."""
+"""How far apart snapshots are: what they may cost (docs/reference/snapshots.md)."""
 
 import pytest
 

@@ -85,7 +85,7 @@ def test_a_hundred_thousand_random_stresses(name: str) -> None:
     ],
 )
 def test_plane_edges_apex_and_cap(values: tuple[float, ...], pressure: float, expected: str | None) -> None:
-    """The closed forms of docs/numerics.md."""
+    """The closed forms of docs/theory/materials.md."""
     sine = math.sin(PHI)
     most = 2.0 * (C * math.cos(PHI) + pressure * sine)
     a, b = most / (3.0 - sine), most / (3.0 + sine)

@@ -18,7 +18,7 @@ from .rows import Rows
 
 _SETTLED = 1e-7
 """Of what a step changes of the impulses, that its sweeps leave. Chosen: the energy that the bond takes is less than
-1e-9 of what passes it then (docs/numerics.md)."""
+1e-9 of what passes it then (docs/theory/bonds.md)."""
 _SLOWEST = 0.02
 """Least bound of the smallest eigenvalue of the rows over the largest one: 60 sweeps. Chosen: tied nodes that are held
 have none."""

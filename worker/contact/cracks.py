@@ -31,7 +31,7 @@ _FORESEEN = 0.5
 """Of that width: the faces of a crack as wide as this are searched, so that they have their pairs when it opens."""
 AGE, _YOUNG = 16, 0.3
 """Steps between two in which cracks may come of age, and the share of young ones from which on they do
-(docs/numerics.md, "Edges at cracks")."""
+(docs/theory/contact.md, "Edges at cracks")."""
 _KEPT = 12
 """Columns of what a crack has kept."""
 _AHEAD = 8

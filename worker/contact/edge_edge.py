@@ -18,8 +18,8 @@ _END = 1e-4
 by which a node may be beside a face, so that what slides over a rim is held by the edge until the node is."""
 _FLUSH = 0.05
 """Sine of the angle by which the normal of a contact may lie beyond that of a face: edges of faces that lie on each
-other cross there, a little to either side. Chosen by fragments that are pressed together (docs/numerics.md, "Face on
-face")."""
+other cross there, a little to either side. Chosen by fragments that are pressed together (docs/theory/contact.md, "Face
+on face")."""
 _ROUND = 0.01
 """Of the length of an edge: added to the distance at which a pair may meet."""
 _WORTH = 0.02

@@ -3,7 +3,7 @@
 When a node separates into three pieces or more, a copy is the twin of another across a facet only where their pieces
 have that facet in common. With the other pieces it has an edge or the node alone, and at the moment of separation it
 lies on all their sides, at a gap of exactly zero. Which of them it would enter the end of the step tells: the nearest
-of those below which it would be then, with its foot on it (docs/numerics.md, "Contact" of fracture).
+of those below which it would be then, with its foot on it (docs/theory/contact.md, "Contact" of fracture).
 
 The corners of narrow sides are taken family by family: what each member is to the corners of its family is found in
 loops over these, in rows of a few kilobytes that compilers make vectors of. Few of them are looked at on their own.

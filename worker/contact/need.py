@@ -8,7 +8,7 @@ from ..state import Ints
 
 _SETTLED = 0.0015
 """Of the impulses of a step, the most that its last sweep may have changed them by. Chosen by rubble between a ram and
-walls, which is as stiff then as with many more sweeps (docs/numerics.md, "Sweeps by need"); metals have less
+walls, which is as stiff then as with many more sweeps (docs/theory/contact.md, "Sweeps by need"); metals have less
 with the fewest."""
 _ENOUGH = 0.5
 """Of that: with less, a sweep fewer does."""

@@ -26,7 +26,7 @@ _SHORTEST = 10.0
 """Steps of free flight that a search looks ahead at least; at most twice what the last search was good for."""
 _LONGEST = 80.0
 """The same at most where bodies break: with 300 steps the pairs between fragments cost a quarter more than the searches
-that they save (docs/bench.md, the bar to 40 us).
+that they save (docs/performance/bench.md, the bar to 40 us).
 """
 _AHEAD = 2.0
 """Steps before the end of what a search looked ahead at which another one is due: the second is the one that

@@ -25,7 +25,7 @@ SHARP = sine_and_cosine(math.radians(25.0))[1]
 BENT, PRESSED = sine_and_cosine(math.radians(5.0))[1], 4
 """The same of parts that are pressed together beyond their strength (cases/impact.py), and after how many steps edges
 are looked at there: ridges of surfaces that were flat cross without a node inside, and what overlaps has no pressure.
-Chosen by flyer plates of copper at 1 to 2.4 km/s (docs/numerics.md, "Ridges under pressure")."""
+Chosen by flyer plates of copper at 1 to 2.4 km/s (docs/theory/contact.md, "Ridges under pressure")."""
 
 _A, _B, _C, _D, _OWNER, _TOP, _FACE, _OPEN, _LENGTH, _LOW, _NORMAL = range(11)
 """Columns of a half edge that travels: its nodes, the third node of its face and the one opposite, the owners of these

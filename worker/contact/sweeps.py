@@ -45,7 +45,7 @@ SHARES = float(2**30)
 _PAIR, _CRACK = 0.8, 1.0
 """Share of the last push along the normal that a node and a face begin with, for all of it would lag behind and make
 energy; and nodes across a crack, of which so many press on each other that sweeps cannot make up for any of it
-(docs/numerics.md, "Dust under pressure")."""
+(docs/theory/contact.md, "Dust under pressure")."""
 _ACROSS = (1.0, -1.0, 0.0, 0.0)
 """Weights of the nodes on either side of a crack."""
 _ROUNDING = 2.0**-40

@@ -6,7 +6,7 @@ while theirs stays as it is. Below SQUEEZED of the initial volume a pressure of 
 
     b(J) = STIFF K (SQUEEZED / J - 1)^2,    J = V / V0 < SQUEEZED
 
-Its energy is elastic. Tets of parts that erode leave instead (docs/numerics.md, Pressure forms).
+Its energy is elastic. Tets of parts that erode leave instead (docs/theory/elements.md, Pressure forms).
 """
 
 import numpy as np

@@ -19,7 +19,7 @@ from .tet4 import CHANGE, MODULUS, SEEN, VOLUME, VOLUME_MID
 
 THINNEST = 0.1
 """Smallest altitude over longest edge of a tet whose volume strain is averaged; 0.82 for a regular tet. Chosen: what
-strains its neighbours by a tenth closes it (docs/numerics.md)."""
+strains its neighbours by a tenth closes it (docs/theory/elements.md)."""
 
 _HEAT, _TOLD, _MASS, _GROWN = HEAT * CHUNK, TOLD * CHUNK, MASS * CHUNK, DILATION * CHUNK
 

@@ -6,9 +6,9 @@ of the tets is what the pressures of the nodes do on the volumes of the nodes:
 
     sum_e V_e e_e mean_a(p_a) = sum_a p_a V_a e_a,    V_a e_a = sum_e V_e e_e / 4
 
-and no energy is made or lost by the mean (docs/numerics.md, "Matter at the nodes"). Nodes have the pressure of a linear
-material with a tension cut-off. A pressure that is linear in the strain is a mean of four by itself, and stays with the
-tet; so does the pressure of an equation of state with heat.
+and no energy is made or lost by the mean (docs/theory/elements.md, "Matter at the nodes"). Nodes have the pressure of a
+linear material with a tension cut-off. A pressure that is linear in the strain is a mean of four by itself, and stays
+with the tet; so does the pressure of an equation of state with heat.
 """
 
 import numpy as np

@@ -4,7 +4,7 @@ A tet's stress does -p dV on its own volume; the energy that an averaged pressur
 the strain that the pressure sees. Over all tets round a node the two agree where the pressure is uniform. The rest is
 booked tet by tet as WORK_AVERAGED: what differences of pressure within an average store, which comes back; what is
 lost for good, where neighbours yield, tear or leave at different times; and what the stabilising fluxes of ``split``
-dissipate (docs/numerics.md, What averaging takes).
+dissipate (docs/theory/elements.md, What averaging takes).
 """
 
 from ..jit import njit

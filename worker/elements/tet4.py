@@ -63,7 +63,8 @@ _P, _Q, _MASS, _VOLUME = PRESSURE * CHUNK, VISCOUS * CHUNK, MASS * CHUNK, TET_VO
 _SIXTH = 1.0 / 6.0
 CLOSING = 4.0
 """Steps at least in which a tet would lose, or gain, all of its volume at the rate of the step before. Chosen: about
-what the default viscosity asks for, 4.3; at the end of such a step p = -K ln J is wrong by 0.5 % (docs/numerics.md)."""
+what the default viscosity asks for, 4.3; at the end of such a step p = -K ln J is wrong by 0.5 %
+(docs/theory/time_integration.md)."""
 LENGTH_FACTOR = 1.2009369551760027
 """V^(1/3) times sqrt(sum |grad N|^2) of a regular tet, sqrt(6) / (6 sqrt(2))^(1/3): with l = LENGTH_FACTOR over that
 root, l is V^(1/3) for a regular tet and shrinks with the altitude of a flat one."""
@@ -335,7 +336,8 @@ def scatter_forces(force, wi, tets, n):  # type: ignore[no-untyped-def]
 def step_limit(w, s, n):  # type: ignore[no-untyped-def]
     """LIMIT: c sqrt(sum |grad N|^2), one over the largest stable step, 1/s; NaN where the volume is not positive.
 
-    Twice this is never below the highest frequency of a tet with lumped mass (derived in docs/numerics.md).
+    Twice this is never below the highest frequency of a tet with lumped mass (derived in
+    docs/theory/time_integration.md).
     """
     for i in range(n):
         volume = w[VOLUME + i]

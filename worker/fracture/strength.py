@@ -53,7 +53,8 @@ class Toughness:
         """(m,) J/m^2, of facets that break with a ``share`` (m,) of shear in the square of the effective traction.
 
         On a straight way of opening that is the share of the work that shear does, and the two add up to what breaks
-        the facet by w_n / energy + w_s / shear_energy = 1 (Wu and Reuter 1965, exponent 1; docs/numerics.md, Bonds).
+        the facet by w_n / energy + w_s / shear_energy = 1 (Wu and Reuter 1965, exponent 1; docs/theory/bonds.md,
+        Bonds).
         """
         if self.shear_energy is None:
             return np.full(len(share), self.energy)

@@ -1,7 +1,7 @@
 """log and exp of our own: the same bits on any processor, in loops over a chunk that the compiler turns into vectors.
 
 Only + - * /, and the bits of a float64 as an integer, which are alike in a vector lane and in a scalar; so no result
-depends on a C library. Derived in docs/numerics.md.
+depends on a C library. Derived in docs/theory/sums.md.
 """
 
 import numpy as np

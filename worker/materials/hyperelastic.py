@@ -1,7 +1,7 @@
 """Elastic shear of a material without a strength: the deviatoric stress has a potential, so it keeps its energy.
 
 W = V0 G/4 (tr b + tr b^-1 - 6), b = J^(-2/3) F F^T: the Mooney-Rivlin form with equal constants, which to the fourth
-order in strain is Hencky's, G (ln V : ln V). Derived in docs/numerics.md.
+order in strain is Hencky's, G (ln V : ln V). Derived in docs/theory/materials.md.
 """
 
 import numpy as np

@@ -1,7 +1,7 @@
 """Johnson-Holmquist 2: strength of a brittle material by pressure, rate and damage; pressure with bulking; tension.
 
-Johnson and Holmquist 1994. The order of a step is in docs/numerics.md: the pressure of n+1, with the bulking and the
-damage of n; the strength there; the return; the damage and the bulking of n+1.
+Johnson and Holmquist 1994. The order of a step is in docs/theory/materials.md: the pressure of n+1, with the bulking
+and the damage of n; the strength there; the return; the damage and the bulking of n+1.
 """
 
 import math

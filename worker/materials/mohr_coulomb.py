@@ -2,7 +2,8 @@
 
 f = (s1 - s3) + (s1 + s3) sin(phi) - 2 c cos(phi) <= 0 with s1 >= s2 >= s3, tension positive, and s1 - s3 <= cap.
 Flow keeps the volume, or is along the same form with the dilation angle psi instead of phi, and the pressure rises.
-Derived in docs/numerics.md. The steps of the return are inlined by force: as calls they take three times as long.
+Derived in docs/theory/materials.md. The steps of the return are inlined by force: as calls they take three times as
+long.
 """
 
 import math

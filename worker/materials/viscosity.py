@@ -11,7 +11,8 @@ HALF = 0.01
 waves in bars (10 m/s over some tets: 5e-4) and weak shocks (300 m/s in copper: 0.03)."""
 SQUEEZED = 0.1
 """Of the volume: compression in which an averaged tet's own rate is resisted in full. Chosen by what columns of metal
-bear at 1.5 and 2 km/s (docs/numerics.md, "Plates under 100 GPa"); where metal flows at 100 m/s it is some 1e-3."""
+bear at 1.5 and 2 km/s (docs/theory/contact.md, "Plates under 100 GPa"); where metal flows at 100 m/s it is some
+1e-3."""
 _P, _Q, _MASS, _WORK = PRESSURE * CHUNK, VISCOUS * CHUNK, MASS * CHUNK, WORK_VISCOUS * CHUNK
 
 
@@ -39,11 +40,11 @@ def bulk_viscosity(w, s, n, linear, shock, quadratic, rate_of_change, breaks, in
     von Neumann and Richtmyer 1950 (quadratic), Landshoff 1955 (linear); S = u / (u + HALF c) tells a shock from an
     elastic wave. ``rate_of_change`` turns CHANGE into a volume flux, 1/s. With G = sqrt(sum |grad N|^2) and Q the
     tangent (linear + shock S (2 - S)) c + 2 quadratic u the largest stable step is
-    1 / (G (G l Q + sqrt((G l Q)^2 + c^2))); l = LENGTH_FACTOR / G. Both are derived in docs/numerics.md. A tet that is
-    inside out has no viscosity, and NaN as its limit. One that is at rest or expands is bounded as one that begins to
-    be compressed; where a part ``breaks``, one in tension as one that is compressed at the speed at which it would be
-    let go, |p| / (density c). ``initial``: the density at the start where the pressure sees the mean of the nodes, and
-    so does the viscosity (``resisted``); else 0.
+    1 / (G (G l Q + sqrt((G l Q)^2 + c^2))); l = LENGTH_FACTOR / G. Both are derived in docs/theory/time_integration.md.
+    A tet that is inside out has no viscosity, and NaN as its limit. One that is at rest or expands is bounded as one
+    that begins to be compressed; where a part ``breaks``, one in tension as one that is compressed at the speed at
+    which it would be let go, |p| / (density c). ``initial``: the density at the start where the pressure sees the mean
+    of the nodes, and so does the viscosity (``resisted``); else 0.
     """
     for i in range(n):
         mass, change = s[_MASS + i], w[CHANGE + i]

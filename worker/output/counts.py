@@ -1,8 +1,9 @@
 """How large the model is and into what it has broken: with every report in which that has changed.
 
-To find the fragments all ranks look at all their tets (docs/snapshots.md, "Between two snapshots"). So it is done when
-a facet has broken or a tet has left since the last time, and as often as a share of the wall time allows: in every
-report of a small model, every few seconds of a large one. Rank 0 decides, and its decision goes round with the loads.
+To find the fragments all ranks look at all their tets (docs/reference/snapshots.md, "Between two snapshots"). So it is
+done when a facet has broken or a tet has left since the last time, and as often as a share of the wall time allows: in
+every report of a small model, every few seconds of a large one. Rank 0 decides, and its decision goes round with the
+loads.
 """
 
 import math

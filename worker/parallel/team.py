@@ -6,10 +6,11 @@ answer is the same on any number of threads.
 
 The thread that asks works, too, and waits for tasks that have begun, not for threads: where another program has the
 core of a helper it does the tasks itself. OpenMP waits for every thread at the end of every region, which takes
-milliseconds then (docs/scaling.md, "Threads"). One word says which tasks there are: their number, and the next one. A
-thread takes a task by adding one to the word. A colour does not end before its last task, so the arguments of a task
-stay as they are. Helpers look at the word for some 50 us, then sleep until the next pass. To wake a thread takes its
-waker some 20 us, so the asking thread wakes one or two, and whoever is woken wakes two more while there are tasks.
+milliseconds then (docs/performance/scaling.md, "Threads"). One word says which tasks there are: their number, and the
+next one. A thread takes a task by adding one to the word. A colour does not end before its last task, so the arguments
+of a task stay as they are. Helpers look at the word for some 50 us, then sleep until the next pass. To wake a thread
+takes its waker some 20 us, so the asking thread wakes one or two, and whoever is woken wakes two more while there are
+tasks.
 """
 
 import ctypes

@@ -1,6 +1,6 @@
 """Materials of Abaqus/Explicit as those of Conoid (Analysis User's Guide, "Materials").
 
-What the formulas there and here do not share is a remark of the keyword: docs/import.md has them side by side.
+What the formulas there and here do not share is a remark of the keyword: docs/howto/import.md has them side by side.
 """
 
 from collections.abc import Sequence

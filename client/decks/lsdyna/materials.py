@@ -1,6 +1,6 @@
 """Materials and equations of state of LS-DYNA as those of Conoid (LS-DYNA Keyword User's Manual, volume II).
 
-What the formulas there and here do not share is a remark of the keyword: docs/import.md has them side by side.
+What the formulas there and here do not share is a remark of the keyword: docs/howto/import.md has them side by side.
 """
 
 from collections.abc import Callable

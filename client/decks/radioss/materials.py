@@ -1,6 +1,6 @@
 """Materials, equations of state and failure of Radioss as those of Conoid (Reference Guide, "Material laws").
 
-What the formulas there and here do not share is a remark of the option: docs/import.md has them side by side.
+What the formulas there and here do not share is a remark of the option: docs/howto/import.md has them side by side.
 """
 
 from collections.abc import Callable
