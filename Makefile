@@ -1,8 +1,9 @@
 # make demo   steel breaks glass: submitted over HTTP, run on 2 MPI ranks, watched live, checked, drawn (demo.png)
 # make test   linters, types and every test that takes seconds, in two halves at a time (the dots are of both)
 # make bench  speed, and speed against error, in 15 minutes: tables in build/bench (BENCH=quick: 2, BENCH=long: 60)
-# make accuracy  docs/accuracy.md: every row of the verification catalogue as measured here (ACCURACY=quick: no studies)
-# make reference  docs/case.md and the JSON schema, from the texts of the models in cases/
+# make accuracy  docs/verification/accuracy.md: every row of the verification catalogue as measured here (ACCURACY=quick: no studies)
+# make reference  docs/reference/case.md and the JSON schema, from the texts of the models in cases/; http.md, from the routes
+# make docs   the documentation as a site: build/site/index.html; a link that leads nowhere is an error
 # make drill  the long tests: faults by the hundred (table in build/drill; goes on where it was; DRILL="--shard 1/4"),
 #             then studies and failures that take minutes; root on Debian gets Slurm, libfaketime, systemd
 #
@@ -25,7 +26,7 @@ told = @echo "$(1)"; began=$$(date +%s); \
 	while sleep 5 >/dev/null 2>&1; do echo "$(1): $$(($$(date +%s) - began)) s"; done & clock=$$!; \
 	trap "kill $$clock" EXIT; $(2)
 
-.PHONY: demo test lint style types check kept check-solver check-services bench accuracy reference drill clean
+.PHONY: demo test lint style types check kept check-solver check-services bench accuracy reference docs drill clean
 .DEFAULT_GOAL := test
 
 demo: $(READY)
@@ -62,7 +63,13 @@ accuracy: $(READY)
 
 reference: $(READY)
 	$(BIN)/conoid schema --out cases/case.schema.json
-	$(BIN)/conoid schema --page --out docs/case.md
+	$(BIN)/conoid schema --page --out docs/reference/case.md
+	$(BIN)/python -m conoid.server.reference > docs/reference/http.md
+
+docs: $(READY)
+	@$(PIP) --no-deps -r docs/requirements.lock
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet
+	@echo "build/site/index.html"
 
 drill: $(READY)
 	@if [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null && ! { command -v slurmctld && command -v faketime && command -v systemd-analyze; } >/dev/null; then \

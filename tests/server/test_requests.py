@@ -16,7 +16,7 @@ from starlette.requests import Request
 from starlette.testclient import TestClient
 
 from conoid.cases.reference import json_schema
-from conoid.server import shapes
+from conoid.server import reference, shapes
 from conoid.server.app import ROUTERS, build_app, opened
 from conoid.server.connections import BODY
 from conoid.server.errors import ServiceError
@@ -26,6 +26,7 @@ from conoid.server.tokens import check_token, create_token
 
 from .running import TOML, Running, case_text
 
+ROOT = Path(__file__).parents[2]
 HEALTH = {"/healthz", "/readyz"}
 OPEN = {*HEALTH, "/v1/case.schema.json"}
 ROUTES = [
@@ -615,3 +616,9 @@ def test_the_log_of_a_run_that_has_ended_is_as_without_following(server: Running
     assert server.ann.http.get(f"/v1/runs/{run}/logs/0?follow=true").text == "a line\n"
     log.unlink()
     refusal(server.ann.http.get(f"/v1/runs/{run}/logs/0?follow=true"), 404, "not_found")
+
+
+def test_the_page_of_the_http_interface_is_what_make_reference_makes() -> None:
+    assert (ROOT / "docs" / "reference" / "http.md").read_text(encoding="utf-8") == reference.page(), (
+        "run: make reference"
+    )
