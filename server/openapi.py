@@ -64,6 +64,7 @@ ANSWERS: dict[tuple[str, str], dict[int, tuple[str, str]]] = {
     ("get", "/v1/runs/{run_id}/events"): {200: (_JSON, "EventPage")},
     ("get", "/v1/runs/{run_id}/stream"): {200: ("text/event-stream", ""), 204: ("", "")},
     ("get", "/v1/runs/{run_id}/history"): {200: (_JSON, "History"), 304: ("", "")},
+    ("get", "/v1/runs/{run_id}/columns"): {200: (_JSON, "History"), 304: ("", "")},
     ("get", "/v1/runs/{run_id}/snapshots"): {200: (_JSON, "Snapshots"), 304: ("", "")},
     ("get", "/v1/runs/{run_id}/snapshots/{n}"): {200: (_BYTES, ""), 304: ("", "")},
     ("get", "/v1/runs/{run_id}/logs/{rank}"): {200: (_TEXT, ""), 206: (_TEXT, ""), 304: ("", "")},
