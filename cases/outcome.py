@@ -21,11 +21,13 @@ class Check(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class Measured(msgspec.Struct, kw_only=True, frozen=True):
-    """What a probe has measured at the end."""
+    """What a probe has measured: at the end, and the extremes of all lines of the history (NaN: not known)."""
 
     name: str
     value: float
     unit: str = ""
+    least: float = math.nan
+    most: float = math.nan
 
 
 class Made(msgspec.Struct, kw_only=True, frozen=True):
@@ -150,7 +152,7 @@ class Outcome(msgspec.Struct, kw_only=True, frozen=True):
     """Per CPU-second and core."""
     reference: list[Check] = []
     probes: list[Measured] = []
-    """The last value of each probe."""
+    """The last value of each probe, the smallest and the largest."""
     warnings: list[str] = []
 
 

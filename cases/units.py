@@ -118,6 +118,16 @@ def parse_quantity(value: object, unit: str) -> float:
     return usable(number, f"{value!r} cannot be used: in SI units it")
 
 
+def written(value: object) -> tuple[str, str] | None:
+    """Number and unit of a quantity as they are written, the unit empty where there is none; None of what is no
+    quantity. Whether there is such a unit is not asked.
+    """
+    if isinstance(value, bool) or not isinstance(value, int | float | str):
+        return None
+    match = _QUANTITY.fullmatch(str(value)) if len(str(value)) <= _LONGEST else None
+    return (match[1], match[2]) if match is not None else None
+
+
 def usable(number: float, what: str = "it") -> float:
     """The number, if it is not beyond LARGEST either way; ``what`` says so. Raises ValueError."""
     if number and not 1.0 / LARGEST <= abs(number) <= LARGEST:

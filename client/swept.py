@@ -1,10 +1,11 @@
 """The table of a sweep as a picture: results over what was changed, a panel a result. With matplotlib."""
 
-import re
 from collections.abc import Mapping, Sequence
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+
+from conoid.cases.history import split
 
 from .errors import ClientError, UsageError
 
@@ -13,7 +14,6 @@ Row = Mapping[str, str]
 _COLOURS = ("#4c78a8", "#f58518", "#54a24b", "#e45756", "#72b7b2", "#b279a2", "#eeca3b", "#9d755d", "#ff9da6")
 _PANELS = 6
 """Results that are drawn when nobody names any. Chosen: as many as are read on one page."""
-_QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*")
 _FIRST = (
     "reference.",
     "probe.",
@@ -26,7 +26,7 @@ _FIRST = (
 )
 """What is drawn rather than other columns."""
 _NEVER = frozenset({"time", "elapsed", "cpu", "elements", "nodes", "worst_residual", "reference.worst_residual",
-                    "energy.residual", "energy.initial"})  # fmt: skip
+                    "energy.residual", "energy.initial", "steps", "warnings"})  # fmt: skip
 """What is drawn only when it is asked for: it tells of the machine or of the mesh."""
 
 
@@ -35,24 +35,29 @@ def figure(rows: Sequence[Row], keys: Sequence[str], x: str | None, columns: Seq
 
     One curve for each combination of the other keys. Raises ClientError.
     """
-    over = _axis(rows, keys, x)
-    shown = [_known(rows, name) for name in columns] or _telling(rows, keys)
+    titles = {split(title)[0]: title for title in rows[0]} if rows else {}
+    changed = {key: titles[key] for key in keys if key in titles}
+    if not changed:
+        raise ClientError("no run of the sweep is there any more")
+    over = _axis(rows, changed, x)
+    shown = [_known(rows, name) for name in columns] or _telling(rows, list(changed.values()))
     if not shown:
         raise ClientError("no run of the sweep has ended with a number that differs between its points")
     across = min(len(shown), 3)
     down = -(-len(shown) // across)
     made = Figure(figsize=(4.6 * across, 3.4 * down), layout="constrained")
-    others = [key for key in keys if key != over and len({row[key] for row in rows}) > 1]
+    others = [title for title in changed.values() if title != over and len({row[title] for row in rows}) > 1]
     for index, name in enumerate(shown):
         _panel(made.add_subplot(down, across, index + 1), rows, over, others, name)
     return made
 
 
-def _axis(rows: Sequence[Row], keys: Sequence[str], x: str | None) -> str:
-    if x is not None and x not in keys:
-        raise UsageError(f"x = {x!r}: the sweep changes {', '.join(keys)}")
-    varies = [key for key in keys if len({row[key] for row in rows}) > 1]
-    return x or next(iter([*varies, *keys]))
+def _axis(rows: Sequence[Row], changed: Mapping[str, str], x: str | None) -> str:
+    """The title of the column on the axis."""
+    if x is not None and x not in changed:
+        raise UsageError(f"x = {x!r}: the sweep changes {', '.join(changed)}")
+    varies = [title for title in changed.values() if len({row[title] for row in rows}) > 1]
+    return changed[x] if x is not None else next(iter([*varies, *changed.values()]))
 
 
 def _known(rows: Sequence[Row], name: str) -> str:
@@ -63,32 +68,37 @@ def _known(rows: Sequence[Row], name: str) -> str:
     return known[name]
 
 
-def _telling(rows: Sequence[Row], keys: Sequence[str]) -> list[str]:
+def _telling(rows: Sequence[Row], titles: Sequence[str]) -> list[str]:
     """The columns of numbers that differ between the points, the most telling ones first."""
 
     def differs(name: str) -> bool:
         found = {value for row in rows if (value := _number(row[name])) is not None}
         return len(found) > 1
 
-    left_out = {*keys, *_NEVER, "run", "digest"}
+    left_out = {*map(_bare, titles), *_NEVER, "run", "digest"}
     names = [name for name in rows[0] if _bare(name) not in left_out and differs(name)]
-    ranks = {name: next((n for n, first in enumerate(_FIRST) if name.startswith(first)), len(_FIRST)) for name in names}
-    return sorted(names, key=lambda name: ranks[name])[:_PANELS]
+    return sorted(names, key=_rank)[:_PANELS]
+
+
+def _rank(title: str) -> tuple[bool, int]:
+    """The least comes first; extremes of probes come last."""
+    first = next((n for n, begins in enumerate(_FIRST) if title.startswith(begins)), len(_FIRST))
+    return _bare(title).endswith((".min", ".max")), first
 
 
 def _panel(axes: Axes, rows: Sequence[Row], over: str, others: Sequence[str], name: str) -> None:
     curves: dict[str, list[Row]] = {}
     for row in rows:
         if _number(row[name]) is not None:
-            curves.setdefault(", ".join(f"{key} {row[key]}" for key in others), []).append(row)
-    unit, places = _places(rows, over)
+            curves.setdefault(", ".join(_valued(row, title) for title in others), []).append(row)
+    words, places = _places(rows, over)
     for number, (label, some) in enumerate(curves.items()):
         points = sorted((places[row[over]], _number(row[name]) or 0.0) for row in some)
         colour = _COLOURS[number % len(_COLOURS)]
         axes.plot(*zip(*points, strict=True), "o-", color=colour, markersize=4, linewidth=1.2, label=label)
-    if unit is None:
+    if words:
         axes.set_xticks(list(places.values()), list(places))
-    axes.set(xlabel=f"{over}, {unit}" if unit else over, ylabel=_labelled(name))
+    axes.set(xlabel=_labelled(over), ylabel=_labelled(name))
     axes.grid(alpha=0.3)
     if others:
         axes.legend(fontsize=7, frameon=False)
@@ -96,22 +106,26 @@ def _panel(axes: Axes, rows: Sequence[Row], over: str, others: Sequence[str], na
 
 def _bare(column: str) -> str:
     """The name of a column without its unit."""
-    return re.sub(r" \[[^]]*\]$", "", column)
+    return split(column)[0]
 
 
 def _labelled(column: str) -> str:
     """As an axis has it."""
-    return re.sub(r" \[([^]]*)\]$", r", \1", column.removeprefix("reference.").removeprefix("probe."))
+    name, unit = split(column.removeprefix("reference.").removeprefix("probe."))
+    return f"{name}, {unit}" if unit else name
 
 
-def _places(rows: Sequence[Row], over: str) -> tuple[str | None, dict[str, float]]:
-    """The unit of the values and where each lies; the unit is None where they are words, or have several units."""
+def _valued(row: Row, title: str) -> str:
+    """``run.ranks 2``, ``speed 200 m/s``."""
+    name, unit = split(title)
+    return f"{name} {row[title]} {unit}".strip()
+
+
+def _places(rows: Sequence[Row], over: str) -> tuple[bool, dict[str, float]]:
+    """Whether the values are words, and where each of them lies."""
     texts = list(dict.fromkeys(row[over] for row in rows))
-    found = [_QUANTITY.fullmatch(text) for text in texts]
-    units = {match[2] for match in found if match is not None}
-    if None in found or len(units) > 1:
-        return None, {text: float(place) for place, text in enumerate(texts)}
-    return units.pop(), {text: float(match[1]) for text, match in zip(texts, found, strict=True) if match is not None}
+    numbers = {text: value for text in texts if (value := _number(text)) is not None}
+    return (False, numbers) if len(numbers) == len(texts) else (True, {text: float(n) for n, text in enumerate(texts)})
 
 
 def _number(text: str) -> float | None:

@@ -1,6 +1,7 @@
 """From a case to an outcome, with the kernels loaded: build, advance, run the outputs, sum up."""
 
 import logging
+import math
 import resource
 import time
 from collections.abc import Sequence
@@ -31,7 +32,7 @@ from .loop import STOPS, Loop, Start
 from .migration import checkpoint
 from .migration.route import route
 from .output import rewind
-from .output.history import History
+from .output.history import History, extremes
 from .output.journal import Journal
 from .parallel.choice import Choice
 from .parallel.comm import Comm
@@ -44,6 +45,8 @@ from .timers import Timers, by_phase
 
 CHOSEN, ALL, PROJECT = "chosen", "all", "project"
 """What is done with the threads of a rank."""
+
+_UNKNOWN = (math.nan, math.nan)
 
 log = logging.getLogger("conoid.worker")
 
@@ -166,6 +169,17 @@ def _sharing(sim: Simulation) -> Sharing | None:
     )  # fmt: skip
 
 
+def _probes(loop: Loop, folder: Path) -> list[Measured]:
+    """Their last values, and on rank 0 the extremes of the history, which one that was restarted goes on writing."""
+    probes = loop.sim.case.probes
+    ends = extremes(folder, [probe.name for probe in probes]) if loop.sim.comm.rank == 0 else {}
+    found = []
+    for probe, value in zip(probes, loop.measured, strict=False):
+        least, most = ends.get(probe.name, _UNKNOWN)
+        found.append(Measured(name=probe.name, value=value, unit=FIELD_UNITS[probe.field], least=least, most=most))
+    return found
+
+
 def _sum_up(
     loop: Loop,
     folder: Path,
@@ -220,10 +234,7 @@ def _sum_up(
         without=without(sim.case), peak_memory=memory or [],
         element_updates_per_second=(loop.updates - start.updates) / total_cpu if total_cpu > 0.0 else 0.0,
         reference=checks,
-        probes=[
-            Measured(name=probe.name, value=value, unit=FIELD_UNITS[probe.field])
-            for probe, value in zip(sim.case.probes, loop.measured, strict=False)
-        ],
+        probes=_probes(loop, folder),
         warnings=[
             *borne(compressed), *start.warnings, *loop.warnings, *loop.lost,
             *sim.ledger.warnings(sim.case.numerics.dt_safety),

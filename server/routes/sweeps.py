@@ -1,17 +1,14 @@
 """Sweeps: hand in, look at, cancel, and the table of what came out."""
 
-import csv
-import io
-import re
 from collections import Counter
 from collections.abc import Sequence
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Header, Query, Response
 from fastapi.responses import JSONResponse
-from msgspec import structs
 
-from conoid.cases.outcome import Outcome, known
+from conoid.cases.points import Point, to_csv
+from conoid.cases.points import table as points_table
 
 from .. import openapi, view
 from ..auth import Identity, Reader, Submitter
@@ -58,27 +55,13 @@ def show(service: ServiceOf, identity: Reader, sweep_id: str) -> dict[str, Any]:
     return _shown(service, _find(service, identity, sweep_id))
 
 
-_FORMULA = re.compile(r"[=@\t\r]|[+-](?!(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?( [^\W\d][\w*/^ -]*)?$)")
-"""The beginning of a text that a spreadsheet computes. A number with a sign, and perhaps a unit, is not one."""
-
-
-def cell(value: Any) -> Any:
-    """A value of a CSV table. A text that a spreadsheet would compute gets an apostrophe, which makes it a text."""
-    return f"'{value}" if isinstance(value, str) and _FORMULA.match(value) else value
-
-
 @router.get("/v1/sweeps/{sweep_id}/table")
 @blocking
 def table(service: ServiceOf, identity: Reader, sweep_id: str) -> Response:
     """A line a point as CSV: what was changed, the state of the run, and its results as far as it has any."""
     plan = _find(service, identity, sweep_id)
-    lines = [_line(service, point, run) for point, run in _pairs(service, plan)]
-    out = io.StringIO()
-    columns = list(dict.fromkeys(name for line in lines for name in line))
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(cell(name) for name in columns)
-    writer.writerows([cell(line.get(name, "")) for name in columns] for line in lines)
-    return Response(out.getvalue(), media_type="text/csv; charset=utf-8")
+    points = [_point(service, values, run) for values, run in _pairs(service, plan)]
+    return Response(to_csv(points_table(points)), media_type="text/csv; charset=utf-8")
 
 
 @router.post("/v1/sweeps/{sweep_id}:cancel", status_code=202)
@@ -130,28 +113,6 @@ def _shown(service: Service, plan: Plan) -> dict[str, Any]:
     return {**_headed(plan, pairs), "points": points}
 
 
-def _line(service: Service, point: dict[str, Any], run: Run) -> dict[str, Any]:
+def _point(service: Service, values: dict[str, Any], run: Run) -> Point:
     ended = view.outcome(service.settings.runs / run.id) if run.state.final else None
-    values = {key: value if isinstance(value, int | float | str) else repr(value) for key, value in point.items()}
-    return {**values, "run": run.id, "state": run.state.value, "cause": run.cause or "", **_results(ended)}
-
-
-def _results(ended: Outcome | None) -> dict[str, Any]:
-    """The numbers of an outcome that stand alone, the terms of the energy, the references, the last values of the
-    probes; with units in brackets.
-    """
-    if ended is None:
-        return {}
-    names = ("elements", "nodes", "fragments", "broken", "eroded", "worst_residual")
-    times = {f"{name} [s]": getattr(ended, name) for name in ("time", "elapsed", "cpu")}
-    energy = {} if ended.energy is None else structs.asdict(ended.energy)
-    terms = {_with_unit(f"energy.{name}", "" if name == "residual" else "J"): joule for name, joule in energy.items()}
-    checks = {_with_unit(f"reference.{check.name}", check.unit): check.value for check in ended.reference}
-    probes = {_with_unit(f"probe.{each.name}", each.unit): each.value for each in ended.probes}
-    numbers = {"steps": ended.steps, **times, **{name: getattr(ended, name) for name in names}}
-    found = {**numbers, **terms, **checks, **probes}
-    return {**{name: "" if known(value) is None else value for name, value in found.items()}, "digest": ended.digest}
-
-
-def _with_unit(name: str, unit: str) -> str:
-    return f"{name} [{unit}]" if unit else name
+    return Point(values=values, run=run.id, state=run.state.value, cause=run.cause or "", outcome=ended)

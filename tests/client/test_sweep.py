@@ -81,7 +81,7 @@ def test_what_spreadsheets_write(tmp_path: Path) -> None:
 
 
 ROWS = [
-    {"v": f"{v} m/s", "run.ranks": str(ranks), "run": "r", "state": "succeeded", "cpu [s]": str(v),
+    {"v [m/s]": str(v), "run.ranks": str(ranks), "run": "r", "state": "succeeded", "cpu [s]": str(v),
      "fragments": str(v * v), "energy.plastic [J]": str(v + ranks), "eroded": "0", "digest": ""}
     for v in (100, 200, 300) for ranks in (1, 2)
 ]  # fmt: skip
@@ -96,7 +96,9 @@ def test_what_differs_is_drawn_over_what_was_changed() -> None:
 
 
 def test_words_on_the_axis_and_columns_by_name() -> None:
-    made = swept.figure([{**row, "v": f"law {row['v'][0]}"} for row in ROWS], ["v", "run.ranks"], "v", ["cpu"])
+    made = swept.figure(
+        [{**row, "v [m/s]": f"law {row['v [m/s]'][0]}"} for row in ROWS], ["v", "run.ranks"], "v", ["cpu"]
+    )
     assert [axes.get_ylabel() for axes in made.axes] == ["cpu, s"]
     assert [label.get_text() for label in made.axes[0].get_xticklabels()] == ["law 1", "law 2", "law 3"]
 

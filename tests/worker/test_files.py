@@ -1,6 +1,7 @@
 """Frames and histories as files: fields, units, times."""
 
 import csv
+import math
 import shutil
 from pathlib import Path
 
@@ -15,7 +16,7 @@ from conoid.worker.fracture.columns import FacetConstants, Facets, PairState, So
 from conoid.worker.output import frames, storage
 from conoid.worker.output.damage import spent_energy
 from conoid.worker.output.frames import principal
-from conoid.worker.output.history import History
+from conoid.worker.output.history import History, extremes
 from conoid.worker.output.journal import Journal
 from conoid.worker.output.losses import Losses
 from conoid.worker.output.rewind import rewind
@@ -60,6 +61,16 @@ def test_a_file_of_an_earlier_worker_keeps_its_columns(tmp_path: Path) -> None:
         head, line = csv.reader(file)
     assert dict(zip(head, line, strict=True))["push [N]"] == "7.0"
     assert not any(history.part_of(name) for name in head)
+
+
+def test_extremes_are_those_of_all_lines_that_have_a_number(tmp_path: Path) -> None:
+    table = History(tmp_path, {"push": "N", "hole": "m"})
+    for push, hole in ((7.0, math.nan), (-2.0, 3.0), (5.0, math.nan)):
+        table.write(1, 1e-7, 1e-7, "tet 1", ENERGY, [*MOMENTA, push, hole])
+    table.close()
+    found = extremes(tmp_path, ["push", "hole", "absent"])
+    assert (found["push"], found["hole"]) == ((-2.0, 7.0), (3.0, 3.0))
+    assert all(math.isnan(value) for value in (*found["absent"], *extremes(tmp_path / "gone", ["push"])["push"]))
 
 
 def test_a_file_of_the_run_that_is_gone_is_told_from_other_files(tmp_path: Path) -> None:

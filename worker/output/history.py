@@ -3,7 +3,8 @@ history.parquet, where pyarrow is there.
 """
 
 import csv
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import msgspec
@@ -52,6 +53,22 @@ def _head(path: Path) -> list[str]:
         return []
     with path.open(newline="", encoding="utf-8") as file:
         return next(csv.reader(file), [])
+
+
+def extremes(folder: Path, names: Sequence[str]) -> dict[str, tuple[float, float]]:
+    """The smallest and the largest number of each of these columns; NaN where there is none, or no file any more."""
+    found = dict.fromkeys(names, (math.nan, math.nan))
+    path = folder / layout.HISTORY
+    if not names or not path.exists():
+        return found
+    with path.open(newline="", encoding="utf-8") as file:
+        head = {history.split(text)[0]: k for k, text in enumerate(next(csv.reader(file), []))}
+        lines = list(csv.reader(file))
+    for name in head.keys() & found.keys():
+        values = [value for line in lines if not math.isnan(value := float(line[head[name]]))]
+        if values:
+            found[name] = min(values), max(values)
+    return found
 
 
 def write_parquet(path: Path) -> Path | None:
