@@ -9,6 +9,7 @@
       history.csv            time history: clock, ledger, probes; history.parquet at the end, where pyarrow is there
       frames/000012.vtkhdf   one file a frame      frames/frames.vtkhdf.series  for ParaView
       snapshots/000012.snap  surface and table of the fragments (cases/snapshot.py); snapshot.request asks for one
+      snapshots/000012.tets  all tets in few bytes, for sections; not of every snapshot
       checkpoints/000001200/ complete state, by global ids; checkpoint.request asks for one
       job.json, job.sh       the job of a batch system that runs it (cases/batch.py); stop.request ends it for good
       files/<sha256>.inp     the run's own copies of the files that its case names (cases/files.py)
@@ -29,6 +30,7 @@ CHECKPOINTS = "checkpoints"
 CHECKPOINT_REQUEST = "checkpoint.request"
 """Whoever makes this file asks the worker for a checkpoint; the worker takes it away."""
 SNAPSHOTS = "snapshots"
+TETS_SUFFIX = ".tets"
 SNAPSHOT_REQUEST = "snapshot.request"
 """Whoever makes this file asks the worker for a snapshot; the worker takes it away."""
 FILES = "files"
@@ -68,6 +70,11 @@ def checkpoint(folder: Path, step: int) -> Path:
 def snapshot(folder: Path, n: int) -> Path:
     """Path of snapshot ``n`` in the run folder ``folder``."""
     return folder / SNAPSHOTS / f"{n:06d}.snap"
+
+
+def snapshot_tets(folder: Path, n: int) -> Path:
+    """Path of all tets of snapshot ``n`` in the run folder ``folder``."""
+    return snapshot(folder, n).with_suffix(TETS_SUFFIX)
 
 
 def share(folder: Path, n: int, rank: int) -> Path:

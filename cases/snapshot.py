@@ -95,9 +95,12 @@ def pack(header: Header, columns: Mapping[str, Column]) -> bytes:
     return b"".join([MAGIC, VERSION.to_bytes(4, "little"), room.to_bytes(4, "little"), text, *blob])
 
 
-def header_of(blob: bytes | memoryview) -> Header:
-    """The header of a blob. Raises ValueError for what is no snapshot, or not whole."""
+def header_of(blob: bytes | memoryview, size: int | None = None) -> Header:
+    """The header of a blob, or of its beginning if ``size`` says how many bytes all of it has. Raises ValueError for
+    what is no snapshot, or not whole.
+    """
     data = memoryview(blob)
+    size = len(data) if size is None else size
     if bytes(data[:8]) != MAGIC:
         raise ValueError("not a snapshot: it does not begin with CONOSNAP")
     version, room = (int.from_bytes(data[at : at + 4], "little") for at in (8, 12))
@@ -108,7 +111,7 @@ def header_of(blob: bytes | memoryview) -> Header:
     except msgspec.MsgspecError as error:
         raise ValueError(f"the header of the snapshot cannot be read: {error}") from None
     for name, array in header.arrays.items():
-        if array.dtype not in TYPES or array.offset % 8 or array.offset + size_of(array) > len(data):
+        if array.dtype not in TYPES or array.offset % 8 or array.offset + size_of(array) > size:
             raise ValueError(f"the snapshot has no whole array {name!r}")
     return header
 

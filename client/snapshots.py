@@ -1,9 +1,11 @@
 """A snapshot of the fragments of a run, as numpy sees it; docs/reference/snapshots.md has its arrays."""
 
+import gzip
+import zlib
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from conoid.cases import snapshot
+from conoid.cases import layout, snapshot
 from conoid.cases.figures import counted, exact
 
 from .errors import ClientError
@@ -63,5 +65,9 @@ class Snapshot:
 
 
 def read(path: Path | str) -> Snapshot:
-    """The snapshot in a file. Raises OSError, ClientError."""
-    return Snapshot(Path(path).read_bytes())
+    """The snapshot in a file, or all tets of one (``.tets``). Raises OSError, ClientError."""
+    data = Path(path).read_bytes()
+    try:
+        return Snapshot(gzip.decompress(data) if Path(path).suffix == layout.TETS_SUFFIX else data)
+    except (EOFError, zlib.error) as error:
+        raise ClientError(f"{path}: {error}") from None

@@ -67,6 +67,8 @@ ANSWERS: dict[tuple[str, str], dict[int, tuple[str, str]]] = {
     ("get", "/v1/runs/{run_id}/columns"): {200: (_JSON, "History"), 304: ("", "")},
     ("get", "/v1/runs/{run_id}/snapshots"): {200: (_JSON, "Snapshots"), 304: ("", "")},
     ("get", "/v1/runs/{run_id}/snapshots/{n}"): {200: (_BYTES, ""), 304: ("", "")},
+    ("get", "/v1/runs/{run_id}/snapshots/{n}/tets"): {200: (_BYTES, ""), 304: ("", "")},
+    ("get", "/v1/runs/{run_id}/fragments/{label}"): {200: (_JSON, "FragmentCourse"), 304: ("", "")},
     ("get", "/v1/runs/{run_id}/logs/{rank}"): {200: (_TEXT, ""), 206: (_TEXT, ""), 304: ("", "")},
     ("get", "/v1/runs/{run_id}/files"): {200: (_JSON, "Files")},
     ("get", "/v1/runs/{run_id}/files/{path}"): {200: (_FILE, ""), 206: (_FILE, ""), 304: ("", "")},

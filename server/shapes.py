@@ -174,6 +174,18 @@ class Snapshots(msgspec.Struct, kw_only=True):
     snapshots: list[Snapshot]
 
 
+class FragmentCourse(msgspec.Struct, kw_only=True):
+    """A fragment in the snapshots that have it: their numbers and times in s, its mass in kg, speed in m/s, longest
+    side in m, tets."""
+
+    n: list[int]
+    t: list[float]
+    mass: list[float]
+    speed: list[float]
+    size: list[float]
+    tets: list[int]
+
+
 class History(msgspec.Struct, kw_only=True):
     """The course of a run, thinned."""
 
@@ -269,6 +281,6 @@ class Health(msgspec.Struct, kw_only=True):
 
 ALL = (
     Problem, Receipt, RunPage, RunStatus, Validation, Gallery, EventPage, Files, SentFile, SentFiles,
-    Snapshots, History, Me, Health, Wish,
+    Snapshots, FragmentCourse, History, Me, Health, Wish,
     SweepPage, Sweep,
 )  # fmt: skip

@@ -324,7 +324,7 @@ TELLS = {
     "worker/contact/common_volume.py", "worker/contact/inside.py", "worker/contact/overlap.py",
     "worker/fracture/fragments.py", "worker/gauges/shapes.py", "worker/groups.py", "worker/job.py", "worker/meter.py",
     "worker/output/fields.py", "worker/output/frames.py", "worker/penetration.py", "worker/reference.py",
-    "worker/snapshots/decimate.py", "worker/snapshots/table.py",
+    "worker/snapshots/decimate.py", "worker/snapshots/invariants.py", "worker/snapshots/table.py",
 }  # fmt: skip
 """They report, refuse and balance; what they compute is in no answer, but for parts that are pushed apart at the start
 (docs/theory/sums.md)."""

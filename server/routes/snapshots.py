@@ -1,5 +1,6 @@
 """Snapshots of the fragments of a run (docs/reference/snapshots.md)."""
 
+from pathlib import Path
 from typing import Annotated, Any
 
 import msgspec
@@ -9,7 +10,7 @@ from fastapi import Path as PathParameter
 from conoid.cases import layout
 from conoid.cases.messages import Snapshot
 
-from .. import download, series
+from .. import download, pieces, series
 from ..errors import not_found
 from ..events import Run
 from ..lanes import blocking
@@ -18,6 +19,7 @@ from .history import Known
 from .runs import OwnedRun
 
 router = APIRouter()
+Label = Annotated[int, PathParameter(ge=0, le=2**63 - 1, description="the number of the fragment")]
 Number = Annotated[int, PathParameter(ge=0, le=10**9, description="the number of the snapshot")]
 _TYPE = "application/octet-stream"
 _BYTES: dict[int | str, dict[str, Any]] = {
@@ -44,10 +46,39 @@ async def content(
 ) -> Response:
     """One snapshot, as docs/reference/snapshots.md has it; its ETag is its sha256, and it never changes."""
     told = await service.lanes.run(_told, service, run, n)
-    headers = {"ETag": f'"{told.sha256}"', "Cache-Control": "private, max-age=31536000, immutable"}
-    if download.is_known(headers["ETag"], if_none_match):
+    return await _sent(request, service, run, told.path, told.sha256, if_none_match)
+
+
+@router.get("/v1/runs/{run_id}/snapshots/{n}/tets", responses=_BYTES, response_class=Response)
+async def tets(request: Request, run: OwnedRun, service: ServiceOf, n: Number, if_none_match: Known = "") -> Response:
+    """All tets of a snapshot, for sections, packed by gzip; 404 where it has none."""
+    told = await service.lanes.run(_told, service, run, n)
+    if not told.tets:
+        raise not_found(f"the tets of snapshot {n} of run {run.id}")
+    path = str(Path(told.path).with_suffix(layout.TETS_SUFFIX))
+    return await _sent(request, service, run, path, f"{told.sha256}-tets", if_none_match)
+
+
+@router.get("/v1/runs/{run_id}/fragments/{label}")
+@blocking
+def fragment(run: OwnedRun, service: ServiceOf, label: Label, if_none_match: Known = "") -> Response:
+    """The course of a fragment over the snapshots of a run, over 200 of them at most: n, t in s, mass in kg, speed in
+    m/s, size in m, tets.
+    """
+    folder = service.settings.runs / run.id
+    found = service.histories.of(folder / layout.JOURNAL)
+    with found.lock:
+        found.catch_up()
+        told = [_decode(found.snapshots[n]) for n in sorted(found.snapshots)]
+    return download.tagged(msgspec.json.encode(pieces.course(folder, told, label)), if_none_match)
+
+
+async def _sent(request: Request, service: Service, run: Run, path: str, tag: str, known: str) -> Response:
+    """A file that never changes; its ETag is the ``tag``."""
+    headers = {"ETag": f'"{tag}"', "Cache-Control": "private, max-age=31536000, immutable"}
+    if download.is_known(headers["ETag"], known):
         return Response(status_code=304, headers=headers)
-    return await service.downloads.whole(request, service.settings.runs / run.id, told.path, headers, _TYPE)
+    return await service.downloads.whole(request, service.settings.runs / run.id, path, headers, _TYPE)
 
 
 def _told(service: Service, run: Run, n: int) -> Snapshot:

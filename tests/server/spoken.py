@@ -48,11 +48,11 @@ def told(reports: int, ranks: int = 2, every: int = 100) -> Iterator[messages.An
             yield snapshot(k // every, f"{k}", **at)
 
 
-def snapshot(n: int, text: str, **at: Any) -> messages.Snapshot:
-    data = text.encode()
+def snapshot(n: int, text: str | bytes, tets: int = 0, **at: Any) -> messages.Snapshot:
+    data = text.encode() if isinstance(text, str) else text
     return messages.Snapshot(
         **at, n=n, path=f"snapshots/{n:06d}.snap", bytes=len(data), triangles=4, fragments=7 + n,
-        sha256=hashlib.sha256(data).hexdigest(), cause="run.snapshots",
+        sha256=hashlib.sha256(data).hexdigest(), cause="run.snapshots", tets=tets,
     )  # fmt: skip
 
 

@@ -1,5 +1,6 @@
 """The history of a run and its snapshots over HTTP."""
 
+import struct
 import time
 from itertools import pairwise
 from pathlib import Path
@@ -10,6 +11,7 @@ import pytest
 
 from conoid.cases import layout, messages
 from conoid.cases.run import State
+from conoid.cases.snapshot import Column, Header, pack
 from conoid.server import history
 from conoid.server.history import History
 
@@ -153,6 +155,61 @@ def test_a_snapshot_that_the_journal_does_not_tell_of_is_not_there(server: Runni
     assert [one["n"] for one in server.ann.http.get(place).json()["snapshots"]] == [0]
     assert server.ann.http.get(f"{place}/7").status_code == 404
     assert server.ann.http.get(f"{place}/0").status_code == 404
+
+
+def test_all_tets_are_fetched_where_there_are_any(server: Running, run: str) -> None:
+    folder = server.ann.runs / run
+    at: dict[str, Any] = {"run": run, "step": 0, "t": 0.0, "wall": 0.0}
+    write(folder, iter([snapshot(0, "0", tets=4, **at), snapshot(1, "1", **at)]))
+    (folder / layout.SNAPSHOTS).mkdir()
+    layout.snapshot_tets(folder, 0).write_bytes(b"tets")
+    place = f"/v1/runs/{run}/snapshots"
+    got = server.ann.http.get(f"{place}/0/tets")
+    assert (got.status_code, got.content) == (200, b"tets")
+    again = server.ann.http.get(f"{place}/0/tets", headers={"If-None-Match": got.headers["ETag"]})
+    assert again.status_code == 304
+    assert [server.ann.http.get(f"{place}/{n}/tets").status_code for n in (1, 2)] == [404, 404]
+    assert server.bob.http.get(f"{place}/0/tets").status_code == 404
+
+
+def test_the_course_of_a_fragment_is_that_of_the_snapshots_that_have_it(server: Running, run: str) -> None:
+    folder = server.ann.runs / run
+    (folder / layout.SNAPSHOTS).mkdir()
+    made = []
+    for n in range(5):
+        data = tabled({1: 3.0 + n, 7: 2.0} if n else {7: 2.0})
+        layout.snapshot(folder, n).write_bytes(data if n < 4 else data[:200])  # the last is damaged
+        made.append(snapshot(n, data, run=run, step=n, t=1e-6 * n, wall=0.0))
+    write(folder, iter(made))
+    found = server.ann.http.get(f"/v1/runs/{run}/fragments/1")
+    assert found.json() == {
+        "n": [1, 2, 3], "t": [1e-6, 2e-6, 3e-6], "mass": [4.0, 5.0, 6.0], "speed": [5.0] * 3, "size": [0.5] * 3,
+        "tets": [10] * 3,
+    }  # fmt: skip
+    known = {"If-None-Match": found.headers["ETag"]}
+    assert server.ann.http.get(f"/v1/runs/{run}/fragments/1", headers=known).status_code == 304
+    assert server.ann.http.get(f"/v1/runs/{run}/fragments/2").json()["t"] == []
+    assert server.ann.http.get(f"/v1/runs/{run}/fragments/-1").status_code in {400, 422}
+    assert server.bob.http.get(f"/v1/runs/{run}/fragments/1").status_code == 404
+
+
+def tabled(masses: dict[int, float]) -> bytes:
+    """A snapshot with fragments of these masses by number, all 5 m/s fast, and nothing to see."""
+    n = len(masses)
+    header = Header(
+        n=0, step=0, t=0.0, box=((0.0,) * 3, (0.0,) * 3), ranks=1, parts=[], tets=0, surface_triangles=0,
+        fragments_total=n, fragments_listed=n, fields={},
+    )  # fmt: skip
+    columns: dict[str, tuple[str, str, list[Any]]] = {
+        "fragment_id": ("int64", "q", list(masses)), "fragment_mass": ("float64", "d", list(masses.values())),
+        "fragment_velocity": ("float32", "f", [3.0, 0.0, -4.0] * n), "fragment_size": ("float32", "f", [0.5] * n),
+        "fragment_tets": ("uint32", "I", [10] * n),
+    }  # fmt: skip
+    packed = {
+        name: Column(kind, (len(values),), struct.pack(f"<{len(values)}{letter}", *values))
+        for name, (kind, letter, values) in columns.items()
+    }
+    return pack(header, packed)
 
 
 def test_one_is_asked_for_while_it_runs(server: Running, tmp_path: Path) -> None:

@@ -1,10 +1,11 @@
-"""From a whole model to the bytes of a snapshot (cases/snapshot.py)."""
+"""From a whole model to the bytes of a snapshot (cases/snapshot.py), and to those of all its tets."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from msgspec.structs import replace
 
 from conoid.cases.snapshot import FIELD, Array, Column, Field, Header, pack, size_of
 
@@ -12,7 +13,7 @@ from ..fracture import connectivity
 from ..fracture.numbers import numbered
 from ..parallel.comm import SerialComm
 from ..state import Floats, Ints, Model
-from . import decimate, outline, table
+from . import arrows, decimate, outline, table, volume
 from .outline import Outline
 from .share import Whole
 
@@ -20,8 +21,15 @@ _VERTEX, _TRIANGLE = 6 + 4, 12 + 2 + 1
 """Bytes of a vertex, and of a triangle without its fields."""
 _HEADER = 200
 """Bytes that an array takes in the header and in filling up, at most."""
-UNITS = {"speed": "m/s", "broken_faces": "", "plastic_strain": "", "temperature": "K", "damage": ""}
+UNITS = {
+    "speed": "m/s", "broken_faces": "", "plastic_strain": "", "temperature": "K", "damage": "", "mises": "Pa",
+    "pressure": "Pa", "principal_stress": "Pa",
+}  # fmt: skip
 """Fields, and their units. ``broken_faces`` is the share of a tet's faces that have broken."""
+
+
+_PERCENTILES = 0, 2, 98, 100
+"""Chosen: without a few extreme triangles the others are told apart."""
 
 
 @dataclass(frozen=True)
@@ -37,11 +45,15 @@ class Made:
     """A snapshot, and what its journal line says besides."""
 
     data: bytes
+    tets: bytes
+    """All tets for sections, packed; empty where there are more than ``volume.MOST_TETS``, or none."""
     triangles: int
     fragments: int
     smallest: int
     """See ``table.by_size``, as the next."""
     sizes: list[int]
+    fields: dict[str, list[float]]
+    """Of each field its least value, what 2 % and what 98 % of the triangles are below, and its largest."""
 
 
 Births = Callable[[Ints], Floats]
@@ -54,32 +66,65 @@ def made(whole: Whole, told: dict[str, Any], births: Births, budget: Budget) -> 
     every = table.measured(whole, numbered(whole.numbers, labels, whole.next, SerialComm())[0])
     columns, row = table.columns(every, births(every.label))
     values, seen = _fields(whole), outline.find(whole.model, every.of)
-    room = budget.bytes - _bytes(columns) - _HEADER * (len(columns) + len(values) + 6)
+    room = budget.bytes - _bytes(columns) - arrows.MOST_BYTES - _HEADER * (len(columns) + len(values) + 8)
 
     def fits(tried: Outline) -> bool:
         each = _TRIANGLE + 1 + len(values)
         return len(tried.tet) <= budget.triangles and _VERTEX * len(tried.points) + each * len(tried.tet) <= room
 
     drawn = decimate.to_budget(seen, every.mass, budget.triangles, fits)
-    box, arrays = _drawn(whole, drawn, row)
-    fields = {}
-    for name, of in {"speed": _speed(whole.model, drawn), **{n: v[drawn.tet] for n, v in values.items()}}.items():
-        low, high, arrays[FIELD + name] = _in_bits(of)
-        fields[name] = Field(unit=UNITS[name], low=low, high=high)
+    velocity = _velocity(whole.model, drawn)
+    of = {"speed": _length(velocity), **{name: each[drawn.tet] for name, each in values.items()}}
+    fields, levels = _levels(of)
+    corners = np.concatenate([np.zeros((0, 4), np.int64), *(b.tets.astype(np.int64) for b in whole.model.blocks)])
+    box = _box(whole.model.nodes.x[corners.reshape(-1)])
     header = Header(
         **told, box=box, parts=whole.model.parts, tets=whole.model.elements_global, fields=fields,
         surface_triangles=len(seen.tet), fragments_total=len(every.label),
         fragments_listed=min(len(every.label), table.MOST_ROWS),
     )  # fmt: skip
-    data = pack(header, {name: _column(values) for name, values in (arrays | columns).items()})
-    return Made(data, len(drawn.tet), len(every.label), *table.by_size(every.size))
+    arrays = _drawn(whole, drawn, row, box) | arrows.chosen(drawn, velocity)
+    data = _packed(header, arrays | levels | columns)
+    tets = _tets(whole, header, corners, values, row[every.of]) if 0 < len(corners) <= volume.MOST_TETS else b""
+    return Made(data, tets, len(drawn.tet), len(every.label), *table.by_size(every.size), _ranges(of))
 
 
-def _drawn(whole: Whole, drawn: Outline, row: Ints) -> tuple[Any, dict[str, "np.ndarray"]]:
-    """The box, and the arrays of vertices and triangles but the fields; ``row`` (g,): of each fragment."""
-    box, positions = _in_box(drawn.points)
-    return box, {
-        "positions": positions, "triangles": drawn.triangles.astype(np.uint32),
+def _tets(whole: Whole, header: Header, corners: Ints, values: dict[str, Floats], row: Ints) -> bytes:
+    """All tets; ``corners`` (tets, 4): places of their nodes, ``row`` (tets,): of the fragment of each."""
+    places = _in_box(whole.model.nodes.x, header.box)
+    nodes, over, order = volume.ordered(places, corners)
+    every = {"speed": volume.speed(whole.model.nodes.v, corners), **values}
+    fields, levels = _levels({name: each[order] for name, each in every.items()})
+    arrays = {
+        "positions": places[nodes], "tet_steps": volume.steps(over), "tet_row": row[order].astype(np.uint16),
+        "tet_part": _parts(whole.model)[order],
+    }  # fmt: skip
+    return volume.packed(_packed(replace(header, fields=fields), arrays | levels))
+
+
+def _packed(header: Header, arrays: dict[str, "np.ndarray"]) -> bytes:
+    return pack(header, {name: _column(values) for name, values in arrays.items()})
+
+
+def _levels(of: dict[str, Floats]) -> tuple[dict[str, Field], dict[str, "np.ndarray"]]:
+    """What the header has of fields (m,), and their arrays."""
+    fields, arrays = {}, {}
+    for name, values in of.items():
+        low, high, arrays[FIELD + name] = _in_bits(values)
+        fields[name] = Field(unit=UNITS[name], low=low, high=high)
+    return fields, arrays
+
+
+def _ranges(of: dict[str, Floats]) -> dict[str, list[float]]:
+    """See ``Made.fields``."""
+    known = {name: values[np.isfinite(values)] for name, values in of.items()}
+    return {name: np.percentile(values, _PERCENTILES).tolist() for name, values in known.items() if len(values)}
+
+
+def _drawn(whole: Whole, drawn: Outline, row: Ints, box: Any) -> dict[str, "np.ndarray"]:
+    """The arrays of vertices and triangles but the fields; ``row`` (g,): of each fragment."""
+    return {
+        "positions": _in_box(drawn.points, box), "triangles": drawn.triangles.astype(np.uint32),
         "vertex_fragment": row[drawn.fragment].astype(np.uint32), "triangle_rank": whole.rank[drawn.tet],
         "triangle_part": _parts(whole.model)[drawn.tet],
     }  # fmt: skip
@@ -94,11 +139,14 @@ def _fields(whole: Whole) -> dict[str, Floats]:
     return values
 
 
-def _speed(model: Model, drawn: Outline) -> Floats:
-    """(m,) of the mean velocity of the nodes that a triangle had at first, m/s."""
+def _velocity(model: Model, drawn: Outline) -> Floats:
+    """(m, 3) m/s, the mean of the nodes that a triangle had at first."""
     v = model.nodes.v[drawn.faces]
-    mean = (v[:, 0] + v[:, 1] + v[:, 2]) / 3.0
-    return np.asarray(np.sqrt(mean[:, 0] ** 2 + mean[:, 1] ** 2 + mean[:, 2] ** 2))
+    return np.asarray((v[:, 0] + v[:, 1] + v[:, 2]) / 3.0)
+
+
+def _length(v: Floats) -> Floats:
+    return np.asarray(np.sqrt(v[:, 0] ** 2 + v[:, 1] ** 2 + v[:, 2] ** 2))
 
 
 def _parts(model: Model) -> "np.ndarray":
@@ -106,13 +154,18 @@ def _parts(model: Model) -> "np.ndarray":
     return np.concatenate([np.zeros(0, np.uint8), *parts])
 
 
-def _in_box(points: Floats) -> tuple[Any, "np.ndarray"]:
-    """Low and high corner of the box round the points, and (v, 3) uint16 places in it."""
+def _box(points: Floats) -> Any:
+    """Low and high corner of the box round the points."""
     if not len(points):
-        return ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)), np.zeros((0, 3), np.uint16)
-    low, high = points.min(axis=0), points.max(axis=0)
+        return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    return tuple(points.min(axis=0).tolist()), tuple(points.max(axis=0).tolist())
+
+
+def _in_box(points: Floats, box: Any) -> "np.ndarray":
+    """(v, 3) uint16 places in a box."""
+    low, high = np.array(box)
     places = np.rint((points - low) * (65535.0 / np.where(high > low, high - low, 1.0)))
-    return (tuple(low.tolist()), tuple(high.tolist())), np.clip(places, 0, 65535).astype(np.uint16)
+    return np.asarray(np.clip(places, 0, 65535).astype(np.uint16))
 
 
 def _in_bits(values: Floats) -> tuple[float, float, "np.ndarray"]:

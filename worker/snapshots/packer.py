@@ -25,6 +25,10 @@ _NICE, _LOWEST = 10, 19
 """By how much the priority is lowered: ranks have nine times the share of a core then. Chosen: the rest is enough. And
 the lowest there is.
 """
+_TETS = 256_000_000
+"""Bytes of all tets of all snapshots of a run, about: those of early ones leave room for later ones. Chosen: a hundred
+times 150,000 tets in 2,900 fragments.
+"""
 _PATIENCE = 60.0
 """s that the share of a rank may take to appear. Chosen: many times what a slow disk takes."""
 _LOOK = 0.005
@@ -70,8 +74,29 @@ def _made(folder: Path, task: dict[str, Any], births: Births) -> dict[str, Any]:
     return {
         "path": str(place.relative_to(folder)), "bytes": len(made.data), "triangles": made.triangles,
         "fragments": made.fragments, "sha256": hashlib.sha256(made.data).hexdigest(), "smallest": made.smallest,
-        "sizes": made.sizes,
+        "sizes": made.sizes, "tets": _with_tets(folder, task, made.tets),
+        "fields": made.fields,
     }  # fmt: skip
+
+
+def _with_tets(folder: Path, task: dict[str, Any], tets: bytes) -> int:
+    """Writes the tets of a snapshot where they have room; their bytes. Without them it has no sections."""
+    if not tets or not _may_keep(folder, task, len(tets)):
+        return 0
+    try:
+        whole_file.write(layout.snapshot_tets(folder, task["n"]), tets)
+    except OSError:
+        return 0
+    return len(tets)
+
+
+def _may_keep(folder: Path, task: dict[str, Any], size: int) -> bool:
+    """Whether ``size`` bytes of tets more leave room for those of later snapshots; the last one always has them."""
+    if task["cause"] == "end":
+        return True
+    kept = sum(path.stat().st_size for path in (folder / layout.SNAPSHOTS).glob(f"*{layout.TETS_SUFFIX}"))
+    passed = min(1.0, task["t"] / task["end"]) if task["end"] > 0.0 else 1.0
+    return kept + size <= max(size, _TETS * passed)
 
 
 def _awaited(path: Path) -> share.Share:

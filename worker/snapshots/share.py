@@ -15,10 +15,14 @@ from conoid.cases.whole import named
 
 from ..fracture.numbers import UNKNOWN
 from ..ids import located
-from ..state import DAMAGE, MASS, PLASTIC_STRAIN, TEMPERATURE, Block, Floats, Ints, Model, Nodes
+from ..state import DAMAGE, MASS, PLASTIC_STRAIN, PRESSURE, S_XX, TEMPERATURE, Block, Floats, Ints, Model, Nodes
+from . import invariants
 
 ROWS = {"plastic_strain": PLASTIC_STRAIN, "temperature": TEMPERATURE, "damage": DAMAGE}
 """Rows of the state of tets that become fields, where a block has them."""
+_STRESSES = PRESSURE + 1 - S_XX
+_STRESS = slice(S_XX, PRESSURE + 1)
+"""Of the rows of the state: the deviatoric stress and the pressure."""
 Share = dict[str, "np.ndarray"]
 """Arrays by name; those of block k begin with ``k.``."""
 
@@ -36,6 +40,7 @@ def copied(
     for k, block in enumerate(model.blocks):
         share[f"{k}.part"] = np.array([block.part])
         share[f"{k}.mass"] = block.row(MASS)
+        share[f"{k}.stress"] = block.state[:, _STRESS, :].astype(np.float32)
         for name in ("id", "tets", "across", "bond"):
             share[f"{k}.{name}"] = getattr(block, name).copy()
         for name, row in ROWS.items():
@@ -78,7 +83,7 @@ class Whole:
     rank: "np.ndarray"
     """(tets,) uint16."""
     rows: dict[str, Floats]
-    """(tets,) each of ``ROWS`` that some block has; 0 where it has not."""
+    """(tets,) each of ``ROWS`` that some block has, 0 where it has not, and the invariants of the stress."""
     numbers: Ints
     """(tets,) of the fragments of the last frame."""
     initial: int
@@ -98,13 +103,14 @@ def joined(shares: Sequence[Share], parts: list[str]) -> Whole:
     )  # fmt: skip
     gathered = [_block(shares, part, ids) for part in range(len(parts))]
     blocks = [block for block, _ in gathered if block.n]
-    columns = {
-        name: np.concatenate([column[name] for _, column in gathered]) for name in ("mass", "rank", "fragment", *ROWS)
-    }
+    names = "mass", "rank", "fragment", "stress", *ROWS
+    columns = {name: np.concatenate([column[name] for _, column in gathered]) for name in names}
     some = {name.partition(".")[2] for share in shares for name in share}
     held = np.concatenate([share["held"] for share in shares])
     total = sum(block.n for block in blocks)
     rows = {name: columns[name] for name in ROWS if name in some}
+    if "stress" in some:
+        rows |= invariants.of(columns["stress"].T)
     initial, following = shares[0]["numbers"].tolist()
     return Whole(
         Model(nodes, blocks, parts, total, n), held, columns["mass"], columns["rank"], rows,
@@ -132,6 +138,8 @@ def _block(shares: Sequence[Share], part: int, ids: Ints) -> tuple[Block, dict[s
     corners = [located(ids, nodes)[block["tets"]] for _, block, nodes in found]
     tets = (np.concatenate(corners)[order] if corners else nowhere).astype(np.uint32)
     columns = {name: column(name, np.zeros(0)) for name in ("mass", *ROWS)}
+    stresses = [_by_tet(b["stress"], len(b["id"])) for _, b, _ in found if "stress" in b]
+    columns["stress"] = np.concatenate(stresses)[order] if stresses else np.zeros((len(tet), _STRESSES), np.float32)
     columns["fragment"] = column("fragment", np.zeros(0, np.int64), UNKNOWN)
     ranks = np.concatenate([np.zeros(0, np.uint16), *(np.full(len(b["id"]), rank, np.uint16) for rank, b, _ in found)])
     bond = column("bond", nowhere.astype(np.uint8))
@@ -140,6 +148,11 @@ def _block(shares: Sequence[Share], part: int, ids: Ints) -> tuple[Block, dict[s
         across=column("across", nowhere), bond=bond,
     )  # fmt: skip
     return made, {**columns, "rank": ranks[order]}
+
+
+def _by_tet(stress: "np.ndarray", n: int) -> "np.ndarray":
+    """(n, 7) of (chunks, 7, CHUNK)."""
+    return stress.transpose(0, 2, 1).reshape(-1, _STRESSES)[:n]
 
 
 def _blocks(share: Share) -> int:

@@ -145,5 +145,5 @@ def _clear(folder: Path, n: int) -> None:
     place = folder / layout.SNAPSHOTS
     place.mkdir(exist_ok=True)
     for path in place.iterdir():
-        if path.suffix != ".snap" or not path.stem.isdigit() or int(path.stem) >= n:
+        if path.suffix not in {".snap", layout.TETS_SUFFIX} or not path.stem.isdigit() or int(path.stem) >= n:
             path.unlink(missing_ok=True)

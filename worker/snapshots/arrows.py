@@ -1,0 +1,36 @@
+"""Velocities for arrows: of a few triangles that are spread evenly over what is drawn."""
+
+import numpy as np
+
+from ..state import Floats, Ints
+from .outline import Outline
+
+_MOST = 1000
+"""Arrows. Chosen: more hide the body."""
+MOST_BYTES = _MOST * (4 + 3 * 4)
+_LEVELS = 6
+"""Grids of cells that are tried, from 2^6 along the longest side on."""
+
+
+def chosen(drawn: Outline, velocity: Floats) -> dict[str, "np.ndarray"]:
+    """The arrays of a snapshot: which triangles, and their velocities; ``velocity`` (m, 3): of each, m/s.
+
+    They are the first ones of the cells of the finest grid that has ``_MOST`` cells with a triangle, at most.
+    """
+    rows = np.zeros(0, np.int64)
+    if len(drawn.tet):
+        corners = drawn.points[drawn.triangles]
+        middle = (corners[:, 0] + corners[:, 1] + corners[:, 2]) / 3.0
+        rows = _spread(middle - middle.min(axis=0))
+    return {"arrow_triangle": rows.astype(np.uint32), "arrow_velocity": velocity[rows].astype(np.float32)}
+
+
+def _spread(places: Floats) -> Ints:
+    longest = float(places.max()) or 1.0
+    for level in range(_LEVELS, -1, -1):
+        side = 2**level
+        cell = np.minimum((places * (side / longest)).astype(np.int64), side - 1)
+        found = np.unique((cell[:, 0] * side + cell[:, 1]) * side + cell[:, 2], return_index=True)[1]
+        if len(found) <= _MOST:
+            break
+    return np.sort(found)
