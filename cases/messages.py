@@ -240,7 +240,7 @@ class Snapshot(Message, frozen=True):
     tets: int = 0
     """Bytes of its file of all tets; 0 where it has none."""
     fields: dict[str, list[float]] = {}
-    """Of each field its least value, what 2 % and what 98 % of the triangles are below, and its largest."""
+    """Of each field its least value, what 0.5 % and what 99.5 % of the triangles are below, and its largest."""
 
 
 class Fragments(Snapshot, tag="snapshot", kw_only=True, frozen=True):

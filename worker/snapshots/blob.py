@@ -28,7 +28,7 @@ UNITS = {
 """Fields, and their units. ``broken_faces`` is the share of a tet's faces that have broken."""
 
 
-_PERCENTILES = 0, 2, 98, 100
+_PERCENTILES = 0.0, 0.5, 99.5, 100.0
 """Chosen: without a few extreme triangles the others are told apart."""
 
 
@@ -53,7 +53,7 @@ class Made:
     """See ``table.by_size``, as the next."""
     sizes: list[int]
     fields: dict[str, list[float]]
-    """Of each field its least value, what 2 % and what 98 % of the triangles are below, and its largest."""
+    """Of each field its least value, what 0.5 % and what 99.5 % of the triangles are below, and its largest."""
 
 
 Births = Callable[[Ints], Floats]
