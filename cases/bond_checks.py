@@ -2,13 +2,14 @@
 
 from collections.abc import Iterator
 
-from .bodies import Box, Cylinder, Loose, MeshFile, Plate, Sphere, Tube
+from .bodies import Box, Loose, MeshFile, Plate
 from .bonds import Bonded, SharedBond
 from .boundaries import Gravity
 from .joined import bodies, breakable, shared_bonds
 from .problems import Location, Problem, problem
 from .schema import Case, Part
 from .similar import choices, nearest
+from .solids import Stl
 
 
 def check_bonds(case: Case) -> Iterator[Problem]:
@@ -104,10 +105,8 @@ def _meshes(one: Part, other: Part, breaks: bool, location: Location) -> Iterato
     elif one.mesh.generator == "structured" and not all(isinstance(mesh, Box | Plate) for mesh in pair):
         message = f"structured meshes have nodes in common where both are boxes or plates; use gmsh, or {way}"
         yield problem(location, names, message)
-    elif one.mesh.generator == "gmsh" and not all(
-        isinstance(mesh, Box | Plate | Cylinder | Tube | Sphere) for mesh in pair
-    ):
-        message = f"boxes, plates, cylinders, tubes and spheres are meshed together; take both from a file, or {way}"
+    elif any(isinstance(mesh, Stl) for mesh in pair):
+        message = f"the surface of an STL file is meshed alone; take both from one STEP or mesh file, or {way}"
         yield problem(location, names, message)
     worn = [part.name for part in (one, other) if part.erosion is not None]
     if breaks and worn:

@@ -7,6 +7,10 @@ from pydantic import Field
 from .tables import Model, Name, Positive
 from .units import FractureEnergy, Length, Stress
 
+GAP = 0.1
+"""Of the size of the smaller of two faces, square root of twice its area: the largest distance that is bonded where the
+case names none. Chosen: chords of a circle of 16 sides are 0.05 of a side from it."""
+
 
 class Bonded(Model):
     """What all bonds have in common: the two parts, and what it takes to part them."""
@@ -48,8 +52,8 @@ class Bonded(Model):
 
 class SharedBond(Bonded):
     """Two parts whose meshes have the nodes of the interface in common: one body of two materials, without contact at
-    the interface. The parts are groups of one mesh file that share nodes, or generated shapes that touch and are meshed
-    together.
+    the interface. The parts are groups of one mesh file that share nodes, or shapes, combinations and solids of CAD
+    files that touch and are meshed together.
     """
 
     kind: Literal["shared"]

@@ -16,7 +16,7 @@ from .library import library
 from .materials import Material, Strength
 from .mesh_checks import check_mesh
 from .on import check_ons
-from .overlap import overlaps
+from .overlap import bond_gaps, overlaps
 from .probe_checks import check_probes
 from .problems import Location, Problem, dotted, problem
 from .rigid_checks import check_rigid
@@ -69,7 +69,15 @@ def check_parts(data: Mapping[str, Any]) -> Iterator[Problem]:
         if part is not None and not found:
             parts.append((i, part))
     spec = data.get("contact")
-    yield from overlaps(parts, None if spec == "none" else _read(Contact, spec) or Contact())
+    yield from overlaps(parts, None if spec == "none" else _read(Contact, spec) or Contact(), _tied(data.get("bond")))
+
+
+def _tied(bonds: object) -> dict[frozenset[str], float]:
+    """The names that bonds name: how far these overlap is asked once the case is read."""
+    listed = bonds if isinstance(bonds, list | tuple) else ()
+    names = [each.get("parts") for each in listed if isinstance(each, Mapping)]
+    pairs = [pair for pair in names if isinstance(pair, list | tuple) and all(isinstance(name, str) for name in pair)]
+    return {frozenset(pair): math.inf for pair in pairs}
 
 
 def _read(model: type[Read], value: object) -> Read | None:
@@ -81,7 +89,7 @@ def _read(model: type[Read], value: object) -> Read | None:
 
 def _overlaps(case: Case) -> Iterator[Problem]:
     sound = ((i, part) for i, part in enumerate(case.parts) if not any(check_mesh(part.mesh, ())))
-    yield from overlaps(sound, case.contact)
+    yield from overlaps(sound, case.contact, bond_gaps(case))
 
 
 def _materials(case: Case) -> Iterator[Problem]:

@@ -1,15 +1,17 @@
 """Primitives that overlap before anything is meshed."""
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from itertools import combinations, islice, permutations
 
 from .bodies import Cylinder, Loose, RingSector, Sphere, Tube
+from .bonds import GAP, TiedBond
 from .geometry import Generated, Vector
+from .joined import bodies
 from .placed import Placed, lattice
 from .problems import Problem, problem
 from .profile import Revolved, profile
-from .schema import Contact, Part
+from .schema import Case, Contact, Part
 from .solids import Measured
 
 _POINTS = 12
@@ -21,8 +23,11 @@ _TOUCH = 1e-9
 """Of the size of a body: what reaches no further into another touches it. Far above rounding, far below any gap."""
 
 
-def overlaps(parts: Iterable[tuple[int, Part]], contact: Contact | None) -> Iterator[Problem]:
-    """A problem for each of the numbered ``parts`` that overlaps an earlier one which it meets.
+def overlaps(
+    parts: Iterable[tuple[int, Part]], contact: Contact | None, tied: Mapping[frozenset[str], float]
+) -> Iterator[Problem]:
+    """A problem for each of the numbered ``parts`` that overlaps an earlier one which it meets. ``tied``: how far parts
+    that a tied bond joins may overlap, m, by their names: their nodes are moved onto each other's faces.
 
     Curved bodies count as far as no facet of their mesh can cut them off; loose tets and mesh files do not count.
     """
@@ -36,26 +41,44 @@ def overlaps(parts: Iterable[tuple[int, Part]], contact: Contact | None) -> Iter
     ]
     near = ((a, b, box) for a, b in combinations(solid, 2) if (box := _common(a[3], b[3])) is not None)
     for (i, first, one, _), (j, second, other, _), box in islice(near, _PAIRS):
-        depth = _depth(one, other, *box)
-        if depth > 0.0:
+        depth, gap = _depth(one, other, *box), tied.get(frozenset((first.name, second.name)))
+        if depth > (gap or 0.0):
             way = "move them apart, or set contact.overlap = 'push'"
+            if gap is not None:
+                way = f"the gap of their bond, {gap:.2g} m, is less; move them apart, or raise it"
             message = f"{second.name!r} overlaps parts[{i}], {first.name!r}, by about {depth:.2g} m or more; {way}"
             yield problem(("parts", j, "mesh"), ..., message)
 
 
-def grazes(parts: Iterable[tuple[int, Part]], contact: Contact | None) -> Iterator[Problem]:
-    """A doubt for each of the numbered ``parts`` that fills the hole of another but for what facets may cut off the
-    tube there: two circles of one radius become polygons that overlap.
+def bond_gaps(case: Case) -> dict[frozenset[str], float]:
+    """How far two parts may overlap that a tied bond joins, m, by their names: by its gap."""
+    sizes = {part.name: getattr(part.mesh, "element_size", math.inf) for part in case.parts}
+    found = dict[frozenset[str], float]()
+    for bond in case.bond:
+        if isinstance(bond, TiedBond):
+            least = GAP * min(sizes.get(name, math.inf) for name in bond.parts)
+            found[frozenset(bond.parts)] = bond.gap if bond.gap is not None else least
+    return found
+
+
+def grazes(case: Case) -> Iterator[Problem]:
+    """A doubt for each part that fills the hole of another but for what facets may cut off the tube there: two circles
+    of one radius become polygons that overlap. Of one body they have facets in common, and what is tied is moved onto
+    the other's.
     """
+    contact, body = case.contact, bodies(case)
     if contact is None or contact.overlap != "refuse":
         return
     round_ones = [
         (i, part, part.mesh)
-        for i, part in parts
+        for i, part in enumerate(case.parts)
         if isinstance(part.mesh, Cylinder | Tube) and (not contact.parts or part.name in contact.parts)
     ]
+    tied = {frozenset(bond.parts) for bond in case.bond}
     for (i, outer, tube), (j, inner, rod) in permutations(round_ones, 2):
         if not isinstance(tube, Tube) or tube.axis != rod.axis or outer.turn != inner.turn:
+            continue
+        if body[i] == body[j] or {outer.name, inner.name} in tied:
             continue
         along = "xyz".index(tube.axis)
         off = math.hypot(*(tube.base[k] - rod.base[k] for k in range(3) if k != along))

@@ -16,7 +16,6 @@ from .driven import passing
 from .estimate import Estimate
 from .idle import unloaded
 from .impact import impact_speeds, wave_speed
-from .joined import bodies
 from .library import material
 from .materials import Material
 from .overlap import grazes
@@ -24,7 +23,7 @@ from .problems import Location, Problem, problem
 from .quantities import unit_of_reference
 from .reach import cut_bodies, scant_probes
 from .reference import Schema, definition, json_schema, variants
-from .schema import Case, Part
+from .schema import Case
 from .stiff import stiff
 from .units import QUANTITY
 
@@ -61,12 +60,6 @@ def doubts(data: Mapping[str, Any], case: Case, expected: Estimate) -> list[Prob
     return [*bare_numbers(data), *oddities(case, expected)]
 
 
-def _apart(case: Case) -> list[tuple[int, Part]]:
-    """The parts that are bodies of their own, by number: shapes that are meshed together do not overlap."""
-    of = bodies(case)
-    return [(i, part) for i, part in enumerate(case.parts) if of.count(of[i]) == 1]
-
-
 def oddities(case: Case, expected: Estimate) -> list[Problem]:
     """Those that do not depend on how the case is written."""
     return [
@@ -76,7 +69,7 @@ def oddities(case: Case, expected: Estimate) -> list[Problem]:
         *_shocks(case),
         *crushed(case),
         *damped(case),
-        *grazes(_apart(case), case.contact),
+        *grazes(case),
         *strangers(case),
         *passing(case),
         *unloaded(case),

@@ -10,8 +10,6 @@ from pathlib import Path
 import numpy as np
 
 from conoid.cases import schema
-from conoid.cases.bodies import Mesh, Symmetric
-from conoid.cases.joined import bodies
 from conoid.cases.library import material as find_material
 from conoid.cases.solids import Measured
 from conoid.cases.survey import Survey
@@ -19,13 +17,14 @@ from conoid.cases.survey import Survey
 from . import selection, surface_pressure
 from .bonds import interface
 from .bonds.pieces import Pieces
+from .bonds.sunk import sunk
 from .contact import overlap, pairing
 from .errors import InputError
 from .facts import Facts
 from .hashing import uniform
+from .joint import asked, built_together, grouped
 from .marks import Marks, marks
 from .mesh.build import build as build_mesh
-from .mesh.build import build_together
 from .mesh.faces import FACES, across, normals
 from .mesh.model import TetMesh
 from .pieces import UNSEEN
@@ -92,27 +91,12 @@ def _built(case: schema.Case, folder: Path, say: Say, facts: Facts) -> Iterator[
     for index, part in enumerate(case.parts):
         said = partial(say, f"meshing {part.name}, part {index + 1} of {len(case.parts)}")
         key = f"parts[{index}].mesh"
-        if index not in joint and len(group := _together(case, index)) > 1:
-            joint |= zip(group, build_together([_asked(case.parts[i]) for i in group], key, made=said), strict=True)
-        mesh = joint.get(index) or build_mesh(_asked(part), folder, key=key, made=said)
+        if index not in joint and len(group := grouped(case, index)) > 1:
+            joint |= built_together(case, group, folder, said)
+        mesh = joint.get(index) or build_mesh(asked(part), folder, key=key, made=said)
         if isinstance(part.mesh, Measured):
             facts.take(index, mesh)
         yield index, mesh
-
-
-def _together(case: schema.Case, index: int) -> list[int]:
-    """The parts that gmsh meshes together with one: those of its body that it makes."""
-    body = bodies(case)
-    made = [not isinstance(part.mesh, Measured) and part.mesh.generator == "gmsh" for part in case.parts]
-    return [i for i, of in enumerate(body) if of == body[index] and made[i]] if made[index] else []
-
-
-def _asked(part: schema.Part) -> Mesh:
-    """The mesh of a part, with the default that its erosion decides."""
-    mesh = part.mesh
-    if isinstance(mesh, Symmetric) and mesh.aligned is None:
-        return mesh.model_copy(update={"aligned": part.erosion is not None})
-    return mesh
 
 
 def assembled(case: schema.Case, meshes: Iterable[tuple[int, TetMesh]], overlaps: bool = True) -> Whole:
@@ -130,7 +114,8 @@ def assembled(case: schema.Case, meshes: Iterable[tuple[int, TetMesh]], overlaps
     if overlaps and interface.tied_pairs(case):
         exposed = (made.across if len(made.across) else across(t)) < 0
         joined = interface.find(case, x, t, part_of_tet, exposed)
-        x, tied, warnings = joined.x, joined.pieces, [*warnings, *joined.warnings]
+        x, tied = joined.x, joined.pieces
+        warnings += [*joined.warnings, *sunk(case, x, t, part_of_tet, exposed, tied)]
     volumes = _volumes(x, t)
     masses = volumes * np.array([find_material(case, part.material).density for part in case.parts])[part_of_tet]
     shares = _shares(case, made, masses)

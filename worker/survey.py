@@ -17,6 +17,7 @@ from . import compile as ahead
 from . import counting, kernels
 from .errors import ConoidError
 from .facts import Facts
+from .joint import built_together, grouped
 from .mesh.build import build
 from .mesh.child import Limits, limit
 from .mesh.model import TetMesh
@@ -34,11 +35,11 @@ def surveyed(case: Case, folder: Path, compiled: bool = True) -> Survey:
         if not isinstance(part.mesh, Measured):
             continue
         try:
-            mesh = build(part.mesh, folder, key=f"parts[{index}].mesh")
+            meshes |= _made(case, index, folder, meshes)
         except ConoidError as error:
-            refused.append(str(error))
+            refused += [] if str(error) in refused else [str(error)]
             continue
-        meshes[index] = mesh
+        mesh = meshes[index]
         facts.take(index, mesh)
         if mesh.origin is not None:
             placed.append((index, mesh.origin, turned(mesh.points, part.turn)))
@@ -54,6 +55,16 @@ def surveyed(case: Case, folder: Path, compiled: bool = True) -> Survey:
     except ConoidError as error:
         return Survey(parts=facts.parts, loads=loads, refused=[str(error)])
     return Survey(parts=facts.parts, loads=loads, touching=facts.survey().touching, told=told)
+
+
+def _made(case: Case, index: int, folder: Path, there: dict[int, TetMesh]) -> dict[int, TetMesh]:
+    """The mesh of a part, and of those that are meshed together with it, where they are not ``there`` yet."""
+    if index in there:
+        return {}
+    group = grouped(case, index)
+    if len(group) > 1:
+        return built_together(case, group, folder)
+    return {index: build(case.parts[index].mesh, folder, key=f"parts[{index}].mesh")}
 
 
 def _begun(case: Case, meshes: dict[int, TetMesh], compiled: bool) -> list[str]:

@@ -1,10 +1,15 @@
 """What is tied at the start: areas and integrals to rounding, a constant stress between any meshes, gaps."""
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scipy.spatial import Delaunay
 
 from conoid.cases import load
+from conoid.cases.load import parse_case
+from conoid.worker.assembly import assemble
 from conoid.worker.bonds import clipping, interface
 from conoid.worker.bonds.rows import Rows, assembled
 from conoid.worker.errors import InputError
@@ -13,6 +18,7 @@ from conoid.worker.mesh.model import TetMesh
 
 from ..worker.meshes import Floats, block
 from . import scenes
+from .scenes import BOND, built, start
 
 
 def turned(x: Floats, seed: int) -> Floats:
@@ -98,6 +104,21 @@ def test_the_finer_surface_lies_on_the_other_one() -> None:
     np.testing.assert_allclose(found.x[rows.node, 2], 2.0, rtol=0.0, atol=1e-13)
     np.testing.assert_allclose(found.x[rows.node, :2], x[rows.node, :2], rtol=0.0, atol=1e-13)
     assert len(np.unique(rows.node)) == 100
+
+
+def test_parts_that_overlap_by_more_than_the_gap_are_refused_and_nodes_that_are_left_out_counted() -> None:
+    """Facets of 2.5 mm cut 0.2 mm off the hole of a tube, where those of the rod in it are finer."""
+    below = scenes.block("below", (0, 0, -4), (8, 8, 0), 2)
+    above = scenes.block("above", (0, 0, -0.3), (8, 8, 4), 1.3)
+    with pytest.raises(InputError, match=r"^bond\[0\].gap = 0.000\d* m: 'below' and 'above' overlap by 0.0003 m or"):
+        built('contact = "none"\n' + start(1e-6) + below + above + BOND)
+    rod = {"shape": "cylinder", "radius": "4 mm", "length": "10 mm", "element_size": "1 mm"}
+    tube = {"shape": "tube", "inner_radius": "4 mm", "radius": "7 mm", "length": "10 mm", "element_size": "2.5 mm"}
+    parts = [{"name": name, "material": "steel", "mesh": mesh} for name, mesh in (("rod", rod), ("tube", tube))]
+    data = {"name": "joint", "run": {"end_time": "1 us"}, "parts": parts, "contact": "none"}
+    whole = assemble(parse_case({**data, "bond": [{"parts": ["rod", "tube"], "kind": "tied"}]}), Path())
+    (line,) = whole.warnings
+    assert re.match(r"bond\[0\]: \d+ nodes of 'rod' are not tied: they lie up to 0.000\d* m inside 'tube', more", line)
 
 
 def test_what_is_too_far_is_refused_or_counted() -> None:

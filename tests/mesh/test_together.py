@@ -6,10 +6,17 @@ from typing import Any
 import numpy as np
 import pytest
 
+from conoid.cases.bodies import Ogive
+from conoid.cases.geometry import volume
 from conoid.cases.load import parse_case
+from conoid.cases.problems import CaseError
+from conoid.cases.schema import Case
 from conoid.worker.assembly import Whole, assemble
 from conoid.worker.errors import InputError, MeshError
 from conoid.worker.mesh.faces import FACES, across, areas
+from conoid.worker.survey import surveyed
+
+from .cad_files import written
 
 PLATE = {"shape": "plate", "width": "20 mm", "height": "20 mm", "thickness": "5 mm", "element_size": "4 mm"}
 ROD = {"shape": "cylinder", "radius": "4 mm", "length": "10 mm", "element_size": "2.5 mm", "axis": "x"}
@@ -17,10 +24,15 @@ TUBE = {"shape": "tube", "inner_radius": "4 mm", "radius": "7 mm", "length": "10
         "axis": "x"}  # fmt: skip
 
 
-def joined(one: dict[str, Any], other: dict[str, Any]) -> Whole:
+def case(one: dict[str, Any], other: dict[str, Any], planes: str = "") -> Case:
     parts = [{"name": name, "material": "steel", "mesh": mesh} for name, mesh in (("one", one), ("other", other))]
-    data = {"name": "joint", "run": {"end_time": "1 us"}, "parts": parts, "contact": "none"}
-    return assemble(parse_case({**data, "bond": [{"parts": ["one", "other"], "kind": "shared"}]}), Path())
+    data = {"name": "joint", "run": {"end_time": "1 us"}, "parts": parts, "contact": "none",
+            "boundaries": [{"kind": "symmetry", "axis": axis} for axis in planes]}  # fmt: skip
+    return parse_case({**data, "bond": [{"parts": ["one", "other"], "kind": "shared"}]})
+
+
+def joined(one: dict[str, Any], other: dict[str, Any], planes: str = "", folder: Path = Path()) -> Whole:
+    return assemble(case(one, other, planes), folder)
 
 
 def interface(whole: Whole) -> float:
@@ -70,5 +82,44 @@ def test_grids_that_match_are_joined_and_others_are_refused() -> None:
 def test_shapes_with_a_gap_and_shapes_that_overlap_are_refused() -> None:
     with pytest.raises(InputError, match="no face in common"):
         joined({**PLATE, "base": [0, 0, "5.5 mm"]}, PLATE)
-    with pytest.raises(MeshError, match="shapes that a bond joins overlap"):
+    with pytest.raises(MeshError, match=r"^parts\[1\].mesh: overlaps parts\[0\].mesh, to which a bond joins it"):
         joined({**PLATE, "base": [0, 0, "4 mm"]}, PLATE)
+    with pytest.raises(CaseError, match=r"^bond\[0\].parts = .* the surface of an STL file is meshed alone"):
+        joined({"shape": "stl", "path": "a.stl", "unit": "1 mm", "element_size": "1 mm"}, PLATE)
+
+
+@pytest.mark.parametrize("axis", ["x", "y", "z"])
+def test_a_core_that_fills_a_jacket(axis: str) -> None:
+    """An ogive in what is left of a larger one: a quarter, whose nodes are exactly on the planes at which it is cut."""
+    base: list[Any] = [0, 0, 0]
+    base["xyz".index(axis)] = "2 mm"
+    core = {"shape": "ogive", "radius": "3 mm", "crh": 3, "shank": "6 mm", "axis": axis, "base": base}
+    hull = {"shape": "ogive", "radius": "4 mm", "crh": 3, "shank": "8 mm", "axis": axis}
+    more = {"element_size": "1.2 mm", "sector": "quarter"}
+    jacket = {"shape": "difference", "of": [hull, core], "axis": axis, **more}
+    whole = joined(jacket, {**core, **more}, "xyz".replace(axis, ""))
+    solids = [volume(Ogive.model_validate({**each, **more})) for each in (hull, core)]
+    assert volumes(whole) == pytest.approx([solids[0] - solids[1], solids[1]], rel=0.02)
+    for direction in {0, 1, 2} - {"xyz".index(axis)}:
+        across = whole.points[:, direction]
+        assert (across == 0.0).sum() > 50
+        assert not ((across != 0.0) & (np.abs(across) < 1e-7)).any()
+    assert (whole.volumes > 0.0).all()
+
+
+def test_solids_of_a_step_file_are_two_parts_of_one_body(tmp_path: Path) -> None:
+    """What ``validate`` finds is what the run has; a part of the body that no file has is meshed with them."""
+    (tmp_path / "s.step").write_text(written(tmp_path)[0])
+    core, jacket = (
+        {"shape": "cad", "path": "s.step", "solids": [name], "element_size": "2 mm"} for name in ("Core", "Jacket")
+    )
+    whole = joined(core, jacket, folder=tmp_path)
+    assert volumes(whole) == pytest.approx([1e-6, 2e-7])
+    assert interface(whole) == pytest.approx(1e-4)
+    told = surveyed(case(core, jacket), tmp_path, compiled=False)
+    assert not told.refused
+    assert [part.elements for part in told.parts] == np.bincount(whole.tet_part).tolist()
+    block = {"shape": "box", "low": ["10 mm", "2 mm", "2 mm"], "high": ["15 mm", "8 mm", "8 mm"]}
+    told = surveyed(case(core, {**block, "element_size": "2 mm"}), tmp_path, compiled=False)
+    assert not told.refused
+    assert len(told.parts) == 1

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from conoid.cases.bonds import TiedBond
+from conoid.cases.bonds import GAP, TiedBond
 from conoid.cases.schema import Case
 
 from ..contact import search
@@ -26,9 +26,6 @@ from . import clipping
 from .pieces import Pieces
 from .rows import assembled
 
-GAP = 0.1
-"""Of the size of the smaller of two faces, square root of twice its area: the largest distance that is bonded where the
-case names none. Chosen: chords of a circle of 16 sides are 0.05 of a side from it."""
 _NEAR = 10.0
 """Of the largest distance that is bonded: nodes up to so far are counted in a warning."""
 _COVERED = 0.95
@@ -260,9 +257,15 @@ def _nothing(bond: int, spec: TiedBond, cut: _Cut, limit: Floats | float) -> str
     one, two = spec.parts
     if not len(cut.area):
         return f"bond[{bond}].parts: no faces of {one!r} and {two!r} lie face to face; move the parts to each other"
-    least = float(cut.distance.min())
+    nearest = int(np.argmin(cut.distance))
+    least = float(cut.distance[nearest])
     if least <= float(np.max(limit)):
         return f"bond[{bond}].parts: {one!r} and {two!r} touch in a line or a point only; a bond needs faces in common"
+    if cut.least[nearest] < 0.0:
+        return (
+            f"bond[{bond}].gap{_worded(limit)}: {one!r} and {two!r} overlap by {least:.3g} m or more; move them apart, "
+            "or raise it"
+        )
     return (
         f"bond[{bond}].gap{_worded(limit)}: the nearest faces of {one!r} and {two!r} are {least:.3g} m apart; move the "
         "parts to each other, or raise it"

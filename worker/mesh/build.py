@@ -7,7 +7,7 @@ import importlib.util
 import json
 import os
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -51,19 +51,22 @@ def build(
 
 
 def build_together(
-    meshes: Sequence[Mesh], key: str = "parts", limits: Limits | None = None, made: Callable[[], None] = lambda: None
+    meshes: Mapping[str, Mesh], folder: Path, limits: Limits | None = None, made: Callable[[], None] = lambda: None
 ) -> list[TetMesh]:
-    """The tets of generated ``meshes`` that have the nodes of their interfaces in common (mesh/together.py), as
-    ``build`` makes those of one; ``key``: of all of them, for messages. Raises MeshError.
+    """The tets of ``meshes``, by their keys, that have the nodes of their interfaces in common (mesh/together.py), as
+    ``build`` makes those of one. Raises MeshError.
     """
+    key = next(iter(meshes))
     _need_gmsh(key)
-    asked = "\n".join((_maker(), *(mesh.model_dump_json() for mesh in meshes)))
-    target = cache_folder() / f"{hashlib.sha256(asked.encode()).hexdigest()}.npz"
+    found_files = {named: sources(mesh, folder, named) for named, mesh in meshes.items()}
+    asked = [_content(mesh, found_files[named], named) for named, mesh in meshes.items()]
+    target = cache_folder() / f"{hashlib.sha256(' '.join(asked).encode()).hexdigest()}.npz"
     found = _loaded(target, len(meshes))
     if found is None:
         made()
+        every = {named: path for files in found_files.values() for named, path in files.items()}
         with _writable(target) as place:
-            run_child(meshes, {}, place, key, limits or Limits())
+            run_child(meshes, every, place, key, limits or Limits())
             found = _loaded(place, len(meshes))
     if found is None:
         raise MeshError(f"{key}: the mesh process left no meshes in {target.parent}")

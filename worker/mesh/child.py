@@ -14,7 +14,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
@@ -22,7 +22,7 @@ from pydantic import TypeAdapter
 
 from conoid.cases.bodies import Mesh, MeshFile
 from conoid.cases.run import ExitCode
-from conoid.cases.solids import Measured
+from conoid.cases.solids import Cad, Combination, Measured
 
 from ..errors import InputError, MeshError, StoppedError
 from ..signals import REQUESTS
@@ -63,18 +63,19 @@ class Limits:
         )
 
 
-def run_child(mesh: Mesh | Sequence[Mesh], sources: Sources, target: Path, key: str, limits: Limits) -> None:
-    """Makes ``mesh`` (of the files in ``sources``) in a child process, which leaves it in ``target``; several
-    are meshed together, and left in ``beside(target, k)``.
+def run_child(mesh: Mesh | Mapping[str, Mesh], sources: Sources, target: Path, key: str, limits: Limits) -> None:
+    """Makes ``mesh`` (of the files in ``sources``) in a child process, which leaves it in ``target``; several, by their
+    keys, are meshed together, and left in ``beside(target, k)``.
 
     Raises MeshError with the child's own line, or with the limit that it broke; StoppedError where the run was asked to
     stop: launchers tell all processes of a rank.
     """
     limits = limits.allowed()
     request = {
-        "mesh": [each.model_dump(mode="json") for each in mesh]
-        if isinstance(mesh, Sequence)
+        "mesh": {named: each.model_dump(mode="json") for named, each in mesh.items()}
+        if isinstance(mesh, Mapping)
         else mesh.model_dump(mode="json"),
+        "joint": isinstance(mesh, Mapping),
         "sources": {named: str(path) for named, path in sources.items()},
         "target": str(target),
         "key": key,
@@ -144,14 +145,15 @@ def main() -> int:
     limit(limits)
     key, target = str(request["key"]), Path(request["target"])
     try:
-        if isinstance(request["mesh"], list):
-            perform_together(TypeAdapter(list[Mesh]).validate_python(request["mesh"]), key, target)
+        sources = {named: Path(path) for named, path in request["sources"].items()}
+        if request["joint"]:
+            perform_together(TypeAdapter(dict[str, Mesh]).validate_python(request["mesh"]), sources, target)
         else:
             mesh: Mesh = TypeAdapter[Mesh](Mesh).validate_python(request["mesh"])
-            perform(mesh, key, {named: Path(path) for named, path in request["sources"].items()}, target)
+            perform(mesh, key, sources, target)
     except InputError as error:
-        text = str(error)
-        return _told(text if text.startswith(key) else f"{key}: {text}", ExitCode.BAD_INPUT)
+        text, keys = str(error), tuple(request["mesh"]) if request["joint"] else (key,)
+        return _told(text if text.startswith(keys) else f"{key}: {text}", ExitCode.BAD_INPUT)
     except MemoryError:
         return _told(_too_much_memory(key, limits), ExitCode.BAD_INPUT)
     except (Exception, SystemExit) as error:
@@ -185,14 +187,19 @@ def beside(target: Path, k: int) -> Path:
     return target.with_name(f"{target.stem}-{k}{target.suffix}")
 
 
-def perform_together(meshes: list[Mesh], key: str, target: Path) -> None:
-    """Makes generated meshes that have the nodes of their interfaces in common, and stores each."""
+def perform_together(meshes: dict[str, Mesh], sources: Sources, target: Path) -> None:
+    """Makes meshes that have the nodes of their interfaces in common, by their keys, and stores each."""
     from .model import check
     from .order import morton_ordered
     from .store import save
     from .together import together
 
-    made = together([mesh for mesh in meshes if not isinstance(mesh, Measured)], key, target.stem)
+    drawn = {
+        key: mesh
+        for key, mesh in meshes.items()
+        if isinstance(mesh, Cad | Combination) or not isinstance(mesh, Measured)
+    }
+    made = together(drawn, sources, target.stem)
     for k, mesh in enumerate(made):
         save(morton_ordered(check(mesh)), beside(target, k))
 

@@ -1,128 +1,162 @@
-"""Shapes meshed together, so that parts that touch have the nodes of their interface in common. In the child process.
+"""Bodies meshed together, so that parts that touch have the nodes of their interface in common. In the child process.
 
-OpenCASCADE cuts the shapes with each other (fragments): a face of two shapes is one face, and has one mesh. Each part
+OpenCASCADE cuts the bodies with each other (fragments): a face of two bodies is one face, and has one mesh. Each part
 has its element size in its own volume, the smaller one at the interface.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from conoid.cases.bodies import Symmetric
-from conoid.cases.geometry import AXES, Generated, bounds, centre, index
+from conoid.cases.bodies import RingSector, Symmetric
+from conoid.cases.combined import cut_by
+from conoid.cases.geometry import Generated, bounds, centre, cut_directions
+from conoid.cases.profile import Revolved
+from conoid.cases.solids import Cad, Combination
 
 from ..errors import MeshError
 from .frame import refuse_impossible
 from .gmsh_session import OPTIONS, session
-from .model import Ids, Origin, TetMesh
-from .named import gathered
-from .occ.sizes import GMSH_SIZE
+from .model import Names, Origin, TetMesh
+from .occ import body as primitives
+from .occ.combine import extent
+from .occ.draw import Solids
+from .occ.features import small_features
+from .occ.frame import Frame, scale_of
+from .occ.meshing import with_names
+from .occ.sizes import GMSH_SIZE, graded
+from .occ.sliding import Cut
+from .occ.solids import draw_solid
+from .sources import Sources
 from .unstructured import draw
 
-_TET = 4
-"""gmsh's element type of the 4-node tet."""
 _TURN = 2.0 * math.pi / 3.0
 """About the line x = y = z: x becomes y, y becomes z, z becomes x."""
 
-Entities = list[tuple[int, int]]
-"""gmsh's dimension and tag of some volumes."""
+_Solid = Cad | Combination
+Joint = Generated | _Solid
+"""What can be meshed together with others."""
 
 
-def together(bodies: Sequence[Generated], key: str, name: str) -> list[TetMesh]:
-    """The meshes of ``bodies``, of nodes of one numbering: ``name`` stands for the file that they come from. MeshError,
-    naming ``key``, when gmsh cannot make them.
+@dataclass(frozen=True)
+class _Model:
+    """What is drawn into the current model of ``gmsh``."""
+
+    gmsh: Any
+    bodies: Mapping[str, Joint]
+    """By the keys of their meshes."""
+    frame: Frame
+    """Of all: x, y, z from the origin."""
+    volumes: Sequence[Sequence[int]]
+    """Numbers of the volumes of each body."""
+
+
+def together(bodies: Mapping[str, Joint], sources: Sources, name: str) -> list[TetMesh]:
+    """The meshes of ``bodies``, by the keys of their meshes, of nodes of one numbering: ``name`` stands for the file
+    that they come from. MeshError, naming a key, when gmsh cannot make them.
     """
-    for body in bodies:
-        refuse_impossible(body, key)
-    corners = np.array([bounds(body) for body in bodies])
-    scale = math.ldexp(1.0, math.frexp(float(np.ptp(corners.reshape(-1, 3), axis=0).max()))[1])
+    for key, body in bodies.items():
+        if not isinstance(body, _Solid):
+            refuse_impossible(body, key)
     with session(OPTIONS) as gmsh:
-        drawn = [_drawn(gmsh, body, scale) for body in bodies]
-        volumes = _fragments(gmsh.model.occ, drawn, key)
+        frame = Frame((0.0, 0.0, 0.0), "z", _scale(gmsh, bodies, sources))
+        drawn = [_drawn(gmsh, body, frame.scale, sources, key) for key, body in bodies.items()]
+        model = _Model(gmsh, bodies, frame, _fragments(gmsh.model.occ, drawn, list(bodies)))
         gmsh.model.occ.synchronize()
-        _sizes(gmsh, bodies, volumes, scale)
-        gmsh.model.mesh.generate(3)
-        return [_mesh(gmsh, tags, scale, name) for tags in volumes]
+        _sizes(model)
+        cuts = sorted({cut for body in bodies.values() for cut in _cuts(body, frame)})
+        made, names = with_names(gmsh, frame, min(body.element_size for body in bodies.values()), cuts)
+        return [_part(model, made, names, k, name) for k in range(len(bodies))]
 
 
-def _drawn(gmsh: Any, body: Generated, scale: float) -> Entities:
+def _scale(gmsh: Any, bodies: Mapping[str, Joint], sources: Sources) -> float:
+    """About the extent of all, from which lengths are scaled."""
+    known = [corners for body in bodies.values() if not isinstance(body, _Solid) and (corners := bounds(body))]
+    sizes = [extent(gmsh, body, sources, key) for key, body in bodies.items() if isinstance(body, _Solid)]
+    return scale_of(max([*sizes, *np.ptp(np.array(known).reshape(-1, 3), axis=0).tolist()] if known else sizes))
+
+
+def _drawn(gmsh: Any, body: Joint, scale: float, sources: Sources, key: str) -> Solids:
     """The volumes of a body where it lies in space, lengths over ``scale``."""
-    occ = gmsh.model.occ
+    occ, start = gmsh.model.occ, body.centre if isinstance(body, _Solid) else centre(body)
     before = set(occ.getEntities(3))
-    draw(gmsh, body.model_copy(update={"aligned": False}) if isinstance(body, Symmetric) else body, scale)
+    if isinstance(body, _Solid):
+        draw_solid(gmsh, body, Frame(start, body.axis, scale), sources, key)
+    elif isinstance(body, Revolved | RingSector):
+        primitives.draw(occ, body, Frame(start, body.axis, scale))
+    else:
+        draw(gmsh, body.model_copy(update={"aligned": False}) if isinstance(body, Symmetric) else body, scale)
     made = [each for each in occ.getEntities(3) if each not in before]
     turns = {"z": 0, "x": 1, "y": 2}[body.axis]
     if turns:
         occ.rotate(made, 0, 0, 0, 1, 1, 1, turns * _TURN)
-    occ.translate(made, *(c / scale for c in centre(body)))
+    occ.translate(made, *(c / scale for c in start))
     return made
 
 
-def _fragments(occ: Any, drawn: list[Entities], key: str) -> list[list[int]]:
-    """Tags of the volumes of each body, cut so that they have faces in common. Raises MeshError where two overlap."""
+def _cuts(body: Joint, frame: Frame) -> list[Cut]:
+    """The planes on which a body is cut, in the frame of all."""
+    start = body.centre if isinstance(body, _Solid) else centre(body)
+    across = cut_by(body.sector, body.axis) if isinstance(body, _Solid) else cut_directions(body, body.axis)
+    return [(d, start[d] / frame.scale) for d in across]
+
+
+def _fragments(occ: Any, drawn: list[Solids], keys: list[str]) -> list[list[int]]:
+    """Numbers of the volumes of each body, cut so that they have faces in common. MeshError where two overlap."""
     every = [(of, each) for of, made in enumerate(drawn) for each in made]
     entities = [each for _, each in every]
     _, became = occ.fragment(entities[:1], entities[1:])
     owner: dict[int, int] = {}
     for (of, _), pieces in zip(every, became, strict=True):
         for _, tag in pieces:
-            if owner.setdefault(tag, of) != of:
-                raise MeshError(f"{key}: shapes that a bond joins overlap; they may touch only")
+            if (first := owner.setdefault(tag, of)) != of:
+                raise MeshError(f"{keys[of]}: overlaps {keys[first]}, to which a bond joins it; they may touch only")
     return [[tag for tag, of in owner.items() if of == body] for body in range(len(drawn))]
 
 
-def _sizes(gmsh: Any, bodies: Sequence[Generated], volumes: list[list[int]], scale: float) -> None:
+def _sizes(model: _Model) -> None:
     """The element size of each body in its volumes."""
-    field, own = gmsh.model.mesh.field, []
-    largest = max(GMSH_SIZE * _largest(body) / scale for body in bodies)
-    for body, tags in zip(bodies, volumes, strict=True):
+    gmsh, frame = model.gmsh, model.frame
+    field, own, sizes = gmsh.model.mesh.field, [], list[float]()
+    for body, tags in zip(model.bodies.values(), model.volumes, strict=True):
+        sizes += [body.element_size, body.element_size if body.grading is None else body.grading.far_size]
         inside = field.add("Restrict")
-        field.setNumber(inside, "InField", _size(field, body, scale))
+        field.setNumber(inside, "InField", _size(gmsh, body, frame))
         field.setNumbers(inside, "VolumesList", tags)
         own.append(inside)
     least = field.add("Min")
     field.setNumbers(least, "FieldsList", own)
     field.setAsBackgroundMesh(least)
-    gmsh.option.setNumber("Mesh.MeshSizeMin", min(GMSH_SIZE * body.element_size / scale for body in bodies))
-    gmsh.option.setNumber("Mesh.MeshSizeMax", largest)
+    for name, pick in (("Min", min), ("Max", max)):
+        gmsh.option.setNumber(f"Mesh.MeshSize{name}", GMSH_SIZE * frame.length(pick(sizes)))
 
 
-def _largest(body: Generated) -> float:
-    return body.element_size if body.grading is None else max(body.element_size, body.grading.far_size)
+def _size(gmsh: Any, body: Joint, frame: Frame) -> int:
+    """The number of the field of a body's element size: one number, or by its grading."""
+    if body.grading is not None:
+        return graded(gmsh, body.element_size, body.grading, frame)
+    field = gmsh.model.mesh.field
+    size = field.add("MathEval")
+    field.setString(size, "F", repr(GMSH_SIZE * frame.length(body.element_size)))
+    return int(size)
 
 
-def _size(field: Any, body: Generated, scale: float) -> int:
-    """The tag of the field of a body's element size: one number, or by its grading."""
-    size, grading = field.add("MathEval"), body.grading
-    if grading is None:
-        field.setString(size, "F", repr(GMSH_SIZE * body.element_size / scale))
-        return int(size)
-    along = None if grading.axis is None else index(grading.axis)
-    squares = [f"({AXES[i]}-({grading.origin[i] / scale!r}))^2" for i in range(3) if i != along]
-    field.setString(size, "F", f"Abs(Sqrt({'+'.join(squares)})-{grading.radius / scale!r})")
-    graded = field.add("Threshold")
-    values = ("DistMin", grading.near), ("DistMax", grading.far)
-    sizes = ("SizeMin", GMSH_SIZE * body.element_size), ("SizeMax", GMSH_SIZE * grading.far_size)
-    for name, value in (*values, *sizes):
-        field.setNumber(graded, name, value / scale)
-    field.setNumber(graded, "InField", size)
-    return int(graded)
+def _part(model: _Model, made: TetMesh, names: Names, k: int, name: str) -> TetMesh:
+    """Body ``k``: its tets of all that are ``made``, whose nodes and tets gmsh calls ``names``."""
+    elements = [model.gmsh.model.mesh.getElements(3, tag)[1] for tag in model.volumes[k]]
+    own = np.concatenate([np.concatenate(each).astype(np.int64) for each in elements if len(each)])
+    nodes, tets = np.unique(made.tets[np.isin(names.tets, own)], return_inverse=True)
+    origin = Origin(name, nodes.astype(np.int64), tuple(_notes(model, k)))
+    return TetMesh(made.points[nodes], tets.reshape(-1, 4).astype(np.int32), origin)
 
 
-def _mesh(gmsh: Any, tags: list[int], scale: float, name: str) -> TetMesh:
-    """The tets of some volumes."""
-    ids, corners = list[Ids](), list[Ids]()
-    for tag in tags:
-        kinds, elements, nodes = gmsh.model.mesh.getElements(3, tag)
-        at = list(kinds).index(_TET)
-        ids.append(np.asarray(elements[at], np.int64))
-        corners.append(np.asarray(nodes[at], np.int64).reshape(-1, 4))
-    node_tags, coordinates, _ = gmsh.model.mesh.getNodes()
-    every, points = np.asarray(node_tags, np.int64), scale * coordinates.reshape(-1, 3)
-    found = gathered(every, points, np.concatenate(ids), np.concatenate(corners))
-    mesh = TetMesh(found.mesh.points, found.mesh.tets, Origin(name, found.places))
-    if mesh.volumes().sum() < 0:
-        mesh = TetMesh(mesh.points, mesh.tets[:, [0, 2, 1, 3]], mesh.origin)
-    return mesh
+def _notes(model: _Model, k: int) -> list[str]:
+    """What the user should know of a body of which only the mesh tells the sizes."""
+    key, body = list(model.bodies.items())[k]
+    if not isinstance(body, _Solid):
+        return []
+    volumes = [(3, tag) for tag in model.volumes[k]]
+    return [f"{key}: {note}" for note in small_features(model.gmsh, body.element_size, model.frame, volumes)]

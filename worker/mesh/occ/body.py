@@ -11,7 +11,7 @@ from conoid.cases.profile import Revolved
 from ..frame import refuse_impossible
 from ..gmsh_session import OPTIONS, session
 from ..model import TetMesh
-from .draw import ROUND, Angles, drawn
+from .draw import ROUND, Angles, Solids, drawn
 from .frame import Frame, scale_of
 from .meshing import meshed
 from .sizes import set_size
@@ -25,11 +25,13 @@ def primitive(body: Revolved | RingSector, key: str) -> TetMesh:
     low, high = bounds(body) or ((0.0,) * 3, (0.0,) * 3)
     frame = Frame(body.base, body.axis, scale_of(max(b - a for a, b in zip(low, high, strict=True))))
     with session(OPTIONS) as gmsh:
-        _draw(gmsh.model.occ, body, frame)
+        draw(gmsh.model.occ, body, frame)
         gmsh.model.occ.synchronize()
         set_size(gmsh, body.element_size, body.grading, frame)
-        return meshed(gmsh, frame, body.element_size, len(cut_directions(body, body.axis)))
+        cuts = [(k, 0.0) for k in range(len(cut_directions(body, body.axis)))]
+        return meshed(gmsh, frame, body.element_size, cuts)
 
 
-def _draw(occ: Any, body: Revolved | RingSector, frame: Frame) -> None:
-    drawn(occ, body, frame, ring.angles(body) if isinstance(body, RingSector) else [_SECTORS[body.sector]])
+def draw(occ: Any, body: Revolved | RingSector, frame: Frame) -> Solids:
+    """Its sector, in the ``frame`` of the model."""
+    return drawn(occ, body, frame, ring.angles(body) if isinstance(body, RingSector) else [_SECTORS[body.sector]])

@@ -7,23 +7,26 @@ import numpy as np
 
 from conoid.cases.figures import si
 
+from .draw import Solids
 from .frame import Frame
 
 _SHORT = 0.5
 """Of the element size: edges below it are told. Chosen: a tet there has half the time step."""
 
 
-def small_features(gmsh: Any, element_size: float, frame: Frame) -> Iterator[str]:
-    """A line each of short edges, and of fillets that the elements are too large for."""
+def small_features(gmsh: Any, element_size: float, frame: Frame, solids: Solids) -> Iterator[str]:
+    """A line each of short edges of ``solids``, and of fillets that the elements are too large for."""
     least = _SHORT * frame.length(element_size)
-    lengths = [gmsh.model.occ.getMass(*each) for each in gmsh.model.getEntities(1)]
+    faces = sorted(set(gmsh.model.getBoundary(solids, combined=False, oriented=False)))
+    edges = sorted(set(gmsh.model.getBoundary(faces, combined=False, oriented=False)))
+    lengths = [gmsh.model.occ.getMass(*each) for each in edges]
     short = [length for length in lengths if 1e-12 < length < least]
     if short:
         yield (
             f"{len(short)} of {len(lengths)} edges are shorter than half of element_size, the shortest "
             f"{si(min(short) * frame.scale, 'm')}: tets there are as small and hold the time step down"
         )
-    every = [_radius(gmsh, number) for _, number in gmsh.model.getEntities(2)]
+    every = [_radius(gmsh, number) for _, number in faces]
     radii = [radius for radius in every if radius < frame.length(element_size)]
     if radii:
         yield (

@@ -1,15 +1,16 @@
 """From a drawn model, with its sizes set, to tets, whose nodes are moved from where they hold the time step down."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from ...errors import MeshError
 from ..gmsh_session import named_mesh
-from ..model import REGULAR_STEP, TetMesh
+from ..model import REGULAR_STEP, Names, TetMesh
 from ..smooth import smoothed
 from .frame import Frame
-from .sliding import Sliding
+from .sliding import Cut, Sliding
 
 WANTED = 0.75
 """Step lengths below this share of a regular tet's with edge ``element_size`` are raised where possible."""
@@ -17,10 +18,13 @@ _OTHERS = ({"Mesh.Algorithm3D": 1}, {"Mesh.Algorithm3D": 1, "Mesh.Algorithm": 1}
 """What is tried where gmsh fails: its Delaunay mesher in place of HXT, then triangles by MeshAdapt as well."""
 
 
-def meshed(gmsh: Any, frame: Frame, element_size: float, cuts: int) -> TetMesh:
-    """The tets of the current model, m, in space. The first ``cuts`` directions of the frame are those across which it
-    is cut at 0.
-    """
+def meshed(gmsh: Any, frame: Frame, element_size: float, cuts: Sequence[Cut]) -> TetMesh:
+    """The tets of the current model, m, in space, which is cut on the planes ``cuts`` of the frame."""
+    return with_names(gmsh, frame, element_size, cuts)[0]
+
+
+def with_names(gmsh: Any, frame: Frame, element_size: float, cuts: Sequence[Cut]) -> tuple[TetMesh, Names]:
+    """The same, and what gmsh calls its nodes and tets."""
     _generate(gmsh)
     found = named_mesh(gmsh)
     mesh = found.mesh
@@ -29,7 +33,7 @@ def meshed(gmsh: Any, frame: Frame, element_size: float, cuts: int) -> TetMesh:
     sliding, points = Sliding.of(gmsh, np.asarray(found.names.nodes), mesh.points, cuts)
     wanted = WANTED * REGULAR_STEP * frame.length(element_size)
     mesh = smoothed(TetMesh(points, mesh.tets), sliding, wanted)
-    return TetMesh(frame.to_space(mesh.points), mesh.tets)
+    return TetMesh(frame.to_space(mesh.points), mesh.tets), found.names
 
 
 def _generate(gmsh: Any) -> None:

@@ -1,6 +1,6 @@
 """Where the nodes of a drawn body may go without changing its shape: along the faces and edges of its model."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Self
 
@@ -12,6 +12,8 @@ from ..model import Floats, Ids
 NEAR = 1e-9
 """Nodes this near to a plane on which a body is cut are on it, in lengths of order one."""
 
+Cut = tuple[int, float]
+"""A plane on which a body is cut: its direction, and where it cuts that."""
 Nearest = Callable[[Floats], Floats]
 """The points (k, 3) of an entity nearest to others."""
 
@@ -20,7 +22,7 @@ Nearest = Callable[[Floats], Floats]
 class Sliding:
     """``entity``: (n,) number of what each node is on in ``nearest``, -1 within the body, -2 at a corner.
 
-    ``held``: (n, 3) coordinates that a node keeps besides: 0 on the planes on which the body is cut.
+    ``held``: (n, 3) coordinates that a node keeps besides: those of the planes on which the body is cut.
     """
 
     entity: NDArray[np.int32]
@@ -28,9 +30,9 @@ class Sliding:
     held: NDArray[np.bool_]
 
     @classmethod
-    def of(cls, gmsh: Any, tags: Ids, points: Floats, cuts: int) -> tuple[Self, Floats]:
-        """That of the current model with its mesh, for nodes called ``tags`` at ``points``; the first ``cuts``
-        directions are those across which the body is cut at 0. And the points, put exactly there.
+    def of(cls, gmsh: Any, tags: Ids, points: Floats, cuts: Sequence[Cut]) -> tuple[Self, Floats]:
+        """That of the current model with its mesh, for nodes called ``tags`` at ``points``, and the points, put exactly
+        on the planes of ``cuts``.
         """
         entity, nearest = np.full(len(tags), -1, np.int32), list[Nearest]()
         for dimension, number in gmsh.model.getEntities():
@@ -42,9 +44,9 @@ class Sliding:
             if dimension:
                 nearest.append(_nearest(gmsh, dimension, number))
         points, held = points.copy(), np.zeros(points.shape, bool)
-        for direction in range(cuts):
-            on = np.abs(points[:, direction]) < NEAR
-            points[on, direction], held[on, direction] = 0.0, True
+        for direction, at in cuts:
+            on = np.abs(points[:, direction] - at) < NEAR
+            points[on, direction], held[on, direction] = at, True
         return cls(entity, tuple(nearest), held), points
 
     def movable(self, node: int) -> bool:

@@ -49,16 +49,25 @@ def measured(mesh: Measured, sources: Sources, key: str) -> TetMesh:
 def _of_solid(mesh: Cad | Combination, sources: Sources, key: str) -> _Made:
     with session(OPTIONS) as gmsh:
         frame = Frame(mesh.centre, mesh.axis, scale_of(extent(gmsh, mesh, sources, key)))
-        drawing = Drawing(gmsh, frame, sources)
-        solids = joined(gmsh.model.occ, sector(gmsh.model.occ, drawing.solids(mesh, key), mesh), key)
-        if not solids:
-            raise MeshError(f"{key}: nothing is left of it; check sizes and places of its shapes")
-        gmsh.model.occ.synchronize()
-        notes = list(small_features(gmsh, mesh.element_size, frame))
-        _refuse_too_many(gmsh, solids, mesh, frame, key)
+        solids = draw_solid(gmsh, mesh, frame, sources, key)
+        notes = list(small_features(gmsh, mesh.element_size, frame, solids))
         set_size(gmsh, mesh.element_size, mesh.grading, frame)
-        made = meshed(gmsh, frame, mesh.element_size, len(cut_by(mesh.sector, mesh.axis)))
+        cuts = [(k, 0.0) for k in range(len(cut_by(mesh.sector, mesh.axis)))]
+        made = meshed(gmsh, frame, mesh.element_size, cuts)
     return _Made(made, [f"{key}: {note}" for note in notes])
+
+
+def draw_solid(gmsh: Any, mesh: Cad | Combination, frame: Frame, sources: Sources, key: str) -> Solids:
+    """The volumes of a body in the ``frame`` of the model, which has its centre and its axis: its sector, with faces in
+    common where its solids touch. MeshError where nothing is left, or where it would have too many tets.
+    """
+    occ = gmsh.model.occ
+    solids = joined(occ, sector(occ, Drawing(gmsh, frame, sources).solids(mesh, key), mesh), key)
+    if not solids:
+        raise MeshError(f"{key}: nothing is left of it; check sizes and places of its shapes")
+    occ.synchronize()
+    _refuse_too_many(gmsh, solids, mesh, frame, key)
+    return solids
 
 
 def _of_surface(mesh: Stl, sources: Sources, key: str) -> _Made:
@@ -69,7 +78,7 @@ def _of_surface(mesh: Stl, sources: Sources, key: str) -> _Made:
     with session(OPTIONS) as gmsh:
         enclose(gmsh, surface, mesh.unit / frame.scale, mesh.edge_angle)
         set_size(gmsh, mesh.element_size, mesh.grading, frame)
-        made = meshed(gmsh, frame, mesh.element_size, 0)
+        made = meshed(gmsh, frame, mesh.element_size, ())
     return _Made(made, [])
 
 
