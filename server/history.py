@@ -18,6 +18,7 @@ from conoid.cases.run import State
 
 from .columns import Columns
 from .journal import Tail, seq_of
+from .notes import KINDS, Notes
 
 _SAMPLES = 4096
 """Reports of a run that are kept, at most. Chosen: some times what a chart has pixels."""
@@ -68,6 +69,7 @@ class History:
     cuts: list[bytes] = field(default_factory=list)
     snapshots: dict[int, bytes] = field(default_factory=dict)
     """Lines by the numbers of the snapshots."""
+    notes: Notes = field(default_factory=Notes)
     answers: dict[int, tuple[int, bytes]] = field(default_factory=dict)
     """Answers of a run that has ended, by their points: the last event, and the body."""
 
@@ -85,6 +87,8 @@ class History:
             lines = block.split(b"\n")
             for line in lines:
                 kind = line[_TYPE]
+                if kind in KINDS:
+                    self.notes.take(line)
                 if kind == b"prog":
                     self._progress = line
                 elif kind == b"load":

@@ -48,6 +48,7 @@ def _body(history: History, points: int) -> bytes:
         "ranks": _ranks(_spread(loads, _NUMBERS // max(1, sum(map(len, loads[-1].phases.values()))) if loads else 1)),
         "balance": [msgspec.Raw(line) for line in history.cuts],
         "snapshots": listed(history),
+        **history.notes.shown(),
     })  # fmt: skip
 
 

@@ -200,6 +200,12 @@ class History(msgspec.Struct, kw_only=True):
     ranks: dict[str, Any]
     balance: list[dict[str, Any]]
     snapshots: list[dict[str, Any]]
+    log: list[dict[str, Any]]
+    """Messages of the log, of states and of checkpoints; of a long log its beginning and its end."""
+    log_left_out: int
+    """Messages between these two."""
+    warnings: list[dict[str, Any]]
+    """Warnings and errors of the whole log, each text once."""
 
 
 class Wish(msgspec.Struct, kw_only=True, forbid_unknown_fields=True):

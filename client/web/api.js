@@ -1,19 +1,15 @@
 // The server's REST and SSE, with the token of this tab. EventSource cannot send headers, so SSE is read with fetch.
 
-const KEY = "conoid.token";
+import { token } from "./token.js";
 
-export const token = {
-  get: () => sessionStorage.getItem(KEY) ?? "",
-  set: (text) => sessionStorage.setItem(KEY, text),
-  clear: () => sessionStorage.removeItem(KEY),
-};
+export { token };
 
 // A refusal in the server's own words (RFC 9457).
 export class Problem extends Error {
   constructor(status, body) {
     const detail = body?.detail && body.detail !== body.title ? `: ${body.detail}` : "";
     super(`${body?.title ?? `the server answered ${status}`}${detail}`);
-    this.status = status;
+    Object.assign(this, { status, body });
   }
 }
 
@@ -22,9 +18,9 @@ export const refused = (error) => error instanceof Problem && error.status < 500
 
 const address = (path) => new URL(path, document.baseURI);
 
-async function send(path, { method = "GET", headers = {}, signal, cache = "no-store" } = {}) {
+export async function send(path, { method = "GET", headers = {}, body, signal, cache = "no-store" } = {}) {
   const shown = token.get() ? { Authorization: `Bearer ${token.get()}` } : {};
-  const response = await fetch(address(path), { method, headers: { ...shown, ...headers }, signal, cache });
+  const response = await fetch(address(path), { method, headers: { ...shown, ...headers }, body, signal, cache });
   if (!response.ok) throw new Problem(response.status, await response.json().catch(() => null));
   return response;
 }
@@ -44,11 +40,32 @@ export async function tail(run, rank) {
 
 export const call = async (path, options) => (await send(path, options)).json();
 
-// The messages of a run after the number `after`, as they come, until the server ends the stream.
-export async function* messages(run, after, signal) {
+const LARGE = 64 << 20; // Bytes from which on a file goes to disk as it comes, where the browser can do that.
+const MOST = 1 << 30; // Bytes that a browser keeps in memory until the file is saved.
+
+// Saves a file of the server as `name`. A link cannot show the token, so the bytes go through the page; `onBytes` hears
+// how many have come. Throws Error for a file that is too large for that.
+export async function download(path, name, size, onBytes) {
+  const place = size > LARGE ? await globalThis.showSaveFilePicker?.({ suggestedName: name }) : null;
+  if (!place && size > MOST) throw new Error("too large for this browser; conoid get copies it");
+  const { body } = await send(path);
+  let there = 0;
+  const counted = body.pipeThrough(new TransformStream({ transform(chunk, out) {
+    onBytes(there += chunk.byteLength);
+    out.enqueue(chunk);
+  } }));
+  if (place) return counted.pipeTo(await place.createWritable());
+  const href = URL.createObjectURL(await new Response(counted).blob());
+  Object.assign(document.createElement("a"), { href, download: name }).click();
+  return setTimeout(() => URL.revokeObjectURL(href), 60000);
+}
+
+// The messages of a run after the number `after`, as they come, until the server ends the stream; `onOpen` when it begins.
+export async function* messages(run, after, signal, onOpen) {
   const headers = { Accept: "text/event-stream", "Last-Event-ID": String(after) };
   const response = await send(`v1/runs/${encodeURIComponent(run)}/stream`, { headers, signal });
   if (response.status === 204) return;
+  onOpen();
   const reader = response.body.pipeThrough(new TextDecoderStream()).getReader();
   let buffer = "";
   for (;;) {

@@ -11,7 +11,9 @@ import { RunsPage } from "./runs.js";
 const page = document.getElementById("page");
 const who = document.getElementById("who");
 const leave = document.getElementById("leave");
+const AWAY = 3000; // ms after which a server that does not answer is asked again.
 let shown = null;
+let again = 0;
 
 function show(next) {
   shown?.close?.();
@@ -24,27 +26,33 @@ function show(next) {
 function signIn(told = "") {
   who.textContent = "";
   leave.hidden = true;
-  const field = h("input", { type: "password", autocomplete: "off", "aria-label": "token", placeholder: "token", required: "" });
+  const field = h("input#token", { type: "password", autocomplete: "current-password", "aria-label": "token", placeholder: "token", required: "" });
+  const remembered = h("input", { type: "checkbox" });
   const submit = async (event) => {
     event.preventDefault();
-    token.set(field.value.trim());
+    token.set(field.value.trim(), remembered.checked);
     await start();
   };
   const form = h("form.card.sign-in", { onsubmit: submit },
     h("h1", {}, "Sign in"),
-    h("p.hint", {}, "Paste the token that the server gave you. It is kept in this tab only, and forgotten when you close it."),
+    h("p.hint", {}, "Paste the token that the server gave you. This tab keeps it until you close it."),
     field,
-    told ? h("p.problem", {}, told) : "",
+    h("label.check", {}, remembered, h("span", {}, "Remember it in this browser, until I sign out")),
+    told ? h("p.problem", { role: "alert" }, told) : "",
     h("div", {}, h("button", {}, "Sign in")));
-  show({ element: form });
+  show({ element: form, signsIn: true });
   field.focus();
 }
 
 // Where we are ---------------------------------------------------------------------------------------------------------
 
+const refuse = () => {
+  token.clear();
+  signIn("The server does not accept this token any more.");
+};
 const PAGES = {
-  runs: () => new RunsPage(() => signIn("The server does not accept this token any more.")),
-  run: ([run]) => new RunPage(run),
+  runs: () => new RunsPage(refuse),
+  run: ([run]) => new RunPage(run, refuse),
   compare: (runs) => new PairPage(runs),
 };
 
@@ -53,8 +61,9 @@ function route() {
   show((PAGES[name] ?? PAGES.runs)(names));
 }
 
-// A server with tokens is not asked before there is one.
+// A server with tokens is not asked before there is one. One that is away is asked again until it answers.
 async function start() {
+  clearTimeout(again);
   try {
     const { auth } = await offer();
     if (auth && !token.get()) return signIn();
@@ -63,16 +72,29 @@ async function start() {
     leave.hidden = !token.get();
     route();
   } catch (error) {
-    const known = error instanceof Problem && (error.status === 401 || error.status === 403);
-    if (known) signIn(token.get() ? "The server does not know this token." : "");
-    else page.replaceChildren(h("p.problem", {}, `No answer from the server: ${error.message}`));
-    if (known) token.clear();
+    if (error instanceof Problem && (error.status === 401 || error.status === 403)) {
+      const told = token.get() ? "The server does not know this token." : "";
+      token.clear();
+      return signIn(told);
+    }
+    show({ element: h("section.card.missing", {}, h("h1", {}, "The server does not answer"), h("p.problem", { role: "status" }, `No answer from the server: ${error.message}`),
+      h("p.hint", {}, "It is asked again every few seconds.")) });
+    again = setTimeout(start, AWAY);
   }
+  return undefined;
 }
 
 leave.addEventListener("click", () => {
   token.clear();
   signIn();
 });
-addEventListener("hashchange", () => (shown?.element?.matches?.("form") ? start() : route()));
+// Another tab has signed in to stay, or has signed out.
+token.listen((text) => {
+  if (text && shown?.signsIn) start();
+  else if (!text) {
+    token.clear();
+    signIn();
+  }
+});
+addEventListener("hashchange", () => (shown?.signsIn ? start() : route()));
 start();

@@ -31,7 +31,7 @@ export class Headline {
     this.link.className = `link ${kind || "over"}`;
     if (this.shown !== state) this.state.replaceChildren(pill(this.shown = state));
     this.progress.replaceChildren(meter(state, live.fraction), h("b", {}, percent(live.fraction)));
-    const told = [live.cause, live.message, live.state === "queued" && info.reason, notice].filter((text) => text && text !== live.state).join(" · ");
+    const told = [!over && live.message, live.state === "queued" && info.reason, notice].filter(Boolean).join(" · ");
     say(this.told, told);
     this.told.hidden = !told;
     for (const button of this.buttons) {

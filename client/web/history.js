@@ -21,7 +21,7 @@ export async function readPlan(run, signal) {
 }
 
 export function take(live, history, info = {}, plan = null) {
-  const { series = {}, parts = {}, sizes = {}, ranks = {}, balance = [], snapshots = [], last, state, elapsed } = history;
+  const { series = {}, parts = {}, sizes = {}, ranks = {}, balance = [], snapshots = [], log = [], warnings = [], last, state, elapsed } = history;
   const number = series.t?.length ?? 0;
   const rows = Array.from({ length: number }, (_, i) => Object.fromEntries(Object.entries(series).map(([name, values]) => [name, values[i]])));
   live.ledger = rows.map((row, i) => ({ t: row.t, dt: row.dt, limiter: row.limiter, energy: energy(row), parts: at(parts, i) })).filter(({ dt }) => Number.isFinite(dt));
@@ -30,6 +30,7 @@ export function take(live, history, info = {}, plan = null) {
   if (sizes.sizes?.length) live.spread = sizes;
   live.balances = balance;
   live.snapshots = snapshots;
+  Object.assign(live, { log, leftOut: history.log_left_out ?? 0, warnings: new Map(warnings.map(({ text, level }) => [text, level])) });
   Object.assign(live, { seq: last, state, heard: Date.now() / 1000 });
   Object.assign(live, { cause: info.cause ?? null, message: info.message ?? "" });
   if (elapsed > 0) Object.assign(live, { wall: Date.now() / 1000, began: Date.now() / 1000 - elapsed, loaded: Date.now() / 1000 });

@@ -5,7 +5,7 @@ export const GROUPS = ["compute", "contact", "exchange", "waiting", "output", "d
 export const TERMS = [["kinetic", "kinetic"], ["elastic", "elastic"], ["plastic", "plastic"], ["viscous", "viscous"], ["contact", "contact-work"], ["friction", "friction"], ["eroded", "eroded"], ["fracture", "fracture"], ["cohesive", "cohesive"], ["stepping", "stepping"], ["averaging", "averaging"]];
 
 const MOST_POINTS = 2000;
-const MOST_LINES = 500;
+const MOST_LINES = 1500;
 const OWN = new Set(["contact", "exchange", "output"]); // Phases with a group of their own; the others are computing.
 
 export class Live {
@@ -19,7 +19,9 @@ export class Live {
     this.found = -1; // Step of the newest state whose fragments are known
     this.balances = []; // the messages
     this.snapshots = []; // { n, t, fragments, … }
-    this.log = []; // messages for people
+    this.log = []; // messages for people: of the log, of states, of checkpoints
+    this.leftOut = 0; // Messages in the middle of a long log that the server has left out
+    this.warnings = new Map(); // Level by text of every warning and error
   }
 
   take(message) {
@@ -34,7 +36,10 @@ export class Live {
   on_status(message) {
     Object.assign(this, { state: message.state, cause: message.cause, message: message.message ?? "" });
     if (message.state === "running") this.began ??= message.wall;
+    this.note(message);
   }
+
+  on_checkpoint(message) { this.note(message); }
 
   on_started(message) {
     this.started = message;
@@ -81,8 +86,18 @@ export class Live {
   }
 
   on_log(message) {
+    this.warn(message.level, message.text);
+    this.note(message);
+  }
+
+  note(message) {
     this.log.push(message);
     if (this.log.length > MOST_LINES) this.log.shift();
+  }
+
+  // A warning that is said again is there once.
+  warn(level, text) {
+    if ((level === "warning" || level === "error") && !this.warnings.has(text)) this.warnings.set(text, level);
   }
 
   on_finished(message) { this.finished = message; }

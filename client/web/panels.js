@@ -1,7 +1,6 @@
-// The parts of a run's page that are no charts: bars of the ranks, balance events, the log by rank, reference numbers.
+// The parts of a run's page that are no charts: bars of the ranks, balance events, reference numbers.
 
-import { tail } from "./api.js";
-import { alike, clock, count, exacts, fixed, h, legend, percent, si } from "./figures.js";
+import { alike, count, exacts, fixed, h, legend, percent, si } from "./figures.js";
 import { GROUPS } from "./live.js";
 
 const MOST_RANKS = 24;
@@ -72,56 +71,6 @@ function bars(title, values) {
   return h("div", {}, h("h3", {}, `${title}: slowest over mean ${fixed(most / (mean || 1))}`),
     h("div.ranks", {}, values.slice(0, MOST_RANKS).flatMap((value, rank) => [h("span.who", {}, `rank ${rank}`),
       h("div.stack", {}, h("i", { style: { width: `${(100 * value) / most}%`, background: "var(--compute)" } })), h("span.busy", {}, texts[rank])])));
-}
-
-// Messages for people as they come, and the log file of each rank, by tabs that arrow keys move between.
-export class Logs {
-  constructor(live) {
-    Object.assign(this, { live, tab: "messages", ranks: 0, logged: "" });
-    this.tabs = h("div.tabs", { role: "tablist", "aria-label": "log of", onkeydown: (event) => this.key(event) });
-    this.lines = h("pre.log", { id: "log-lines", tabindex: 0, role: "tabpanel", "aria-label": "log" });
-    this.element = h("section.card.logs", {}, h("div.card-head", {}, h("h2", {}, "Log"), this.tabs), this.lines);
-  }
-
-  get names() { return ["messages", ...Array.from({ length: this.ranks }, (_, rank) => String(rank)), "launcher"]; }
-
-  async choose(tab) {
-    this.tab = tab;
-    this.head();
-    this.tabs.querySelector("[aria-selected=true]")?.focus();
-    this.logged = "";
-    if (tab === "messages") return this.draw();
-    const told = await tail(this.live.run, tab).catch((error) => error.message);
-    if (this.tab !== tab) return;
-    this.lines.replaceChildren(told || h("span.hint", {}, "nothing yet"));
-    this.lines.scrollTop = this.lines.scrollHeight;
-  }
-
-  key(event) {
-    const move = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
-    if (move) this.choose(this.names.at((this.names.indexOf(this.tab) + move) % this.names.length));
-  }
-
-  head() {
-    this.tabs.replaceChildren(...this.names.map((name) => h("button.tab", { type: "button", role: "tab", "aria-controls": "log-lines",
-      "aria-selected": String(name === this.tab), tabindex: name === this.tab ? 0 : -1, onclick: () => this.choose(name) },
-    Number.isNaN(Number(name)) ? name : `rank ${name}`)));
-  }
-
-  draw(ranks) {
-    if (ranks !== undefined && ranks !== this.ranks) {
-      this.ranks = ranks;
-      this.head();
-    }
-    const { log } = this.live;
-    const state = `${this.tab} ${log.length} ${log.at(-1)?.seq}`;
-    if (this.tab !== "messages" || this.logged === state) return;
-    this.logged = state;
-    const atEnd = this.lines.scrollTop + this.lines.clientHeight >= this.lines.scrollHeight - 8;
-    this.lines.replaceChildren(...(log.length ? log.map((entry) =>
-      h(`div.${entry.level}`, {}, h("time", {}, clock(entry.wall)), `  [${entry.rank ?? 0}] ${entry.text}`)) : [h("span.hint", {}, "none since the page was opened")]));
-    if (atEnd) this.lines.scrollTop = this.lines.scrollHeight;
-  }
 }
 
 const COLUMNS = ["quantity", "computed", "expected", "tolerance", "result", "source"];

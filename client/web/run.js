@@ -3,23 +3,29 @@
 import { call, messages, refused } from "./api.js";
 import { Body } from "./body.js";
 import { Cards } from "./cards.js";
-import { counted, fixed, h, percent, si } from "./figures.js";
+import { counted, fixed, h, percent, si, words } from "./figures.js";
+import { Files } from "./files.js";
 import { Headline } from "./headline.js";
 import { fill, readPlan } from "./history.js";
 import { FINAL, Live } from "./live.js";
+import { Logs, Warnings } from "./logs.js";
 import { Numbers, residual } from "./numbers.js";
-import { Balances, Logs, Ranks, checksTable } from "./panels.js";
+import { Balances, Ranks, checksTable } from "./panels.js";
 import { plots } from "./plots.js";
+import { Situation } from "./situation.js";
 
 const CHARTS_EVERY = 500; // ms; the head and the bars are drawn with every message.
+const QUEUE_EVERY = 3; // s after which the place in the queue is asked for.
+const STAGES = { accepted: "This run is taken in.", queued: "This run waits for its turn.", starting: "This run starts: its mesh and its program are made ready." };
 const pause = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 
 export class RunPage {
-  constructor(run) {
-    Object.assign(this, { live: new Live(run), info: {}, outcome: null, abort: new AbortController(), connection: ["waiting", "connecting"], due: false, plotted: 0, busy: new Set() });
+  // `onRefused` is called where the server does not accept the token any more.
+  constructor(run, onRefused) {
+    Object.assign(this, { live: new Live(run), info: {}, outcome: null, abort: new AbortController(), connection: ["waiting", "connecting"], due: false, plotted: 0, busy: new Set(), onRefused });
     this.path = `v1/runs/${encodeURIComponent(run)}`;
     this.build();
-    this.timer = setInterval(() => this.later(), 1000);
+    this.timer = setInterval(() => this.tick(), 1000);
     this.follow();
   }
 
@@ -36,6 +42,9 @@ export class RunPage {
     this.numbers = new Numbers();
     this.notes = { energy: h("span.note"), residual: h("span.note"), imbalance: h("span.note"), counts: h("span.note") };
     this.logs = new Logs(live);
+    this.warnings = new Warnings();
+    this.files = new Files(live.run);
+    this.situation = new Situation(live.run, () => this.files.read());
     this.charts = plots(live, (place) => this.balances.open(place));
     this.body = new Body(live.run, (snapshot) => {
       this.charts.snapshot = snapshot;
@@ -43,9 +52,9 @@ export class RunPage {
     });
     this.empty = h("section.card.empty-stage", { "aria-label": "the body" });
     this.fillCards();
-    this.element = h("div.work", {}, this.head.element,
+    this.element = h("div.work", {}, this.head.element, this.situation.element,
       h("div.bench", {}, h("div.stage", {}, this.body.element, this.empty),
-        h("aside.now", { "aria-label": "now" }, this.numbers.element, this.cards.beside, this.logs.element)),
+        h("aside.now", { "aria-label": "now" }, this.numbers.element, this.warnings.element, this.cards.beside, this.files.element, this.logs.element)),
       this.cards.grid, this.cards.shelf);
     this.draw();
   }
@@ -77,13 +86,13 @@ export class RunPage {
     await this.readInfo();
     let filled = false;
     while (!this.abort.signal.aborted) {
+      let away = false;
       try {
         if (!filled) await fill(live, this.info, await readPlan(live.run, this.abort.signal), this.abort.signal);
         filled = true;
         this.later();
         if (FINAL.has(live.state)) break;
-        for await (const message of messages(live.run, live.seq, this.abort.signal)) {
-          this.connection = ["live", "live"];
+        for await (const message of messages(live.run, live.seq, this.abort.signal, () => this.hears())) {
           wait = 500;
           if (live.take(message)) this.later(message);
           if (FINAL.has(live.state)) break;
@@ -91,9 +100,10 @@ export class RunPage {
       } catch (error) {
         if (this.abort.signal.aborted) return;
         if (refused(error)) return this.fail(error);
+        away = true;
       }
       if (FINAL.has(live.state)) break;
-      this.connection = ["waiting", "reconnecting"];
+      this.connection = ["waiting", away ? "server away, trying again" : "reconnecting"];
       this.later();
       await pause(wait);
       wait = Math.min(2 * wait, 8000);
@@ -103,7 +113,12 @@ export class RunPage {
     }
     this.connection = ["", "ended"];
     await this.readInfo();
-    await this.readOutcome();
+    this.readOutcome();
+    this.later();
+  }
+
+  hears() {
+    this.connection = ["live", "live"];
     this.later();
   }
 
@@ -117,8 +132,16 @@ export class RunPage {
   }
 
   // A run that was cancelled in the queue has no outcome.
-  async readOutcome() {
+  readOutcome() {
     this.outcome = this.info.outcome ?? null;
+    for (const text of this.outcome?.warnings ?? []) this.live.warn("warning", text);
+  }
+
+  // No message tells of the place in the queue: it is asked for now and then.
+  tick() {
+    this.later();
+    this.ticks = (this.ticks ?? 0) + 1;
+    if (this.live.state === "queued" && this.ticks % QUEUE_EVERY === 0) this.readInfo();
   }
 
   async ask(verb) {
@@ -136,9 +159,15 @@ export class RunPage {
     this.later();
   }
 
+  // There is no such run, or there is no more of it than what the server tells.
   fail(error) {
     this.close();
-    this.element.replaceChildren(h("p.problem", {}, error.message), h("p", {}, h("a", { href: "#/" }, "All runs")));
+    if (error.status === 401 && this.onRefused) return this.onRefused();
+    const ended = error.body?.outcome;
+    const kept = ended && `It ended as ${words(ended.state ?? "unknown")}${ended.cause ? ` (${ended.cause})` : ""}.`;
+    this.element.replaceChildren(h("section.card.missing", {}, h("h1", {}, error.status === 410 ? "This run was removed" : error.status === 404 ? "There is no such run" : "This run cannot be shown"),
+      h("p.problem", {}, error.message), kept ? h("p", {}, kept) : "", h("p", {}, h("a.button", { href: "#/" }, "All runs"))));
+    return undefined;
   }
 
   // Drawing ------------------------------------------------------------------------------------------------------
@@ -168,6 +197,8 @@ export class RunPage {
     this.balances.draw();
     this.cards.show("balances", live.balances.length > 0);
     this.logs.draw(this.info.ranks ?? 0);
+    this.warnings.draw(live);
+    this.situation.draw(live);
     this.body.update(live.snapshots);
     this.drawStage();
     this.drawChecks();
@@ -209,10 +240,11 @@ export class RunPage {
 
   // Until there is a snapshot the place of the body says why.
   drawStage() {
-    const { state, snapshots } = this.live;
+    const { state, message, snapshots } = this.live;
     this.empty.hidden = snapshots.length > 0;
     if (this.empty.hidden) return;
-    const told = FINAL.has(state) ? "This run has left no snapshot." : "The body is shown here with the first snapshot.";
-    this.empty.replaceChildren(h("p.hint", {}, told));
+    const told = FINAL.has(state) ? "This run has left no snapshot." : STAGES[state] ?? "The body is shown here with the first snapshot.";
+    const more = state === "queued" ? this.info.reason : message;
+    this.empty.replaceChildren(h("div", {}, h("p", {}, told), FINAL.has(state) ? "" : h("p.hint", {}, more)));
   }
 }

@@ -8,10 +8,22 @@ import { pathToFileURL } from "node:url";
 
 class Element {
   constructor(tag) { Object.assign(this, { tag, children: [], style: {}, dataset: {}, options: [], classList: { add() {} }, hidden: false }); }
-  append(...children) { this.children.push(...children); }
-  insertBefore(child, next) { this.children.splice(next ? this.children.indexOf(next) : this.children.length, 0, child); }
-  remove() {}
-  replaceChildren(...children) { this.children = children; }
+  append(...children) { for (const child of children) this.insertBefore(child); }
+  prepend(child) { this.insertBefore(child, this.children[0]); }
+  insertBefore(child, next) {
+    if (child instanceof Element) {
+      child.remove();
+      child.parent = this;
+    }
+    this.children.splice(next ? this.children.indexOf(next) : this.children.length, 0, child);
+  }
+  remove() {
+    if (this.parent) this.parent.children = this.parent.children.filter((one) => one !== this);
+  }
+  replaceChildren(...children) {
+    this.children = [];
+    this.append(...children);
+  }
   setAttribute(name, value) { this[name] = value; }
   set textContent(value) { this.children = [value]; }
   querySelectorAll() { return []; }

@@ -2,6 +2,7 @@
 
 import struct
 import time
+from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -103,6 +104,24 @@ def test_memory_is_bounded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
     assert 10 < len(found.samples) < 200
     assert sum(sample.size for sample in found.samples) <= 500_000
     assert found.newest is not None
+
+
+def test_the_log_of_the_whole_run_is_bounded_and_a_warning_is_there_once(server: Running, run: str) -> None:
+    def spoken() -> Iterator[messages.AnyMessage]:
+        yield messages.Status(run="r", wall=1.0, state=State.RUNNING)
+        for k in range(5000):
+            level = "warning" if k % 50 == 7 else "info"
+            yield messages.Log(run="r", wall=2.0, level=level, text=f"line {k % 100}" if level == "warning" else f"{k}")
+        yield messages.Log(run="r", wall=3.0, level="error", text="long " * 10_000)
+
+    write(server.ann.runs / run, spoken())
+    found = shown(server, run)
+    texts = [line.get("text", line.get("state")) for line in found["log"]]
+    assert texts[:3] == ["running", "0", "1"]
+    assert texts[-2] == "4999"
+    assert len(texts[-1]) < 2100
+    assert found["log_left_out"] == 5002 - len(texts) == 4002
+    assert [line["text"][:8] for line in found["warnings"]] == ["line 7", "line 57", "long lon"]
 
 
 def test_garbage_in_the_journal_does_no_harm(server: Running, run: str) -> None:

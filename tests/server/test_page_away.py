@@ -108,3 +108,121 @@ def test_a_refusal_is_no_silence(web: Path) -> None:
     told = played(web, LIST.replace("answer", "403"))
     assert "the server answered 403" in told
     assert "No answer" not in told
+
+
+def test_a_page_whose_server_is_away_comes_back_by_itself(web: Path) -> None:
+    script = """
+        const soon = globalThis.setTimeout;
+        globalThis.setTimeout = (work, ms) => soon(work, Math.min(ms, 40));
+        await load("app.js");
+        await pause(30);
+        const before = text(document.getElementById("page"));
+        state.served = (path) => ({ "lib/index.json": { auth: false }, "v1/me": { owner: "ann" } })[path] ?? { runs: [] };
+        await new Promise((done) => soon(done, 300));
+        return [before.includes("The server does not answer"), text(document.getElementById("who"))];
+    """
+    assert played(web, script) == [True, "ann"]
+
+
+def test_a_token_lasts_for_the_tab_or_until_the_user_signs_out(web: Path) -> None:
+    script = """
+        const store = () => { const kept = {}; return { kept, getItem: (k) => kept[k] ?? null, setItem(k, v) { kept[k] = v; }, removeItem(k) { delete kept[k]; } }; };
+        [globalThis.sessionStorage, globalThis.localStorage] = [store(), store()];
+        const { token } = await load("token.js");
+        const seen = () => [token.get(), Object.keys(sessionStorage.kept).length, Object.keys(localStorage.kept).length];
+        const told = [];
+        token.set("one");
+        told.push(seen());
+        token.set("two", true);
+        told.push(seen());
+        token.clear();
+        told.push(seen());
+        Object.defineProperty(globalThis, "localStorage", { get() { throw new Error("refused"); } });
+        Object.defineProperty(globalThis, "sessionStorage", { get() { throw new Error("refused"); } });
+        token.set("three", true);
+        return [...told, token.get()];
+    """
+    assert played(web, script) == [["one", 1, 0], ["two", 1, 1], ["", 0, 0], "three"]
+
+
+ENDED = {
+    **RUN,
+    "state": "failed",
+    "cause": "diverged",
+    "message": "tet 7 is inside out",
+    "outcome": {"warnings": ["a", "c"]},
+}
+
+
+def test_a_run_that_has_ended_says_why_and_what_it_was_warned_of(web: Path) -> None:
+    """Its warnings are those of the whole log and of the outcome, each once, whenever the page is opened."""
+    log = [{"type": "log", "seq": 1, "level": "warning", "text": each, "wall": 1.0} for each in "aba"]
+    history = {"series": {}, "snapshots": [], "log": log, "warnings": log[:2], "last": 3, "state": "failed"}
+    script = """
+        const { RunPage } = await load("run.js");
+        const [run, history] = %s;
+        const files = { files: [{ path: "checkpoints/000000120/manifest.json", size: 5, url: "/v1/x" }, { path: "history.csv", size: 2e6, url: "/v1/y" }] };
+        state.served = (path) => (path.endsWith("history") ? history : path.endsWith("/files") ? files : path === "v1/runs/a" ? run : 404);
+        const page = new RunPage("a");
+        await pause(300);
+        const told = [text(page.situation.element), text(page.warnings.list), text(page.logs.lines), text(page.files.list)];
+        page.close();
+        return told;
+    """
+    told, warnings, log_shown, files = played(web, script % json.dumps([ENDED, history]))
+    assert "Failed: its numbers have grown beyond all bounds" in told
+    assert "tet 7 is inside out" in told
+    assert "Go on from step 120" in told
+    assert "Open the case" in told
+    assert warnings.split() == ["a", "b", "c"]
+    assert log_shown.split()[1::2] == ["a", "b", "a"]
+    assert "2.00 MB" in files
+
+
+@pytest.mark.parametrize(
+    ("problem", "words"),
+    [
+        ({"status": 404, "title": "Not Found"}, "There is no such run"),
+        (
+            {"status": 410, "title": "Gone", "outcome": {"state": "failed", "cause": "mesh"}},
+            "It ended as failed (mesh)",
+        ),
+    ],
+)
+def test_a_run_that_is_not_there_says_so(web: Path, problem: dict[str, Any], words: str) -> None:
+    script = """
+        const { RunPage } = await load("run.js");
+        const { Problem } = await load("api.js");
+        const page = new RunPage("a");
+        const problem = %s;
+        page.fail(new Problem(problem.status, problem));
+        return text(page.element);
+    """
+    assert words in played(web, script % json.dumps(problem))
+
+
+def test_a_closed_chart_and_the_one_beside_the_body_are_the_same_at_the_next_visit(web: Path) -> None:
+    script = """
+        const kept = {};
+        globalThis.localStorage = { getItem: (k) => kept[k] ?? null, setItem(k, v) { kept[k] = v; } };
+        globalThis.CSS = { escape: (one) => one };
+        const { Cards } = await load("cards.js");
+        const made = () => {
+            const cards = new Cards("energy");
+            for (const name of ["energy", "dt", "counts"]) cards.add(name, name, "");
+            cards.place();
+            return cards;
+        };
+        const seen = ({ beside, grid, shelf }) => [beside, grid].map((place) => [...place.children].map((card) => card["data-card"]).join()).concat(text(shelf));
+        const first = made();
+        const told = [seen(first)];
+        first.close("dt");
+        first.move("counts");
+        told.push(seen(made()));
+        globalThis.localStorage = null;
+        first.close("counts");
+        return [...told, seen(first)];
+    """
+    assert played(web, script) == [
+        ["energy", "dt,counts", "Closed"], ["counts", "energy", "Closed + dt"], ["", "energy", "Closed + dt + counts"],
+    ]  # fmt: skip

@@ -1,0 +1,88 @@
+// What is to be said of a run that waits, or that has not ended as it should: why, how far it came, the end of its log,
+// and what can be done next.
+
+import { call, tail } from "./api.js";
+import { h, si } from "./figures.js";
+
+const LINES = 12; // Of the end of the log.
+const CAUSES = {
+  input: "its case cannot be run", mesh: "its mesh cannot be made", diverged: "its numbers have grown beyond all bounds", energy: "its energy does not close",
+  memory: "it needs more memory than there is", walltime: "its wall time was used up", steps: "run.max_steps was used up before run.end_time",
+  preempted: "the batch system has taken its place away", node: "a process or a machine of it is gone", launch: "it could not be started",
+  storage: "a file could not be written", cancelled: "it was cancelled", service: "the server could not go on with it",
+};
+const HELP = {
+  input: "Change the keys that the message names, and start again.", mesh: "Change the mesh, and start again.",
+  diverged: "Look at the last snapshot and at dt before the end; a smaller numerics.dt_safety or erosion of worn tets helps.",
+  energy: "Look at the energy by term: the term that grows is the one that fails; a smaller numerics.dt_safety helps.",
+  memory: "Use larger elements, or a machine with more memory.", walltime: "Go on from the last checkpoint, or allow more in run.wall_time.",
+  steps: "Go on with a larger run.max_steps; the log says which tet holds the time step down.", storage: "Make room on the disk, then go on from the last checkpoint.",
+};
+const POINT = /^checkpoints\/(\d+)\/manifest\.json$/;
+const BAD = new Set(["failed", "lost", "timed_out", "cancelled"]);
+
+export class Situation {
+  // `files()` promises the files of the run.
+  constructor(run, files) {
+    Object.assign(this, { run, files, told: "" });
+    this.path = `v1/runs/${encodeURIComponent(run)}`;
+    this.element = h("section.card.situation", { "aria-label": "what has happened", hidden: "" });
+  }
+
+  draw(live) {
+    const state = BAD.has(live.state) ? live.state : "";
+    const key = `${state} ${live.cause} ${live.message}`;
+    this.element.hidden = !state;
+    if (!state || this.told === key) return;
+    this.told = key;
+    this.element.className = `card situation ${state}`;
+    this.fill(live);
+  }
+
+  async fill(live) {
+    const log = h("pre.log", { tabindex: 0, role: "region", "aria-label": "end of the log", hidden: "" });
+    const actions = h("div.actions", {}, this.open());
+    this.element.replaceChildren(h("div", {}, h("h2", {}, sentence(live)), live.message ? h("p", {}, live.message) : "",
+      h("p.hint", {}, reached(live)), HELP[live.cause] ? h("p", {}, HELP[live.cause]) : "", actions), log);
+    const [files, lines] = await Promise.all([this.files(), this.end(live)]);
+    const point = files.filter(({ path }) => POINT.test(path)).at(-1);
+    if (point) actions.prepend(this.restart(POINT.exec(point.path)[1]));
+    else if (live.cause !== "input") actions.append(h("span.hint", {}, "It has left no checkpoint to go on from."));
+    log.hidden = !lines;
+    log.replaceChildren(lines);
+    log.scrollTop = log.scrollHeight;
+  }
+
+  open() { return h("a.button", { href: `#/new?from=${encodeURIComponent(this.run)}` }, "Open the case"); }
+
+  restart(step) {
+    const button = h("button", { type: "button", onclick: async () => {
+      button.disabled = true;
+      try {
+        const { id } = await call(`${this.path}:restart`, { method: "POST" });
+        location.hash = `#/runs/${encodeURIComponent(id)}`;
+      } catch (error) {
+        button.after(h("span.problem", {}, error.message));
+        button.disabled = false;
+      }
+    } }, `Go on from step ${Number(step)}`);
+    return button;
+  }
+
+  // Of the first log that has any: of the launcher where a run never began, else of rank 0.
+  async end(live) {
+    for (const name of live.progress ? ["0", "launcher"] : ["launcher", "0"]) {
+      const text = (await tail(this.run, name).catch(() => "")).trimEnd();
+      if (text) return text.split("\n").slice(-LINES).join("\n");
+    }
+    return "";
+  }
+}
+
+export const sentence = ({ state, cause }) => `${{ failed: "Failed", lost: "Lost", timed_out: "Timed out", cancelled: "Cancelled" }[state]}${cause && cause !== state ? `: ${CAUSES[cause] ?? cause}` : ""}`;
+
+function reached({ progress, snapshots }) {
+  if (!progress) return "It had not begun its first step.";
+  const last = snapshots.at(-1);
+  return `It had come to ${si(progress.t, "s")} of ${si(progress.end_time, "s")}, step ${progress.step}${last ? `; the last snapshot, of ${si(last.t, "s")}, is shown below` : ""}.`;
+}

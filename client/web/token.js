@@ -1,0 +1,40 @@
+// The token of this tab, or the one that this browser remembers. Where a browser keeps nothing it lasts as long as the
+// page.
+
+const KEY = "conoid.token";
+let here = "";
+
+const at = (store, act) => {
+  try {
+    return act(store());
+  } catch {
+    return null;
+  }
+};
+const session = () => sessionStorage;
+const lasting = () => localStorage;
+
+export const token = {
+  get: () => here || (at(session, (store) => store.getItem(KEY)) ?? at(lasting, (store) => store.getItem(KEY)) ?? ""),
+
+  // `remembered`: also for the tabs and the visits to come.
+  set(text, remembered = false) {
+    here = text;
+    at(session, (store) => store.setItem(KEY, text));
+    if (remembered) at(lasting, (store) => store.setItem(KEY, text));
+    else at(lasting, (store) => store.removeItem(KEY));
+  },
+
+  clear() {
+    here = "";
+    at(session, (store) => store.removeItem(KEY));
+    at(lasting, (store) => store.removeItem(KEY));
+  },
+
+  // `onChange(text)` when another tab remembers a token, or signs out ("").
+  listen(onChange) {
+    addEventListener("storage", ({ key, newValue, storageArea }) => {
+      if (key === KEY && storageArea === at(lasting, (store) => store)) onChange(newValue ?? "");
+    });
+  },
+};
