@@ -1,4 +1,4 @@
-"""What a run has said in words since its beginning: its log, its states and its checkpoints, as lines of the journal."""
+"""What a run has said in words since its beginning: log, states and checkpoints, as lines of the journal."""
 
 from collections import deque
 from dataclasses import dataclass, field

@@ -28,8 +28,8 @@ def history(
 ) -> Response:
     """The reports of a run, thinned to ``points``: ``series`` by name over ``t`` (step, dt, counts, imbalance, each
     term of the energy, and as ``share_...`` the phases of the step), ``ranks`` with CPU seconds by phase and rank, all
-    cuts (``balance``) and ``snapshots``, the ``log`` and its ``warnings``, ``state``, and ``elapsed`` wall time in s. The
-    stream goes on from ``last``.
+    cuts (``balance``) and ``snapshots``, the ``log`` and its ``warnings``, ``state``, and ``elapsed`` wall time in s.
+    The stream goes on from ``last``.
     """
     found = service.histories.of(service.settings.runs / run.id / layout.JOURNAL)
     with found.lock:

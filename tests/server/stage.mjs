@@ -1,6 +1,6 @@
 // A page without a browser: elements that keep what is put into them, and a server that answers what a test says.
 // { module, script } in JSON on standard input; what the async script returns is written to standard output. It has
-// `load(module)`, `text(element)`, `pause(ms)` and `state.served`: a function from a path to what is sent as
+// `load(module)`, `text(element)`, `pause(ms)`, `store()` and `state.served`: a function from a path to what is sent as
 // JSON, or to a number, which is a status; it may throw, and then nobody answers.
 
 import { readFileSync } from "node:fs";
@@ -60,6 +60,11 @@ const text = (element) => (element instanceof Element ? element.children.map(tex
 const pause = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 const { module, script } = JSON.parse(readFileSync(0, "utf8"));
 const load = (name) => import(new URL(name, pathToFileURL(module)));
+// What a browser keeps by name.
+const store = () => {
+  const kept = new Map();
+  return { kept, getItem: (key) => kept.get(key) ?? null, setItem: (key, value) => kept.set(key, value), removeItem: (key) => kept.delete(key) };
+};
 const Async = (async () => {}).constructor;
-const answer = await new Async("load", "state", "text", "pause", script)(load, state, text, pause);
+const answer = await new Async("load", "state", "text", "pause", "store", script)(load, state, text, pause, store);
 process.stdout.write(JSON.stringify(answer ?? null), () => process.exit(0));

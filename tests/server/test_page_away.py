@@ -117,7 +117,8 @@ def test_a_page_whose_server_is_away_comes_back_by_itself(web: Path) -> None:
         await load("app.js");
         await pause(30);
         const before = text(document.getElementById("page"));
-        state.served = (path) => ({ "lib/index.json": { auth: false }, "v1/me": { owner: "ann" } })[path] ?? { runs: [] };
+        const answers = { "lib/index.json": { auth: false }, "v1/me": { owner: "ann" } };
+        state.served = (path) => answers[path] ?? { runs: [] };
         await new Promise((done) => soon(done, 300));
         return [before.includes("The server does not answer"), text(document.getElementById("who"))];
     """
@@ -126,10 +127,9 @@ def test_a_page_whose_server_is_away_comes_back_by_itself(web: Path) -> None:
 
 def test_a_token_lasts_for_the_tab_or_until_the_user_signs_out(web: Path) -> None:
     script = """
-        const store = () => { const kept = {}; return { kept, getItem: (k) => kept[k] ?? null, setItem(k, v) { kept[k] = v; }, removeItem(k) { delete kept[k]; } }; };
         [globalThis.sessionStorage, globalThis.localStorage] = [store(), store()];
         const { token } = await load("token.js");
-        const seen = () => [token.get(), Object.keys(sessionStorage.kept).length, Object.keys(localStorage.kept).length];
+        const seen = () => [token.get(), sessionStorage.kept.size, localStorage.kept.size];
         const told = [];
         token.set("one");
         told.push(seen());
@@ -137,8 +137,8 @@ def test_a_token_lasts_for_the_tab_or_until_the_user_signs_out(web: Path) -> Non
         told.push(seen());
         token.clear();
         told.push(seen());
-        Object.defineProperty(globalThis, "localStorage", { get() { throw new Error("refused"); } });
-        Object.defineProperty(globalThis, "sessionStorage", { get() { throw new Error("refused"); } });
+        for (const name of ["localStorage", "sessionStorage"])
+            Object.defineProperty(globalThis, name, { get() { throw new Error("refused"); } });
         token.set("three", true);
         return [...told, token.get()];
     """
@@ -161,11 +161,13 @@ def test_a_run_that_has_ended_says_why_and_what_it_was_warned_of(web: Path) -> N
     script = """
         const { RunPage } = await load("run.js");
         const [run, history] = %s;
-        const files = { files: [{ path: "checkpoints/000000120/manifest.json", size: 5, url: "/v1/x" }, { path: "history.csv", size: 2e6, url: "/v1/y" }] };
-        state.served = (path) => (path.endsWith("history") ? history : path.endsWith("/files") ? files : path === "v1/runs/a" ? run : 404);
+        const file = (path, size) => ({ path, size, url: `/v1/${path}` });
+        const files = { files: [file("checkpoints/000000120/manifest.json", 5), file("history.csv", 2e6)] };
+        const answers = { "v1/runs/a": run, "v1/runs/a/history": history, "v1/runs/a/files": files };
+        state.served = (path) => answers[path] ?? 404;
         const page = new RunPage("a");
         await pause(300);
-        const told = [text(page.situation.element), text(page.warnings.list), text(page.logs.lines), text(page.files.list)];
+        const told = [page.situation.element, page.warnings.list, page.logs.lines, page.files.list].map(text);
         page.close();
         return told;
     """
@@ -203,8 +205,7 @@ def test_a_run_that_is_not_there_says_so(web: Path, problem: dict[str, Any], wor
 
 def test_a_closed_chart_and_the_one_beside_the_body_are_the_same_at_the_next_visit(web: Path) -> None:
     script = """
-        const kept = {};
-        globalThis.localStorage = { getItem: (k) => kept[k] ?? null, setItem(k, v) { kept[k] = v; } };
+        globalThis.localStorage = store();
         globalThis.CSS = { escape: (one) => one };
         const { Cards } = await load("cards.js");
         const made = () => {
@@ -213,7 +214,8 @@ def test_a_closed_chart_and_the_one_beside_the_body_are_the_same_at_the_next_vis
             cards.place();
             return cards;
         };
-        const seen = ({ beside, grid, shelf }) => [beside, grid].map((place) => [...place.children].map((card) => card["data-card"]).join()).concat(text(shelf));
+        const names = (place) => place.children.map((card) => card["data-card"]).join();
+        const seen = ({ beside, grid, shelf }) => [names(beside), names(grid), text(shelf)];
         const first = made();
         const told = [seen(first)];
         first.close("dt");
