@@ -1,6 +1,7 @@
 """The case that is made of a deck, as plain data, with what its keys come from as comments."""
 
 import math
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -94,6 +95,14 @@ class Draft:
     def material_of(self, key: str) -> tuple[str, Made] | None:
         """Name and constants of a material of the deck."""
         return self._made.get(key)
+
+    def call(self, bodies: Sequence[Body], solid: Iterable[str]) -> Names:
+        """Gives the bodies their names in the case; parts that have ``solid`` elements and are not defined refuse."""
+        self.account.without(solid, [body.key for body in bodies])
+        names = Names()
+        for body in bodies:
+            body.name = names.give(body.title, "part", body.key)
+        return names
 
     def add_part(self, body: Body, names: Names) -> None:
         """A part of the case, of one of the deck."""

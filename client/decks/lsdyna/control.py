@@ -47,9 +47,9 @@ def contact(block: Block, name: str, options: frozenset[str], entry: Entry, surf
     other = None if name in SINGLE else surface(fields.whole("MSID"), fields.whole("MSTYP"), entry)
     if name in SINGLE:
         fields.forgive("MSID MSTYP", "a single surface has no other one")
-    if any(card.text.strip() for card in fields.more):
-        entry.remark("left", f"line {fields.more[0].number}", "optional cards of the penalty method")
-        fields.more.clear()
+    if fields.extra:
+        entry.remark("left", f"line {fields.extra[0]}", "optional cards of the penalty method")
+        fields.extra.clear()
     fields.rest("refused")
     return Meeting(one, other, max(still, 0.0), entry)
 

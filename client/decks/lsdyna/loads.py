@@ -2,47 +2,21 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
 from typing import Any
 
 from conoid.cases.cards import Block
 
 from ..account import Entry
-from ..draft import Draft
-from ..holds import Course, Hold, displacement_speed, velocity_course
+from ..holds import Hold, displacement_speed, velocity_course
 from ..start import Start
 from ..topology import Chosen
-from ..units import ACCELERATION, LENGTH, TIME
-from ..walls import Stop
+from ..units import ACCELERATION, TIME
+from . import walls
 from .fields import Fields, trimmed
+from .scene import Scene
 
 _AXES = {1: "x", 2: "y", 3: "z"}
 _CORNERS = "DOFX DOFY DOFZ"
-
-
-@dataclass
-class Scene:
-    """What loads ask of the deck, and what they add to the case."""
-
-    draft: Draft
-    nodes: Callable[[int, Entry], Chosen]
-    """The node set of a number; raises ValueError."""
-    bodies: Callable[[int, Entry], Chosen]
-    """The part set of a number; raises ValueError."""
-    part: Callable[[int], Chosen]
-    curve: Callable[[int], Course]
-    """Raises ValueError."""
-    end: float
-    starts: list[Start] = field(default_factory=list)
-    holds: list[Hold] = field(default_factory=list)
-    walls: list[Stop] = field(default_factory=list)
-
-    def lasting(self, number: int) -> Course:
-        """The curve of a number, which must not end before the run does. Raises ValueError."""
-        found = self.curve(number)
-        if found and found[-1][0] < self.end < float("inf"):
-            raise ValueError(f"the curve ends at {found[-1][0]:g}, before the end of the run at {self.end:g}")
-        return found
 
 
 # Velocities at the start ----------------------------------------------------------------------------------------------
@@ -173,33 +147,7 @@ def motion(scene: Scene, block: Block, options: frozenset[str], entry: Entry) ->
         fields.rest("refused")
 
 
-# Walls and gravity ----------------------------------------------------------------------------------------------------
-
-
-def wall(scene: Scene, block: Block, options: frozenset[str], entry: Entry) -> None:
-    """``*RIGIDWALL_PLANAR``: a plane at rest, without end."""
-    cards = block.cards["ID" in options :]
-    layout = ("NSID NSIDEX BOXID OFFSET BIRTH DEATH RWKSF", "XT YT ZT XH YH ZH FRIC WVEL")
-    fields = Fields(block, entry, cards, layout)
-    fields.refuse("NSIDEX BOXID OFFSET BIRTH", "exceptions, boxes, offsets and times are not taken over")
-    if 0.0 < fields.real("DEATH") < scene.end:
-        fields.refuse("DEATH", "the wall goes before the run ends; here it stays")
-    fields.forgive("RWKSF WVEL", "how rigid bodies meet the wall, and a threshold of welding")
-    tail = [fields.real(name) for name in ("XT", "YT", "ZT")]
-    head = [fields.real(name) for name in ("XH", "YH", "ZH")]
-    friction = fields.real("FRIC")
-    if not 0.0 <= friction < 1.0:
-        fields.refuse("FRIC", "nodes stick to the wall there; here friction is Coulomb's")
-        friction = 0.0
-    number = fields.whole("NSID")
-    normal = [b - a for a, b in zip(tail, head, strict=True)]
-    if not any(normal):
-        raise ValueError("its normal, from XT YT ZT to XH YH ZH, has no length")
-    table: dict[str, Any] = {"kind": "wall", "point": scene.draft.vector(tail, LENGTH), "normal": normal}
-    if friction:
-        table["friction"] = friction
-    scene.walls.append(Stop(scene.nodes(number, entry), table, entry))
-    fields.rest("refused")
+# Gravity --------------------------------------------------------------------------------------------------------------
 
 
 def body_load(scene: Scene, block: Block, options: frozenset[str], entry: Entry) -> None:
@@ -228,7 +176,8 @@ HANDLERS: Mapping[str, tuple[Handler, frozenset[str]]] = {
     "INITIAL_VELOCITY_RIGID_BODY": (velocity_rigid, frozenset()),
     "BOUNDARY_SPC": (restraint, frozenset({"SET", "NODE", "ID"})),
     "BOUNDARY_PRESCRIBED_MOTION": (motion, frozenset({"SET", "NODE", "RIGID", "ID"})),
-    "RIGIDWALL_PLANAR": (wall, frozenset({"ID", "FORCES", "DISPLAY"})),
+    "RIGIDWALL_PLANAR": (walls.planar, walls.OPTIONS - {"MOTION", "CYLINDER", "SPHERE"}),
+    "RIGIDWALL_GEOMETRIC": (walls.geometric, walls.OPTIONS - {"FORCES", "MOVING"}),
     "LOAD_BODY": (body_load, frozenset({"X", "Y", "Z"})),
 }
 """Keywords that are taken over, with the options that may stand behind them."""

@@ -11,7 +11,6 @@ from ..bonds import Tie, join
 from ..contacts import Meeting, meet
 from ..draft import Body, Draft, Made
 from ..holds import Hold, Holding
-from ..naming import Names
 from ..start import begin
 from ..topology import Topology
 from ..units import TIME, System, Weighed
@@ -22,6 +21,7 @@ from .fields import Fields, numbers
 from .layouts import LAYOUTS, NUMBERS
 from .mesh import held_of, parts_of, read_nodes, read_points
 from .named import Numbered
+from .scene import Scene
 from .words import LEFT, REFUSED, reason
 
 _MESH = ("NODE", "ELEMENT_SOLID")
@@ -164,17 +164,14 @@ class LsDyna:
         """The case, in units of ``system``."""
         self._draft = Draft(self.path, system, self.account)
         self._draft.title = self.title
-        self.account.without(self._solid, [body.key for body in self._bodies])
+        names = self._draft.call(self._bodies, self._solid)
         self._topology = Topology(
             [body.key for body in self._bodies], partial(read_nodes, self.path), partial(read_points, self.path)
         )
-        names = Names()
-        for body in self._bodies:
-            body.name = names.give(body.title, "part", body.key)
         self._make_materials(system)
         end, named = self._end(), self._numbered
         named.topology = self._topology
-        self._scene = loads.Scene(self._draft, named.nodes, named.part_set, named.part, named.curve, end)
+        self._scene = Scene(self._draft, named.nodes, named.part_set, named.part, named.curve, end)
         self._meetings: list[Meeting] = []
         self._ties: list[Tie] = []
         for block, entry in self._blocks:
@@ -224,7 +221,7 @@ class LsDyna:
         name = block.name
         for base, (handler, allowed) in loads.HANDLERS.items():
             found, options = block.parted(allowed)
-            if found == base and (options or not allowed or base == "RIGIDWALL_PLANAR"):
+            if found == base and (options or not allowed or base.startswith("RIGIDWALL")):
                 handler(self._scene, block, options, entry)
                 return
         base, options = block.parted(control.OPTIONS)

@@ -1,31 +1,16 @@
 """What moves, holds and stops bodies in a Radioss deck, what meets, and what the engine file says."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from typing import Any
 
 from ..account import Entry
 from ..contacts import Meeting
-from ..draft import Draft
 from ..holds import Course, Hold, displacement_speed, velocity_course
 from ..start import Start
-from ..topology import Chosen
-from ..units import ACCELERATION, LENGTH, TIME
-from ..walls import Stop
+from ..units import ACCELERATION, TIME
+from .scene import Scene
 from .text import Fields, Option, real
-
-
-@dataclass
-class Scene:
-    """What loads ask of the deck, and what they add to the case."""
-
-    draft: Draft
-    nodes: Callable[[int, Entry], Chosen]
-    curve: Callable[[int, Entry], Course]
-    end: float
-    starts: list[Start] = field(default_factory=list)
-    holds: list[Hold] = field(default_factory=list)
-    walls: list[Stop] = field(default_factory=list)
+from .walls import WALLS, wall
 
 
 def take(scene: Scene, option: Option, entry: Entry) -> None:
@@ -66,11 +51,15 @@ def _restraint(scene: Scene, option: Option, entry: Entry) -> None:
         code = fields.text("CODE").split()
         if not code or len(code[0]) != 3 or set("".join(code)) - set("01"):
             raise ValueError(f"line {row[0]}: {' '.join(code)!r} is no code of translations and rotations")
-        if len(code) > 1 and "1" in code[1]:
-            entry.remark("left", f"rotations {code[1]}", "nodes of solids have none")
+        chosen = scene.nodes(fields.whole("GRNOD"), entry)
         speeds = {axis: 0.0 for axis, held in zip("xyz", code[0], strict=True) if held == "1"}
+        if chosen.bodies and chosen.bodies & scene.rigid:
+            if code[1:] != ["111"] or not speeds:
+                raise ValueError("a rigid body that is held along some axes and turns is not followed (111)")
+        elif len(code) > 1 and "1" in code[1]:
+            entry.remark("left", f"rotations {code[1]}", "nodes of solids have none")
         if speeds:
-            scene.holds.append(Hold(scene.nodes(fields.whole("GRNOD"), entry), entry, speeds))
+            scene.holds.append(Hold(chosen, entry, speeds))
         else:
             entry.leave("no translation is held")
 
@@ -120,33 +109,6 @@ def _gravity(scene: Scene, option: Option, entry: Entry) -> None:
     fields.rest()
 
 
-def _wall(scene: Scene, option: Option, entry: Entry) -> None:
-    """A fixed plane by two points of its normal; it stops the group of nodes."""
-    layout = ("NODE: SLIDE: GRNOD1: GRNOD2:", "D FRIC DIAMETER FFAC IFQ:", "XM YM ZM", "XM1 YM1 ZM1")
-    fields = Fields(option, entry, option.rows[1:], layout)
-    fields.refuse("NODE GRNOD2", "walls that move, and nodes that are left out, are not taken over")
-    fields.forgive("DIAMETER FFAC IFQ", "size and filter of friction of the wall")
-    slide, friction = fields.whole("SLIDE"), fields.real("FRIC")
-    if slide == 1:
-        fields.refuse("SLIDE", "nodes stick to the wall there; here friction is Coulomb's")
-    group, reach = fields.whole("GRNOD1"), fields.real("D")
-    if not group and not reach:
-        raise ValueError("neither grnd_ID1 nor d: the wall stops no node")
-    if not group:
-        raise ValueError("the wall stops the nodes within d of it; name a group of nodes, grnd_ID1")
-    fields.forgive("D", "how near nodes are that the wall stops besides")
-    low = [fields.real(name) for name in ("XM", "YM", "ZM")]
-    high = [fields.real(name) for name in ("XM1", "YM1", "ZM1")]
-    normal = [b - a for a, b in zip(low, high, strict=True)]
-    if not any(normal):
-        raise ValueError("its normal, from M to M1, has no length")
-    table: dict[str, Any] = {"kind": "wall", "point": scene.draft.vector(low, LENGTH), "normal": normal}
-    if slide == 2 and friction:
-        table["friction"] = friction
-    scene.walls.append(Stop(scene.nodes(group, entry), table, entry))
-    fields.rest()
-
-
 def _values(option: Option) -> list[float]:
     """Numbers of the engine file, between blanks. Raises CardError."""
     return [real(line, item, option.shown) for line, text in option.rows for item in text.split()]
@@ -169,32 +131,57 @@ def _step(scene: Scene, option: Option, entry: Entry) -> None:
     entry.take("numerics.dt_safety")
 
 
-def contact(option: Option, entry: Entry, surface: Callable[[str, int, Entry], frozenset[str]]) -> Meeting:
-    """``/INTER/TYPE7`` and ``TYPE2``: nodes of a group on faces of a surface. Raises CardError, ValueError."""
-    rows = option.rows[1:]
-    if option.words[1] == "TYPE2":
-        fields = Fields(option, entry, rows, ("GRNOD: SURF: IGNORE: SPOTFLAG: LEVEL: ISEARCH: IDEL: -: DSEARCH",))
+_PENALTY = "stiffness, gap and damping of the penalty method"
+_GENERAL = (
+    "SURF1: SURF2: ISTF: ITHE: IGAP: IREM_I2: -: IDEL: IEDGE: IPSTIF:", "GRNOD: -: GAP_SCALE MESH_SIZE GAP_S GAP_M",
+    "STMIN STMAX IGAP0: IPEN0: IPEN_MAX STFAC_MDT", "STFAC FRIC - TSTART TSTOP",
+    "IBC: -: IVIS2: INACTI: VIS_S ITHICK: -: PMAX", "IFRIC: IFILTR: XFREQ -: SENS: DTSTIF -: FRIC_ID:",
+)  # fmt: skip
+"""Lines of TYPE24 and TYPE25, whose settings of the penalty method differ (Reference Guide, /INTER/TYPE24)."""
+_LAYOUTS: dict[str, tuple[str, ...]] = {
+    "TYPE2": ("GRNOD: SURF: IGNORE: SPOTFLAG: LEVEL: ISEARCH: IDEL: -: DSEARCH",),
+    "TYPE7": (
+        "GRNOD: SURF: ISTF: ITHE: IGAP: -: IBAG: IDEL: ICURV: IADM:", "FSCALE_GAP GAP_MAX FPENMAX",
+        "STMIN STMAX MESH_SIZE DTMIN IREM_GAP: IREM_I2:", "STFAC FRIC GAPMIN TSTART TSTOP",
+        "IBC: - INACTI: VIS_S VIS_F BUMULT", "IFRIC: IFILTR: XFREQ IFORM: SENS: FCT_F: ASCALE_F FRIC_ID:",
+    ),
+    "TYPE24": _GENERAL,
+    "TYPE25": _GENERAL,
+}  # fmt: skip
+CONTACTS = frozenset(_LAYOUTS)
+Surface = Callable[[str, int, Entry], frozenset[str]]
+
+
+def contact(option: Option, entry: Entry, surface: Surface) -> Meeting:
+    """``/INTER/TYPE7`` and ``TYPE2``: nodes of a group on faces of a surface; ``TYPE24`` and ``TYPE25``: surfaces on
+    each other, and one on itself. Raises CardError, ValueError.
+    """
+    kind = option.words[1]
+    fields = Fields(option, entry, option.rows[1:], _LAYOUTS[kind])
+    if kind == "TYPE2":
         fields.forgive("IGNORE SPOTFLAG LEVEL ISEARCH IDEL DSEARCH", "how the other code ties nodes")
-        fields.more.clear()
-        friction = 0.0
-    else:
-        fields = Fields(
-            option, entry, rows,
-            ("GRNOD: SURF: ISTF: ITHE: IGAP: -: IBAG: IDEL: ICURV: IADM:", "FSCALE_GAP GAP_MAX FPENMAX",
-             "STMIN STMAX MESH_SIZE DTMIN IREM_GAP: IREM_I2:", "STFAC FRIC GAPMIN TSTART TSTOP",
-             "IBC: - INACTI: VIS_S VIS_F BUMULT", "IFRIC: IFILTR: XFREQ IFORM: SENS: FCT_F: ASCALE_F FRIC_ID:"),
-        )  # fmt: skip
-        fields.refuse("TSTART SENS IFRIC FRIC_ID ITHE", "contact that begins later, or with another friction")
-        friction = fields.real("FRIC")
-        fields.whole("GRNOD"), fields.whole("SURF")
-        fields.rest("left", "stiffness, gap and damping of the penalty method") if friction >= 0.0 else None
-    one = surface("GRNOD", fields.whole("GRNOD"), entry)
-    other = surface("SURF", fields.whole("SURF"), entry)
-    return Meeting(one, None if one == other else other, friction, entry)
+        fields.extra.clear()
+        return _meeting(fields, surface, ("GRNOD", "SURF"), 0.0)
+    fields.refuse("TSTART SENS IFRIC FRIC_ID ITHE IVIS2 PMAX", "contact that begins later, or with another friction")
+    names = tuple(name for name in ("GRNOD", "SURF", "SURF1", "SURF2") if fields.whole(name))
+    friction = fields.real("FRIC")
+    fields.rest("left", _PENALTY)
+    return _meeting(fields, surface, names, friction)
+
+
+def _meeting(fields: Fields, surface: Surface, names: tuple[str, ...], friction: float) -> Meeting:
+    """Of the one or two sides that are given; one surface alone meets itself. Raises ValueError."""
+    entry = fields.entry
+    if not names or names == ("GRNOD",):
+        raise ValueError("no surface is named")
+    if len(names) > 2:
+        raise ValueError("a group of nodes beside two surfaces is not taken over")
+    sides = [surface(name.rstrip("12"), fields.whole(name), entry) for name in names]
+    return Meeting(sides[0], None if sides[0] == sides[-1] else sides[-1], friction, entry)
 
 
 _HANDLERS: dict[tuple[str, str], Callable[[Scene, Option, Entry], None]] = {
     ("INIVEL", "TRA"): _translation, ("INIVEL", "AXIS"): _about_axis, ("IMPVEL", ""): _motion,
-    ("IMPDISP", ""): _motion, ("GRAV", ""): _gravity, ("RWALL", "PLANE"): _wall, ("BCS", ""): _restraint,
+    ("IMPDISP", ""): _motion, ("GRAV", ""): _gravity, **dict.fromkeys(WALLS, wall), ("BCS", ""): _restraint,
     ("ANIM", "DT"): _frames, ("H3D", "DT"): _frames, ("DT", ""): _step,
 }  # fmt: skip

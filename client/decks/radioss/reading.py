@@ -11,13 +11,13 @@ from ..bonds import Tie, join
 from ..contacts import Meeting, meet
 from ..draft import Body, Draft, Made
 from ..holds import Holding
-from ..naming import Names
 from ..start import begin
 from ..topology import Chosen, Topology
 from ..units import TIME, System, Weighed, named
 from ..walls import stand
-from . import loads, materials
+from . import bodies, loads, materials
 from .mesh import read_nodes, read_points
+from .scene import Scene
 from .text import Fields, Option, cut, numbers, options, real
 from .words import LEFT, REFUSED, SOLIDS
 
@@ -40,6 +40,8 @@ class Radioss:
         self._failures: dict[int, Fields] = {}
         self._groups: dict[tuple[str, int], tuple[Option, Entry]] = {}
         self._curves: dict[int, tuple[Option, Entry]] = {}
+        self._mains: dict[int, str] = {}
+        """Main nodes of rigid bodies, and the keys of these: what acts on the one acts on the other."""
         for option in options(path):
             self._read(option)
         self._engine()
@@ -147,15 +149,15 @@ class Radioss:
         self._draft = draft = Draft(self.path, system, self.account)
         draft.name = draft.name.removesuffix("_0000")
         draft.title = self.title
-        self.account.without(self._solid, [body.key for body in self._bodies])
+        names = draft.call(self._bodies, self._solid)
         self._topology = Topology(
             [body.key for body in self._bodies], partial(read_nodes, self.path), partial(read_points, self.path)
         )
-        names = Names()
-        for body in self._bodies:
-            body.name = names.give(body.title, "part", body.key)
         self._make_materials(system)
-        scene = loads.Scene(draft, self._nodes, self._curve, self._end())
+        for option, entry in self._options:
+            self._guarded(self._rigid, option, entry)
+        rigid = frozenset(self._mains.values())
+        scene = Scene(draft, self._nodes, self._curve, lambda: self._topology.points, rigid, self._end())
         for option, entry in self._options:
             self._guarded(partial(loads.take, scene), option, entry)
         begin(draft, self._topology, self._bodies, scene.starts)
@@ -171,6 +173,11 @@ class Radioss:
                 elif why := REFUSED.get(option.words[0]):
                     entry.refuse(why)
         return draft
+
+    def _rigid(self, option: Option, entry: Entry) -> None:
+        if option.words[0] == "RBODY" and option.words[1:2] != ["LAGMUL"]:
+            found = bodies.rigid(option, entry, self._bodies, self._topology, self._nodes)
+            self._mains |= [found] if found else []
 
     def _make_materials(self, system: System) -> None:
         used = {body.material for body in self._bodies}
@@ -213,16 +220,16 @@ class Radioss:
         meetings: list[Meeting] = []
         ties: list[Tie] = []
         for option, entry in self._options:
-            if option.words[0] == "INTER" and option.words[1:2] in (["TYPE7"], ["TYPE2"]):
+            if option.words[0] == "INTER" and loads.CONTACTS.intersection(option.words[1:2]):
                 try:
                     made = loads.contact(option, entry, self._surface)
                 except (CardError, ValueError) as error:
                     entry.refuse(str(error))
                     continue
-                if option.words[1] == "TYPE7":
-                    meetings.append(made)
-                else:
+                if option.words[1] == "TYPE2":
                     ties += [(pair, entry) for pair in sorted(made.pairs())]
+                else:
+                    meetings.append(made)
         join(draft, self._topology, self._bodies, ties)
         meet(draft, self._bodies, meetings)
 
@@ -258,6 +265,8 @@ class Radioss:
             raise ValueError(f"the group of nodes {number} takes some away by numbers below 0, which is not followed")
         if kind == "PART":
             return Chosen(what, bodies=frozenset(map(str, items)))
+        if kind == "NODE" and items and set(items) <= self._mains.keys():
+            return Chosen(what, bodies=frozenset(self._mains[item] for item in items))
         if kind == "NODE":
             on = f"nodes:{number}" if ("SURF", number) in self._groups else str(number)
             return Chosen(what, nodes=lambda: set(items), on=on)

@@ -13,7 +13,8 @@ from conoid.cases.cards import CardError
 from conoid.cases.included import lines
 from conoid.cases.problems import shown
 
-from ..account import Entry, Remark
+from .. import fields
+from ..account import Entry
 
 _REAL = re.compile(r"([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))(?:[eEdD]([+-]?[0-9]{1,4})|([+-][0-9]{1,4}))?", re.ASCII)
 _WHOLE = re.compile(r"[+-]?[0-9]{1,18}", re.ASCII)
@@ -95,71 +96,24 @@ def cut(row: Row, *widths: int) -> list[str]:
     return found
 
 
-class Fields:
-    """Named fields of the lines of an option; what is not 0 and was read by nobody is told at the end."""
+class Fields(fields.Fields[int]):
+    """The fields of some lines of an option."""
 
     def __init__(self, option: Option, entry: Entry, rows: Sequence[Row], layout: Sequence[str]) -> None:
         """``layout``: for each line its fields; a name with ``:`` has 10 columns, others 20, ``-`` no meaning."""
-        self.option, self.entry = option, entry
-        self._found: dict[str, tuple[int, str]] = {}
-        self._read: set[str] = set()
+        self.option = option
+        found: dict[str, tuple[int, str]] = {}
         for row, names in zip(rows, layout, strict=False):
             words = names.split()
-            for name, item in zip(words, cut(row, *(10 if word.endswith(":") else 20 for word in words)), strict=True):
-                if name.strip(":") != "-":
-                    self._found[name.strip(":")] = row[0], item
-        self.more = [row for row in rows[len(layout) :] if row[1].strip()]
+            items = zip(words, cut(row, *(10 if word.endswith(":") else 20 for word in words)), strict=True)
+            found |= {name.strip(":"): (row[0], item) for name, item in items if name.strip(":") != "-"}
+        super().__init__(entry, found, [number for number, text in rows[len(layout) :] if text.strip()])
 
-    def given(self, name: str) -> bool:
-        """Whether the field is there and not empty."""
-        return bool(self._found.get(name, (0, ""))[1])
+    def _real(self, place: int, item: str, name: str) -> float:
+        return real(place, item, name)
 
-    def real(self, name: str, default: float = 0.0) -> float:
-        """A number; ``default`` for an empty field. Raises CardError."""
-        self._read.add(name)
-        line, item = self._found.get(name, (0, ""))
-        return real(line, item, name) if item else default
-
-    def nonzero(self, name: str, default: float) -> float:
-        """A number of which 0 means the default."""
-        return self.real(name) or default
-
-    def whole(self, name: str) -> int:
-        """A whole number; 0 for an empty field. Raises CardError."""
-        self._read.add(name)
-        line, item = self._found.get(name, (0, ""))
-        return whole(line, item, name) if item else 0
-
-    def text(self, name: str) -> str:
-        """The text of a field."""
-        self._read.add(name)
-        return self._found.get(name, (0, ""))[1]
-
-    def forgive(self, names: str, why: str) -> None:
-        """Fields that are left out, and why; those that are 0 say nothing."""
-        self._tell("left", names.split(), why)
-
-    def refuse(self, names: str, why: str) -> None:
-        """Fields without which the case would answer wrong."""
-        self._tell("refused", names.split(), why)
-
-    def differ(self, name: str, why: str) -> None:
-        """A field whose meaning differs here."""
-        self._read.add(name)
-        self.entry.remark("differs", f"{name} = {self._found.get(name, (0, ''))[1] or '(empty)'}", why)
-
-    def rest(self, kind: Remark = "refused", why: str = "not taken over") -> None:
-        """Everything that is not 0 and nobody has read."""
-        self._tell(kind, [name for name in self._found if name not in self._read], why)
-        if self.more:
-            self.entry.remark(kind, f"line {self.more[0][0]}", "a line that is not read here")
-
-    def _tell(self, kind: Remark, names: list[str], why: str) -> None:
-        for name in names:
-            self._read.add(name)
-            item = self._found.get(name, (0, ""))[1]
-            if item and not (_REAL.fullmatch(item) and real(0, item, name) == 0.0):
-                self.entry.remark(kind, f"{name} = {item}", why)
+    def _whole(self, place: int, item: str, name: str) -> int:
+        return whole(place, item, name)
 
 
 def numbers(rows: Sequence[Row], what: str) -> list[int]:

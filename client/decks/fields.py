@@ -1,0 +1,90 @@
+"""Named fields of a keyword: what was read of them, and what was not."""
+
+from collections.abc import Sequence
+from typing import Generic, TypeVar
+
+from conoid.cases.cards import CardError
+
+from .account import Entry, Remark
+
+Place = TypeVar("Place")
+"""Where a field stands: a card, or the number of a line."""
+
+
+class Fields(Generic[Place]):
+    """The fields of a keyword by the names that the manual of its code gives them.
+
+    What is not 0 and was read by nobody is told at the end (``rest``): nothing is passed over in silence.
+    """
+
+    def __init__(self, entry: Entry, found: dict[str, tuple[Place, str]], extra: Sequence[int]) -> None:
+        """``extra``: numbers of lines behind those with names."""
+        self.entry = entry
+        self.extra = list(extra)
+        self._found = found
+        self._read: set[str] = set()
+
+    def _real(self, place: Place, item: str, name: str) -> float:
+        """The number that a field has. Raises CardError."""
+        raise NotImplementedError
+
+    def _whole(self, place: Place, item: str, name: str) -> int:
+        """The whole number that a field has. Raises CardError."""
+        raise NotImplementedError
+
+    def given(self, name: str) -> bool:
+        """Whether the field is there and not empty."""
+        return name in self._found and bool(self._found[name][1])
+
+    def real(self, name: str, default: float = 0.0) -> float:
+        """A number; ``default`` for an empty field. Raises CardError."""
+        self._read.add(name)
+        return self._real(*self._found[name], name) if self.given(name) else default
+
+    def nonzero(self, name: str, default: float) -> float:
+        """A number of which 0 means the default. Raises CardError."""
+        return self.real(name) or default
+
+    def whole(self, name: str, default: int = 0) -> int:
+        """A whole number; ``default`` for an empty field. Raises CardError."""
+        self._read.add(name)
+        return self._whole(*self._found[name], name) if self.given(name) else default
+
+    def text(self, name: str) -> str:
+        """The text of a field."""
+        self._read.add(name)
+        return self._found[name][1] if name in self._found else ""
+
+    def forgive(self, names: str, why: str) -> None:
+        """Fields that are left out, and why; those that are 0 say nothing."""
+        self._tell("left", names.split(), why)
+
+    def refuse(self, names: str, why: str) -> None:
+        """Fields without which the case would answer wrong."""
+        self._tell("refused", names.split(), why)
+
+    def differ(self, name: str, why: str) -> None:
+        """A field whose meaning differs here."""
+        self._read.add(name)
+        self.entry.remark("differs", self._shown(name), why)
+
+    def rest(self, kind: Remark = "refused", why: str = "not taken over") -> None:
+        """Everything that is not 0 and nobody has read."""
+        self._tell(kind, [name for name in self._found if name not in self._read], why)
+        if self.extra:
+            self.entry.remark(kind, f"line {self.extra[0]}", "a line that is not read here")
+
+    def _tell(self, kind: Remark, names: list[str], why: str) -> None:
+        for name in names:
+            self._read.add(name)
+            if not self._void(name):
+                self.entry.remark(kind, self._shown(name), why)
+
+    def _void(self, name: str) -> bool:
+        try:
+            return not self.given(name) or self._real(*self._found[name], name) == 0.0
+        except CardError:
+            return False
+
+    def _shown(self, name: str) -> str:
+        return f"{name} = {self._found[name][1] if self.given(name) else '(empty)'}"

@@ -1,0 +1,113 @@
+"""Rigid walls of an LS-DYNA deck: planes, cylinders and spheres without an end, at rest, driven, or with a mass."""
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from conoid.cases.cards import Block
+
+from ..account import Entry
+from ..holds import displacement_speed, velocity_course
+from ..units import LENGTH, MASS, SPEED, TIME
+from ..walls import Stop
+from .fields import Fields
+from .scene import Scene
+
+_TAIL, _HEAD = ("XT", "YT", "ZT"), ("XH", "YH", "ZH")
+_SHAPES: Mapping[str, str] = {"CYLINDER": "RADCYL LENCYL NSEGS", "SPHERE": "RADSPH"}
+"""Cards of the round ones (the manual, *RIGIDWALL_GEOMETRIC)."""
+OPTIONS = frozenset({"ID", "FORCES", "DISPLAY", "MOVING", "MOTION", *_SHAPES})
+"""Options that are followed; ORTHO, FINITE, FLAT and PRISM are not."""
+
+
+def planar(scene: Scene, block: Block, options: frozenset[str], entry: Entry) -> None:
+    """``*RIGIDWALL_PLANAR``: a plane without end, at rest or with a mass and a speed along its normal."""
+    layout = ["NSID NSIDEX BOXID OFFSET BIRTH DEATH RWKSF", "XT YT ZT XH YH ZH FRIC WVEL"]
+    layout += ["MASS V0"] if "MOVING" in options else []
+    fields = Fields(block, entry, _cards(block, options, len(layout)), layout)
+    fields.refuse("OFFSET", "an offset is not taken over")
+    fields.forgive("RWKSF WVEL", "how rigid bodies meet the wall, and a threshold of welding")
+    table: dict[str, Any] = {"kind": "wall", "point": _point(scene, fields), "normal": _direction(fields)}
+    if "MOVING" in options:
+        _moving(scene, fields, table)
+    _stand(scene, fields, table)
+
+
+def geometric(scene: Scene, block: Block, options: frozenset[str], entry: Entry) -> None:
+    """``*RIGIDWALL_GEOMETRIC_CYLINDER`` without an end and ``_SPHERE``, at rest or moved by a curve (``_MOTION``)."""
+    shape = next((name for name in _SHAPES if name in options), "")
+    if not shape:
+        raise ValueError("a cylinder or a sphere is taken over")
+    layout = ["NSID NSIDEX BOXID BIRTH DEATH", "XT YT ZT XH YH ZH FRIC", _SHAPES[shape]]
+    layout += ["LCID OPT VX VY VZ"] if "MOTION" in options else []
+    fields = Fields(block, entry, _cards(block, options, len(layout)), layout)
+    radius = fields.real("RADCYL" if shape == "CYLINDER" else "RADSPH")
+    table: dict[str, Any] = {"kind": "wall", "shape": shape.lower(), "point": _point(scene, fields)}
+    table["radius"] = scene.draft.quantity(radius, LENGTH)
+    if shape == "CYLINDER":
+        table["axis"] = _direction(fields)
+        fields.refuse("LENCYL", "the cylinder ends; a wall does not, a rigid part of that shape does")
+        fields.forgive("NSEGS", "segments of output")
+    else:
+        fields.forgive(" ".join(_HEAD), "of no meaning for a sphere")
+    if "MOTION" in options:
+        _driven(scene, fields, table)
+    _stand(scene, fields, table)
+
+
+def _cards(block: Block, options: frozenset[str], count: int) -> list[Any]:
+    """The cards of the wall, without those of its number and of what it writes out."""
+    cards = list(block.cards["ID" in options :])
+    return cards[:count] if options & {"FORCES", "DISPLAY"} else cards
+
+
+def _point(scene: Scene, fields: Fields) -> list[str | float]:
+    return scene.draft.vector([fields.real(name) for name in _TAIL], LENGTH)
+
+
+def _direction(fields: Fields) -> list[float]:
+    along = [fields.real(b) - fields.real(a) for a, b in zip(_TAIL, _HEAD, strict=True)]
+    if not any(along):
+        raise ValueError("its direction, from XT YT ZT to XH YH ZH, has no length")
+    return along
+
+
+def _moving(scene: Scene, fields: Fields, table: dict[str, Any]) -> None:
+    """A mass, and the speed along the normal with which it begins; without a mass the wall stays as fast."""
+    along, speed, mass = table["normal"], fields.real("V0"), fields.real("MASS")
+    length = math.hypot(*along)
+    if speed:
+        table["velocity"] = scene.draft.vector([speed * value / length for value in along], SPEED)
+    if mass > 0.0:
+        table["mass"] = scene.draft.quantity(mass, MASS)
+        if fields.real("FRIC"):
+            fields.differ("FRIC", "the wall moves along its normal alone there; here friction drags it along as well")
+    elif speed:
+        fields.refuse("V0", "a speed without MASS; give the wall a mass, or velocity and course")
+
+
+def _driven(scene: Scene, fields: Fields, table: dict[str, Any]) -> None:
+    """A velocity or a displacement by a curve, along a direction whose length scales it not."""
+    along = [fields.real(name) for name in ("VX", "VY", "VZ")]
+    length = math.hypot(*along)
+    if length == 0.0:
+        raise ValueError("VX VY VZ: the direction of the motion has no length")
+    curve, kind = scene.lasting(fields.whole("LCID")), fields.whole("OPT")
+    speed, course = (displacement_speed(curve, scene.end), ()) if kind else velocity_course(curve, scene.end)
+    table["velocity"] = scene.draft.vector([speed * value / length for value in along], SPEED)
+    if course:
+        table["course"] = [[scene.draft.quantity(time, TIME), factor] for time, factor in course]
+
+
+def _stand(scene: Scene, fields: Fields, table: dict[str, Any]) -> None:
+    """What all walls have in common: whom they stop, when, and their friction."""
+    fields.refuse("NSIDEX BOXID BIRTH", "exceptions, boxes and times are not taken over")
+    if 0.0 < fields.real("DEATH") < scene.end:
+        fields.refuse("DEATH", "the wall goes before the run ends; here it stays")
+    friction = fields.real("FRIC")
+    if not 0.0 <= friction < 1.0:
+        fields.refuse("FRIC", "nodes stick to the wall there; here friction is Coulomb's")
+    elif friction:
+        table["friction"] = friction
+    scene.walls.append(Stop(scene.nodes(fields.whole("NSID"), fields.entry), table, fields.entry))
+    fields.rest("refused")
