@@ -10,6 +10,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from . import connections, errors, identity, keeper, limits, openapi, page, reader
 from .bell import Bell
+from .cards import Cards
 from .crowd import Crowd
 from .door import Door
 from .download import Downloads
@@ -25,7 +26,7 @@ from .metrics import Metrics, Timed
 from .present import Present
 from .readiness import Readiness
 from .receiving import Receiver
-from .routes import cases, events, files, health, history, logs, me, runs, sent, snapshots
+from .routes import cases, events, files, health, history, logs, me, runs, sent, snapshots, table
 from .routes import sweeps as sweep_routes
 from .sent import SentFiles
 from .service import Service
@@ -39,6 +40,7 @@ from .telemetry import Telemetry
 ROUTERS = (
     cases.router,
     runs.router,
+    table.router,
     events.router,
     history.router,
     snapshots.router,
@@ -106,6 +108,7 @@ def opened(settings: Settings) -> Iterator[Service]:
             supervisor=supervisor,
             desk=desk,
             histories=Histories(),
+            cards=Cards(settings.runs, store),
             readiness=Readiness(settings, store),
             crowd=Crowd(http, connections.raise_limit()),
             downloads=Downloads(lanes),

@@ -25,6 +25,8 @@ class Run:
     """Why a stop was asked for."""
     threads: int = 1
     """Of each rank."""
+    title: str = ""
+    """Of the case."""
 
     @property
     def cores(self) -> int:

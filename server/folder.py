@@ -32,6 +32,8 @@ APART = f"{_NEW}files-"
 _TELLING = (layout.SUBMISSION, layout.JOURNAL, layout.WORKER)
 """One of these is left where a run has been, whatever was damaged."""
 _UNREADABLE = "outcome.unreadable.json"
+_TITLE = 200
+"""Characters of a title that lists have. Chosen: a line or two."""
 DAMAGED = (FileNotFoundError, IsADirectoryError, NotADirectoryError, PermissionError)
 """What the system says of a file that is gone, or is none any more (``whole.opened``), or not for this user."""
 _NO_FILE = (FileNotFoundError, IsADirectoryError, NotADirectoryError)
@@ -194,7 +196,9 @@ def run(folder: Path) -> Run:
 
 def first(made: Submission) -> Run:
     """The run as it was accepted."""
-    return Run(made.id, made.owner, made.name, made.ranks, made.submitted, threads=made.threads)
+    return Run(
+        made.id, made.owner, made.name, made.ranks, made.submitted, threads=made.threads, title=made.title[:_TITLE]
+    )  # fmt: skip
 
 
 def replay(accepted: Run, told: Iterable[Status]) -> Run:

@@ -53,6 +53,7 @@ ANSWERS: dict[tuple[str, str], dict[int, tuple[str, str]]] = {
     ("get", "/v1/cases/{name}"): {200: ("application/toml", "")},
     ("post", "/v1/runs"): {202: (_JSON, "Receipt")},
     ("get", "/v1/runs"): {200: (_JSON, "RunPage")},
+    ("get", "/v1/table"): {200: (_JSON, "Table"), 304: ("", "")},
     ("get", "/v1/runs/{run_id}"): {200: (_JSON, "RunStatus"), 304: ("", "")},
     ("delete", "/v1/runs/{run_id}"): {204: ("", "")},
     ("post", "/v1/runs/{run_id}:keep"): {200: (_JSON, "RunStatus")},
@@ -129,7 +130,8 @@ def install(app: FastAPI) -> None:
         made = own()
         case = reference.json_schema("#/components/schemas/{model}")
         _, shapes_ = msgspec.json.schema_components(shapes.ALL, ref_template="#/components/schemas/{name}")
-        _tell_of_null(shapes_["Outcome"]["properties"])
+        for shape in shapes_.values():
+            _tell_of_null(shape.get("properties", {}))
         made["components"] = {
             "schemas": {**case.pop("$defs"), "Case": case, **shapes_},
             "securitySchemes": {"token": {"type": "http", "scheme": "bearer"}},

@@ -73,7 +73,9 @@ def _told(path: Path) -> list[Status]:
 
 def _as_accepted(known: Run | None) -> Run:
     assert known is not None
-    return Run(known.id, known.owner, known.name, known.ranks, known.submitted, threads=known.threads)
+    return Run(
+        known.id, known.owner, known.name, known.ranks, known.submitted, threads=known.threads, title=known.title
+    )
 
 
 def _fate(path: Path, trace: Trace) -> Literal["none", "alive", "gone"]:

@@ -21,7 +21,7 @@ A server answers at `http://HOST:8750` without options. `make reference` makes t
 - A header `Idempotency-Key` makes a request safe to repeat: the same key and body give the same run.
 """
 _TITLES = (
-    ("Cases", ("/v1/cases", "/v1/case.schema.json")), ("Runs", ("/v1/runs",)), ("Sweeps", ("/v1/sweeps",)),
+    ("Cases", ("/v1/cases", "/v1/case.schema.json")), ("Runs", ("/v1/runs", "/v1/table")), ("Sweeps", ("/v1/sweeps",)),
     ("Files that cases name", ("/v1/files",)), ("The server", ("/",)),
 )  # fmt: skip
 """A route stands below the first title that has a beginning of its path."""

@@ -6,6 +6,7 @@ from typing import Annotated
 from fastapi import Depends, Request
 
 from .bell import Bell
+from .cards import Cards
 from .crowd import Crowd
 from .download import Downloads
 from .farewells import Farewells
@@ -35,6 +36,7 @@ class Service:
     supervisor: Supervisor
     desk: Desk
     histories: Histories
+    cards: Cards
     readiness: Readiness
     crowd: Crowd
     downloads: Downloads

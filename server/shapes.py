@@ -69,6 +69,7 @@ class RunLine(msgspec.Struct, kw_only=True):
     id: str
     owner: str
     name: str
+    title: str
     state: State
     cause: Cause | None
     message: str
@@ -82,10 +83,16 @@ class RunLine(msgspec.Struct, kw_only=True):
     url: str
 
 
+class ListedRun(RunLine, kw_only=True):
+    """A run among others."""
+
+    short: str
+    """The beginning of the id that no other run of the owner has."""
+
+
 class RunStatus(RunLine, kw_only=True):
     """A run, how far it is, and how it has ended."""
 
-    title: str
     case_file: str
     estimate: dict[str, float]
     progress: Progress | None
@@ -95,7 +102,53 @@ class RunStatus(RunLine, kw_only=True):
 class RunPage(msgspec.Struct, kw_only=True):
     """Runs, newest first, and the cursor of the following page; null on the last."""
 
-    runs: list[RunLine]
+    runs: list[ListedRun]
+    next: str | None
+
+
+class Share(msgspec.Struct, kw_only=True):
+    """How far a run is; ``t`` and ``end_time`` are simulated time, ``eta`` wall time left, s."""
+
+    t: float
+    end_time: float
+    eta: float
+    step: int
+
+
+class TableRow(ListedRun, kw_only=True):
+    """A run in the table: where its case is among those that are alike, what it has otherwise, its results."""
+
+    progress: Share | None
+    case: int | None
+    values: dict[str, bool | int | float | str | None]
+    results: list[float | None] | None
+    references: int
+    """Reference numbers that it was compared with."""
+    missed: list[str]
+    """Those that it misses."""
+
+
+class Result(msgspec.Struct, kw_only=True):
+    """What a number of a run is."""
+
+    name: str
+    unit: str
+
+
+class AlikeCases(msgspec.Struct, kw_only=True):
+    """Values by key that cases have in common, SI; units of those that have one; what their runs have as results."""
+
+    values: dict[str, bool | int | float | str]
+    units: dict[str, str]
+    results: list[Result]
+
+
+class Table(msgspec.Struct, kw_only=True):
+    """Runs, newest first, and the cursor of the following page, null on the last; ``pending`` of them are not read."""
+
+    runs: list[TableRow]
+    cases: list[AlikeCases]
+    pending: int
     next: str | None
 
 
@@ -241,7 +294,7 @@ class SweepPoint(msgspec.Struct, kw_only=True):
     """What was changed at a point, and its run."""
 
     values: dict[str, Any]
-    run: RunLine
+    run: ListedRun
 
 
 class Sweep(SweepLine, kw_only=True):
@@ -286,7 +339,7 @@ class Health(msgspec.Struct, kw_only=True):
 
 
 ALL = (
-    Problem, Receipt, RunPage, RunStatus, Validation, Gallery, EventPage, Files, SentFile, SentFiles,
+    Problem, Receipt, RunPage, RunStatus, Table, Validation, Gallery, EventPage, Files, SentFile, SentFiles,
     Snapshots, FragmentCourse, History, Me, Health, Wish,
     SweepPage, Sweep,
 )  # fmt: skip

@@ -15,16 +15,16 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from conoid.cases.run import Cause, State
 
+from .chosen import OPEN, Chosen
 from .engine import engine_of, failure, identity_of
 from .events import Run
-from .tables import BONDS, KEYS, LABELS, META, RUNS, TOKENS
+from .tables import BONDS, CARDS, KEYS, LABELS, META, RUNS, TOKENS
 from .usage import Took
 
 _ONLY = 1
 """The number of the one bond that there may be."""
 _AT_ONCE = 500
 """Ids in one statement. Chosen: SQLite takes 999 in its older versions."""
-_OPEN = [state.value for state in State if not state.final]
 
 
 @dataclass(frozen=True)
@@ -44,6 +44,16 @@ class Bond(msgspec.Struct, frozen=True):
 
     server: str
     place: str
+
+
+@dataclass(frozen=True)
+class KeptCard:
+    """What is kept of a run for the table of runs (card.py); ``final``: it has ended."""
+
+    run: str
+    form: int
+    final: bool
+    body: bytes
 
 
 class Store:
@@ -156,46 +166,61 @@ class Store:
             rows = (connection.execute(sa.select(RUNS).where(RUNS.c.id.in_(some))) for some in _parts(run_ids))
             return {row["id"]: _run(row) for found in rows for row in found.mappings()}
 
-    def page(
-        self, owner: str, states: Sequence[State], before: str | None, limit: int,
-        labels: Mapping[str, str] | None = None,
-    ) -> list[Run]:  # fmt: skip
-        """At most ``limit`` runs of ``owner``, newest first, older than the run ``before``; all states when none; those
-        that have all ``labels``.
-        """
-        query = sa.select(RUNS).where(RUNS.c.owner == owner).order_by(RUNS.c.id.desc()).limit(limit)
-        if states:
-            query = query.where(RUNS.c.state.in_([state.value for state in states]))
+    def page(self, owner: str, chosen: Chosen, before: str | None, limit: int) -> list[Run]:
+        """At most ``limit`` of the ``chosen`` runs of ``owner``, newest first, older than the run ``before``."""
+        query = sa.select(RUNS).where(*chosen.where(owner)).order_by(RUNS.c.id.desc()).limit(limit)
         if before is not None:
             query = query.where(RUNS.c.id < before)
-        for name, value in (labels or {}).items():
-            same = (LABELS.c.owner == owner, LABELS.c.name == name, LABELS.c.value == value)
-            query = query.where(RUNS.c.id.in_(sa.select(LABELS.c.run).where(*same)))
         with self._engine.connect() as connection:
             return [_run(row) for row in connection.execute(query).mappings()]
 
+    def ids_about(self, owner: str, first: str, last: str) -> list[str]:
+        """The ids of all runs of ``owner`` from ``first`` to ``last``, sorted, with one neighbour at either end."""
+        own = sa.select(RUNS.c.id).where(RUNS.c.owner == owner)
+        before = own.where(RUNS.c.id < first).order_by(RUNS.c.id.desc()).limit(1)
+        after = own.where(RUNS.c.id > last).order_by(RUNS.c.id).limit(1)
+        within = own.where(RUNS.c.id.between(first, last)).order_by(RUNS.c.id)
+        with self._engine.connect() as connection:
+            return [run_id for query in (before, within, after) for (run_id,) in connection.execute(query)]
+
+    def cards(self, run_ids: Sequence[str]) -> list[KeptCard]:
+        """The cards of some runs, as far as they are kept."""
+        with self._engine.connect() as connection:
+            found = (connection.execute(sa.select(CARDS).where(CARDS.c.run.in_(some))) for some in _parts(run_ids))
+            return [KeptCard(*row) for rows in found for row in rows]
+
+    def keep_cards(self, cards: Sequence[KeptCard], titles: Mapping[str, str]) -> None:
+        """Keeps cards in place of earlier ones of the same runs; runs of an old database get their ``titles``."""
+        with self._engine.begin() as connection:
+            for card in cards:
+                connection.execute(sa.delete(CARDS).where(CARDS.c.run == card.run))
+                connection.execute(sa.insert(CARDS).values(asdict(card)))
+            for run_id, title in titles.items():
+                untitled = sa.update(RUNS).where(RUNS.c.id == run_id, RUNS.c.title == "")
+                connection.execute(untitled.values(title=title))
+
     def open_runs(self, owner: str) -> int:
         """How many runs of ``owner`` have not ended."""
-        query = sa.select(sa.func.count()).select_from(RUNS).where(RUNS.c.owner == owner, RUNS.c.state.in_(_OPEN))
+        query = sa.select(sa.func.count()).select_from(RUNS).where(RUNS.c.owner == owner, RUNS.c.state.in_(OPEN))
         with self._engine.connect() as connection:
             return connection.execute(query).scalar_one()
 
     def ended(self) -> dict[str, State]:
         """All runs that are known to have ended: how, by id."""
-        query = sa.select(RUNS.c.id, RUNS.c.state).where(RUNS.c.state.not_in(_OPEN))
+        query = sa.select(RUNS.c.id, RUNS.c.state).where(RUNS.c.state.not_in(OPEN))
         with self._engine.connect() as connection:
             return {run_id: State(state) for run_id, state in connection.execute(query)}
 
     def open(self) -> dict[str, Run]:
         """All runs that are not known to have ended, by id."""
-        query = sa.select(RUNS).where(RUNS.c.state.in_(_OPEN))
+        query = sa.select(RUNS).where(RUNS.c.state.in_(OPEN))
         with self._engine.connect() as connection:
             return {row["id"]: _run(row) for row in connection.execute(query).mappings()}
 
     def taken(self) -> list[Took]:
         """What every run that has ended took."""
         query = sa.select(RUNS.c.owner, RUNS.c.ranks * RUNS.c.threads, RUNS.c.started, RUNS.c.finished)
-        ended = query.where(RUNS.c.state.not_in(_OPEN), RUNS.c.started > 0.0)
+        ended = query.where(RUNS.c.state.not_in(OPEN), RUNS.c.started > 0.0)
         with self._engine.connect() as connection:
             return [Took(*row) for row in connection.execute(ended)]
 

@@ -19,6 +19,7 @@ RUNS = sa.Table(
     sa.Column("finished", sa.Float(53), nullable=False),
     sa.Column("stopping_for", sa.String(16)),
     sa.Column("threads", sa.Integer, nullable=False, server_default="1"),
+    sa.Column("title", sa.Text, nullable=False, server_default=""),
     sa.Index("runs_of_owner", "owner", "id"),
     sa.Index("runs_by_state", "state"),
 )
@@ -43,6 +44,15 @@ LABELS = sa.Table(
     sa.Index("runs_of_label", "owner", "name", "value", "run"),
 )
 """The labels of each run."""
+CARDS = sa.Table(
+    "cards",
+    META,
+    sa.Column("run", sa.String(22), primary_key=True),
+    sa.Column("form", sa.Integer, nullable=False),
+    sa.Column("final", sa.Boolean, nullable=False),
+    sa.Column("body", sa.LargeBinary, nullable=False),
+)
+"""What the table of runs tells of each run (card.py): it can be made again from the folders."""
 BONDS = sa.Table(
     "bond",
     META,

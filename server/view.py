@@ -15,7 +15,11 @@ from conoid.cases.run import State
 from . import folder, pins
 from .errors import ServiceError
 from .events import Run
+from .rows import short
 from .service import Service
+
+_SHORT = 7
+"""Letters of a short id, at least. Chosen: those of git."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +43,7 @@ def snapshot(service: Service, run: Run) -> Snapshot:
     ended = outcome(path) if run.state.final else None
     body = {
         **brief(service, run),
-        "title": made.title if made else "",
+        "title": made.title if made else run.title,
         "case_file": made.case_file if made else "",
         "estimate": made.estimate if made else {},
         "progress": progress,
@@ -70,6 +74,7 @@ def brief(service: Service, run: Run, labels: Mapping[str, str] | None = None) -
         "id": run.id,
         "owner": run.owner,
         "name": run.name,
+        "title": run.title,
         "state": run.state,
         "cause": run.cause,
         "message": run.message,
@@ -87,7 +92,27 @@ def brief(service: Service, run: Run, labels: Mapping[str, str] | None = None) -
 def briefs(service: Service, runs: Sequence[Run]) -> list[dict[str, Any]]:
     """Lines of a list, as the runs are now; the labels from the database, so that no file is read."""
     labels = service.store.labels([run.id for run in runs])
-    return [brief(service, service.supervisor.current(run.id) or run, labels[run.id]) for run in runs]
+    shorts = short_ids(service, runs)
+    return [
+        {**brief(service, service.supervisor.current(run.id) or run, labels[run.id]), "short": shorts[run.id]}
+        for run in runs
+    ]
+
+
+def short_ids(service: Service, runs: Sequence[Run]) -> dict[str, str]:
+    """The shortest beginning of the id of each of an owner's runs that no other run of the owner has, by its id."""
+    if not runs:
+        return {}
+    ids = [run.id for run in runs]
+    return short(service.store.ids_about(runs[0].owner, min(ids), max(ids)), _SHORT)
+
+
+def progress(service: Service, run_id: str) -> dict[str, float] | None:
+    """How far a run is whose worker lives."""
+    told = service.supervisor.progress(run_id)
+    if told is None:
+        return None
+    return {"t": told.t, "end_time": told.end_time, "eta": told.eta, "step": told.step}
 
 
 def to_cursor(run: Run) -> str:

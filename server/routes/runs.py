@@ -17,6 +17,7 @@ from conoid.cases.run import State
 
 from .. import download, folder, openapi, pins, restarts, view
 from ..auth import Identity, Pass, Reader, Submitter, unauthorized
+from ..chosen import Chosen
 from ..copies import names_files
 from ..crowd import place_of
 from ..errors import ServiceError, invalid_case, not_found
@@ -25,6 +26,7 @@ from ..lanes import blocking
 from ..limits import read_body
 from ..service import Service, ServiceOf
 from ..submission import Wishes, labels_of
+from .choice import ChosenOf
 
 router = APIRouter()
 Body = Annotated[bytes, Depends(read_body)]
@@ -54,44 +56,41 @@ async def submit(
     return JSONResponse(receipt, 202, {"Location": receipt["url"]})
 
 
+Cursor = Annotated[str | None, Query(json_schema_extra={"pattern": "^[A-Za-z0-9_-]{30}$"})]
+
+
 @router.get("/v1/runs")
 @blocking
 def page(
     service: ServiceOf,
     identity: Reader,
-    state: Annotated[str | None, Query(description="one or more states, with commas between")] = None,
-    cursor: Annotated[str | None, Query(json_schema_extra={"pattern": "^[A-Za-z0-9_-]{30}$"})] = None,
+    chosen: ChosenOf,
+    cursor: Cursor = None,
     limit: Annotated[int, Query(ge=1, le=500)] = 50,
-    label: Annotated[list[str] | None, Query(description="NAME=VALUE; runs that have all of them")] = None,
     prefix: Annotated[str, Query(pattern="^[0-9a-z]{0,22}$", description="the beginning of their ids")] = "",
 ) -> dict[str, Any]:
     """Own runs, newest first, without those whose folder has been removed; ``next`` is the cursor of the following
     page, null on the last.
     """
-    before = view.from_cursor(cursor) if cursor is not None else prefix + _LAST if prefix else None
-    pages = _pages(service, identity.owner, _states(state), before, limit + 1, labels_of(label or ()))
-    runs = list(islice(takewhile(lambda run: run.id.startswith(prefix), pages), limit + 1))
+    runs = listed(service, identity.owner, chosen, cursor, limit + 1, prefix)
     following = view.to_cursor(runs[limit - 1]) if len(runs) > limit else None
     return {"runs": view.briefs(service, runs[:limit]), "next": following}
 
 
-def _pages(
-    service: Service, owner: str, states: list[State], before: str | None, size: int, labels: dict[str, str]
-) -> Iterator[Run]:
+def listed(service: Service, owner: str, chosen: Chosen, cursor: str | None, most: int, prefix: str = "") -> list[Run]:
+    """At most so many of an owner's runs that are there, newest first, from the cursor on. Raises ServiceError 400."""
+    before = view.from_cursor(cursor) if cursor is not None else prefix + _LAST if prefix else None
+    pages = _pages(service, owner, chosen, before, most)
+    return list(islice(takewhile(lambda run: run.id.startswith(prefix), pages), most))
+
+
+def _pages(service: Service, owner: str, chosen: Chosen, before: str | None, size: int) -> Iterator[Run]:
     """The runs of an owner that are there, newest first, so many at a time from the store."""
-    while some := service.store.page(owner, states, before, size, labels):
+    while some := service.store.page(owner, chosen, before, size):
         yield from service.present.left(some)
         if len(some) < size:
             return
         before = some[-1].id
-
-
-def _states(text: str | None) -> list[State]:
-    try:
-        return [State(word) for word in text.split(",")] if text else []
-    except ValueError as error:
-        allowed = ", ".join(State)
-        raise ServiceError(400, "bad_parameter", f"state: {error}; allowed: {allowed}", pointer="state") from None
 
 
 @blocking

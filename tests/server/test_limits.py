@@ -14,6 +14,7 @@ from conoid.cases.messages import Log, to_json
 from conoid.cases.run import State
 from conoid.server import digests, folder, series, view
 from conoid.server.app import opened
+from conoid.server.chosen import Chosen
 from conoid.server.events import Run
 from conoid.server.routes import events
 from conoid.server.routes.cases import _gallery
@@ -147,7 +148,7 @@ def test_a_database_without_labels_gets_them_from_the_folders(server: Running) -
         connection.execute(sa.text("drop table labels"))
     server.service.supervisor.close()
     with opened(settings) as service:
-        assert [one.id for one in service.store.page("ann", [], None, 10, {"colour": "red"})] == [red]
+        assert [one.id for one in service.store.page("ann", Chosen(labels={"colour": "red"}), None, 10)] == [red]
         assert not Store(settings.database_url).unlabelled
 
 
@@ -177,7 +178,8 @@ def test_three_thousand_runs_are_searched_in_a_moment(tmp_path: Path) -> None:
             store._label(connection, one, {"point": str(n), "sweep": "s"})
     began = time.process_time()
     for n in range(40):
-        assert [one.id for one in store.page("ann", [], None, 51, {"sweep": "s", "point": str(n)})] == [runs[n].id]
+        chosen = Chosen(labels={"sweep": "s", "point": str(n)})
+        assert [one.id for one in store.page("ann", chosen, None, 51)] == [runs[n].id]
     assert time.process_time() - began < 1.0
     assert set(store.labels([one.id for one in runs[:700]])) == {one.id for one in runs[:700]}
     assert len(store.some([one.id for one in runs])) == 3000

@@ -1,0 +1,31 @@
+"""A case with every default as a flat table: ``parts[0].velocity[2]`` to -210.0, in SI units."""
+
+from collections.abc import Iterator
+from itertools import islice
+from typing import Any
+
+Scalar = bool | int | float | str
+"""A value of a key."""
+_UNTOLD = frozenset({"name", "title", "description", "reference"})
+"""Keys of a case that change no answer."""
+
+
+def flat(case: dict[str, Any], most: int, longest: int) -> dict[str, Scalar]:
+    """The values of the keys that a case has, by key, ``most`` of them; texts of at most ``longest`` characters. What
+    changes no answer is left out: names, descriptions, references.
+    """
+    told = ((key, value) for key, value in case.items() if key not in _UNTOLD)
+    pairs = (pair for key, value in told for pair in _scalars(key, value))
+    return {key: value[:longest] if isinstance(value, str) else value for key, value in islice(pairs, most)}
+
+
+def _scalars(key: str, value: Any) -> Iterator[tuple[str, Scalar]]:
+    if isinstance(value, dict):
+        for name, each in value.items():
+            if name != "description":
+                yield from _scalars(f"{key}.{name}", each)
+    elif isinstance(value, list):
+        for n, each in enumerate(value):
+            yield from _scalars(f"{key}[{n}]", each)
+    elif value is not None:
+        yield key, value

@@ -1,0 +1,50 @@
+"""The table of runs: what a page needs of many runs at once."""
+
+from dataclasses import replace
+from typing import Annotated, Any
+
+import msgspec
+from fastapi import APIRouter, Header, Query, Response
+
+from .. import download, view
+from ..auth import Reader
+from ..lanes import blocking
+from ..rows import Table
+from ..service import ServiceOf
+from .choice import ChosenOf
+from .runs import Cursor, listed
+
+router = APIRouter()
+
+
+@router.get("/v1/table")
+@blocking
+def table(
+    service: ServiceOf,
+    identity: Reader,
+    chosen: ChosenOf,
+    cursor: Cursor = None,
+    limit: Annotated[int, Query(ge=1, le=500)] = 500,
+    changed: Annotated[float | None, Query(description="open, or submitted or ended then or later, Unix s")] = None,
+    if_none_match: Annotated[str, Header(alias="If-None-Match")] = "",
+) -> Response:
+    """Own runs, newest first, with title, progress, the values of their cases and their results.
+
+    ``cases`` has the values of cases that are alike once, with their units; ``case`` of a run is its place there, and
+    ``values`` what it has otherwise (null: it has no such key). ``results`` of a run stand in the order of those of its
+    case; null before its end, and while they are not read yet (``pending`` runs of this page: ask again). ``next`` is
+    the cursor of the following page, null on the last. An answer has at most 500 runs and about 4 MB.
+    """
+    asked = replace(chosen, changed=changed)
+    runs = listed(service, identity.owner, asked, cursor, limit + 1)
+    cards, made = service.cards.of(runs[:limit]), Table()
+    lines = view.briefs(service, runs[:limit])
+    for line in lines:
+        if not made.add({**line, "progress": view.progress(service, line["id"])}, cards.get(line["id"])):
+            break
+    last = runs[len(made.rows) - 1] if len(made.rows) < len(runs) else None
+    body: dict[str, Any] = {
+        "runs": made.rows, "cases": [group.shown() for group in made.groups], "pending": made.pending,
+        "next": view.to_cursor(last) if last is not None else None,
+    }  # fmt: skip
+    return download.tagged(msgspec.json.encode(body), if_none_match)

@@ -1,0 +1,103 @@
+"""Rows of the table of runs as they are sent. The values of a case are sent once for all runs of cases that are alike,
+and of each run what it has otherwise.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise, starmap
+from typing import Any
+
+import msgspec
+
+from conoid.cases.flat import Scalar
+from conoid.cases.key_units import unit_of_key
+
+from .card import Card
+
+MOST_BYTES = 4 << 20
+"""Of the rows of an answer. Chosen: 2,000 runs of a case with fifty results."""
+_ALIKE = 0.8
+"""Of the keys of two cases that both must have for their runs to be compared value by value. Chosen."""
+_GROUPS = 50
+"""Of cases in an answer; what is like none of them has no values there. Chosen: 50 cases of 300 values are 0.6 MB."""
+
+
+@dataclass
+class Group:
+    """Cases that are alike."""
+
+    values: dict[str, Scalar]
+    """Of the first of them."""
+    results: dict[str, str] = field(default_factory=dict)
+    """Units of the results of all of them, by name, in their order."""
+
+    def takes(self, keys: Mapping[str, Scalar]) -> bool:
+        """Whether a case with these keys is like the first."""
+        both = len(self.values.keys() & keys.keys())
+        return both >= _ALIKE * (len(self.values) + len(keys) - both)
+
+    def shown(self) -> dict[str, Any]:
+        """As it is sent."""
+        units = {key: unit for key in self.values if (unit := unit_of_key(key))}
+        results = [{"name": name, "unit": unit} for name, unit in self.results.items()]
+        return {"values": self.values, "units": units, "results": results}
+
+
+class Table:
+    """Is filled run by run, until it has ``MOST_BYTES``."""
+
+    def __init__(self) -> None:
+        """No row yet."""
+        self.groups: list[Group] = []
+        self.rows: list[msgspec.Raw] = []
+        self.pending = 0
+        """Runs without a card."""
+        self._bytes = 0
+
+    def add(self, line: dict[str, Any], card: Card | None) -> bool:
+        """The row of a run with its ``line`` in a list; False where there is no room for it any more."""
+        row = msgspec.json.encode({**line, **self._of_card(card)})
+        if self.rows and self._bytes + len(row) > MOST_BYTES:
+            return False
+        self.pending += card is None
+        self._bytes += len(row)
+        self.rows.append(msgspec.Raw(row))
+        return True
+
+    def _of_card(self, card: Card | None) -> dict[str, Any]:
+        number = self._group(card.values) if card is not None else None
+        if card is None or number is None:
+            return {"case": None, "values": {}, "results": None, "references": 0, "missed": []}
+        group = self.groups[number]
+        for name in card.results or ():
+            group.results.setdefault(name, card.units.get(name, ""))
+        results = None if card.results is None else [card.results.get(name) for name in group.results]
+        return {
+            "case": number, "values": dict(_others(group.values, card.values)), "results": results,
+            "references": card.references, "missed": card.missed,
+        }  # fmt: skip
+
+    def _group(self, values: dict[str, Scalar]) -> int | None:
+        found = next((n for n, group in enumerate(self.groups) if group.takes(values)), None)
+        if found is None and len(self.groups) < _GROUPS:
+            self.groups.append(Group(values))
+            return len(self.groups) - 1
+        return found
+
+
+def _others(common: Mapping[str, Scalar], values: Mapping[str, Scalar]) -> Iterator[tuple[str, Scalar | None]]:
+    """What differs from ``common``; None for a key that is not there."""
+    for key in {**common, **values}:
+        if common.get(key) != values.get(key):
+            yield key, values.get(key)
+
+
+def short(ids: Sequence[str], least: int) -> dict[str, str]:
+    """The shortest beginning of each of the sorted ``ids`` that no other one of them has, of ``least`` letters."""
+    shared = [0, *starmap(_shared, pairwise(ids)), 0]
+    return {each: each[: max(least, 1 + max(about))] for each, about in zip(ids, pairwise(shared), strict=True)}
+
+
+def _shared(one: str, other: str) -> int:
+    """How many letters two different ids have in common at their beginning."""
+    return next((n for n, (a, b) in enumerate(zip(one, other, strict=False)) if a != b), min(len(one), len(other)))
