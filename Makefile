@@ -85,7 +85,7 @@ $(READY): requirements.lock pyproject.toml
 		&& $(PIP) -c requirements.lock --no-build-isolation -e ".[worker]")
 	$(call told,installing the rest,$(KEPT) -m conoid.worker.compile & kernels=$$!; \
 		$(PIP) --no-deps -r requirements.lock || { kill $$kernels; exit 1; }; wait $$kernels)
-	@$(KEPT) -c "import conoid.client.cli, conoid.client.render, conoid.server.serve, matplotlib.pyplot, pandas"
+	@$(KEPT) -c "import conoid.client.cli, conoid.client.drawing.render, conoid.server.serve, matplotlib.pyplot, pandas"
 	@mkdir -p build/types/conoid
 	@for house in $(HOUSES); do ln -sfn ../../../$$house build/types/conoid/$$house; done
 	@touch $(READY)

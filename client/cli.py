@@ -18,6 +18,7 @@ from . import benches, commands, converging, hard, reports, shelf, sweeping, val
 from .batch import batch_run
 from .console import echo, echo_json, one_line, prepare
 from .decks.command import import_deck
+from .drawing.fields import FIELDS
 from .errors import ClientError
 from .examination import examine
 from .once import run_once
@@ -33,7 +34,6 @@ from .options import (
     show,
     warn,
 )
-from .pictures import FIELDS
 from .submission import data_of, locate
 
 _Mistake = cast(type[typer.BadParameter], typer.BadParameter.__base__)

@@ -18,11 +18,12 @@ from conoid.cases.similar import allowed
 
 from . import silence, tables
 from .console import PlainConsole, echo_json, one_line
+from .drawing.fields import FIELDS
+from .drawing.picture import Drawn
 from .errors import UsageError
 from .live import Live, exit_code
 from .local import GRACE, LocalServer
 from .options import complain
-from .pictures import FIELDS, Drawn
 from .result import Result
 from .run import Run
 from .submission import data_of, folder_of

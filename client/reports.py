@@ -13,9 +13,9 @@ from . import compare as comparing
 from . import replay, tables
 from . import report as reporting
 from .console import echo, echo_json
+from .drawing.fields import require_field
 from .errors import ViewError
 from .options import Json, SourceArgument, Token, Url, aloud, named, opened, show
-from .pictures import require_field
 
 figures = typer.Typer(no_args_is_help=True, help="Charts from what a run has told.")
 

@@ -4,7 +4,7 @@ import json
 import re
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
@@ -20,10 +20,13 @@ from conoid.cases.units import parse_quantity
 
 from . import html
 from .columns import Columns, joined, read_columns
+from .drawing.look import FILMS
+from .drawing.picture import Drawn
+from .drawing.planes import Mirror, Wall
+from .drawing.scene import Scene, draw
 from .errors import ClientError, LookError, NotFoundError, UnfinishedError, ViewError
 from .folders import Folder, LocalFolder
 from .journal import from_line
-from .pictures import Drawn, Mirror, Scene, Wall, draw
 
 _TABLE = re.compile(rf"{fragments.FOLDER}/fragments_(\d+)\.csv")
 _BEYOND = 0.01
@@ -104,7 +107,7 @@ class Result:
         Raises UnfinishedError, ViewError where pyvista is missing.
         """
         try:
-            from .render import read_mesh  # pyvista is loaded when it is needed
+            from .drawing.surfaces import read_mesh  # pyvista is loaded when it is needed
         except ModuleNotFoundError as error:
             raise ViewError(f"meshes need the extra 'view': pip install 'conoid[view]' ({error})") from None
         return read_mesh(self.frame(-1 if time is None else self.nearest(time)))
@@ -196,18 +199,21 @@ class Result:
         time: float | str | Sequence[float | str] | None = None,
         **options: Any,
     ) -> Drawn:
-        """Draws frames: as a PNG, side by side where there are several, or as a GIF where ``out`` ends in ``.gif``.
+        """Draws frames: as a PNG, side by side where there are several, or as a film (``out`` ends in .gif or .mp4).
 
         ``frame`` has their numbers, ``time`` times in s or as ``"60 us"``, of each the nearest frame. Without both it
-        is the last one, of a GIF every one. ``options`` are the fields of ``conoid.client.pictures.Look``. Raises
+        is the last one, of a film every one. ``options`` are the fields of ``conoid.client.drawing.look.Look``. Raises
         ViewError.
         """
-        every = Path(out or "").suffix.lower() == ".gif"
+        every = str(out or "").lower().endswith(FILMS)
         if not self.frames:
             self.folder.path(layout.JOURNAL)  # a folder without frames may be none of a run
             raise UnfinishedError(f"{self.folder.name} has not written any frame")
         chosen = self._chosen(_listed(frame), [seconds(one) for one in _listed(time)], every)
-        return draw([self.frame(one) for one in chosen], self.scene(), self.folder.name, field, out, **options)
+        scene = self.scene()
+        if options.get("fixed"):
+            scene = replace(scene, frames=tuple(self.frame(one.index) for one in self.frames))
+        return draw([self.frame(one) for one in chosen], scene, self.folder.name, field, out, **options)
 
     def _chosen(self, frames: Sequence[int], times: Sequence[float], every: bool) -> list[int]:
         """Numbers of frames, in the order in which they were asked for."""

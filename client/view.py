@@ -4,8 +4,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from .drawing.fields import require_field
+from .drawing.picture import Drawn
+from .drawing.scene import Scene, draw
 from .errors import LookError, ViewError
-from .pictures import Drawn, Scene, draw, require_field
 from .result import Result
 
 
@@ -18,10 +20,10 @@ def view(
     time: float | str | Sequence[float | str] | None = None,
     **options: Any,
 ) -> Drawn:
-    """Draws frames of a result, of a run's folder, or a frame file: a PNG, or a GIF. Raises ViewError.
+    """Draws frames of a result, of a run's folder, or a frame file: a PNG, a GIF or an MP4. Raises ViewError.
 
     Which frames, and by which numbers or times, is as ``Result.view`` has it; ``options`` are the fields of
-    ``conoid.client.pictures.Look``.
+    ``conoid.client.drawing.look.Look``.
     """
     require_field(field)
     if isinstance(source, Result):

@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 import zenoh
 
-from conoid.client import pictures
+from conoid.client.drawing import renderer
+from conoid.client.drawing.picture import Picture
 from conoid.client.http import Router
 from conoid.client.local import LocalServer
-from conoid.client.pictures import Picture
 
 from .fakes import FAKE_WORKER, Broker, free_port
 from .studio import Ended, studio
@@ -46,7 +46,7 @@ def one_child() -> Iterator[Callable[[Picture], Ended]]:
 @pytest.fixture
 def warm(one_child: Callable[[Picture], Ended], monkeypatch: pytest.MonkeyPatch) -> None:
     """Pictures are drawn by one child, not each by its own."""
-    monkeypatch.setattr(pictures, "child", one_child)
+    monkeypatch.setattr(renderer, "child", one_child)
 
 
 @pytest.fixture

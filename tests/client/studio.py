@@ -1,4 +1,4 @@
-"""A child process that has loaded VTK and draws one picture after the other, as ``conoid.client.render`` draws one."""
+"""A child process that has loaded VTK and draws one picture after the other, as ``render`` draws one."""
 
 import subprocess
 import sys
@@ -7,14 +7,15 @@ from contextlib import contextmanager
 
 import msgspec
 
-from conoid.client.pictures import Picture, _environment
+from conoid.client.drawing.picture import Picture
+from conoid.client.drawing.renderer import _environment
 
 Ended = tuple[int, bytes, str]
 """Exit code, last line, complaints."""
 
 _LOOP = """
 import sys
-from conoid.client import render
+from conoid.client.drawing import render
 for line in sys.stdin.buffer:
     code, told = render.told(line)
     print(f"{code}{told}", flush=True)
@@ -23,7 +24,7 @@ for line in sys.stdin.buffer:
 
 @contextmanager
 def studio() -> Iterator[Callable[[Picture], Ended]]:
-    """What stands in for ``pictures.child``, without 3 s for the start of each."""
+    """What stands in for ``renderer.child``, without 3 s for the start of each."""
     child = subprocess.Popen(
         [sys.executable, "-c", _LOOP], stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=_environment()
     )

@@ -72,7 +72,7 @@ def test_one_module_prints() -> None:
     printing = {"print", "typer.echo", "typer.secho", "Console"}
     found = {
         path.name
-        for path in CLIENT.glob("*.py")
+        for path in CLIENT.rglob("*.py")
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
         if isinstance(node, ast.Call) and ast.unparse(node.func) in printing
     }

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from conoid.cases import fragments
-from conoid.client import hues
+from conoid.client.drawing import hues
 from conoid.client.snapshots import Snapshot
 from conoid.worker.snapshots import blob
 

@@ -6,7 +6,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-from .errors import ViewError
+from ..errors import ViewError
 
 _LISTS = ("Points", "Connectivity", "Offsets", "Types")
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from conoid.cases.figures import exact
 
-from .pictures import Picture
+from .picture import Picture
 
 Array: TypeAlias = "np.ndarray[Any, np.dtype[np.float64]]"
 
@@ -23,7 +23,7 @@ _ASIDE = 1.55
 """How much more the camera looks at a plane of symmetry than at the other sides. Chosen."""
 _LONG = 2.2
 """Times its second extent, from which on a body is long, and lies along the picture. Chosen."""
-_ALONG = (0.6, 0.55)
+_ALONG = (0.45, 0.5)
 """Components of the direction to the camera along a long body and from the third side, where the one from the side that
 it shows is 1.55. Chosen."""
 _FILL = 0.84
@@ -55,7 +55,8 @@ def settled(picture: Picture, bounds: Array) -> Picture:
     if picture.camera is not None:
         return picture
     centre, extent = bounds.mean(axis=1), np.ptp(bounds, axis=1)
-    extent[[mirror.axis for mirror in picture.mirrors]] *= 2.0
+    for mirror in picture.mirrors:
+        extent[mirror.axis] = 2.0 * np.abs(bounds[mirror.axis] - mirror.at).max()
     sides = {cut.axis: 1.0 if cut.at > centre[cut.axis] else -1.0 for cut in picture.cuts}
     longest, second = np.argsort(extent)[:-3:-1].tolist()
     if picture.up is None and extent[longest] > _LONG * extent[second]:
@@ -121,12 +122,12 @@ def panels(n: int, body: tuple[float, float], room: tuple[float, float]) -> int:
     return max(range(1, n + 1), key=lambda columns: (largest(columns), -columns))
 
 
-def place(points: Sequence[Array], picture: Picture, aspect: float) -> Camera:
-    """A camera that sees all points in a panel whose width over height is ``aspect``."""
+def place(points: Sequence[Array], every: Sequence[Array], picture: Picture, aspect: float) -> Camera:
+    """A camera that sees all ``points`` in a panel whose width over height is ``aspect``, and is before ``every``."""
     towards, right, above = axes(picture.camera or FROM, picture.up)
     width, height, centre = reach(points, right, above)
     half = 0.5 * max(height, width / aspect, 1e-30) / _FILL / picture.look.zoom
-    deep = max(float(np.linalg.norm(each - centre, axis=1).max()) for each in points if len(each))
+    deep = max(float(np.linalg.norm(each - centre, axis=1).max()) for each in every if len(each))
     return Camera(centre, towards, right, above, half, max(deep, half))
 
 
@@ -136,7 +137,7 @@ def round_length(most: float) -> float:
     return next(factor * power for factor in (5.0, 2.0, 1.0) if factor * power <= most * (1.0 + 1e-9))
 
 
-def scale_bar(camera: Camera, aspect: float) -> tuple[float, str]:
-    """A round length in m that fits below the body, and how it is written."""
-    length = round_length(_SCALE * 2.0 * camera.half * aspect)
+def scale_bar(camera: Camera, aspect: float, room: float = math.inf) -> tuple[float, str]:
+    """A round length in m that fits below the body and in ``room``, m, and how it is written."""
+    length = round_length(min(_SCALE * 2.0 * camera.half * aspect, room))
     return length, exact(length, "m", 3)

@@ -1,0 +1,40 @@
+"""Arrows on the surface: a few of the vectors, evenly over the picture, of what is nearest to the camera."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from . import vtk
+from .camera import Camera
+from .shot import Shot
+
+_ACROSS = 22
+"""Arrows along the longer side of a panel. Chosen."""
+_LONGEST = 1.8
+"""Times the distance of two arrows, the length of the longest. Chosen."""
+
+
+def longest(shots: Sequence[Shot]) -> float:
+    """The longest vector of all shots."""
+    return max(float(np.linalg.norm(vectors, axis=1).max()) for shot in shots for _, vectors in [_all(shot)])
+
+
+def on(shot: Shot, eye: Camera, aspect: float, most: float) -> Any | None:
+    """The arrows on a shot, of which one of length ``most`` is the longest; None where nothing moves."""
+    places, vectors = _all(shot)
+    step = 2.0 * eye.half * max(aspect, 1.0) / _ACROSS
+    cell = np.floor(np.stack([places @ eye.right, places @ eye.above], axis=1) / step).astype(np.int64)
+    order = np.lexsort((-(places @ eye.towards), cell[:, 1], cell[:, 0]))
+    first = np.append(True, np.any(np.diff(cell[order], axis=0) != 0, axis=1))
+    chosen = order[first]
+    chosen = chosen[np.linalg.norm(vectors[chosen], axis=1) > 0.02 * most]
+    return vtk.arrows(places[chosen], vectors[chosen], _LONGEST * step / most) if len(chosen) and most > 0.0 else None
+
+
+def _all(shot: Shot) -> tuple[Any, Any]:
+    surfaces = [piece.surface for piece in shot.pieces]
+    return (
+        np.concatenate([np.asarray(surface.points, float) for surface in surfaces]),
+        np.concatenate([np.asarray(surface.point_data["vector"], float) for surface in surfaces]),
+    )

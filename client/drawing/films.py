@@ -1,0 +1,64 @@
+"""Pictures one after the other in one file: GIF by Pillow, MP4 by ffmpeg."""
+
+import shutil
+import subprocess
+from collections.abc import Iterator
+from importlib import import_module
+from itertools import chain
+from pathlib import Path
+from typing import Any
+
+from PIL import Image
+
+from ..errors import ViewError
+
+_LOOKED_AT = 5
+"""Frames by which the 256 colours of a GIF are chosen. Chosen: evenly over the film."""
+
+
+def save(images: Iterator[Any], n: int, rate: float, out: Path) -> None:
+    """Writes ``n`` images of one size, so many a second. Raises ViewError where there is no ffmpeg for an MP4."""
+    if out.suffix.lower() == ".gif":
+        _gif(list(images), rate, out)
+    else:
+        _mp4(images, rate, out)
+
+
+def _gif(images: list[Any], rate: float, out: Path) -> None:
+    """All frames have one palette, so that no colour changes by itself."""
+    some = [images[k * (len(images) - 1) // max(_LOOKED_AT - 1, 1)] for k in range(_LOOKED_AT)]
+    width, height = images[0].size
+    strip = Image.new("RGB", (width, height * len(some)))
+    for n, image in enumerate(some):
+        strip.paste(image.convert("RGB"), (0, n * height))
+    palette = strip.quantize(256, method=Image.Quantize.MEDIANCUT)
+    first, *others = (image.convert("RGB").quantize(palette=palette, dither=Image.Dither.NONE) for image in images)
+    first.save(out, save_all=True, append_images=others, duration=round(1000.0 / rate), loop=0, disposal=2)
+
+
+def _mp4(images: Iterator[Any], rate: float, out: Path) -> None:
+    """H.264 in a form that browsers and presentations play; sides are even numbers of pixels."""
+    first = next(images)
+    width, height = (side - side % 2 for side in first.size)
+    command = [
+        ffmpeg(), "-loglevel", "error", "-y", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}",
+        "-r", f"{rate:g}", "-i", "-", "-an", "-c:v", "libx264", "-crf", "18", "-pix_fmt", "yuv420p",
+        "-movflags", "+faststart", str(out),
+    ]  # fmt: skip
+    frames = (image.convert("RGB").crop((0, 0, width, height)).tobytes() for image in chain([first], images))
+    done = subprocess.run(command, input=b"".join(frames), capture_output=True, check=False)
+    if done.returncode:
+        told = done.stderr.decode(errors="replace").strip().splitlines()
+        raise ViewError(f"ffmpeg could not write the film: {told[-1] if told else f'code {done.returncode}'}")
+
+
+def ffmpeg() -> str:
+    """The program that writes an MP4. Raises ViewError where there is none."""
+    if found := shutil.which("ffmpeg"):
+        return found
+    try:
+        return str(import_module("imageio_ffmpeg").get_ffmpeg_exe())
+    except (ImportError, RuntimeError):
+        raise ViewError(
+            "an .mp4 needs ffmpeg: pip install imageio-ffmpeg, or your system's ffmpeg; a .gif does not"
+        ) from None

@@ -1,0 +1,82 @@
+"""Planes and directions of a picture, as a user writes them: ``x,y=0.002``, ``-x``, ``1,-1.5,0.6``, ``top``."""
+
+import math
+import re
+
+import msgspec
+
+from conoid.cases.figures import number
+
+from ..errors import LookError
+
+Vector = tuple[float, float, float]
+
+
+class Mirror(msgspec.Struct, frozen=True):
+    """The plane ``axis = at``; ``axis`` is 0, 1 or 2, ``at`` in m."""
+
+    axis: int
+    at: float = 0.0
+
+
+class Wall(msgspec.Struct, frozen=True):
+    """A rigid wall to draw: a point on it, m, and its normal."""
+
+    point: Vector
+    normal: Vector
+
+
+VIEWS: dict[str, Vector] = {
+    "front": (0.0, -1.0, 0.0), "back": (0.0, 1.0, 0.0), "left": (-1.0, 0.0, 0.0), "right": (1.0, 0.0, 0.0),
+    "top": (0.0, 0.0, 1.0), "bottom": (0.0, 0.0, -1.0), "iso": (1.0, -1.0, 1.0),
+}  # fmt: skip
+"""Standard views: the direction from the body to the camera."""
+_FARTHEST = 1e6
+"""m from the origin that a plane may lie. Chosen: VTK draws in single precision."""
+_NUMBER = r"[+-]?[0-9]*\.?[0-9]+(?:[eE][+-]?\d+)?"
+_PLANE = re.compile(rf"\s*([xyz])\s*(?:=\s*({_NUMBER}))?\s*")
+_AXIS = re.compile(r"\s*([+-]?)([xyz])\s*")
+_DIRECTION = re.compile(rf"\s*({_NUMBER})\s*,\s*({_NUMBER})\s*,\s*({_NUMBER})\s*")
+
+
+def mirrors(text: str, symmetry: tuple[Mirror, ...]) -> tuple[Mirror, ...]:
+    """The planes of ``auto`` (those of ``symmetry``), ``none``, or ``x,y=0.002``, one an axis. Raises LookError."""
+    if text == "auto":
+        return symmetry
+    found = planes(text, "mirror")
+    if len({plane.axis for plane in found}) < len(found):
+        raise LookError(f"mirror = {text!r}: one plane across each axis")
+    return found
+
+
+def planes(text: str, option: str) -> tuple[Mirror, ...]:
+    """The planes of ``x,y=0.002``, none of ``none`` and of an empty text. Raises LookError."""
+    if text in {"none", ""}:
+        return ()
+    read = [_PLANE.fullmatch(plane) for plane in text.split(",")]
+    if None in read:
+        auto = "auto, none, or " if option == "mirror" else ""
+        raise LookError(f"{option} = {text!r}: write {auto}planes such as x or x,y=0.002 (in m)")
+    found = tuple(Mirror("xyz".index(plane[1]), float(plane[2] or 0.0)) for plane in read if plane is not None)
+    if not all(abs(plane.at) < _FARTHEST for plane in found):
+        raise LookError(f"{option} = {text!r}: a plane within {number(_FARTHEST)} m")
+    return found
+
+
+def direction(text: str, option: str) -> Vector | None:
+    """``-x``, ``1,-1.5,0.6`` or the name of a view as a vector; None for an empty text. Raises LookError."""
+    if not text:
+        return None
+    if option == "camera" and text.strip() in VIEWS:
+        return VIEWS[text.strip()]
+    if axis := _AXIS.fullmatch(text):
+        sign = -1.0 if axis[1] == "-" else 1.0
+        return sign * (axis[2] == "x"), sign * (axis[2] == "y"), sign * (axis[2] == "z")
+    found = _DIRECTION.fullmatch(text)
+    parts = [float(each) for each in found.groups()] if found is not None else []
+    largest = max(map(abs, parts), default=0.0)
+    if not 0.0 < largest < math.inf:
+        named = f", or one of {', '.join(VIEWS)}" if option == "camera" else ""
+        raise LookError(f"{option} = {text!r}: write an axis such as -x, a direction such as 1,-1.5,0.6{named}")
+    x, y, z = (each / largest for each in parts)
+    return x, y, z

@@ -1,0 +1,88 @@
+"""Draws frames as one file: ``python -m conoid.client.drawing.render`` reads a Picture as JSON and prints a Drawn.
+
+``surfaces`` has what is drawn of a frame (a ``shot``), ``camera`` from where, ``studio`` draws it, ``ink`` adds lines;
+``printer`` puts the panels on a ``sheet`` and has ``captions`` written beside them.
+"""
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from ..errors import LookError, ViewError
+from . import camera, films, scales, surfaces, vtk
+from .fields import FIELDS, NAMED
+from .picture import Drawn, Picture
+from .printer import Printer
+from .renderer import reason
+from .scales import Scale
+from .shot import Shot
+
+
+def draw(picture: Picture) -> Drawn:
+    """Writes ``picture.out``. Raises ViewError where a frame cannot be drawn."""
+    field = FIELDS[picture.field]
+    picture, shots = _shots(picture)
+    values = [shot.shown for shot in shots]
+    of = _all_values(picture) if picture.range_of and field.kind not in NAMED else values
+    scale = None if field.kind in NAMED else scales.of(of, field, picture.look)
+    Path(picture.out).parent.mkdir(parents=True, exist_ok=True)
+    beyond = _save(picture, shots, scale)
+    return Drawn(
+        out=picture.out, field=picture.field, unit=field.unit,
+        faces=sum(int(piece.surface.n_cells) for shot in shots for piece in shot.pieces),
+        low=float(min(each.min() for each in values)), high=float(max(each.max() for each in values)),
+        limits=(scale.low, scale.high) if scale and scale.uniform is None else None,
+        times=[shot.time for shot in shots], beyond=beyond,
+    )  # fmt: skip
+
+
+def _shots(picture: Picture) -> tuple[Picture, list[Shot]]:
+    """All frames, and the picture with the camera that the first one asks for."""
+    shots, bounds = [], []
+    for path in picture.frames:
+        mesh, time = vtk.read(path)
+        grid = surfaces.prepared(mesh, picture)
+        picture = camera.settled(picture, surfaces.bulk(grid, picture))
+        bounds.append(np.reshape(mesh.bounds, (3, 2)))
+        surfaces.require_sections(picture, np.array([bounds[-1]]))
+        shots.append(Shot(surfaces.pieces(grid, picture, picture.camera or camera.FROM), time, bounds[-1]))
+    return picture, shots
+
+
+def _all_values(picture: Picture) -> list[Any]:
+    """The field of all tets or nodes of the frames by which the range goes."""
+    return [surfaces.values(vtk.read(path)[0], picture.field)[0] for path in picture.range_of]
+
+
+def _save(picture: Picture, shots: Sequence[Shot], scale: Scale | None) -> int:
+    """Writes the file, and gives the number of pieces that have flown out of the picture."""
+    with Printer(picture, shots, scale) as printer:
+        if picture.film:
+            films.save((printer.image([shot]) for shot in shots), len(shots), picture.look.rate, Path(picture.out))
+        else:
+            printer.image(shots).save(picture.out)
+        return printer.beyond
+
+
+def main() -> int:
+    """Reads standard input, draws, prints the result as one line of JSON; a failure is one line on standard error."""
+    code, line = told(sys.stdin.buffer.read())
+    print(line, file=sys.stderr if code else sys.stdout)
+    return code
+
+
+def told(asked: bytes) -> tuple[int, str]:
+    """The exit code and the line for a Picture as JSON."""
+    picture = msgspec.json.decode(asked, type=Picture)
+    try:
+        return 0, msgspec.json.encode(draw(picture)).decode()
+    except (ViewError, OSError, ValueError, RuntimeError) as error:
+        return LookError.exit_code if isinstance(error, LookError) else 1, reason(error, picture.out)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,89 @@
+"""The scale of a picture: the ends of the colour bar, at round numbers, and its colours; numpy only."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..errors import ViewError
+from .fields import Field
+from .look import Look
+
+_PARTS = 6
+"""Parts of a colour bar, at most. Chosen."""
+_UNIFORM = "#9fb0c0"
+"""What has one value everywhere: of no scale, so that it cannot be read as low or high. Chosen."""
+_ALIKE = 1e-9
+"""Share of a value by which others differ from it by rounding alone. Chosen."""
+
+
+def rgb(colour: str) -> tuple[int, int, int]:
+    """``#4c78a8`` as three numbers to 255."""
+    return int(colour[1:3], 16), int(colour[3:5], 16), int(colour[5:7], 16)
+
+
+def blend(colours: Sequence[str], n: int = 256) -> list[str]:
+    """So many colours from the first to the last."""
+    corners = np.array([rgb(colour) for colour in colours], float)
+    places = np.linspace(0, len(colours) - 1, n)
+    channels = np.stack([np.interp(places, range(len(colours)), corners[:, i]) for i in range(3)], axis=1)
+    return ["#" + "".join(f"{round(value):02x}" for value in channel) for channel in channels.tolist()]
+
+
+@dataclass(frozen=True)
+class Scale:
+    """The colour bar: its ends, in the field's unit, the values that are written beside it, and its colours from low to
+    high. One colour and no ends: the field has the value ``uniform`` everywhere.
+    """
+
+    low: float
+    high: float
+    ticks: list[float]
+    colours: list[str]
+    uniform: float | None = None
+
+
+def of(values: Sequence[Any], field: Field, look: Look) -> Scale:
+    """The scale of all ``values`` together."""
+    every = np.concatenate([np.asarray(each, float).reshape(-1) for each in values])
+    known = every[np.isfinite(every)]
+    if not len(known):
+        raise ViewError(f"{field.label}: no value of these frames is a number")
+    least, most = float(known.min()), float(known.max())
+    if look.limits is None and most - least <= max(field.floor, _ALIKE * max(abs(least), abs(most))):
+        return Scale(least, most, [], [_UNIFORM], 0.5 * (least + most))
+    low, high = _ends(known, field, look)
+    return Scale(low, high, ticks(low, high), blend(field.colours, look.bands or 256))
+
+
+def _ends(known: Any, field: Field, look: Look) -> tuple[float, float]:
+    if look.limits is not None:
+        return look.limits
+    low, high = (float(end) for end in np.percentile(known, look.percentiles))
+    if field.kind == "centred":
+        low, high = -max(abs(low), abs(high)), max(abs(low), abs(high))
+    elif 0 < low < 0.1 * high:
+        low = 0.0
+    return rounded(low, high)
+
+
+def rounded(low: float, high: float) -> tuple[float, float]:
+    """Round numbers around ``low`` and ``high``."""
+    step = _step(low, high)
+    first, last = np.floor(low / step + 1e-9), np.ceil(high / step - 1e-9)
+    return float(first * step), float(max(last, first + 1) * step)
+
+
+def ticks(low: float, high: float) -> list[float]:
+    """Both ends, and the round numbers between them that are not next to an end."""
+    step = _step(low, high)
+    first, last = np.ceil(low / step + 0.4), np.floor(high / step - 0.4)
+    return [low, *(float(n * step) for n in np.arange(first, last + 1)), high]
+
+
+def _step(low: float, high: float) -> float:
+    """A round number, of which at most ``_PARTS`` fit between the two."""
+    span = max(high - low, 1e-9 * max(abs(low), abs(high)), 1e-30)
+    power = 10.0 ** np.floor(np.log10(span / 4))
+    return float(next(f * power for f in (1, 2, 2.5, 5, 10) if span / (f * power) <= _PARTS + 1e-9))

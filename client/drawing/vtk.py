@@ -1,0 +1,68 @@
+"""The only module that imports pyvista: meshes, lights and the off-screen window in the few words that pictures use."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pyvista as pv
+
+from ..errors import ViewError
+from .frame import require_whole
+
+
+def read(path: str) -> tuple[Any, float | None]:
+    """The whole mesh of a frame, its pieces merged, and the frame's time, s. Raises ViewError for a damaged frame."""
+    require_whole(path)
+    mesh = pv.read(path)
+    data = mesh.field_data
+    if isinstance(mesh, pv.PartitionedDataSet | pv.MultiBlock):
+        pieces = [piece for piece in mesh if piece is not None and piece.n_cells]
+        data = pieces[0].field_data if pieces and "time" not in data else data
+        mesh = pv.merge(pieces, merge_points=False)
+    if mesh.n_cells == 0:
+        raise ViewError(f"{path}: this frame has no elements")
+    return mesh, float(np.ravel(data["time"])[0]) if "time" in data else None
+
+
+def bare(mesh: Any) -> Any:
+    """The same points, in double precision, and cells, without fields."""
+    return pv.UnstructuredGrid(mesh.cells, mesh.celltypes, np.asarray(mesh.points, dtype=float))
+
+
+def joined(surfaces: Sequence[Any]) -> Any:
+    """One surface of several, whose points at the same place are one."""
+    return pv.merge(list(surfaces), merge_points=True).extract_surface(algorithm="dataset_surface")
+
+
+def window(size: tuple[int, int], ground: str) -> Any:
+    """An off-screen window without smoothing of edges: they are drawn larger and made smaller."""
+    plotter: Any = pv.Plotter(off_screen=True, window_size=list(size), lighting="none", border=False)
+    plotter.set_background(ground)
+    plotter.render_window.SetMultiSamples(0)
+    return plotter
+
+
+def light(position: Sequence[float], intensity: float) -> Any:
+    """A light that is held to the camera."""
+    return pv.Light(position=position, intensity=intensity, light_type="camera light")
+
+
+def disk(centre: Any, normal: Any, radius: float) -> Any:
+    """A flat disk."""
+    return pv.Disc(center=centre, inner=0.0, outer=radius, normal=normal, r_res=1, c_res=96)
+
+
+def arrows(places: Any, vectors: Any, factor: float) -> Any:
+    """Arrows from ``places`` along ``vectors``, both (n, 3), ``factor`` times as long."""
+    cloud = pv.PolyData(places)
+    cloud["vector"] = vectors
+    shape = pv.Arrow(tip_length=0.26, tip_radius=0.075, shaft_radius=0.022, tip_resolution=12, shaft_resolution=8)
+    return cloud.glyph(orient="vector", scale="vector", factor=factor, geom=shape)
+
+
+def depths(plotter: Any) -> Any:
+    """(height, width) of the last drawing, 0 at the near plane to 1 at the far one and at the ground."""
+    width, height = plotter.window_size
+    flat = pv._vtk.vtkFloatArray()
+    plotter.render_window.GetZbufferData(0, 0, width - 1, height - 1, flat)
+    return np.asarray(pv.convert_array(flat)).reshape(height, width)[::-1]
