@@ -28,6 +28,8 @@ export async function send(path, { method = "GET", headers = {}, body, signal, c
 // Snapshots never change, and the server says so: the browser keeps them.
 export const binary = async (path, options) => (await send(path, { ...options, cache: "default" })).arrayBuffer();
 
+export const text = async (path, options) => (await send(path, options)).text();
+
 const TAIL = 65536; // Bytes of a log that are shown.
 
 // The end of the log of a rank, or of "launcher". Of an empty file no part can be asked for.

@@ -3,7 +3,7 @@
 import { Problem, call, token } from "./api.js";
 import { h } from "./figures.js";
 import { offer } from "./libraries.js";
-import { PairPage } from "./pair.js";
+import { ComparePage } from "./compare.js";
 import { place } from "./place.js";
 import { RunPage } from "./run.js";
 import { RunsPage } from "./runs.js";
@@ -53,7 +53,7 @@ const refuse = () => {
 const PAGES = {
   runs: () => new RunsPage(refuse),
   run: ([run]) => new RunPage(run, refuse),
-  compare: (runs) => new PairPage(runs),
+  compare: (runs) => new ComparePage(runs),
 };
 
 function route() {

@@ -1,21 +1,25 @@
-// The charts of a run on ECharts: one cursor and one zoom for all of them, keys as well as the pointer.
+// A chart of a run on ECharts: one cursor and one zoom for all of a page, keys as well as the pointer, saved as CSV and SVG.
 
-import { exact, h, onAxis, percent, si } from "./figures.js";
+import { colour, common } from "./axes.js";
+import { h } from "./figures.js";
 import { echarts } from "./libraries.js";
+import { save, tableOf, toCsv } from "./tables.js";
 
 const GROUP = "run";
-const FONT = 12;
 const NEAR = "100px"; // Of the window: a chart farther off is drawn when there is time, and again when it comes near.
+const PICTURE = { width: 960, height: 420 }; // px of a saved picture.
 const whenIdle = globalThis.requestIdleCallback ?? ((work) => setTimeout(work, 200)); // Not every browser has it.
-const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
 
 // A chart of `height` px. `option()` gives what ECharts calls an option, or null while there is nothing to draw.
-// `onEnter` gets the place of the cursor in the first series when Enter is pressed.
+// `onEnter` gets the place of the cursor in the first series when Enter is pressed; `table()` promises the table that is
+// saved, { head, rows }, in place of what is drawn; `name()` is how its files begin.
 export class Chart {
-  constructor(height, label, option, { alone = false, onClick, onEnter } = {}) {
+  constructor(height, label, option, { alone = false, onClick, onEnter, table, name = () => "chart" } = {}) {
     this.element = h("div.plot", { tabindex: 0, role: "img", "aria-label": `${label}; arrow keys move the cursor${onEnter ? ", Enter opens the nearest marker" : ""}`, style: { height: `${height}px` } },
       h("p.hint", {}, "waiting for the first numbers"));
-    Object.assign(this, { option, alone, onClick, onEnter, at: 0, seen: false });
+    Object.assign(this, { height, label, option, alone, onClick, onEnter, table, name, at: 0, seen: false });
+    const button = (kind, act) => h("button.tab", { type: "button", title: `save as ${kind}`, "aria-label": `save as ${kind}: ${label}`, onclick: act }, kind);
+    this.tools = h("span.save", { hidden: "" }, button("CSV", () => this.saveTable()), button("SVG", () => this.savePicture()));
     this.eye = new IntersectionObserver((entries) => this.look(entries.at(-1).isIntersecting), { rootMargin: NEAR });
     this.eye.observe(this.element);
     this.watch = new ResizeObserver(() => this.chart?.resize());
@@ -54,10 +58,21 @@ export class Chart {
 
   paint() {
     const option = this.kit && this.element.clientWidth ? this.option() : null;
+    this.tools.hidden = !option;
     if (!option) return;
     this.chart ??= this.init();
-    this.chart.setOption({ ...common(this.alone), ...option }, { replaceMerge: ["series"], lazyUpdate: false });
+    const panels = option.grid?.length ?? 1;
+    const other = panels !== (this.panels ?? 1);
+    if (other) this.stretch(panels);
+    this.chart.setOption({ ...common(this.alone), ...option }, { replaceMerge: other ? ["series", "grid", "xAxis", "yAxis"] : ["series"], lazyUpdate: false });
     this.points = Math.max(...option.series.map((one) => one.data?.length ?? 0));
+  }
+
+  // A chart of several panels, one below the other, is higher.
+  stretch(panels) {
+    this.panels = panels;
+    this.element.style.height = `${Math.round(this.height * (0.4 + 0.6 * panels))}px`;
+    this.chart.resize();
   }
 
   init() {
@@ -80,6 +95,24 @@ export class Chart {
     this.chart.dispatchAction({ type: "showTip", seriesIndex: 0, dataIndex: this.at });
   }
 
+  // Makes one series stand out; null: none.
+  highlight(seriesName) {
+    this.chart?.dispatchAction({ type: "downplay" });
+    if (seriesName !== null) this.chart?.dispatchAction({ type: "highlight", seriesName });
+  }
+
+  async saveTable() {
+    const { head, rows } = (await this.table?.()) ?? tableOf(this.option());
+    save(`${this.name()}.csv`, toCsv(head, rows), "text/csv");
+  }
+
+  savePicture() {
+    const chart = this.kit.init(null, null, { renderer: "svg", ssr: true, ...PICTURE, height: PICTURE.height * (this.panels ?? 1) });
+    chart.setOption({ ...common(this.alone), ...this.option(), backgroundColor: colour("card") });
+    save(`${this.name()}.svg`, chart.renderToSVGString(), "image/svg+xml");
+    chart.dispose();
+  }
+
   close() {
     this.closed = true;
     this.watch.disconnect();
@@ -87,56 +120,4 @@ export class Chart {
     this.dark.removeEventListener("change", this.redraw);
     this.chart?.dispose();
   }
-}
-
-// What all have: the theme's colours, a tip without markup, zoom by dragging in the chart with Ctrl and the wheel.
-function common(alone) {
-  return {
-    animation: false,
-    textStyle: { fontFamily: "system-ui, sans-serif", color: colour("ink") },
-    grid: { left: 64, right: 14, top: 30, bottom: 26 },
-    legend: { top: 0, left: 0, type: "scroll", itemWidth: 10, itemHeight: 10, textStyle: { color: colour("soft"), fontSize: FONT }, inactiveColor: colour("faint") },
-    tooltip: {
-      trigger: alone ? "item" : "axis", renderMode: "richText", confine: true, backgroundColor: colour("card"), borderColor: colour("line"),
-      textStyle: { color: colour("ink"), fontSize: FONT }, axisPointer: { type: "line", lineStyle: { color: colour("faint") } },
-    },
-    dataZoom: alone ? [] : [{ type: "inside", zoomOnMouseWheel: "ctrl", moveOnMouseWheel: false, moveOnMouseMove: true, filterMode: "none" }],
-  };
-}
-
-const line = () => ({ lineStyle: { color: colour("line") } });
-const label = (unit) => ({ color: colour("soft"), fontSize: FONT, hideOverlap: true, formatter: (value) => exact(value, unit, 3) });
-
-export const time = (end, more = {}) =>
-  ({ type: "value", min: 0, max: end, axisLine: line(), splitLine: { show: false }, axisLabel: { ...label("s"), formatter: onAxis(end, "s") }, axisPointer: { label: { show: false, formatter: ({ value }) => exact(Number(value), "s", 4) } }, ...more });
-export const axis = (unit, more = {}) =>
-  ({ type: "value", splitNumber: 4, scale: more.scale ?? false, splitLine: line(), axisLabel: label(unit), ...more });
-
-// series({ name, data: [[t, value]], colour, … }): a line, or with `stack` an area on those before.
-export function series({ name, data, colour: tone, unit = "", stack, ...more }) {
-  const body = colour(tone) || tone;
-  return {
-    name, type: "line", data, showSymbol: false, sampling: stack ? undefined : "lttb", color: body,
-    lineStyle: { width: stack ? 0.5 : 1.8 }, tooltip: { valueFormatter: (value) => si(Array.isArray(value) ? value[1] : value, unit) },
-    ...(stack ? { stack, areaStyle: { opacity: 0.85 } } : {}), ...more,
-  };
-}
-
-// Events as pins; `pick` finds the event of a click by its place in the list.
-export const pins = (name, data) =>
-  ({ name, type: "scatter", data, symbol: "pin", symbolSize: 22, color: colour("accent"), cursor: "pointer", z: 5, tooltip: { valueFormatter: () => "click to open" } });
-
-// A horizontal line that a value should not pass.
-export const limit = (value) =>
-  ({ silent: true, symbol: "none", label: { show: false }, lineStyle: { color: colour("bad"), type: "dashed" }, data: [{ yAxis: value }] });
-
-// cells [t, rank, share]: the colour says how a rank compares with the busiest one of the same moment.
-export function heat(ranks, times, cells) {
-  return {
-    legend: { show: false }, tooltip: { ...common(true).tooltip, formatter: ({ value: [at, rank, share] }) => `${si(times[at], "s")}\nrank ${rank}: ${percent(share, 0)} of the busiest` },
-    xAxis: { type: "category", data: times, axisLine: line(), axisTick: { show: false }, axisLabel: { ...label("s"), formatter: (value) => onAxis(times.at(-1), "s")(Number(value)) } },
-    yAxis: { type: "category", data: Array.from({ length: ranks }, (_, rank) => `rank ${rank}`), inverse: true, axisLine: line(), axisTick: { show: false }, axisLabel: { color: colour("soft"), fontSize: FONT } },
-    visualMap: { show: false, min: 0, max: 1, dimension: 2, inRange: { color: [colour("card"), colour("compute")] } },
-    series: [{ type: "heatmap", data: cells, progressive: 0 }],
-  };
 }

@@ -47,6 +47,12 @@ export function onAxis(most, unit) {
   return (value) => tied(trimmed(significant(value / worth, 3)), name);
 }
 
+// The unit of an axis whose largest magnitude is `most`, with its prefix, and the texts of its numbers without it.
+export function scaleOf(most, unit) {
+  const [worth, name] = unitOf([known(most)], unit, 3);
+  return { unit: name, text: (value) => exact(value / worth) };
+}
+
 // A number without a unit, with k, M, G or T where it is large.
 export function large(value) {
   const [worth, name] = step(Math.abs(known(value)), [...UP, [1, ""]], 3);

@@ -1,13 +1,66 @@
 // Fills the record of a run from the server's history: one answer instead of every message since the start.
 
-import { Problem, call } from "./api.js";
-import { TERMS, compared, grouped, totals } from "./live.js";
+import { Problem, call, refused, text } from "./api.js";
+import { FINAL, TERMS, compared, grouped, totals } from "./live.js";
+import { pick } from "./tables.js";
 
 const POINTS = 1000;
+const MOST = 4096; // Reports that the server gives.
+const SOON = 2000; // ms until the columns of the history are asked for again while there are none,
+const LATER = 15000; // and while the run goes on: the stream has some lines only.
+
+const path = (run) => `v1/runs/${encodeURIComponent(run)}`;
+const pause = (ms, signal) => new Promise((resolve) => {
+  const timer = setTimeout(resolve, ms);
+  signal.addEventListener("abort", () => { clearTimeout(timer); resolve(); }, { once: true });
+});
 
 // `info` is the run as the server tells it, `plan` its case with every default, null before it is there.
 export async function fill(live, info, plan, signal) {
-  take(live, await call(`v1/runs/${encodeURIComponent(live.run)}/history?points=${POINTS}`, { signal }), info, plan);
+  const columns = readColumns(live.run, undefined, undefined, signal).catch(() => live.columns);
+  take(live, await call(`${path(live.run)}/history?points=${POINTS}`, { signal }), info, plan);
+  live.columns = await columns;
+}
+
+// The columns of history.csv that are named, all without a name: { units, values, lines, extremes }.
+export async function readColumns(run, names = ["*"], points = POINTS, signal = undefined) {
+  const words = [...names.map((name) => `name=${encodeURIComponent(name)}`), `points=${points}`];
+  let told = await call(`${path(run)}/columns?${words.join("&")}`, { signal });
+  while (told.behind) told = await call(`${path(run)}/columns?${words.join("&")}`, { signal });
+  const units = Object.fromEntries(Object.entries(told.columns).map(([name, { unit }]) => [name, unit]));
+  return { units, values: { t: [], ...told.values }, lines: told.lines, extremes: told.columns };
+}
+
+// Keeps the columns of a run that goes on up to date until it has ended; `onNews` is called when they have changed.
+export async function followColumns(live, signal, onNews) {
+  for (let over = FINAL.has(live.state); !over && !signal.aborted;) {
+    await untilLater(live, signal);
+    over = FINAL.has(live.state);
+    try {
+      live.columns = await readColumns(live.run, undefined, undefined, signal);
+      onNews();
+    } catch (error) {
+      if (refused(error)) return; // The page of the run says what is wrong.
+      over = false;
+      await pause(LATER, signal);
+    }
+  }
+}
+
+// Some seconds, or until the run has ended.
+async function untilLater(live, signal) {
+  const until = Date.now() + (live.columns.lines ? LATER : SOON);
+  while (Date.now() < until && !FINAL.has(live.state) && !signal.aborted) await pause(SOON / 4, signal);
+}
+
+// { head, rows } of columns of history.csv, every line that there is.
+export const everyLine = async (run, names) => pick(await text(`${path(run)}/files/history.csv`), names);
+
+// A record of the same run with as many reports as the server has.
+export async function everyReport(live, make) {
+  const whole = make(live.run);
+  take(whole, await call(`${path(live.run)}/history?points=${MOST}`), {}, live.plan);
+  return whole;
 }
 
 // The case of a run with all defaults, null while it is not written yet.
@@ -28,6 +81,7 @@ export function take(live, history, info = {}, plan = null) {
   live.sizes = rows.filter((row) => Number.isFinite(row.nodes)).map(({ t, nodes, facets, fragments }) => ({ t, nodes, facets, fragments }));
   live.loads = loads(ranks, rows);
   if (sizes.sizes?.length) live.spread = sizes;
+  live.plan = plan ?? live.plan;
   live.balances = balance;
   live.snapshots = snapshots;
   Object.assign(live, { log, leftOut: history.log_left_out ?? 0, warnings: new Map(warnings.map(({ text, level }) => [text, level])) });

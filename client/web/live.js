@@ -12,8 +12,10 @@ export class Live {
   constructor(run) {
     Object.assign(this, { run, seq: 0, state: "accepted", cause: null, message: "", began: null, wall: 0, heard: 0 });
     Object.assign(this, { started: null, progress: null, load: null, counts: null, finished: null, loaded: 0 });
+    this.plan = null; // The case with every default, null before it is there
+    this.columns = { units: {}, values: { t: [] }, lines: 0 }; // Of history.csv: by name, as many values as t has
     this.ledger = []; // { t, dt, limiter, energy, parts: { name: { kinetic, internal } } }
-    this.loads = []; // { t, imbalance, contact: share, shares: [of the busiest, a rank] }
+    this.loads = []; // { t, imbalance, by: { group: share of the CPU time }, shares: [of the busiest, a rank] }
     this.sizes = []; // { t, nodes, facets, fragments }
     this.spread = null; // { t, smallest, sizes }: how many fragments have which size now
     this.found = -1; // Step of the newest state whose fragments are known
@@ -50,6 +52,16 @@ export class Live {
     this.progress = message;
     const { t, dt, limiter, energy, parts = {} } = message;
     keep(this.ledger, { t, dt, limiter, energy, parts });
+    this.follow(message);
+  }
+
+  // The newest line of the history, which a report has; what it does not have comes with the next answer of the server.
+  follow({ sampled, energy, parts = {}, probes = {} }) {
+    const { values } = this.columns;
+    if (!(sampled > (values.t.at(-1) ?? Infinity))) return;
+    const told = { t: sampled, ...energy, ...probes, ...Object.fromEntries(Object.entries(parts).flatMap(([part, one]) => Object.entries(one).map(([name, value]) => [`${name}.${part}`, value]))) };
+    for (const [name, column] of Object.entries(values)) column.push(told[name] ?? null);
+    if (values.t.length > 2 * MOST_POINTS) for (const [name, column] of Object.entries(values)) values[name] = column.filter((_, i) => i % 2 === 0);
   }
 
   on_load(message) {
@@ -148,10 +160,11 @@ export function totals(groups) {
 
 const sum = (values = []) => values.reduce((total, value) => total + value, 0);
 
-// The work of each rank over that of the busiest one, and the share of contact in the CPU time.
+// The work of each rank over that of the busiest one, and what share of the CPU time of all ranks each group has.
 export function compared(groups) {
   const work = totals(Object.fromEntries(["compute", "contact", "output"].filter((name) => groups[name]).map((name) => [name, groups[name]])));
   const most = Math.max(...work, 1e-300);
-  const all = sum(Object.entries(groups).filter(([name]) => name !== "descheduled").flatMap(([, seconds]) => seconds));
-  return { shares: work.map((value) => value / most), contact: all > 0 ? sum(groups.contact) / all : 0 };
+  const told = Object.entries(groups).filter(([name]) => name !== "descheduled").map(([name, seconds]) => [name, sum(seconds)]);
+  const all = sum(told.map(([, seconds]) => seconds));
+  return { shares: work.map((value) => value / most), by: Object.fromEntries(told.map(([name, seconds]) => [name, all > 0 ? seconds / all : 0])) };
 }

@@ -3,15 +3,15 @@
 import { call, messages, refused } from "./api.js";
 import { Body } from "./body.js";
 import { Cards } from "./cards.js";
-import { counted, fixed, h, percent, si, words } from "./figures.js";
+import { counted, fixed, h, percent, words } from "./figures.js";
 import { Files } from "./files.js";
 import { Headline } from "./headline.js";
-import { fill, readPlan } from "./history.js";
+import { fill, followColumns, readPlan } from "./history.js";
 import { FINAL, Live } from "./live.js";
 import { Logs, Warnings } from "./logs.js";
 import { Numbers, residual } from "./numbers.js";
 import { Balances, Ranks, checksTable } from "./panels.js";
-import { plots } from "./plots.js";
+import { nothing, plots } from "./plots.js";
 import { Situation } from "./situation.js";
 
 const CHARTS_EVERY = 500; // ms; the head and the bars are drawn with every message.
@@ -40,7 +40,7 @@ export class RunPage {
     const { live } = this;
     this.head = new Headline((verb) => this.ask(verb));
     this.numbers = new Numbers();
-    this.notes = { energy: h("span.note"), residual: h("span.note"), imbalance: h("span.note"), counts: h("span.note") };
+    this.notes = { residual: h("span.note"), imbalance: h("span.note"), counts: h("span.note") };
     this.logs = new Logs(live);
     this.warnings = new Warnings();
     this.files = new Files(live.run);
@@ -68,7 +68,7 @@ export class RunPage {
     const add = (name, title, beside, content) => this.cards.add(name, title, beside, content);
     add("checks", "Against the reference", "", this.checks);
     for (const [name, [chart, title, beside]] of this.drawn) add(name, title, h("span.beside", {}, beside, this.notes[name]), chart.element);
-    add("ranks", "Load of each rank", this.ranks.note, this.ranks.element);
+    add("ranks", "What each rank does now", this.ranks.note, this.ranks.element);
     add("balances", this.balances.title, this.balances.beside, this.balances.element).setAttribute("aria-label", "balance events");
     this.cards.show("checks", false);
     this.cards.show("balances", false);
@@ -88,7 +88,10 @@ export class RunPage {
     while (!this.abort.signal.aborted) {
       let away = false;
       try {
-        if (!filled) await fill(live, this.info, await readPlan(live.run, this.abort.signal), this.abort.signal);
+        if (!filled) {
+          await fill(live, this.info, await readPlan(live.run, this.abort.signal), this.abort.signal);
+          followColumns(live, this.abort.signal, () => this.drawCharts());
+        }
         filled = true;
         this.later();
         if (FINAL.has(live.state)) break;
@@ -196,6 +199,7 @@ export class RunPage {
     this.ranks.draw(live);
     this.balances.draw();
     this.cards.show("balances", live.balances.length > 0);
+    for (const [name, missing] of Object.entries(nothing(live))) this.cards.show(name, !missing);
     this.logs.draw(this.info.ranks ?? 0);
     this.warnings.draw(live);
     this.situation.draw(live);
@@ -217,10 +221,7 @@ export class RunPage {
 
   drawNotes() {
     const { progress, load, counts } = this.live;
-    if (progress) {
-      this.notes.residual.replaceChildren(residual(progress.energy.residual));
-      this.notes.energy.textContent = `kinetic ${si(progress.energy.kinetic, "J")}`;
-    }
+    if (progress) this.notes.residual.replaceChildren(residual(progress.energy.residual));
     this.notes.imbalance.textContent = load ? fixed(load.imbalance) : "";
     this.notes.counts.textContent = counts ? counted(counts.fragments, "fragment") : "";
   }

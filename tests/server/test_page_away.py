@@ -81,18 +81,18 @@ def test_a_run_is_asked_for_again_when_the_server_cannot_answer_now(web: Path, s
     assert played(web, script % status) == [False, True]
 
 
-def test_two_runs_are_read_again_when_the_server_comes_back(web: Path) -> None:
+def test_runs_are_compared_when_the_server_comes_back(web: Path) -> None:
     script = """
-        const { PairPage } = await load("pair.js");
-        const page = new PairPage(["a", "b"], 100);
+        const { ComparePage } = await load("compare.js");
+        const page = new ComparePage(["a", "b", "c"], 100);
         await pause(50);
         const before = text(page.element);
-        const history = { series: {}, snapshots: [], elapsed: 0 };
-        state.served = (path) => (path.endsWith("history") ? history : path.includes("files") ? 404 : %s);
-        await pause(200);
+        const known = { columns: { columns: {}, values: {}, lines: 0 }, history: { series: { t: [] } }, snapshots: { snapshots: [] } };
+        state.served = (path) => (path.includes("files") ? 404 : known[path.split("/")[3]] ?? { ...%s, id: path.split("/")[2] });
+        await pause(300);
         const after = text(page.element);
         page.close();
-        return [before.includes("away"), after.includes("succeeded")];
+        return [before.includes("away"), ["3 runs", "Add a chart", "Values that differ"].every((words) => after.includes(words))];
     """
     assert played(web, script % json.dumps(RUN)) == [True, True]
 

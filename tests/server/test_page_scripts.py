@@ -152,11 +152,110 @@ def test_a_long_series_is_thinned_and_keeps_its_ends(ask: Ask) -> None:
 
 
 def test_keys_that_differ_are_told_by_their_place(ask: Ask) -> None:
-    one = {"name": "a", "parts": [{"name": "bar", "v": [0, 0, 1]}], "run": {"ranks": 1, "frames": None}}
-    other = {"name": "b", "parts": [{"name": "bar", "v": [0, 0, 2]}], "run": {"ranks": 1, "seed": None}, "new": True}
-    assert ask("pair.js", "page.differences(data[0], data[1])", [one, other]) == [
-        ["parts[0].v[2]", 1, 2], ["new", None, True],
+    one = {"name": "a", "parts": [{"name": "bar", "v": [0, 0, 1]}], "run": {"ranks": 1, "frames": None}, "list": [1, 2]}
+    other = {"name": "b", "parts": [{"name": "bar", "v": [0, 0, 2]}], "run": {"ranks": 1, "seed": None}, "list": [1]}
+    assert ask("contrast.js", "page.differences(data)", [one, other, {**one, "new": True}]) == [
+        ["parts.bar.v.z", 1, 2, 1], ["list.1", 2, None, 2], ["new", None, None, True],
     ]  # fmt: skip
+
+
+def test_runs_are_called_by_what_tells_them_apart(ask: Ask) -> None:
+    def named(names: list[str], differing: list[list[Any]]) -> list[str]:
+        runs = [{"info": {"name": name, "id": f"1k1f9cbqje{k:02d}"}} for k, name in enumerate(names)]
+        found: list[str] = ask("contrast.js", "page.called(data[0], data[1])", [runs, differing])
+        return found
+
+    keys = [["parts.bar.v.z", 1, 2.5]]
+    assert named(["bar", "ball"], keys) == ["bar", "ball"]
+    assert named(["bar", "bar"], keys) == ["bar v z 1", "bar v z 2.5"]
+    assert named(["bar", "bar"], []) == ["1k1f9cbqje00", "1k1f9cbqje01"]
+    assert named(["bar", "bar"], [["seed", 1, 1]]) == ["seed 1 (1k1f9cbqje00)", "seed 1 (1k1f9cbqje01)"]
+    assert named(["a", "a", "b"], [["x", 1, 2, 3]]) == ["a, x 1", "a, x 2", "b"]
+
+
+def test_a_column_of_results_has_one_unit(ask: Ask) -> None:
+    def run(push: float | None, passed: bool) -> dict[str, Any]:
+        extremes = {} if push is None else {"push": {"unit": "N", "last": push, "least": -push, "most": 2 * push}}
+        outcome = {"reference": [{"name": "speed", "value": 1e-3, "unit": "m/s", "pass": passed}], "fragments": 1200}
+        plan = {"probes": [{"name": "push"}]}
+        return {"info": {"outcome": outcome}, "plan": plan, "columns": {"units": {"push": "N"}, "extremes": extremes}}
+
+    script = "page.results(data, 'most').map(({ title, unit, values, text }) => [title, unit, values.map(text)])"
+    assert ask("contrast.js", script, [run(3.0, True), run(2e3, False), run(None, True)]) == [
+        ["push", "kN", ["0.006", "4", "–"]], ["speed (reference)", "mm/s", ["1", "1", "1"]],
+        ["references met", "", ["100 %", "0 %", "100 %"]], ["fragments", "", ["1\u202f200"] * 3],
+    ]  # fmt: skip
+
+
+def test_what_is_drawn_is_a_table(ask: Ask) -> None:
+    told = [
+        {"name": "a", "unit": "Pa", "data": [[0, 1.5], [2, None]]},
+        {"name": "b, c", "data": [{"value": [1, 2]}, [2, 3]]}, {"name": "pins", "aside": True, "data": [[5, 5]]},
+    ]  # fmt: skip
+    table = ask("tables.js", "page.tableOf({ series: data })", told)
+    assert table == {"head": ["t [s]", "a [Pa]", "b, c"], "rows": [[0, 1.5, None], [1, None, 2], [2, None, 3]]}
+    csv = ask("tables.js", "page.toCsv(data.head, data.rows)", table)
+    assert csv == 't [s],a [Pa],"b, c"\n0,1.5,\n1,,2\n2,,3\n'
+
+
+def test_columns_are_picked_from_a_history_as_they_stand(ask: Ask) -> None:
+    text = 'step,t [s],limiter,kinetic [J],push [N]\r\n0,0.0,"a, ""b""",1.25e-07,3.0\r\n1,1e-9,c,nan,4.0\r\n2,2e'
+    assert ask("tables.js", "page.pick(data, ['push', 'kinetic', 'none'])", text) == {
+        "head": ["t [s]", "push [N]", "kinetic [J]"], "rows": [["0.0", "3.0", "1.25e-07"], ["1e-9", "4.0", "nan"]],
+    }  # fmt: skip
+
+
+def test_work_of_ranks_fills_time_without_gaps_however_uneven_reports_are(ask: Ask) -> None:
+    few = [{"t": t, "shares": [1.0, 0.5]} for t in (1.0, 1.5, 4.0)]
+    assert ask("loads.js", "page.cells(data, 2, 4).filter(({ row }) => row === 1)", few) == [
+        {"from": a, "to": b, "row": 1, "share": 0.5} for a, b in ((0, 1), (1, 1.5), (1.5, 4))
+    ]  # fmt: skip
+    many = [{"t": k**2 / 1e4, "shares": [k % 2] * 200} for k in range(1, 1001)]
+    found = ask("loads.js", "page.cells(data, 200, 100)", many)
+    row = [one for one in found if one["row"] == 3]
+    assert len(row) <= 240
+    assert [one["to"] for one in row[:-1]] == [one["from"] for one in row[1:]]
+    assert (row[0]["from"], row[-1]["to"]) == (0, 100)
+    assert max(one["row"] for one in found) == 63
+    names = "[0, 63].map((row) => page.rowName(row, 200))"
+    assert ask("loads.js", names) == ["ranks 0 to 3", "ranks 197 to 199"]
+
+
+LIVE = """(() => {
+    const live = new page.Live("r");
+    live.plan = data.plan;
+    live.columns = data.columns;
+    data.messages.forEach((one, i) => live.take({ ...one, seq: i + 1 }));
+    return live.columns.values;
+})()"""
+
+
+def test_probes_follow_the_stream_from_the_last_line_that_is_known(ask: Ask) -> None:
+    columns = {"units": {"t": "s", "push": "N", "kinetic": "J"}, "lines": 2,
+               "values": {"t": [0, 1], "push": [0, 5], "kinetic": [9, 8], "kinetic.rod": [9, 8], "momentum_x": [0, 1]}}  # fmt: skip
+    at = {"type": "progress", "t": 9, "dt": 1, "limiter": "", "energy": {"kinetic": 7}}
+    parts = {"rod": {"kinetic": 6}}
+    messages = [
+        {**at, "sampled": 1, "probes": {"push": 5}}, {**at, "sampled": 3, "probes": {"push": None}, "parts": parts},
+        {**at, "sampled": 3, "probes": {"push": None}}, {**at, "sampled": 4, "probes": {"push": 6}}, at,
+    ]  # fmt: skip
+    assert ask("live.js", LIVE, {"columns": columns, "messages": messages}) == {
+        "t": [0, 1, 3, 4], "push": [0, 5, None, 6], "kinetic": [9, 8, 7, 7], "kinetic.rod": [9, 8, 6, None],
+        "momentum_x": [0, 1, None, None],
+    }  # fmt: skip
+
+
+def test_forces_go_by_who_pushes_whom_and_a_magnitude_needs_all_components(ask: Ask) -> None:
+    def probe(name: str, field: str, **more: str) -> dict[str, str]:
+        return {"name": name, "part": "glass", "field": field, **more}
+
+    forces = [probe(f"push_{axis}", f"contact_force_{axis}", by="steel") for axis in "xyz"]
+    plan = {"probes": [*forces, probe("stop", "wall_force_z", wall="floor"), probe("lost", "contact_force_x")]}
+    values = {"t": [0, 1], "push_x": [0, 2], "push_y": [0, 3], "push_z": [1, 6], "stop": [0, 0]}
+    live = {"plan": plan, "columns": {"values": values, "units": {}, "lines": 2}}
+    assert ask("probes.js", "page.pushes(data)", live) == {
+        "steel on glass": {axis: f"push_{axis}" for axis in "xyz"}, "wall floor on glass": {"z": "stop"},
+    }  # fmt: skip
 
 
 def test_the_page_writes_numbers_as_python_does(ask: Ask) -> None:

@@ -1,0 +1,92 @@
+// Parts of a chart's option for ECharts: axes with one unit each, lines and areas, marks, the tooltip.
+
+import { exact, onAxis, percent, scaleOf, si } from "./figures.js";
+
+export const FONT = 12;
+const DASHES = ["solid", [7, 4], [2, 3]];
+const HUES = 6; // Of the style sheet: --line-0 and so on, which the colour-blind tell apart (Okabe and Ito 2008).
+export const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim() || name;
+
+// Colour and dash of the line number `i`: no two of the first eighteen have both alike.
+export const lineStyle = (i) => ({ colour: `line-${i % HUES}`, dash: DASHES[Math.floor(i / HUES) % DASHES.length] });
+
+// What all charts have: the theme's colours, a tooltip without markup, zoom with Ctrl and the wheel.
+export function common(alone) {
+  return {
+    animation: false,
+    textStyle: { fontFamily: "system-ui, sans-serif", color: colour("ink") },
+    grid: { left: 64, right: 14, top: 34, bottom: 26 },
+    legend: { top: 0, left: 0, right: 4, type: "scroll", itemWidth: 18, itemHeight: 9, textStyle: { color: colour("soft"), fontSize: FONT }, inactiveColor: colour("faint"),
+      pageIconColor: colour("soft"), pageIconInactiveColor: colour("line"), pageTextStyle: { color: colour("soft"), fontSize: FONT } },
+    tooltip: {
+      trigger: alone ? "item" : "axis", renderMode: "richText", confine: true, backgroundColor: colour("card"), borderColor: colour("line"),
+      textStyle: { color: colour("ink"), fontSize: FONT }, axisPointer: { type: "line", lineStyle: { color: colour("faint") } },
+    },
+    dataZoom: alone ? [] : [{ type: "inside", xAxisIndex: "all", zoomOnMouseWheel: "ctrl", moveOnMouseWheel: false, moveOnMouseMove: true, filterMode: "none" }],
+  };
+}
+
+const rule = () => ({ lineStyle: { color: colour("line") } });
+export const label = (formatter) => ({ color: colour("soft"), fontSize: FONT, hideOverlap: true, formatter });
+
+export const time = (end, more = {}) => ({
+  type: "value", min: 0, max: end, axisLine: rule(), splitLine: { show: false }, axisLabel: label(onAxis(end, "s")),
+  axisPointer: { label: { show: false, formatter: ({ value }) => exact(Number(value), "s", 4) } }, ...more,
+});
+
+// An axis in one unit, which stands above it; `most` is the largest magnitude on it.
+export function axis(unit, most, more = {}) {
+  const scale = scaleOf(most, unit);
+  return {
+    type: "value", splitNumber: 4, splitLine: rule(), axisLabel: label(scale.text), name: scale.unit, nameGap: 10,
+    nameTextStyle: { color: colour("soft"), fontSize: FONT, align: "right", padding: [0, 6, 0, 0] }, ...more,
+  };
+}
+
+// Powers of ten; a unit gets its prefix at each of them.
+export const logarithmic = (unit, more = {}) => ({
+  type: "log", splitLine: rule(), axisLabel: label((value) => exact(value, unit, 1)), ...more,
+});
+
+export const shares = (more = {}) => ({ ...axis("", 1), min: 0, max: 1, interval: 0.25, axisLabel: label((value) => percent(value, 0)), ...more });
+
+// The largest magnitude in some series; of a stack the sum at each place.
+export function largest(list) {
+  let most = 0;
+  const sums = new Map();
+  for (const { data, stack } of list) {
+    for (const point of data ?? []) {
+      const [x, y] = point.value ?? point;
+      if (!Number.isFinite(y)) continue;
+      if (stack) sums.set(x, (sums.get(x) ?? 0) + y);
+      most = Math.max(most, stack ? Math.abs(sums.get(x)) : Math.abs(y));
+    }
+  }
+  return most;
+}
+
+// series({ name, data: [[t, value]], colour, unit, … }): a line, or with `stack` an area on those before.
+export function series({ name, data, colour: tone, unit = "", stack, dash = "solid", width = 1.8, text = (value) => si(value, unit, 4), ...more }) {
+  return {
+    name, unit, type: "line", data, showSymbol: data.length === 1, sampling: stack || data.length < 2000 ? undefined : "minmax", color: colour(tone), connectNulls: false,
+    lineStyle: { width: stack ? 0.5 : width, type: dash }, tooltip: { valueFormatter: (value) => text(Array.isArray(value) ? value[1] : value) },
+    ...(stack ? { stack, stackStrategy: "all", areaStyle: { opacity: 0.85 } } : {}), emphasis: { focus: "series" }, ...more,
+  };
+}
+
+// A number that is expected, with its tolerance, over the time for which it is: a dashed line in a band.
+export function expected({ value, tolerance, since, until }, tone) {
+  return {
+    markLine: { silent: true, symbol: "none", animation: false, label: { show: false }, lineStyle: { color: colour(tone), type: [4, 3], width: 1.4 },
+      data: [[{ coord: [since, value] }, { coord: [until, value] }]] },
+    markArea: { silent: true, animation: false, itemStyle: { color: colour(tone), opacity: 0.14 }, data: [[{ coord: [since, value - tolerance] }, { coord: [until, value + tolerance] }]] },
+  };
+}
+
+// Events as pins, which a click opens.
+export const pins = (name, data) =>
+  ({ name, aside: true, type: "scatter", data, symbol: "pin", symbolSize: 22, color: colour("accent"), cursor: "pointer", z: 5, tooltip: { valueFormatter: () => "click to open" } });
+
+// A horizontal line that a value should not pass.
+export const limit = (value) =>
+  ({ silent: true, symbol: "none", label: { show: false }, lineStyle: { color: colour("bad"), type: "dashed" }, data: [{ yAxis: value }] });

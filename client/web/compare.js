@@ -1,0 +1,255 @@
+// Several runs on one page: their histories over each other, what tells them apart, their results, their bodies side by side.
+
+import { axis, largest, lineStyle, logarithmic, series, time } from "./axes.js";
+import { binary, call, refused } from "./api.js";
+import { Chart } from "./charts.js";
+import { called, common, differences, results } from "./contrast.js";
+import { count, h, pill, si } from "./figures.js";
+import { everyLine, readColumns, readPlan } from "./history.js";
+import { swatch } from "./lines.js";
+import { FINAL } from "./live.js";
+import { fitted } from "./plots.js";
+import { recall, remember } from "./remember.js";
+import { Sheet } from "./sheet.js";
+import { SideBySide } from "./side.js";
+import { decode } from "./snapshot.js";
+
+const TALL = 260;
+const AGAIN = 5000; // ms until runs that go on, or of which nobody answered, are read again.
+const POINTS = 600; // Of a line; twelve lines are drawn at once.
+const REPORTS = 200; // Of a line of reports.
+const AT_ONCE = 4; // Runs that are read at the same time.
+const MOST_CHARTS = 8;
+const LEDGER = ["kinetic", "elastic", "plastic", "viscous", "contact", "friction", "eroded", "fracture", "cohesive", "external", "residual"];
+const JOURNAL = { fragments: "", nodes: "", imbalance: "" }; // Quantities of reports, with their units.
+
+export class ComparePage {
+  constructor(ids, again = AGAIN) {
+    Object.assign(this, { ids, again, runs: [], hidden: new Set(), charts: [], abort: new AbortController() });
+    this.head = h("section.card", {}, h("h1", {}, `${ids.length} runs`), h("p.hint", {}, "Loading …"));
+    this.grid = h("div.cards.charts");
+    this.sheet = new Sheet();
+    this.bodies = new SideBySide();
+    this.sizes = new Chart(TALL, "number of fragments of a size and larger, of each run", () => this.ofSizes(), { alone: true, name: () => "fragment_sizes", table: undefined });
+    this.element = h("div.work", {}, this.head, this.grid, this.sheet.element, this.bodies.element);
+    document.title = `${ids.length} runs · Conoid`;
+    this.read();
+  }
+
+  close() {
+    this.abort.abort();
+    clearTimeout(this.timer);
+    this.bodies.close();
+    for (const { chart } of [...this.charts, { chart: this.sizes }]) chart.close();
+  }
+
+  // Reading ----------------------------------------------------------------------------------------------------------
+
+  async read() {
+    const { signal } = this.abort;
+    try {
+      const known = new Map(this.runs.map((run) => [run.id, run]));
+      const todo = this.ids.filter((id) => !known.has(id) || !FINAL.has(known.get(id).info.state));
+      await inTurn(todo, AT_ONCE, async (id) => { known.set(id, { ...known.get(id), ...(await readRun(id, signal)) }); });
+      this.runs = this.ids.map((id) => known.get(id));
+    } catch (error) {
+      if (signal.aborted) return;
+      this.head.replaceChildren(h("h1", {}, `${this.ids.length} runs`), h("p.problem", {}, refused(error) ? error.message : `No answer from the server: ${error.message}`));
+      if (!refused(error)) this.later();
+      return;
+    }
+    if (signal.aborted) return;
+    this.draw();
+    this.readSnapshots();
+    if (this.runs.some(({ info }) => !FINAL.has(info.state))) this.later();
+  }
+
+  later() {
+    this.timer = setTimeout(() => this.read(), this.again);
+  }
+
+  // The last snapshot of each run, for the sizes of its fragments; after all else.
+  async readSnapshots() {
+    const { signal } = this.abort;
+    await inTurn(this.runs, AT_ONCE, async (run) => {
+      const path = `v1/runs/${encodeURIComponent(run.id)}/snapshots`;
+      run.snapshots = (await call(path, { signal })).snapshots;
+      const last = run.snapshots.at(-1);
+      if (last && run.snapshot?.header.n !== last.n) run.snapshot = decode(await binary(`${path}/${last.n}`, { signal }));
+    }).catch(() => {});
+    if (signal.aborted) return;
+    const broken = this.runs.some(({ snapshot }) => snapshot && fitted(snapshot).points.length > snapshot.header.parts.length);
+    if (broken && !this.sizes.placed) this.grid.append(this.sizes.placed = this.card("Fragment sizes", this.sizes.tools, this.sizes.element));
+    this.sizes.draw();
+    this.bodies.offer(this.runs.flatMap(({ id, snapshots }, line) => (snapshots?.length ? [{ id, snapshots, line, called: this.names[line] }] : [])));
+  }
+
+  // Quantities -------------------------------------------------------------------------------------------------------
+
+  get key() { return `compare.${this.runs[0]?.plan?.name ?? ""}`; }
+
+  // { group: [name, …] } of what all runs have.
+  offered() {
+    const columns = common(this.runs.map(({ columns: { units } }) => Object.keys(units)));
+    const probes = common(this.runs.map(({ plan }) => (plan?.probes ?? []).map(({ name }) => name))).filter((name) => columns.includes(name));
+    const energy = LEDGER.filter((name) => columns.includes(name) && !probes.includes(name));
+    const parts = columns.filter((name) => /^(kinetic|internal)\./.test(name));
+    const rest = columns.filter((name) => ![...probes, ...energy, ...parts, "t", "step", "initial"].includes(name));
+    return { Probes: probes, "Energy, J": energy, "Energy of parts, J": parts, "Reports": Object.keys(JOURNAL), Others: rest };
+  }
+
+  chosen() {
+    const { Probes: probes, ...rest } = this.offered();
+    const all = [...probes, ...Object.values(rest).flat()];
+    const kept = recall(this.key, null)?.filter((name) => all.includes(name));
+    if (kept?.length) return kept;
+    const broken = this.runs.some(({ info }) => (info.outcome?.fragments ?? 0) > 2);
+    return [...probes.slice(0, broken ? 2 : 3), "kinetic", ...(broken ? ["fragments"] : []), "residual"].filter((name) => all.includes(name)).slice(0, 5);
+  }
+
+  // Drawing ----------------------------------------------------------------------------------------------------------
+
+  draw() {
+    this.differing = differences(this.runs.map(({ plan }) => plan));
+    this.names = called(this.runs, this.differing);
+    this.drawHead();
+    if (!this.drawn) for (const name of this.chosen()) this.addChart(name);
+    this.drawn = true;
+    this.sheet.draw(this.runs.map((run, i) => ({ name: this.names[i], href: `#/runs/${encodeURIComponent(run.id)}`, line: i, state: run.info.state })), this.differing, (which) => results(this.runs, which));
+    this.fill(this.charts);
+  }
+
+  drawHead() {
+    const focused = document.activeElement?.dataset?.run;
+    const cases = [...new Set(this.runs.map(({ info }) => info.title || info.name))];
+    this.head.replaceChildren(
+      h("div.card-head", {}, h("h1", {}, `${this.runs.length} runs`), h("span.hint", {}, cases.length === 1 ? cases[0] : ""), h("span.note", {}, this.adder())),
+      h("div.lines", { role: "group", "aria-label": "runs; press to hide or show" }, this.runs.map((run, i) => this.entry(run, i))));
+    if (focused) this.head.querySelector(`[data-run="${CSS.escape(focused)}"]`)?.focus();
+  }
+
+  entry({ id, info }, i) {
+    const light = (name) => { for (const { chart } of this.charts) chart.highlight(name); };
+    const names = this.names;
+    return h("span.line", {},
+      h("button.tab", { type: "button", "data-run": id, "aria-pressed": String(!this.hidden.has(id)), title: `${info.title || info.name}, ${id}`, onclick: () => this.toggle(id),
+        onmouseenter: () => light(names[i]), onmouseleave: () => light(null), onfocus: () => light(names[i]), onblur: () => light(null) }, swatch(i), names[i]),
+      FINAL.has(info.state) && info.state === "succeeded" ? "" : pill(info.state), h("a.open", { href: `#/runs/${encodeURIComponent(id)}`, "aria-label": `open ${names[i]}` }, "open"));
+  }
+
+  toggle(id) {
+    if (!this.hidden.delete(id)) this.hidden.add(id);
+    this.head.querySelector(`[data-run="${CSS.escape(id)}"]`).setAttribute("aria-pressed", String(!this.hidden.has(id)));
+    for (const { chart } of this.charts) chart.draw();
+    this.sizes.draw();
+  }
+
+  adder() {
+    return h("button.quiet", { type: "button", onclick: () => {
+      const all = Object.values(this.offered()).flat();
+      this.addChart(all.find((name) => !this.charts.some((one) => one.name === name)) ?? all[0]);
+      this.keep();
+    } }, "Add a chart");
+  }
+
+  card(title, beside, ...content) {
+    return h("section.card", { "aria-label": title }, h("div.card-head", {}, h("h2", {}, title), h("span.beside", {}, beside)), ...content);
+  }
+
+  addChart(name) {
+    if (this.charts.length >= MOST_CHARTS) return;
+    const made = { name };
+    const list = h("select", { "aria-label": "quantity", onchange: () => {
+      made.name = list.value;
+      this.keep();
+      this.fill([made]);
+    } }, Object.entries(this.offered()).filter(([, names]) => names.length).map(([group, names]) =>
+      h("optgroup", { label: group }, names.map((one) => h("option", { value: one, selected: one === name ? "" : false }, one)))));
+    made.chart = new Chart(TALL, "a quantity of all runs over time", () => this.overlaid(made.name), { name: () => `compared_${made.name}`, table: () => this.table(made.name) });
+    const shut = h("button.tool.shut", { type: "button", "aria-label": "close this chart", onclick: () => {
+      made.chart.close();
+      made.element.remove();
+      this.charts = this.charts.filter((one) => one !== made);
+      this.keep();
+    } });
+    made.element = h("section.card", { "data-card": "", "aria-label": "chart" }, h("div.card-head", {}, list, h("span.beside", {}, made.chart.tools), h("span.tools", {}, shut)), made.chart.element);
+    this.charts.push(made);
+    this.grid.insertBefore(made.element, this.sizes.placed ?? null);
+    if (this.drawn) this.fill([made]);
+  }
+
+  keep() { remember(this.key, this.charts.map(({ name }) => name)); }
+
+  // Reads what charts show and is not there yet, and draws them.
+  async fill(charts) {
+    const { signal } = this.abort;
+    const names = charts.map(({ name }) => name);
+    await inTurn(this.runs, AT_ONCE, async (run) => {
+      const lacking = names.filter((name) => !(name in JOURNAL) && name in run.columns.units && !(name in run.curves));
+      const { values } = lacking.length ? await readColumns(run.id, lacking, POINTS, signal) : {};
+      for (const name of lacking) run.curves[name] = { t: values.t, values: values[name] };
+      if (names.some((name) => name in JOURNAL && !(name in run.curves))) await readReports(run, signal);
+    }).catch(() => {});
+    if (!signal.aborted) for (const { chart } of charts) chart.draw();
+  }
+
+  overlaid(name) {
+    const unit = JOURNAL[name] ?? this.runs.map(({ columns }) => columns.units[name]).find((one) => one !== undefined) ?? "";
+    const ends = this.runs.map(({ plan, columns }) => plan?.run?.end_time ?? columns.extremes.t?.last ?? 0);
+    const log = name === "fragments" || name === "nodes" || name === "residual";
+    const list = this.runs.flatMap((run, i) => {
+      const data = points(run, name).filter(([, value]) => !log || value > 0);
+      const { colour, dash } = lineStyle(i);
+      return data.length && !this.hidden.has(run.id) ? [{ ...series({ name: this.names[i], unit, colour, dash, width: 1.6, data }), z: 3 }] : [];
+    });
+    if (!list.length) return this.hidden.size ? empty(ends) : null;
+    return { legend: { show: false }, grid: { left: 64, right: 14, top: 26, bottom: 26 }, tooltip: { ...tooltip(unit) },
+      xAxis: time(Math.max(...ends)), yAxis: log ? logarithmic(unit) : axis(unit, largest(list), { scale: true }), series: list };
+  }
+
+  // All lines of all runs, one below the other.
+  async table(name) {
+    const unit = this.runs.map(({ columns }) => columns.units[name]).find((one) => one !== undefined) ?? "";
+    const each = await Promise.all(this.runs.map(async (run) => (name in JOURNAL ? points(run, name) : (await everyLine(run.id, [name])).rows)));
+    return { head: ["run", "t [s]", unit ? `${name} [${unit}]` : name], rows: each.flatMap((rows, i) => rows.map((row) => [this.runs[i].id, ...row])) };
+  }
+
+  ofSizes() {
+    const list = this.runs.flatMap(({ id, snapshot }, i) => {
+      const data = snapshot && !this.hidden.has(id) ? fitted(snapshot).points : [];
+      const { colour, dash } = lineStyle(i);
+      return data.length > 1 ? [{ ...series({ name: this.names[i], unit: "", colour, dash, data }), step: "end", sampling: undefined }] : [];
+    });
+    if (!list.length) return null;
+    return { legend: { show: false }, grid: { left: 64, right: 14, top: 26, bottom: 26 }, xName: "size [m]", xAxis: logarithmic("m", { splitLine: { show: false } }), yAxis: logarithmic("", { min: 1, axisLabel: { formatter: count } }), series: list,
+      tooltip: { trigger: "axis", formatter: (told) => `${si(told[0].value[0], "m")} and larger\n${told.map(({ seriesName, value }) => `${seriesName}: ${count(value[1])}`).join("\n")}` } };
+  }
+}
+
+const empty = (ends) => ({ xAxis: time(Math.max(...ends)), yAxis: axis("", 1), series: [] });
+const tooltip = (unit) => ({ trigger: "axis", order: "valueDesc", valueFormatter: (value) => si(Array.isArray(value) ? value[1] : value, unit, 4) });
+
+// [[t, value]] of a run.
+function points({ curves }, name) {
+  const { t = [], values = [] } = curves[name] ?? {};
+  return t.map((at, i) => [at, values[i]]);
+}
+
+async function readReports(run, signal) {
+  const { series: { t, ...told } } = await call(`v1/runs/${encodeURIComponent(run.id)}/history?points=${REPORTS}`, { signal });
+  for (const name of Object.keys(JOURNAL)) run.curves[name] = { t, values: told[name] ?? [] };
+}
+
+async function readRun(id, signal) {
+  const path = `v1/runs/${encodeURIComponent(id)}`;
+  const [info, plan, columns] = await Promise.all([call(path, { signal }), readPlan(id, signal), readColumns(id, [], POINTS, signal)]);
+  return { id, info, plan, columns, curves: {} };
+}
+
+// Does work for each of many, some at a time.
+async function inTurn(list, atOnce, work) {
+  const left = [...list];
+  await Promise.all(Array.from({ length: atOnce }, async () => {
+    while (left.length) await work(left.shift());
+  }));
+}

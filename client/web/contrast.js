@@ -1,0 +1,80 @@
+// What tells some runs apart: their names, the keys of their cases that differ, the results of each.
+
+import { count, duration, exact, fixed, number, rough, scaleOf, words } from "./figures.js";
+
+const NEVER = /^(name|title|description|reference\b.*)$/; // Keys that change no answer.
+const FEW = 3; // Keys in the name of a run.
+const PLACES = new Set(["parts", "run", "boundaries", "materials", "numerics"]); // Tables that need no mention in it.
+const SHORT = 8; // Letters of an id, at least.
+
+const AXES = ["x", "y", "z"];
+
+// { "run.ranks": 2, "parts.steel.velocity.z": 210, … } of a case with all defaults; tables of a list go by their names,
+// components of a vector by their axes.
+export function flat(value, key = "") {
+  if (value === null || typeof value !== "object") return { [key]: value };
+  const vector = Array.isArray(value) && value.length === AXES.length && value.every((one) => typeof one === "number");
+  const named = (name) => (vector ? AXES[name] : Array.isArray(value) ? value[name]?.name ?? name : name);
+  return Object.assign({}, ...Object.keys(value).map((name) => flat(value[name], key ? `${key}.${named(name)}` : named(name))));
+}
+
+// [[key, value of the first, of the second, …], …] of what cases do not have in common.
+export function differences(plans) {
+  const all = plans.map((plan) => flat(plan ?? {}));
+  const keys = [...new Set(all.flatMap(Object.keys))];
+  return keys.filter((key) => !NEVER.test(key) && all.some((one) => (one[key] ?? null) !== (all[0][key] ?? null))).map((key) => [key, ...all.map((one) => one[key])]);
+}
+
+export function shown(value) {
+  if (value === undefined || value === null) return "–";
+  return typeof value === "number" ? number(value) : String(value);
+}
+
+// The shortest beginnings of ids that tell them apart.
+export function shortened(ids) {
+  let length = SHORT;
+  const longest = Math.max(0, ...ids.map((id) => id.length));
+  while (length < longest && new Set(ids.map((id) => id.slice(0, length))).size < new Set(ids).size) length += 1;
+  return ids.map((id) => id.slice(0, length));
+}
+
+// What runs are called: by name; those of one name by the few keys that differ, else by their ids.
+export function called(runs, differing) {
+  const names = runs.map(({ info }) => info.name || info.id);
+  const ids = shortened(runs.map(({ info }) => info.id));
+  const by = differing.length && differing.length <= FEW ? runs.map((_, i) => differing.map(([key, ...values]) => `${key.split(".").slice(-3).filter((word) => !PLACES.has(word)).join(" ")} ${shown(values[i])}`).join(", ")) : ids;
+  const told = names.map((name, i) => (names.filter((other) => other === name).length < 2 ? name : names.every((other) => other === name) ? by[i] : `${name}, ${by[i]}`));
+  return told.map((name, i) => (told.filter((other) => other === name).length < 2 ? name : `${name} (${ids[i]})`));
+}
+
+// Results ----------------------------------------------------------------------------------------------------------------
+
+// [{ title, unit, values, text }] of what can be compared of the results, a value a run; null where a run has none.
+// `which` of last, least and most is told of probes.
+export function results(runs, which) {
+  const probes = common(runs.map(({ plan }) => (plan?.probes ?? []).map(({ name }) => name)));
+  const references = [...new Set(runs.flatMap(({ info }) => (info.outcome?.reference ?? []).map(({ name }) => name)))];
+  const of = (title, unit, value, text = null) => column(title, unit, runs.map((run) => value(run) ?? null), text);
+  const end = (name) => ({ info }) => info.outcome?.[name];
+  return [
+    ...probes.map((name) => of(name, unitOf(runs, name), ({ columns }) => columns.extremes?.[name]?.[which])),
+    ...references.map((name) => of(`${name} (reference)`, runs.map(({ info }) => check(info, name)?.unit).find(Boolean) ?? "", ({ info }) => check(info, name)?.value)),
+    of("references met", "", ({ info }) => (info.outcome?.reference?.length ? info.outcome.reference.filter(({ pass }) => pass).length / info.outcome.reference.length : null), (value) => fixed(100 * value, 0).concat(" %")),
+    of("kinetic energy", "J", ({ columns }) => columns.extremes?.kinetic?.last),
+    of("fragments", "", ({ info }) => info.outcome?.fragments, count), of("eroded tets", "", end("eroded"), count),
+    of("worst residual", "", ({ info }) => info.outcome?.worst_residual, rough),
+    of("simulated time", "s", ({ columns }) => columns.extremes?.t?.last), of("steps", "", end("steps"), count), of("elements", "", end("elements"), count),
+    of("wall time", "s", end("elapsed"), duration), of("CPU time", "s", end("cpu"), duration),
+  ].filter(({ values }) => values.some((value) => value !== null));
+}
+
+const check = (info, name) => (info.outcome?.reference ?? []).find((one) => one.name === name);
+const unitOf = (runs, name) => runs.map(({ columns }) => columns.units[name]).find((unit) => unit !== undefined) ?? "";
+export const common = (lists) => (lists.length ? lists[0].filter((name) => lists.every((list) => list.includes(name))) : []);
+
+// Numbers of a column have one unit, which stands in its head.
+function column(title, unit, values, text) {
+  const scale = scaleOf(Math.max(0, ...values.filter(Number.isFinite).map(Math.abs)), unit);
+  return { title: words(title), si: unit, unit: text ? "" : scale.unit, values, text: (value) => (value === null ? "–" : text ? text(value) : exact(Number(scale.text(value)), "", 5)) };
+}
+

@@ -1,0 +1,55 @@
+// The energy of a run over time: the ledger, whose terms add up to what came in, and the energies of the parts.
+
+import { axis, largest, limit, logarithmic, series, time } from "./axes.js";
+import { named } from "./colours.js";
+import { rough } from "./figures.js";
+import { TERMS } from "./live.js";
+
+export const VIEWS = { ledger: "all terms of the ledger", lost: "without the kinetic energy", internal: "internal energy by part", kinetic: "kinetic energy by part" };
+const FLOOR = 1e-10; // Residuals below it are rounding.
+const RESIDUAL = 1e-2; // Above it a run's energy does not close.
+
+export const end = ({ plan, progress, columns, ledger }) => plan?.run?.end_time ?? progress?.end_time ?? columns.values.t.at(-1) ?? ledger.at(-1)?.t ?? 1;
+export const parts = ({ ledger, columns }) => {
+  const told = Object.keys(columns.values).filter((name) => name.startsWith("kinetic.")).map((name) => name.slice(8));
+  return told.length ? told : Object.keys(ledger.at(-1)?.parts ?? {});
+};
+
+// [[t, value]] of a column of the history; of a run that has none yet, of its reports.
+export function course(live, name) {
+  const { values } = live.columns;
+  if (values[name]) return values.t.map((t, i) => [t, values[name][i]]);
+  const [kind, part] = name.split(".");
+  return live.ledger.map(({ t, energy, parts: each }) => [t, (part === undefined ? energy[name] : each?.[part]?.[kind]) ?? null]);
+}
+
+export const names = (live, view) => (view === "internal" || view === "kinetic" ? parts(live).map((part) => `${view}.${part}`) :
+  [...TERMS.map(([name]) => name).filter((name) => view === "ledger" || name !== "kinetic"), "external", "initial"]);
+
+export function ofEnergy(live, view) {
+  const list = view === "internal" || view === "kinetic" ? ofParts(live, view) : ofTerms(live, view);
+  if (!(list[0]?.data.length > 1)) return null;
+  return { xAxis: time(end(live)), yAxis: axis("J", largest(list)), series: list };
+}
+
+// Areas on each other, below zero what is given back: with the kinetic energy they end at what came in, a line.
+function ofTerms(live, view) {
+  const all = TERMS.filter(([name]) => view === "ledger" || name !== "kinetic").map(([name, tone]) => ({ name: words(name), colour: tone, unit: "J", stack: "energy", data: course(live, name) }));
+  const list = all.filter(({ data }) => data.some(([, value]) => value)).map(series);
+  if (view !== "ledger") return list;
+  const [initial, external] = [course(live, "initial"), course(live, "external")];
+  const came = initial.map(([t, value], i) => [t, value + (external[i]?.[1] ?? 0)]);
+  return [...list, series({ name: "initial + external", colour: "ink", unit: "J", dash: [5, 4], width: 1.4, data: came, z: 4 })];
+}
+
+const words = (name) => ({ stepping: "time stepping", averaging: "pressure averaging", viscous: "bulk viscosity" })[name] ?? name;
+
+// One area a part, in the colours that the parts have in the view of the body.
+export const ofParts = (live, view) => parts(live).map((part, i) =>
+  series({ name: part, colour: named(i), unit: "J", stack: "energy", data: course(live, `${view}.${part}`).filter(([, value]) => value !== null) }));
+
+export function ofResidual(live) {
+  const data = course(live, "residual").map(([t, value]) => [t, value > FLOOR ? value : null]);
+  if (!data.some(([, value]) => value)) return null;
+  return { xAxis: time(end(live)), yAxis: logarithmic(""), series: [series({ name: "residual", colour: "accent", data, text: (value) => rough(Number(value)), markLine: limit(RESIDUAL) })] };
+}

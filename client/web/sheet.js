@@ -1,0 +1,69 @@
+// The table of runs that are compared: what is different about each, and what came out; sorted by any column.
+
+import { shown } from "./contrast.js";
+import { h, pill } from "./figures.js";
+import { swatch } from "./lines.js";
+import { save, toCsv } from "./tables.js";
+
+const MOST_KEYS = 12;
+const WHICH = { last: "last value", least: "least value", most: "greatest value" };
+
+export class Sheet {
+  constructor() {
+    Object.assign(this, { by: null, down: false, all: false });
+    this.which = h("select", { "aria-label": "of probes", onchange: () => this.draw() }, Object.entries(WHICH).map(([value, words]) => h("option", { value }, `probes: ${words}`)));
+    this.place = h("div.scroll", { tabindex: 0, role: "region", "aria-label": "values and results" });
+    this.note = h("p.hint", { hidden: "" });
+    const csv = h("button.tab", { type: "button", "aria-label": "save as CSV: values and results", onclick: () => this.save() }, "CSV");
+    this.element = h("section.card", { hidden: "" }, h("div.card-head", {}, h("h2", {}, "Values that differ, and results"), h("span.beside", {}, this.which, h("span.save", {}, csv))), this.place, this.note);
+  }
+
+  // `rows`: { name, href, line, state } a run; `differing` as contrast.js has it; `results` gives columns for which value.
+  draw(rows = this.rows, differing = this.differing, results = this.results) {
+    Object.assign(this, { rows, differing, results });
+    this.element.hidden = false;
+    const keys = differing.slice(0, MOST_KEYS).map(([key, ...values]) => ({ title: key, unit: "", values, text: shown, key: true }));
+    this.columns = [...keys, ...results(this.which.value || "last")];
+    const more = differing.length - keys.length;
+    this.note.hidden = more <= 0;
+    this.note.textContent = `${more} more keys differ.`;
+    const order = this.order();
+    const head = this.columns.map((column) => this.head(column));
+    const focused = document.activeElement?.dataset?.sorts;
+    this.place.replaceChildren(h("table.checks.sheet", {}, h("thead", {}, h("tr", {}, h("th", { scope: "col" }, "run"), head)),
+      h("tbody", {}, order.map((i) => h("tr", {}, h("th.row", { scope: "row" }, swatch(rows[i].line), h("a", { href: rows[i].href }, rows[i].name), rows[i].state === "succeeded" ? "" : pill(rows[i].state)),
+        this.columns.map(({ values, text, key }) => h(key ? "td.value" : "td.number", {}, text(values[i]))))))));
+    if (focused) this.place.querySelector(`[data-sorts="${CSS.escape(focused)}"]`)?.focus();
+  }
+
+  head({ title, unit, key }) {
+    const sorted = this.by === title ? (this.down ? "descending" : "ascending") : "none";
+    const mark = { ascending: " ▲", descending: " ▼", none: "" }[sorted];
+    return h(`th${key ? "" : ".number"}`, { scope: "col", "aria-sort": sorted }, h("button.sort", { type: "button", "data-sorts": title, onclick: () => this.sort(title) }, title, unit ? h("small", {}, ` ${unit}`) : "", mark));
+  }
+
+  sort(title) {
+    Object.assign(this, { down: this.by === title && !this.down, by: title });
+    this.draw();
+  }
+
+  // Places of the rows; what has no value stands last.
+  order() {
+    const places = this.rows.map((_, i) => i);
+    const column = this.columns.find(({ title }) => title === this.by);
+    if (!column) return places;
+    const value = (i) => column.values[i];
+    const missing = (one) => one === null || one === undefined;
+    return places.sort((a, b) => {
+      const [one, other] = [value(a), value(b)];
+      if (missing(one) || missing(other)) return missing(one) - missing(other);
+      const less = typeof one === "number" && typeof other === "number" ? one - other : String(one).localeCompare(String(other), undefined, { numeric: true });
+      return this.down ? -less : less;
+    });
+  }
+
+  save() {
+    const head = ["run", ...this.columns.map(({ title, si: unit }) => (unit ? `${title} [${unit}]` : title))];
+    save("compared.csv", toCsv(head, this.rows.map(({ name }, i) => [name, ...this.columns.map(({ values }) => values[i])])), "text/csv");
+  }
+}
