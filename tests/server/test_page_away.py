@@ -87,12 +87,18 @@ def test_runs_are_compared_when_the_server_comes_back(web: Path) -> None:
         const page = new ComparePage(["a", "b", "c"], 100);
         await pause(50);
         const before = text(page.element);
-        const known = { columns: { columns: {}, values: {}, lines: 0 }, history: { series: { t: [] } }, snapshots: { snapshots: [] } };
-        state.served = (path) => (path.includes("files") ? 404 : known[path.split("/")[3]] ?? { ...%s, id: path.split("/")[2] });
+        const columns = { columns: {}, values: {}, lines: 0 };
+        const known = { columns, history: { series: { t: [] } }, snapshots: { snapshots: [] } };
+        const run = (id) => ({ ...%s, id });
+        state.served = (path) => {
+            const [, , id, what] = path.split("/");
+            return what === "files" ? 404 : known[what] ?? run(id);
+        };
         await pause(300);
         const after = text(page.element);
         page.close();
-        return [before.includes("away"), ["3 runs", "Add a chart", "Values that differ"].every((words) => after.includes(words))];
+        const told = ["3 runs", "Add a chart", "Values that differ"].every((words) => after.includes(words));
+        return [before.includes("away"), told];
     """
     assert played(web, script % json.dumps(RUN)) == [True, True]
 

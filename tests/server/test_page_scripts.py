@@ -231,8 +231,8 @@ LIVE = """(() => {
 
 
 def test_probes_follow_the_stream_from_the_last_line_that_is_known(ask: Ask) -> None:
-    columns = {"units": {"t": "s", "push": "N", "kinetic": "J"}, "lines": 2,
-               "values": {"t": [0, 1], "push": [0, 5], "kinetic": [9, 8], "kinetic.rod": [9, 8], "momentum_x": [0, 1]}}  # fmt: skip
+    values = {"t": [0, 1], "push": [0, 5], "kinetic": [9, 8], "kinetic.rod": [9, 8], "momentum_x": [0, 1]}
+    columns = {"units": {"t": "s", "push": "N", "kinetic": "J"}, "lines": 2, "values": values}
     at = {"type": "progress", "t": 9, "dt": 1, "limiter": "", "energy": {"kinetic": 7}}
     parts = {"rod": {"kinetic": 6}}
     messages = [
