@@ -1,16 +1,20 @@
 """The files of a deck: itself and those that it includes, all below its folder."""
 
 import io
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Self
 
 from . import whole
 
 _DEEPEST, _MOST = 8, 1000
 """Includes within each other, and in all. Chosen: decks of whole vehicles have some hundred, three deep."""
 _UTF_16 = (b"\xff\xfe", b"\xfe\xff")
-_LONGEST = 4096
-"""Characters of a line. Chosen: the longest format has 200."""
+LONGEST = 4096
+"""Characters of a line of cards. Chosen: the longest format has 200."""
+LONGEST_LINE = 65_536
+"""Characters of a line of values between commas. Chosen: Abaqus has 256, programs that write sets in one line some
+thousand."""
 
 
 class Included:
@@ -20,6 +24,8 @@ class Included:
         """``path``: of the deck."""
         self.files: list[Path] = []
         """Every file that has been begun, once, in order."""
+        self.followed: list[Line] = []
+        """The lines that have made others be included."""
         self._path = path
         self._open: list[Path] = []
         self._count = 0
@@ -55,12 +61,65 @@ class Included:
             self.files.append(there[0])
         return there[0]
 
+    def follow(self, name: str, including: Path, line: "Line") -> Path:
+        """``enter``, which a ``line`` asks for. Raises ValueError, with that line."""
+        self.followed.append(line)
+        try:
+            return self.enter(name, including)
+        except ValueError as error:
+            raise ValueError(f"line {line}: {error}") from None
+
     def leave(self) -> None:
         """Ends with the file that was entered last."""
         self._open.pop()
 
 
-def lines(path: Path) -> Iterator[tuple[int, str]]:
+class Line(int):
+    """The number of a line in its file; as text ``7``, or ``7 of mesh.inc`` where that is not the deck itself."""
+
+    file: str
+
+    def __new__(cls, number: int, file: str = "") -> Self:
+        """``file``: as the deck names it, empty for the deck itself."""
+        made = super().__new__(cls, number)
+        made.file = file
+        return made
+
+    def __str__(self) -> str:
+        """The number, and the file that has the line."""
+        return f"{int(self)} of {self.file}" if self.file else f"{int(self)}"
+
+
+def own(line: int) -> int:
+    """The number of a line of the deck itself; 0 for one of a file that it includes."""
+    return 0 if getattr(line, "file", "") else int(line)
+
+
+def flattened(deck: Included, named: Callable[[str], str | None], longest: int = LONGEST) -> Iterator[tuple[Line, str]]:
+    """The lines of a deck, those of what it includes in their places; ``named``: the file that a line includes, None
+    for any other line; ``longest``: characters of a line, at most. Raises ValueError, OSError.
+    """
+    return _flat(deck, deck.start(), "", named, longest)
+
+
+def included_by(text: str) -> str | None:
+    """The file that a line ``#include mesh.inc`` of a Radioss deck names; None for any other line."""
+    word, _, name = text.strip().partition(" ")
+    return name.strip().strip('"') if word.lower() == "#include" and name.strip() else None
+
+
+def _flat(
+    deck: Included, path: Path, file: str, named: Callable[[str], str | None], longest: int
+) -> Iterator[tuple[Line, str]]:
+    for number, text in lines(path, longest):
+        if (name := named(text)) is None:
+            yield Line(number, file), text
+            continue
+        yield from _flat(deck, deck.follow(name, path, Line(number, file)), name, named, longest)
+        deck.leave()
+
+
+def lines(path: Path, longest: int = LONGEST) -> Iterator[tuple[int, str]]:
     """Lines of a text file with their numbers, without their ends; UTF-8 where a line is that, else Latin-1.
 
     Raises ValueError for what is no text, OSError where there is no regular file.
@@ -69,10 +128,10 @@ def lines(path: Path) -> Iterator[tuple[int, str]]:
         if data.peek(2)[:2] in _UTF_16:
             raise ValueError("the file is UTF-16; save it as UTF-8 text")
         number = 0
-        while line := data.readline(_LONGEST):
+        while line := data.readline(longest):
             number += 1
-            if len(line) == _LONGEST:
-                raise ValueError(f"line {number}: a line of more than {_LONGEST} characters; this is no text file")
+            if len(line) == longest:
+                raise ValueError(f"line {number}: a line of more than {longest} characters; this is no text file")
             if b"\0" in line:
                 raise ValueError(f"line {number}: a null byte; this is no text file")
             yield number, _decoded(line.rstrip(b"\r\n").removeprefix(b"\xef\xbb\xbf" if number == 1 else b""))

@@ -12,17 +12,17 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+from .included import LONGEST_LINE, Included, Line
 from .problems import ConoidError
 
 _FIELD = re.compile(r'(?:"[^"]*"|[^",])*')
 _NUMBERS = re.compile(r"[0-9+\-.eEdD,\s]*", re.ASCII)
 _WHOLE = re.compile(r"\s*\+?[0-9]{1,18}\s*", re.ASCII)
 _WHOLES = re.compile(r"[0-9,\s]*", re.ASCII)
+_INCLUDE = re.compile(r"\s*\*\s*INCLUDE\s*,", re.ASCII | re.IGNORECASE)
 _D = str.maketrans("dD", "ee")
 _LONGEST = 60
 """Characters of a line that a message shows. Chosen: half a line of a terminal."""
-_LONGEST_LINE = 65_536
-"""Characters of a line that is read. Chosen: Abaqus has 256, programs that write sets in one line some thousand."""
 _UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 _UTF_8 = b"\xef\xbb\xbf"
 
@@ -45,28 +45,24 @@ class Source:
 
     def __init__(self, path: Path) -> None:
         """Opens ``path``. Raises InpError for a file that is not text."""
-        self._name = path
-        self._number = 0
+        self.included = Included(path)
+        """The files that are read: the first is ``path``, the others what it includes (``*INCLUDE, INPUT=``)."""
         self._ahead: tuple[int, str] | None = None
 
     def blocks(self) -> Iterator[Block]:
         """Every keyword line; data lines that were not read are passed over. Raises InpError."""
-        with self._name.open("rb") as start:
-            if start.read(2) in _UTF_16:
-                raise InpError("the file is UTF-16; save it as UTF-8 text")
-        with self._name.open(encoding="latin-1", newline=None) as file:
-            self._lines = self._useful(iter(lambda: file.readline(_LONGEST_LINE), ""))
-            for number, text in self.data():
-                if text.strip():
-                    raise InpError(f"line {number}: data before the first keyword; this is not an .inp file")
-            if self._ahead is None:
-                raise InpError("the file has no keyword; this is not an .inp file")
-            while self._ahead is not None:
-                number, text = self._ahead
-                self._ahead = None
-                yield _block(self._continued(text), number)
-                for _ in self.data():
-                    pass
+        self._lines = self._useful(self.included.start(), "")
+        for number, text in self.data():
+            if text.strip():
+                raise InpError(f"line {number}: data before the first keyword; this is not an .inp file")
+        if self._ahead is None:
+            raise InpError("the file has no keyword; this is not an .inp file")
+        while self._ahead is not None:
+            number, text = self._ahead
+            self._ahead = None
+            yield _block(self._continued(text), number)
+            for _ in self.data():
+                pass
 
     def data(self) -> Iterator[tuple[int, str]]:
         """(line number, text) of the data lines up to the next keyword; empty ones are among them."""
@@ -82,19 +78,20 @@ class Source:
         """The data lines that are not empty."""
         return ((number, text) for number, text in self.data() if text.strip())
 
-    def _useful(self, file: Iterator[str]) -> Iterator[tuple[int, str]]:
-        """Lines that are no comments."""
-        for number, text in enumerate(file, 1):
-            if len(text) == _LONGEST_LINE:
-                raise InpError(f"line {number}: a line of more than {_LONGEST_LINE} characters; this is no text file")
-            if number == 1:
-                text = text.removeprefix(_UTF_8.decode("latin-1"))
-            if not text.isascii():
-                text = _decoded(text)
-            if "\0" in text:
-                raise InpError(f"line {number}: a null byte; this is not a text file")
-            if not text.lstrip().startswith("**"):
-                yield number, text
+    def _useful(self, path: Path, name: str) -> Iterator[tuple[int, str]]:
+        """Lines that are no comments, those of included files in their places; ``name``: how the deck names the file,
+        empty for the deck itself.
+        """
+        for line, text in _read(path, name):
+            if (wanted := included_by(text)) is None:
+                yield line, text
+                continue
+            try:
+                inner = self.included.follow(wanted, path, Line(line, name))
+            except ValueError as error:
+                raise InpError(str(error)) from None
+            yield from self._useful(inner, wanted)
+            self.included.leave()
 
     def _continued(self, text: str) -> str:
         """A keyword line with the lines that continue it."""
@@ -105,6 +102,35 @@ class Source:
                 break
             whole += more[1].strip()
         return whole
+
+
+def _read(path: Path, name: str) -> Iterator[tuple[int, str]]:
+    """Lines of a file that are no comments."""
+    with path.open("rb") as start:
+        if start.read(2) in _UTF_16:
+            raise InpError("the file is UTF-16; save it as UTF-8 text")
+    with path.open(encoding="latin-1", newline=None) as file:
+        for number, text in enumerate(iter(lambda: file.readline(LONGEST_LINE), ""), 1):
+            line = Line(number, name) if name else number
+            if len(text) == LONGEST_LINE:
+                raise InpError(f"line {line}: a line of more than {LONGEST_LINE} characters; this is no text file")
+            if number == 1:
+                text = text.removeprefix(_UTF_8.decode("latin-1"))
+            if not text.isascii():
+                text = _decoded(text)
+            if "\0" in text:
+                raise InpError(f"line {line}: a null byte; this is not a text file")
+            if not text.lstrip().startswith("**"):
+                yield line, text
+
+
+def included_by(text: str) -> str | None:
+    """The file that a line ``*INCLUDE, INPUT=mesh.inc`` names; None for any other line."""
+    if not _INCLUDE.match(text):
+        return None
+    values = [value.strip() for word, _, value in (item.partition("=") for item in fields(text)[1:])
+              if "".join(word.split()).upper() == "INPUT"]  # fmt: skip
+    return values[0].strip('"') if len(values) == 1 and values[0] else None
 
 
 def _decoded(text: str) -> str:

@@ -1,24 +1,26 @@
-"""A keyword deck with all that it includes, as one file: so it is sent, hashed and kept."""
+"""A deck with all that it includes, as one file: so it is sent, hashed and kept."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from conoid.cases import whole
-from conoid.cases.included import Included, lines
+from conoid.cases import inp, whole
+from conoid.cases.included import LONGEST_LINE, Included, flattened, included_by, lines
 
 ENDINGS = (".k", ".key", ".dyn")
 """Of the names of keyword decks."""
-_INCLUDES = re.compile(rb"(?im)^\*[ \t]*INCLUDE")
+_PLAIN: dict[str, Callable[[str], str | None]] = {".inp": inp.included_by, ".rad": included_by}
+"""Endings of the other decks, and which file a line of them includes: its lines stand in the place of that line."""
+_INCLUDES = re.compile(rb"(?im)^[ \t]*[*#][ \t]*INCLUDE")
 _CHUNK = 1 << 24
 """Bytes that are searched at once. Chosen."""
 _STANDARD = "*KEYWORD"
 
 
 def includes(path: Path) -> bool:
-    """Whether a file is a keyword deck that may include others. Raises OSError."""
-    if path.suffix.lower() not in ENDINGS:
+    """Whether a file is a deck that may include others. Raises OSError."""
+    if path.suffix.lower() not in (*ENDINGS, *_PLAIN):
         return False
     rest = b""
     with whole.opened(path) as file:
@@ -34,10 +36,12 @@ def write(deck: Path, target: Path) -> list[Path]:
 
     Raises ValueError where it cannot be followed, OSError.
     """
-    included = Included(deck)
+    included, plain = Included(deck), _PLAIN.get(deck.suffix.lower())
     with target.open("w", encoding="utf-8", newline="\n") as made:
-        for text in _Flat(included).of(included.start(), _STANDARD, top=True):
-            made.write(f"{text}\n")
+        if plain is not None:
+            made.writelines(f"{text}\n" for _, text in flattened(included, plain, LONGEST_LINE))
+        else:
+            made.writelines(f"{text}\n" for text in _Flat(included).of(included.start(), _STANDARD, top=True))
     return included.files
 
 

@@ -4,6 +4,8 @@ from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import Any, Literal, TypeVar
 
+from conoid.cases.included import Line
+
 T = TypeVar("T")
 Fate = Literal["taken", "left", "refused"]
 Remark = Literal["left", "differs", "refused"]
@@ -104,6 +106,11 @@ class Account:
         """The entry of a keyword line, to be decided."""
         self.entries.append(Entry(keyword, line, file))
         return self.entries[-1]
+
+    def follow(self, keyword: str, lines: Iterable[Line]) -> None:
+        """The lines that include other files, which are read."""
+        for line in lines:
+            self.open(keyword, int(line), line.file).leave("the file is read as a part of the deck")
 
     def close(self) -> None:
         """What nothing was said of is not known, and refuses the import."""

@@ -4,12 +4,21 @@ import hashlib
 import random
 from pathlib import Path
 
+import numpy as np
 import pytest
+from pydantic import TypeAdapter
 
+from conoid.cases.bodies import MeshFile
 from conoid.cases.cards import Deck
 from conoid.cases.load import CaseError
 from conoid.client import one_deck
+from conoid.client.decks.importing import read_deck
+from conoid.client.decks.toml import bare
+from conoid.client.errors import UsageError
 from conoid.client.local_files import Hashes, keep_copies, with_hashes
+from conoid.worker.mesh.read import read
+
+from .deck_texts import abaqus, r20, radioss
 
 
 def said(path: Path) -> list[object]:
@@ -102,3 +111,65 @@ def test_a_deck_that_leads_out_of_its_folder_is_refused_in_a_line(tmp_path: Path
     with pytest.raises(CaseError, match=r"^parts\[0\]\.mesh\.path = 'a\.k': the (included )?file '.*' ") as told:
         Hashes().of(case("a.k"), tmp_path / "in")
     assert "\n" not in str(told.value)
+
+
+def split(folder: Path, name: str, text: str, begin: str, end: str, line: str) -> None:
+    """A deck whose lines from ``begin`` to ``end`` stand in a file of its own, and the same in one file."""
+    at, to = text.index(begin), text.index(end)
+    (folder / "sub").mkdir()
+    (folder / "sub" / "mesh.inc").write_text(text[at:to])
+    (folder / f"whole_{name}").write_text(text)
+    for stem in ("bar", "whole_bar"):
+        (folder / f"{stem}_0001.rad").write_text(f"{RUN}/END\n")
+    (folder / name).write_text(f"{text[:at]}{line}\n{text[to:]}")
+
+
+RUN = "/RUN/body/1\n1e-5\n"
+OTHERS = {
+    "bar.inp": (
+        abaqus("*Density\n7.85e-9,\n*Elastic\n2.1e5, 0.3"), "*Node", "*Solid", '*Include, input="sub/mesh.inc"'
+    ),
+    "bar_0000.rad": (
+        radioss("/MAT/ELAST/1", "steel", r20("7.85E-9"), r20(2.1e5, 0.3)).replace(RUN, ""), "/NODE", "/MAT",
+        "#include sub/mesh.inc",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_decks_of_other_codes_that_include_say_the_same_and_are_handed_in_as_one(tmp_path: Path, name: str) -> None:
+    split(tmp_path, name, *OTHERS[name])
+    units = None if name.endswith(".rad") else "mm,t,s"
+    found, plain = (read_deck(tmp_path / each, units) for each in (name, f"whole_{name}"))
+    assert found.refusals == []
+    (included,) = [each for each in found.account.entries if "include" in each.keyword.lower()]
+    assert included.fate == "left"
+    assert {each.file for each in found.account.of("taken")} - {"bar_0001.rad"} == {"", "sub/mesh.inc"}
+    for each in (found, plain):
+        each.data["parts"][0]["mesh"].pop("path")
+    assert bare(found.data["parts"]) == bare(plain.data["parts"])
+    spec = {"shape": "file", "path": name, "unit": 1e-3}
+    mesh = TypeAdapter[MeshFile](MeshFile).validate_python(spec)
+    made = read(mesh, tmp_path / name)
+    assert made.origin is not None
+    assert [path for path, _ in made.origin.included] == [str(tmp_path / "sub" / "mesh.inc")]
+    assert one_deck.includes(tmp_path / name)
+    files = one_deck.write(tmp_path / name, tmp_path / f"one_{name}")
+    assert [path.name for path in files] == [name, "mesh.inc"]
+    assert not one_deck.includes(tmp_path / f"one_{name}")
+    np.testing.assert_array_equal(read(mesh, tmp_path / f"one_{name}").points, made.points)
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_includes_of_other_codes_that_cannot_be_followed_are_one_line(tmp_path: Path, name: str) -> None:
+    split(tmp_path, name, *OTHERS[name])
+    line, inner = OTHERS[name][3], tmp_path / "sub" / "mesh.inc"
+    inner.write_text(inner.read_text() + line.replace("sub/mesh.inc", name) + "\n")
+    with pytest.raises(UsageError, match=rf"line \d+ of sub/mesh.inc: the file '{name}' includes itself"):
+        read_deck(tmp_path / name)
+    inner.unlink()
+    with pytest.raises(UsageError, match=r"line \d+: the included file 'sub/mesh.inc' is no file there"):
+        read_deck(tmp_path / name)
+    (tmp_path / name).write_text((tmp_path / name).read_text().replace("sub/mesh.inc", "/etc/passwd"))
+    with pytest.raises(UsageError, match=r"line \d+: the included file '/etc/passwd' is not below the folder"):
+        read_deck(tmp_path / name)

@@ -346,13 +346,18 @@ def test_what_cannot_be_read_is_refused_with_its_line(text: str, message: str, t
 
 @pytest.mark.parametrize(
     "word",
-    ["INCLUDE, INPUT=x.inp", "NGEN", "NFILL", "NMAP, TYPE=RECTANGULAR", "NCOPY", "ELGEN", "ELCOPY",
+    ["INCLUDE", "NGEN", "NFILL", "NMAP, TYPE=RECTANGULAR", "NCOPY", "ELGEN", "ELCOPY",
      "SYSTEM", "Im Perfection", "SYMMETRIC MODEL GENERATION", "PARAMETER"],
 )  # fmt: skip
 def test_what_makes_or_moves_nodes_is_refused(word: str, tmp_path: Path) -> None:
     name = "".join(word.partition(",")[0].split()).upper()
     with pytest.raises(MeshError, match=rf"line 18: \*{name} is not followed; write the nodes and elements out"):
         read(f"{FLAT}*{word}\n1, 2\n", tmp_path)
+
+
+def test_what_is_included_and_is_not_there_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(MeshError, match=r"line 18: the included file 'x.inp' is no file there"):
+        read(f"{FLAT}*INCLUDE, INPUT=x.inp\n", tmp_path)
 
 
 def test_a_set_with_an_element_that_is_not_there_is_refused_where_it_is_chosen(tmp_path: Path) -> None:

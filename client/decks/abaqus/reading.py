@@ -40,6 +40,7 @@ class Abaqus:
         self._source = Source(path)
         for block in self._source.blocks():
             self._take(block)
+        self.account.follow("*INCLUDE", self._source.included.followed)
         self.instances = {each.key("NAME"): each for each in self.of("INSTANCE")}
 
     def of(self, *words: str) -> list[Keyword]:
@@ -48,7 +49,7 @@ class Abaqus:
 
     def _take(self, block: Block) -> None:
         word = spelt(block.word)
-        entry = self.account.open(f"*{word}", block.line)
+        entry = self.account.open(f"*{word}", int(block.line), getattr(block.line, "file", ""))
         if word not in MATERIAL:
             self._material = ""
         rows = [] if word in _MESH else list(self._source.data())

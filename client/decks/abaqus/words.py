@@ -45,7 +45,7 @@ REFUSED: dict[str, str] = {
     "CLOAD": "forces on nodes: [[boundaries]] kind = \"traction\" acts on faces",
     "TEMPERATURE": "temperatures that are given; here work becomes heat where it is done",
     "FIELD": "fields that are given", "IMPORT": "a state of another analysis",
-    "INCLUDE": "write what it includes into the file: the mesh is read of one file",
+    "INCLUDE": "it names no file by INPUT",
     "PARAMETER": "values that are computed; write them out",
     **dict.fromkeys(
         ("NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY", "SYSTEM", "IMPERFECTION"),

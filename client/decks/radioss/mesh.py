@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+from conoid.cases.included import Included
+
 from ..topology import Point
 from .text import Option, Row, cut, numbers, options, real, whole
 from .words import SOLIDS
@@ -10,7 +12,7 @@ from .words import SOLIDS
 def read_points(path: Path) -> dict[int, Point]:
     """Where nodes are, by their numbers. Raises CardError."""
     points: dict[int, Point] = {}
-    for option in options(path):
+    for option in options(Included(path)):
         if option.words[0] == "NODE":
             for row in option.rows:
                 if row[1].strip():
@@ -23,7 +25,7 @@ def read_points(path: Path) -> dict[int, Point]:
 def read_nodes(path: Path) -> dict[str, set[int]]:
     """Nodes of each part with solids, by its number as text. Raises CardError."""
     nodes: dict[str, set[int]] = {}
-    for option in options(path):
+    for option in options(Included(path)):
         if option.words[0] in SOLIDS:
             nodes.setdefault(str(option.number()), set()).update(_solids(option))
     return nodes

@@ -5,6 +5,7 @@ from functools import partial
 from pathlib import Path
 
 from conoid.cases.cards import CardError
+from conoid.cases.included import Included
 
 from ..account import Account, Entry, once
 from ..bonds import Tie, join
@@ -42,11 +43,16 @@ class Radioss:
         self._curves: dict[int, tuple[Option, Entry]] = {}
         self._mains: dict[int, str] = {}
         """Main nodes of rigid bodies, and the keys of these: what acts on the one acts on the other."""
-        for option in options(path):
-            self._read(option)
+        self._read_all(path, "")
         self._engine()
         for option, entry in self._options:
             self._guarded(self._define, option, entry)
+
+    def _read_all(self, path: Path, name: str) -> None:
+        deck = Included(path)
+        for option in options(deck, name):
+            self._read(option)
+        self.account.follow("#include", deck.followed)
 
     def _read(self, option: Option) -> None:
         entry = self.account.open(option.shown, option.line, option.file)
@@ -65,8 +71,7 @@ class Radioss:
             self.account.remarks.append("no engine file (NAME_0001.rad beside NAME_0000.rad) was found")
             return
         self.account.remarks.append(f"the engine file {engine.name} was read")
-        for option in options(engine, engine.name):
-            self._read(option)
+        self._read_all(engine, engine.name)
 
     def _guarded(self, do: Callable[[Option, Entry], None], option: Option, entry: Entry) -> None:
         try:

@@ -7,10 +7,9 @@ comment; whole numbers take 10 columns, others 20.
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 from conoid.cases.cards import CardError
-from conoid.cases.included import lines
+from conoid.cases.included import Included, flattened, included_by
 from conoid.cases.problems import shown
 
 from .. import fields
@@ -42,20 +41,20 @@ class Option:
         return sum(_WHOLE.fullmatch(word) is not None and int(word) > 0 for word in self.words) > 1
 
 
-def options(path: Path, file: str = "") -> Iterator[Option]:
-    """Every option of a file, up to ``/END``; empty lines are among their lines. Raises CardError, OSError."""
+def options(deck: Included, file: str = "") -> Iterator[Option]:
+    """Every option of a deck, with what it includes, up to ``/END``; empty lines are among their lines. ``file``: how
+    messages call the deck. Raises CardError, OSError.
+    """
     option: Option | None = None
     try:
-        for number, text in lines(path):
-            if text.startswith("#include"):
-                raise CardError(f"line {number}: #include is not followed; write out what it stands for")
+        for number, text in flattened(deck, included_by):
             if text.startswith(("#", "$")):
                 continue
             if text.startswith("/"):
                 if option is not None:
                     yield option
                 words = [word.strip().upper() for word in text.strip()[1:].split("/")]
-                option = Option(text.strip(), words, number, [], file)
+                option = Option(text.strip(), words, int(number), [], number.file or file)
             elif option is not None:
                 option.rows.append((number, text))
             elif text.strip():

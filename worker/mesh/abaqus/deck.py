@@ -5,6 +5,7 @@ from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 
+from conoid.cases.included import own
 from conoid.cases.inp import Block, Source, fields, is_whole, numbers, shortened, whole, wholes
 
 from ...errors import MeshError
@@ -36,6 +37,8 @@ class Deck:
         self._source = Source(path)
         for block in self._source.blocks():
             self._take(block)
+        self.files = self._source.included.files
+        """The file, and those that it includes."""
         if self._here is not self.root:
             raise MeshError(f"the file ends inside of {_named(self._here)}; is it cut off?")
 
@@ -138,7 +141,7 @@ class Deck:
             row = wholes(line, items if known else items[:1])
             made.numbers.append(row[0])
             made.nodes.extend(row[1 : 1 + (kind.corners or len(row))])
-            made.lines.append(line)
+            made.lines.append(own(line))
         if kind.kind is Kind.SOLID:
             here.solids.setdefault(kind, Rows()).extend(made)
         elif made.numbers:

@@ -44,7 +44,7 @@ def read_inp(path: Path, group: str | None, key: str) -> Content:
     model = Placed(deck, pieces, places)
     every = [each for place, numbers in chosen.items() for each in model.solids(place, numbers)]
     named, told = named_sets(model)
-    return Content(tags, points, every, named, (*_notes(deck, pieces, group), *told))
+    return Content(tags, points, every, named, (*_notes(deck, pieces, group), *told), tuple(deck.files[1:]))
 
 
 def _nodes(pieces: list[Piece]) -> tuple[Ids, Floats, list[Tags]]:

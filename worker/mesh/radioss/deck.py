@@ -5,6 +5,8 @@ from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from conoid.cases.included import Included, own
+
 from ...errors import MeshError
 from .lines import Block, blocks, number, point, wholes
 
@@ -77,7 +79,9 @@ class Deck:
         """By first word and number."""
         self.passed, self.volumes, self.joining = Counter[str](), Counter[str](), Counter[str]()
         """Lines of elements that are not read, and keywords that join bodies, by first word."""
-        for block in blocks(path):
+        self.included = Included(path)
+        """The deck, and the files that it includes."""
+        for block in blocks(self.included):
             self._take(block)
 
     def _take(self, block: Block) -> None:
@@ -123,7 +127,7 @@ class Deck:
             rows.numbers.append(number(line, text, "an element"))
             rows.parts.append(part)
             rows.nodes.extend(nodes)
-            rows.lines.append(line)
+            rows.lines.append(own(line))
 
     def _part(self, block: Block, word: str) -> None:
         title, rows = block.titled()

@@ -7,9 +7,8 @@ for others.
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from pathlib import Path
 
-from conoid.cases.included import lines
+from conoid.cases.included import Included, flattened, included_by
 from conoid.cases.problems import shown
 
 from ...errors import MeshError
@@ -48,13 +47,11 @@ class Block:
         return title, [(number, text) for number, text in self.rows[1:] if text.strip()]
 
 
-def blocks(path: Path) -> Iterator[Block]:
-    """All of a deck up to ``/END``. Raises MeshError."""
+def blocks(deck: Included) -> Iterator[Block]:
+    """All of a deck, with what it includes, up to ``/END``. Raises MeshError."""
     block: Block | None = None
     try:
-        for number, text in lines(path):
-            if text[:8].lower() == "#include":
-                raise MeshError(f"line {number}: #include is not followed; write the nodes and elements out")
+        for number, text in flattened(deck, included_by):
             if text.startswith(("#", "$")):
                 continue
             if text.startswith("/"):

@@ -39,7 +39,7 @@ def read_radioss(path: Path, group: str | None, key: str) -> Content:
         raise MeshError(f"{many} lines of /{word}, whose elements are not read; choose a part without them by group")
     named, told = reader.named()
     points = np.array(deck.points).reshape(-1, 3)[order]
-    return Content(reader.tags, points, chosen, named, (*_notes(deck, chosen), *told))
+    return Content(reader.tags, points, chosen, named, (*_notes(deck, chosen), *told), tuple(deck.included.files[1:]))
 
 
 _NONE = np.zeros(0, np.int64)
