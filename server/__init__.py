@@ -1,1 +1,1 @@
-"""The job server: takes cases over HTTP, runs them as MPI workers one queue at a time, and tells how they go."""
+"""The job server: accepts cases over HTTP, starts MPI workers from a queue, and reports their progress."""

@@ -1,5 +1,5 @@
-"""``python -m conoid.server``: runs the server; ``token add | list | revoke`` decides who may use it, ``adopt`` takes
-over a folder that was moved or restored."""
+"""``python -m conoid.server``: runs the server. ``token add | list | revoke`` manages access; ``adopt`` registers a
+folder of runs that was moved or restored."""
 
 import argparse
 import logging
@@ -22,7 +22,8 @@ from .tokens import SCOPES, TokenError, create_token
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Exit code 0; or one line that says what is wrong, and 2 where it was asked wrongly, 1 where it cannot be done."""
+    """Exit code: 0; 2 for a wrong command line, 1 for anything else that failed, with one line that says what is
+    wrong."""
     options = _parser().parse_args(arguments)
     logging.basicConfig(format="%(asctime)s %(levelname)s %(message)s", level=logging.INFO)
     try:
@@ -147,7 +148,7 @@ def _serve(options: argparse.Namespace) -> None:
 
 
 def _check_programs(settings: Settings) -> None:
-    """Raises SettingsError where no run could be started."""
+    """Raises SettingsError where the launcher or the worker is no program."""
     launcher = command(settings.mpiexec, "--mpiexec") if settings.mpiexec else ()
     for option, words in (("--mpiexec", launcher), ("--worker", settings.worker)):
         if words and shutil.which(words[0]) is None:
@@ -155,12 +156,13 @@ def _check_programs(settings: Settings) -> None:
 
 
 def _untouched(settings: Settings) -> bool:
-    """Whether neither a server nor a token has made the database of this folder yet."""
+    """Whether the folder has no database yet: neither a server nor ``token add`` has used it."""
     return not settings.database and not settings.database_file.exists()
 
 
 def _store(options: argparse.Namespace) -> Store:
-    """The database that has the tokens. Raises SettingsError where there is none yet: the folder may be another one."""
+    """The database with the tokens. Raises SettingsError where it does not exist: ``--runs`` may name another
+    folder."""
     settings = _settings(options)
     if _untouched(settings):
         raise SettingsError(f"--runs {settings.runs}: no server has used this folder, and it has no tokens")
@@ -169,7 +171,7 @@ def _store(options: argparse.Namespace) -> Store:
 
 
 def _add(options: argparse.Namespace) -> None:
-    """Makes the folder and its database where need be, as the server does, and then says which."""
+    """Creates the folder and its database where they do not exist, as the server does, and reports a new database."""
     settings = _settings(options)
     new = _untouched(settings)
     os.umask(0o077)
@@ -184,7 +186,7 @@ def _add(options: argparse.Namespace) -> None:
 
 
 def _adopt(options: argparse.Namespace) -> None:
-    """Raises SettingsError where a server uses the folder, or there is none."""
+    """Raises SettingsError where another server uses the folder, or where it does not exist."""
     settings = _settings(options)
     if not settings.runs.is_dir():
         raise SettingsError(f"--runs {settings.runs}: there is no such folder")

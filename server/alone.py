@@ -1,4 +1,4 @@
-"""One process a folder of runs."""
+"""A lock: at most one server for a folder of runs."""
 
 import fcntl
 import os
@@ -17,8 +17,8 @@ class AloneError(StartError):
 
 @contextmanager
 def only_one(runs: Path) -> Iterator[None]:
-    """Two servers on one folder would start every run twice. The folder itself is locked, which nobody deletes by the
-    way, and a file in it for file systems that lock files only."""
+    """Two servers on one folder would start every run twice. Two locks are taken: one on the folder itself, since a
+    file in it could be deleted, and one on a file, for file systems that lock files only."""
     with ExitStack() as stack:
         folder = os.open(runs, os.O_RDONLY | os.O_DIRECTORY)
         stack.callback(os.close, folder)

@@ -1,4 +1,4 @@
-"""Wiring: the parts of the server, put together; nothing is decided here."""
+"""Builds the application out of the parts of the server."""
 
 import asyncio
 from collections.abc import AsyncIterator, Iterator
@@ -64,9 +64,8 @@ _SAFE_HEADERS = {
 
 @contextmanager
 def opened(settings: Settings) -> Iterator[Service]:
-    """The parts of a server, the supervisor last; closed in reverse, while workers go on.
-
-    Raises StoreError, IdentityError, TelemetryError, OSError.
+    """Opens the parts of a server in order of dependence, the supervisor last, and closes them in reverse order;
+    workers go on. Raises StoreError, IdentityError, TelemetryError, OSError.
     """
     settings.runs.mkdir(0o700, parents=True, exist_ok=True)
     with ExitStack() as stack:
@@ -126,13 +125,13 @@ def opened(settings: Settings) -> Iterator[Service]:
 
 
 def launcher_of(settings: Settings) -> Launcher:
-    """What the site's settings file names."""
+    """The launcher that the settings file of the site names."""
     site = settings.site
     return SlurmLauncher(settings, site.slurm) if site.launcher == "slurm" and site.slurm else LocalLauncher(settings)
 
 
 def build_app(service: Service) -> FastAPI:
-    """The application over the parts that are open."""
+    """The FastAPI application over open parts."""
 
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
@@ -167,7 +166,7 @@ def build_app(service: Service) -> FastAPI:
 
 
 class _SafeHeaders:
-    """Adds to every answer what keeps a browser from reading more into it than was meant; streams pass untouched."""
+    """Middleware that adds security headers to every answer; streams pass through unchanged."""
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app

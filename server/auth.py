@@ -1,4 +1,4 @@
-"""Who asks, and what they may: dependencies that give the routes an identity, or refuse."""
+"""Authentication: dependencies that give a route the identity of the caller and check its scopes."""
 
 import math
 import time
@@ -17,12 +17,13 @@ from .store import Token
 from .tokens import SCOPES
 
 RECHECK = 2.0
-"""s after which the token behind a long answer is looked at again. Chosen: who is revoked hears no more within 5 s."""
+"""s between two checks of the token of a long answer, so that a stream ends at most 5 s after its token is revoked.
+Chosen."""
 
 
 @dataclass(frozen=True)
 class Identity:
-    """Who asks."""
+    """The caller: owner and token."""
 
     owner: str
     token: Token | None
@@ -34,7 +35,7 @@ class Identity:
 
 
 async def identify(request: Request, service: ServiceOf) -> Identity:
-    """The identity behind a request, whose token the door has looked up. Raises ServiceError 401."""
+    """The identity of a request; the middleware ``door`` has looked up its token. Raises ServiceError 401."""
     if not service.settings.auth:
         _same_machine_page(request)
         return Identity(LOCAL_OWNER, None)
@@ -45,7 +46,7 @@ async def identify(request: Request, service: ServiceOf) -> Identity:
 
 
 def unauthorized() -> ServiceError:
-    """401."""
+    """The error for a request without a valid token."""
     return ServiceError(
         401, "unauthorized", "this needs a valid token", headers={"WWW-Authenticate": "Bearer"},
         hint="send the header 'Authorization: Bearer <token>'; the server's operator makes tokens",
@@ -53,7 +54,8 @@ def unauthorized() -> ServiceError:
 
 
 def _same_machine_page(request: Request) -> None:
-    """Without tokens a web page from elsewhere must not reach the server through the user's browser."""
+    """Refuses requests of other web pages on a server without tokens: a page of another site could reach it through
+    the user's browser."""
     host = request.url.hostname or ""
     if not loopback(host):
         raise ServiceError(403, "forbidden", f"Host {host!r}: a server without tokens answers on loopback names only")
@@ -63,7 +65,7 @@ def _same_machine_page(request: Request) -> None:
 
 
 def requires(scope: str) -> Callable[[Identity], Awaitable[Identity]]:
-    """A dependency that gives the identity. Raises ServiceError 401, or 403 when the token lacks ``scope``."""
+    """A dependency that returns the identity. Raises ServiceError 401, or 403 when the token lacks ``scope``."""
 
     async def check(identity: Annotated[Identity, Depends(identify)]) -> Identity:
         if not identity.allows(scope):
@@ -79,7 +81,7 @@ Submitter = Annotated[Identity, Depends(requires("submit"))]
 
 
 class Pass:
-    """Lets a long answer go on while the token behind it is valid, and for ``seconds`` at most where some are given."""
+    """Limits a long answer: to the life of its token, and to ``seconds`` where they are given."""
 
     def __init__(self, service: Service, identity: Identity, seconds: float | None = None) -> None:
         self._service, self._identity = service, identity
@@ -88,11 +90,11 @@ class Pass:
 
     @property
     def left(self) -> float:
-        """s until somebody should look again."""
+        """s until the next check of the token."""
         return max(0.0, min(RECHECK, self._ends - time.monotonic()))
 
     async def holds(self) -> bool:
-        """False once the token has been revoked, or the time is over."""
+        """False once the token has been revoked or the time is over."""
         now = time.monotonic()
         if now >= self._ends:
             return False
@@ -102,7 +104,7 @@ class Pass:
         return await self._service.lanes.run(self._valid)
 
     def _valid(self) -> bool:
-        """A database that cannot be asked now ends nobody's stream."""
+        """A database that does not answer does not end a stream."""
         token = self._identity.token
         try:
             return token is None or self._service.store.token(token.id) is not None

@@ -1,4 +1,4 @@
-"""Wakes the coroutines that wait for news of a run. A bell carries no news: who is woken looks at the files."""
+"""Wake-up of coroutines that wait for a change of a run. It carries no data: the waiter reads the run's files again."""
 
 import asyncio
 from collections.abc import Iterator
@@ -6,21 +6,22 @@ from contextlib import contextmanager
 
 
 class Listener:
-    """One who waits. Call ``clear`` before looking, ``wait`` after having found nothing: no ring is ever missed."""
+    """A waiter. Call ``clear``, read the files, then ``wait`` if nothing is new: no change can be missed in this
+    order."""
 
     def __init__(self) -> None:
         self._rung = asyncio.Event()
 
     def clear(self) -> None:
-        """Forgets the rings so far."""
+        """Clears the event."""
         self._rung.clear()
 
     def ring(self) -> None:
-        """From the event loop's thread."""
+        """Sets the event. Called in the thread of the event loop."""
         self._rung.set()
 
     async def wait(self, timeout: float) -> bool:
-        """True when the bell rang since ``clear``, False after ``timeout`` seconds without."""
+        """True when the event was set since ``clear``, False after ``timeout`` seconds without."""
         try:
             await asyncio.wait_for(self._rung.wait(), timeout)
         except TimeoutError:
@@ -29,7 +30,7 @@ class Listener:
 
 
 class Bell:
-    """One for all runs."""
+    """The waiters of all runs."""
 
     def __init__(self) -> None:
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -37,11 +38,11 @@ class Bell:
         self.closed = False
 
     def attach(self, loop: asyncio.AbstractEventLoop) -> None:
-        """The loop in which the listeners live."""
+        """Sets the event loop of the waiters."""
         self._loop = loop
 
     def ring(self, run_id: str) -> None:
-        """From any thread."""
+        """Wakes all waiters of a run. Called from any thread."""
         if self._loop is not None and not self._loop.is_closed():
             self._loop.call_soon_threadsafe(self._ring, run_id)
 
@@ -50,19 +51,20 @@ class Bell:
             listener.ring()
 
     def close(self) -> None:
-        """Wakes everybody for the last time; ``closed`` tells them to leave. From the loop's thread."""
+        """Wakes all waiters for the last time; they leave when they read ``closed``. Called in the thread of the
+        loop."""
         self.closed = True
         for run_id in self._listeners:
             self._ring(run_id)
 
     @property
     def listening(self) -> int:
-        """How many wait now."""
+        """Number of present waiters."""
         return sum(len(listeners) for listeners in self._listeners.values())
 
     @contextmanager
     def listen(self, run_id: str) -> Iterator[Listener]:
-        """A listener for as long as the block lasts. From the loop's thread."""
+        """A waiter that is registered while the block runs. Called in the thread of the loop."""
         listener = Listener()
         self._listeners.setdefault(run_id, set()).add(listener)
         try:

@@ -1,4 +1,4 @@
-"""Connections of people who never finish what they say, or never read: each has its time, and all have their number."""
+"""Protection against slow clients: a time limit for headers and unread answers, and a limit of connections."""
 
 import asyncio
 import resource
@@ -13,27 +13,28 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 BODY = 1 << 20
 """Bytes of the largest body (``limits``)."""
 HEADER = 10.0
-"""s in which a request's header must arrive, from its first byte or from the opening of its connection. Chosen."""
+"""s within which the header of a request must arrive, from its first byte or from the start of the connection.
+Chosen."""
 _PIECES, _PAUSE = 4, 0.5
-"""Pieces of a header that are read as they arrive; s between two further ones. Chosen: a client sends its header in one
-piece, and each piece that is read takes 0.1 ms of the event loop.
+"""Pieces of a header that are parsed as they arrive, and s between two later parses. Chosen: a normal client sends
+its header in one piece, and a parse takes 0.1 ms of the event loop.
 """
 READ = 30.0
-"""s in which a client must read something of an answer that waits to be sent. Chosen: a laptop sleeps longer, and asks
-again."""
+"""s within which a client must read part of a waiting answer. Chosen: a laptop that sleeps longer asks again."""
 _SHARE, _MOST = 4, 8192
-"""One descriptor in so many may be a connection; the most connections at all. Chosen: the others are files."""
+"""One file descriptor of so many may be a connection; and the largest number of connections. Chosen: the remaining
+descriptors are for files."""
 _FILES = 65_536
-"""Descriptors that the server asks for. Chosen: more than it can use."""
+"""File descriptors that the server requests from the system. Chosen: more than it uses."""
 _SOME = 64
-"""Idle connections among which the one is chosen that makes room. Chosen: 0.1 ms."""
+"""Number of oldest idle connections among which the one to close is chosen. Chosen: takes 0.1 ms."""
 _ACCEPTED = 4
-"""Connections that asyncio accepts in one turn of the event loop. Chosen: 0.5 ms."""
+"""Connections that asyncio accepts in one turn of the event loop. Chosen: takes 0.5 ms."""
 _FULL = b"HTTP/1.1 503 Service Unavailable\r\nRetry-After: 5\r\nContent-Length: 0\r\nConnection: close\r\n\r\n"
 
 
 def raise_limit() -> int:
-    """Takes as many descriptors as the system gives; returns how many connections are let in at a time."""
+    """Raises the limit of file descriptors as far as the system allows; returns the largest number of connections."""
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     wanted = _FILES if hard == resource.RLIM_INFINITY else min(_FILES, hard)
     if soft < wanted:
@@ -42,27 +43,27 @@ def raise_limit() -> int:
 
 
 class Connection(H11Protocol):
-    """A connection that is closed when a header does not arrive in time, when nobody reads its answers, or when it is
-    idle while others need its place.
+    """A connection that is closed when its header is late, when its answers are not read, or when it is idle and the
+    limit of connections is reached.
     """
 
     most = _MOST
-    """Connections at a time."""
+    """Largest number of connections."""
     idle: dict["Connection", None] = {}  # noqa: RUF012
-    """Those without a whole request, the oldest first."""
+    """Connections without a complete request, oldest first."""
     owner = ""
-    """Whose token the last request has shown."""
+    """User of the last request's token, or the address."""
     _overdue: asyncio.TimerHandle | None = None
     _unread: asyncio.TimerHandle | None = None
     _pieces = 0
-    """Of the header that has not arrived."""
+    """Bytes of the incomplete header."""
     _useless = 0
-    """Bytes of bodies that were answered before their end."""
+    """Bytes of request bodies that arrived after their answer."""
     _left = 0
-    """Bytes that waited to be sent at the last look."""
+    """Bytes that waited to be sent at the previous check."""
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
-        """Makes room when there is none."""
+        """Closes an idle connection where the limit is reached."""
         super().connection_made(transport)
         self.app_state = {**self.app_state, "connection": self}
         self.idle[self] = None
@@ -71,11 +72,11 @@ class Connection(H11Protocol):
             self._make_room()
 
     def _make_room(self) -> None:
-        """Of the oldest idle connections one goes that shows no token, else one of the user who has most of them."""
+        """Of the oldest idle connections, one without a token is closed, else one of the user with most connections."""
         some = list(islice(self.idle, _SOME))
         crowd = Counter(one.who for one in some)
         oldest = max(some, key=lambda one: (one is not self, not one.owner, crowd[one.who]))
-        del self.idle[oldest]  # at once: of a crowd that comes in one turn of the loop each makes room for one more
+        del self.idle[oldest]  # at once: of many connections that arrive in one turn of the loop, each closes one
         if oldest is self:
             self.transport.write(_FULL)
             self.transport.close()
@@ -84,19 +85,19 @@ class Connection(H11Protocol):
 
     @property
     def who(self) -> str:
-        """A user, or an address."""
+        """The user of a connection, or its address."""
         return self.owner or (self.client[0] if self.client else "")
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Frees its place."""
+        """Removes the connection from the count."""
         self.idle.pop(self, None)
         self._unset_timer()
         self._look_no_more()
         super().connection_lost(exc)
 
     def data_received(self, data: bytes) -> None:
-        """The time of a header begins with its first byte, and more bytes do not make it longer; one that comes in many
-        pieces is read slowly. Of a body that was answered before its end no more is read than a body may have.
+        """The time limit of a header begins with its first byte; further bytes do not extend it. A header in many
+        pieces is parsed at intervals. After an answer, no more of the request body is read than the largest body.
         """
         if self.conn.our_state is h11.DONE and self.conn.their_state is h11.SEND_BODY:
             self._useless += len(data)
@@ -124,24 +125,24 @@ class Connection(H11Protocol):
             self.transport.resume_reading()
 
     def on_response_complete(self) -> None:
-        """The connection may be used again, or closed for another one."""
+        """The request is complete: the connection is idle, and may be closed for another one."""
         super().on_response_complete()
         if not self.transport.is_closing():
             self.idle[self] = None
 
     def pause_writing(self) -> None:
-        """The client does not read as fast as is sent."""
+        """The client reads slower than the server sends."""
         super().pause_writing()
         self._left = self.transport.get_write_buffer_size()
         self._unread = self.loop.call_later(READ, self._look)
 
     def resume_writing(self) -> None:
-        """It has read."""
+        """The client has read."""
         super().resume_writing()
         self._look_no_more()
 
     def _look(self) -> None:
-        """Closes a connection of which nothing has been read since the last look."""
+        """Closes a connection whose client has read nothing since the previous check."""
         left = self.transport.get_write_buffer_size()
         if left >= self._left:
             self.transport.abort()
@@ -163,11 +164,11 @@ class Connection(H11Protocol):
 
 
 def options() -> dict[str, Any]:
-    """What uvicorn is told."""
+    """Options of uvicorn."""
     Connection.most = raise_limit()
     return {"http": Connection, "backlog": _ACCEPTED}
 
 
 def queue(listener: socket.socket) -> None:
-    """The system keeps as many connections that are not accepted as may be open. uvicorn has given it ``_ACCEPTED``."""
+    """The backlog of the socket: as many connections as may be open. uvicorn would set ``_ACCEPTED``."""
     listener.listen(_MOST)

@@ -1,4 +1,4 @@
-"""A run's own copies of the files that its case names: second names of files that never change."""
+"""A run's own copies of the files that its case names: hard links to files that never change."""
 
 import re
 import secrets
@@ -21,16 +21,16 @@ from .sent import SentFiles, give
 _LACKING = "you have sent no such file, or it has been removed since; send it first (PUT /v1/files/{sha256})"
 _NAMING = re.compile(rb"""path["']?[ \t]*[=:]|\\[uUx]""")
 Source = Callable[[FileName, Path], None]
-"""Puts a file that a case names where it is told. Raises FileNotFoundError, OSError."""
+"""Puts a file that a case names at a path. Raises FileNotFoundError, OSError."""
 
 
 def of_owner(sent: SentFiles, owner: str) -> Source:
-    """From what a user has sent."""
+    """Copies of files that a user has sent."""
     return lambda file, target: sent.give(owner, file.sha256, target)
 
 
 def of_run(folder: Path) -> Source:
-    """From what another run of the same user has; the source raises ServiceError 409 for what it has lost."""
+    """Copies of files of another run of the same user; raises ServiceError 409 where that run has lost one."""
 
     def put(file: FileName, target: Path) -> None:
         try:
@@ -43,9 +43,7 @@ def of_run(folder: Path) -> Source:
 
 
 def fill(files: Sequence[FileName], source: Source, folder: Path) -> None:
-    """Gives a folder a copy of each file; they are on disk when this returns. Raises CaseError for those that are
-    not there, OSError.
-    """
+    """Gives a folder a copy of each file; they are on disk on return. Raises CaseError for missing files, OSError."""
     place = folder / layout.FILES
     if files:
         place.mkdir(0o700)
@@ -65,8 +63,8 @@ def fill(files: Sequence[FileName], source: Source, folder: Path) -> None:
 
 @contextmanager
 def apart(runs: Path, files: Sequence[FileName], source: Source) -> Iterator[Path]:
-    """A folder with the files, as that of a run has them, for the time in which they are read. What a server that is
-    killed leaves of it is removed by the next one. Raises as ``fill``.
+    """A temporary folder with the files, laid out as in the folder of a run. A server that was killed leaves it
+    behind; the next one removes it. Raises the errors of ``fill``.
     """
     place = runs / f"{APART}{secrets.token_hex(8)}"
     place.mkdir(0o700)
@@ -79,5 +77,5 @@ def apart(runs: Path, files: Sequence[FileName], source: Source) -> Iterator[Pat
 
 
 def names_files(body: bytes) -> bool:
-    """Whether a case may name files, by its text alone: a key ``path``, or letters that are written in another way."""
+    """Whether the text of a case may name files: it has a key ``path``, or escaped letters."""
     return _NAMING.search(body) is not None

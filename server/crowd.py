@@ -1,6 +1,6 @@
-"""How much each user holds of the server at a time: requests in progress, and long answers.
+"""Limits of each user: requests in progress, and long answers.
 
-A request is in progress until its answer is sent: so this bounds the bodies and the answers that are in memory too.
+A request is in progress until its answer is sent, so this limits the bodies and answers in memory, too.
 """
 
 import asyncio
@@ -15,19 +15,19 @@ from conoid.cases.policy import Http
 from .lanes import busy
 
 PATIENCE = 60.0
-"""s for which a request waits for its turn. Chosen: longer than most answers take."""
+"""s that a request waits for its turn. Chosen: longer than most answers take."""
 
 
 class Place:
-    """Of one request."""
+    """The place of one request among those in progress."""
 
     def __init__(self, crowd: "Crowd", who: str) -> None:
-        """A request in progress."""
+        """``who``: the user of the request."""
         self._crowd, self._who = crowd, who
         self.is_long = False
 
     def lengthen(self) -> None:
-        """The answer takes as long as a run, or a download: it counts among the long ones from now on.
+        """Counts the answer among the long ones from now on: it takes as long as a run or a download.
 
         Raises ServiceError 429.
         """
@@ -37,20 +37,22 @@ class Place:
 
 
 class Crowd:
-    """Belongs to the event loop."""
+    """Counts of requests by user. Used in the thread of the event loop."""
 
     def __init__(self, limits: Http, connections: int) -> None:
-        """``connections``: of all users; one of them takes at most half for what waits and what is long."""
+        """``connections``: limit for all users; one user gets at most half of it for waiting requests and long
+        answers."""
         self._requests = limits.requests
         self._waiting, self._streams = min(limits.waiting, connections // 4), min(limits.streams, connections // 4)
         self._turns: dict[str, asyncio.Semaphore] = {}
         self._asked: Counter[str] = Counter()
-        """Requests that wait or are in progress."""
+        """Requests that wait or are in progress, by user."""
         self._long: Counter[str] = Counter()
 
     @asynccontextmanager
     async def place(self, who: str) -> AsyncIterator[Place]:
-        """Waits for the turn of a request. Raises ServiceError 429 when too many of the user's wait, or too long."""
+        """Waits for the turn of a request. Raises ServiceError 429 when too many requests of the user wait, or when
+        it waits too long."""
         if self._asked[who] >= self._requests + self._waiting:
             raise busy(f"{self._requests} of your requests are in progress and {self._waiting} wait")
         place, turn = Place(self, who), self._turns.setdefault(who, asyncio.Semaphore(self._requests))
@@ -65,13 +67,13 @@ class Crowd:
         finally:
             if place.is_long:
                 self._long[who] -= 1
-                self._long += Counter()  # keeps what is above 0
+                self._long += Counter()  # keeps counts above 0 only
             else:
                 turn.release()
                 self._leave(who)
 
     def lengthen(self, who: str) -> None:
-        """A request in progress becomes a long answer. Raises ServiceError 429."""
+        """Moves a request in progress to the long answers. Raises ServiceError 429."""
         if self._long[who] >= self._streams:
             raise busy(
                 f"you have {self._streams} event streams, followed logs, waits or downloads; no more are allowed"
@@ -87,7 +89,7 @@ class Crowd:
 
 
 def place_of(request: Request) -> Place:
-    """Of the request that is being answered."""
+    """The place of the request that is being answered."""
     place: Place = request.scope["state"]["place"]
     return place
 

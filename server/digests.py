@@ -1,4 +1,4 @@
-"""The sha256 of files, computed in slices, once for each state of a file."""
+"""SHA-256 of files, computed in slices and kept for each state of a file."""
 
 import asyncio
 import hashlib
@@ -10,21 +10,21 @@ from weakref import WeakValueDictionary
 from .lanes import Lanes
 
 State = tuple[int, int, int, int, int]
-"""Device, inode, times of the last change of content and of the file in ns, size in bytes."""
+"""State of a file: device, inode, times of the last change of content and of the inode in ns, size in bytes."""
 _KEPT = 10_000
 """Digests that are kept, 32 bytes each. Chosen."""
 _SLICE, _CHUNK = 1 << 25, 1 << 18
-"""Bytes that are read in one piece of work, and at once. Chosen: 0.1 s, and others of the user come between."""
+"""Bytes of one task, and bytes of one read. Chosen: 0.1 s, between which other requests of the user are served."""
 
 
 def state_of(file: BinaryIO) -> State:
-    """Of an open file."""
+    """State of an open file."""
     status = os.fstat(file.fileno())
     return status.st_dev, status.st_ino, status.st_mtime_ns, status.st_ctime_ns, status.st_size
 
 
 class Digests:
-    """Belongs to the event loop."""
+    """Digests of files. Used in the thread of the event loop."""
 
     def __init__(self, lanes: Lanes) -> None:
         """None is known yet."""
@@ -33,7 +33,7 @@ class Digests:
         self._locks: WeakValueDictionary[State, asyncio.Lock] = WeakValueDictionary()
 
     async def of(self, file: BinaryIO, state: State) -> bytes:
-        """The sha256 of the first ``size`` bytes. Raises OSError, ServiceError 503."""
+        """SHA-256 of the first ``size`` bytes. Raises OSError, ServiceError 503."""
         lock = self._locks.setdefault(state, asyncio.Lock())
         async with lock:
             if state not in self._known:
@@ -50,7 +50,7 @@ class Digests:
 
 
 def _add(total: "hashlib._Hash", file: BinaryIO, offset: int, size: int) -> int:
-    """Adds ``size`` bytes of a file to a digest; returns how many there were."""
+    """Adds ``size`` bytes of a file to a digest; returns the number of bytes read."""
     end = offset + size
     while offset < end and (chunk := os.pread(file.fileno(), min(_CHUNK, end - offset), offset)):
         total.update(chunk)

@@ -1,6 +1,4 @@
-"""Middleware: who asks, and whether it is the turn of the request (``turns``). What a user holds is bounded here
-(``crowd``).
-"""
+"""Middleware: finds the token of a request and waits for its turn (``turns``). Limits by user are in ``crowd``."""
 
 import hashlib
 import time
@@ -19,26 +17,27 @@ from .tokens import check_token
 from .turns import Turns
 
 ALIVE = "/healthz"
-"""Waits for its turn, and for nothing else that the server does."""
+"""/healthz: waits for its turn and for nothing else."""
 LOCAL_OWNER = "local"
-"""Owns all runs of a server without access control."""
+"""Owner of all runs on a server without access control."""
 _SEEN = 1000
-"""Tokens that were valid lately and are kept. Chosen."""
+"""Number of recently valid tokens that are kept. Chosen."""
 _FRESH = 1.0
-"""s for which a token that was valid is taken for valid. Chosen: who is revoked is answered with 401 after that."""
+"""s for which a valid token is not looked up again. Chosen: a revoked token is refused after that time."""
 
 
 class Door:
-    """Lets requests in. The app finds the token in the state of the scope, and the place of the request."""
+    """Middleware of all requests. The app reads the token and the place of the request from the state of the scope."""
 
     def __init__(self, app: ASGIApp, service: Service) -> None:
         self._app, self._service = app, service
         self._seen: OrderedDict[bytes, tuple[float, Token]] = OrderedDict()
-        """By its hash: until when a token is taken for valid; after that the database is asked in its owner's lane."""
+        """By hash of a token: until when it is taken as valid; after that the database is asked, in the lane of its
+        owner."""
         self._turns = Turns()
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Answers 429 and 503 itself where a request does not come in."""
+        """Answers 429 and 503 itself where a request is not let in."""
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
@@ -76,7 +75,7 @@ class Door:
         return token.owner if token is not None else _address(scope)
 
     async def _token(self, scope: Scope) -> Token | None:
-        """The token of the request; None where it shows none that is valid. Raises ServiceError 429, 503, 507."""
+        """The token of the request; None where it has no valid one. Raises ServiceError 429, 503, 507."""
         scheme, _, text = Headers(scope=scope).get("authorization", "").partition(" ")
         if not self._service.settings.auth:
             await self._turns.wait(LOCAL_OWNER)
@@ -107,6 +106,6 @@ class Door:
 
 
 def _address(scope: Scope) -> str:
-    """No name of a user: those have no blank."""
+    """A name that no user can have: names of users have no blank."""
     client = scope.get("client")
     return f"address {client[0]}" if client else "address"
