@@ -14,11 +14,10 @@ from functools import cache
 import msgspec
 
 from conoid.cases.cores import usable_cores
-from conoid.cases.load import CaseError
 
 from .errors import ServiceError
 from .lanes import Lanes
-from .reading import CPU, PID, WALL, Answer, Question, Reading
+from .reading import CPU, PID, WALL, Answer, Question, Reading, WrongCaseError
 
 _log = logging.getLogger("conoid.server")
 _LOAD = 30.0
@@ -65,7 +64,7 @@ class Reader:
         if answer.crash:
             raise RuntimeError(answer.crash)
         if answer.reading is None:
-            raise CaseError(answer.problems)
+            raise WrongCaseError(answer.problems, answer.files)
         return answer.reading
 
     def _ask(self, question: bytes) -> bytes:

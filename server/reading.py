@@ -12,7 +12,7 @@ import signal
 import socket
 import sys
 import traceback
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -38,6 +38,8 @@ _NICE = 5
 """Steps of priority below the server, which goes on answering. Chosen."""
 _SHIPPED = "demo"
 """Read once before all others. Chosen: small, with a material of the library."""
+_MOST_FILES = 1000
+"""Files of a case with problems that are told of. Chosen."""
 _UNREAD = "was not read yet: its run reads it"
 PID = 4
 """Bytes of the number of a process, which it sends first."""
@@ -62,6 +64,15 @@ class FileName(msgspec.Struct, frozen=True, kw_only=True):
     key: str
     path: str
     sha256: str
+
+
+class WrongCaseError(CaseError):
+    """A case with problems, and the files that it names all the same."""
+
+    def __init__(self, problems: Iterable[Problem], files: Sequence[FileName]) -> None:
+        """Keeps both."""
+        super().__init__(problems)
+        self.files = files
 
 
 class Reading(msgspec.Struct, frozen=True, kw_only=True):
@@ -90,6 +101,8 @@ class Answer(msgspec.Struct, frozen=True, kw_only=True):
 
     reading: Reading | None = None
     problems: list[Problem] = []
+    files: list[FileName] = []
+    """Of a case with problems: the files that it names, as far as it could be read; ``sha256`` may be empty."""
     crash: str = ""
 
 
@@ -98,7 +111,7 @@ def read(question: Question) -> Answer:
     try:
         return Answer(reading=_read(question))
     except CaseError as error:
-        return Answer(problems=list(error.problems))
+        return Answer(problems=list(error.problems), files=_named(question))
     except MemoryError:
         raise
     except Exception:
@@ -123,8 +136,20 @@ def _read(question: Question) -> Reading:
 
 
 def _files(case: Case) -> list[FileName]:
-    found = files_of(case.model_dump(include={"parts"}))
-    return [FileName(key=dotted(file.table), path=file.path, sha256=file.sha256 or "") for file in found]
+    return _names(case.model_dump(include={"parts"}))
+
+
+def _named(question: Question) -> list[FileName]:
+    """The files of a case that cannot be run; none where its text cannot be read."""
+    try:
+        text = _text(question.body)
+        return _names(json_data(text) if question.json else toml_data(text))[:_MOST_FILES]
+    except CaseError:
+        return []
+
+
+def _names(data: Mapping[str, Any]) -> list[FileName]:
+    return [FileName(key=dotted(file.table), path=file.path, sha256=file.sha256 or "") for file in files_of(data)]
 
 
 def _weighed(case: Case, data: Mapping[str, Any], question: Question) -> tuple[dict[str, int | float], list[Problem]]:

@@ -152,6 +152,14 @@ class Table(msgspec.Struct, kw_only=True):
     next: str | None
 
 
+class CaseFile(msgspec.Struct, kw_only=True):
+    """A file that a case names, in the table ``key``; ``sha256`` is empty where the case has no hash of it."""
+
+    key: str
+    path: str
+    sha256: str
+
+
 class Validation(msgspec.Struct, kw_only=True):
     """Whether a case could be submitted; with warnings, estimate and every default where it could, and what its files
     hold (``survey``: by part, with loads, and bodies that touch).
@@ -162,6 +170,7 @@ class Validation(msgspec.Struct, kw_only=True):
     warnings: list[ProblemEntry] = []
     estimate: dict[str, float] = {}
     case: dict[str, Any] = {}
+    files: list[CaseFile] = []
     survey: dict[str, Any] = {}
 
 

@@ -22,7 +22,7 @@ from .errors import ServiceError, database_away, invalid_case
 from .folder import Copy, Submission
 from .holds import words
 from .reader import the_reader
-from .reading import Question, Reading
+from .reading import Question, Reading, WrongCaseError
 from .sent import SentFiles
 from .settings import Settings
 from .store import Store
@@ -79,9 +79,12 @@ class Desk:
         reading = self._reader.read(question)
         if not reading.files:
             return reading
-        with apart(self._settings.runs, reading.files, source) as place:
-            told = _surveyed(reading, place, {} if surveys is None else surveys)
-            return self._reader.read(structs.replace(question, survey=told, folder=str(place)))
+        try:
+            with apart(self._settings.runs, reading.files, source) as place:
+                told = _surveyed(reading, place, {} if surveys is None else surveys)
+                return self._reader.read(structs.replace(question, survey=told, folder=str(place)))
+        except CaseError as error:
+            raise WrongCaseError(error.problems, reading.files) from None
 
     def source(self, owner: str, restart: str = "") -> Source:
         """Where the files that a case of an owner names come from: what he has sent, or the run that goes on."""

@@ -4,6 +4,7 @@ import { Problem, call, token } from "./api.js";
 import { h } from "./figures.js";
 import { offer } from "./libraries.js";
 import { ComparePage } from "./compare.js";
+import { NewPage } from "./new.js";
 import { place } from "./place.js";
 import { RunPage } from "./run.js";
 import { RunsPage } from "./runs.js";
@@ -54,11 +55,12 @@ const PAGES = {
   runs: () => new RunsPage(refuse),
   run: ([run]) => new RunPage(run, refuse),
   compare: (runs) => new ComparePage(runs),
+  new: (_, query) => new NewPage(query, refuse),
 };
 
 function route() {
-  const { page: name, names } = place(location.hash);
-  show((PAGES[name] ?? PAGES.runs)(names));
+  const { page: name, names, query } = place(location.hash);
+  show((PAGES[name] ?? PAGES.runs)(names, query));
 }
 
 // A server with tokens is not asked before there is one. One that is away is asked again until it answers.

@@ -5,15 +5,18 @@ from functools import cache
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Header, Response
+from msgspec import to_builtins
 
 from conoid.cases import reference
-from conoid.cases.load import CaseError, read_case, shipped
+from conoid.cases.files import files_of
+from conoid.cases.load import CaseError, read_case, read_data, shipped
 
 from .. import openapi
 from ..auth import Reader, Submitter
 from ..copies import names_files
 from ..errors import entry, not_found
 from ..lanes import blocking
+from ..reading import WrongCaseError
 from ..service import ServiceOf
 from .runs import Body
 
@@ -28,17 +31,23 @@ async def validate(
     content_type: Annotated[str, Header(include_in_schema=False)] = "",
 ) -> dict[str, Any]:
     """Whether the case could be submitted: every problem at once, or warnings, estimate, the case with all defaults,
-    and what the files that it names hold.
+    and what the files that it names hold; in both cases ``files``, those that it names.
     """
     try:
         lanes, desk = service.surveyors if names_files(body) else service.readers, service.desk
         reading = await lanes.run(desk.read, body, content_type, desk.source(identity.owner))
     except CaseError as error:
-        return {"valid": False, "problems": [entry(problem) for problem in error.problems]}
+        files = error.files if isinstance(error, WrongCaseError) else []
+        problems = [entry(problem) for problem in error.problems]
+        return {"valid": False, "problems": problems, "files": [to_builtins(file) for file in files]}
     odd = [entry(doubt) for doubt in reading.doubts]
     case = json.loads(reading.case)
     told = {"survey": json.loads(reading.survey)} if reading.survey else {}
-    return {"valid": True, "problems": [], "warnings": odd, "estimate": reading.estimate, "case": case, **told}
+    files = [to_builtins(file) for file in reading.files]
+    return {
+        "valid": True, "problems": [], "warnings": odd, "estimate": reading.estimate, "case": case, "files": files,
+        **told,
+    }  # fmt: skip
 
 
 @router.get("/v1/case.schema.json")
@@ -63,6 +72,16 @@ def shipped_case(service: ServiceOf, identity: Reader, name: str) -> Response:
     if path is None:
         raise not_found(f"case {name[:80]!r}")
     return Response(path.read_bytes(), media_type="application/toml")
+
+
+@router.get("/v1/cases/{name}/files/{file}")
+@blocking
+def shipped_file(service: ServiceOf, identity: Reader, name: str, file: str) -> Response:
+    """A file that a shipped case names."""
+    path = shipped().get(name)
+    if path is None or file not in {named.path for named in files_of(read_data(path))}:
+        raise not_found(f"file {file[:80]!r} of case {name[:80]!r}")
+    return Response(path.with_name(file).read_bytes(), media_type="application/octet-stream")
 
 
 @cache

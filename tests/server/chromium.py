@@ -87,12 +87,20 @@ class Browser:
             self._process.wait()
         self._to.close()
 
-    def page(self, width: int = 1280, height: int = 720, *, dark: bool = False, phone: bool = False) -> "Page":
-        """An empty page in a profile of its own."""
-        context = self.call("Target.createBrowserContext")["browserContextId"]
+    def page(
+        self,
+        width: int = 1280,
+        height: int = 720,
+        *,
+        dark: bool = False,
+        phone: bool = False,
+        beside: "Page | None" = None,
+    ) -> "Page":
+        """An empty page in a profile of its own, or in that of another page."""
+        context = beside.context if beside else self.call("Target.createBrowserContext")["browserContextId"]
         target = self.call("Target.createTarget", url="about:blank", browserContextId=context)["targetId"]
         session = self.call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
-        page = Page(self, session, target)
+        page = Page(self, session, target, context)
         self._listeners[session] = page.heard
         page.open(width, height, dark=dark, phone=phone)
         return page
@@ -141,8 +149,8 @@ class Browser:
 class Page:
     """One page: what a person does with it, and what the browser says of it."""
 
-    def __init__(self, browser: Browser, session: str, target: str) -> None:
-        self._browser, self._session, self._target = browser, session, target
+    def __init__(self, browser: Browser, session: str, target: str, context: str) -> None:
+        self._browser, self._session, self._target, self.context = browser, session, target, context
         self.errors: list[str] = []
         """What stands in the console as an error, scripts that have failed, and pages of the server that did."""
         self.answers: list[tuple[int, str]] = []

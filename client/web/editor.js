@@ -1,0 +1,56 @@
+// A text with line numbers. A line of which something is wrong is marked.
+
+import { h } from "./figures.js";
+
+export class Editor {
+  constructor(label, onInput) {
+    this.numbers = h("pre.numbers", { "aria-hidden": "true" });
+    this.area = h("textarea.text", { "aria-label": label, spellcheck: "false", autocapitalize: "off", autocomplete: "off", wrap: "off",
+      oninput: () => this.changed(onInput), onscroll: () => { this.numbers.scrollTop = this.area.scrollTop; } });
+    this.marks = new Set();
+    this.element = h("div.editor", {}, this.numbers, this.area);
+    this.count();
+  }
+
+  get text() { return this.area.value; }
+
+  // The caret stays on its line where the text around it has changed.
+  set text(text) {
+    if (this.area.value === text) return;
+    const { selectionStart: at, scrollTop } = this.area;
+    const after = this.area.value.length - at;
+    const before = this.area.value.slice(0, at);
+    this.area.value = text;
+    this.area.setSelectionRange(...Array(2).fill(text.startsWith(before) ? at : Math.max(0, text.length - after)));
+    this.area.scrollTop = scrollTop;
+    this.count();
+  }
+
+  changed(onInput) {
+    this.count();
+    onInput();
+  }
+
+  // Marks lines, from 0 on.
+  mark(lines) {
+    this.marks = new Set(lines);
+    this.drawn = 0;
+    this.count();
+  }
+
+  count() {
+    const lines = this.area.value.split("\n").length;
+    if (lines === this.drawn) return;
+    this.drawn = lines;
+    this.numbers.replaceChildren(...Array.from({ length: lines }, (_, i) => h(this.marks.has(i) ? "span.wrong" : "span", {}, `${i + 1}\n`)));
+  }
+
+  // Selects a line and brings it into view.
+  goTo(line) {
+    const lines = this.area.value.split("\n");
+    const start = lines.slice(0, line).reduce((sum, one) => sum + one.length + 1, 0);
+    this.area.focus();
+    this.area.setSelectionRange(start, start + (lines[line]?.length ?? 0));
+    this.area.scrollTop = Math.max(0, (this.area.scrollHeight * (line - 4)) / lines.length);
+  }
+}

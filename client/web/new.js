@@ -1,0 +1,239 @@
+// A new run: its case in an editor, the files that it names, what the server says of it, and the start.
+
+import { Problem, call, send } from "./api.js";
+import { isJson, lineOf, valueOf, withKey } from "./casetext.js";
+import { Editor } from "./editor.js";
+import { counted, h } from "./figures.js";
+import { Outbox } from "./outbox.js";
+import { recall, remember } from "./remember.js";
+import { filesTable, verdict } from "./verdict.js";
+
+const IDLE = 500; // ms without a key after which the case is checked.
+const AGAIN = 3000; // ms after which a server that did not answer is asked again.
+const DRAFT = 200000; // Letters of a case that the browser keeps until the next visit.
+const OWN = /^(restart|keep|sweep.*)$/; // Labels that say something of one run alone.
+const FIELDS = [["title", "Title", "", "title"], ["ranks", "Ranks", "run", "ranks"], ["threads", "Threads", "run", "threads"]];
+
+export class NewPage {
+  // `query` may name a run from which the case is taken (`from`), or a shipped case (`case`).
+  constructor(query, onRefused) {
+    Object.assign(this, { from: query.get("from") ?? "", onRefused, told: null, checked: null, abort: new AbortController(), key: fresh() });
+    this.outbox = new Outbox(this.from, () => this.news());
+    this.build();
+    this.begin(query.get("case"));
+    document.title = "New run · Conoid";
+  }
+
+  close() {
+    this.abort.abort();
+    this.outbox.close();
+    clearTimeout(this.timer);
+  }
+
+  build() {
+    this.editor = new Editor("the case", () => this.typed());
+    this.gallery = h("select", { "aria-label": "start from a shipped case", onchange: () => this.take(this.gallery.value) }, h("option", { value: "" }, "a shipped case …"));
+    const chosen = h("input", { type: "file", multiple: "", "aria-label": "choose a case and its files", onchange: () => this.drop([...chosen.files]) });
+    this.fields = FIELDS.map(([id, words, table, name]) => {
+      const input = h("input", { type: table ? "number" : "text", min: 1, id: `new-${id}`, placeholder: table ? "1" : "", oninput: () => this.set(table, name, input) });
+      return { input, table, name, element: h(`label.row.of-${id}`, {}, h("span", {}, words), input) };
+    });
+    this.labels = h("input", { type: "text", placeholder: "study=speeds, mesh=fine" });
+    this.startButton = h("button", { type: "button", disabled: "", onclick: () => this.start() }, "Start");
+    this.said = h("p", { role: "status" });
+    this.verdict = h("div");
+    this.files = h("div");
+    const file = h("label.button", {}, "Choose files", chosen);
+    this.element = h("div.work.new", { ondragover: (event) => event.preventDefault(), ondrop: (event) => this.dropped(event), onkeydown: (event) => this.pressed(event) },
+      h("div.run-head", {}, h("h1", {}, this.from ? "Start again with changes" : "New run"), h("span.grow"), this.gallery, file),
+      h("div.bench", {},
+        h("section.card.stage-editor", { "aria-label": "case" }, h("p.hint", {}, "Paste a case, drop it here with the files that it names, or begin with a shipped one."), this.editor.element),
+        h("aside.now", { "aria-label": "check and start" },
+          h("section.card.start", { "aria-label": "start" }, ...this.fields.map(({ element }) => element), h("label.row", {}, h("span", {}, "Labels"), this.labels),
+            h("div.actions", {}, this.startButton, h("span.hint", {}, "Ctrl+Enter")), this.said),
+          h("section.card", { "aria-label": "check" }, h("h2", {}, "Check"), this.verdict),
+          h("section.card", { "aria-label": "files of the case" }, h("h2", {}, "Files"), this.files))));
+  }
+
+  // Where the case comes from ---------------------------------------------------------------------------------------------
+
+  async begin(shipped) {
+    this.draw();
+    const { signal } = this.abort;
+    try {
+      if (this.from) await this.open(signal);
+      else if (shipped) await this.read(shipped);
+      else this.show(recall("draft", ""));
+      const { cases } = await call("v1/cases", { signal });
+      this.gallery.append(...cases.map(({ name, title }) => h("option", { value: name, title }, `${name}: ${title}`)));
+    } catch (error) {
+      this.fail(error);
+    }
+  }
+
+  async open(signal) {
+    const path = `v1/runs/${encodeURIComponent(this.from)}`;
+    const info = await call(path, { signal });
+    this.labels.value = Object.entries(info.labels ?? {}).filter(([name]) => !OWN.test(name)).map((pair) => pair.join("=")).join(", ");
+    this.show(await (await send(`${path}/files/${info.case_file}`, { signal })).text());
+  }
+
+  async read(name) {
+    this.outbox.shipped = name;
+    this.show(await (await send(`v1/cases/${encodeURIComponent(name)}`, { signal: this.abort.signal })).text());
+  }
+
+  async take(name) {
+    if (!name || (this.editor.text.trim() && !confirm("Replace the case in the editor?"))) return;
+    await this.read(name).catch((error) => this.fail(error));
+  }
+
+  show(text) {
+    this.editor.text = text;
+    this.typed();
+  }
+
+  dropped(event) {
+    event.preventDefault();
+    this.drop([...event.dataTransfer.files]);
+  }
+
+  // A case goes into the editor, all others are files that a case may name.
+  async drop(files) {
+    const cases = files.filter(({ name }) => /\.(toml|json)$/i.test(name));
+    if (cases.length) this.show(await cases[0].text());
+    for (const file of files) if (file !== cases[0]) this.outbox.add(file);
+  }
+
+  set(table, name, input) {
+    if (input.value === "") return;
+    this.editor.text = withKey(this.editor.text, table, name, table ? String(Math.max(1, Math.round(Number(input.value)))) : JSON.stringify(input.value));
+    this.typed();
+  }
+
+  pressed(event) {
+    if (event.key === "Enter" && (event.ctrlKey || event.metaKey) && !this.startButton.disabled) {
+      event.preventDefault();
+      this.start();
+    }
+  }
+
+  // The check -------------------------------------------------------------------------------------------------------------
+
+  typed() {
+    this.key = fresh();
+    if (!this.from && this.editor.text.length < DRAFT) remember("draft", this.editor.text);
+    this.later(IDLE);
+    this.draw();
+  }
+
+  later(ms) {
+    clearTimeout(this.timer);
+    this.timer = setTimeout(() => this.check(), ms);
+  }
+
+  // One check at a time, of the text as it is then; what is typed meanwhile is checked after it.
+  async check() {
+    const { text } = this.editor;
+    if (this.checking || this.checked === text || this.abort.signal.aborted) return;
+    if (!text.trim()) return this.take_in(text, null);
+    this.checking = true;
+    this.draw();
+    try {
+      this.take_in(text, await this.ask("v1/cases:validate", text));
+    } catch (error) {
+      this.checked = null;
+      this.fail(error);
+      if (!(error instanceof Problem) || error.status >= 500 || error.status === 429) this.later(AGAIN);
+    }
+    this.checking = false;
+    this.draw();
+    if (this.checked !== null && this.editor.text !== this.checked) this.later(0);
+    return undefined;
+  }
+
+  async ask(path, text, headers = {}) {
+    const type = isJson(text) ? "application/json" : "application/toml";
+    return (await send(path, { method: "POST", headers: { "Content-Type": type, ...headers }, body: text, signal: this.abort.signal })).json();
+  }
+
+  take_in(text, told) {
+    Object.assign(this, { checked: text, told });
+    this.say("");
+    this.news();
+  }
+
+  // Hashes that have become known go into the case; a file that has come makes the check worth while again.
+  news() {
+    if (this.abort.signal.aborted) return;
+    const named = this.told?.files ?? [];
+    if (this.checked === this.editor.text) {
+      const text = this.outbox.ready(this.editor.text, named);
+      const here = named.every((file) => this.outbox.stateOf(file).state === "sent");
+      if (text !== this.editor.text) this.show(text);
+      else if (here && this.waited) [this.checked, this.waited] = [null, this.later(0)];
+      this.waited = Boolean(named.length) && !here;
+    }
+    this.draw();
+  }
+
+  // The start -------------------------------------------------------------------------------------------------------------
+
+  // The same key for the same case: a start that is asked for twice is one run.
+  async start() {
+    const labels = this.labels.value.split(",").map((one) => one.trim()).filter(Boolean);
+    const query = labels.map((label) => `label=${encodeURIComponent(label)}`).join("&");
+    this.starting = true;
+    this.draw();
+    try {
+      const { id } = await this.ask(`v1/runs${query ? `?${query}` : ""}`, this.editor.text, { "Idempotency-Key": this.key });
+      remember("draft", "");
+      location.hash = `#/runs/${encodeURIComponent(id)}`;
+    } catch (error) {
+      this.fail(error);
+    }
+    this.starting = false;
+    this.draw();
+  }
+
+  fail(error) {
+    if (this.abort.signal.aborted) return;
+    if (error.status === 401) this.onRefused();
+    else this.say(error instanceof Problem ? error.message : `No answer from the server: ${error.message}`);
+  }
+
+  say(text) { this.said.replaceChildren(text ? h("span.problem", {}, text) : ""); }
+
+  // What is wrong; a file that is not here yet stands among the files.
+  problems(named) {
+    const wanted = new Set(named.filter((file) => this.outbox.stateOf(file).state !== "sent").map(({ key }) => `${key}.sha256`));
+    return (this.told?.problems ?? []).filter(({ key }) => !wanted.has(key));
+  }
+
+  draw() {
+    const { text } = this.editor;
+    const current = this.checked === text;
+    const named = this.told?.files ?? [];
+    const waits = named.filter((file) => this.outbox.stateOf(file).state !== "sent").length;
+    this.startButton.disabled = !(current && this.told?.valid && !waits && !this.starting);
+    this.startButton.textContent = this.starting ? "Starting …" : waits ? `Waits for ${counted(waits, "file")}` : "Start";
+    for (const { input, table, name } of this.fields) if (document.activeElement !== input) input.value = valueOf(text, table, name);
+    const problems = this.problems(named);
+    const lines = problems.map((one) => place(text, one));
+    const state = `${text.length} ${current} ${this.checking} ${waits} ${lines}`;
+    if (this.seen !== state || this.shown !== this.told) {
+      [this.seen, this.shown] = [state, this.told];
+      this.editor.mark(lines.filter((line) => line >= 0));
+      this.verdict.replaceChildren(verdict(text, current ? "" : "checking …", this.told && { ...this.told, problems }, lines, (line) => this.editor.goTo(line)));
+    }
+    this.files.replaceChildren(filesTable(named, this.outbox));
+  }
+}
+
+// The line of a problem: that of its key, or the one that the message names.
+function place(text, { key, message }) {
+  const told = /at line (\d+)/.exec(message);
+  return told ? Number(told[1]) - 1 : key ? lineOf(text, key) : -1;
+}
+
+const fresh = () => [...crypto.getRandomValues(new Uint8Array(16))].map((byte) => byte.toString(16).padStart(2, "0")).join("");
