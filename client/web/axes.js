@@ -10,7 +10,8 @@ export const colour = (name) => getComputedStyle(document.documentElement).getPr
 // Colour and dash of the line number `i`: no two of the first eighteen have both alike.
 export const lineStyle = (i) => ({ colour: `line-${i % HUES}`, dash: DASHES[Math.floor(i / HUES) % DASHES.length] });
 
-// What all charts have: the theme's colours, a tooltip without markup, zoom with Ctrl and the wheel.
+// What all charts have: the theme's colours, zoom with Ctrl and the wheel; those that stand `alone` a tooltip of one item,
+// the others the cursor, for which readout.js has the values.
 export function common(alone) {
   return {
     animation: false,
@@ -19,7 +20,7 @@ export function common(alone) {
     legend: { top: 0, left: 0, right: 4, type: "scroll", itemWidth: 18, itemHeight: 9, textStyle: { color: colour("soft"), fontSize: FONT }, inactiveColor: colour("faint"),
       pageIconColor: colour("soft"), pageIconInactiveColor: colour("line"), pageTextStyle: { color: colour("soft"), fontSize: FONT } },
     tooltip: {
-      trigger: alone ? "item" : "axis", renderMode: "richText", confine: true, backgroundColor: colour("card"), borderColor: colour("line"),
+      trigger: alone ? "item" : "axis", showContent: alone, renderMode: alone ? "richText" : "html", confine: true, backgroundColor: colour("card"), borderColor: colour("line"),
       textStyle: { color: colour("ink"), fontSize: FONT }, axisPointer: { type: "line", lineStyle: { color: colour("faint") } },
     },
     dataZoom: alone ? [] : [{ type: "inside", xAxisIndex: "all", zoomOnMouseWheel: "ctrl", moveOnMouseWheel: false, moveOnMouseMove: true, filterMode: "none" }],
@@ -65,11 +66,12 @@ export function largest(list) {
   return most;
 }
 
-// series({ name, data: [[t, value]], colour, unit, … }): a line, or with `stack` an area on those before.
+// series({ name, data: [[t, value]], colour, unit, … }): a line, or with `stack` an area on those before. `text` words a
+// value; it gets the point too.
 export function series({ name, data, colour: tone, unit = "", stack, dash = "solid", width = 1.8, text = (value) => si(value, unit, 4), ...more }) {
   return {
     name, unit, type: "line", data, showSymbol: data.length === 1, sampling: stack || data.length < 2000 ? undefined : "minmax", color: colour(tone), connectNulls: false,
-    lineStyle: { width: stack ? 0.5 : width, type: dash }, tooltip: { valueFormatter: (value) => text(Array.isArray(value) ? value[1] : value) },
+    lineStyle: { width: stack ? 0.5 : width, type: dash }, tooltip: { valueFormatter: (value, point) => text(Array.isArray(value) ? value[1] : value, point) },
     ...(stack ? { stack, stackStrategy: "all", areaStyle: { opacity: 0.85 } } : {}), emphasis: { focus: "series" }, ...more,
   };
 }

@@ -3,6 +3,7 @@
 import { colour, common } from "./axes.js";
 import { h } from "./figures.js";
 import { echarts } from "./libraries.js";
+import { readout } from "./readout.js";
 import { save, tableOf, toCsv } from "./tables.js";
 
 const GROUP = "run";
@@ -11,13 +12,13 @@ const PICTURE = { width: 960, height: 420 }; // px of a saved picture.
 const whenIdle = globalThis.requestIdleCallback ?? ((work) => setTimeout(work, 200)); // Not every browser has it.
 
 // A chart of `height` px. `option()` gives what ECharts calls an option, or null while there is nothing to draw.
-// `onEnter` gets the place of the cursor in the first series when Enter is pressed; `table()` promises the table that is
+// `unit` is that of its x axis; only time is shared with other charts. `onEnter` gets the place of the cursor in the first series when Enter is pressed; `table()` promises the table that is
 // saved, { head, rows }, in place of what is drawn; `name()` is how its files begin.
 export class Chart {
-  constructor(height, label, option, { alone = false, onClick, onEnter, table, name = () => "chart" } = {}) {
+  constructor(height, label, option, { alone = false, unit = "s", onClick, onEnter, table, name = () => "chart" } = {}) {
     this.element = h("div.plot", { tabindex: 0, role: "img", "aria-label": `${label}; arrow keys move the cursor${onEnter ? ", Enter opens the nearest marker" : ""}`, style: { height: `${height}px` } },
       h("p.hint", {}, "waiting for the first numbers"));
-    Object.assign(this, { height, label, option, alone, onClick, onEnter, table, name, at: 0, seen: false });
+    Object.assign(this, { height, label, option, alone, unit, onClick, onEnter, table, name, at: 0, seen: false });
     const button = (kind, act) => h("button.tab", { type: "button", title: `save as ${kind}`, "aria-label": `save as ${kind}: ${label}`, onclick: act }, kind);
     this.tools = h("span.save", { hidden: "" }, button("CSV", () => this.saveTable()), button("SVG", () => this.savePicture()));
     this.eye = new IntersectionObserver((entries) => this.look(entries.at(-1).isIntersecting), { rootMargin: NEAR });
@@ -27,6 +28,9 @@ export class Chart {
     this.dark = matchMedia("(prefers-color-scheme: dark)");
     this.dark.addEventListener("change", this.redraw = () => this.draw());
     this.element.addEventListener("keydown", (event) => this.key(event));
+    this.element.addEventListener("pointermove", ({ clientX, clientY }) => { this.pointer = [clientX, clientY]; });
+    this.element.addEventListener("pointerleave", () => this.leave());
+    this.element.addEventListener("blur", () => this.leave());
     this.open();
   }
 
@@ -65,6 +69,8 @@ export class Chart {
     const other = panels !== (this.panels ?? 1);
     if (other) this.stretch(panels);
     this.chart.setOption({ ...common(this.alone), ...option }, { replaceMerge: other ? ["series", "grid", "xAxis", "yAxis"] : ["series"], lazyUpdate: false });
+    this.series = option.series;
+    this.reads = !this.alone && !option.tooltip?.formatter;
     this.points = Math.max(...option.series.map((one) => one.data?.length ?? 0));
   }
 
@@ -78,12 +84,26 @@ export class Chart {
   init() {
     this.element.replaceChildren();
     const chart = this.kit.init(this.element, null, { renderer: "canvas" });
-    if (!this.alone) {
+    if (!this.alone && this.unit === "s") {
       chart.group = GROUP;
       this.kit.connect(GROUP);
     }
     if (this.onClick) chart.on("click", this.onClick);
+    chart.on("updateAxisPointer", ({ axesInfo }) => this.read(axesInfo?.find(({ axisDim }) => axisDim === "x")));
     return chart;
+  }
+
+  // Of all charts that show the cursor the one that has the pointer or the focus tells what its lines are worth.
+  read(cursor) {
+    const focused = document.activeElement === this.element;
+    if (!this.reads || !cursor || !(this.pointer || focused)) return;
+    const { right, top, height } = this.element.getBoundingClientRect();
+    readout.show(this, cursor.value, this.series, this.pointer ?? [right, top + height / 2]);
+  }
+
+  leave() {
+    this.pointer = null;
+    readout.hide(this);
   }
 
   key(event) {
@@ -115,6 +135,7 @@ export class Chart {
 
   close() {
     this.closed = true;
+    readout.hide(this);
     this.watch.disconnect();
     this.eye.disconnect();
     this.dark.removeEventListener("change", this.redraw);

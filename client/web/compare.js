@@ -3,8 +3,8 @@
 import { axis, largest, lineStyle, logarithmic, series, time } from "./axes.js";
 import { binary, call, refused } from "./api.js";
 import { Chart } from "./charts.js";
-import { called, common, differences, results } from "./contrast.js";
-import { count, h, pill, si } from "./figures.js";
+import { called, common, differences, inWords, keyColumns, results } from "./contrast.js";
+import { count, h, pill } from "./figures.js";
 import { everyLine, readColumns, readPlan } from "./history.js";
 import { swatch } from "./lines.js";
 import { FINAL } from "./live.js";
@@ -52,6 +52,7 @@ export class ComparePage {
       const todo = this.ids.filter((id) => !known.has(id) || !FINAL.has(known.get(id).info.state));
       await inTurn(todo, AT_ONCE, async (id) => { known.set(id, { ...known.get(id), ...(await readRun(id, signal)) }); });
       this.runs = this.ids.map((id) => known.get(id));
+      this.units ??= await readUnits(this.runs[0].plan?.name, signal);
     } catch (error) {
       if (signal.aborted) return;
       this.head.replaceChildren(h("h1", {}, `${this.ids.length} runs`), h("p.problem", {}, refused(error) ? error.message : `No answer from the server: ${error.message}`));
@@ -111,11 +112,11 @@ export class ComparePage {
 
   draw() {
     this.differing = differences(this.runs.map(({ plan }) => plan));
-    this.names = called(this.runs, this.differing);
+    this.names = called(this.runs, this.differing, this.units);
     this.drawHead();
     if (!this.drawn) for (const name of this.chosen()) this.addChart(name);
     this.drawn = true;
-    this.sheet.draw(this.runs.map((run, i) => ({ name: this.names[i], href: `#/runs/${encodeURIComponent(run.id)}`, line: i, state: run.info.state })), this.differing, (which) => results(this.runs, which));
+    this.sheet.draw(this.runs.map((run, i) => ({ name: this.names[i], href: `#/runs/${encodeURIComponent(run.id)}`, line: i, state: run.info.state })), keyColumns(this.differing, this.runs[0].plan, this.units), (which) => results(this.runs, which));
     this.fill(this.charts);
   }
 
@@ -164,7 +165,7 @@ export class ComparePage {
       this.keep();
       this.fill([made]);
     } }, Object.entries(this.offered()).filter(([, names]) => names.length).map(([group, names]) =>
-      h("optgroup", { label: group }, names.map((one) => h("option", { value: one, selected: one === name ? "" : false }, one)))));
+      h("optgroup", { label: group }, names.map((one) => h("option", { value: one, selected: one === name ? "" : false }, inWords(one))))));
     made.chart = new Chart(TALL, "a quantity of all runs over time", () => this.overlaid(made.name), { name: () => `compared_${made.name}`, table: () => this.table(made.name) });
     const shut = h("button.tool.shut", { type: "button", "aria-label": "close this chart", onclick: () => {
       made.chart.close();
@@ -203,7 +204,7 @@ export class ComparePage {
       return data.length && !this.hidden.has(run.id) ? [{ ...series({ name: this.names[i], unit, colour, dash, width: 1.6, data }), z: 3 }] : [];
     });
     if (!list.length) return this.hidden.size ? empty(ends) : null;
-    return { legend: { show: false }, grid: { left: 64, right: 14, top: 26, bottom: 26 }, tooltip: { ...tooltip(unit) },
+    return { legend: { show: false }, grid: { left: 64, right: 14, top: 26, bottom: 26 },
       xAxis: time(Math.max(...ends)), yAxis: log ? logarithmic(unit) : axis(unit, largest(list), { scale: true }), series: list };
   }
 
@@ -218,16 +219,14 @@ export class ComparePage {
     const list = this.runs.flatMap(({ id, snapshot }, i) => {
       const data = snapshot && !this.hidden.has(id) ? fitted(snapshot).points : [];
       const { colour, dash } = lineStyle(i);
-      return data.length > 1 ? [{ ...series({ name: this.names[i], unit: "", colour, dash, data }), step: "end", sampling: undefined }] : [];
+      return data.length > 1 ? [{ ...series({ name: this.names[i], unit: "", colour, dash, data, text: count }), step: "end", sampling: undefined }] : [];
     });
     if (!list.length) return null;
-    return { legend: { show: false }, grid: { left: 64, right: 14, top: 26, bottom: 26 }, xName: "size [m]", xAxis: logarithmic("m", { splitLine: { show: false } }), yAxis: logarithmic("", { min: 1, axisLabel: { formatter: count } }), series: list,
-      tooltip: { trigger: "axis", formatter: (told) => `${si(told[0].value[0], "m")} and larger\n${told.map(({ seriesName, value }) => `${seriesName}: ${count(value[1])}`).join("\n")}` } };
+    return { legend: { show: false }, grid: { left: 64, right: 14, top: 26, bottom: 26 }, xName: "size [m]", xAxis: logarithmic("m", { splitLine: { show: false } }), yAxis: logarithmic("", { min: 1, axisLabel: { formatter: count } }), series: list };
   }
 }
 
 const empty = (ends) => ({ xAxis: time(Math.max(...ends)), yAxis: axis("", 1), series: [] });
-const tooltip = (unit) => ({ trigger: "axis", order: "valueDesc", valueFormatter: (value) => si(Array.isArray(value) ? value[1] : value, unit, 4) });
 
 // [[t, value]] of a run.
 function points({ curves }, name) {
@@ -244,6 +243,13 @@ async function readRun(id, signal) {
   const path = `v1/runs/${encodeURIComponent(id)}`;
   const [info, plan, columns] = await Promise.all([call(path, { signal }), readPlan(id, signal), readColumns(id, [], POINTS, signal)]);
   return { id, info, plan, columns, curves: {} };
+}
+
+// The units of the keys of a case, by key.
+async function readUnits(name, signal) {
+  if (!name) return {};
+  const { cases = [] } = await call(`v1/table?limit=1&case=${encodeURIComponent(name)}`, { signal }).catch(() => ({}));
+  return cases[0]?.units ?? {};
 }
 
 // Does work for each of many, some at a time.

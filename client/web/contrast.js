@@ -9,13 +9,11 @@ const SHORT = 8; // Letters of an id, at least.
 
 const AXES = ["x", "y", "z"];
 
-// { "run.ranks": 2, "parts.steel.velocity.z": 210, … } of a case with all defaults; tables of a list go by their names,
-// components of a vector by their axes.
+// { "run.ranks": 2, "parts[0].velocity[2]": 210, … } of a case with all defaults, by the keys that can be set.
 export function flat(value, key = "") {
   if (value === null || typeof value !== "object") return { [key]: value };
-  const vector = Array.isArray(value) && value.length === AXES.length && value.every((one) => typeof one === "number");
-  const named = (name) => (vector ? AXES[name] : Array.isArray(value) ? value[name]?.name ?? name : name);
-  return Object.assign({}, ...Object.keys(value).map((name) => flat(value[name], key ? `${key}.${named(name)}` : named(name))));
+  const under = (name) => (Array.isArray(value) ? `${key}[${name}]` : key ? `${key}.${name}` : name);
+  return Object.assign({}, ...Object.keys(value).map((name) => flat(value[name], under(name))));
 }
 
 // [[key, value of the first, of the second, …], …] of what cases do not have in common.
@@ -23,6 +21,17 @@ export function differences(plans) {
   const all = plans.map((plan) => flat(plan ?? {}));
   const keys = [...new Set(all.flatMap(Object.keys))];
   return keys.filter((key) => !NEVER.test(key) && all.some((one) => (one[key] ?? null) !== (all[0][key] ?? null))).map((key) => [key, ...all.map((one) => one[key])]);
+}
+
+// What a key is about: "steel velocity z" for "parts[0].velocity[2]".
+export function about(key, plan) {
+  let at = plan;
+  const told = key.split(/[.[\]]+/).filter(Boolean).map((word) => {
+    const list = Array.isArray(at) ? at : null;
+    at = at?.[word];
+    return list ? (list.length === AXES.length && typeof list[0] === "number" ? AXES[word] : list[word]?.name ?? word) : word;
+  });
+  return told.filter((word) => !PLACES.has(word)).map(words).join(" ");
 }
 
 export function shown(value) {
@@ -39,13 +48,31 @@ export function shortened(ids) {
 }
 
 // What runs are called: by name; those of one name by the few keys that differ, else by their ids.
-export function called(runs, differing) {
+export function called(runs, differing, units = {}) {
   const names = runs.map(({ info }) => info.name || info.id);
   const ids = shortened(runs.map(({ info }) => info.id));
-  const by = differing.length && differing.length <= FEW ? runs.map((_, i) => differing.map(([key, ...values]) => `${key.split(".").slice(-3).filter((word) => !PLACES.has(word)).join(" ")} ${shown(values[i])}`).join(", ")) : ids;
+  const by = differing.length && differing.length <= FEW ? runs.map((_, i) => differing.map((told) => keyed(told, i, runs, units)).join(", ")) : ids;
   const told = names.map((name, i) => (names.filter((other) => other === name).length < 2 ? name : names.every((other) => other === name) ? by[i] : `${name}, ${by[i]}`));
   return told.map((name, i) => (told.filter((other) => other === name).length < 2 ? name : `${name} (${ids[i]})`));
 }
+
+const keyed = ([key, ...values], i, runs, units) => `${about(key, runs[0].plan)} ${typeof values[i] === "number" ? exact(values[i], units[key] ?? "") : shown(values[i])}`;
+
+// A column for each of the first keys that differ: what it is about, its key, its unit, the values.
+export const keyColumns = (differing, plan, units) => differing.map(([key, ...values]) => {
+  const numbers = values.filter(Number.isFinite);
+  const scale = scaleOf(Math.max(0, ...numbers.map(Math.abs)), units[key] ?? "");
+  const text = (value) => (typeof value === "number" ? exact(Number(scale.text(value)), "", 6) : shown(value));
+  return { title: about(key, plan), key, si: units[key] ?? "", unit: numbers.length ? scale.unit : "", values, text };
+});
+
+// Quantities of every run, in words.
+const QUANTITIES = {
+  kinetic: "kinetic energy", elastic: "elastic energy", plastic: "plastic work", viscous: "work of bulk viscosity", contact: "energy lost in contact", friction: "work of friction",
+  eroded: "energy of eroded tets", fracture: "energy of fracture", cohesive: "energy in cohesive facets", external: "work from outside", residual: "energy residual", dt: "time step",
+  stepping: "error of unequal time steps", averaging: "energy of averaged pressures", fragments: "number of fragments", nodes: "number of nodes", imbalance: "load imbalance, slowest rank over mean",
+};
+export const inWords = (name) => QUANTITIES[name] ?? words(name.replace(/^(kinetic|internal)\.(.*)$/, "$1 energy of $2"));
 
 // Results ----------------------------------------------------------------------------------------------------------------
 

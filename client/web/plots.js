@@ -39,7 +39,7 @@ export function plots(live, onBalance) {
     energy: add("energy", "energy over time", title, [by], () => ofEnergy(live, view()), { table: lines(() => names(live, view())) }),
     probes: add("probes", "probes over time", "Probes", [chooser.element], () => (chooser.draw(), ofProbes(live, chooser.chosen)), { table: lines(() => chooser.chosen) }),
     forces: add("forces", "contact forces over time", "Contact forces", [], () => ofForces(live), { table: lines(() => columnsOf(live)) }),
-    sizes: add("sizes", "number of fragments of a size and larger", "Fragment sizes", [], () => ofSizes(made.snapshot, live.spread), { alone: true, table: async () => tableOf({ ...ofSizes(made.snapshot, live.spread), xName: "size [m]" }) }),
+    sizes: add("sizes", "number of fragments of a size and larger", "Fragment sizes", [], () => ofSizes(made.snapshot, live.spread), { unit: "m", table: async () => tableOf({ ...ofSizes(made.snapshot, live.spread), xName: "size [m]" }) }),
     counts: add("counts", "nodes, broken facets and fragments over time", "Nodes, broken facets, fragments", [], () => ofCounts(live), { table: reports(ofCounts) }),
     residual: add("residual", "energy residual over time", "Energy residual", [], () => ofResidual(live), { table: lines(() => ["residual"]) }),
     dt: add("dt", "time step over time", "Time step", [], () => ofStep(live), { table: reports(ofStep) }),
@@ -66,9 +66,9 @@ function ofCounts(live) {
 function ofStep(live) {
   if (live.ledger.length < 2) return null;
   const data = live.ledger.filter(({ dt }) => dt > 0).map(({ t, dt, limiter }) => ({ value: [t, dt], limiter }));
-  const told = { trigger: "axis", formatter: ([{ data: { value, limiter } }]) => `${si(value[0], "s")}\ndt ${si(value[1], "s")}\n${limiter ? `limited by ${limiter}` : ""}`.trim() };
-  const list = [{ ...series({ name: "dt", colour: "elastic", unit: "s", data }), sampling: undefined }];
-  return { xAxis: time(end(live)), yAxis: axis("s", largest(list), { scale: true }), series: list, tooltip: told };
+  const text = (value, point) => `${si(value, "s", 4)}${point?.limiter ? `, limited by ${point.limiter}` : ""}`;
+  const list = [{ ...series({ name: "dt", colour: "elastic", unit: "s", data, text }), sampling: undefined }];
+  return { xAxis: time(end(live)), yAxis: axis("s", largest(list), { scale: true }), series: list };
 }
 
 // N(size) over the size, both logarithmic: of the snapshot that is shown, with the law that fits best, and of the newest
@@ -76,19 +76,18 @@ function ofStep(live) {
 function ofSizes(snapshot, spread) {
   const list = [...(snapshot ? ofSnapshot(snapshot) : []), ...(spread ? [ofSpread(spread)] : [])];
   if (!list.length) return null;
-  return { xAxis: logarithmic("m", { splitLine: { show: false } }), yAxis: logarithmic("", { min: LEAST, axisLabel: { formatter: count } }), series: list,
-    tooltip: { trigger: "item", formatter: ({ value }) => `${count(value[1])} of ${si(value[0], "m")} and more` } };
+  return { xAxis: logarithmic("m", { splitLine: { show: false } }), yAxis: logarithmic("", { min: LEAST, axisLabel: { formatter: count } }), series: list };
 }
 
 function ofSnapshot(snapshot) {
   const { points, best } = fitted(snapshot);
   if (points.length < 2) return [];
-  const list = [{ ...series({ name: "fragments of this size and larger", colour: "compute", data: points }), type: "scatter", symbolSize: 4 }];
+  const list = [{ ...series({ name: "fragments of this size and larger", colour: "compute", data: points, text: count }), type: "scatter", symbolSize: 4 }];
   if (best) {
     const [low, high] = [points[0][0], points.at(-1)[0]];
     const curve = Array.from({ length: CURVE }, (_, i) => low * (high / low) ** (i / (CURVE - 1))).map((size) => [size, points.length * best.longer(size)]);
     const told = best.law === "power" ? `exponent ${fixed(best.parameter)}` : si(best.parameter, "m");
-    list.push({ ...series({ name: `${best.law} law, ${told}`, colour: "bad", data: curve.filter(([, number]) => number >= LEAST) }), lineStyle: { type: "dashed" } });
+    list.push({ ...series({ name: `${best.law} law, ${told}`, colour: "bad", data: curve.filter(([, number]) => number >= LEAST), text: (value) => fixed(value, 1) }), lineStyle: { type: "dashed" } });
   }
   return list;
 }
@@ -100,7 +99,7 @@ export function fitted(snapshot) {
   return known.get(snapshot);
 }
 
-const ofSpread = ({ t, ...spread }) => ({ ...series({ name: `with dust, at ${exact(t, "s", 3)}`, colour: "faint", data: longer(spread) }), step: "end", sampling: undefined });
+const ofSpread = ({ t, ...spread }) => ({ ...series({ name: `with dust, at ${exact(t, "s", 3)}`, colour: "faint", data: longer(spread), text: count }), step: "end", sampling: undefined });
 
 // [size, number of fragments as long and longer] at the beginning of each bin, from bins of half a power of two.
 export function longer({ smallest, sizes: counts }) {

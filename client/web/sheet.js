@@ -1,6 +1,5 @@
 // The table of runs that are compared: what is different about each, and what came out; sorted by any column.
 
-import { shown } from "./contrast.js";
 import { h, pill } from "./figures.js";
 import { swatch } from "./lines.js";
 import { save, toCsv } from "./tables.js";
@@ -18,15 +17,14 @@ export class Sheet {
     this.element = h("section.card", { hidden: "" }, h("div.card-head", {}, h("h2", {}, "Values that differ, and results"), h("span.beside", {}, this.which, h("span.save", {}, csv))), this.place, this.note);
   }
 
-  // `rows`: { name, href, line, state } a run; `differing` as contrast.js has it; `results` gives columns for which value.
-  draw(rows = this.rows, differing = this.differing, results = this.results) {
-    Object.assign(this, { rows, differing, results });
+  // `rows`: { name, href, line, state } a run; `keys`: columns of what differs; `results` gives columns for which value.
+  draw(rows = this.rows, keys = this.keys, results = this.results) {
+    Object.assign(this, { rows, keys, results });
     this.element.hidden = false;
-    const keys = differing.slice(0, MOST_KEYS).map(([key, ...values]) => ({ title: key, unit: "", values, text: shown, key: true }));
-    this.columns = [...keys, ...results(this.which.value || "last")];
-    const more = differing.length - keys.length;
-    this.note.hidden = more <= 0;
-    this.note.textContent = `${more} more keys differ.`;
+    this.columns = [...keys.slice(0, MOST_KEYS), ...results(this.which.value || "last")];
+    const more = keys.slice(MOST_KEYS);
+    this.note.hidden = !more.length;
+    this.note.textContent = `These keys differ too: ${more.map(({ key }) => key).join(", ")}.`;
     const order = this.order();
     const head = this.columns.map((column) => this.head(column));
     const focused = document.activeElement?.dataset?.sorts;
@@ -39,7 +37,7 @@ export class Sheet {
   head({ title, unit, key }) {
     const sorted = this.by === title ? (this.down ? "descending" : "ascending") : "none";
     const mark = { ascending: " ▲", descending: " ▼", none: "" }[sorted];
-    return h(`th${key ? "" : ".number"}`, { scope: "col", "aria-sort": sorted }, h("button.sort", { type: "button", "data-sorts": title, onclick: () => this.sort(title) }, title, unit ? h("small", {}, ` ${unit}`) : "", mark));
+    return h(`th${key ? "" : ".number"}`, { scope: "col", "aria-sort": sorted }, h("button.sort", { type: "button", "data-sorts": title, title: key ?? false, onclick: () => this.sort(title) }, title, unit ? h("small", {}, ` ${unit}`) : "", mark));
   }
 
   sort(title) {

@@ -155,19 +155,25 @@ def test_keys_that_differ_are_told_by_their_place(ask: Ask) -> None:
     one = {"name": "a", "parts": [{"name": "bar", "v": [0, 0, 1]}], "run": {"ranks": 1, "frames": None}, "list": [1, 2]}
     other = {"name": "b", "parts": [{"name": "bar", "v": [0, 0, 2]}], "run": {"ranks": 1, "seed": None}, "list": [1]}
     assert ask("contrast.js", "page.differences(data)", [one, other, {**one, "new": True}]) == [
-        ["parts.bar.v.z", 1, 2, 1], ["list.1", 2, None, 2], ["new", None, None, True],
+        ["parts[0].v[2]", 1, 2, 1], ["list[1]", 2, None, 2], ["new", None, None, True],
     ]  # fmt: skip
+    script = "data[1].map((key) => page.about(key, data[0]))"
+    keys = ["parts[0].v[2]", "list[1]", "run.ranks", "materials.mild_steel.A"]
+    assert ask("contrast.js", script, [one, keys]) == ["bar v z", "list 1", "ranks", "mild steel A"]
 
 
 def test_runs_are_called_by_what_tells_them_apart(ask: Ask) -> None:
     def named(names: list[str], differing: list[list[Any]]) -> list[str]:
-        runs = [{"info": {"name": name, "id": f"1k1f9cbqje{k:02d}"}} for k, name in enumerate(names)]
-        found: list[str] = ask("contrast.js", "page.called(data[0], data[1])", [runs, differing])
+        ids = [f"1k1f9cbqje{k:02d}" for k in range(len(names))]
+        plan = {"parts": [{"name": "bar", "v": [0, 0, 1]}]}
+        runs = [{"info": {"name": name, "id": id_}, "plan": plan} for name, id_ in zip(names, ids, strict=True)]
+        script = "page.called(data[0], data[1], { 'parts[0].v[2]': 'm/s' })"
+        found: list[str] = ask("contrast.js", script, [runs, differing])
         return found
 
-    keys = [["parts.bar.v.z", 1, 2.5]]
+    keys = [["parts[0].v[2]", 1, 2500]]
     assert named(["bar", "ball"], keys) == ["bar", "ball"]
-    assert named(["bar", "bar"], keys) == ["bar v z 1", "bar v z 2.5"]
+    assert named(["bar", "bar"], keys) == ["bar v z 1 m/s", "bar v z 2.5 km/s"]
     assert named(["bar", "bar"], []) == ["1k1f9cbqje00", "1k1f9cbqje01"]
     assert named(["bar", "bar"], [["seed", 1, 1]]) == ["seed 1 (1k1f9cbqje00)", "seed 1 (1k1f9cbqje01)"]
     assert named(["a", "a", "b"], [["x", 1, 2, 3]]) == ["a, x 1", "a, x 2", "b"]
@@ -243,6 +249,18 @@ def test_probes_follow_the_stream_from_the_last_line_that_is_known(ask: Ask) -> 
         "t": [0, 1, 3, 4], "push": [0, 5, None, 6], "kinetic": [9, 8, 7, 7], "kinetic.rod": [9, 8, 6, None],
         "momentum_x": [0, 1, None, None],
     }  # fmt: skip
+
+
+def test_the_box_beside_the_cursor_has_the_nearest_points_of_all_lines(ask: Ask) -> None:
+    script = """page.worth(data.map((one) => ({ ...one, tooltip: { valueFormatter: (value) => `${value} J` } })), 2.6)
+        .map(({ name, text }) => [name, text])"""
+    lines = [
+        {"name": "low", "data": [[0, 1], [2, 2], [3, 3]]}, {"name": "high", "data": [{"value": [1, 9]}]},
+        {"name": "gap", "data": [[2.5, None]]}, {"name": "pins", "aside": True, "data": [[2.6, 5]]},
+    ]  # fmt: skip
+    assert ask("readout.js", script, lines) == [["high", "9 J"], ["low", "3 J"]]
+    stacked = [{"name": name, "stack": "s", "data": [[0, value]]} for name, value in (("below", 9), ("above", 1))]
+    assert ask("readout.js", script, stacked) == [["above", "1 J"], ["below", "9 J"]]
 
 
 def test_forces_go_by_who_pushes_whom_and_a_magnitude_needs_all_components(ask: Ask) -> None:

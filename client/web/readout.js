@@ -1,0 +1,60 @@
+// What the lines of a chart are worth at its cursor: a box beside the pointer, or beside the chart that has the focus.
+
+import { colour } from "./axes.js";
+import { exact, h } from "./figures.js";
+
+const AWAY = 14; // px from the pointer.
+const MOST = 24; // Lines.
+
+// The place in `data` that is nearest to x; data goes by x.
+export function nearestTo(data, x) {
+  let [low, high] = [0, data.length - 1];
+  const at = (i) => (data[i].value ?? data[i])[0];
+  while (high - low > 1) {
+    const middle = (low + high) >> 1;
+    if (at(middle) <= x) low = middle;
+    else high = middle;
+  }
+  return Math.abs(at(high) - x) < Math.abs(at(low) - x) ? high : low;
+}
+
+// [{ name, value, colour, dash, text }] of series at x, the largest values first, of a stack the uppermost.
+export function worth(list, x) {
+  const known = list.filter(({ data, aside, tooltip }) => data?.length && !aside && tooltip);
+  const told = known.flatMap(({ name, data, color, lineStyle, tooltip: { valueFormatter }, stack }) => {
+    const point = data[nearestTo(data, x)];
+    const [, value] = point.value ?? point;
+    return Number.isFinite(value) ? [{ name, value, color, dash: lineStyle?.type, stack, text: valueFormatter(value, point) }] : [];
+  });
+  return told.some(({ stack }) => stack) ? told.reverse() : told.sort((a, b) => b.value - a.value);
+}
+
+// One box for the whole page: a chart that is left gives it to the next.
+class Readout {
+  get element() {
+    if (!this.made) document.body.append(this.made = h("div.readout", { role: "status", hidden: "" }));
+    return this.made;
+  }
+
+  // `of` is the chart, `place` what [x, y] in the window it stands beside.
+  show(of, x, list, place) {
+    const rows = worth(list, x);
+    if (!rows.length) return this.hide(of);
+    this.of = of;
+    this.element.hidden = false;
+    this.element.replaceChildren(h("b", {}, exact(x, of.unit ?? "s", 4)), h("div.rows", {}, rows.slice(0, MOST).flatMap(({ name, color, dash, text }) =>
+      [h(`i.swatch.dash-${Array.isArray(dash) ? dash[0] : "none"}`, { style: { color: color ?? colour("ink") } }), h("span", {}, name), h("span.number", {}, text)])),
+    rows.length > MOST ? `and ${rows.length - MOST} more` : "");
+    const { offsetWidth: width, offsetHeight: height } = this.element;
+    const left = place[0] + AWAY + width < innerWidth ? place[0] + AWAY : Math.max(0, place[0] - AWAY - width);
+    Object.assign(this.element.style, { left: `${left}px`, top: `${Math.max(4, Math.min(innerHeight - height - 4, place[1] - height / 2))}px` });
+  }
+
+  hide(of) {
+    if (this.of !== of) return;
+    this.of = null;
+    this.element.hidden = true;
+  }
+}
+
+export const readout = new Readout();
