@@ -17,7 +17,11 @@ from conoid.cases import layout
 from .errors import ClientError
 from .result import Result
 
-MODULES = ("body.js", "colours.js", "figures.js", "shaders.js", "snapshot.js", "view3d.js")
+MODULES = (
+    "arrows.js", "body.js", "colours.js", "eye.js", "figures.js", "framing.js", "outlines.js", "overlay.js",
+    "picked.js", "ranges.js", "saving.js", "scales.js", "section.js", "shaders.js", "snapshot.js", "surface.js",
+    "tools.js", "view3d.js",
+)  # fmt: skip
 """Of the live page, without what asks a server."""
 PACKAGE, VERSION = "nicegui", "3.18.0"
 THREE = (
@@ -34,6 +38,10 @@ export async function binary(path) {
   const text = document.getElementById(`snapshot-${path.split("/").pop()}`).textContent;
   return Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0)).buffer;
 }
+export async function call(path) {
+  if (path.endsWith("/case.resolved.json")) return JSON.parse(document.getElementById("case").textContent);
+  throw new Error("there is no server");
+}
 """
 _LIBRARIES = 'export const three = () => import("conoid/three");'
 _START = """
@@ -43,17 +51,15 @@ document.getElementById("replay").append(body.element);
 body.update(JSON.parse(document.getElementById("snapshots").textContent));
 """
 _STYLE = """
-#replay { --soft: #5a6775; --accent: #1f6feb; --line: #d9e0e7 }
+#replay { --soft: #5a6775; --accent: #1f6feb; --line: #d9e0e7; --ink: #1c2530; --paper: #f6f7f9 }
+#replay { --card: #ffffff; --track: #e6eaef }
 #replay [hidden], #replay h2 { display: none }
-.card-head .note, .field, .scale, .legend { color: var(--soft); font-size: 13.5px }
-.view3d { height: min(60vh, 500px); border: 1px solid var(--line); overflow: hidden; margin: .4rem 0 }
-.view3d canvas { display: block; width: 100%; height: 100%; touch-action: none }
-.scrub, .controls, .legend { display: flex; flex-wrap: wrap; align-items: center; gap: .4rem 1rem; margin: .5rem 0 }
-.scrub input { flex: 1 } .field, .scale, .legend span { display: inline-flex; align-items: center; gap: .5rem }
-.scale > i { width: 7.5rem; height: .6rem } .legend i { width: .6rem; height: .6rem }
-.row { display: grid; gap: .5rem 1.2rem; grid-template-columns: repeat(auto-fill, minmax(9rem, 1fr)) }
-.row dt { color: var(--soft); font-size: 12.5px } .row dd { margin: 0; font-weight: 600 }
+#replay button, #replay select, #replay input { font: inherit }
+#replay .frame3d { height: min(64vh, 540px); flex: none }
+.card-head .note, .field { color: var(--soft); font-size: 13.5px } .field { display: inline-flex; align-items: center }
+.key { width: .7rem; height: .7rem }
 """
+"""Beside body.css: what the page has from its own style sheet."""
 
 
 def html(result: Result) -> str:
@@ -74,10 +80,19 @@ def html(result: Result) -> str:
         embedded.append(_script("application/octet-stream", _base64(blob), f"snapshot-{int(Path(name).stem)}"))
     addresses = {name: f"data:text/javascript;base64,{_base64(code)}" for name, code in imports.items()}
     return "".join([
-        f"<style>{_STYLE}</style><div id=replay></div>", *embedded,
+        f"<style>{_STYLE}{(_WEB / 'body.css').read_text(encoding='utf-8')}</style><div id=replay></div>", *embedded,
+        _script("application/json", _json(_case(result)), "case"),
         _script("application/json", _json(entries), "snapshots"),
         _script("importmap", _json({"imports": addresses})), _script("module", _START),
     ])  # fmt: skip
+
+
+def _case(result: Result) -> object:
+    """The case with every default; null where it is not there."""
+    try:
+        return json.loads(result.folder.path(layout.RESOLVED_CASE).read_bytes())
+    except (ClientError, OSError, ValueError):
+        return None
 
 
 def three() -> bytes:

@@ -1,53 +1,49 @@
-// The card of the breaking body: the view, what colours and cuts it, a picked fragment, and the snapshots over time.
+// The card of the breaking body: the view, its tools, a picked fragment, and the snapshots over time.
 
-import { binary } from "./api.js";
-import { SCALE_CSS, named } from "./colours.js";
-import { alike, count, counted, h, si, vector, words } from "./figures.js";
+import { binary, call } from "./api.js";
+import { count, counted, h, si } from "./figures.js";
 import { three } from "./libraries.js";
+import { Picked, table } from "./picked.js";
+import { range } from "./ranges.js";
+import { film, hindrance, picture } from "./saving.js";
+import { unpack } from "./section.js";
 import { colourings, decode, fragment, rowOf } from "./snapshot.js";
+import { Tools } from "./tools.js";
 import { View3d } from "./view3d.js";
 
 const MOST_KEPT = 40; // Decoded snapshots, about 1 MB each.
-const MOST_NAMED = 12; // Ranks or parts in the legend.
+const MOST_VOLUMES = 8; // Those of all tets, some MB each.
 const PLAY = 400; // ms for each snapshot.
-const HEAVIEST = 30; // Fragments that can be chosen by name.
-const AXES = ["x", "y", "z"];
+const HOLLOW = "this snapshot has no file of all tets, so its section is not filled";
 
 export class Body {
-  // `onShow` gets the snapshot that is on the screen.
-  constructor(run, onShow) {
-    Object.assign(this, { run, onShow, entries: [], kept: new Map(), ranges: {}, following: true, picked: null, wanted: null });
+  // `onShow` gets the snapshot that is on the screen. `bare`: without tools and the time line, for several beside each other:
+  // `ready` is the View3d once it is there (share() of eye.js), at(t) shows a time.
+  constructor(run, onShow = () => {}, { bare = false } = {}) {
+    Object.assign(this, { run, onShow, bare, entries: [], kept: new Map(), volumes: new Map(), following: true, picked: null, wanted: null, planes: [] });
+    this.path = `v1/runs/${encodeURIComponent(run)}`;
+    this.ready = new Promise((done) => { this.whenReady = done; });
     this.build();
   }
 
   build() {
-    const input = (label, attributes) => h("input", { type: "range", min: 0, step: 0.01, "aria-label": label, ...attributes });
-    const choice = (label, names) => h("select", { "aria-label": label }, names.map((name) => h("option", { value: name }, words(name))));
-    this.holder = h("div.view3d");
-    this.by = choice("colour by", ["fragment", "rank", "part"]);
-    this.explode = input("explode", { max: 2, value: 0 });
-    this.axis = choice("section across", ["none", ...AXES]);
-    this.cut = input("place of the section", { max: 1, value: 0.5, disabled: "" });
-    this.chosen = h("select", { "aria-label": "fragment" });
-    this.scrub = input("snapshot", { max: 0, step: 1, value: 0 });
+    this.holder = h("div.holder3d");
+    this.tools = new Tools({
+      colour: () => this.paint(), section: () => this.choose(), slice: () => this.slice(), camera: (name) => this.view.eye.view(name),
+      follow: (text) => this.follow(text), set: (name, value) => this.set(name, value), opacities: () => this.view.set({ opacities: this.tools.opacities }),
+      save: (kind) => this.save(kind), fragments: () => this.list(),
+    });
+    this.card = new Picked(() => this.pick(-1), (id) => this.history(id));
+    this.scrub = h("input", { type: "range", min: 0, step: 1, max: 0, value: 0, "aria-label": "snapshot" });
     this.playing = h("button.quiet", { type: "button" }, "Play");
-    this.key = h("div.scale");
-    this.row = h("dl.facts.row", { hidden: "" });
     this.note = h("span.note");
-    const field = (text, ...inputs) => h("label.field", {}, h("span", {}, text), ...inputs);
-    this.controls = h("div.controls", {},
-      field("Colour", this.by), this.key, field("Explode", this.explode), field("Section", this.axis), this.cut, field("Fragment", this.chosen));
     this.bar = h("div.scrub", {}, this.playing, this.scrub);
-    this.element = h("section.card.wide", { "aria-label": "the body", hidden: "" },
-      h("div.card-head", {}, h("h2", {}, "The body"), this.note), this.holder, this.bar, this.controls, this.row);
+    this.element = h("section.card.body3d", { "aria-label": "the body", hidden: "" },
+      h("div.card-head", {}, h("h2", {}, "The body"), this.note), this.bare ? "" : this.tools.element, h("div.frame3d", {}, this.holder, this.card.element), this.bare ? "" : this.bar);
     this.listen();
   }
 
   listen() {
-    this.by.onchange = () => this.paint();
-    this.explode.oninput = () => this.view?.set("explode", Number(this.explode.value));
-    this.axis.onchange = this.cut.oninput = () => this.slice();
-    this.chosen.onchange = () => this.pick(Number(this.chosen.value));
     this.scrub.oninput = () => {
       this.pause();
       this.following = Number(this.scrub.value) === this.entries.length - 1;
@@ -56,7 +52,7 @@ export class Body {
     this.playing.onclick = () => (this.player ? this.pause() : this.play());
   }
 
-  // All snapshots of the run so far: [{ n, t, fragments, … }]. The newest is shown, unless an earlier one was chosen.
+  // All snapshots of the run so far, as messages tell of them. The newest is shown, unless an earlier one was chosen.
   update(entries) {
     if (entries.length === this.entries.length) return;
     const first = !this.entries.length;
@@ -69,117 +65,207 @@ export class Body {
 
   async start() {
     try {
-      this.view = new View3d(await three(), (row) => this.pick(row));
+      const [modules, plan] = await Promise.all([three(), call(`${this.path}/files/case.resolved.json`).catch(() => null)]);
+      if (this.closed) return;
+      this.cuts(plan);
+      this.view = new View3d(modules, (row) => this.pick(row));
+      this.view.set({ cuts: this.planes });
+      this.view.eye.onMode = () => { this.tools.frame.value = this.view.eye.mode === "part" ? `part ${this.view.eye.part}` : this.view.eye.mode; };
       Object.assign(this.view.canvas, { tabIndex: 0 });
       this.view.canvas.setAttribute("role", "application");
-      this.view.canvas.setAttribute("aria-label", "the body in 3-D; arrow keys turn it, plus and minus zoom");
-      this.holder.append(this.view.canvas);
-      if (this.snapshot) this.present(this.snapshot);
+      this.view.canvas.setAttribute("aria-label", "the body in 3-D; arrow keys turn it, plus and minus zoom, more keys stand under Camera");
+      this.view.canvas.addEventListener("keydown", (event) => this.key(event));
+      this.holder.append(this.view.element);
+      this.whenReady(this.view);
+      if (this.snapshot) this.present(this.snapshot, this.volume);
     } catch (error) {
       this.holder.replaceChildren(h("p.hint", {}, `No 3-D: ${error.message}`));
     }
   }
 
+  // The planes of symmetry that hold all parts, one for each axis.
+  cuts(plan) {
+    const found = (plan?.boundaries ?? []).filter(({ kind, parts }) => kind === "symmetry" && !parts?.length);
+    this.planes = ["x", "y", "z"].map((name, axis) => ({ axis, at: found.find((one) => one.axis === name)?.at })).filter(({ at }) => at !== undefined);
+    this.tools.mirrorLine.hidden = !this.planes.length;
+  }
+
+  // Snapshots -----------------------------------------------------------------------------------------------------------
+
   // Only the place asked for last is fetched, when scrubbing is faster than the network.
   async show(place) {
     this.scrub.value = place;
     this.wanted = place;
-    if (this.fetching) return;
-    this.fetching = true;
+    if (this.fetching) return this.fetching;
+    this.fetching = this.fetch();
+    await this.fetching;
+    return (this.fetching = null);
+  }
+
+  async fetch() {
     try {
       while (this.wanted !== null) {
         const entry = this.entries[this.wanted];
         this.wanted = null;
-        this.present(await this.read(entry));
+        const [snapshot, volume] = await Promise.all([this.read(entry), this.slicing ? this.readVolume(entry) : null]);
+        this.entry = entry;
+        if (!this.closed) this.present(snapshot, volume);
       }
     } catch (error) {
       this.note.textContent = error.message;
-    } finally {
-      this.fetching = false;
     }
+  }
+
+  // The last snapshot up to a time, s, or the first.
+  at(t) {
+    const place = Math.max(0, this.entries.findLastIndex((entry) => entry.t <= t * (1 + 1e-9)));
+    if (this.entries[place] !== this.entry) this.show(place);
+    this.following = false;
   }
 
   async read({ n }) {
-    const found = this.kept.get(n) ?? decode(await binary(`v1/runs/${encodeURIComponent(this.run)}/snapshots/${n}`));
-    this.kept.delete(n);
-    this.kept.set(n, found);
-    if (this.kept.size > MOST_KEPT) this.kept.delete(this.kept.keys().next().value);
+    return this.known(this.kept, n, MOST_KEPT, async () => decode(await binary(`${this.path}/snapshots/${n}`)));
+  }
+
+  // Null where it has none.
+  async readVolume({ n, tets }) {
+    return tets ? this.known(this.volumes, n, MOST_VOLUMES, async () => unpack(await binary(`${this.path}/snapshots/${n}/tets`))) : null;
+  }
+
+  async known(kept, n, most, read) {
+    const found = kept.get(n) ?? (await read());
+    kept.delete(n);
+    kept.set(n, found);
+    if (kept.size > most) kept.delete(kept.keys().next().value);
     return found;
   }
 
-  present(snapshot) {
-    this.snapshot = snapshot;
-    const { header } = snapshot;
-    for (const [name, { low, high }] of Object.entries(header.fields)) {
-      const [least, most] = this.ranges[name] ?? [low, high];
-      this.ranges[name] = [Math.min(low, least), Math.max(high, most)];
-    }
-    this.note.textContent = `${si(header.t, "s")} · step ${count(header.step)} · ${counted(header.fragments_total, "fragment")} · ${counted(snapshot.arrays.triangles.length / 3, "triangle")}`;
+  present(snapshot, volume) {
+    Object.assign(this, { snapshot, volume });
+    const { header, arrays } = snapshot;
+    this.note.textContent = `${si(header.t, "s")} · step ${count(header.step)} · ${counted(header.fragments_total, "fragment")} · ${counted(arrays.triangles.length / 3, "triangle")}`;
     this.scrub.setAttribute("aria-valuetext", si(header.t, "s"));
     this.onShow(snapshot);
     this.offer();
     if (!this.view) return;
+    this.view.look.caption = si(header.t, "s");
     this.view.show(snapshot);
+    if (volume && this.slicing) this.view.fill(volume);
     this.paint();
-    this.slice();
-    this.pick(this.picked === null ? -1 : rowOf(snapshot, this.picked));
+    this.tell();
+    this.pick(this.picked === null ? -1 : rowOf(snapshot, this.picked), true);
+    this.list();
     this.element.dataset.shown = header.n;
   }
 
   offer() {
-    const names = colourings(this.snapshot);
-    if (this.by.options.length !== names.length) {
-      const before = this.by.value;
-      this.by.replaceChildren(...names.map((name) => h("option", { value: name }, words(name))));
-      this.by.value = names.includes(before) ? before : "fragment";
-    }
-    const { fragment_id: ids, fragment_mass: masses } = this.snapshot.arrays;
-    const rows = [...ids.keys()].sort((a, b) => masses[b] - masses[a]).slice(0, HEAVIEST);
-    const weights = alike(rows.map((row) => masses[row]), "kg");
-    this.chosen.replaceChildren(h("option", { value: -1 }, "none picked"),
-      ...rows.map((row, i) => h("option", { value: row }, ids[row] < 0n ? "the rest" : `${weights[i]} (${ids[row]})`)));
+    const { header, arrays } = this.snapshot;
+    this.tools.offer(colourings(this.snapshot));
+    this.tools.offerParts(header.parts);
+    this.tools.edgeNote.textContent = header.surface_triangles > arrays.triangles.length / 3 ? `the surface is simplified: ${counted(header.surface_triangles, "face")} of the mesh` : "";
   }
+
+  // Colour, section, camera ---------------------------------------------------------------------------------------------
 
   paint() {
     if (!this.view?.snapshot) return;
-    const { fields, parts, ranks } = this.snapshot.header;
-    const by = this.by.value;
-    const field = fields[by];
-    this.view.colour(by, this.ranges[by]);
-    const names = by === "part" ? parts : by === "rank" ? Array.from({ length: ranks }, (_, rank) => `rank ${rank}`) : [];
-    const legend = h("div.legend", {}, names.slice(0, MOST_NAMED).map((name, i) => h("span", {}, h("i", { style: { background: named(i) } }), name)));
-    if (field) {
-      const [low, high] = alike(this.ranges[by], field.unit);
-      this.key.replaceChildren(h("span", {}, low), h("i", { style: { background: SCALE_CSS } }), h("span", {}, high));
-    } else this.key.replaceChildren(legend);
+    const by = this.tools.by.value;
+    const field = this.snapshot.header.fields[by];
+    if (!field) return this.view.colour(by);
+    const told = this.entries.map(({ fields }) => fields?.[by]).filter(Boolean);
+    const ends = range(this.tools.choice, by, this.snapshot, told);
+    this.tools.ends(ends, field.unit);
+    return this.view.colour(by, ends, this.tools.choice.bands);
+  }
+
+  // Another plane: in the middle of what the frame shows, with the side cut away that the camera sees.
+  async choose() {
+    const name = this.tools.across.value;
+    this.slicing = name !== "none";
+    if (!this.slicing) {
+      this.tools.tell(null, "");
+      return this.view.slice(null);
+    }
+    const way = this.view.eye.back();
+    const axis = ["x", "y", "z"].indexOf(name);
+    this.normal = axis < 0 ? way : [0, 1, 2].map((i) => (i === axis ? 1 : 0));
+    this.tools.flipped = axis >= 0 && way[axis] < 0;
+    const along = this.view.eye.along(this.normal);
+    this.tools.slide(...along, (along[0] + along[1]) / 2);
+    this.slice();
+    this.volume = await this.readVolume(this.entry).catch(() => null);
+    if (this.volume && this.volume.header.n === this.snapshot.header.n) this.view.fill(this.volume);
+    return this.tell();
   }
 
   slice() {
-    const axis = AXES.indexOf(this.axis.value);
-    this.cut.disabled = axis < 0;
-    this.view?.section(axis < 0 ? null : axis, Number(this.cut.value));
+    const sign = this.tools.flipped ? -1 : 1;
+    this.view.slice({ normal: this.normal.map((part) => sign * part), at: sign * Number(this.tools.place.value) });
+    this.tell();
   }
 
-  pick(row) {
+  tell() {
+    if (this.slicing) this.tools.tell(Number(this.tools.place.value), this.entry.tets || this.volume ? "" : HOLLOW);
+  }
+
+  follow(text) {
+    const [mode, part] = text.split(" ");
+    this.view.eye.follow(mode, part === undefined ? null : Number(part));
+  }
+
+  set(name, value) {
+    this.view.set(name === "mirror" ? { mirrors: value ? this.planes : [], cuts: value ? [] : this.planes } : { [name]: value });
+  }
+
+  key(event) {
+    if (event.ctrlKey || event.metaKey || event.altKey) return;
+    const flip = (name) => { this.tools[name].checked = !this.tools[name].checked; this.set(name, this.tools[name].checked); };
+    const keys = {
+      i: () => this.view.eye.view("isometric"), f: () => this.follow("fit"), a: () => this.follow("all"), e: () => flip("edges"), o: () => flip("lines"),
+      v: () => flip("arrows"), m: () => this.planes.length && flip("mirror"), " ": () => this.playing.click(), ",": () => this.step(-1), ".": () => this.step(1),
+      ...Object.fromEntries(["x", "y", "z"].flatMap((name) => [[name, () => this.view.eye.view(`+${name}`)], [name.toUpperCase(), () => this.view.eye.view(`-${name}`)]])),
+    };
+    if (!keys[event.key]) return;
+    keys[event.key]();
+    event.preventDefault();
+  }
+
+  step(by) {
+    this.pause();
+    const place = Math.min(Math.max(Number(this.scrub.value) + by, 0), this.entries.length - 1);
+    this.following = place === this.entries.length - 1;
+    this.show(place);
+  }
+
+  // Fragments -----------------------------------------------------------------------------------------------------------
+
+  // `kept`: of a new snapshot, in which a fragment may be missing.
+  pick(row, kept = false) {
     const found = row >= 0 ? fragment(this.snapshot, row) : null;
-    this.view.set("picked", row);
-    if (found || this.picked !== null) this.row.hidden = !found;
-    this.picked = found ? found.id : this.picked !== null && this.player ? this.picked : null;
-    this.chosen.value = row;
-    if (this.chosen.selectedIndex < 0) this.chosen.value = -1;
-    if (found) this.row.replaceChildren(...this.facts(found));
+    this.view.mark(row);
+    this.card.show(found, this.snapshot.header.t);
+    if (found || !kept) this.picked = found ? found.id : null;
+    this.list();
   }
 
-  facts(found) {
-    const entry = (name, value, broad) => h(broad ? "div.broad" : "div", {}, h("dt", {}, name), h("dd", {}, value));
-    return [
-      entry("fragment", found.rest ? "the rest" : String(found.id)), entry("mass", si(found.mass, "kg")),
-      entry("size", si(found.size, "m")), entry("tets", count(found.tets)),
-      entry("birth", found.birth > 0 ? si(found.birth, "s") : "from the start"),
-      entry("speed", si(Math.hypot(...found.velocity), "m/s")), entry("velocity", vector([...found.velocity], "m/s"), true),
-      entry("centre", vector([...found.centre], "m"), true),
-    ];
+  list() {
+    if (!this.tools.fragments.open || !this.snapshot) return;
+    const row = this.picked === null ? -1 : rowOf(this.snapshot, this.picked);
+    this.tools.heaviest.replaceChildren(...table(this.snapshot, row, (chosen) => this.pick(chosen)));
   }
+
+  // { t, mass, speed } of a fragment, from the server, or from what is here.
+  async history(id) {
+    return call(`${this.path}/fragments/${id}`).catch(() => this.remembered(id));
+  }
+
+  remembered(id) {
+    const rows = [...this.kept.values()].map((one) => [one.header.t, one, rowOf(one, id)]).filter(([, , row]) => row >= 0).sort((a, b) => a[0] - b[0]);
+    const each = rows.map(([, one, row]) => fragment(one, row));
+    return { t: rows.map(([t]) => t), mass: each.map(({ mass }) => mass), speed: each.map(({ velocity }) => Math.hypot(...velocity)) };
+  }
+
+  // Time ----------------------------------------------------------------------------------------------------------------
 
   play() {
     if (Number(this.scrub.value) >= this.entries.length - 1) this.show(0);
@@ -199,7 +285,26 @@ export class Body {
     this.following = Number(this.scrub.value) === this.entries.length - 1;
   }
 
+  async save(kind) {
+    const name = `${this.run}-${this.tools.by.value}`;
+    const { saved, filming } = this.tools;
+    if (kind === "picture") return picture(this.view, `${name}-${String(this.snapshot.header.n).padStart(3, "0")}`);
+    if (this.filmed) return this.filmed.abort();
+    saved.textContent = hindrance();
+    if (saved.textContent) return null;
+    this.pause();
+    this.following = false;
+    this.filmed = new AbortController();
+    filming.textContent = "Stop";
+    await film(this.view, name, this.entries.length, (i) => this.show(i), (i) => { saved.textContent = `snapshot ${i + 1} of ${this.entries.length}`; }, this.filmed.signal);
+    saved.textContent = this.filmed.signal.aborted ? "stopped" : "saved";
+    filming.textContent = "Film";
+    return (this.filmed = null);
+  }
+
   close() {
+    this.closed = true;
+    this.filmed?.abort();
     clearInterval(this.player);
     this.view?.close();
   }

@@ -1,4 +1,4 @@
-// Colours of the view: a hue for each part, variations of it for the fragments of the part (hues.py has the same function),
+// Colours of the view: a hue for each part, variations of it for the fragments of the part (client/drawing/hues.py has the same function),
 // and a scale from low to high that grey prints and the colour blind keep apart.
 
 // Degrees in OKLCH of the first parts.

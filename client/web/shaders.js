@@ -1,57 +1,127 @@
 // The program that draws the body: places from 16 bits, an offset and a colour of each fragment from small textures.
 
 export const ROWS_WIDTH = 256; // Texels in a line of a texture that has one texel a fragment.
+export const MOST_PARTS = 256;
 
+// `mirrors`: `planes` of them, x y z of the normal and the distance; bit k of the image's number says whether it lies behind plane k.
+// `layer`: -1 draws what is opaque, k the part k alone. What is not drawn is put outside.
 export const VERTEX = `
 precision highp float;
 precision highp int;
 uniform mat4 modelViewMatrix, projectionMatrix;
 uniform vec3 low, span, middle;
+uniform vec4 mirrors[3];
 uniform float explode;
-uniform int picked;
-uniform sampler2D centres, tints;
+uniform int image, layer, planes;
+uniform sampler2D centres, tints, shown;
 in vec4 corner;
-in float value;
-out vec3 view, place;
-out float level;
+in float value, part, omit;
+out vec3 view, place, edge;
+out float level, inside;
 flat out vec4 tint;
 flat out int row;
+flat out float turned, opacity;
 void main() {
   row = int(corner.w);
   ivec2 texel = ivec2(row % ${ROWS_WIDTH}, row / ${ROWS_WIDTH});
   place = low + span * corner.xyz / 65535.0;
-  vec3 apart = explode * (texelFetch(centres, texel, 0).xyz - middle);
-  vec4 seen = modelViewMatrix * vec4(place + apart, 1.0);
+  vec3 seenAt = place + explode * (texelFetch(centres, texel, 0).xyz - middle);
+  turned = 1.0;
+  inside = 1e30;
+  for (int k = 0; k < planes; k += 1) inside = min(inside, abs(dot(mirrors[k].xyz, place) - mirrors[k].w));
+  for (int k = 0; k < 3; k += 1) {
+    if ((((image + gl_InstanceID) >> k) & 1) == 1) {
+      place -= 2.0 * (dot(mirrors[k].xyz, place) - mirrors[k].w) * mirrors[k].xyz;
+      seenAt -= 2.0 * (dot(mirrors[k].xyz, seenAt) - mirrors[k].w) * mirrors[k].xyz;
+      turned = -turned;
+    }
+  }
+  vec4 seen = modelViewMatrix * vec4(seenAt, 1.0);
   view = seen.xyz;
   level = value;
+  int number = gl_VertexID % 3;
+  edge = vec3(number == 0, number == 1, number == 2);
+  if (omit == 1.0) edge.y = 1.0;
+  if (omit == 2.0) edge.z = 1.0;
   tint = texelFetch(tints, texel, 0);
-  if (row == picked) tint.a = 0.0;
+  opacity = texelFetch(shown, ivec2(int(part + 0.5), 0), 0).r;
+  bool solid = opacity > 0.995;
   gl_Position = projectionMatrix * seen;
+  if (layer < 0 ? !solid : (solid || opacity < 0.005 || int(part + 0.5) != layer)) gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
 }`;
 
-// mode 0: the colour of the fragment; 1: the value through the map; 2: the number of the row, to pick by.
+// mode 0: the colour of the fragment; 1: the value through the map; 2: the number of the row, to pick by and to find outlines.
+// Faces in a plane of symmetry (nearer than `thin`) are inside, where there are images.
+// `cap` 1: a section, which no light shades and no plane cuts. `plane`: what lies beyond it is cut away.
 export const FRAGMENT = `
 precision highp float;
 precision highp int;
-uniform int mode;
+uniform int mode, cap;
+uniform float edges, thin;
 uniform vec4 plane;
 uniform vec2 range;
+uniform vec3 ink;
 uniform sampler2D map;
-in vec3 view, place;
-in float level;
+in vec3 view, place, edge;
+in float level, inside;
 flat in vec4 tint;
 flat in int row;
+flat in float turned, opacity;
 out vec4 colour;
 void main() {
-  if (dot(plane.xyz, place) > plane.w) discard;
+  if (cap == 0 && (dot(plane.xyz, place) > plane.w || inside < thin)) discard;
   if (mode == 2) {
-    colour = vec4(float(row & 255), float((row >> 8) & 255), 255.0, 255.0) / 255.0;
+    colour = vec4(float(row & 255), float((row >> 8) & 255), cap == 0 ? 255.0 : 254.0, 255.0) / 255.0;
     return;
   }
   vec3 normal = normalize(cross(dFdx(view), dFdy(view)));
   vec3 base = mode == 0 ? tint.rgb : texture(map, vec2(level * range.x + range.y, 0.5)).rgb;
-  float light = 0.45 + 0.55 * abs(dot(normal, normalize(vec3(0.3, 0.5, 1.0))));
-  if (!gl_FrontFacing) base *= 0.6;
-  if (tint.a == 0.0) base = mix(base, vec3(1.0, 0.9, 0.2), 0.75);
-  colour = vec4(base * light, 1.0);
+  float facing = abs(dot(normal, normalize(view)));
+  float light = 0.56 + 0.3 * abs(dot(normal, normalize(vec3(0.25, 0.55, 1.0)))) + 0.2 * facing;
+  if (cap == 0 && (gl_FrontFacing ? 1.0 : -1.0) * turned < 0.0) base *= 0.55;
+  if (cap == 1) light = 1.0;
+  vec3 shade = base * light;
+  if (edges > 0.0) {
+    vec3 near = edge / max(fwidth(edge), vec3(1e-6));
+    float line = 1.0 - smoothstep(0.0, 0.9, min(min(near.x, near.y), near.z));
+    shade = mix(shade, ink, edges * line);
+  }
+  colour = vec4(shade, opacity);
+}`;
+
+// One triangle over the whole picture, for the lines where the numbers of `rows` change.
+export const OVER = `
+precision highp float;
+void main() { gl_Position = vec4(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0, 0.0, 1.0); }`;
+
+// Thin lines round every fragment, and a thick one in a colour of its own round the picked one.
+export const LINES = `
+precision highp float;
+precision highp int;
+uniform sampler2D rows;
+uniform int picked, thick;
+uniform float strength;
+uniform vec3 ink, mark;
+out vec4 colour;
+int at(ivec2 place, ivec2 size) {
+  vec4 found = texelFetch(rows, clamp(place, ivec2(0), size - 1), 0);
+  return found.b == 0.0 ? -1 : int(found.r * 255.0 + 0.5) + 256 * int(found.g * 255.0 + 0.5);
+}
+void main() {
+  ivec2 size = textureSize(rows, 0);
+  ivec2 here = ivec2(gl_FragCoord.xy);
+  int own = at(here, size);
+  float differ = 0.0;
+  for (int k = 0; k < 4; k += 1) {
+    ivec2 step = ivec2[4](ivec2(1, 0), ivec2(-1, 0), ivec2(0, 1), ivec2(0, -1))[k];
+    if (at(here + step, size) != own) differ += 0.5;
+  }
+  colour = vec4(ink, strength * min(differ, 1.0));
+  if (picked < 0) return;
+  float close = 0.0;
+  for (int i = -thick; i <= thick; i += 1) for (int j = -thick; j <= thick; j += 1) {
+    bool mine = at(here + ivec2(i, j), size) == picked;
+    if (mine != (own == picked) && i * i + j * j <= thick * thick) close = 1.0;
+  }
+  if (close > 0.0) colour = vec4(mark, 1.0);
 }`;

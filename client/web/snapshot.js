@@ -19,7 +19,7 @@ export function decode(buffer) {
   for (const [name, { dtype, shape, offset }] of Object.entries(header.arrays)) {
     arrays[name] = new TYPES[dtype](buffer, offset, shape.reduce((size, length) => size * length, 1));
   }
-  if (arrays.fragment_id.length > MOST_ROWS) throw new Error(`${arrays.fragment_id.length} rows of fragments; most: ${MOST_ROWS}`);
+  if (arrays.fragment_id?.length > MOST_ROWS) throw new Error(`${arrays.fragment_id.length} rows of fragments; most: ${MOST_ROWS}`);
   return { header, arrays };
 }
 
@@ -36,8 +36,8 @@ export function corners({ positions, triangles, vertex_fragment: rows }) {
   return out;
 }
 
-// What triangles are coloured by: "fragment", "rank", "part" and the fields of this case.
-export const colourings = ({ header }) => ["fragment", "rank", "part", ...Object.keys(header.fields)];
+// What triangles are coloured by: "fragment", "part", "rank" and the fields of this case.
+export const colourings = ({ header }) => ["fragment", "part", ...(header.ranks > 1 ? ["rank"] : []), ...Object.keys(header.fields)];
 
 // One byte a corner: the rank and the part by number, a field between its low and its high.
 export function cornerValues({ arrays }, by) {
@@ -45,7 +45,7 @@ export function cornerValues({ arrays }, by) {
   const values = arrays[name];
   const out = new Uint8Array(arrays.triangles.length);
   if (by === "fragment" || !values) return out;
-  for (let i = 0; i < values.length; i += 1) out.fill(values[i], 3 * i, 3 * i + 3);
+  for (let i = 0, o = 0; i < values.length; i += 1) out[o++] = out[o++] = out[o++] = values[i];
   return out;
 }
 

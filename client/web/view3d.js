@@ -1,171 +1,125 @@
-// The body in 3-D: one draw call, whatever the number of fragments; frames are drawn when something has changed.
+// The body in 3-D: a canvas with the picture and one over it with axes, scale bar and legend. Frames are drawn when something
+// has changed. It fills the element that holds it, and may be there several times; share() of eye.js has them move together.
 
-import { map, ofFragment } from "./colours.js";
-import { FRAGMENT, ROWS_WIDTH, VERTEX } from "./shaders.js";
-import { cornerValues, corners } from "./snapshot.js";
+import { Arrows } from "./arrows.js";
+import { Eye } from "./eye.js";
+import { h } from "./figures.js";
+import { Outlines } from "./outlines.js";
+import { draw as drawOver } from "./overlay.js";
+import { ramp, scaleOf } from "./scales.js";
+import { named } from "./colours.js";
+import { Surface } from "./surface.js";
 
-const OPEN = 1e30; // A section plane that cuts nothing, m.
-const MARGIN = 1.15; // Of the distance at which the box just fills the canvas.
-const TURN = Math.PI / 24; // Of one arrow key.
+const MANY = 60_000; // Triangles from which on lines wait until the body stands still.
+const STILL = 160; // ms.
 
 export class View3d {
   // `modules` is what libraries.three() gives; `onPick` gets the row of a fragment, or -1.
-  constructor({ THREE, OrbitControls }, onPick) {
-    this.three = THREE;
+  constructor(modules, onPick = () => {}) {
+    const { THREE } = modules;
     this.renderer = new THREE.WebGLRenderer({ antialias: true, alpha: true });
+    this.renderer.autoClear = this.renderer.info.autoReset = false;
     this.canvas = this.renderer.domElement;
-    this.scene = new THREE.Scene();
-    this.camera = new THREE.PerspectiveCamera(35, 1, 1e-3, 10);
-    this.controls = new OrbitControls(this.camera, this.canvas);
-    this.controls.addEventListener("change", () => this.later());
-    this.controls.addEventListener("start", () => { this.moved = true; });
-    this.target = new THREE.WebGLRenderTarget(1, 1);
-    this.material = new THREE.RawShaderMaterial({
-      glslVersion: THREE.GLSL3, vertexShader: VERTEX, fragmentShader: FRAGMENT, side: THREE.DoubleSide, uniforms: this.uniforms(),
-    });
-    this.mesh = new THREE.Mesh(new THREE.BufferGeometry(), this.material);
-    this.mesh.frustumCulled = false;
-    this.scene.add(this.mesh);
+    this.over = h("canvas.over", { "aria-hidden": "true" });
+    this.element = h("div.view3d", {}, this.canvas, this.over);
+    this.look = { explode: 0, mirrors: [], cuts: [], opacities: [], lines: true, edges: false, arrows: false, axes: true, bar: true, legend: true, caption: "" };
+    this.surface = new Surface(THREE);
+    this.outlines = new Outlines(THREE);
+    this.arrows = new Arrows(THREE);
+    this.extras = new THREE.Scene();
+    this.extras.add(this.arrows.mesh);
+    this.point = new THREE.WebGLRenderTarget(1, 1);
+    this.eye = new Eye(modules, this.canvas, () => this.turned(), () => ({ ...this.look, snapshot: this.snapshot, shown: (part) => this.opacity(part) > 0.005 }));
+    this.picked = -1;
     this.pickable(onPick);
+    this.dark = matchMedia("(prefers-color-scheme: dark)");
+    this.theme = () => { this.tones = null; this.later(); };
+    this.dark.addEventListener("change", this.theme);
     this.watch = new ResizeObserver(() => this.resize());
-    this.watch.observe(this.canvas);
-  }
-
-  uniforms() {
-    const { Vector2, Vector3, Vector4 } = this.three;
-    const texture = this.texture(new Uint8Array(4), 1, 1);
-    return {
-      low: { value: new Vector3() }, span: { value: new Vector3(1, 1, 1) }, middle: { value: new Vector3() }, explode: { value: 0 },
-      picked: { value: -1 }, mode: { value: 0 }, plane: { value: new Vector4(0, 0, 0, OPEN) }, range: { value: new Vector2(1, 0) },
-      centres: { value: texture }, tints: { value: texture }, map: { value: texture },
-    };
-  }
-
-  texture(data, width, height) {
-    const { DataTexture, FloatType, NearestFilter, RGBAFormat, UnsignedByteType } = this.three;
-    const type = data instanceof Float32Array ? FloatType : UnsignedByteType;
-    const made = new DataTexture(data, width, height, RGBAFormat, type);
-    Object.assign(made, { minFilter: NearestFilter, magFilter: NearestFilter, needsUpdate: true });
-    return made;
-  }
-
-  replace(name, texture) {
-    this.material.uniforms[name].value.dispose();
-    this.material.uniforms[name].value = texture;
+    this.watch.observe(this.element);
   }
 
   // What is shown -------------------------------------------------------------------------------------------------------
 
   show(snapshot) {
-    const { BufferAttribute, BufferGeometry } = this.three;
-    const [low, high] = snapshot.header.box;
-    const { uniforms } = this.material;
     this.snapshot = snapshot;
-    this.mesh.geometry.dispose();
-    this.mesh.geometry = new BufferGeometry();
-    this.mesh.geometry.setAttribute("corner", new BufferAttribute(corners(snapshot.arrays), 4));
-    this.mesh.geometry.setDrawRange(0, snapshot.arrays.triangles.length);
-    uniforms.low.value.fromArray(low);
-    uniforms.span.value.fromArray(high.map((value, i) => value - low[i]));
-    uniforms.middle.value.fromArray(high.map((value, i) => (value + low[i]) / 2));
-    this.rows(snapshot.arrays, snapshot.header.parts.length);
-    this.colour(this.by ?? "fragment", this.scale);
-    if (!this.aimed) this.aim();
+    this.surface.show(snapshot);
+    this.surface.slice(this.section ?? null);
+    this.colour(this.by ?? "fragment", this.range, this.bands);
+    this.pointers();
+    if (this.sized) this.eye.keep();
+    this.later();
   }
 
-  rows({ fragment_centre: centres, fragment_id: ids, triangles, triangle_part: parts, vertex_fragment: of }, bodies) {
-    const part = new Uint8Array(ids.length);
-    for (let i = parts.length - 1; i >= 0; i -= 1) part[of[triangles[3 * i]]] = parts[i];
-    const height = Math.max(1, Math.ceil(ids.length / ROWS_WIDTH));
-    const places = new Float32Array(4 * ROWS_WIDTH * height);
-    const tints = new Uint8Array(4 * ROWS_WIDTH * height);
-    for (let row = 0; row < ids.length; row += 1) {
-      places.set(centres.subarray(3 * row, 3 * row + 3), 4 * row);
-      tints.set([...ofFragment(ids[row], part[row], bodies), 255], 4 * row);
+  // All tets of the snapshot that is shown (section.js), for sections that are filled.
+  fill(volume) {
+    this.surface.volume = volume;
+    this.surface.cutAll();
+    this.later();
+  }
+
+  // `range`: { low, high, number } of the scale for a field, in so many bands; 0: smooth.
+  colour(by, range, bands = 0) {
+    Object.assign(this, { by, range, bands });
+    this.surface.colour(by, range, bands);
+    this.later();
+  }
+
+  // Any of `look`: explode, mirrors and cuts ({ axis, at } each), opacities by part, lines, edges, arrows, axes, bar, legend, caption.
+  set(changes) {
+    Object.assign(this.look, changes);
+    this.surface.shared.explode.value = this.look.explode;
+    this.surface.shared.edges.value = this.look.edges ? 0.5 : 0;
+    if ("opacities" in changes) this.surface.opacities(this.look.opacities);
+    if (!this.snapshot) return;
+    if ("mirrors" in changes) {
+      this.surface.reflect(this.look.mirrors);
+      this.surface.cutAll();
     }
-    this.replace("centres", this.texture(places, ROWS_WIDTH, height));
-    this.replace("tints", this.texture(tints, ROWS_WIDTH, height));
-  }
-
-  // `scale` is [low, high] of the colour map for a field; without it the values are numbers.
-  colour(by, scale) {
-    Object.assign(this, { by, scale });
-    const field = this.snapshot.header.fields[by];
-    const { uniforms } = this.material;
-    const values = new this.three.BufferAttribute(cornerValues(this.snapshot, by), 1, true);
-    this.mesh.geometry.setAttribute("value", values);
-    uniforms.mode.value = by === "fragment" ? 0 : 1;
-    this.replace("map", this.texture(map(Boolean(field)), 256, 1));
-    const [low, high] = field ? scale ?? [field.low, field.high] : [0, 1];
-    const width = high - low || 1;
-    if (field) uniforms.range.value.set((field.high - field.low) / width, (field.low - low) / width);
-    else uniforms.range.value.set(255 / 256, 0.5 / 256); // The middle of the number's texel.
+    this.pointers();
+    if ("mirrors" in changes || "explode" in changes || "opacities" in changes) this.eye.keep();
     this.later();
   }
 
-  set(name, value) {
-    this.material.uniforms[name].value = value;
+  // Cuts away what lies beyond `normal` · x = `at`, m; null: nothing.
+  slice(section) {
+    this.section = section;
+    if (!this.snapshot) return;
+    this.surface.slice(section);
+    this.pointers();
     this.later();
   }
 
-  // Cuts away what lies beyond `share` (0 to 1) of the box along an axis (0, 1, 2); null: nothing.
-  section(axis, share) {
-    const { low, span, plane } = this.material.uniforms;
-    plane.value.set(0, 0, 0, OPEN);
-    if (axis !== null) {
-      plane.value.setComponent(axis, 1);
-      plane.value.w = low.value.getComponent(axis) + share * span.value.getComponent(axis);
-    }
-    this.later();
+  // The greatest speed of the arrows is in `fastest`.
+  pointers() {
+    if (!this.look.arrows) return this.arrows.hide();
+    const { normal, at } = this.section ?? {};
+    const kept = (place) => !normal || normal[0] * place[0] + normal[1] * place[1] + normal[2] * place[2] <= at;
+    this.fastest = this.arrows.show(this.snapshot, {
+      explode: this.look.explode, middle: this.surface.shared.middle.value.toArray(), mirrors: this.look.mirrors,
+      keep: (part, place) => this.opacity(part) > 0.005 && kept(place), ink: this.inks().ink, reach: this.eye.reach(),
+    });
+    return this.fastest;
   }
 
-  // The camera ----------------------------------------------------------------------------------------------------------
+  opacity(part) { return this.look.opacities[part] ?? 1; }
 
-  // Looks at the whole box, its longest side from left to right.
-  aim() {
-    const { low, span } = this.material.uniforms;
-    const size = span.value.length();
-    const half = Math.tan((this.camera.fov * Math.PI) / 360);
-    const sides = span.value.toArray();
-    const longest = sides.indexOf(Math.max(...sides));
-    const up = longest === 2 ? 1 : 2;
-    const side = 3 - longest - up;
-    const away = [0, 0, 0];
-    [away[longest], away[up], away[side]] = [0.3, 0.45, longest === 2 ? 1 : -1];
-    const far = Math.max(sides[longest] / Math.max(0.5, this.camera.aspect), sides[up] + sides[side]) / (2 * half) + sides[side];
-    this.camera.up.set(0, 0, 0).setComponent(up, 1);
-    this.controls.target.copy(span.value).multiplyScalar(0.5).add(low.value);
-    this.camera.position.fromArray(away).normalize().multiplyScalar(MARGIN * far).add(this.controls.target);
-    Object.assign(this.camera, { near: size / 100, far: size * 30 });
-    this.camera.updateProjectionMatrix();
-    this.aimed = true;
-    this.controls.update();
+  mark(row) {
+    this.picked = row;
     this.later();
-  }
-
-  turn(key) {
-    const { Spherical, Vector3, Quaternion } = this.three;
-    const moves = { ArrowLeft: [-TURN, 0, 1], ArrowRight: [TURN, 0, 1], ArrowUp: [0, -TURN, 1], ArrowDown: [0, TURN, 1], "+": [0, 0, 0.9], "-": [0, 0, 1.1] };
-    if (!moves[key]) return false;
-    this.moved = true;
-    const [about, over, nearer] = moves[key];
-    const level = new Quaternion().setFromUnitVectors(this.camera.up, new Vector3(0, 1, 0));
-    const away = this.camera.position.clone().sub(this.controls.target).applyQuaternion(level);
-    const place = new Spherical().setFromVector3(away);
-    place.set(place.radius * nearer, place.phi + over, place.theta + about).makeSafe();
-    this.camera.position.copy(away.setFromSpherical(place).applyQuaternion(level.invert()).add(this.controls.target));
-    this.controls.update();
-    return true;
   }
 
   resize() {
-    const { clientWidth: width, clientHeight: height } = this.canvas;
+    const { clientWidth: width, clientHeight: height } = this.element;
     if (!width || !height) return;
-    this.renderer.setPixelRatio(Math.min(2, devicePixelRatio || 1));
+    const ratio = Math.min(2, devicePixelRatio || 1);
+    this.renderer.setPixelRatio(ratio);
     this.renderer.setSize(width, height, false);
-    this.camera.aspect = width / height;
-    this.camera.updateProjectionMatrix();
-    if (this.snapshot && !this.moved) this.aim(); // The canvas was not on the page when the first snapshot came.
+    Object.assign(this.over, { width: Math.round(width * ratio), height: Math.round(height * ratio) });
+    this.outlines.size(this.canvas.width, this.canvas.height, ratio);
+    this.sized = { width, height, ratio };
+    this.eye.aspect(width, height);
+    if (this.snapshot && !this.eye.direction) this.eye.keep();
     this.draw();
   }
 
@@ -177,15 +131,68 @@ export class View3d {
     requestAnimationFrame(() => this.draw());
   }
 
+  // While a large body turns it is drawn without lines.
+  turned() {
+    if (this.snapshot?.arrays.triangles.length > 3 * MANY) {
+      clearTimeout(this.still);
+      this.moving = true;
+      this.still = setTimeout(() => { this.moving = false; this.later(); }, STILL);
+    }
+    this.later();
+  }
+
   // The script time of a frame stands in the browser's own timeline as "conoid:frame", with the number of draw calls.
   draw() {
     this.due = false;
-    if (this.closed || !this.snapshot) return;
+    if (this.closed || !this.snapshot || !this.sized) return;
     const start = performance.now();
-    this.renderer.render(this.scene, this.camera);
-    performance.measure("conoid:frame", { start, detail: { calls: this.renderer.info.render.calls } });
+    const { renderer, surface, eye: { camera }, look } = this;
+    const tones = this.inks();
+    surface.shared.ink.value.setRGB(...tones.ink);
+    renderer.info.reset();
+    renderer.setRenderTarget(null);
+    renderer.setClearColor(0, 0);
+    renderer.clear();
+    surface.draw(renderer, camera);
+    if (this.arrows.mesh.visible) renderer.render(this.extras, camera);
+    const lines = look.lines && !this.moving;
+    if (lines || this.picked >= 0) {
+      this.outlines.draw(renderer, () => surface.numbers(renderer, camera), camera, { picked: this.picked, lines, ink: tones.ink });
+    }
+    this.drawOver();
+    performance.measure("conoid:frame", { start, detail: { calls: renderer.info.render.calls } });
     performance.clearMeasures("conoid:frame");
   }
+
+  drawOver() {
+    const { width, height, ratio } = this.sized;
+    const { ink, soft, paper } = this.inks().css;
+    const ctx = this.over.getContext("2d");
+    ctx.setTransform(ratio, 0, 0, ratio, 0, 0);
+    const { axes, bar, caption } = this.look;
+    drawOver(ctx, { width, height, camera: this.eye.camera, distance: this.eye.distance, axes, bar, caption, ink, soft, paper, legend: this.look.legend ? this.legend() : null });
+  }
+
+  legend() {
+    const { by, range, snapshot: { header } } = this;
+    const field = header.fields[by];
+    const arrows = this.look.arrows && this.fastest ? this.fastest : 0;
+    if (field) return { title: scaleOf(by).label, unit: field.unit, ...range, colours: ramp(scaleOf(by).colours, this.bands), arrows };
+    const list = by === "rank" ? Array.from({ length: header.ranks }, (_, rank) => `rank ${rank}`) : header.parts;
+    return { title: by, names: list.map((name, i) => ({ name, colour: named(i) })), arrows };
+  }
+
+  // Colours of the page, once for each theme.
+  inks() {
+    if (this.tones) return this.tones;
+    const style = getComputedStyle(this.element);
+    const css = Object.fromEntries(["ink", "soft", "paper"].map((name) => [name, style.getPropertyValue(`--${name}`).trim() || "#808080"]));
+    const ink = /^#[0-9a-f]{6}/i.test(css.ink) ? [1, 3, 5].map((at) => parseInt(css.ink.slice(at, at + 2), 16) / 255) : [0.1, 0.1, 0.1];
+    this.tones = { css, ink: ink.map((share) => share * 0.9) };
+    return this.tones;
+  }
+
+  // Picking -------------------------------------------------------------------------------------------------------------
 
   pickable(onPick) {
     let down = null;
@@ -194,31 +201,33 @@ export class View3d {
       const still = down && Math.hypot(event.offsetX - down[0], event.offsetY - down[1]) < 4;
       if (still && this.snapshot) onPick(this.pick(event.offsetX, event.offsetY));
     });
-    this.canvas.addEventListener("keydown", (event) => { if (this.turn(event.key)) event.preventDefault(); });
+    this.canvas.addEventListener("keydown", (event) => {
+      if (!event.ctrlKey && !event.metaKey && !event.altKey && this.eye.key(event.key, event.shiftKey)) event.preventDefault();
+    });
   }
 
   // The row of the fragment at a place of the canvas (CSS pixels), -1 beside the body: one pixel is drawn by number.
   pick(x, y) {
-    const { mode } = this.material.uniforms;
-    const { clientWidth: width, clientHeight: height } = this.canvas;
-    const [before, pixel] = [mode.value, new Uint8Array(4)];
-    this.camera.setViewOffset(width, height, x, y, 1, 1);
-    mode.value = 2;
-    this.renderer.setRenderTarget(this.target);
-    this.renderer.clear();
-    this.renderer.render(this.scene, this.camera);
-    this.renderer.readRenderTargetPixels(this.target, 0, 0, 1, 1, pixel);
-    this.renderer.setRenderTarget(null);
-    mode.value = before;
-    this.camera.clearViewOffset();
-    return pixel[2] === 255 ? pixel[0] + 256 * pixel[1] : -1;
+    const { renderer, surface, eye: { camera } } = this;
+    const pixel = new Uint8Array(4);
+    camera.setViewOffset(this.sized.width, this.sized.height, x, y, 1, 1);
+    renderer.setRenderTarget(this.point);
+    renderer.setClearColor(0, 0);
+    renderer.clear();
+    surface.numbers(renderer, camera, [-1, ...surface.ghosts(camera)]);
+    renderer.readRenderTargetPixels(this.point, 0, 0, 1, 1, pixel);
+    renderer.setRenderTarget(null);
+    camera.clearViewOffset();
+    return pixel[2] >= 254 ? pixel[0] + 256 * pixel[1] : -1;
   }
 
   close() {
     this.closed = true;
+    clearTimeout(this.still);
     this.watch.disconnect();
-    this.controls.dispose();
-    this.mesh.geometry.dispose();
+    this.dark.removeEventListener("change", this.theme);
+    this.eye.controls.dispose();
+    for (const one of [this.surface, this.outlines, this.arrows, this.point]) (one.close ?? one.dispose).call(one);
     this.renderer.dispose();
   }
 }

@@ -1,20 +1,25 @@
 """What the page computes without a browser, asked by node: snapshots, fits, groups of phases, keys that differ."""
 
 import base64
+import gzip
+import itertools
 import json
 import math
 import re
 import shutil
 import subprocess
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from scipy.spatial import ConvexHull
 
 from conoid.cases import fragments
-from conoid.client.drawing import hues
+from conoid.client.drawing import hues, scales
+from conoid.client.drawing.fields import FIELDS
 from conoid.client.snapshots import Snapshot
 from conoid.worker.snapshots import blob
 
@@ -342,3 +347,127 @@ def test_an_address_that_cannot_be_read_is_the_list(ask: Ask) -> None:
     script = "data.map((hash) => { const { page: shown, names } = page.place(hash); return [shown, ...names]; })"
     assert ask("place.js", script, list(found)) == list(found.values())
     assert ask("place.js", "page.place('#/new?from=a%20b').query.get('from')") == "a b"
+
+
+# Sections, frames and scales of the body ------------------------------------------------------------------------------
+
+
+def test_a_section_has_the_area_the_places_and_the_values_of_the_tets_that_it_cuts(ask: Ask) -> None:
+    body = shattered(4, 7)
+    told = {"n": 0, "step": 0, "t": 0.0, "ranks": 1}
+    made = blob.made(body.whole(1), told, lambda labels: np.zeros(len(labels)), blob.Budget())
+    data = gzip.decompress(made.tets)
+    known = Snapshot(data)
+    tets = np.array(ask("section.js", "page.nodes(data)", known.array("tet_steps").ravel().tolist())).reshape(-1, 4)
+    points = known.points
+    volume = volumes(points[tets])
+    assert np.abs(volume).sum() == pytest.approx(volumes(body.x[body.tets]).sum(), rel=1e-3)
+    names = "positions", "tet_row", "field:plastic_strain"
+    arrays = {name: known.array(name).ravel().tolist() for name in names}
+    asked = {"header": {"box": known.header.box}, "tets": tets.ravel().tolist(), "arrays": arrays}
+    for normal, at in (([1.0, 0.0, 0.0], 2.1e-3), ([0.0, -0.6, 0.8], 1e-4), ([0.577, 0.577, 0.577], 3.2e-3)):
+        found = ask("section.js", f"page.cut(data, {normal}, {at})", asked)
+        corner = np.array(found["corners"]).reshape(-1, 3, 4)
+        low, high = np.array(known.header.box)
+        places = low + corner[:, :, :3] / 65535.0 * (high - low)
+        assert np.abs(places @ np.array(normal) - at).max() <= 2.0 * (high - low).max() / 65535.0
+        assert np.array_equal(corner[:, 0, 3], known.array("tet_row")[found["tet"]])
+        area = 0.5 * np.linalg.norm(np.cross(places[:, 1] - places[:, 0], places[:, 2] - places[:, 0]), axis=1)
+        assert area.sum() == pytest.approx(section_of(points[tets], np.array(normal), at), rel=1e-3)
+        assert set(found["omit"]) <= {0, 1, 2}
+        values = ask("section.js", "page.cutValues(data[0], data[1], 'plastic_strain')", [asked, found])
+        assert np.array_equal(values, np.repeat(known.array("field:plastic_strain")[found["tet"]], 3))
+
+
+def volumes(corners: np.ndarray) -> np.ndarray:
+    return np.asarray(np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])) / 6.0)
+
+
+def section_of(corners: np.ndarray, normal: np.ndarray, at: float) -> float:
+    """Area in which a plane cuts tets (n, 4, 3): of the convex hulls of the points on their edges."""
+    basis, total = np.linalg.svd(normal[None])[2][1:], 0.0
+    for tet in corners:
+        heights = tet @ normal - at
+        pairs = [(i, j) for i, j in itertools.combinations(range(4), 2) if heights[i] * heights[j] < 0.0]
+        if len(pairs) > 2:
+            part = [heights[i] / (heights[i] - heights[j]) for i, j in pairs]
+            points = [tet[i] + t * (tet[j] - tet[i]) for (i, j), t in zip(pairs, part, strict=True)]
+            total += ConvexHull(np.array(points) @ basis.T, qhull_options="QJ").volume
+    return total
+
+
+def test_debris_does_not_make_the_frame_wider_and_heavy_pieces_do(ask: Ask) -> None:
+    told = {"n": 0, "step": 0, "t": 0.0, "ranks": 1}
+
+    def framed(mass: float) -> tuple[float, float]:
+        """How far the frame reaches along x, m: that of the bodies, and that of all."""
+        body = shattered(5, 1)
+        far = np.argmax(body.x[body.tets].mean(axis=1)[:, 0])
+        alone = replace(body, bond=body.bond.copy(), mass=body.mass.copy(), x=body.x.copy())
+        nodes = np.unique(body.tets[far])
+        x = np.vstack([body.x, body.x[nodes] + [1.0, 0.0, 0.0]])
+        tets = body.tets.copy()
+        tets[far] = len(body.x) + np.searchsorted(nodes, body.tets[far])
+        across = body.across.copy()
+        across[across // 4 == far] = -1
+        across[far] = -1
+        alone.mass[far] = mass
+        alone = replace(alone, x=x, v=np.vstack([body.v, body.v[nodes]]), tets=tets, across=across)
+        data = blob.made(alone.whole(1), told, lambda labels: np.zeros(len(labels)), blob.Budget()).data
+        ends = []
+        for options in ("{}", "{ all: true }"):
+            points = np.array(ask("framing.js", f"page.points(data, {options})", decoded(ask, data))).reshape(-1, 3)
+            ends.append(points[:, 0].max())
+        return ends[0], ends[1]
+
+    light, everything = framed(1e-9)
+    assert light < 0.01 < 0.9 < everything
+    assert framed(1.0)[0] > 0.9
+
+
+def decoded(ask: Ask, data: bytes) -> Any:
+    """With numbers of fragments as node has them again when it has read them from JSON."""
+    return ask("snapshot.js", "page.decode(data)", sent(data))
+
+
+def test_a_camera_stands_as_near_as_its_frame_lets_it(ask: Ask) -> None:
+    random = np.random.default_rng(2)
+    for _ in range(3):
+        points, turn = random.normal(size=(40, 3)), np.linalg.qr(random.normal(size=(3, 3)))[0]
+        axes = {"right": turn[0].tolist(), "up": turn[1].tolist(), "back": turn[2].tolist()}
+        found = ask("framing.js", "page.stand(data[0], data[1], [0.5, 0.3], 0.2)", [points.ravel().tolist(), axes])
+        x, y, z = (turn @ (points - found["place"]).T).tolist()
+        seen = np.array([np.array(x) / -np.array(z), np.array(y) / -np.array(z)])
+        assert (np.array(z) < 0.0).all()
+        assert seen[0].max() <= 0.3 + 1e-9
+        assert seen[0].min() >= -0.5 - 1e-9
+        assert np.abs(seen[1]).max() <= 0.2 + 1e-9
+        touched = [seen[0].max() > 0.3 - 1e-9 and seen[0].min() < -0.5 + 1e-9, np.ptp(seen[1]) > 0.4 - 1e-9]
+        assert any(touched)
+
+
+def test_scales_are_those_of_pictures(ask: Ask) -> None:
+    for name in ("mises", "pressure", "principal_stress", "damage", "plastic_strain", "temperature", "speed"):
+        field = FIELDS[name]
+        found = ask("scales.js", f"[page.scaleOf('{name}'), page.ramp(page.scaleOf('{name}').colours)]")
+        assert found[0]["label"] == field.label
+        assert found[0]["centred"] == (field.kind == "centred")
+        known = [scales.rgb(colour) for colour in scales.blend(field.colours)]
+        assert np.abs(np.array(found[1]).reshape(-1, 4)[:, :3] - np.array(known)).max() <= 1
+        assert min(sum(colour) for colour in known) >= 150, "no end is black"
+    spans = [(0.0, 1.0), (-3.2e9, 7.7e9), (0.013, 0.0131), (293.15, 1498.9), (5.0, 5.0)]
+    found = ask("scales.js", "data.map(([low, high]) => page.rounded(low, high).slice(0, 2))", spans)
+    assert found == [pytest.approx(list(scales.rounded(low, high))) for low, high in spans]
+
+
+def test_the_ends_of_a_scale_are_those_that_are_chosen(ask: Ask, made: bytes) -> None:
+    header = Snapshot(made).header.fields["speed"]
+    told = [[0.0, 10.0, 90.0, 100.0], [0.0, 20.0, 190.0, 900.0]]
+    choices = {("all", "run"): (0.0, 1000.0), ("most", "run"): (10.0, 200.0), ("hand", "run"): (3.0, 4.0)}
+    for (how, over), ends in choices.items():
+        choice = json.dumps({"how": how, "over": over, "hand": [3.0, 4.0]})
+        found = ask("ranges.js", f"page.range({choice}, 'speed', null, data)", told)
+        assert (found["low"] <= ends[0], found["high"] >= ends[1] - 1e-9, found["high"]) == (True, True, ends[1])
+    one = ask("ranges.js", "page.range({ how: 'all', over: 'now' }, 'speed', data, [])", decoded(ask, made))
+    assert one["low"] <= header.low
+    assert one["high"] >= header.high

@@ -1,0 +1,93 @@
+// What is known of one fragment: a list of facts, and its mass and speed over the snapshots. And the table of the heaviest.
+
+import { alike, count, h, si, vector } from "./figures.js";
+
+const HEAVIEST = 30;
+const [WIDE, TALL] = [200, 40]; // px of a small chart.
+
+const entry = (name, value, broad) => h(broad ? "div.broad" : "div", {}, h("dt", {}, name), h("dd", {}, value));
+
+export class Picked {
+  // `onClose` is called when it is put away, `history(id)` gives { t, mass, speed }.
+  constructor(onClose, history) {
+    this.history = history;
+    this.list = h("dl.facts.row");
+    this.course = h("div.course");
+    const close = h("button.quiet.shut-picked", { type: "button", "aria-label": "put the fragment away", onclick: onClose }, "×");
+    this.element = h("div.picked", { hidden: "" }, close, this.list, this.course);
+  }
+
+  // A fragment (snapshot.js) at the time `t` of the snapshot that is shown, or null.
+  show(found, t) {
+    this.element.hidden = !found;
+    if (!found) return (this.id = null);
+    this.list.replaceChildren(...facts(found));
+    if (this.id !== found.id) this.read(found.id);
+    this.id = found.id;
+    return this.place(t);
+  }
+
+  async read(id) {
+    this.told = null;
+    this.course.replaceChildren();
+    if (id < 0n) return;
+    const told = await this.history(id).catch(() => null);
+    if (this.id !== id || !told || told.t.length < 2) return;
+    this.told = told;
+    this.course.replaceChildren(...[["mass", told.mass, "kg"], ["speed", told.speed, "m/s"]].map(([name, values, unit]) => small(name, told.t, values, unit)));
+  }
+
+  // A line at the time that is shown.
+  place(t) {
+    if (!this.told) return;
+    const x = across(this.told.t)(t);
+    for (const line of this.course.querySelectorAll("line")) ["x1", "x2"].forEach((name) => line.setAttribute(name, x));
+  }
+}
+
+function facts(found) {
+  return [
+    entry("fragment", found.rest ? "the rest" : String(found.id)), entry("mass", si(found.mass, "kg")),
+    entry("size", si(found.size, "m")), entry("tets", count(found.tets)),
+    entry("birth", found.birth > 0 ? si(found.birth, "s") : "from the start"),
+    entry("speed", si(Math.hypot(...found.velocity), "m/s")), entry("velocity", vector([...found.velocity], "m/s"), true),
+    entry("centre", vector([...found.centre], "m"), true),
+  ];
+}
+
+const across = (t) => (time) => (WIDE * (time - t[0])) / (t.at(-1) - t[0] || 1);
+
+function svg(tag, attributes, ...children) {
+  const element = document.createElementNS("http://www.w3.org/2000/svg", tag);
+  for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, value);
+  element.append(...children);
+  return element;
+}
+
+// A line over time from 0 to the largest value, which stands beside its name.
+function small(name, t, values, unit) {
+  const most = Math.max(...values) || 1;
+  const x = across(t);
+  const path = values.map((value, i) => `${i ? "L" : "M"}${x(t[i])} ${TALL - (TALL * value) / most}`).join("");
+  const [first, last] = alike([values[0], values.at(-1)], unit);
+  const drawn = svg("svg", { viewBox: `0 0 ${WIDE} ${TALL}`, role: "img", "aria-label": `${name} over time, from ${first} to ${last}`, preserveAspectRatio: "none" },
+    svg("path", { d: path, class: "over-time" }), svg("line", { x1: 0, x2: 0, y1: 0, y2: TALL, class: "now-line" }));
+  return h("figure", {}, h("figcaption", {}, `${name}, up to ${si(most, unit)}`), drawn);
+}
+
+// The heaviest fragments of a snapshot; `onPick` gets the row of one.
+export function table({ arrays, header }, picked, onPick) {
+  const { fragment_id: ids, fragment_mass: masses, fragment_size: sizes, fragment_velocity: v, fragment_birth: births } = arrays;
+  const rows = [...ids.keys()].filter((row) => ids[row] >= 0n).sort((a, b) => masses[b] - masses[a]).slice(0, HEAVIEST);
+  const columns = [
+    alike(rows.map((row) => masses[row]), "kg"), alike(rows.map((row) => Math.hypot(v[3 * row], v[3 * row + 1], v[3 * row + 2])), "m/s"),
+    alike(rows.map((row) => sizes[row]), "m"), rows.map((row) => (births[row] > 0 ? si(births[row], "s") : "start")),
+  ];
+  const body = rows.map((row, i) => h("tr", { "aria-selected": String(row === picked) },
+    h("th", { scope: "row" }, h("button.tab", { type: "button", onclick: () => onPick(row) }, String(ids[row]))), columns.map((column) => h("td.number", {}, column[i]))));
+  const more = header.fragments_total - rows.length;
+  return [
+    h("table.checks.heaviest", {}, h("thead", {}, h("tr", {}, ["number", "mass", "speed", "size", "birth"].map((name) => h("th", { scope: "col" }, name)))), h("tbody", {}, body)),
+    more > 0 ? h("p.hint", {}, `and ${count(more)} lighter ones`) : "",
+  ];
+}

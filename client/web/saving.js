@@ -1,0 +1,66 @@
+// A picture of the body as it is seen, and a film of its snapshots.
+
+const RATE = 8; // Snapshots a second of a film.
+const BITS = 12e6; // A second.
+const KINDS = ["video/webm;codecs=vp9", "video/webm;codecs=vp8", "video/webm"];
+const HOLD = 800; // ms that the last one stands.
+
+// What a view shows, on the colour of the page, on `onto` (a canvas, made where there is none).
+export function composed(view, onto = document.createElement("canvas")) {
+  view.draw(); // The browser keeps what is drawn until this task ends.
+  const { width, height } = view.canvas;
+  if (onto.width !== width || onto.height !== height) Object.assign(onto, { width, height });
+  const ctx = onto.getContext("2d");
+  ctx.fillStyle = view.inks().css.paper;
+  ctx.fillRect(0, 0, width, height);
+  ctx.drawImage(view.canvas, 0, 0);
+  ctx.drawImage(view.over, 0, 0);
+  return onto;
+}
+
+export async function picture(view, name) {
+  const blob = await new Promise((done) => composed(view).toBlob(done, "image/png"));
+  download(blob, `${name}.png`);
+}
+
+// What keeps this browser from making films, or an empty text.
+export function hindrance() {
+  if (typeof MediaRecorder === "undefined" || !HTMLCanvasElement.prototype.captureStream) return "This browser makes no films.";
+  return KINDS.some((kind) => MediaRecorder.isTypeSupported(kind)) ? "" : "This browser makes no films in WebM.";
+}
+
+// `show(i)` shows snapshot i and returns when it stands; `told(i)` is called before each; `signal` ends it early.
+export async function film(view, name, number, show, told, signal) {
+  const canvas = composed(view);
+  const stream = canvas.captureStream(RATE);
+  const recorder = new MediaRecorder(stream, { mimeType: KINDS.find((kind) => MediaRecorder.isTypeSupported(kind)), videoBitsPerSecond: BITS });
+  const pieces = [];
+  recorder.ondataavailable = ({ data }) => pieces.push(data);
+  const ended = new Promise((done) => { recorder.onstop = done; });
+  recorder.start();
+  recorder.pause();
+  for (let i = 0; i < number && !signal.aborted; i += 1) {
+    told(i);
+    await show(i);
+    composed(view, canvas);
+    recorder.resume();
+    await pause(i === number - 1 ? HOLD : 1000 / RATE);
+    recorder.pause();
+  }
+  recorder.stop();
+  await ended;
+  stream.getTracks().forEach((track) => track.stop());
+  if (!signal.aborted) download(new Blob(pieces, { type: "video/webm" }), `${name}.webm`);
+}
+
+const pause = (ms) => new Promise((done) => setTimeout(done, ms));
+
+function download(blob, name) {
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(blob);
+  link.download = name;
+  document.body.append(link);
+  link.click();
+  link.remove();
+  setTimeout(() => URL.revokeObjectURL(link.href), 60_000);
+}

@@ -1,0 +1,135 @@
+// The bar of tools of the body: colour, section, camera, scale, parts, what is shown, fragments, saving. It keeps what is chosen.
+
+import { named } from "./colours.js";
+import { VIEW_NAMES } from "./eye.js";
+import { h, si, words } from "./figures.js";
+import { scaleOf } from "./scales.js";
+
+const CUTS = ["none", "x", "y", "z", "as seen"];
+const STEPS = 400; // Of the slider of a section.
+const SIGNS = { "+": "+", "-": "−" };
+const KEYS = "x y z: look from there, with Shift from the other side · i: isometric · f: fit · a: fit all · e: edges · o: outlines · "
+  + "v: arrows · m: mirror · arrows: turn, with Shift move · + −: zoom · , .: snapshot · Space: play";
+
+export class Tools {
+  // `act` has what the tools do: colour(), slice(), camera(name), follow(text), set(changes), opacities(), save(kind), fragments().
+  constructor(act) {
+    Object.assign(this, { act, choice: { how: "most", over: "run", hand: null, bands: 0 }, flipped: false });
+    this.by = choice("colour by", ["fragment", "part"], () => act.colour());
+    this.across = choice("section across", CUTS, () => act.section());
+    this.place = h("input", { type: "range", "aria-label": "place of the section", min: 0, max: 1, step: "any", value: 0.5, oninput: () => act.slice() });
+    this.told = h("output.place");
+    this.flip = button("Flip", "cut away the other side", () => { this.flipped = !this.flipped; act.slice(); });
+    this.panels = [
+      panel("Camera", this.camera()), panel("Scale", this.scale()), panel("Parts", (this.parts = h("div.parts"))),
+      panel("Show", this.show()), panel("Fragments", (this.heaviest = h("div.scroll", { tabindex: 0, role: "region", "aria-label": "the heaviest fragments" }))), panel("Save", this.save()),
+    ];
+    this.fragments = this.panels[4];
+    this.fragments.addEventListener("toggle", () => act.fragments());
+    this.cutting = h("span.cutting", { hidden: "" }, this.place, this.told, this.flip);
+    this.element = h("div.tools3d", { role: "toolbar", "aria-label": "tools of the body" }, field("Colour", this.by), field("Section", this.across), this.cutting, this.panels);
+    this.element.addEventListener("keydown", (event) => { if (event.key === "Escape") this.shut(); });
+    for (const one of this.panels) one.addEventListener("toggle", () => { if (one.open) this.shut(one); });
+  }
+
+  shut(except) {
+    for (const one of this.panels) if (one !== except) one.open = false;
+  }
+
+  camera() {
+    const buttons = VIEW_NAMES.map((name) => button(name.replace(/^[+-]/, (sign) => SIGNS[sign]), `look from ${name}`, () => this.act.camera(name)));
+    this.frame = choice("what the frame follows", ["fit", "all", "free"], () => this.act.follow(this.frame.value));
+    this.frames([]);
+    return h("div.lines", {}, h("div.buttons", {}, buttons), field("Frame", this.frame), h("p.hint", {}, KEYS));
+  }
+
+  // Parts that the camera can follow.
+  frames(parts) {
+    const names = { fit: "fits the bodies", all: "fits all, debris too", free: "stays" };
+    const before = this.frame.value;
+    this.frame.replaceChildren(...Object.entries(names).map(([value, name]) => h("option", { value }, name)),
+      ...parts.map((name, i) => h("option", { value: `part ${i}` }, `follows ${name}`)));
+    this.frame.value = before;
+  }
+
+  scale() {
+    const set = () => {
+      const hand = [this.low, this.high].map((input) => Number(input.value));
+      const whole = this.low.value !== "" && this.high.value !== "" && hand.every(Number.isFinite) && hand[0] < hand[1];
+      this.choice = { how: this.how.value, over: this.over.value, hand: whole ? hand : null, bands: Number(this.bands.value) };
+      this.low.disabled = this.high.disabled = this.how.value !== "hand";
+      this.over.disabled = this.how.value === "hand";
+      this.act.colour();
+    };
+    this.how = worded("ends of the scale", { most: "all but the extremes (0.5 %)", all: "least to largest", hand: "by hand" }, set);
+    this.over = worded("over which snapshots", { run: "the whole run", now: "this snapshot" }, set);
+    this.bands = worded("bands of the scale", { 0: "smooth", 6: "6 bands", 10: "10 bands", 16: "16 bands" }, set);
+    this.low = h("input", { type: "number", step: "any", "aria-label": "low end of the scale", disabled: "", onchange: set });
+    this.high = h("input", { type: "number", step: "any", "aria-label": "high end of the scale", disabled: "", onchange: set });
+    this.unit = h("span.hint");
+    return h("div.lines", {}, field("Ends", this.how), field("Over", this.over), field("From", this.low), field("to", this.high, this.unit), field("Colours", this.bands));
+  }
+
+  // Shown beside the fields for the ends by hand.
+  ends({ low, high }, unit) {
+    this.unit.textContent = unit;
+    if (this.how.value === "hand" && this.low.value !== "") return;
+    [this.low.value, this.high.value] = [low, high].map((end) => Math.round(end / (high - low) * 1e4) * ((high - low) / 1e4));
+  }
+
+  offerParts(parts) {
+    if (this.parts.childElementCount === parts.length) return;
+    this.shares = parts.map((name, i) => h("input", { type: "range", min: 0, max: 1, step: 0.05, value: 1, "aria-label": `opacity of ${name}`, oninput: () => this.act.opacities() }));
+    this.parts.replaceChildren(...parts.map((name, i) => h("div.part", {},
+      h("label", {}, h("input", { type: "checkbox", checked: "", "aria-label": `show ${name}`, onchange: ({ target }) => { this.shares[i].value = target.checked ? 1 : 0; this.act.opacities(); } }),
+        h("i.key", { style: { background: named(i) } }), name), this.shares[i])));
+    this.frames(parts);
+  }
+
+  get opacities() { return (this.shares ?? []).map(({ value }) => Number(value)); }
+
+  show() {
+    const box = (name, label, on) => (this[name] = h("input", { type: "checkbox", ...(on ? { checked: "" } : {}), onchange: () => this.act.set(name, this[name].checked), "aria-label": label }));
+    const line = (name, label, on) => h("label.check", {}, box(name, label, on), label);
+    this.explode = h("input", { type: "range", min: 0, max: 2, step: 0.01, value: 0, "aria-label": "explode", oninput: () => this.act.set("explode", Number(this.explode.value)) });
+    this.edgeNote = h("p.hint");
+    this.mirrorLine = line("mirror", "mirror images", false);
+    this.mirrorLine.hidden = true;
+    return h("div.lines", {}, line("lines", "outlines of fragments", true), line("edges", "edges of the mesh", false), this.edgeNote,
+      this.mirrorLine, line("arrows", "velocities as arrows", false), line("axes", "axes", true), line("bar", "scale bar", true), line("legend", "legend", true), field("Pull apart", this.explode));
+  }
+
+  save() {
+    this.filming = button("Film", "save a film of the snapshots (WebM)", () => this.act.save("film"));
+    this.saved = h("p.hint", { role: "status" });
+    return h("div.lines", {}, h("div.buttons", {}, button("Picture", "save a picture (PNG)", () => this.act.save("picture")), this.filming), this.saved);
+  }
+
+  // `list`: names of what can be chosen to colour by.
+  offer(list) {
+    if (list.join() === [...this.by.options].map(({ value }) => value).join()) return;
+    const before = this.by.value;
+    this.by.replaceChildren(...list.map((name) => h("option", { value: name }, ["fragment", "part", "rank"].includes(name) ? name : scaleOf(name).label)));
+    this.by.value = list.includes(before) ? before : "fragment";
+  }
+
+  // The slider goes over `low` to `high`, m, and stands at `at`.
+  slide(low, high, at) {
+    Object.assign(this.place, { min: low, max: high, step: (high - low) / STEPS || "any" });
+    this.place.value = at;
+    this.cutting.hidden = false;
+  }
+
+  // What stands beside the slider.
+  tell(at, hollow) {
+    this.told.textContent = at === null ? "" : `${si(at, "m")}${hollow ? ", hollow" : ""}`;
+    this.told.title = hollow;
+    this.cutting.hidden = at === null;
+  }
+}
+
+const button = (text, label, onclick) => h("button.quiet", { type: "button", "aria-label": label, title: label, onclick }, text);
+const field = (text, ...inputs) => h("label.field", {}, h("span", {}, text), ...inputs);
+const panel = (title, content) => h("details.panel", {}, h("summary", {}, title), h("div.sheet", {}, content));
+const choice = (label, names, onchange) => h("select", { "aria-label": label, onchange }, names.map((name) => h("option", { value: name }, words(name))));
+const worded = (label, names, onchange) => h("select", { "aria-label": label, onchange }, Object.entries(names).map(([value, name]) => h("option", { value }, name)));
