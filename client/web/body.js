@@ -39,7 +39,7 @@ export class Body {
     this.note = h("span.note");
     this.bar = h("div.scrub", {}, this.playing, this.scrub);
     this.element = h("section.card.body3d", { "aria-label": "the body", hidden: "" },
-      h("div.card-head", {}, h("h2", {}, "The body"), this.note), this.bare ? "" : this.tools.element, h("div.frame3d", {}, this.holder, this.card.element), this.bare ? "" : this.bar);
+      h("div.card-head", {}, h("h2", {}, "The body"), this.note), this.bare ? "" : this.tools.element, h("div.frame3d", {}, this.holder, h("div.aside3d", {}, this.tools.cutting, this.card.element)), this.bare ? "" : this.bar);
     this.listen();
   }
 
@@ -200,12 +200,12 @@ export class Body {
 
   slice() {
     const sign = this.tools.flipped ? -1 : 1;
-    this.view.slice({ normal: this.normal.map((part) => sign * part), at: sign * Number(this.tools.place.value) });
+    this.view.slice({ normal: this.normal.map((part) => sign * part), at: sign * this.tools.at });
     this.tell();
   }
 
   tell() {
-    if (this.slicing) this.tools.tell(Number(this.tools.place.value), this.entry.tets || this.volume ? "" : HOLLOW);
+    if (this.slicing) this.tools.tell(this.tools.at, this.entry.tets || this.volume ? "" : HOLLOW);
   }
 
   follow(text) {

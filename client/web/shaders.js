@@ -3,7 +3,7 @@
 export const ROWS_WIDTH = 256; // Texels in a line of a texture that has one texel a fragment.
 export const MOST_PARTS = 256;
 
-// `mirrors`: `planes` of them, x y z of the normal and the distance; bit k of the image's number says whether it lies behind plane k.
+// `mirrors`: planes, x y z of the normal and the distance; bit k of the image's number says whether it lies behind plane k.
 // `layer`: -1 draws what is opaque, k the part k alone. What is not drawn is put outside.
 export const VERTEX = `
 precision highp float;
@@ -12,12 +12,12 @@ uniform mat4 modelViewMatrix, projectionMatrix;
 uniform vec3 low, span, middle;
 uniform vec4 mirrors[3];
 uniform float explode;
-uniform int image, layer, planes;
+uniform int image, layer;
 uniform sampler2D centres, tints, shown;
 in vec4 corner;
 in float value, part, omit;
 out vec3 view, place, edge;
-out float level, inside;
+out float level;
 flat out vec4 tint;
 flat out int row;
 flat out float turned, opacity;
@@ -27,8 +27,6 @@ void main() {
   place = low + span * corner.xyz / 65535.0;
   vec3 seenAt = place + explode * (texelFetch(centres, texel, 0).xyz - middle);
   turned = 1.0;
-  inside = 1e30;
-  for (int k = 0; k < planes; k += 1) inside = min(inside, abs(dot(mirrors[k].xyz, place) - mirrors[k].w));
   for (int k = 0; k < 3; k += 1) {
     if ((((image + gl_InstanceID) >> k) & 1) == 1) {
       place -= 2.0 * (dot(mirrors[k].xyz, place) - mirrors[k].w) * mirrors[k].xyz;
@@ -51,25 +49,33 @@ void main() {
 }`;
 
 // mode 0: the colour of the fragment; 1: the value through the map; 2: the number of the row, to pick by and to find outlines.
-// Faces in a plane of symmetry (nearer than `thin`) are inside, where there are images.
+// Faces in a plane of symmetry (nearer than `thin`) are between a body and its image, and not drawn.
 // `cap` 1: a section, which no light shades and no plane cuts. `plane`: what lies beyond it is cut away.
 export const FRAGMENT = `
 precision highp float;
 precision highp int;
-uniform int mode, cap;
+uniform int mode, cap, planes;
 uniform float edges, thin;
 uniform vec4 plane;
+uniform vec4 mirrors[3];
 uniform vec2 range;
 uniform vec3 ink;
 uniform sampler2D map;
 in vec3 view, place, edge;
-in float level, inside;
+in float level;
 flat in vec4 tint;
 flat in int row;
 flat in float turned, opacity;
 out vec4 colour;
+bool between() {
+  vec3 normal = normalize(cross(dFdx(place), dFdy(place)));
+  for (int k = 0; k < planes; k += 1) {
+    if (abs(dot(mirrors[k].xyz, place) - mirrors[k].w) < thin && abs(dot(mirrors[k].xyz, normal)) > 0.9) return true;
+  }
+  return false;
+}
 void main() {
-  if (cap == 0 && (dot(plane.xyz, place) > plane.w || inside < thin)) discard;
+  if (cap == 0 && (dot(plane.xyz, place) > plane.w || between())) discard;
   if (mode == 2) {
     colour = vec4(float(row & 255), float((row >> 8) & 255), cap == 0 ? 255.0 : 254.0, 255.0) / 255.0;
     return;

@@ -27,7 +27,7 @@ export class Tools {
     this.fragments = this.panels[4];
     this.fragments.addEventListener("toggle", () => act.fragments());
     this.cutting = h("span.cutting", { hidden: "" }, this.place, this.told, this.flip);
-    this.element = h("div.tools3d", { role: "toolbar", "aria-label": "tools of the body" }, field("Colour", this.by), field("Section", this.across), this.cutting, this.panels);
+    this.element = h("div.tools3d", { role: "toolbar", "aria-label": "tools of the body" }, field("Colour", this.by), field("Section", this.across), this.panels);
     this.element.addEventListener("keydown", (event) => { if (event.key === "Escape") this.shut(); });
     for (const one of this.panels) one.addEventListener("toggle", () => { if (one.open) this.shut(one); });
   }
@@ -54,7 +54,7 @@ export class Tools {
 
   scale() {
     const set = () => {
-      const hand = [this.low, this.high].map((input) => Number(input.value));
+      const hand = [this.low, this.high].map((input) => Number(input.value) * (this.worth ?? 1));
       const whole = this.low.value !== "" && this.high.value !== "" && hand.every(Number.isFinite) && hand[0] < hand[1];
       this.choice = { how: this.how.value, over: this.over.value, hand: whole ? hand : null, bands: Number(this.bands.value) };
       this.low.disabled = this.high.disabled = this.how.value !== "hand";
@@ -72,9 +72,11 @@ export class Tools {
 
   // Shown beside the fields for the ends by hand.
   ends({ low, high }, unit) {
-    this.unit.textContent = unit;
+    const [shown, name] = si(Math.max(Math.abs(low), Math.abs(high)), unit).split(" ");
+    this.unit.textContent = name ?? "";
+    this.worth = 10 ** Math.round(Math.log10(Math.max(Math.abs(low), Math.abs(high)) / Number(shown))) || 1;
     if (this.how.value === "hand" && this.low.value !== "") return;
-    [this.low.value, this.high.value] = [low, high].map((end) => Math.round(end / (high - low) * 1e4) * ((high - low) / 1e4));
+    [this.low.value, this.high.value] = [low, high].map((end) => rounded(end / this.worth));
   }
 
   offerParts(parts) {
@@ -120,6 +122,12 @@ export class Tools {
     this.cutting.hidden = false;
   }
 
+  // m.
+  get at() {
+    const { value, min, max } = this.place;
+    return Math.abs(value) < 1e-6 * (max - min) ? 0 : Number(value);
+  }
+
   // What stands beside the slider.
   tell(at, hollow) {
     this.told.textContent = at === null ? "" : `${si(at, "m")}${hollow ? ", hollow" : ""}`;
@@ -128,6 +136,7 @@ export class Tools {
   }
 }
 
+const rounded = (value) => Math.round(value * 1e4) / 1e4;
 const button = (text, label, onclick) => h("button.quiet", { type: "button", "aria-label": label, title: label, onclick }, text);
 const field = (text, ...inputs) => h("label.field", {}, h("span", {}, text), ...inputs);
 const panel = (title, content) => h("details.panel", {}, h("summary", {}, title), h("div.sheet", {}, content));
