@@ -1,5 +1,5 @@
-// Colours of the view: a hue for each part, variations of it for the fragments of the part (client/drawing/hues.py has the same function),
-// and a scale from low to high that grey prints and the colour blind keep apart.
+// Colours of the view: a hue for each part, variations of it for the fragments of the part.
+// client/drawing/hues.py has the same function.
 
 // Degrees in OKLCH of the first parts.
 const HUES = [252, 70, 165, 15, 305, 120, 205, 345];
@@ -9,26 +9,6 @@ const STEPS = [0xd1b54a32d192ed03n, 0xabc98388fb8fac03n, 0x8cb92ba72f3d8dd7n];
 const [STRONG, MUTED] = [[0.66, 0.12], [0.84, 0.045]];
 const DARKER = 0.13; // Lightness between a part and the one that has its hue again.
 const REST = [140, 146, 152]; // Of the fragments that have no row of their own, number -1.
-
-// Of the viridis scale (van der Walt and Smith 2015, CC0), at equal distances, without its darkest part.
-const SCALE = ["#355f8d", "#2a788e", "#21918c", "#22a884", "#44bf70", "#7ad151", "#bddf26", "#fde725"];
-
-const bytes = (hex) => [1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16));
-
-export const SCALE_CSS = `linear-gradient(90deg, ${SCALE.join(", ")})`;
-
-// 256 colours as RGBA bytes: of numbers from 0 on, or of a scale.
-export function map(scale) {
-  const out = new Uint8Array(4 * 256);
-  for (let i = 0; i < 256; i += 1) out.set([...(scale ? between(i / 255) : ofName(i)), 255], 4 * i);
-  return out;
-}
-
-function between(share) {
-  const at = share * (SCALE.length - 1);
-  const [a, b] = [SCALE[Math.floor(at)], SCALE[Math.ceil(at)]].map(bytes);
-  return a.map((low, i) => Math.round(low + (b[i] - low) * (at % 1)));
-}
 
 // [r, g, b] of a rank or a part by its number from 0 on, and the same for a style.
 export const ofName = (number) => rgb(STRONG[0] - DARKER * (Math.floor(number / HUES.length) % 3), STRONG[1], HUES[number % HUES.length]);
