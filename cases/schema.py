@@ -195,7 +195,8 @@ class Run(Model):
     integral of the rate that other explicit codes store, with shear components of tensors. ``strain_rate``:
     sqrt(2/3 d' : d') of the rate of deformation d, of the velocities in the frame. ``contact_pressure`` of nodes: what
     contact and walls have given a node since the frame before, along the normal of its share of the surface that is
-    pushed (a third of each face that is met at less than 60 degrees), over that area and time; 0 in the first frame."""
+    pushed (a third of each face that is met at less than 60 degrees), over that area and time; 0 in the first frame.
+    What walls give to rigid parts is not in it: a probe of the force of a wall on a part has it."""
     samples: Annotated[Count, Field(ge=1, le=1_000_000)] = 500
     """Number of lines of history.csv, evenly spaced."""
     snapshots: Annotated[Count, Field(ge=0, le=100_000)] = 100

@@ -21,7 +21,7 @@ from conoid.cases.run import State
 from conoid.cases.schema import Case
 from conoid.cases.stages import without
 
-from . import digest, reference, simulation
+from . import digest, reference, simulation, unstrained
 from .assembly import quiet
 from .balance import Balance
 from .contact import common_volume
@@ -207,6 +207,7 @@ def _sum_up(
     inside = look(sim.contact, sim.model, labels, sim.comm) if sim.contact else None
     common = common_volume.measure(sim.contact, sim.model, labels, sim.comm) if sim.contact else None
     compressed = sim.crushing.found() if sim.crushing is not None else []
+    stiff = list(unstrained.told(sim, folder, eroded)) if failure is None and not loop.stopped else []
     state, cause, message = State.SUCCEEDED, None, ""
     if loop.stopped:
         state, cause, message = *STOPS[loop.stopped][:2], loop.reason()
@@ -240,6 +241,6 @@ def _sum_up(
             *sim.ledger.warnings(sim.case.numerics.dt_safety),
             *(sim.erosion.warnings(eroded) if sim.erosion is not None else []),
             *(sim.fracture.warnings if sim.fracture is not None else []), *(inside.warnings if inside else []),
-            *(common.warnings if common else []), *(sim.contact.need.warnings if sim.contact else []),
+            *(common.warnings if common else []), *(sim.contact.need.warnings if sim.contact else []), *stiff,
         ],
     )  # fmt: skip

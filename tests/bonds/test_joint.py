@@ -1,8 +1,12 @@
 """Bodies that tied bonds hold together: waves, energy, momentum; joints that are torn, and what meets again."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
+from conoid.worker.bonds import law as bond_law
+from conoid.worker.bonds.records import DAMAGE, NORMAL, PUSH, TiedRows
 from conoid.worker.contact import inside
 from conoid.worker.simulation import Simulation
 
@@ -99,6 +103,36 @@ def test_a_joint_that_is_torn_takes_its_energy(way: tuple[float, float, float], 
     assert sim.bonds.tied == 0
     assert end.fracture == pytest.approx(energy * 64e-6, rel=0.02)
     assert end.residual < 1e-4
+
+
+@pytest.mark.parametrize("way", [(0.0, 0.0, 50.0), (50.0, 0.0, 0.0), (30.0, 20.0, 36.0)])
+def test_a_joint_that_opens_in_some_twenty_steps_takes_what_its_law_says(
+    way: tuple[float, float, float], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The sum of 2 G(B) (1 - D) dD A over rows and steps, B the share of shear that a row has in a step: waves bend
+    blocks that are driven at this speed, so that a joint in shear is peeled as well.
+    """
+    taken = 0.0
+    plain = bond_law.open_bonds
+
+    def opened(rows: TiedRows, *arguments: Any) -> int:
+        nonlocal taken
+        before = rows.state.copy()
+        apart = int(plain(rows, *arguments))
+        push, out = before[:, PUSH : PUSH + 3], before[:, NORMAL : NORMAL + 3]
+        along = (push * out).sum(axis=1)
+        shear, tension = ((push - along[:, None] * out) ** 2).sum(axis=1), np.maximum(along, 0.0) ** 2
+        mixed = shear / np.maximum(shear + tension, 1e-300)
+        left = (1.0 - before[:, DAMAGE]) ** 2 - (1.0 - rows.state[:, DAMAGE]) ** 2
+        taken += float((left * rows.area / ((1.0 - mixed) / 2000.0 + mixed / 4000.0)).sum())
+        return apart
+
+    monkeypatch.setattr(bond_law, "open_bonds", opened)
+    law = 'strength = "50 MPa"\nshear_strength = "70 MPa"\nenergy = "2 kJ/m^2"\nshear_energy = "4 kJ/m^2"\n'
+    parts = block("below", (0, 0, -4), (8, 8, 0), 2) + block("above", (0, 0, 0), (8, 8, 4), 1.3)
+    end = run(built(start(8e-6) + parts + BOND + law + moved(3.9e-3, 1, way) + moved(-1, -3.9e-3, (0.0, 0.0, 0.0))))
+    assert 1800.0 * 64e-6 < taken < 4000.0 * 64e-6
+    assert end.fracture == pytest.approx(taken, rel=0.01)
 
 
 def test_what_was_torn_apart_meets_again() -> None:

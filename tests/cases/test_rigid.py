@@ -1,13 +1,16 @@
 """Keys of rigid parts and of walls: what is refused, in one line, and which part could be rigid."""
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
 
+from conoid.cases.bonds import TiedBond
 from conoid.cases.estimate import estimate
 from conoid.cases.load import CaseError, apply_overrides, parse_case
 from conoid.cases.placed import bulk
 from conoid.cases.plausible import oddities
+from conoid.cases.unstrained import Strained, could_be_rigid
 
 BALL = {"shape": "sphere", "centre": [0, 0, "5.1 mm"], "radius": "5 mm", "element_size": "1 mm"}
 PAD = {"shape": "box", "low": ["-9 mm", "-9 mm", "-9 mm"], "high": ["9 mm", "9 mm", 0], "element_size": "2 mm"}
@@ -96,3 +99,21 @@ def test_a_stiff_part_could_be_rigid() -> None:
     assert line.startswith("parts[0].rigid: is 318 times as stiff against waves as all that 'ball' meets")
     assert told() == []
     assert told("parts[0].rigid=false", "parts[1].material=steel") == []
+
+
+def test_a_part_that_stayed_elastic_could_have_been_rigid() -> None:
+    """Told after the run: not of one that has yielded, has strained or has much of the energy, nor of one with a bond,
+    which no rigid part can have.
+    """
+    case = parse_case(scene("parts[0].rigid=false"))
+    ball, block = Strained(600, 2e-4, 0.01, False), Strained(400, 0.05, 0.99, False)
+    (line,) = could_be_rigid(case, [ball, block], "stability: tet 7 of ball")
+    assert line == (
+        "parts[0].rigid: 'ball' stayed elastic, with strains of 0.0002 or less (root of the mean square) and 1 % of "
+        "the energy of deformation; rigid = true would save 60 % of the tets, which hold the time step down"
+    )
+    for other in (replace(ball, plastic=True), replace(ball, strain=2e-3), replace(ball, share=0.1)):
+        assert not list(could_be_rigid(case, [other, block], ""))
+    assert not list(could_be_rigid(parse_case(scene()), [ball, block], ""))
+    bonded = case.model_copy(update={"bond": (TiedBond(parts=("ball", case.parts[1].name), kind="tied"),)})
+    assert not list(could_be_rigid(bonded, [ball, block], ""))
