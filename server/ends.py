@@ -1,4 +1,4 @@
-"""What a run's plain files tell of its end where its worker has not: when that was, and how far it had come."""
+"""The end of a run as its files show it, for a worker that wrote no outcome: when it ended, and how far it had come."""
 
 import math
 from pathlib import Path
@@ -16,13 +16,13 @@ from .events import Run
 M = TypeVar("M", bound=Message)
 
 _BLOCK = 4 << 20
-"""Bytes of a journal that are read at once. Chosen."""
+"""Bytes of one read of a journal. Chosen."""
 _TYPE = slice(9, 13)
-"""Of a line: the first letters of its type, behind ``{"type":"``."""
+"""The first letters of a message's type in a line, after ``{"type":"``."""
 
 
 class _Said(msgspec.Struct):
-    """The part of a message that tells when it was written."""
+    """The part of a message that has its time."""
 
     wall: float
 
@@ -31,8 +31,8 @@ _said = msgspec.json.Decoder(_Said)
 
 
 def when(path: Path) -> float:
-    """Unix time, s, of the last that was heard of the run in ``path``: the last message of its journal, or, where there
-    is none, its outcome; 0 where neither can be read.
+    """Unix time, s, of the last sign of the run in ``path``: of the last message of its journal, or of its outcome
+    where there is no journal; 0 where neither can be read.
     """
     try:
         return _said.decode(journal.last(path / layout.JOURNAL)).wall or _written(path)
@@ -48,7 +48,8 @@ def _written(path: Path) -> float:
 
 
 def so_far(outcome: Outcome, run: Run, path: Path) -> Outcome:
-    """``outcome`` with what the journal in ``path`` has last told, where a worker has begun to step."""
+    """``outcome`` with the last step, time and energies of the journal in ``path``, where a worker has begun to
+    step."""
     started, told, counts = _newest(path / layout.JOURNAL)
     if started is None:
         return outcome
@@ -66,7 +67,7 @@ def so_far(outcome: Outcome, run: Run, path: Path) -> Outcome:
 
 
 def _newest(path: Path) -> tuple[Started | None, Progress | None, Counts | None]:
-    """The newest message of each kind; a line that cannot be read is none."""
+    """The newest message of each type; lines that cannot be read are skipped."""
     lines = {b"star": b"", b"prog": b"", b"coun": b""}
     try:
         tail = journal.Tail(path)

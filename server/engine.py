@@ -1,4 +1,4 @@
-"""The engine of the server's database: how it is opened, which file it is, and what is told when it fails."""
+"""The SQLAlchemy engine of the server's database: how it is opened, which file it uses, and its error messages."""
 
 import os
 import shutil
@@ -10,10 +10,10 @@ import sqlalchemy as sa
 from .settings import StartError
 
 _BUSY = 2000
-"""ms that SQLite waits for another process to let go. Chosen: longer than any transaction of this server takes, shorter
-than what a caller waits for."""
+"""ms that SQLite waits for a lock of another process. Chosen: longer than any transaction of this server, shorter
+than the time limit of a request."""
 _TABLES = 1 << 16
-"""Bytes without which SQLite opens no database: its log and what it shares with others. By hand: 32 KiB."""
+"""Bytes of free disk below which SQLite cannot open a database: its log and its shared memory. By hand: 32 KiB."""
 
 
 class StoreError(StartError):
@@ -21,7 +21,8 @@ class StoreError(StartError):
 
 
 def failure(url: str | sa.URL, error: Exception, deed: str = "used") -> StoreError:
-    """What is told of a database: its file, or its address without the password, and why it cannot be ``deed``."""
+    """The message for a database that failed: its file, or its address without the password, and why ``deed``
+    failed."""
     try:
         made = sa.make_url(url)
         sqlite = made.get_backend_name() == "sqlite" and made.database
@@ -42,7 +43,7 @@ def _full(folder: Path) -> bool:
 
 
 def engine_of(url: str | sa.URL) -> sa.Engine:
-    """Raises SQLAlchemyError, ImportError where the driver is not installed."""
+    """Opens the database. Raises SQLAlchemyError, ImportError where the driver is not installed."""
     made = sa.make_url(url)
     engine = sa.create_engine(made, pool_pre_ping=made.get_backend_name() != "sqlite")
     if engine.dialect.name == "sqlite":
@@ -51,13 +52,13 @@ def engine_of(url: str | sa.URL) -> sa.Engine:
 
 
 def _tune(connection: Any, _record: object) -> None:
-    """WAL lets readers go on while one writes."""
+    """Switches SQLite to WAL, so that readers do not wait for a writer."""
     for pragma in ("journal_mode=wal", f"busy_timeout={_BUSY}"):
         connection.execute(f"pragma {pragma}").close()
 
 
 def identity_of(engine: sa.Engine) -> tuple[int, int] | None:
-    """Device and number of the file of an SQLite database; None where there is none, as for other databases."""
+    """Device and inode of the file of an SQLite database; None for other databases and where there is no file."""
     place = engine.url.database if engine.dialect.name == "sqlite" else None
     try:
         status = os.stat(place) if place else None

@@ -46,8 +46,8 @@ class ServiceError(Exception):
         headers: Mapping[str, str] | None = None,
         outcome: Mapping[str, Any] | None = None,
     ) -> None:
-        """``pointer`` is a JSON pointer into the body, or the name of a parameter or header; ``outcome`` is what is
-        kept of a run that has been removed.
+        """``pointer``: a JSON pointer into the body, or the name of a parameter or header; ``outcome``: the kept
+        outcome of a run that has been removed.
         """
         super().__init__(detail)
         self.status, self.headers = status, dict(headers or {})
@@ -70,7 +70,7 @@ class ServiceError(Exception):
         self.body = body
 
     def response(self) -> Response:
-        """The answer itself."""
+        """The answer as problem+json."""
         return JSONResponse(self.body, self.status, self.headers, MEDIA_TYPE)
 
 
@@ -84,7 +84,7 @@ def invalid_case(problems: Sequence[Problem]) -> ServiceError:
 
 
 def not_found(what: str) -> ServiceError:
-    """404; the same for what does not exist and for what belongs to somebody else."""
+    """404, with the same text for a run that does not exist and for a run of another user."""
     return ServiceError(404, "not_found", f"{what}: there is none")
 
 
@@ -127,8 +127,8 @@ async def _http_error(request: Request, error: Exception) -> Response:
 
 
 def allowed(app: FastAPI, path: str) -> str:
-    """The methods of all routes of the path: where several patterns match, the longest one is meant. Empty where none
-    does.
+    """The methods of all routes of a path; where several patterns match, of the longest one. Empty where none
+    matches.
     """
     found: dict[str, set[str]] = {}
     for router in app.state.routers:
@@ -148,7 +148,7 @@ async def _parameter_error(_: Request, error: Exception) -> Response:
 
 
 async def _storage(request: Request, error: Exception) -> Response:
-    """A file that cannot be read now, or was damaged."""
+    """The error for a file that cannot be read now, or is damaged."""
     assert isinstance(error, OSError)
     _log.error("%s %s: %s", request.method, request.url.path, error)
     detail = f"a file of the run cannot be used: {error.strerror or error}"
@@ -156,13 +156,14 @@ async def _storage(request: Request, error: Exception) -> Response:
 
 
 async def _database(request: Request, error: Exception) -> Response:
-    """Locked by another process, full, or away: never for good."""
+    """The error for a database that is locked by another process, full, or not reachable; the request may succeed
+    later."""
     _log.error("%s %s: the database cannot be used: %s", request.method, request.url.path, error)
     return database_away(error).response()
 
 
 def database_away(error: Exception) -> ServiceError:
-    """507 where its disk is full, 503 for anything else."""
+    """The status of a failed write: 507 where the disk is full, 503 otherwise."""
     said = str(error).splitlines()[0]
     if "disk is full" in said:
         return ServiceError(507, "storage", "the disk of the server's database is full", retryable=True)
@@ -171,7 +172,7 @@ def database_away(error: Exception) -> ServiceError:
 
 
 async def _crash(request: Request, error: Exception) -> Response:
-    """The log gets the traceback, the caller does not."""
+    """500 for the caller; the traceback is in the server's log."""
     _log.error("%s %s failed", request.method, request.url.path, exc_info=error)
     detail = "the server failed to answer; its log says why"
     return ServiceError(500, "internal", detail, retryable=True).response()

@@ -1,4 +1,5 @@
-"""A run as the server knows it, what may happen to it, and what is done about it. No more than their shapes."""
+"""The state of a run in the server, the events that change it, and the actions that follow. Data only; the rules are
+in ``lifecycle``."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -9,7 +10,7 @@ from conoid.cases.run import Cause, State
 
 @dataclass(frozen=True)
 class Run:
-    """What the server knows of a run. Times are Unix s, 0 when they have not come yet."""
+    """What the server knows of a run. Times are Unix s, 0 until they are known."""
 
     id: str
     owner: str
@@ -24,13 +25,13 @@ class Run:
     stopping_for: Cause | None = None
     """Why a stop was asked for."""
     threads: int = 1
-    """Of each rank."""
+    """Threads of each rank."""
     title: str = ""
     """Of the case."""
 
     @property
     def cores(self) -> int:
-        """That it takes while it runs."""
+        """Cores that the run takes."""
         return self.ranks * self.threads
 
 
@@ -39,31 +40,31 @@ class Run:
 
 @dataclass(frozen=True)
 class Admitted:
-    """The run is on disk and may wait for its turn."""
+    """The run is on disk and may be queued."""
 
 
 @dataclass(frozen=True)
 class Granted:
-    """Enough slots are free. ``batch``: it goes on waiting, in the queue of a batch system."""
+    """Enough slots are free. ``batch``: the run was handed over and waits in the queue of a batch system."""
 
     batch: bool = False
 
 
 @dataclass(frozen=True)
 class WorkerStarts:
-    """A batch system has given the worker its cores, at the Unix time ``at``."""
+    """A batch system has started the worker, at the Unix time ``at``."""
 
     at: float
 
 
 @dataclass(frozen=True)
 class WorkerWaits:
-    """A batch system has taken the cores away; the worker goes on from its checkpoint when it gets some again."""
+    """A batch system has stopped the worker; it continues from its checkpoint when it gets cores again."""
 
 
 @dataclass(frozen=True)
 class LaunchFailed:
-    """The worker could not be started."""
+    """The worker could not be started, and will not be tried again."""
 
     message: str
     cause: Cause = Cause.LAUNCH
@@ -71,14 +72,14 @@ class LaunchFailed:
 
 @dataclass(frozen=True)
 class LaunchPutOff:
-    """The worker could not be started now: a full disk, no descriptor left. The run waits for its turn again."""
+    """The worker could not be started now: a full disk, no free descriptor. The run stays in the queue."""
 
     message: str
 
 
 @dataclass(frozen=True)
 class Broken:
-    """The run's folder is gone (``writable`` is False then), or does not tell any more what is to be run."""
+    """The run's folder is missing (``writable`` is False), or no longer has a readable case."""
 
     message: str
     writable: bool = False
@@ -86,60 +87,61 @@ class Broken:
 
 @dataclass(frozen=True)
 class WorkerRuns:
-    """The worker says that it runs."""
+    """The worker has reported that it runs."""
 
 
 @dataclass(frozen=True)
 class CancelAsked:
-    """Its owner wants it to stop. ``handed``: a worker lives, or a batch system has the run."""
+    """The owner has asked for a cancel. ``handed``: a worker runs, or a batch system has the run."""
 
     handed: bool = False
 
 
 @dataclass(frozen=True)
 class WallTimeOver:
-    """It has run as long as it may."""
+    """The run has reached its limit of wall time."""
 
 
 @dataclass(frozen=True)
 class OutputOver:
-    """Its folder is larger than one may be."""
+    """The run's folder has reached its limit of bytes."""
 
 
 @dataclass(frozen=True)
 class GraceOver:
-    """It was asked to stop and did not."""
+    """The worker did not stop in the time it was given."""
 
 
 @dataclass(frozen=True)
 class WorkerExited:
-    """The worker has ended. ``code`` is None when nobody could collect it; negative: minus the signal."""
+    """The worker's processes have ended. ``code``: the exit code; negative: minus the number of the signal; None
+    where no process could collect it."""
 
     code: int | None
     outcome: Outcome | None
     out_of_memory: bool = False
     disk_failed: bool = False
-    """Its disk is full, or it complained of it."""
+    """Whether the worker's disk is full, or it reported an error of its disk."""
     traces: str = ""
-    """What it left for people in place of an outcome."""
+    """The message that the worker left where it wrote no outcome."""
     reading: tuple[State, Cause, str] | None = None
-    """What a batch system says of an end without an outcome."""
+    """The end as a batch system reports it, where there is no outcome."""
     at: float = 0.0
-    """When that was by its files, Unix s; 0 where nobody knows better than that it is now."""
+    """Unix time of the end by the run's files, s; 0 where they do not show it: now."""
 
 
 @dataclass(frozen=True)
 class Found:
-    """What a starting server sees of a run that an earlier one left open."""
+    """A server that starts has found a run that an earlier one left open."""
 
     worker: Literal["none", "alive", "gone"]
     outcome: Outcome | None = None
     rebooted: bool = False
     code: int | None = None
-    """What its launcher says of its end, where it could."""
+    """The end as its launcher reports it, where it could."""
     disk_failed: bool = False
     at: float = 0.0
-    """When it was last heard of by its files, Unix s; 0 where they do not tell."""
+    """Unix time of the last sign of the run in its files, s; 0 where there is none."""
 
 
 Event = (
@@ -160,14 +162,14 @@ Event = (
 )
 
 ONCE = (LaunchFailed, LaunchPutOff, Broken, Found)
-"""Events that nobody would say again."""
+"""Events that are not sent a second time."""
 
 # Actions --------------------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
 class Journal:
-    """Append a Status line to the journal and publish it. Only while no worker writes."""
+    """Appends a Status line to the journal and publishes it. Only while no worker writes."""
 
     state: State
     cause: Cause | None = None
@@ -176,31 +178,31 @@ class Journal:
 
 @dataclass(frozen=True)
 class WriteOutcome:
-    """Write outcome.json."""
+    """Writes outcome.json."""
 
     outcome: Outcome
 
 
 @dataclass(frozen=True)
 class Launch:
-    """Start the worker."""
+    """Starts the worker."""
 
 
 @dataclass(frozen=True)
 class Adopt:
-    """Watch a worker that an earlier server started."""
+    """Watches a worker that an earlier server started."""
 
 
 @dataclass(frozen=True)
 class Stop:
-    """Ask the worker to stop at its next step; kill it when it does not. The run's folder remembers ``why``."""
+    """Asks the worker to stop at its next step, and kills it when it does not. ``why`` is kept in the run's folder."""
 
     why: Cause
 
 
 @dataclass(frozen=True)
 class Kill:
-    """End the worker's processes now."""
+    """Kills the worker's processes now."""
 
 
 Action = Journal | WriteOutcome | Launch | Adopt | Stop | Kill

@@ -1,4 +1,4 @@
-"""What the log of a launcher says of the end of its ranks: for a server that is not the launcher's parent."""
+"""The end of the ranks as the launcher's log shows it, for a server that is not the parent of the launcher."""
 
 import errno
 import os
@@ -8,35 +8,36 @@ from pathlib import Path
 from conoid.cases import layout, whole
 
 _TAIL = 1 << 14
-"""Bytes at the end of the log in which the banner of the launcher is looked for. Chosen: a banner has 700."""
+"""Bytes at the end of the log that are searched for the launcher's banner. Chosen: a banner has 700."""
 _ABORTS = "Abort("
-"""What MPICH begins with where a rank ends all others."""
+"""The beginning of MPICH's line for a rank that aborts all others."""
 _LAST_WORDS = 300
-"""Characters of the last line that are told. Chosen."""
+"""Characters of the last line that are shown. Chosen."""
 _COMPLAINTS = [
     os.strerror(number).encode()
     for number in (errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EROFS, errno.ESTALE, errno.EFBIG)
 ]
 _CODE = re.compile(rb"^=   EXIT CODE: (\d{1,3})$", re.MULTILINE)
 _PID = re.compile(rb"^=   PID (\d+) RUNNING AT ", re.MULTILINE)
-"""MPICH's banner; Hydra writes it when a rank ends before the others, with the signal's number for a rank killed."""
+"""The banner of Hydra, MPICH's launcher, for a rank that ended before the others; for a killed rank with the number
+of the signal."""
 
 
 def exit_code(folder: Path) -> int | None:
-    """The code of the rank that ended first, as the newest banner has it; None when there is none."""
+    """Exit code of the rank that ended first, by the newest banner; None without a banner."""
     found = _CODE.findall(_tail(folder))
     return int(found[-1]) if found else None
 
 
 def rank_killed(folder: Path) -> int | None:
-    """The number of the process that ended first, as the newest banner has it; None when there is none."""
+    """Process number of the rank that ended first, by the newest banner; None without a banner."""
     found = _PID.findall(_tail(folder))
     return int(found[-1]) if found else None
 
 
 def last_words(folder: Path, log: Path | None = None) -> str:
-    """The last line of the launcher's log, or of another ``log``, that is neither of the launcher's own banner nor of
-    MPI, which says that a rank has ended; empty where there is none.
+    """The last line of the launcher's log, or of another ``log``, that is neither the banner nor a line of MPI;
+    empty where there is none.
     """
     text = _tail(folder, log).decode(errors="replace")
     said = [line.strip() for line in text.partition("=====")[0].splitlines() if not line.startswith(_ABORTS)]
@@ -44,7 +45,7 @@ def last_words(folder: Path, log: Path | None = None) -> str:
 
 
 def disk_failed(folder: Path) -> bool:
-    """Whether a rank complained of its disk, or could not because there is no room for a complaint."""
+    """Whether a rank reported an error of its disk, or could not since the log itself has no room."""
     said = _tail(folder)
     if any(words in said for words in _COMPLAINTS):
         return True

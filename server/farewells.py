@@ -1,4 +1,4 @@
-"""purged.jsonl: a line for every run whose folder has been removed, so that what came of it is not forgotten."""
+"""purged.jsonl: one line for each run whose folder has been removed, with its outcome."""
 
 import io
 import os
@@ -22,7 +22,7 @@ FILE = "purged.jsonl"
 
 
 class Farewell(msgspec.Struct, kw_only=True, frozen=True):
-    """What is kept of a run; times are Unix s."""
+    """The kept record of a removed run; times are Unix s."""
 
     id: str
     owner: str
@@ -36,9 +36,9 @@ class Farewell(msgspec.Struct, kw_only=True, frozen=True):
     message: str
     removed: float
     why: str
-    """Who or what has removed it."""
+    """Who or which rule has removed it."""
     steps: int | None = None
-    """This and the time that the computation reached, s, are None where nobody knows them."""
+    """This time and the simulated time reached, s, are None where they are not known."""
     time: float | None = None
     digest: str = ""
     bytes: int = 0
@@ -46,7 +46,7 @@ class Farewell(msgspec.Struct, kw_only=True, frozen=True):
 
     @property
     def run(self) -> Run:
-        """As the database has it."""
+        """The record as a row of the database."""
         cause = Cause(self.cause) if self.cause else None
         return Run(
             self.id, self.owner, self.name, self.ranks, self.submitted, State(self.state), cause, self.message,
@@ -58,7 +58,7 @@ _farewell = msgspec.json.Decoder(Farewell)
 
 
 def of(run: Run, path: Path, why: str) -> Farewell:
-    """The line of a run that has ended, while its folder is there."""
+    """The record of a run that has ended, made while its folder exists."""
     ended = folder.outcome(path)
     results: dict[str, Any] = (
         {} if ended is None else {"steps": ended.steps, "time": known(ended.time), "digest": ended.digest}
@@ -72,10 +72,10 @@ def of(run: Run, path: Path, why: str) -> Farewell:
 
 
 class Farewells:
-    """May be used from any thread. Only where each line stands is kept in memory."""
+    """The records of all removed runs, for any thread. Memory holds the place of each line alone."""
 
     def __init__(self, runs: Path) -> None:
-        """Reads the file once; what a killed server left half written is no line. Raises OSError."""
+        """Reads the file once; an incomplete last line is ignored. Raises OSError."""
         self._path, self._lock = runs / FILE, threading.Lock()
         self._at: dict[str, int] = {}
         self._end = 0
@@ -90,11 +90,11 @@ class Farewells:
             self._at[_farewell.decode(raw).id] = place
 
     def __iter__(self) -> Iterator[str]:
-        """The ids of all."""
+        """Ids of all removed runs."""
         return iter(tuple(self._at))
 
     def add(self, line: Farewell) -> None:
-        """On disk when this returns; a second line of a run replaces the first. Raises OSError."""
+        """Appends a record; it is on disk on return. A second record of a run replaces the first. Raises OSError."""
         with self._lock, whole.appended(self._path, 0o600) as file:
             end = os.fstat(file.fileno()).st_size
             begin = b"" if not end or _last(self._path, end) == b"\n" else b"\n"
@@ -108,7 +108,7 @@ class Farewells:
         durable.sync_folder(self._path.parent)
 
     def get(self, run_id: str) -> Farewell | None:
-        """The line of a run; None when there is none. Raises OSError."""
+        """The record of a run; None without one. Raises OSError."""
         place = self._at.get(run_id)
         if place is None:
             return None

@@ -1,4 +1,4 @@
-"""A run's folder as the server uses it: the submission, the outcome, the process record; all readable without it."""
+"""The folder of a run: submission, case, outcome and process record. All of it can be read without the server."""
 
 import hashlib
 import os
@@ -28,27 +28,27 @@ _ID = re.compile(r"[0-9a-z]{22}")
 _LETTERS = "0123456789abcdefghjkmnpqrstvwxyz"
 _NEW, _GONE = ".new-", ".gone-"
 APART = f"{_NEW}files-"
-"""What the names of folders begin with that are there for a moment; a server removes them when it starts."""
+"""Beginnings of the names of temporary folders; a server removes them when it starts."""
 _TELLING = (layout.SUBMISSION, layout.JOURNAL, layout.WORKER)
-"""One of these is left where a run has been, whatever was damaged."""
+"""Files of which at least one stays where a run was, however much is damaged."""
 _UNREADABLE = "outcome.unreadable.json"
 _TITLE = 200
-"""Characters of a title that lists have. Chosen: a line or two."""
+"""Characters of a title in lists. Chosen: a line or two."""
 DAMAGED = (FileNotFoundError, IsADirectoryError, NotADirectoryError, PermissionError)
-"""What the system says of a file that is gone, or is none any more (``whole.opened``), or not for this user."""
+"""Errors of the system for a file that is missing, is not a regular file (``whole.opened``), or is not readable."""
 _NO_FILE = (FileNotFoundError, IsADirectoryError, NotADirectoryError)
 
 
 class Copy(msgspec.Struct, kw_only=True, frozen=True):
-    """A file that the case names, of which the run has its own copy: ``files/<sha256>`` and how its name ends."""
+    """A file that the case names; the run has a copy of its own: ``files/<sha256>`` with the ending of its name."""
 
     path: str
-    """As the case has it: a name."""
+    """The name in the case."""
     sha256: str
 
 
 class Submission(msgspec.Struct, kw_only=True, frozen=True):
-    """submission.json: what the server must know again when its database is gone. Times are Unix s."""
+    """submission.json: what the server needs when its database is lost. Times are Unix s."""
 
     id: str
     owner: str
@@ -60,32 +60,33 @@ class Submission(msgspec.Struct, kw_only=True, frozen=True):
     body_sha256: str
     idempotency_key: str | None
     wall_time: float | None
-    """s after which the run is stopped."""
+    """Time limit of the run, s."""
     estimate: dict[str, int | float]
     labels: dict[str, str] = {}
-    """Words of the submitter."""
+    """Labels of the submitter."""
     profile: str = ""
-    """Of the batch system; empty where there is none."""
+    """Profile of the batch system; empty where there is none."""
     priority: int = 0
-    """Among the runs of its owner."""
+    """Priority among the runs of its owner."""
     wishes_sha256: str = ""
-    """Of labels, profile and priority as they were asked for; empty in what earlier servers wrote."""
+    """Hash of labels, profile and priority as they were given; empty in files of earlier servers."""
     threads: int = 1
-    """Of each rank."""
+    """Threads of each rank."""
     files: list[Copy] = []
 
     @property
     def cores(self) -> int:
-        """That the run takes."""
+        """Cores that the run takes."""
         return self.ranks * self.threads
 
 
 class Process(msgspec.Struct, kw_only=True, frozen=True):
-    """worker.json: which process runs it. ``started`` and ``boot`` tell it from a later one with the same number."""
+    """worker.json: the process of the run. ``started`` and ``boot`` distinguish it from a later process with the
+    same number."""
 
     pid: int
     started: int
-    """Clock ticks after the boot."""
+    """Start of the process in clock ticks after the boot."""
     boot: str
     launched: float
 
@@ -96,8 +97,8 @@ _last_stamp, _stamping = 0, threading.Lock()
 
 
 def new_id() -> tuple[str, float]:
-    """An id of 22 letters and digits, and the Unix time in s. Half of each id is random, and ids sort in the order in
-    which they are made, also where the clock is set back.
+    """An id of 22 letters and digits, and the Unix time in s. One half of each id is random. Ids sort in the order
+    of their creation, also when the clock is set back.
     """
     global _last_stamp
     with _stamping:
@@ -106,7 +107,7 @@ def new_id() -> tuple[str, float]:
 
 
 def begin_after(run_id: str) -> None:
-    """Ids to come sort after this one, whatever the clock says."""
+    """Makes later ids sort after this one, whatever the clock shows."""
     global _last_stamp
     stamp = 0
     for letter in run_id[:11]:
@@ -115,7 +116,7 @@ def begin_after(run_id: str) -> None:
 
 
 def is_id(text: str) -> bool:
-    """True for what ``new_id`` could have made."""
+    """True for a text that ``new_id`` could have returned."""
     return _ID.fullmatch(text) is not None
 
 
@@ -126,8 +127,8 @@ def _letters(number: int, length: int) -> str:
 def create(
     runs: Path, submission: Submission, case: bytes, resolved: bytes, fill: Callable[[Path], None] | None = None
 ) -> Path:
-    """Makes the folder of an accepted run, in which ``fill`` puts what else belongs there; it appears whole, and is on
-    disk when this returns. Raises OSError, and what ``fill`` raises.
+    """Creates the folder of an accepted run; ``fill`` adds further files. It appears whole, and is on disk on
+    return. Raises OSError, and the errors of ``fill``.
     """
     beside, folder = runs / f"{_NEW}{submission.id}", runs / submission.id
     accepted = Status(run=submission.id, seq=1, wall=submission.submitted, state=State.ACCEPTED)
@@ -146,13 +147,13 @@ def create(
 
 
 def discard(runs: Path, run_id: str) -> None:
-    """Removes what ``create`` made of a run that nobody was promised."""
+    """Removes the folder of a run that was not acknowledged."""
     for path in (runs / f"{_NEW}{run_id}", runs / run_id):
         shutil.rmtree(path, ignore_errors=True)
 
 
 def purge(runs: Path, run_id: str) -> None:
-    """Removes the folder of a run: at once for everybody, file by file after that. Raises OSError."""
+    """Removes the folder of a run: first its name, then file by file. Raises OSError."""
     beside = runs / f"{_GONE}{run_id}"
     os.rename(runs / run_id, beside)
     durable.sync_folder(runs)
@@ -165,7 +166,7 @@ def runs_in(runs: Path) -> list[Path]:
 
 
 def scan(runs: Path) -> Iterator[Path]:
-    """The folders of all runs, oldest first; what a killed server left half made, or half removed, is removed."""
+    """The folders of all runs, oldest first. Removes folders that a killed server left half made or half removed."""
     for path in sorted(runs.iterdir()):
         if path.name.startswith((_NEW, _GONE)):
             shutil.rmtree(path, ignore_errors=True)
@@ -174,7 +175,7 @@ def scan(runs: Path) -> Iterator[Path]:
 
 
 def there(path: Path) -> bool:
-    """Whether there is such a file; also where that is nobody's business, since its folder is locked away."""
+    """Whether the file exists; True also where its folder may not be read."""
     try:
         path.lstat()
     except (FileNotFoundError, NotADirectoryError):
@@ -185,12 +186,12 @@ def there(path: Path) -> bool:
 
 
 def submission(folder: Path) -> Submission:
-    """Raises OSError, or msgspec.MsgspecError when the file is not one."""
+    """Reads submission.json. Raises OSError, or msgspec.MsgspecError when it is damaged."""
     return _submission.decode(whole.read(folder / layout.SUBMISSION))
 
 
 def run(folder: Path) -> Run:
-    """The run as its folder tells it: the submission, and the Status lines of the journal."""
+    """The run by its folder: submission.json, and the Status lines of the journal."""
     return replay(first(submission(folder)), journal.statuses(folder / layout.JOURNAL))
 
 
@@ -202,7 +203,7 @@ def first(made: Submission) -> Run:
 
 
 def replay(accepted: Run, told: Iterable[Status]) -> Run:
-    """The run as the Status lines of its journal tell it."""
+    """The run by the Status lines of its journal."""
     return reduce(_after, told, accepted)
 
 
@@ -215,7 +216,7 @@ def _after(told: Run, status: Status) -> Run:
 
 
 def outcome(folder: Path) -> Outcome | None:
-    """What outcome.json says; None when there is none, or none that can be read."""
+    """The outcome of outcome.json; None when it is missing or damaged."""
     try:
         return outcome_from_json(whole.read(folder / layout.OUTCOME))
     except (*_NO_FILE, msgspec.MsgspecError, UnicodeDecodeError):
@@ -223,7 +224,7 @@ def outcome(folder: Path) -> Outcome | None:
 
 
 def outcome_error(folder: Path) -> str:
-    """Why outcome.json cannot be read; empty when it can, or when there is none."""
+    """Why outcome.json cannot be read; empty when it can, or when it is missing."""
     try:
         outcome_from_json(whole.read(folder / layout.OUTCOME))
     except FileNotFoundError:
@@ -236,15 +237,14 @@ def outcome_error(folder: Path) -> str:
 
 
 def write_outcome(folder: Path, ended: Outcome) -> None:
-    """Writes outcome.json whole; one that nobody can read is kept beside it. Raises OSError."""
+    """Writes outcome.json whole; a damaged one is kept beside it. Raises OSError."""
     if outcome_error(folder):
         put_away(folder / layout.OUTCOME, folder / _UNREADABLE)
     durable.write(folder / layout.OUTCOME, outcome_to_json(ended))
 
 
 def put_away(path: Path, kept: Path | None = None) -> None:
-    """Makes the name free, for a file that is to be written whole; what stands there is kept where that is named.
-
+    """Frees the name of a file that is about to be written; the present one is renamed where a name for it is given.
     Raises OSError.
     """
     if kept is not None and not kept.exists():
@@ -256,12 +256,12 @@ def put_away(path: Path, kept: Path | None = None) -> None:
 
 
 def is_as_accepted(folder: Path, made: Submission) -> bool:
-    """Whether the case is the one that was read and checked. Raises OSError."""
+    """Whether the case on disk is the one that was checked. Raises OSError."""
     return made.body_sha256 in {"", digest_of(made.case_file, whole.read(folder / made.case_file))}
 
 
 def digest_of(case_file: str, body: bytes) -> str:
-    """Of a case as it was handed in, and of its kind."""
+    """Hash of a submitted case and of its type."""
     return hashlib.sha256(case_file.encode() + b"\0" + body).hexdigest()
 
 
@@ -271,7 +271,7 @@ def write_stop(folder: Path, why: Cause) -> None:
 
 
 def stop_asked(folder: Path) -> Cause | None:
-    """Why a stop was asked for; None when none was."""
+    """Why a stop was asked for; None without a request."""
     try:
         return Cause(whole.read(folder / layout.STOP_REQUEST, 80).decode())
     except (OSError, ValueError):
@@ -279,7 +279,7 @@ def stop_asked(folder: Path) -> Cause | None:
 
 
 def process(folder: Path) -> Process | None:
-    """The process that was started for the run; None when there was none."""
+    """The process that was started for the run; None before that."""
     try:
         return _process.decode(whole.read(folder / layout.WORKER))
     except (*DAMAGED, msgspec.MsgspecError):
@@ -292,7 +292,7 @@ def write_process(folder: Path, started: Process) -> None:
 
 
 def runs_for(folder: Path) -> float:
-    """s since the recorded process was started, by the clock of the machine's start; 0 where there is no record."""
+    """s since the start of the recorded process, by the clock since the boot; 0 without a record."""
     made = process(folder)
     if made is None or not made.started:
         return 0.0

@@ -1,17 +1,17 @@
-"""HEAD is answered wherever GET is: with the same headers, at once, and without a body."""
+"""HEAD for every route with GET: the same headers, at once, without a body."""
 
 import anyio
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 
 class Heads:
-    """Middleware that asks the app for GET, and ends the answer, however long it would become, after its headers."""
+    """Middleware that calls the app with GET and ends the answer after its headers, however long the body would be."""
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Passes on what is no HEAD."""
+        """Passes on requests other than HEAD."""
         if scope["type"] != "http" or scope["method"] != "HEAD":
             await self._app(scope, receive, send)
             return

@@ -1,4 +1,4 @@
-"""What the C library does with the memory that the server has given back."""
+"""Settings of the C library's heap, so that freed memory returns to the system."""
 
 import ctypes
 import sys
@@ -6,18 +6,17 @@ import sys
 _ARENA_MAX, _MMAP_THRESHOLD = -8, -3
 """Parameters of mallopt(3), of glibc."""
 _HEAPS = 2
-"""That all threads share. Chosen: Python runs one thread at a time; the server's processor time stays as it was."""
+"""Number of heaps for all threads. Chosen: Python runs one thread at a time, and the CPU time did not change."""
 _LARGE = 256 << 10
-"""Bytes of a block that goes back to the system at once. Chosen: answers that grow with a run are larger. glibc would
-raise its own bound to the largest block that it has seen.
+"""Size in bytes from which a freed block returns to the system at once. Chosen: answers that grow with a run are
+larger. glibc would raise the limit to the largest block so far.
 """
 
 
 def share() -> bool:
-    """Lets all threads take from few heaps, before there are threads; False where the C library cannot be told.
-
-    Else each of the threads that read journals and answer keeps a heap of its own, which does not become smaller than
-    its largest answer has made it: the server grows for as long as threads come to their first large answer.
+    """Limits the number of heaps; call it before the first thread. False where the C library has no such setting.
+    Without it each thread has a heap of its own, which stays as large as the largest answer that the thread has
+    made.
     """
     if not sys.platform.startswith("linux"):
         return False

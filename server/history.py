@@ -21,17 +21,17 @@ from .journal import Tail, seq_of
 from .notes import KINDS, Notes
 
 _SAMPLES = 4096
-"""Reports of a run that are kept, at most. Chosen: some times what a chart has pixels."""
+"""Largest number of reports that are kept of a run. Chosen: some times the pixels of a chart."""
 _BYTES = 16 << 20
-"""Of the reports of a run, at most. Chosen: room for all of them up to some hundred ranks."""
+"""Largest size of the kept reports of a run, bytes. Chosen: room for all of them up to some hundred ranks."""
 _CUTS = 10_000
-"""Balance events that are kept, the newest. Chosen."""
+"""Number of newest balance events that are kept. Chosen."""
 _RUNS = 16
-"""Runs whose history is kept, those last asked for. Chosen."""
+"""Number of runs whose history is kept, the last ones asked for. Chosen."""
 _BLOCK = 4 << 20
-"""Bytes of the journal that are read at once. Chosen."""
+"""Bytes of one read of the journal. Chosen."""
 _TYPE = slice(9, 13)
-"""Of a line: the first letters of its type, behind ``{"type":"``."""
+"""The first letters of a message's type in a line, after ``{"type":"``."""
 
 _snapshot = msgspec.json.Decoder(Snapshot)
 _status = msgspec.json.Decoder(Status)
@@ -39,7 +39,7 @@ _status = msgspec.json.Decoder(Status)
 
 @dataclass(frozen=True)
 class Sample:
-    """A report: lines of the journal as they stood when it came, b"" for what had not come yet."""
+    """A report: the newest line of each type at its time; b"" for types without a line yet."""
 
     progress: bytes
     load: bytes
@@ -48,13 +48,13 @@ class Sample:
 
     @property
     def size(self) -> int:
-        """Bytes, but for what samples share."""
+        """Size in bytes, without lines that several samples share."""
         return len(self.progress) + len(self.load)
 
 
 @dataclass
 class History:
-    """The history of a run as far as its journal has been read."""
+    """The history of a run, up to the part of its journal that has been read."""
 
     path: Path
     last: int = 0
@@ -62,27 +62,27 @@ class History:
     wall: float = 0.0
     """Unix time of the last status, s."""
     began: float | None = None
-    """Unix time at which the worker began to run, s."""
+    """Unix time of the start of the worker, s."""
     state: State = State.ACCEPTED
     samples: list[Sample] = field(default_factory=list)
     newest: Sample | None = None
     cuts: list[bytes] = field(default_factory=list)
     snapshots: dict[int, bytes] = field(default_factory=dict)
-    """Lines by the numbers of the snapshots."""
+    """Lines of snapshots by number."""
     notes: Notes = field(default_factory=Notes)
     answers: dict[int, tuple[int, bytes]] = field(default_factory=dict)
-    """Answers of a run that has ended, by their points: the last event, and the body."""
+    """Answers for a run that has ended, by their number of points: the last event, and the body."""
 
     def __post_init__(self) -> None:
         self.lock = threading.Lock()
         self.columns = Columns(self.path.with_name(layout.HISTORY))
-        """Of the time history beside the journal; they catch up by themselves, under the same lock."""
+        """Columns of history.csv; they are read separately, under the same lock."""
         self._tail = Tail(self.path)
         self._progress = self._counts = self._snapshot = b""
         self._every, self._reports, self._size = 1, 0, 0
 
     def catch_up(self) -> None:
-        """Reads what is new; under the lock."""
+        """Reads new lines of the journal; the lock is held."""
         while block := self._tail.block(_BLOCK):
             lines = block.split(b"\n")
             for line in lines:
@@ -133,7 +133,7 @@ _RARE = frozenset({b"stat", b"snap", b"bala"})
 
 
 class Histories:
-    """The histories that were asked for last; from any thread."""
+    """Histories of the runs that were asked for last, for any thread."""
 
     def __init__(self) -> None:
         """None yet."""
@@ -141,7 +141,7 @@ class Histories:
         self._known: OrderedDict[Path, History] = OrderedDict()
 
     def of(self, path: Path) -> History:
-        """That of the journal at ``path``; its holder takes its lock, and lets it catch up."""
+        """The history of the journal at ``path``; the caller takes its lock and calls ``catch_up``."""
         with self._lock:
             found = self._known.setdefault(path, History(path))
             self._known.move_to_end(path)

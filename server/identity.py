@@ -1,8 +1,8 @@
-"""Whose runs these are: one server has one folder of runs and one database, and each says which other it belongs to.
+"""Identity of a server: one folder of runs and one database, each with the name of the other.
 
-A second server on the same database would take the runs of the first one for lost, and a copy of a folder would end
-the workers of the original: both are refused. ``adopt`` says that folder and database belong together here, for a
-folder that has been moved, or restored from a backup.
+A second server on the same database would mark the runs of the first one as lost, and a copy of a folder would stop
+the workers of the original: both are refused. ``adopt`` binds a folder and a database that were moved, or restored
+from a backup.
 """
 
 import secrets
@@ -28,7 +28,7 @@ class IdentityError(SettingsError):
 
 @dataclass(frozen=True)
 class Pair:
-    """What the folder and the database say, each None where it says nothing yet."""
+    """The identities in folder and database; None where there is none yet."""
 
     place: str
     folder: Bond | None
@@ -36,7 +36,7 @@ class Pair:
 
 
 def require(runs: Path, store: Store) -> None:
-    """Binds a folder and a database that are new to each other. Raises IdentityError where they are no pair, OSError,
+    """Binds a new folder and a new database. Raises IdentityError where they do not belong together, OSError,
     SQLAlchemyError.
     """
     found = _look(runs, store)
@@ -50,9 +50,8 @@ def require(runs: Path, store: Store) -> None:
 
 
 def adopt(runs: Path, store: Store) -> str:
-    """Folder and database belong together here from now on; what they belonged to before, in one line.
-
-    Raises OSError, SQLAlchemyError.
+    """Binds folder and database to each other here; returns the previous identities in one line. Raises OSError,
+    SQLAlchemyError.
     """
     try:
         found = _look(runs, store)
@@ -66,7 +65,7 @@ def adopt(runs: Path, store: Store) -> str:
 
 
 def _look(runs: Path, store: Store) -> Pair:
-    """Raises IdentityError where the folder's file says nothing that can be read."""
+    """Reads the file of the folder. Raises IdentityError where it is damaged."""
     place = str(runs.resolve())
     try:
         folder = msgspec.json.decode(whole.read(runs / FILE, _MOST), type=Bond)
@@ -80,7 +79,7 @@ def _look(runs: Path, store: Store) -> Pair:
 
 
 def _wrong(found: Pair) -> str:
-    """Why the two are no pair; empty when they are, or can become one."""
+    """Why the two do not belong together; empty when they do, or can be bound."""
     if found.folder is not None and found.folder.place != found.place:
         return f"this folder is a copy of {found.folder.place}, or was moved from there"
     if found.database is None:

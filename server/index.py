@@ -1,4 +1,4 @@
-"""The database as the supervisor uses it: an index over the runs' folders, which may lag behind them."""
+"""The database as an index over the folders of the runs, which may be behind them. Used by the supervisor."""
 
 import logging
 import time
@@ -12,20 +12,20 @@ from .store import Store
 
 _log = logging.getLogger("conoid.server")
 _REST = 5.0
-"""s for which a database that failed is left alone, so that nobody waits for it a second time. Chosen."""
+"""s for which a database that failed is not used, so that the supervisor does not wait for it again. Chosen."""
 
 
 class Index:
-    """Belongs to the supervisor's thread."""
+    """Used in the supervisor's thread."""
 
     def __init__(self, store: Store) -> None:
-        """Everything is saved."""
+        """All runs are saved."""
         self._store, self._rests_until = store, 0.0
         self.unsaved: set[str] = set()
-        """Runs that have changed since they were saved."""
+        """Runs that changed after they were saved."""
 
     def save(self, run: Run) -> bool:
-        """False when the run is not in the database yet, which is logged."""
+        """False, with a line in the log, when the run is not in the database yet."""
         self.unsaved.add(run.id)
         if time.monotonic() < self._rests_until:
             return False
@@ -39,7 +39,7 @@ class Index:
         return True
 
     def add(self, run: Run, key: str | None, labels: Mapping[str, str]) -> None:
-        """What is known already stays when nothing can be written now. Raises SQLAlchemyError."""
+        """Rows that cannot be written now keep their old values. Raises SQLAlchemyError."""
         try:
             self._store.add(run, key, labels)
         except SQLAlchemyError:

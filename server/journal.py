@@ -1,4 +1,5 @@
-"""journal.jsonl: the truth about a run. One writer at a time: the server before and after the worker, not beside it."""
+"""journal.jsonl: all events of a run, the source of its state. It has one writer at a time: the worker while it
+runs, the server before and after."""
 
 import os
 from collections.abc import Iterator
@@ -12,11 +13,11 @@ from conoid.cases.messages import Status, to_json
 from conoid.cases.run import Cause, State
 
 _CHUNK = 1 << 18
-"""Bytes of a journal that are read at once: some hundred lines. Chosen."""
+"""Bytes of one read: some hundred lines. Chosen."""
 
 
 class _Head(msgspec.Struct):
-    """The part of a message that the server reads of every line, whatever else a newer worker puts in it."""
+    """The fields that the server reads of every line, whatever else a newer worker writes."""
 
     seq: int
     type: str
@@ -36,9 +37,8 @@ class Line:
 
 
 class Tail:
-    """Follows a journal from its beginning; gives complete lines only, so a line that is being written is never torn.
-
-    A journal that does not exist yet is empty.
+    """Reads a journal from its beginning as it grows; returns complete lines only. A journal that does not exist yet
+    is empty.
     """
 
     def __init__(self, path: Path, after: int = 0) -> None:
@@ -47,7 +47,7 @@ class Tail:
         self._offset = _line_before(path, after) if after else 0
 
     def read(self) -> list[Line]:
-        """The new lines, at most about 256 kB of them; an empty list when there are none now."""
+        """The new events, about 256 kB at most; empty when there are none."""
         while True:
             chunk = self._chunk()
             if not chunk:
@@ -58,13 +58,13 @@ class Tail:
                 return lines
 
     def block(self, size: int) -> bytes:
-        """The next complete lines as they stand, about ``size`` bytes of them; empty when there are none now."""
+        """The next complete lines as they stand, about ``size`` bytes; empty when there are none."""
         chunk = self._chunk(size)
         self._offset += len(chunk)
         return chunk
 
     def _chunk(self, size: int = _CHUNK) -> bytes:
-        """The next complete lines. A line longer than the chunk size is read whole."""
+        """The next complete lines. A line longer than the chunk is read whole."""
         try:
             with whole.opened(self._path) as file:
                 while True:
@@ -78,7 +78,7 @@ class Tail:
 
 
 def _line_before(path: Path, after: int) -> int:
-    """Where some line with ``seq`` at most ``after`` begins, close to the last of them: numbers rise along the file."""
+    """Offset of a line with ``seq`` at most ``after``, close to the last such line: numbers increase along the file."""
     if not path.exists():
         return 0
     with whole.opened(path) as file:
@@ -104,7 +104,7 @@ def _line(raw: bytes) -> Line | None:
 
 
 def seq_of(raw: bytes) -> int:
-    """The number of a line; 0 for what is none."""
+    """The number of a line; 0 for a damaged one."""
     line = _line(raw)
     return line.seq if line is not None else 0
 
@@ -117,7 +117,7 @@ def lines(path: Path, after: int = 0) -> Iterator[Line]:
 
 
 def statuses(path: Path) -> list[Status]:
-    """The Status messages of a journal, in order; what is damaged is passed over."""
+    """The Status messages of a journal, in order; damaged lines are skipped."""
     found = (_status_in(line.raw) for line in lines(path) if line.type == "status")
     return [status for status in found if status is not None]
 
@@ -133,7 +133,7 @@ def _status_in(raw: bytes) -> Status | None:
 
 
 def last(path: Path) -> bytes:
-    """The last line that is one, without the line feed; b"" where there is none. Raises OSError."""
+    """The last whole line, without the line feed; b"" where there is none. Raises OSError."""
     window = _CHUNK
     with whole.opened(path) as file:
         size = os.fstat(file.fileno()).st_size
@@ -147,10 +147,8 @@ def last(path: Path) -> bytes:
 
 
 def append(path: Path, status: Status) -> Status:
-    """Appends ``status`` under the next number and returns it as written; on disk when this returns. Raises OSError.
-
-    A line that a killed worker left half written is no event: it is cut off first; so is this one when it cannot be
-    written whole.
+    """Appends ``status`` with the next number and returns it as written; it is on disk on return. Raises OSError. An
+    incomplete last line of a killed worker is cut off first; this line is cut off when it cannot be written whole.
     """
     with whole.appended(path, 0o600) as file:
         numbered = msgspec.structs.replace(status, seq=_mend(file.fileno()) + 1)
@@ -165,8 +163,8 @@ def append(path: Path, status: Status) -> Status:
 
 
 def _mend(descriptor: int) -> int:
-    """The largest number of the last lines, however much damage follows them; what stands after the last line feed is
-    completed or cut off.
+    """The largest number of the last lines, however much damage follows; text after the last line feed is completed
+    or cut off.
     """
     window = _CHUNK
     while True:

@@ -1,4 +1,4 @@
-"""Looks after the folders of runs and what users have sent: how large they are, what is removed, and when."""
+"""Sizes and removal of the folders of runs and of the files that users have sent."""
 
 import logging
 import threading
@@ -23,25 +23,23 @@ from .weights import Left, Weights, copies, size
 
 _log = logging.getLogger("conoid.server")
 _PATIENCE = 5.0
-"""s after its start at which a server first looks at the folders, so that it answers before, and between two looks for
-who asks. Chosen."""
+"""s from the start of the server to the first pass over the folders; also the shortest time between two passes that
+requests cause. Chosen."""
 
 
 class Keeper:
-    """A thread; its methods may be called from any. Runs are looked at where a site asks for it by [retention] or
-    quota.output_bytes.
-    """
+    """A thread, with methods for any thread. Runs are measured where the site has [retention] or quota.output_bytes."""
 
     def __init__(
         self, settings: Settings, store: Store, lines: Farewells, is_open: Callable[[str], bool], sent: SentFiles
     ) -> None:
-        """``is_open`` says whether a run has not ended for good."""
+        """``is_open``: whether a run has not ended for good."""
         self._settings, self._store, self._lines, self._is_open, self._sent = settings, store, lines, is_open, sent
         self._rules = settings.site.retention
         asked = self._rules.oldest is not None or self._rules.bytes is not None
         self._weighs = asked or settings.site.quota.output_bytes is not None
         self.needed: Callable[[], Set[str]] = frozenset
-        """Hashes of files that nobody removes now."""
+        """Hashes of files that may not be removed now."""
         self._lock, self._asking = threading.Lock(), threading.Lock()
         self._asked_again = 0.0
         self._weights = Weights()
@@ -52,24 +50,21 @@ class Keeper:
         self._thread = threading.Thread(target=self._work, name="keeper", daemon=True)
 
     def start(self) -> None:
-        """Begins to look."""
+        """Starts the thread."""
         self._thread.start()
 
     def close(self) -> None:
-        """Looks no more."""
+        """Stops the thread."""
         self._leave.set()
         if self._thread.is_alive():
             self._thread.join(_PATIENCE)
 
     def kept(self, owner: str) -> int:
-        """Bytes of the folders of an owner's runs and of his files, at the last look."""
+        """Bytes of an owner's runs and files, at the last pass."""
         return self._kept[owner]
 
     def kept_now(self, owner: str) -> int:
-        """The same; where no thread looks they are looked at now, at most every ``_PATIENCE`` s.
-
-        Raises SQLAlchemyError.
-        """
+        """The same; without the thread they are measured now, at most every ``_PATIENCE`` s. Raises SQLAlchemyError."""
         with self._asking:
             if not self._weighs and time.monotonic() >= self._asked_again:
                 with suppress(OSError):
@@ -78,7 +73,7 @@ class Keeper:
         return self._kept[owner]
 
     def remove(self, run: Run, why: str) -> None:
-        """Removes the folder of a run that has ended; its line is on disk first. Raises OSError."""
+        """Removes the folder of a run that has ended; its record is on disk first. Raises OSError."""
         path = self._settings.runs / run.id
         if not path.is_dir():
             raise FileNotFoundError(path)
@@ -89,7 +84,7 @@ class Keeper:
             self._kept = self._weights.by_owner()
 
     def look(self) -> None:
-        """One look at what users have sent, and at all folders. Raises OSError, SQLAlchemyError."""
+        """One pass over the files of users and over all folders. Raises OSError, SQLAlchemyError."""
         for line in self._sent.purge(time.time(), self.needed()):
             _log.info("%s is removed: no run has it, and nobody has asked for it lately", line)
         if not self._weighs:
@@ -97,17 +92,17 @@ class Keeper:
         paths, known = self._all()
         self._weigh(paths, known)
         for run, why in self._due([known[path.name] for path in paths], time.time()):
-            with suppress(FileNotFoundError):  # its owner was faster
+            with suppress(FileNotFoundError):  # the owner has removed it meanwhile
                 self.remove(run, why)
                 _log.info("run %s of %s is removed: %s", run.id, run.owner, why)
 
     def _all(self) -> tuple[list[Path], dict[str, Run]]:
-        """The folders of all runs that the database knows, and these."""
+        """The folders of all runs in the database, and these."""
         known = {run.id: run for run in self._store.all()}
         return [path for path in folder.runs_in(self._settings.runs) if path.name in known], known
 
     def _weigh(self, paths: list[Path], known: dict[str, Run]) -> None:
-        """Reads the sizes of all folders but those that change no more, and of what users have sent."""
+        """Reads the sizes of the folders that may have changed, and of the files of users."""
         for path in paths:
             if path.name not in self._settled:
                 weighed = size(path), copies(path)
@@ -123,7 +118,7 @@ class Keeper:
             self._kept = self._weights.by_owner()
 
     def _due(self, runs: list[Run], now: float) -> Iterator[tuple[Run, str]]:
-        """The runs to be removed, oldest first, and why."""
+        """The runs to remove, oldest first, and the rule."""
         left, most, oldest = Left(self._weights), self._rules.bytes, self._rules.oldest
         for run in sorted(runs, key=lambda run: run.finished):
             old = oldest is not None and now - run.finished > oldest
@@ -148,7 +143,7 @@ class Keeper:
 
 
 def restore(store: Store, lines: Farewells) -> None:
-    """A database that was lost learns of the runs that have been removed. Raises SQLAlchemyError, OSError."""
+    """Marks removed runs in a database that was lost. Raises SQLAlchemyError, OSError."""
     ended = store.ended()
     for run_id in lines:
         line = lines.get(run_id)

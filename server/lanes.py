@@ -1,7 +1,7 @@
-"""Threads for work that may block: the disk, the database, long computations. Each user has a few of them at a time.
+"""Threads for work that may block: the disk, the database, long computations. Each user has a few at a time.
 
-The event loop itself never waits for a disk. Work that takes too long is answered with 503; its thread stays taken
-until the work ends, so that a disk that hangs takes no more threads than are allowed.
+The event loop never waits for a disk. Work that takes too long is answered with 503; its thread stays in use until
+the work ends, so that a disk that hangs takes no more threads than are allowed.
 """
 
 import asyncio
@@ -19,9 +19,9 @@ from .errors import ServiceError
 P = ParamSpec("P")
 T = TypeVar("T")
 THREADS = 64
-"""Of all users together. Chosen: a disk answers some ten requests at a time; memory of a thread: some 100 kB."""
+"""Threads for all users. Chosen: a disk answers some ten requests at a time; a thread takes some 100 kB."""
 asking: ContextVar[str] = ContextVar("asking", default="nobody")
-"""Who has made the request that is being answered: the name of a user, or an address."""
+"""The caller of the present request: the name of a user, or an address."""
 
 
 @dataclass(eq=False)
@@ -34,11 +34,11 @@ class _Job:
 
 
 class Lanes:
-    """A lane for each user. Belongs to the event loop."""
+    """One lane for each user. Used in the thread of the event loop."""
 
     def __init__(self, each: int, waiting: int, patience: float, most: int = THREADS) -> None:
-        """``each`` threads at a time and ``waiting`` jobs of a user, ``most`` threads of all users. ``patience``: s
-        that a job may take, its waiting included.
+        """``each``: threads at a time, ``waiting``: waiting jobs, both of one user; ``most``: threads of all users;
+        ``patience``: s that a job may take with its waiting.
         """
         self._each, self._waiting, self._patience, self._most = each, waiting, patience, most
         self._jobs: dict[str, deque[_Job]] = {}
@@ -47,9 +47,8 @@ class Lanes:
         self._threads = self._busy = 0
 
     async def run(self, work: Callable[P, T], *args: P.args, **words: P.kwargs) -> T:
-        """The value of ``work``, which a thread computes for who is ``asking``; raises what it raises.
-
-        Raises ServiceError 429 when too many jobs of the user wait, 503 when the work takes too long.
+        """The result of ``work``, computed in a thread for the caller; raises its errors. Raises ServiceError 429
+        when too many jobs of the user wait, 503 when the work takes too long.
         """
         who, loop = asking.get(), asyncio.get_running_loop()
         waiting = self._jobs.setdefault(who, deque())
@@ -72,14 +71,14 @@ class Lanes:
         return ServiceError(503, "unavailable", detail, retryable=True, headers={"Retry-After": "5"})
 
     def _forget(self, job: _Job) -> None:
-        """Nobody waits for the job any more; one that has not begun never does."""
+        """Gives a job up; one that has not begun is not started."""
         if not job.begun:
             self._jobs[job.who].remove(job)
             if not self._jobs[job.who]:
                 del self._jobs[job.who]
 
     def _begin(self) -> None:
-        """Hands jobs to threads, users in turn."""
+        """Gives jobs to threads, one user after the other."""
         while self._busy < self._most:
             who = next((who for who, jobs in self._jobs.items() if jobs and self._taken[who] < self._each), None)
             if who is None:
@@ -97,7 +96,7 @@ class Lanes:
             self._handed.put(job)
 
     def _work(self) -> None:
-        """A thread. It is a daemon: one that hangs does not keep the server from ending."""
+        """A daemon thread: one that hangs does not keep the server from ending."""
         while True:
             job = self._handed.get()
             value, error = None, None
@@ -118,17 +117,17 @@ class Lanes:
             del self._taken[job.who]
         if not job.done.done():
             job.done.set_result(value) if error is None else job.done.set_exception(error)
-            job.done.exception()  # read: nobody may wait for it any more
+            job.done.exception()  # read, since the caller may have left
         self._begin()
 
 
 def busy(detail: str) -> ServiceError:
-    """429: the same user has too much in progress."""
+    """429: too many requests of the same user are in progress."""
     return ServiceError(429, "busy", detail, retryable=True, headers={"Retry-After": "5"})
 
 
 def blocking(route: Callable[P, T]) -> Callable[P, Awaitable[T]]:
-    """A route, or what a route depends on, that may block: it takes ``service`` and runs in the user's lane."""
+    """Decorator for a route, or a dependency, that may block: it takes ``service`` and runs in the user's lane."""
 
     @wraps(route)
     async def run(*args: P.args, **words: P.kwargs) -> T:
