@@ -18,7 +18,7 @@ export class Files {
     if (this.fold.open) this.read();
   }
 
-  // The files of the run: [{ path, size }]; they stay as they were where the server does not answer.
+  // The files of the run: [{ path, size }], null where they are not known; they stay as they were where the server does not answer.
   async read() {
     try {
       const { files } = await call(this.path);
@@ -28,7 +28,7 @@ export class Files {
     } catch (error) {
       this.note.textContent = error.message;
     }
-    return this.known ?? [];
+    return this.known ?? null;
   }
 
   // Those of the run's folder itself, then each folder below it, closed.

@@ -7,7 +7,7 @@ const OLD = 5; // s without a message or the server after which the age of the n
 
 export class Headline {
   // `ask(verb)` asks the server for a checkpoint or a snapshot, or cancels.
-  constructor(ask) {
+  constructor(run, ask) {
     this.title = h("h1");
     this.sub = h("div.sub");
     this.link = h("span.link", { role: "status" });
@@ -16,8 +16,9 @@ export class Headline {
     this.progress = h("div.progress");
     this.buttons = ["checkpoint", "snapshot", "cancel"].map((verb) =>
       h(verb === "cancel" ? "button.stop" : "button.quiet", { type: "button", "data-verb": verb, onclick: () => ask(verb) }, verb[0].toUpperCase() + verb.slice(1)));
+    this.again = h("a.button", { href: `#/new?from=${encodeURIComponent(run)}` }, "Open the case");
     this.element = h("header.head", {},
-      h("div.run-head", {}, h("div.titles", {}, this.title, this.sub), h("div.side", {}, this.link, this.state, this.buttons)),
+      h("div.run-head", {}, h("div.titles", {}, this.title, this.sub), h("div.side", {}, this.link, this.state, this.buttons, this.again)),
       this.progress, this.told);
   }
 

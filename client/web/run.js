@@ -38,7 +38,7 @@ export class RunPage {
 
   build() {
     const { live } = this;
-    this.head = new Headline((verb) => this.ask(verb));
+    this.head = new Headline(live.run, (verb) => this.ask(verb));
     this.numbers = new Numbers();
     this.notes = { residual: h("span.note"), imbalance: h("span.note"), counts: h("span.note") };
     this.logs = new Logs(live);

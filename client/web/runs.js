@@ -59,7 +59,7 @@ export class RunsPage {
     this.table.hidden = !runs.length;
     if (next) this.say(`The newest ${runs.length} are shown; `, h("code", {}, "conoid ls --limit 1000"), " lists more.");
     else if (runs.length) this.say();
-    else this.say("No runs yet. Submit one: ", h("code", {}, "conoid submit taylor_copper"));
+    else this.say("No runs yet. ", h("a", { href: "#/new?case=taylor_copper" }, "Begin with a shipped case"), ", or on the command line: ", h("code", {}, "conoid submit taylor_copper"));
   }
 }
 

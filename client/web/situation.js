@@ -22,7 +22,7 @@ const POINT = /^checkpoints\/(\d+)\/manifest\.json$/;
 const BAD = new Set(["failed", "lost", "timed_out", "cancelled"]);
 
 export class Situation {
-  // `files()` promises the files of the run.
+  // `files()` promises the files of the run, null where they are not known.
   constructor(run, files) {
     Object.assign(this, { run, files, told: "" });
     this.path = `v1/runs/${encodeURIComponent(run)}`;
@@ -41,19 +41,17 @@ export class Situation {
 
   async fill(live) {
     const log = h("pre.log", { tabindex: 0, role: "region", "aria-label": "end of the log", hidden: "" });
-    const actions = h("div.actions", {}, this.open());
+    const actions = h("div.actions");
     this.element.replaceChildren(h("div", {}, h("h2", {}, sentence(live)), live.message ? h("p", {}, live.message) : "",
       h("p.hint", {}, reached(live)), HELP[live.cause] ? h("p", {}, HELP[live.cause]) : "", actions), log);
     const [files, lines] = await Promise.all([this.files(), this.end(live)]);
-    const point = files.filter(({ path }) => POINT.test(path)).at(-1);
-    if (point) actions.prepend(this.restart(POINT.exec(point.path)[1]));
-    else if (live.cause !== "input") actions.append(h("span.hint", {}, "It has left no checkpoint to go on from."));
+    const point = files?.filter(({ path }) => POINT.test(path)).at(-1);
+    if (point) actions.append(this.restart(POINT.exec(point.path)[1]));
+    else if (files) actions.append(h("span.hint", {}, "It has left no checkpoint to go on from; open the case, change it and start again."));
     log.hidden = !lines;
     log.replaceChildren(lines);
     log.scrollTop = log.scrollHeight;
   }
-
-  open() { return h("a.button", { href: `#/new?from=${encodeURIComponent(this.run)}` }, "Open the case"); }
 
   restart(step) {
     const button = h("button", { type: "button", onclick: async () => {

@@ -48,10 +48,10 @@ const stage = {
 Object.assign(globalThis, stage);
 
 export const state = { served: () => { throw new Error("away"); }, asked: [] };
-globalThis.fetch = async (url) => {
+globalThis.fetch = async (url, options = {}) => {
   const path = new URL(url).pathname.slice(1);
   state.asked.push(path);
-  const told = state.served(path);
+  const told = state.served(path, options);
   const status = typeof told === "number" ? told : 200;
   return { ok: status < 300, status, headers: new Map(), json: async () => told };
 };

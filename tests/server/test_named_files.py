@@ -106,6 +106,24 @@ def validated(user: User, data: dict[str, Any], status: int) -> dict[str, Any]:
     return told
 
 
+def test_a_check_names_the_files_of_a_case_whatever_is_wrong_with_it(server: Running, quick: list[Path]) -> None:
+    def verdict(made: dict[str, Any]) -> dict[str, Any]:
+        answer: dict[str, Any] = server.ann.http.post(
+            "/v1/cases:validate", content=json.dumps(made), headers=JSON
+        ).json()
+        return answer
+
+    named = {"key": "parts[0].mesh", "path": "a.inp", "sha256": HASH}
+    without, lacking = verdict(case("a.inp", None)), verdict({**case("a.inp"), "wrong": 1})
+    assert (without["valid"], without["files"]) == (False, [{**named, "sha256": ""}])
+    assert (lacking["valid"], lacking["files"]) == (False, [named])
+    unsent = verdict(case("a.inp"))
+    assert (unsent["problems"][0]["key"], unsent["files"]) == ("parts[0].mesh.sha256", [named])
+    send(server.ann)
+    found = verdict(case("a.inp"))
+    assert (found["valid"], found["files"]) == (True, [named])
+
+
 def test_the_hash_is_of_the_run_and_of_its_key(server: Running, quick: list[Path]) -> None:
     """The same key with another file is another case."""
     other = send(server.ann, MESH + b"** another\n")

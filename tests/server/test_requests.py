@@ -15,6 +15,7 @@ from fastapi.routing import APIRoute
 from starlette.requests import Request
 from starlette.testclient import TestClient
 
+from conoid.cases.load import shipped_path
 from conoid.cases.reference import json_schema
 from conoid.server import reference, shapes
 from conoid.server.app import ROUTERS, build_app, opened
@@ -197,7 +198,7 @@ def test_a_wrong_case_names_key_value_and_what_is_allowed(server: Running, text:
     assert words in entry["message"]
     assert problem["errors"][0]["key"] in problem["detail"]
     verdict = server.ann.http.post("/v1/cases:validate", content=text, headers=TOML).json()
-    assert verdict == {"valid": False, "problems": problem["errors"]}
+    assert verdict == {"valid": False, "problems": problem["errors"], "files": []}
     assert server.ann.http.get("/v1/runs").json()["runs"] == []
 
 
@@ -419,6 +420,10 @@ def test_the_gallery(server: Running) -> None:
         answer = server.ann.http.get(case["url"])
         assert answer.headers["content-type"].startswith("application/toml")
         assert f'name = "{case["name"]}"' in answer.text
+    deck = server.ann.http.get("/v1/cases/imported_taylor/files/imported_taylor.inp")
+    assert deck.content == shipped_path("imported_taylor").with_suffix(".inp").read_bytes()
+    for file in ("imported_taylor.toml", "taylor_copper.toml", "..%2F..%2Fpyproject.toml"):
+        assert server.ann.http.get(f"/v1/cases/imported_taylor/files/{file}").status_code == 404
 
 
 def test_validate_gives_the_estimate_and_every_default(server: Running) -> None:
