@@ -18,7 +18,7 @@ from .errors import ClientError
 from .result import Result
 
 MODULES = (
-    "arrows.js", "body.js", "colours.js", "eye.js", "figures.js", "framing.js", "outlines.js", "overlay.js",
+    "arrows.js", "body.js", "colours.js", "eye.js", "figures.js", "framing.js", "keys.js", "outlines.js", "overlay.js",
     "picked.js", "ranges.js", "saving.js", "scales.js", "section.js", "shaders.js", "snapshot.js", "surface.js",
     "tools.js", "view3d.js",
 )  # fmt: skip

@@ -2,10 +2,11 @@
 
 import { binary, call } from "./api.js";
 import { count, counted, h, si } from "./figures.js";
+import { act } from "./keys.js";
 import { three } from "./libraries.js";
 import { Picked, table } from "./picked.js";
 import { range } from "./ranges.js";
-import { film, hindrance, picture } from "./saving.js";
+import { film, picture } from "./saving.js";
 import { unpack } from "./section.js";
 import { colourings, decode, fragment, rowOf } from "./snapshot.js";
 import { Tools } from "./tools.js";
@@ -44,11 +45,7 @@ export class Body {
   }
 
   listen() {
-    this.scrub.oninput = () => {
-      this.pause();
-      this.following = Number(this.scrub.value) === this.entries.length - 1;
-      this.show(Number(this.scrub.value));
-    };
+    this.scrub.oninput = () => this.step(0);
     this.playing.onclick = () => (this.player ? this.pause() : this.play());
   }
 
@@ -218,16 +215,13 @@ export class Body {
   }
 
   key(event) {
-    if (event.ctrlKey || event.metaKey || event.altKey) return;
-    const flip = (name) => { this.tools[name].checked = !this.tools[name].checked; this.set(name, this.tools[name].checked); };
-    const keys = {
-      i: () => this.view.eye.view("isometric"), f: () => this.follow("fit"), a: () => this.follow("all"), e: () => flip("edges"), o: () => flip("lines"),
-      v: () => flip("arrows"), m: () => this.planes.length && flip("mirror"), " ": () => this.playing.click(), ",": () => this.step(-1), ".": () => this.step(1),
-      ...Object.fromEntries(["x", "y", "z"].flatMap((name) => [[name, () => this.view.eye.view(`+${name}`)], [name.toUpperCase(), () => this.view.eye.view(`-${name}`)]])),
-    };
-    if (!keys[event.key]) return;
-    keys[event.key]();
+    if (event.ctrlKey || event.metaKey || event.altKey || !act(this, event.key)) return;
     event.preventDefault();
+  }
+
+  flip(name) {
+    this.tools[name].checked = !this.tools[name].checked;
+    this.set(name, this.tools[name].checked);
   }
 
   step(by) {
@@ -287,18 +281,12 @@ export class Body {
 
   async save(kind) {
     const name = `${this.run}-${this.tools.by.value}`;
-    const { saved, filming } = this.tools;
     if (kind === "picture") return picture(this.view, `${name}-${String(this.snapshot.header.n).padStart(3, "0")}`);
     if (this.filmed) return this.filmed.abort();
-    saved.textContent = hindrance();
-    if (saved.textContent) return null;
     this.pause();
     this.following = false;
     this.filmed = new AbortController();
-    filming.textContent = "Stop";
-    await film(this.view, name, this.entries.length, (i) => this.show(i), (i) => { saved.textContent = `snapshot ${i + 1} of ${this.entries.length}`; }, this.filmed.signal);
-    saved.textContent = this.filmed.signal.aborted ? "stopped" : "saved";
-    filming.textContent = "Film";
+    await this.tools.whileFilming((told) => film(this.view, name, this.entries.length, (i) => this.show(i), (i) => told(`snapshot ${i + 1} of ${this.entries.length}`), this.filmed.signal));
     return (this.filmed = null);
   }
 

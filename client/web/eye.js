@@ -103,9 +103,15 @@ export class Eye {
     this.onMode?.();
   }
 
+  // Places that the frame shows, of all views that share it.
   list(more = {}) {
+    return [this, ...this.others].flatMap((eye) => eye.places({ all: this.mode === "all", ...more }));
+  }
+
+  places(more) {
     const { snapshot, mirrors, shown } = this.framed();
-    return mirrored(points(snapshot, { all: this.mode === "all", shown, ...more }), mirrors);
+    if (!snapshot) return [];
+    return mirrored(points(snapshot, { shown, ...more }), mirrors);
   }
 
   fit(more = {}) {

@@ -29,7 +29,7 @@ export function hindrance() {
   return KINDS.some((kind) => MediaRecorder.isTypeSupported(kind)) ? "" : "This browser makes no films in WebM.";
 }
 
-// `show(i)` shows snapshot i and returns when it stands; `told(i)` is called before each; `signal` ends it early.
+// What came of it. `show(i)` shows snapshot i and returns when it stands; `told(i)` is called before each; `signal` ends it early.
 export async function film(view, name, number, show, told, signal) {
   const canvas = composed(view);
   const stream = canvas.captureStream(RATE);
@@ -50,7 +50,9 @@ export async function film(view, name, number, show, told, signal) {
   recorder.stop();
   await ended;
   stream.getTracks().forEach((track) => track.stop());
-  if (!signal.aborted) download(new Blob(pieces, { type: "video/webm" }), `${name}.webm`);
+  if (signal.aborted) return "stopped";
+  download(new Blob(pieces, { type: "video/webm" }), `${name}.webm`);
+  return "saved";
 }
 
 const pause = (ms) => new Promise((done) => setTimeout(done, ms));

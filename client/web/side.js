@@ -1,10 +1,12 @@
 // Bodies of several runs side by side: one camera, and one clock, the nearest snapshot of each.
 
 import { binary } from "./api.js";
-import { colourings, decode } from "./snapshot.js";
-import { h, si, words } from "./figures.js";
+import { share } from "./eye.js";
+import { h, si } from "./figures.js";
 import { three } from "./libraries.js";
 import { swatch } from "./lines.js";
+import { rounded, scaleOf } from "./scales.js";
+import { colourings, decode } from "./snapshot.js";
 import { View3d } from "./view3d.js";
 
 const MOST = 4;
@@ -85,13 +87,11 @@ export class SideBySide {
 
   pane(run, modules) {
     const view = new View3d(modules, () => {});
-    const holder = h("div.view3d", { "aria-label": `the body of ${run.called}` });
     Object.assign(view.canvas, { tabIndex: 0 });
     view.canvas.setAttribute("role", "application");
     view.canvas.setAttribute("aria-label", `the body of ${run.called}; arrow keys turn all bodies, plus and minus zoom`);
-    holder.append(view.element ?? view.canvas);
     const caption = h("figcaption", {});
-    return { run, view, kept: new Map(), caption, element: h("figure.pane", {}, h("div.who", {}, swatch(run.line), run.called), holder, caption) };
+    return { run, view, kept: new Map(), caption, element: h("figure.pane", {}, h("div.who", {}, swatch(run.line), run.called), view.element, caption) };
   }
 
   get t() { return (Number(this.clock.value) / STEPS) * this.end; }
@@ -140,14 +140,15 @@ export class SideBySide {
     const names = (lists[0] ?? []).filter((name) => lists.every((list) => list.includes(name)));
     if (!names.length || names.join() === [...this.by.options].map(({ value }) => value).join()) return;
     const before = this.by.value;
-    this.by.replaceChildren(...names.map((name) => h("option", { value: name }, words(name))));
+    this.by.replaceChildren(...names.map((name) => h("option", { value: name }, ["fragment", "part", "rank"].includes(name) ? name : scaleOf(name).label)));
     this.by.value = names.includes(before) ? before : names[0];
   }
 
   // One range of colours for all bodies that are shown.
   range(name) {
     const fields = [...this.panes.values()].map(({ snapshot }) => snapshot?.header.fields[name]).filter(Boolean);
-    return [Math.min(...fields.map(({ low }) => low)), Math.max(...fields.map(({ high }) => high))];
+    const [low, high, number] = rounded(Math.min(...fields.map((field) => field.low)), Math.max(...fields.map((field) => field.high)));
+    return { low, high, number };
   }
 
   paint() {
@@ -176,27 +177,4 @@ export class SideBySide {
     this.watch?.disconnect();
     for (const { view } of this.panes.values()) view.close();
   }
-}
-
-// All views have the camera of the one that was moved last.
-function share(views) {
-  for (const view of views) {
-    view.onMove = () => {
-      for (const other of views) if (other !== view) follow(other, view);
-    };
-    view.listening ??= (view.controls.addEventListener("change", () => view.following || view.onMove()), true);
-  }
-}
-
-function follow(view, { camera, controls }) {
-  view.following = true;
-  view.camera.position.copy(camera.position);
-  view.camera.up.copy(camera.up);
-  view.controls.target.copy(controls.target);
-  Object.assign(view, { moved: true, aimed: true });
-  Object.assign(view.camera, { near: camera.near, far: camera.far });
-  view.camera.updateProjectionMatrix();
-  view.controls.update();
-  view.later();
-  view.following = false;
 }

@@ -3,6 +3,7 @@
 import { named } from "./colours.js";
 import { VIEW_NAMES } from "./eye.js";
 import { h, si, words } from "./figures.js";
+import { hindrance } from "./saving.js";
 import { scaleOf } from "./scales.js";
 
 const CUTS = ["none", "x", "y", "z", "as seen"];
@@ -105,6 +106,17 @@ export class Tools {
     this.filming = button("Film", "save a film of the snapshots (WebM)", () => this.act.save("film"));
     this.saved = h("p.hint", { role: "status" });
     return h("div.lines", {}, h("div.buttons", {}, button("Picture", "save a picture (PNG)", () => this.act.save("picture")), this.filming), this.saved);
+  }
+
+  // `make` makes a film, and tells how far it is; what comes of it stands beside the button.
+  async whileFilming(make) {
+    const problem = hindrance();
+    this.saved.textContent = problem;
+    if (problem) return;
+    this.filming.textContent = "Stop";
+    const ended = await make((text) => { this.saved.textContent = text; }).catch((error) => error.message);
+    this.saved.textContent = ended;
+    this.filming.textContent = "Film";
   }
 
   // `list`: names of what can be chosen to colour by.

@@ -1,0 +1,16 @@
+// Keys of the body, beside those that turn it (eye.js).
+
+const AXES = ["x", "y", "z"];
+const KEYS = {
+  i: (body) => body.view.eye.view("isometric"), f: (body) => body.follow("fit"), a: (body) => body.follow("all"), e: (body) => body.flip("edges"),
+  o: (body) => body.flip("lines"), v: (body) => body.flip("arrows"), m: (body) => body.planes.length && body.flip("mirror"),
+  " ": (body) => body.playing.click(), ",": (body) => body.step(-1), ".": (body) => body.step(1),
+  ...Object.fromEntries(AXES.flatMap((name) => [[name, (body) => body.view.eye.view(`+${name}`)], [name.toUpperCase(), (body) => body.view.eye.view(`-${name}`)]])),
+};
+
+// Does what a key says; whether it says anything.
+export function act(body, key) {
+  if (!Object.hasOwn(KEYS, key)) return false;
+  KEYS[key](body);
+  return true;
+}
