@@ -8,6 +8,7 @@ import io
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
 
@@ -15,13 +16,17 @@ import msgspec
 
 from .history import header
 from .key_units import unit_of_key
-from .outcome import Outcome
+from .messages import Energy
+from .outcome import Check, Measured, Outcome
+from .quantities import FIELD_UNITS, unit_of
+from .schema import Case
 from .units import parse_unit, written
 
 Cell = int | float | str | None
 """None: not known."""
 Named = tuple[str, str]
 """The name of a column and its unit, which is empty where there is none."""
+_VERDICTS = "no", "yes"
 KEY, RUN, RESULT = "key", "run", "result"
 
 _COUNTS = ("fragments", "broken", "eroded")
@@ -30,14 +35,15 @@ _FORMULA = re.compile(r"[=@\t\r]|[+-](?!(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?( [^\W\d
 """The beginning of a text that a spreadsheet computes. A number with a sign, and perhaps a unit, is not one."""
 
 
-class Point(msgspec.Struct, kw_only=True, frozen=True):
-    """What was changed, by key, the run, and how it ended; ``outcome`` is None before that."""
+@dataclass(frozen=True, kw_only=True)
+class Point:
+    """What was changed, by key, the run, and its ``results``, which are none before its end."""
 
     values: Mapping[str, Any]
     run: str = ""
     state: str = ""
     cause: str = ""
-    outcome: Outcome | None = None
+    results: Mapping[Named, Cell] = field(default_factory=dict)
 
 
 class Column(msgspec.Struct, kw_only=True, frozen=True):
@@ -68,10 +74,9 @@ def table(points: Sequence[Point]) -> list[Column]:
 
 
 def _results(points: Sequence[Point]) -> list[Column]:
-    lines = [results(point.outcome) for point in points]
-    names = dict.fromkeys(name for line in lines for name in line)
+    names = dict.fromkeys(name for point in points for name in point.results)
     return [
-        Column(name=name, unit=unit, kind=RESULT, values=[line.get((name, unit)) for line in lines])
+        Column(name=name, unit=unit, kind=RESULT, values=[point.results.get((name, unit)) for point in points])
         for name, unit in names
     ]
 
@@ -96,13 +101,27 @@ def results(ended: Outcome | None) -> dict[Named, Cell]:
     return {name: None if isinstance(value, float) and math.isnan(value) else value for name, value in found.items()}
 
 
+def names(case: Case) -> dict[str, str]:
+    """The results that are numbers of a run of a case, each with its unit."""
+    probes = [Measured(name=probe.name, value=0.0, unit=FIELD_UNITS[probe.field]) for probe in case.probes]
+    fields = {probe.name: probe.field for probe in case.probes}
+    checks = [
+        Check(name=each.title, value=0.0, expected=0.0, tolerance=0.0, passed=True,
+              unit=unit_of(each.quantity, fields.get(each.probe or "")))
+        for each in case.reference
+    ]  # fmt: skip
+    energy = Energy(**dict.fromkeys(Energy.__struct_fields__, 0.0))
+    like = Outcome(state="succeeded", probes=probes, reference=checks, energy=energy)
+    return {name: unit for (name, unit), value in results(like).items() if name != "digest" and value not in _VERDICTS}
+
+
 def _references(ended: Outcome) -> dict[Named, Cell]:
     """Value and verdict of each; those of one title are numbered."""
     found: dict[Named, Cell] = {}
     for n, check in enumerate(ended.reference):
         before = sum(each.name == check.name for each in ended.reference[:n])
         name = f"reference.{check.name}" + (f" ({before + 1})" if before else "")
-        found |= {(name, check.unit): check.value, (f"{name}.passed", ""): "yes" if check.passed else "no"}
+        found |= {(name, check.unit): check.value, (f"{name}.passed", ""): _VERDICTS[check.passed]}
     return found
 
 

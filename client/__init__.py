@@ -7,12 +7,14 @@ and gives its result; a result is viewed.
 from conoid.cases.problems import CaseError, ConoidError
 
 from .errors import ClientError, NotFoundError, ServiceError, UnfinishedError, UnreachableError, ViewError
+from .found import Found
 from .result import Result
 from .run import Run
 from .session import Session, connect
+from .sweep import Sweep
 from .told import RunInfo
 
 __all__ = [
-    "CaseError", "ClientError", "ConoidError", "NotFoundError", "Result", "Run", "RunInfo", "ServiceError", "Session",
-    "UnfinishedError", "UnreachableError", "ViewError", "connect",
+    "CaseError", "ClientError", "ConoidError", "Found", "NotFoundError", "Result", "Run", "RunInfo", "ServiceError",
+    "Session", "Sweep", "UnfinishedError", "UnreachableError", "ViewError", "connect",
 ]  # fmt: skip

@@ -64,11 +64,14 @@ class Router(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class Me(msgspec.Struct, kw_only=True, frozen=True):
-    """Who the server takes us for, what the token allows, and how to subscribe over Zenoh (None: not possible)."""
+    """Who the server takes us for, what the token allows, how to subscribe over Zenoh (None: not possible), and the
+    cores of its runs: ``total`` and ``used``.
+    """
 
     owner: str
     scopes: list[str] = []
     zenoh: Router | None = None
+    slots: dict[str, int] = {}
 
 
 class Http:

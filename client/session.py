@@ -14,13 +14,16 @@ import msgspec
 from conoid.cases.load import CaseError, Overrides, Problem
 from conoid.cases.problems import shown
 
+from .adaptive import MOST, found_by
 from .config import target
 from .errors import MissingError, NotFoundError, ServiceError, UsageError
+from .found import Found
+from .goal import span_of
 from .http import NOT_FOUND, Http
-from .outbox import SURVEY, Outbox
+from .outbox import SURVEY, Outbox, place_of
 from .places import quoted
 from .run import Run
-from .submission import CaseSource, to_json
+from .submission import CaseSource, data_of, to_json
 from .sweep import Point, Sweep, SweepInfo, SweepPage, listed, points_along
 from .told import ID, RunInfo
 
@@ -119,20 +122,41 @@ class Session(Http):
 
     def sweep(
         self, case: CaseSource, points: Sequence[Point] | Mapping[str, Iterable[Any]], at_once: int | None = None,
-        key: str | None = None, *, grid: bool = False, folder: Path | str | None = None,
+        key: str | None = None, *, grid: bool = False, folder: Path | str | None = None, again: bool = False,
     ) -> Sweep:  # fmt: skip
         """Hands a case in at many points, each a mapping of keys to values: all become runs, or none.
 
         A mapping of keys to as many values each is one point after the other, or each with each for a ``grid``.
-        ``at_once`` of them run at a time; ``key`` and ``folder`` as for ``submit``. Raises CaseError, ServiceError.
+        ``at_once`` of them run at a time; ``key`` and ``folder`` as for ``submit``: the same key is the same sweep, of
+        which ``again`` runs the points once more that have ended without success. Raises CaseError, ServiceError.
         """
         chosen = listed(points_along(points, grid=grid) if isinstance(points, Mapping) else points)
         data, told, more = self.outbox.sweep(case, chosen, folder)
         body = to_json({"case": data, "points": told, "at_once": at_once})
-        made = self.post(
-            SweepInfo, "/v1/sweeps", body, "application/json", key or str(uuid.uuid4()), more + _POINT * len(chosen)
-        )
+        kind, more = "application/json", more + _POINT * len(chosen)
+        made = self.post(SweepInfo, "/v1/sweeps", body, kind, key or str(uuid.uuid4()), more)
+        if again and made.failed:
+            made = self.post(SweepInfo, f"/v1/sweeps/{quoted(made.id)}:again", body, kind, more=more)
         return Sweep(self, made.id)
+
+    def adaptive_sweep(
+        self, case: CaseSource, spans: Mapping[str, Sequence[Any]], goal: str, tolerance: Any = None, *,
+        overrides: Overrides = (), at_once: int | None = None, most: int = MOST, out: Path | str | None = None,
+        folder: Path | str | None = None, say: Callable[[str], None] = lambda text: None,
+    ) -> Found:  # fmt: skip
+        """Where a result passes a threshold, ``goal``: ``"probe.core_speed = 0"``, any column of the table of a sweep.
+
+        ``spans`` has the keys that vary, together, and both ends of each: ``{"parts[0].velocity[2]": ("-200 m/s",
+        "-800 m/s")}``. Runs are made, ``at_once`` of them at a time (None: as the server has room), at most ``most``,
+        until the threshold lies in a bracket of ``tolerance``, by the first key: a quantity, a hundredth of the larger
+        end when it is None. ``out`` is a JSON file from which a later call goes on: what has succeeded is not run
+        again. ``say`` hears of each run. Raises CaseError, UsageError for a file of another sweep, ClientError.
+        """
+        data = data_of(case, overrides)
+        return found_by(
+            self, data, place_of(case, folder), goal, [span_of(key, ends) for key, ends in spans.items()], tolerance,
+            at_once, most, None if out is None else Path(out), say,
+        )  # fmt: skip
 
     def sweeps(self) -> list[SweepInfo]:
         """Our sweeps, newest first, without their points."""

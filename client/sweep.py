@@ -6,7 +6,8 @@ import itertools
 import math
 import time
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -24,6 +25,8 @@ from .places import quoted
 from .run import Run
 from .told import ID, RunInfo
 
+_LOOK = 2.0
+"""s after which is looked which runs have ended. Chosen."""
 _COLUMNS = {"run", "state"}
 """That the table of every sweep has."""
 Point = dict[str, Any]
@@ -50,6 +53,12 @@ class SweepInfo(msgspec.Struct, kw_only=True, frozen=True):
     at_once: int | None = None
     removed: int = 0
     points: list[SweepPoint] = []
+
+    @property
+    def failed(self) -> int:
+        """Runs that have ended without success, or were removed."""
+        bad = (n for state, n in self.states.items() if State(state).final and state != State.SUCCEEDED)
+        return sum(bad) + self.removed
 
     @property
     def over(self) -> bool:
@@ -84,12 +93,28 @@ class Sweep:
         """A handle of each of its runs, in the order of the points."""
         return [Run(self.session, point.run.id) for point in self.status().points]
 
-    def wait(self, timeout: float | None = None) -> SweepInfo:
-        """Returns when all runs have ended. Raises TimeoutError after ``timeout`` s."""
+    def wait(
+        self, timeout: float | None = None, say: Callable[[SweepInfo, SweepPoint], None] = lambda info, point: None
+    ) -> SweepInfo:
+        """Returns when all runs have ended. Raises TimeoutError after ``timeout`` s. ``say`` hears of each point whose
+        run has ended, with what is known of all then.
+        """
         deadline = math.inf if timeout is None else time.monotonic() + timeout
-        for run in self.runs():
-            run.wait(None if timeout is None else max(0.0, deadline - time.monotonic()))
-        return self.status()
+        told = set[str]()
+        while True:
+            info = self.status()
+            for point in info.points:
+                if point.run.state.final and point.run.id not in told:
+                    told.add(point.run.id)
+                    say(info, point)
+            left = [point for point in info.points if not point.run.state.final]
+            if not left:
+                return info
+            first = Run(self.session, left[0].run.id)
+            with suppress(TimeoutError):
+                first.wait(min(_LOOK, max(0.0, deadline - time.monotonic())))
+            if time.monotonic() >= deadline:
+                raise TimeoutError(f"sweep {self.id}: {len(left)} of {info.total} runs have not ended")
 
     def cancel(self) -> SweepInfo:
         """Asks every run to stop; to ask twice does no harm."""
@@ -106,7 +131,7 @@ class Sweep:
 
     def table(self) -> list[dict[str, str]]:
         """The lines of the table by column, as text."""
-        return list(csv.DictReader(io.StringIO(self.csv())))
+        return text_rows(self.csv())
 
     def frame(self) -> Any:
         """The table as a pandas.DataFrame. Raises ClientError without pandas."""
@@ -128,26 +153,38 @@ class Sweep:
         return curves.save(swept.figure(self.table(), keys, x, columns), Path(out))
 
 
+def text_rows(text: str) -> list[dict[str, str]]:
+    """The lines of a table in CSV by column."""
+    return list(csv.DictReader(io.StringIO(text)))
+
+
 def points_of(words: Iterable[str], *, grid: bool = False) -> list[Point]:
     """The points of ``key=a,b,c``: one after the other with all keys at once, or each with each for a ``grid``.
 
-    Raises CaseError.
+    A key with one value has it at every point. Raises CaseError.
     """
+    return points_along(axes_of(words), grid=grid, named="--set")
+
+
+def axes_of(words: Iterable[str]) -> dict[str, list[Any]]:
+    """The values of each key of ``key=a,b,c``. Raises CaseError."""
     axes = [_axis(word) for word in words]
     if not axes:
         raise CaseError([Problem("--set", "", "write at least one key with its values, such as run.ranks=1,2")])
     _once("--set", (key for key, _ in axes), "write all values of a key at once, such as run.ranks=1,2")
-    return points_along(dict(axes), grid=grid, named="--set")
+    return dict(axes)
 
 
 def points_along(axes: Mapping[str, Iterable[Any]], *, grid: bool = False, named: str = "points") -> list[Point]:
     """The points of the values of each key: one after the other with all keys at once, or each with each for a
-    ``grid``; ``named``: what errors call them. Raises CaseError.
+    ``grid``; a list of one value holds at every point. ``named``: what errors call them. Raises CaseError.
     """
     lists = {key: _values(key, values, named) for key, values in axes.items()}
     if grid:
         rows: Iterable[tuple[Any, ...]] = itertools.product(*lists.values())
     else:
+        most = max((len(values) for values in lists.values()), default=0)
+        lists = {key: values * most if len(values) == 1 else values for key, values in lists.items()}
         counts = {key: len(values) for key, values in lists.items()}
         if len(set(counts.values())) > 1:
             told = ", ".join(f"{key} has {n}" for key, n in counts.items())

@@ -1,27 +1,77 @@
 """``conoid sweep``: hand in, look at, cancel, the table and the plot."""
 
+import hashlib
+import json
+import uuid
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
+from conoid.cases.cores import usable_cores
 from conoid.cases.figures import counted
+from conoid.cases.load import CaseError, parse_case
+from conoid.cases.points import KEY, to_csv
 from conoid.cases.run import State
 
+from . import adapting
 from .console import echo, echo_json
-from .errors import UsageError
+from .errors import ServiceError, UsageError
+from .local import LocalServer
 from .options import CaseArgument, Json, Ranks, Threads, Token, Url, aloud, complain, on_cores, sweep_named
+from .reports import drawing
 from .saving import save_text
-from .session import connect
-from .submission import data_of, folder_of
-from .sweep import SweepInfo, SweepPoint, points_in, points_of
+from .session import Session, connect
+from .submission import data_of, folder_of, locate
+from .sweep import Point, Sweep, SweepInfo, SweepPoint, points_in, points_of, text_rows
+from .sweep_files import columns_of, file_named
 
 SweepArgument = Annotated[
-    str, typer.Argument(metavar="SWEEP", callback=sweep_named, help="Id of a sweep or its beginning, or 'last'.")
+    str,
+    typer.Argument(
+        metavar="SWEEP", callback=sweep_named, help="The id of a sweep or its beginning, 'last', or the file of one."
+    ),
 ]
 Sets = Annotated[
-    list[str] | None, typer.Option("--set", metavar="KEY=A,B,C", help="Values of a key; may be given again.")
+    list[str] | None,
+    typer.Option(
+        "--set", metavar="KEY=A,B,C",
+        help="Values of a key, or one for all points; KEY=LOW:HIGH with --adaptive. May be given again.",
+    ),
+]  # fmt: skip
+Adaptive = Annotated[
+    str | None,
+    typer.Option("--adaptive", metavar="'RESULT = VALUE'", help="Find where a result of the table passes a value."),
 ]
+Tolerance = Annotated[
+    str | None, typer.Option("--tolerance", help="With --adaptive: width of the bracket; 1 % of the larger end.")
+]
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where the runs are made: on a server, or with one of our own in a folder of this machine."""
+
+    local: bool
+    runs: Path
+    url: str | None
+    token: str | None
+
+    @contextmanager
+    def session(self, data: Mapping[str, Any]) -> Iterator[Session]:
+        """A session; a server of our own has a slot for each core, and as many as the case takes."""
+        if not self.local:
+            with connect(self.url, self.token) as session:
+                yield session
+            return
+        cores = usable_cores()
+        with suppress(CaseError):  # what is wrong is told when the points are made
+            cores = max(cores, parse_case(data).run.cores)
+        with LocalServer(self.runs, cores) as server:
+            yield server.session
 
 
 def sweep(
@@ -31,44 +81,107 @@ def sweep(
     listed: Annotated[
         Path | None, typer.Option("--list", metavar="FILE", help="Points from a CSV file; its first line has the keys.")
     ] = None,
+    adaptive: Adaptive = None,
+    tolerance: Tolerance = None,
+    most: Annotated[int | None, typer.Option("--most", min=2, help="With --adaptive: runs at most; 40.")] = None,
     ranks: Ranks = None,
     threads: Threads = None,
     at_once: Annotated[int | None, typer.Option("--at-once", min=1, help="Runs of it that run at a time.")] = None,
     wait: Annotated[bool, typer.Option("--wait", help="Return when all runs have ended; 1 when one failed.")] = False,
+    new: Annotated[bool, typer.Option("--new", help="Begin anew, also where the same sweep is there.")] = False,
+    local: Annotated[bool, typer.Option("--local", help="Run on this machine, without a server.")] = False,
+    runs: Annotated[Path, typer.Option("--runs", help="With --local: folder of the runs.")] = Path("runs/local"),
+    out: Annotated[
+        Path | None, typer.Option("--out", help="Write the table here (CSV); with --adaptive what was found (JSON).")
+    ] = None,
     url: Url = None,
     token: Token = None,
     as_json: Json = False,
 ) -> None:
-    """Run a case at many points; prints the id of the sweep. sweep-table and sweep-plot show what came out."""
+    """Run a case at many points, or look for the point where a result passes a value.
+
+    The same command goes on with a sweep that was interrupted: points that have succeeded are not run again.
+    """
+    cores, place = on_cores(ranks, threads), Place(local, runs, url, token)
+    if adaptive is not None:
+        if grid or listed is not None:
+            raise UsageError("--adaptive takes --set KEY=LOW:HIGH, and neither --grid nor --list")
+        with place.session(data_of(case, cores)) as session:
+            found = adapting.adaptive(
+                session, case, adaptive, sets or (), cores, tolerance, at_once, most, out, new=new, as_json=as_json
+            )
+        adapting.finish(found)
+        return
+    if tolerance is not None or most is not None:
+        raise UsageError("--tolerance and --most are for --adaptive 'RESULT = VALUE'")
     if (listed is None) == (not sets):
         raise UsageError("give the points with --set KEY=A,B,C, or with --list FILE")
     points = points_in(listed) if listed is not None else points_of(sets or (), grid=grid)
-    with connect(url, token) as session:
-        try:
-            with aloud(f"handing {counted(len(points), 'point')} in") as session.outbox.say:
-                data = data_of(case, on_cores(ranks, threads))
-                made = session.sweep(data, points, at_once=at_once, folder=folder_of(case))
-        except KeyboardInterrupt:
-            complain(
-                "the server may have the points already; conoid sweep-cancel last stops them once it has taken all in"
-            )
+    data = data_of(case, cores)
+    key = str(uuid.uuid4()) if new else _same(case, points, cores, at_once)
+    with place.session(data) as session:
+        made = _handed_in(session, case, data, points, at_once, key)
+        info = _waited(made) if wait or local or out is not None else made.status()
+        _end(made, info, out, as_json=as_json)
+
+
+def _same(case: str, points: Sequence[Point], cores: Sequence[str], at_once: int | None) -> str:
+    """The key of the sweep that these words mean."""
+    told = json.dumps([locate(case).stem, points, list(cores), at_once], default=str)
+    return f"sweep-{hashlib.sha256(told.encode()).hexdigest()[:40]}"
+
+
+def _handed_in(
+    session: Session, case: str, data: Mapping[str, Any], points: Sequence[Point], at_once: int | None, key: str
+) -> Sweep:
+    try:
+        with aloud(f"handing {counted(len(points), 'point')} in") as session.outbox.say:
+            return session.sweep(data, points, at_once=at_once, folder=folder_of(case), key=key, again=True)
+    except ServiceError as error:
+        if error.problem.get("code") != "key_reused":
             raise
-        try:
-            with aloud(f"sweep {made.id}: waiting for its runs"):
-                info = made.wait() if wait else made.status()
-        except KeyboardInterrupt:
-            complain(
-                f"the runs go on; conoid sweep-table {made.id} shows them, conoid sweep-cancel {made.id} stops them"
-            )
-            raise
+        raise UsageError(f"{case}: the case has changed since this sweep was begun; --new begins another one") from None
+    except KeyboardInterrupt:
+        complain("the server may have the points already; conoid sweep-cancel last stops them once it has taken all in")
+        raise
+
+
+def _waited(made: Sweep) -> SweepInfo:
+    try:
+        with aloud(f"sweep {made.id}: waiting for its runs") as name:
+
+            def say(info: SweepInfo, point: SweepPoint) -> None:
+                ended = sum(each.run.state.final for each in info.points)
+                name(f"{ended} of {info.total} runs have ended")
+                complain(f"{ended} of {info.total}: {_how(point)}")
+
+            return made.wait(say=say)
+    except KeyboardInterrupt:
+        complain(
+            f"the same command goes on; conoid sweep-table {made.id} shows the runs, conoid sweep-cancel {made.id} "
+            "stops them"
+        )
+        raise
+
+
+def _end(made: Sweep, info: SweepInfo, out: Path | None, *, as_json: bool) -> None:
+    if out is not None:
+        save_text(out, made.csv())
     if as_json:
         echo_json(info)
     else:
         echo(info.id)
-    failed = [point for point in info.points if wait and point.run.state is not State.SUCCEEDED]
-    if failed:
+    failed = [point for point in info.points if point.run.state.final and point.run.state is not State.SUCCEEDED]
+    if failed and info.over:
         complain(told(failed, info.total))
         raise typer.Exit(1)
+
+
+def _how(point: SweepPoint) -> str:
+    """A point and how its run has ended."""
+    values = ", ".join(f"{key} = {value}" for key, value in point.values.items())
+    why = f": {point.run.message or point.run.cause}" if point.run.state is not State.SUCCEEDED else ""
+    return f"{values}: {point.run.state.value}{why}"
 
 
 def told(failed: list[SweepPoint], total: int) -> str:
@@ -87,8 +200,11 @@ def sweep_table(
     token: Token = None,
 ) -> None:
     """Print a sweep as CSV: a line a point with its values, the state of its run and its results."""
-    with connect(url, token) as session, aloud("reading the sweep"):
-        text = session.find_sweep(sweep).csv()
+    if (path := file_named(sweep)) is not None:
+        text = to_csv(columns_of(path))
+    else:
+        with connect(url, token) as session, aloud("reading the sweep"):
+            text = session.find_sweep(sweep).csv()
     if out is None:
         echo(text, nl=False)
     else:
@@ -109,10 +225,17 @@ def sweep_plot(
     token: Token = None,
 ) -> None:
     """Draw the results of a sweep over what was changed: a panel a result, a curve a value of other keys."""
-    with connect(url, token) as session:
-        with aloud(f"drawing {out}"):
-            drawn = session.find_sweep(sweep).plot(out, columns or (), x)
-        echo(str(drawn))
+    with aloud(f"drawing {out}"):
+        if (path := file_named(sweep)) is not None:
+            made = columns_of(path)
+            keys = [column.name for column in made if column.kind == KEY]
+            drawn = drawing("curves").save(
+                drawing("swept").figure(text_rows(to_csv(made)), keys, x, columns or ()), out
+            )
+        else:
+            with connect(url, token) as session:
+                drawn = session.find_sweep(sweep).plot(out, columns or (), x)
+    echo(str(drawn))
 
 
 def sweep_cancel(sweep: SweepArgument, url: Url = None, token: Token = None, as_json: Json = False) -> None:

@@ -82,6 +82,7 @@ ANSWERS: dict[tuple[str, str], dict[int, tuple[str, str]]] = {
     ("get", "/v1/sweeps"): {200: (_JSON, "SweepPage")},
     ("get", "/v1/sweeps/{sweep_id}"): {200: (_JSON, "Sweep")},
     ("get", "/v1/sweeps/{sweep_id}/table"): {200: ("text/csv", "")},
+    ("post", "/v1/sweeps/{sweep_id}:again"): {202: (_JSON, "Sweep")},
     ("post", "/v1/sweeps/{sweep_id}:cancel"): {202: (_JSON, "Sweep")},
     ("get", "/v1/me"): {200: (_JSON, "Me")},
     ("get", "/healthz"): {200: (_JSON, "Health")},

@@ -7,26 +7,25 @@ starts.
 """
 
 import hashlib
-import json
 import logging
 import re
 import threading
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import msgspec
 
 from conoid.cases import whole
 from conoid.cases.figures import size
-from conoid.cases.load import CaseError, Problem, apply_overrides, json_data
+from conoid.cases.load import CaseError
 
 from . import durable, folder
-from .errors import ServiceError, invalid_case
+from .errors import ServiceError
 from .reading import Reading
 from .settings import Settings
-from .shapes import MOST_POINTS
 from .submission import Desk, Wishes
+from .sweep_wish import Wish, at_point, changed, wish_of
 from .waiting import Need
 
 _log = logging.getLogger("conoid.server")
@@ -54,24 +53,27 @@ class Plan(msgspec.Struct, kw_only=True, frozen=True):
     runs: list[str] = []
     case: dict[str, Any] | None = None
     """What is changed at each point, until all runs are accepted."""
+    tries: list[int] = []
+    """How often each point was run again; empty: none was."""
+    repeated: list[int] = []
+    """Points that are run again, until all of these runs are accepted; ``earlier`` has the runs of before."""
+    earlier: list[str] = []
 
     @property
     def whole(self) -> bool:
         """Whether all of its runs are accepted."""
-        return len(self.runs) == len(self.points)
+        return len(self.runs) == len(self.points) and not self.repeated
 
     @property
     def keys(self) -> list[str]:
         """The idempotency keys of its runs."""
-        return [f"sweep-{self.id}-{n}" for n in range(len(self.points))]
+        tries = self.tries or [0] * len(self.points)
+        return [f"sweep-{self.id}-{n}" + (f"-{again}" if again else "") for n, again in enumerate(tries)]
 
-
-class Wish(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
-    """What is handed in: a case as plain data, the changes of each point, the limit."""
-
-    case: dict[str, Any]
-    points: list[dict[str, Any]]
-    at_once: int | None = None
+    @property
+    def wanted(self) -> list[int]:
+        """The points that get a run when it is filled."""
+        return self.repeated or list(range(len(self.points)))
 
 
 class Sweeps:
@@ -96,7 +98,8 @@ class Sweeps:
     def complete(self) -> None:
         """Goes on with the sweeps that an earlier server was killed in, in a thread; their runs wait meanwhile."""
         for plan in self._left:
-            self._plans[plan.id] = msgspec.structs.replace(plan, runs=self._desk.runs_of(plan.owner, plan.keys))
+            runs = plan.earlier or self._desk.runs_of(plan.owner, plan.keys)
+            self._plans[plan.id] = msgspec.structs.replace(plan, runs=runs)
         self._complete_later(self._left)
 
     def _complete_later(self, plans: Sequence[Plan]) -> None:
@@ -118,7 +121,7 @@ class Sweeps:
             try:
                 if plan.case is None or plan.key is None:
                     raise ServiceError(409, "no_key", "its request broke off, and has no Idempotency-Key")
-                self._fill(plan, self._cases(plan.owner, plan.case, plan.points))
+                self._fill(plan, self._cases(plan))
             except ServiceError as error:
                 if error.body["retryable"] and plan.id not in self._cancelled:
                     return False
@@ -153,24 +156,43 @@ class Sweeps:
             plan = self._earlier(owner, key, digest)
             if plan is not None and plan.whole:
                 return plan
-            wish = _wish(body)
-            cases = self._cases(owner, wish.case, wish.points)
-            fresh = plan or self._new(owner, wish, key, digest)
-            self._desk.check_room(owner, fresh.keys)
-            if plan is None:
-                self._write(fresh)
-            plan = fresh
-            self._filling.add(plan.id)
-            try:
-                filled = self._fill(plan, cases)
-            except ServiceError:
-                self._take_back(plan)
-                raise
-            except Exception:
-                self._complete_later([plan])
-                raise
-            self._filling.discard(plan.id)
-            return filled
+            fresh = plan or self._new(owner, wish_of(body), key, digest)
+            return self._accepted(fresh)
+
+    def again(self, plan: Plan, body: bytes, failed: Mapping[int, str]) -> Plan:
+        """Runs points again: those of ``failed``, by number, whose run is still the one that is given there. ``body``
+        is that of the sweep. Raises ServiceError; then the sweep is as it was.
+        """
+        with self._locks.setdefault(plan.owner, threading.Lock()):
+            plan = self._plans.get(plan.id, plan)
+            if hashlib.sha256(body).hexdigest() != plan.digest:
+                raise ServiceError(422, "key_reused", f"this is another case, or it has other points, than {plan.id}")
+            repeated = [n for n, run in failed.items() if plan.whole and plan.runs[n] == run]
+            if not repeated:
+                return plan
+            tries = plan.tries or [0] * len(plan.points)
+            fresh = msgspec.structs.replace(
+                plan, case=wish_of(body).case, repeated=repeated, earlier=plan.runs,
+                tries=[n + (k in repeated) for k, n in enumerate(tries)],
+            )  # fmt: skip
+            return self._accepted(fresh)
+
+    def _accepted(self, plan: Plan) -> Plan:
+        """The plan with the runs that it lacks, all of them or none. Raises ServiceError."""
+        cases = self._cases(plan)
+        self._desk.check_room(plan.owner, [plan.keys[n] for n in plan.wanted])
+        self._write(plan)
+        self._filling.add(plan.id)
+        try:
+            filled = self._fill(plan, cases)
+        except ServiceError:
+            self._take_back(plan)
+            raise
+        except Exception:
+            self._complete_later([plan])
+            raise
+        self._filling.discard(plan.id)
+        return filled
 
     def held(self, need: Need, active: Iterable[Need]) -> str:
         """Why a run waits for its sweep: for all its runs to be there, or for those that are ``active``. The label of
@@ -200,17 +222,17 @@ class Sweeps:
             raise ServiceError(422, "key_reused", detail, pointer="Idempotency-Key", hint="use a new key")
         return found[0] if found else None
 
-    def _cases(self, owner: str, case: dict[str, Any], points: Sequence[dict[str, Any]]) -> list[tuple[bytes, Reading]]:
-        """The case of each point, each of which can be run. Raises ServiceError with what is wrong."""
-        made = [_changed(case, point, n) for n, point in enumerate(points)]
-        if sum(map(len, made)) > _MOST_BYTES:
+    def _cases(self, plan: Plan) -> dict[int, tuple[bytes, Reading]]:
+        """The case of each point that gets a run, and can be run. Raises ServiceError with what is wrong."""
+        made = {n: changed(plan.case or {}, plan.points[n], n) for n in plan.wanted}
+        if sum(map(len, made.values())) > _MOST_BYTES:
             raise ServiceError(413, "too_large", f"the cases have more than {size(_MOST_BYTES)} together")
-        cases, source, surveys = [], self._desk.source(owner), dict[bytes, bytes]()
-        for n, text in enumerate(made):
+        cases, source, surveys = {}, self._desk.source(plan.owner), dict[bytes, bytes]()
+        for n, text in made.items():
             try:
-                cases.append((text, self._desk.read(text, _JSON, source, surveys)))
+                cases[n] = text, self._desk.read(text, _JSON, source, surveys)
             except CaseError as error:
-                raise _at(n, error) from None
+                raise at_point(n, error) from None
         return cases
 
     def _new(self, owner: str, wish: Wish, key: str | None, digest: str) -> Plan:
@@ -220,26 +242,32 @@ class Sweeps:
             at_once=wish.at_once, points=wish.points, case=wish.case,
         )  # fmt: skip
 
-    def _fill(self, plan: Plan, cases: Sequence[tuple[bytes, Reading]]) -> Plan:
-        plan = msgspec.structs.replace(plan, runs=[])
-        for n, ((body, reading), key) in enumerate(zip(cases, plan.keys, strict=True)):
+    def _fill(self, plan: Plan, cases: Mapping[int, tuple[bytes, Reading]]) -> Plan:
+        runs, keys = list(plan.earlier), plan.keys
+        for n, (body, reading) in cases.items():
             if plan.id in self._cancelled:
                 raise ServiceError(409, "cancelled", f"sweep {plan.id} was cancelled while it was handed in")
             wishes = Wishes({"sweep": plan.id, "point": str(n)})
-            receipt = self._desk.submit(plan.owner, body, _JSON, key, wishes, reading)
-            plan = msgspec.structs.replace(plan, runs=[*plan.runs, receipt["id"]])
+            receipt = self._desk.submit(plan.owner, body, _JSON, keys[n], wishes, reading)
+            runs[n : n + 1] = [receipt["id"]]
+            plan = msgspec.structs.replace(plan, runs=list(runs))
             self._plans[plan.id] = plan
-        plan = msgspec.structs.replace(plan, case=None)
+        plan = msgspec.structs.replace(plan, case=None, repeated=[], earlier=[])
         self._write(plan)
         return plan
 
     def _take_back(self, plan: Plan) -> None:
-        """Cancels the runs of a sweep that was refused in the middle, before any of them has started."""
-        for run_id in self._desk.runs_of(plan.owner, plan.keys):
+        """Cancels the runs that were refused in the middle, before any of them has started. Of a sweep that was to be
+        run again all else stays as it was.
+        """
+        for run_id in self._desk.runs_of(plan.owner, [plan.keys[n] for n in plan.wanted]):
             self._desk.take_back(run_id)
-        del self._plans[plan.id]
         self._cancelled.discard(plan.id)
         self._filling.discard(plan.id)
+        if plan.repeated:
+            self._write(msgspec.structs.replace(plan, case=None, runs=plan.earlier, repeated=[], earlier=[]))
+            return
+        del self._plans[plan.id]
         (self._folder / f"{plan.id}.json").unlink(missing_ok=True)
 
     def _keep(self, plan: Plan) -> None:
@@ -252,30 +280,3 @@ class Sweeps:
         except OSError as error:
             raise ServiceError(507, "storage", f"the sweep cannot be kept: {error.strerror}", retryable=True) from error
         self._keep(plan)
-
-
-def _wish(body: bytes) -> Wish:
-    try:
-        wish = msgspec.convert(json_data(body), Wish)
-    except CaseError as error:
-        raise invalid_case(error.problems) from None
-    except msgspec.ValidationError as error:
-        raise ServiceError(422, "invalid_sweep", str(error), hint="case, points, at_once") from None
-    if not 1 <= len(wish.points) <= MOST_POINTS:
-        raise ServiceError(422, "invalid_sweep", f"{len(wish.points)} points; allowed: 1 to {MOST_POINTS}")
-    if wish.at_once is not None and wish.at_once < 1:
-        raise ServiceError(422, "invalid_sweep", f"at_once = {wish.at_once}: at least 1")
-    return wish
-
-
-def _changed(case: dict[str, Any], point: dict[str, Any], n: int) -> bytes:
-    try:
-        return json.dumps(apply_overrides(case, point)).encode()
-    except CaseError as error:
-        raise _at(n, error) from None
-    except RecursionError:
-        raise _at(n, CaseError([Problem("", "", "its values are nested too deeply")])) from None
-
-
-def _at(n: int, error: CaseError) -> ServiceError:
-    return invalid_case([Problem(each.key, each.value, f"{each.message} (point {n})") for each in error.problems])

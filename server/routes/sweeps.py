@@ -7,8 +7,9 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Depends, Header, Query, Response
 from fastapi.responses import JSONResponse
 
-from conoid.cases.points import Point, to_csv
+from conoid.cases.points import Point, results, to_csv
 from conoid.cases.points import table as points_table
+from conoid.cases.run import State
 
 from .. import openapi, view
 from ..auth import Identity, Reader, Submitter
@@ -70,6 +71,23 @@ async def cancel(service: ServiceOf, identity: Submitter, sweep_id: str) -> dict
     return await service.sweepers.run(_cancelled, service, identity, sweep_id)
 
 
+@router.post("/v1/sweeps/{sweep_id}:again", status_code=202, openapi_extra=openapi.SWEEP_BODY)
+async def again(service: ServiceOf, identity: Submitter, sweep_id: str, body: Body) -> Response:
+    """Runs the points again whose runs have ended without success, or were removed. The request is that with which the
+    sweep was handed in. Asking again changes nothing while these runs go on.
+    """
+    plan = await service.lanes.run(_find, service, identity, sweep_id)
+    failed = await service.lanes.run(_failed, service, plan)
+    plan = await service.sweepers.run(service.sweeps.again, plan, body, failed)
+    return JSONResponse(await service.lanes.run(_shown, service, plan), 202)
+
+
+def _failed(service: Service, plan: Plan) -> dict[int, str]:
+    """The points without a run that has succeeded, or may still, and their runs of now."""
+    good = {run.id for _, run in _pairs(service, plan) if not run.state.final or run.state is State.SUCCEEDED}
+    return {n: run_id for n, run_id in enumerate(plan.runs) if run_id not in good}
+
+
 def _cancelled(service: Service, identity: Identity, sweep_id: str) -> dict[str, Any]:
     plan = _find(service, identity, sweep_id)
     for run_id in service.sweeps.cancel(plan):
@@ -115,4 +133,4 @@ def _shown(service: Service, plan: Plan) -> dict[str, Any]:
 
 def _point(service: Service, values: dict[str, Any], run: Run) -> Point:
     ended = view.outcome(service.settings.runs / run.id) if run.state.final else None
-    return Point(values=values, run=run.id, state=run.state.value, cause=run.cause or "", outcome=ended)
+    return Point(values=values, run=run.id, state=run.state.value, cause=run.cause or "", results=results(ended))

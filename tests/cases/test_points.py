@@ -9,7 +9,7 @@ import pytest
 
 from conoid.cases.key_units import unit_of_key
 from conoid.cases.outcome import Check, Measured, Outcome, from_json, to_json
-from conoid.cases.points import KEY, RESULT, Point, in_one_unit, safe, table, to_csv
+from conoid.cases.points import KEY, RESULT, Point, in_one_unit, results, safe, table, to_csv
 
 
 @pytest.mark.parametrize(
@@ -42,7 +42,7 @@ def test_every_probe_and_every_reference_has_its_columns() -> None:
     ]
     check = Check(name="probe_mean v", value=2.0, expected=1.0, tolerance=0.1, passed=False, unit="m/s")
     ended = from_json(to_json(Outcome(state="succeeded", probes=probes, reference=[check, check], warnings=["w"])))
-    found = {column.title: column.values for column in table([Point(values={"a": 1}, outcome=ended)])}
+    found = {column.title: column.values for column in table([Point(values={"a": 1}, results=results(ended))])}
     assert [found[f"probe.v{which} [m/s]"] for which in ("", ".min", ".max")] == [[412.5], [-1.0], [500.0]]
     assert found["probe.hole [m]"] == found["probe.hole.max [m]"] == [None]
     assert found["reference.probe_mean v [m/s]"] == found["reference.probe_mean v (2) [m/s]"] == [2.0]
@@ -53,7 +53,7 @@ def test_a_line_of_the_csv_is_a_point_whether_it_has_ended_or_not() -> None:
     ended = Outcome(state="succeeded", steps=3)
     made = table([
         Point(values={"run.end_time": "1 us", "note": "=1+1"}, run="r1", state="running"),
-        Point(values={"run.end_time": "2 us"}, run="r2", state="succeeded", outcome=ended),
+        Point(values={"run.end_time": "2 us"}, run="r2", state="succeeded", results=results(ended)),
     ])  # fmt: skip
     assert [column.kind for column in made][:2] == [KEY, KEY]
     assert made[-1].kind == RESULT

@@ -2,7 +2,8 @@
 
 What it does stands in the case's ``description`` as JSON: ``steps``, ``pace`` (s a step), ``lose`` (every so many-th
 message is not sent over Zenoh), ``fail`` (a cause), ``snapshots`` (one in each of the first steps),
-``warn`` (a warning of the log and of the outcome).
+``warn`` (a warning of the log and of the outcome), ``flaw`` (a file: while it is there what is faster than 300 m/s
+fails). Its probe has the residual velocity of Recht and Ipson with a limit of 250 m/s.
 """
 
 import argparse
@@ -98,7 +99,11 @@ def main() -> int:
     if os.environ.get("PMI_RANK", "0") != "0":
         return 0
     signal.signal(signal.SIGTERM, ask_to_stop)
-    plan = json.loads(read_data(options.case).get("description") or "{}")
+    case = read_data(options.case)
+    plan = json.loads(case.get("description") or "{}")
+    speed = speed_of(case)
+    if speed > 300.0 and Path(plan.get("flaw", "/none")).exists():
+        plan["fail"] = "physics"
     voice = Voice(options, plan.get("lose", 0))
     voice.say(messages.Status, state="running")
     voice.say(messages.Started, ranks=2, elements=5, nodes=8, end_time=1.0, setup=0.1, parts={"rod": 5})
@@ -116,11 +121,17 @@ def main() -> int:
     state, cause = (
         ("cancelled", "cancelled") if stop else ("failed", plan["fail"]) if "fail" in plan else ("succeeded", None)
     )
-    leave(options.out, state, cause, step, warnings)
+    leave(options.out, state, cause, step, warnings, speed)
     voice.say(messages.Finished, state=state, digest="d" * 64, steps=step, elapsed=0.1)
     if voice.session is not None:
         voice.session.close()  # type: ignore[no-untyped-call]
     return {"succeeded": 0, "cancelled": 4, "failed": 3}[state]
+
+
+def speed_of(case: dict[str, Any]) -> float:
+    """Of the first part along z, m/s."""
+    velocity = case["parts"][0].get("velocity", [0.0, 0.0, 0.0])
+    return abs(float(str(velocity[2]).split()[0]))
 
 
 def tell_step(voice: Voice, step: int, steps: int) -> None:
@@ -134,12 +145,13 @@ def tell_step(voice: Voice, step: int, steps: int) -> None:
     voice.say(messages.Load, phases={"elements": [0.1, 0.2], "exchange": [0.1, 0.0]}, imbalance=1.33)
 
 
-def leave(folder: Path, state: str, cause: str | None, steps: int, warnings: list[str]) -> None:
+def leave(folder: Path, state: str, cause: str | None, steps: int, warnings: list[str], speed: float) -> None:
     check = outcome.Check(name="extent of rod", value=1.01, expected=1.0, tolerance=0.1, passed=True, unit="m")
     missed = outcome.Check(name="contact time", value=3.0, expected=1.0, tolerance=0.1, passed=False, unit="s")
     ended = outcome.Outcome(
         state=state, cause=cause, message=f"the {cause} of the tale" if cause else "", steps=steps, time=1.0, ranks=2,
-        digest="d" * 64, elements=5, nodes=8, reference=[check, missed], warnings=warnings,
+        digest="d" * 64, elements=5, nodes=8, reference=[check, missed], warnings=warnings, cpu=0.5,
+        probes=[outcome.Measured(name="left", value=max(speed**2 - 250.0**2, 0.0) ** 0.5, unit="m/s")],
     )  # fmt: skip
     (folder / layout.HISTORY).write_text("step,t [s]\n1,0.5\n2,1.0\n")
     (folder / layout.OUTCOME).write_bytes(outcome.to_json(ended))

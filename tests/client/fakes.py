@@ -51,6 +51,11 @@ description = '{json.dumps(plan)}'
 name = "rod"
 material = "steel_42crmo4"
 mesh = {{ shape = "box", low = [0, 0, 0], high = [1e-3, 1e-3, 4e-3], element_size = 5e-4, generator = "structured" }}
+velocity = [0, 0, 1]
+[[probes]]
+name = "left"
+part = "rod"
+field = "velocity_z"
 [run]
 end_time = "1 us"
 ranks = {ranks}

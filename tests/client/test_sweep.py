@@ -21,6 +21,13 @@ def test_keys_go_together_or_each_with_each() -> None:
     ]  # fmt: skip
 
 
+def test_one_value_holds_at_every_point() -> None:
+    words = ["run.ranks=1,2", "run.samples=40"]
+    both = [{"run.ranks": 1, "run.samples": 40}, {"run.ranks": 2, "run.samples": 40}]
+    assert points_of(words) == points_of(words, grid=True) == both
+    assert points_along({"run.ranks": [1, 2], "run.samples": [40]}) == both
+
+
 def test_a_comma_in_a_list_or_in_quotes_divides_nothing() -> None:
     word = """parts[0].velocity=[0, 0, "-1 m/s"],[0, 0, '-2, m/s']"""
     assert points_of([word]) == [
@@ -28,7 +35,7 @@ def test_a_comma_in_a_list_or_in_quotes_divides_nothing() -> None:
     ]  # fmt: skip
 
 
-@pytest.mark.parametrize("words", [[], ["run.ranks"], ["run.ranks="], ["a=1,2", "b=1"]])
+@pytest.mark.parametrize("words", [[], ["run.ranks"], ["run.ranks="], ["a=1,2", "b=1,2,3"]])
 def test_wrong_words_are_refused(words: list[str]) -> None:
     with pytest.raises(ValueError, match="--set"):
         points_of(words)

@@ -1,10 +1,16 @@
-"""Sweeps to hand in: one case over four ends."""
+"""Sweeps to hand in, one case over four ends, and servers that are killed while they take one."""
 
 import json
+import time
 import tomllib
 from typing import Any
 
-from .running import User, case_text
+from conoid.cases.run import State
+from conoid.server import folder
+from conoid.server.events import Run
+from conoid.server.service import Service
+
+from .running import PATIENCE, User, case_text
 
 ENDS = [f"{n} us" for n in range(1, 5)]
 
@@ -22,3 +28,25 @@ def handed_in(user: User, body: bytes, key: str | None = None, status: int = 202
     assert answer.status_code == status, answer.text
     found: dict[str, Any] = answer.json()
     return found
+
+
+class Killed(BaseException):
+    """The server is killed."""
+
+
+class Never(set[str]):
+    """Nothing leaves it: no run starts before the end of the server."""
+
+    def discard(self, _: object) -> None:
+        """Stays."""
+
+
+def after(service: Service, sweep: str, states: set[State]) -> list[Run]:
+    """The runs of the sweep once all are in one of these states."""
+    deadline = time.monotonic() + PATIENCE
+    while True:
+        runs = [run for run in service.store.all() if folder.submission(service.settings.runs / run.id).labels]
+        if not service.sweeps._filling and {run.state for run in runs} <= states:
+            return runs
+        assert time.monotonic() < deadline, runs
+        time.sleep(0.05)

@@ -205,7 +205,7 @@ def test_a_sweep_that_is_being_handed_in_needs_its_files(server: Running, quick:
 
 
 def submission_wish() -> Any:
-    from conoid.server.sweeps import Wish
+    from conoid.server.sweep_wish import Wish
 
     return Wish(case=case(), points=[{"parts[0].mesh.sha256": "0" * 64}])
 

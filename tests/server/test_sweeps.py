@@ -7,7 +7,6 @@ import json
 import math
 import shutil
 import threading
-import time
 import tomllib
 from collections.abc import Iterator
 from dataclasses import replace
@@ -26,15 +25,13 @@ from conoid.client.sweep import SweepInfo
 from conoid.server import folder, limits, reader, view
 from conoid.server.app import build_app, opened
 from conoid.server.errors import ServiceError
-from conoid.server.events import Run
-from conoid.server.service import Service
 from conoid.server.settings import Caps, Settings
 from conoid.server.submission import Desk
 from conoid.server.sweeps import Sweeps
 from conoid.server.tokens import create_token
 
-from .running import PATIENCE, Running, User, case_text
-from .swept import ENDS, handed_in, wish
+from .running import Running, User, case_text
+from .swept import ENDS, Killed, Never, after, handed_in, wish
 
 
 def test_a_sweep_ends_in_a_table(server: Running) -> None:
@@ -105,8 +102,8 @@ def test_no_more_run_at_a_time_than_was_said(server: Running, tmp_path: Path) ->
     assert [server.ann.show(run)["state"] for run in runs[1:]] == ["queued"] * 3
     (tmp_path / "go").touch()
     ended = [server.ann.wait_for(run) for run in runs]
-    for before, after in pairwise(ended):
-        assert before["finished"] <= after["started"]
+    for earlier, later in pairwise(ended):
+        assert earlier["finished"] <= later["started"]
 
 
 def test_a_sweep_is_cancelled_at_once(server: Running, tmp_path: Path) -> None:
@@ -225,10 +222,6 @@ def test_a_sweep_that_is_refused_in_the_middle_leaves_nothing_that_runs(
     assert {server.ann.wait_for(point["run"]["id"])["state"] for point in made["points"]} == {"succeeded"}
 
 
-class Killed(BaseException):
-    """The server is killed."""
-
-
 def broken_off(settings: Settings, monkeypatch: pytest.MonkeyPatch, key: str | None) -> str:
     """A sweep of four points of which two were accepted when the server died."""
     with opened(settings) as service:
@@ -245,24 +238,6 @@ def broken_off(settings: Settings, monkeypatch: pytest.MonkeyPatch, key: str | N
         with pytest.raises(Killed):
             service.sweeps.submit("ann", wish(), key)
         return next((settings.runs / "sweeps").glob("*.json")).stem
-
-
-class Never(set[str]):
-    """Nothing leaves it: no run starts before the end of the server."""
-
-    def discard(self, _: object) -> None:
-        """Stays."""
-
-
-def after(service: Service, sweep: str, states: set[State]) -> list[Run]:
-    """The runs of the sweep once all are in one of these states."""
-    deadline = time.monotonic() + PATIENCE
-    while True:
-        runs = [run for run in service.store.all() if folder.submission(service.settings.runs / run.id).labels]
-        if not service.sweeps._filling and {run.state for run in runs} <= states:
-            return runs
-        assert time.monotonic() < deadline, runs
-        time.sleep(0.05)
 
 
 def test_a_sweep_that_a_killed_server_left_is_completed_before_any_run_starts(

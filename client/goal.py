@@ -1,0 +1,127 @@
+"""What an adaptive sweep looks for, from words: a result and its threshold, and the spans of the keys that vary."""
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import msgspec
+
+from conoid.cases import points
+from conoid.cases.load import CaseError, Problem
+from conoid.cases.problems import shown
+from conoid.cases.schema import Case
+from conoid.cases.similar import nearest
+from conoid.cases.units import parse_quantity, written
+
+_ADAPTIVE, _SET, _TOLERANCE = "--adaptive", "--set", "--tolerance"
+_SHARE = 0.01
+"""Of the larger end, the tolerance where none is given. Chosen: finer than tests of a ballistic limit scatter."""
+_DIGITS = 9
+"""Of a value that is tried: more than any case is sensitive to, and short to read."""
+
+
+class Goal(msgspec.Struct, kw_only=True, frozen=True):
+    """Where a result passes ``threshold``; both in ``unit``."""
+
+    result: str
+    threshold: float
+    unit: str = ""
+
+
+class Span(msgspec.Struct, kw_only=True, frozen=True):
+    """A key and its values at both ends, in ``unit``, which is empty for plain numbers."""
+
+    key: str
+    low: float
+    high: float
+    unit: str = ""
+
+    def value(self, x: float) -> str | float:
+        """As it is written into the case."""
+        rounded = float(f"{x:.{_DIGITS}g}")
+        return f"{rounded!r} {self.unit}" if self.unit else rounded
+
+    def along(self, other: "Span", x: float) -> str | float:
+        """The value at the place of ``x`` of ``other``."""
+        return self.value(self.low + (self.high - self.low) * (x - other.low) / (other.high - other.low))
+
+
+def goal_of(words: str, case: Case) -> Goal:
+    """Of ``probe.NAME = 0``; the result is a column of the table of a sweep, without its unit. Raises CaseError."""
+    name, equals, text = (part.strip() for part in words.rpartition("="))
+    known = points.names(case)
+    if not equals or not name or not text:
+        raise _wrong(_ADAPTIVE, words, "write a result and its threshold, such as 'probe.NAME = 0'")
+    if name not in known:
+        raise _wrong(_ADAPTIVE, name, f"no result of this name; {nearest(name, known)}")
+    return Goal(result=name, threshold=_number(_ADAPTIVE, text, known[name]), unit=known[name])
+
+
+def spans_of(words: Sequence[str]) -> tuple[list[Span], dict[str, Any]]:
+    """The spans of ``KEY=LOW:HIGH`` and the values of ``KEY=VALUE``. Raises CaseError."""
+    from .sweep import axes_of
+
+    spans, constants = list[Span](), dict[str, Any]()
+    for key, values in axes_of(words).items():
+        if len(values) > 1:
+            message = f"{key} has {len(values)} values; an adaptive sweep takes KEY=LOW:HIGH, or one value"
+            raise _wrong(_SET, ",".join(map(str, values)), message)
+        text = values[0]
+        if isinstance(text, str) and ":" in text and (span := _span(key, text)) is not None:
+            spans.append(span)
+        else:
+            constants[key] = text
+    if not spans:
+        raise _wrong(_SET, " ".join(words), "a key varies from LOW to HIGH, such as parts[0].velocity[2]=-200:-800 m/s")
+    return spans, constants
+
+
+def span_of(key: str, ends: Any) -> Span:
+    """Of two values of a key. Raises CaseError."""
+    if not isinstance(ends, Sequence) or isinstance(ends, str) or len(ends) != 2:
+        raise _wrong("spans", ends, f"{key} varies between two values, such as ('-200 m/s', '-800 m/s')")
+    unit, (low, high) = points.in_one_unit(key, list(ends))
+    if not isinstance(low, int | float) or not isinstance(high, int | float):
+        raise _wrong("spans", ends, f"{key}: two numbers of one kind, such as ('-200 m/s', '-800 m/s')")
+    if low == high:
+        raise _wrong("spans", ends, f"{key}: both ends are the same")
+    return Span(key=key, low=float(low), high=float(high), unit=unit)
+
+
+def _span(key: str, text: str) -> Span | None:
+    """None of a text that is no span. A unit behind the second end is that of the first one, too."""
+    low, _, high = (part.strip() for part in text.partition(":"))
+    first, second = written(low), written(high)
+    if first is None or second is None:
+        return None
+    return span_of(key, [low if first[1] else f"{low} {second[1]}".strip(), high])
+
+
+def tolerance_of(given: Any, span: Span) -> float:
+    """In the unit of the span; a bare number is in it. Raises CaseError."""
+    if given is None:
+        return _SHARE * max(abs(span.low), abs(span.high))
+    pair = written(given)
+    if pair is not None and not pair[1]:
+        found = float(pair[0])
+    else:
+        found = _number(_TOLERANCE, str(given), span.unit) / parse_quantity(f"1 {span.unit}".strip(), span.unit)
+    if not 0.0 < found < math.inf:
+        raise _wrong(_TOLERANCE, given, "above 0")
+    return found
+
+
+def _number(option: str, text: str, unit: str) -> float:
+    try:
+        return parse_quantity(text, unit)
+    except ValueError as error:
+        raise _wrong(option, text, str(error)) from None
+
+
+def _wrong(option: str, value: Any, message: str) -> CaseError:
+    return CaseError([Problem(option, shown(value), message)])
+
+
+def changes(spans: Sequence[Span], x: float) -> dict[str, Any]:
+    """What is changed at a point, by key: all spans at the place of ``x`` of the first one."""
+    return {span.key: span.along(spans[0], x) for span in spans}

@@ -1,0 +1,300 @@
+"""Adaptive sweeps of runs whose result is a known function: bracket, curve, rounds, what is kept, what is wrong."""
+
+import json
+import math
+import random
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import pytest
+
+from conoid.cases.load import CaseError
+from conoid.cases.outcome import Measured, Outcome, to_json
+from conoid.cases.run import State
+from conoid.client.adaptive import found_by
+from conoid.client.bracket import Sample, between, bracket, widest
+from conoid.client.errors import ClientError, MissingError, UsageError
+from conoid.client.found import Found, read, table
+from conoid.client.goal import span_of, spans_of, tolerance_of
+from conoid.client.http import Me
+from conoid.client.told import RunInfo
+
+KEY = "parts[0].velocity[2]"
+CASE = {
+    "name": "shot",
+    "parts": [{
+        "name": "core", "material": "tungsten_alloy", "velocity": ["0 m/s", "0 m/s", "1 m/s"],
+        "mesh": {"shape": "sphere", "centre": [0, 0, 0], "radius": "3 mm", "element_size": "1 mm"},
+    }],
+    "probes": [{"name": "left", "part": "core", "field": "velocity_z"}],
+    "run": {"end_time": "1 us"},
+}  # fmt: skip
+
+
+def lambert_jonas(limit: float, a: float, p: float) -> Callable[[float], float]:
+    return lambda v: a * max(abs(v) ** p - limit**p, 0.0) ** (1.0 / p)
+
+
+class Firing:
+    """A server that computes ``curve`` of the velocity; a text that it gives is how the run fails."""
+
+    def __init__(self, curve: Callable[[float], float | str], slots: int = 1) -> None:
+        self.curve, self.slots = curve, slots
+        self.made: dict[str, RunInfo] = {}
+        self.outbox: Any = self
+        self.fired: list[float] = []
+        self.most_at_once = self.open = 0
+
+    def me(self) -> Me:
+        return Me(owner="ann", slots={"total": self.slots, "used": 0})
+
+    def runs(self, states: Sequence[str] = (), limit: int = 50) -> list[RunInfo]:
+        return list(self.made.values())[-limit:]
+
+    def ready(self, case: Mapping[str, Any], folder: Path) -> Mapping[str, Any]:
+        return case
+
+    def submit(self, case: Any, overrides: Any = (), key: str | None = None, *_: Any, **__: Any) -> Any:
+        assert key is not None
+        if key not in self.made:
+            x = float(str(case["parts"][0]["velocity"][2]).split()[0])
+            self.fired.append(x)
+            self.made[key] = ended(f"r{len(self.made):03d}", self.curve(x))
+        self.open += 1
+        self.most_at_once = max(self.most_at_once, self.open)
+        return Fired(self, self.made[key])
+
+
+class Fired:
+    """Its run."""
+
+    def __init__(self, at: Firing, info: RunInfo) -> None:
+        self.at, self.info, self.id = at, info, info.id
+
+    def status(self) -> RunInfo:
+        return self.info
+
+    def wait(self) -> RunInfo:
+        self.at.open -= 1
+        return self.info
+
+
+def ended(run: str, value: float | str) -> RunInfo:
+    lost = isinstance(value, str)
+    probes = [] if lost else [Measured(name="left", value=float(value), unit="m/s")]
+    outcome = Outcome(state="failed" if lost else "succeeded", probes=probes, cpu=2.0)
+    return RunInfo(
+        id=run, owner="ann", name="shot", state=State.FAILED if lost else State.SUCCEEDED, ranks=1, submitted=0.0,
+        message=str(value) if lost else "", outcome_json=msgspec.Raw(to_json(outcome)),
+    )  # fmt: skip
+
+
+def find(
+    at: Firing, ends: Sequence[Any] = ("200 m/s", "800 m/s"), goal: str = "probe.left = 0", tolerance: Any = "5 m/s",
+    *, out: Path | None = None, most: int = 40, at_once: int | None = None, case: Mapping[str, Any] = CASE,
+) -> Found:  # fmt: skip
+    return found_by(at, case, Path(), goal, [span_of(KEY, ends)], tolerance, at_once, most, out, lambda text: None)
+
+
+@pytest.mark.parametrize("slots", [1, 2, 4])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_ballistic_limit_is_bracketed_and_fitted(slots: int, sign: float) -> None:
+    law = lambert_jonas(413.7, 0.92, 2.6)
+    at = Firing(lambda v: sign * law(v), slots)
+    found = find(at, (f"{sign * 200} m/s", f"{sign * 800} m/s"))
+    assert found.limit is not None
+    assert found.uncertainty is not None
+    assert found.reached
+    assert abs(sign * found.limit - 413.7) <= found.uncertainty <= 2.5
+    assert found.points == len(at.fired) <= {1: 9, 2: 12, 4: 16}[slots]
+    assert at.most_at_once == slots if slots > 1 else at.most_at_once == 2
+    assert found.fit is not None
+    if found.fit.points >= 4:
+        assert (found.fit.law, round(found.fit.factor, 3)) == ("Lambert and Jonas", 0.92)
+        assert found.fit.limit == pytest.approx(413.7, abs=1e-3)
+    assert found.cpu == 2.0 * found.points
+
+
+def test_any_limit_of_any_curve_lies_in_its_bracket() -> None:
+    chance = random.Random(3)
+    for _ in range(12):
+        limit, a, p = chance.uniform(201, 799), chance.uniform(0.6, 1.0), chance.uniform(1.5, 4.0)
+        at = Firing(lambert_jonas(limit, a, p), chance.choice([1, 2, 3, 5]))
+        found = find(at, tolerance="2 m/s")
+        (low, _), (high, _) = found.ends
+        assert low <= limit <= high
+        assert high - low <= 2.0
+        if found.fit is not None and found.fit.error is not None:
+            assert abs(found.fit.limit - limit) < max(1e-3, 3.0 * found.fit.error)
+
+
+def test_the_error_of_a_curve_through_points_that_scatter_is_what_they_scatter() -> None:
+    law, chance = lambert_jonas(400.0, 0.9, 2.0), random.Random(1)
+    found = find(Firing(lambda v: law(v) + (chance.gauss(0, 8) if v > 400 else 0.0), 4), tolerance="1 m/s")
+    assert found.fit is not None
+    assert found.fit.error is not None
+    assert 0.1 < found.fit.error < 20.0
+    assert abs(found.fit.limit - 400.0) < 4.0 * found.fit.error
+
+
+def test_a_result_that_goes_through_a_threshold_has_a_line() -> None:
+    found = find(Firing(lambda v: 0.5 * v - 260.0), goal="probe.left = -10 m/s", tolerance=20)
+    assert found.fit is not None
+    assert (found.fit.law, round(found.fit.limit, 6)) == ("line", 500.0)
+    assert found.limit == pytest.approx(500.0, abs=found.uncertainty)
+
+
+def test_no_passage_in_the_range_says_so_with_both_ends() -> None:
+    found = find(Firing(lambda v: 0.0))
+    assert not found.reached
+    assert found.points == 2
+    assert found.lines()[0] == (
+        f"{KEY}: no probe.left = 0 m/s in the range: probe.left is 0 m/s at 200 m/s and 0 m/s at 800 m/s"
+    )
+
+
+def test_a_failed_point_is_gone_round_and_a_failed_end_ends_it() -> None:
+    law = lambert_jonas(413.7, 0.92, 2.6)
+    found = find(Firing(lambda v: "the energy residual" if v == 500.0 else law(v)))
+    assert found.reached
+    assert found.failed == 1
+    assert "1 of them without a result" in found.lines()[-1]
+    bad = find(Firing(lambda v: "the energy residual" if v > 799 else law(v)))
+    assert not bad.reached
+    assert f"the run at {KEY} = 800 m/s has no result: failed: the energy residual" in "\n".join(bad.lines())
+    assert not find(Firing(lambda v: "broken" if 390 < v < 440 else law(v))).reached
+
+
+def test_a_result_that_is_no_number_is_a_point_without_a_result() -> None:
+    law = lambert_jonas(413.7, 0.92, 2.6)
+    found = find(Firing(lambda v: math.nan if v == 500.0 else law(v)))
+    assert (found.failed, found.reached) == (1, True)
+
+
+def test_what_is_not_monotonic_is_said() -> None:
+    found = find(Firing(lambda v: float(v > 300) * float(not 500 < v < 700) * v, 7))
+    assert found.changes > 1
+    assert found.mixed is not None
+    assert "not monotonic, or it scatters: the threshold is passed 3 times between" in found.lines()[1]
+    (low, _), (high, _) = found.ends
+    assert low <= 300.0 <= high
+
+
+def test_as_many_runs_as_are_allowed() -> None:
+    at = Firing(lambert_jonas(413.7, 0.92, 2.6))
+    found = find(at, most=4)
+    assert len(at.fired) == 4
+    assert not found.reached
+    assert "as many runs as are allowed have been made" in "\n".join(found.lines())
+
+
+def test_the_same_sweep_goes_on_from_its_file(tmp_path: Path) -> None:
+    out, law = tmp_path / "shot.json", lambert_jonas(413.7, 0.92, 2.6)
+    find(Firing(law), out=out, most=4)
+    again = Firing(law)
+    found = find(again, out=out)
+    assert found.reached
+    assert found.points == 4 + len(again.fired)
+    idle = Firing(law)
+    assert find(idle, out=out).limit == found.limit
+    assert idle.fired == []
+    finer = Firing(law)
+    assert find(finer, out=out, tolerance="0.5 m/s").points == found.points + len(finer.fired)
+    columns = {column.title: column.values for column in table(read(out))}
+    assert columns[f"{KEY} [m/s]"] == sorted(columns[f"{KEY} [m/s]"], key=float)  # type: ignore[arg-type]
+    assert columns["probe.left [m/s]"][0] == 0.0
+
+
+def test_a_failed_point_is_run_again_and_a_run_that_goes_on_is_not(tmp_path: Path) -> None:
+    law, out = lambert_jonas(413.7, 0.92, 2.6), tmp_path / "shot.json"
+    at = Firing(lambda v: "no disk" if v > 799 else law(v))
+    assert not find(at, out=out).reached
+    at.curve = law
+    assert find(at, out=out).reached
+    assert at.fired.count(800.0) == 2
+    out.unlink()
+    shots = len(at.fired)
+    assert find(at, out=out).reached
+    assert len(at.fired) == shots, "the server has them"
+
+
+def test_another_case_or_goal_is_refused_with_the_key_that_changed(tmp_path: Path) -> None:
+    out, law = tmp_path / "shot.json", lambert_jonas(413.7, 0.92, 2.6)
+    find(Firing(law), out=out, most=2)
+    other = json.loads(json.dumps(CASE))
+    other["run"]["end_time"] = "2 us"
+    with pytest.raises(ClientError, match=r"the case has changed since: run.end_time was '1 us' and is '2 us'; name"):
+        find(Firing(law), out=out, case=other)
+    with pytest.raises(UsageError, match=r"holds another sweep, probe.left = 0 over"):
+        find(Firing(law), out=out, goal="probe.left = 1 m/s")
+    out.write_text("{}")
+    with pytest.raises(UsageError, match="no file of an adaptive sweep"):
+        find(Firing(law), out=out)
+
+
+def test_a_run_whose_folder_is_gone_is_made_again() -> None:
+    at, real = Firing(lambert_jonas(413.7, 0.92, 2.6)), Firing.submit
+    gone = set[str]()
+
+    def submit(case: Any, overrides: Any = (), key: str | None = None, *more: Any, **words: Any) -> Any:
+        if key is not None and key.endswith("-0"):
+            gone.add(key)
+            raise MissingError(410, {"detail": "gone"})
+        return real(at, case, overrides, key, *more, **words)
+
+    at.submit = submit  # type: ignore[method-assign]
+    assert find(at).reached
+    assert gone
+
+
+@pytest.mark.parametrize(
+    ("goal", "words"),
+    [
+        ("probe.lift = 0", "--adaptive = 'probe.lift': no result of this name; did you mean 'probe.left'"),
+        ("probe.left", "write a result and its threshold"),
+        ("probe.left = 3 mm", "--adaptive = '3 mm': '3 mm' has the wrong dimension; expected a speed"),
+        ("digest = 3", "no result of this name"),
+    ],
+)
+def test_a_wrong_goal_is_refused_before_any_run(goal: str, words: str) -> None:
+    at = Firing(lambda v: 0.0)
+    with pytest.raises(CaseError, match=words):
+        find(at, goal=goal)
+    assert at.fired == []
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["run.ranks=1"], "key varies from LOW to HIGH"),
+        ([f"{KEY}=200:200"], "both ends are the same"),
+        ([f"{KEY}=200 m/s:800 mm"], "two numbers of one kind"),
+        ([f"{KEY}=200:800", "run.ranks=1,2"], "run.ranks has 2 values"),
+    ],
+)
+def test_wrong_spans_are_refused(words: list[str], told: str) -> None:
+    with pytest.raises(CaseError, match=told):
+        spans_of(words)
+
+
+def test_spans_go_together_and_units_are_those_that_are_written() -> None:
+    spans, constants = spans_of([f"{KEY}=200:800 m/s", "parts[1].velocity[2]=0.1:0.4 km/s", "run.end_time=40 us"])
+    assert [(span.low, span.high, span.unit) for span in spans] == [(200, 800, "m/s"), (0.1, 0.4, "km/s")]
+    assert spans[1].along(spans[0], 400.0) == "0.2 km/s"
+    assert constants == {"run.end_time": "40 us"}
+    assert [tolerance_of(given, spans[1]) for given in (None, 0.01, "5 m/s")] == [0.004, 0.01, 0.005]
+    for wrong in ("0", "-1 m/s", "1 mm", "nan"):
+        with pytest.raises(CaseError, match="--tolerance"):
+            tolerance_of(wrong, spans[0])
+
+
+def test_points_divide_what_is_left_as_evenly_as_can_be() -> None:
+    assert between(0.0, 1.0, [], 3) == [0.25, 0.5, 0.75]
+    assert between(0.0, 1.0, [0.5], 1) == [0.25]
+    assert widest(0.0, 1.0, [0.2]) == 0.8
+    found = bracket([Sample(1.0, 0.0), Sample(2.0, -3.0), Sample(3.0, None), Sample(4.0, 5.0)])
+    assert found is not None
+    assert (found.low.x, found.high.x) == (2.0, 4.0), "what bounces back is before the limit"
+    assert bracket([Sample(1.0, 1.0), Sample(2.0, 3.0)]) is None
