@@ -1,4 +1,4 @@
-"""What an earlier server has left: every run's folder is looked at once, and again where that failed."""
+"""Runs of an earlier server: each folder is read once, and again where that failed."""
 
 import logging
 from collections.abc import Callable
@@ -19,19 +19,18 @@ _log = logging.getLogger("conoid.server")
 
 
 class Leavings:
-    """Belongs to the supervisor's thread."""
+    """Used in the supervisor's thread."""
 
     def __init__(
         self, runs: Path, store: Store, index: Index, launcher: Launcher, found: Callable[[Left], None]
     ) -> None:
-        """``found`` takes each run that can be read, whether it has ended or not."""
+        """``found`` takes each run that can be read, ended or not."""
         self._runs, self._store, self._index, self._launcher, self._found = runs, store, index, launcher, found
         self._failed: dict[Path, str] = {}
 
     def all(self) -> None:
-        """Every run that is not known to have ended, also one whose folder somebody has emptied.
-
-        Raises OSError, SQLAlchemyError.
+        """Reads every run that is not known to have ended, also one whose folder is empty now. Raises OSError,
+        SQLAlchemyError.
         """
         ended, known, last = self._store.ended(), self._store.open(), ""
         emptied = set(known)
@@ -50,16 +49,16 @@ class Leavings:
                 self._store.relabel(run, pins.labels(self._runs / run.id))
 
     def again(self) -> None:
-        """Those that could not be read."""
+        """Runs that could not be read."""
         for path in tuple(self._failed):
             self.take_up(path)
 
     def take_up(self, path: Path) -> None:
-        """What fails is logged once and comes up again with the next tidying."""
+        """An error is logged once; the run is read again with the next pass."""
         self._take_up(path, lambda: self._store.get(path.name))
 
     def _take_up(self, path: Path, known_of: Callable[[], Run | None]) -> None:
-        """The database is written only where it knows less than the folder: a thousand runs wait for no disk."""
+        """Writes the database only where it is behind the folder, so that a thousand runs do not wait for a disk."""
         told = self._failed.pop(path, "")
         try:
             known = known_of()

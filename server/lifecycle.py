@@ -1,4 +1,4 @@
-"""The life of a run as a pure function: (run, event) -> (run, actions). No clock, no file, no process in here."""
+"""The states of a run as a pure function: (run, event) -> (run, actions). It uses no clock, no file and no process."""
 
 from dataclasses import replace
 
@@ -36,13 +36,13 @@ from .events import (
 Next = tuple[Run, tuple[Action, ...]]
 
 _SIGKILL, _SIGTERM = 9, 15
-"""Their numbers on every POSIX system; the state machine imports nothing of the system."""
+"""Numbers of signals on every POSIX system; this module imports nothing of the system."""
 
 
 def advance(run: Run, event: Event, now: float) -> Next:
-    """The run after ``event`` at the Unix time ``now``, and what must be done, in order.
+    """The run after ``event`` at the Unix time ``now``, and the actions, in order.
 
-    An event that does not matter any more (a cancel of a finished run, a late timer) changes nothing. Every change of
+    An event that has no meaning any more (a cancel of a finished run, a late timer) changes nothing. Every change of
     state obeys ``FOLLOWERS`` of conoid.cases.run.
     """
     if run.state.final:
@@ -94,7 +94,7 @@ def _enter(run: Run, state: State, message: str = "") -> Next:
 
 
 def _end(run: Run, now: float, outcome: Outcome, *, written: bool = False) -> Next:
-    """The final state that ``outcome`` gives; the file comes before the line that tells of it."""
+    """The final state of ``outcome``; the file is written before the line of the journal."""
     state, cause = State(outcome.state), Cause(outcome.cause) if outcome.cause else None
     ended = replace(run, state=state, cause=cause, message=outcome.message, finished=now)
     write = () if written else (WriteOutcome(outcome),)
@@ -102,9 +102,7 @@ def _end(run: Run, now: float, outcome: Outcome, *, written: bool = False) -> Ne
 
 
 def _broken(run: Run, event: Broken, now: float) -> Next:
-    """Nobody can say how it would have ended, unless its owner has asked for the end; what may still compute it ends
-    first.
-    """
+    """The run is lost, unless its owner has asked for a cancel; a worker that may still run is killed first."""
     asked = run.stopping_for is Cause.CANCELLED
     state, cause = (State.CANCELLED, Cause.CANCELLED) if asked else (State.LOST, Cause.STORAGE)
     message = f"stopped on request, without results: {event.message}" if asked else event.message
@@ -127,7 +125,7 @@ def _cancel(run: Run, now: float, handed: bool) -> Next:
 
 
 def _stop(run: Run, why: Cause) -> Next:
-    """No Journal: the worker is the journal's writer now."""
+    """No line for the journal: the worker writes it now."""
     return replace(run, state=State.STOPPING, stopping_for=why), (Stop(why),)
 
 
@@ -142,12 +140,12 @@ def _exited(run: Run, event: WorkerExited, now: float) -> Next:
 
 
 def _at(run: Run, event: WorkerExited | Found, now: float) -> float:
-    """When it ended: as its files tell it where nobody was there to see it."""
+    """Time of the end: by the files where no server ran at that time."""
     return max(event.at, run.started) if event.at else now
 
 
 def _renamed(run: Run, event: WorkerExited, outcome: Outcome) -> Outcome:
-    """A worker knows that it was stopped, not by whom: what nobody asked for is no cancellation."""
+    """A worker records that it was stopped, not by whom: without a request it is no cancel."""
     if run.stopping_for is Cause.STORAGE:
         state, message = State.FAILED, "its output has passed what this server allows a run"
         return msgspec.structs.replace(outcome, state=state, cause=Cause.STORAGE, message=message)
@@ -162,12 +160,12 @@ def _renamed(run: Run, event: WorkerExited, outcome: Outcome) -> Outcome:
 
 
 def _readable(outcome: Outcome) -> bool:
-    """True when the outcome tells a final state and a cause of the closed list."""
+    """True when the outcome has a final state and a known cause."""
     return outcome.state in {state for state in State if state.final} and outcome.cause in {None, *Cause}
 
 
 def _without_outcome(run: Run, event: WorkerExited) -> Outcome:
-    """The end of a worker that could not write its own: the exit code is a hint, never a proof of success."""
+    """The end of a worker without an outcome: the exit code is a hint, never a proof of success."""
     state, cause, message = _reading_of(run, event)
     said = f"; {event.traces}" if event.traces else ""
     return Outcome(state=state, cause=cause, message=f"{message}{said}", ranks=run.ranks, threads=run.threads)

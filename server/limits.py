@@ -1,5 +1,5 @@
-"""What the server refuses before it costs anything: parameters that no route knows, large bodies, cases beyond the
-caps, full queues and disks.
+"""Checks before a request costs anything: unknown parameters, large bodies, cases above the caps, full queues and
+disks.
 """
 
 import asyncio
@@ -32,12 +32,12 @@ _BODY_TIMEOUT = 30.0
 
 
 _COUNTABLE = 1 << 53
-"""Where nothing is capped: what every reader of JSON can still count (IEEE 754)."""
+"""Limit where there is no cap: the largest integer that every JSON reader has (IEEE 754)."""
 
 
 async def check_query(request: Request) -> None:
-    """Raises ServiceError 400 for a parameter that the route does not know, since a misspelt one would pass as left
-    out, and 422 for one that is given twice and has one value: nobody knows which was meant.
+    """Raises ServiceError 400 for an unknown parameter, since a misspelt one would count as absent, and 422 for a
+    parameter with one value that is given twice.
     """
     if not request.query_params:
         return
@@ -59,15 +59,15 @@ def _many(annotation: Any) -> bool:
 
 
 def _query(dependant: Dependant) -> Iterator[Any]:
-    """The parameters of a route, as FastAPI has them."""
+    """The parameters of a route, from FastAPI."""
     yield from dependant.query_params
     for inner in dependant.dependencies:
         yield from _query(inner)
 
 
 async def read_body(request: Request) -> bytes:
-    """The body, never more than ``BODY`` of it in memory. Raises ServiceError 415 for one that is encoded, 413, 408,
-    and 400 where it breaks off.
+    """The body, of which at most ``BODY`` is in memory. Raises ServiceError 415 for an encoded one, 413, 408, and
+    400 where it breaks off.
     """
     check_encoding(request)
     length = request.headers.get("content-length", "0")
@@ -82,7 +82,7 @@ async def read_body(request: Request) -> bytes:
 
 
 def check_encoding(request: Request) -> None:
-    """Raises ServiceError 415 for a body that is encoded: nobody knows how large it will be."""
+    """Raises ServiceError 415 for an encoded body: its size is not known before it is decoded."""
     encoding = request.headers.get("content-encoding", "identity").strip().lower()
     if encoding not in {"", "identity"}:
         detail = f"Content-Encoding {encoding[:80]!r}: a body is sent as it is"
@@ -104,7 +104,7 @@ def _too_large(length: int) -> ServiceError:
 
 
 class Limits(msgspec.Struct, frozen=True):
-    """What a case may say and need here; None: no cap."""
+    """Needs of a case and their limits here; None: no cap."""
 
     slots: int
     elements: int | None
@@ -122,12 +122,12 @@ def of(settings: Settings) -> Limits:
 
 
 def check(case: Case, limits: Limits) -> list[Problem]:
-    """Everything that a valid case says and this server does not allow."""
+    """All problems of a valid case with the limits of this server."""
     return [*_cores(case, limits), *_files(case), *_time(case, limits)]
 
 
 def check_size(estimate: Estimate, caps: Limits) -> list[Problem]:
-    """Everything that the case needs more of than this server allows; what is not known is no reason to refuse."""
+    """All needs of the case that are above the limits; a need that is not known is no reason to refuse."""
     needs = (
         ("parts", "elements", count, estimate.elements, caps.elements),
         ("run.end_time", "steps", count, estimate.steps, caps.steps),
@@ -151,7 +151,7 @@ def _cores(case: Case, settings: Limits) -> Iterator[Problem]:
 
 
 def _files(case: Case) -> Iterator[Problem]:
-    """Files are found by their hash: a path is one of the machine on which the case was written."""
+    """Problems of files without a hash: a path is one of the machine on which the case was written."""
     for file in files_of(case.model_dump(include={"parts"})):
         if file.sha256 is None:
             message = "this key is missing: a server finds a file by its hash; conoid submit and its like fill it in"

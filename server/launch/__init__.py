@@ -1,4 +1,4 @@
-"""How workers are started and ended: one protocol, one module a way of doing it."""
+"""Launchers: the protocol by which workers are started and stopped; one module for each launcher."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -7,9 +7,10 @@ from typing import Literal, Protocol
 from conoid.cases.run import Cause, State
 
 Phase = Literal["unknown", "waits", "runs"]
-"""Of a worker: whether it waits for cores or has them. A batch system that cannot be reached says nothing new."""
+"""State of a worker as its launcher reports it: waiting for cores, or running. A batch system that does not answer
+changes nothing."""
 Reading = tuple[State, Cause, str]
-"""What an end means that the worker has left no outcome of: state, cause, message."""
+"""The end of a worker without an outcome: state, cause, message."""
 
 
 class LaunchError(Exception):
@@ -17,12 +18,12 @@ class LaunchError(Exception):
 
 
 class DamagedError(LaunchError):
-    """What is to be run, or where, is not there any more as it was accepted."""
+    """The accepted case, or the folder, has changed or is missing."""
 
 
 @dataclass(frozen=True)
 class Access:
-    """Where a worker publishes, and as whom (no user: the router asks for none)."""
+    """Zenoh address and credentials of a worker (no user: the router needs none)."""
 
     endpoint: str
     prefix: str
@@ -32,7 +33,7 @@ class Access:
 
 @dataclass(frozen=True)
 class Job:
-    """What is to be run."""
+    """What a launcher starts."""
 
     run: str
     ranks: int
@@ -40,52 +41,53 @@ class Job:
     folder: Path
     telemetry: Access | None
     profile: str = ""
-    """Of the batch system; empty: the site's default."""
+    """Profile of the batch system; empty: the default of the site."""
     wall_time: float | None = None
-    """s that the run may take from its start."""
+    """Time limit from the start, s."""
     group: str = ""
-    """Runs that belong together, such as those of a sweep, and may be handed over as one; empty: it is alone."""
+    """Group of runs that may be handed over as one job array, such as a sweep; empty: none."""
     threads: int = 1
-    """Of each rank."""
+    """Threads of each rank."""
 
 
 @dataclass(frozen=True)
 class Exit:
-    """How a worker ended. ``code`` is None when this server is not its parent; negative: minus the signal."""
+    """End of a worker's processes. ``code``: the exit code; negative: minus the number of the signal; None where
+    this server is not the parent."""
 
     code: int | None
     out_of_memory: bool
     last_words: str
     reading: Reading | None = None
-    """Where somebody knows better than the code tells: a batch system."""
+    """The end as a batch system reports it, which comes before the exit code."""
 
 
 class Worker(Protocol):
-    """A worker that was started, or handed to a batch system: all its ranks, as one. No method waits."""
+    """A started worker with all its ranks, or a job handed to a batch system. No method blocks."""
 
     def phase(self) -> Phase:
-        """What is known of it by now."""
+        """The state now."""
 
     def began(self) -> float:
-        """The Unix time at which it got its cores, s; 0 when it has none."""
+        """Unix time at which it got its cores, s; 0 before that."""
 
     def note(self) -> str:
-        """What people should know of it beyond its state: why it waits, who does not answer; empty for nothing."""
+        """A remark for users: why it waits, or which service does not answer; empty for none."""
 
     def exited(self) -> Exit | None:
-        """None while any of its processes lives."""
+        """The end; None while any of its processes runs."""
 
     def stop(self) -> None:
         """Asks it to stop at its next step."""
 
     def kill(self) -> None:
-        """Ends all its processes now."""
+        """Kills all its processes."""
 
 
 @dataclass(frozen=True)
 class Trace:
-    """What is left of an earlier launch: the worker when it lives, whether there was one, whether it was before
-    the machine's last start."""
+    """The trace of an earlier launch: the worker if it runs, whether there was one, whether that was before the last
+    boot."""
 
     worker: Worker | None
     launched: bool
@@ -96,7 +98,7 @@ class Launcher(Protocol):
     """A way to run workers."""
 
     queues: bool
-    """True when workers wait for cores in a queue that is not the server's."""
+    """True when workers wait for cores in the queue of a batch system."""
 
     def start(self, job: Job) -> Worker:
         """Starts the ranks and records them in the run's folder. Raises LaunchError."""
@@ -105,4 +107,4 @@ class Launcher(Protocol):
         """The worker that an earlier server started for the run."""
 
     def tidy(self) -> None:
-        """Removes what killed workers may have left behind outside of their folders."""
+        """Removes what killed workers may have left outside of their folders, such as shared memory."""

@@ -1,7 +1,7 @@
-"""Runs of a sweep that start together are one job array: one sbatch for all of them, and a job for each.
+"""Runs of a sweep that start together are one job array of Slurm: one sbatch, one task for each run.
 
-A run's record has the name of the array and its own place in it before Slurm hears of either. So whoever finds the
-records, after whatever crash, looks for the tasks of that name, and hands over those that nobody knows.
+The record of each run gets the name of the array and its index before sbatch is called. After a crash the records
+show which tasks to look for, and those that Slurm does not have are submitted again.
 """
 
 import logging
@@ -19,23 +19,22 @@ from .handed import SlurmWorker
 
 _log = logging.getLogger("conoid.server")
 _SETTLES = 0.5
-"""s for which a group has not grown before it is handed over. Chosen: a sweep is written to disk run after run, some
-milliseconds each."""
+"""s without a new run after which a group is submitted. Chosen: the runs of a sweep are written to disk some
+milliseconds apart."""
 _MOST = 1000
-"""Tasks of an array. Slurm's MaxArraySize is 1001 where a site says nothing (slurm.conf(5))."""
+"""Largest number of tasks of an array. The default of Slurm's MaxArraySize is 1001 (slurm.conf(5))."""
 
 
 class Arrays:
-    """Belongs to the launcher's thread."""
+    """Used in the launcher's thread."""
 
     def __init__(self, runs: Path, site: batch.Slurm) -> None:
         """``runs``: the folder of all runs."""
         self._place, self._site = runs / layout.ARRAYS, site
 
     def hand_over(self, workers: Iterable[SlurmWorker]) -> set[str]:
-        """Hands over what starts together; the names of those that are to be left alone in this round.
-
-        Raises AwayError, OSError.
+        """Submits groups that are complete; returns the names of runs that wait for their group. Raises AwayError,
+        OSError.
         """
         fresh: dict[tuple[object, ...], list[SlurmWorker]] = {}
         known: dict[str, list[SlurmWorker]] = {}
@@ -55,7 +54,7 @@ class Arrays:
         return growing
 
     def _join(self, members: Sequence[SlurmWorker]) -> str:
-        """Writes the array down, then its name into the record of each run."""
+        """Writes the record of the array, then its name into the record of each run."""
         word = "".join(letter if letter.isalnum() else "_" for letter in members[0].group)[:60]
         name = f"conoid-{word}-{secrets.token_hex(4)}"
         folder = self._place / name

@@ -1,4 +1,4 @@
-"""Asks the accounting database what jobs have taken, in a thread of its own: nobody waits for it."""
+"""Queries of Slurm's accounting database, in a thread of their own, so that nothing waits for them."""
 
 import logging
 import queue
@@ -14,11 +14,11 @@ class Taker(Protocol):
     """A run whose job has ended."""
 
     def took(self, found: dict[str, str]) -> None:
-        """What the database says of it. Raises OSError."""
+        """Stores the answer of the database. Raises OSError."""
 
 
 class Clerk:
-    """May be used from any thread."""
+    """For use from any thread."""
 
     def __init__(self, place: str = "") -> None:
         """``place``: the folder of Slurm's commands. The thread starts with the first job."""
@@ -28,7 +28,7 @@ class Clerk:
         self._lock = threading.Lock()
 
     def note(self, run: Taker, job: str) -> None:
-        """Asks when it can, and writes down what is answered."""
+        """Queries in turn, and stores the answers."""
         self._waiting.put((run, job))
         with self._lock:
             if not self._thread.is_alive():

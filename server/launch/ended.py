@@ -1,4 +1,4 @@
-"""How a job of Slurm has ended, by its record, the run's folder and what Slurm says of it."""
+"""The end of a Slurm job, by its record, the run's folder, and Slurm's list."""
 
 from pathlib import Path
 
@@ -21,12 +21,12 @@ _READINGS: dict[str, Reading] = {
 
 
 def exit_of(folder: Path, job: Job, entry: Entry) -> Exit:
-    """The end of the job ``entry`` of the run in ``folder``; ``job``: its record, with what the accounting says."""
+    """The end of the job ``entry`` of the run in ``folder``; ``job``: its record with the accounting data."""
     return Exit(_code(job), False, _last_words(folder, job), _reading(entry))
 
 
 def _code(job: Job) -> int | None:
-    """Of the job's script; minus the signal that has ended it; None when nobody knows."""
+    """Exit code of the job's script; minus the number of its signal; None where it is not known."""
     code, _, number = job.accounting.get("ExitCode", "").partition(":")
     if not code.isdigit() or not number.isdigit():
         return None
@@ -34,7 +34,7 @@ def _code(job: Job) -> int | None:
 
 
 def _last_words(folder: Path, job: Job) -> str:
-    """Of the ranks; of a task of an array that ended before them, those of its script."""
+    """Exit code of the ranks; for a task of an array that ended before them, of its script."""
     own = farewell.last_words(folder)
     if own or not job.array:
         return own

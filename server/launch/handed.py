@@ -1,4 +1,4 @@
-"""A run that was handed to Slurm. Its number is its identity; its folder says how it ends, Slurm how it waits."""
+"""A run that was submitted to Slurm. The job name identifies it; its folder shows how it ends, Slurm how it waits."""
 
 import time
 from collections.abc import Mapping, Set
@@ -16,26 +16,26 @@ from .clerk import Clerk
 from .ended import exit_of
 
 _LAG = 5.0
-"""s after the end of a job in which its last files may still come over a network file system. Chosen."""
+"""s after the end of a job in which its last files may still arrive over a network file system. Chosen."""
 _LATE = 10.0
-"""s after which an outcome of a run that nobody writes to is its end, whatever Slurm says or does not say. Chosen."""
+"""s after which an outcome in a folder without new writes is the end of the run, whatever Slurm reports. Chosen."""
 _MOST = 20
-"""Jobs that are handed over for one run, one after the other, because the one before was lost. Chosen."""
+"""Largest number of jobs submitted for one run, each because the one before was lost. Chosen."""
 _RELEASES = 3
-"""Times that a job is released which a node did not start: a node that is busy or restarts is over it, a broken one is
+"""Times that a job is released which a node failed to start: a busy or restarting node recovers, a broken one does
 not. Chosen."""
 _POLITE, _LONGEST_PAUSE = 2.0, 60.0
-"""s after which Slurm is asked again that takes no job now: at first, and at most. Chosen."""
+"""s until Slurm is asked again after a refusal that may pass: first, and at most. Chosen."""
 
 
 class SlurmWorker:
-    """Its first methods may be called from any thread and wait for nothing; ``turn`` belongs to the launcher's."""
+    """The first methods are for any thread and do not block; ``turn`` is for the launcher's thread."""
 
     def __init__(
         self, folder: Path, job: Job, site: batch.Slurm, group: str = "", clerk: Clerk | None = None
     ) -> None:  # fmt: skip
-        """``job`` may be one that an earlier server has handed over, or was about to. ``group``: runs that are handed
-        over as one array where they start together; only of one that nobody has tried to hand over yet.
+        """``job``: a job that an earlier server has submitted or was about to submit, or a new one. ``group``: runs
+        to submit as one array, for runs that were never submitted.
         """
         self.folder = self._folder = folder
         self._job, self._site, self._clerk = job, site, clerk or Clerk()
@@ -49,41 +49,41 @@ class SlurmWorker:
 
     @property
     def name(self) -> str:
-        """Of the job, and its place in an array; no other has it."""
+        """Name and index in an array; unique."""
         return self._job.key
 
     @property
     def record(self) -> Job:
-        """As it stands in the folder."""
+        """The record as it stands in the folder."""
         return self._job
 
     @property
     def fresh(self) -> bool:
-        """True while it may become a task of an array: nobody has tried to hand it over."""
+        """True while it may become a task of an array: it was never submitted."""
         return bool(self.group) and not self._job.job and not self._stop
 
     @property
     def waits_for_array(self) -> bool:
-        """True when it is to be handed over as a task of an array."""
+        """True when it is to be submitted as a task of an array."""
         waits = not self._job.job and self._job.task is not None and not self._stop and self._exit is None
         return waits and time.monotonic() >= self._not_before
 
     # From any thread --------------------------------------------------------------------------------------------------
 
     def phase(self) -> Phase:
-        """By the last list that Slurm has given."""
+        """The state by the last list of Slurm."""
         entry = self._entry
         if entry is None:
             return "unknown" if self._job.job else "waits"
         return "waits" if entry.state in slurm.PENDING else "runs"
 
     def began(self) -> float:
-        """When its job started the last time, Unix s."""
+        """Unix time of its last start, s."""
         entry = self._entry
         return entry.start if entry is not None and entry.state not in slurm.PENDING else 0.0
 
     def note(self) -> str:
-        """Why it waits, or since when nobody knows."""
+        """Why it waits, or since when Slurm does not answer."""
         entry, number = self._entry, self._job.job
         if self._away:
             last = f"; job {number} was {entry.state.lower()} then" if entry else ""
@@ -95,8 +95,8 @@ class SlurmWorker:
         return f"Slurm job {number} is pending: {entry.reason}" if entry.state in slurm.PENDING else ""
 
     def exited(self) -> Exit | None:
-        """None while its job is in the queue or has cores. An outcome in a folder that nobody writes to is an end even
-        when Slurm does not answer.
+        """The end; None while its job waits or runs. An outcome in a folder without new writes is an end also when
+        Slurm does not answer.
         """
         return self._exit or (Exit(None, False, "") if self._complete() else None)
 
@@ -108,12 +108,12 @@ class SlurmWorker:
             return False
 
     def stop(self) -> None:
-        """A file asks the run, wherever it is; Slurm ends a job that waits and tells one that runs. Raises OSError."""
+        """Asks the run to stop by a file; Slurm cancels a waiting job and signals a running one. Raises OSError."""
         (self._folder / layout.STOP_REQUEST).touch()
         self._stop = True
 
     def kill(self) -> None:
-        """Its job is ended by force."""
+        """Has its job killed."""
         self._stop = self._kill = True
 
     # The launcher's thread --------------------------------------------------------------------------------------------
@@ -124,14 +124,14 @@ class SlurmWorker:
         return self._exit is not None
 
     def silent(self, why: str) -> None:
-        """Slurm does not answer. What was known stays."""
+        """Slurm does not answer; the last known state stays."""
         self._away, self._why = self._away or time.monotonic(), why
 
     def turn(self, entries: list[Entry], arrays: Set[str] = frozenset()) -> None:
-        """What is due now; ``entries``: the jobs of this name that Slurm knows, ``arrays``: the numbers of all arrays
-        of which it knows a task. Raises SlurmError, OSError.
+        """Does what is due. ``entries``: the jobs of this name in Slurm's list; ``arrays``: the ids of all arrays with
+        a task in the list. Raises SlurmError, OSError.
 
-        A controller that has crashed may have forgotten that it has started a job, which then waits in vain.
+        A controller that has crashed may have lost the start of a job, which then waits for ever.
         """
         self._away = 0.0
         if self.waits_for_array or (self._job.task is not None and not self._job.job and not self._stop):
@@ -159,7 +159,7 @@ class SlurmWorker:
             self._told = entry.state
 
     def _launch_again(self, entry: Entry) -> None:
-        """Slurm holds a job that a node did not start: nobody else would let it go."""
+        """Releases a job that Slurm holds after a failed start on a node."""
         if self._released < _RELEASES:
             self._released += 1
             slurm.release(self._site.bin, entry.job)
@@ -188,12 +188,12 @@ class SlurmWorker:
             self._exit = Exit(None, False, "", (State.FAILED, Cause.LAUNCH, f"Slurm refuses the job: {error}"))
 
     def wait(self, why: str) -> None:
-        """Slurm takes no job now: it is asked again after a pause that doubles."""
+        """Slurm accepts no job now: it is asked again after a delay that doubles."""
         self._later, self._not_before = why, time.monotonic() + self._pause
         self._pause = min(2.0 * self._pause, _LONGEST_PAUSE)
 
     def leave_array(self) -> None:
-        """It is handed over alone, under a name of its own: the array was refused. Raises OSError."""
+        """The array was refused: the run is submitted alone, under a name of its own. Raises OSError."""
         job, self.group = self._job, ""
         profile = batch.profile_of(self._site, job.profile)
         fresh = batch.new_job(
@@ -202,13 +202,14 @@ class SlurmWorker:
         self.write_down(name=fresh.name, task=None, array="")
 
     def write_down(self, **changes: object) -> None:
-        """The record, on disk before anything follows from it. Raises OSError."""
+        """Writes the record; it is on disk before anything follows from it. Raises OSError."""
         job = msgspec.structs.replace(self._job, **changes)
         whole.write(self._folder / layout.JOB, batch.to_json(job))
         self._job = job
 
     def _chosen(self, entries: list[Entry]) -> Entry | None:
-        """The job that has begun, else the first; a second one, which only a crash of the controller can make, ends."""
+        """The running job, else the first; a second job, which only a crash of the controller can cause, is
+        cancelled."""
         begun = slurm.begun(self._folder, self._job) if len(entries) > 1 else ""
         ordered = sorted(entries, key=lambda entry: (entry.job != begun, entry.state in slurm.FINAL, entry.job))
         for extra in ordered[1:]:
@@ -219,7 +220,7 @@ class SlurmWorker:
         return ordered[0] if ordered else None
 
     def _look_for_it(self, arrays: Set[str]) -> None:
-        """Slurm knows no job of this name: two lists in a row say so before anything is done."""
+        """Slurm has no job of this name: acted on after two lists in a row."""
         self._missing += 1
         if self._missing < 2 or slurm.held(self._folder):
             return
@@ -236,13 +237,13 @@ class SlurmWorker:
 
     @property
     def _array_number(self) -> str:
-        """Of the array that its job is a task of."""
+        """Id of the array of which its job is a task."""
         number, task, _ = self._job.job.partition("_")
         return number if task else ""
 
     def _others_began(self) -> bool:
-        """Whether another task of the array has started: Slurm has the array on its disk, and forgets none of it. A
-        task that is cancelled while it waits leaves no trace in the list.
+        """Whether another task of the array has started: then Slurm has the whole array on its disk. A task that is
+        cancelled while it waits leaves no entry in the list.
         """
         if not self._array_number:
             return False
@@ -251,7 +252,7 @@ class SlurmWorker:
         return any(number.partition("_")[0] == self._array_number for number in begun)
 
     def _end(self, entry: Entry) -> None:
-        """Its job is over; the folder says what that means."""
+        """The job has ended; the folder shows the meaning."""
         self._ended = self._ended or time.monotonic()
         there = (self._folder / layout.OUTCOME).exists()
         begun = bool(slurm.begun(self._folder, self._job))
@@ -266,11 +267,11 @@ class SlurmWorker:
             self._clerk.note(self, entry.job)
 
     def took(self, found: Mapping[str, str]) -> None:
-        """What the accounting database says of its last job. Raises OSError."""
+        """Stores the accounting data of the last job. Raises OSError."""
         self.write_down(accounting={**self._job.accounting, **found})
 
     def _again(self, why: str) -> None:
-        """Another job goes on from the checkpoint that is there, unless somebody has asked for the end."""
+        """Submits another job, which continues from the checkpoint, unless a stop was asked for."""
         if self._stop or self._job.attempt >= _MOST:
             self._exit = Exit(None, False, "", (State.LOST, Cause.NODE, f"{why}, attempt {self._job.attempt}"))
             return

@@ -23,13 +23,14 @@ from . import DamagedError, Exit, Job, LaunchError, Phase, Trace, Worker, memory
 _ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 _NOT_FOR_WORKERS = ("CONOID_DATABASE", "CONOID_TOKEN")
 _CROWDED = 4
-"""Ranks a core from which MPICH's waiting ranks had better sleep than spin."""
+"""Ranks per core from which waiting ranks of MPICH sleep instead of polling."""
 _BURIAL = 1.0
-"""s for which a killed launcher is waited for, so that it leaves no zombie. Chosen: it takes milliseconds."""
+"""s to wait for a killed launcher, so that it is no zombie. Chosen: it takes milliseconds."""
 _FRESH = 1.0
-"""s for which a look at all processes holds. What is looked for was started by a server that is dead. Chosen."""
+"""s for which a list of all processes is used. The processes looked for were started by a server that has ended.
+Chosen."""
 _HOUR = 3600.0
-"""s after which shared memory that no process maps is taken for left over: no launch takes that long to map it."""
+"""s after which shared memory that no process has mapped is removed: a launch maps it much sooner. Chosen."""
 
 
 class LocalLauncher:
@@ -65,7 +66,8 @@ class LocalLauncher:
         return worker
 
     def find(self, run: str, folder: Path) -> Trace:
-        """By its record; for a server that was killed between the launch and the record, by its environment."""
+        """Finds the worker by its record, or by its environment where a server was killed before it wrote the
+        record."""
         process = run_folder.process(folder)
         if process is None:
             leader = processes.leader_of(self._members(run))
@@ -79,19 +81,19 @@ class LocalLauncher:
         return Trace(worker if not rebooted and worker.alive() else None, True, rebooted)
 
     def _members(self, run: str) -> set[int]:
-        """The processes of a run; a thousand runs are found with one look at all processes."""
+        """The processes of a run; one list of all processes serves a thousand runs."""
         if time.monotonic() > self._looked + _FRESH:
             self._living, self._looked = processes.of_all_runs(), time.monotonic()
         return self._living.get(run, set())
 
     def tidy(self) -> None:
-        """MPICH's ranks share memory through files that a kill leaves behind, 2 MB each time."""
+        """Removes shared memory of MPICH that killed ranks have left, 2 MB each."""
         for path in processes.unused_shared_memory(Path("/dev/shm"), "mpich_shm_", _HOUR):
             path.unlink(missing_ok=True)
 
 
 def _log_of(folder: Path) -> BinaryIO:
-    """Where the ranks say what they have to say, in a folder that is made anew when it was removed."""
+    """Opens the log of the launcher, in a folder that is created again where it is missing."""
     try:
         (folder / layout.LOGS).mkdir(0o700, exist_ok=True)
         return whole.appended(folder / layout.LOGS / layout.LAUNCHER_LOG)
@@ -100,7 +102,7 @@ def _log_of(folder: Path) -> BinaryIO:
 
 
 def find_mpiexec(chosen: str) -> tuple[str, ...]:
-    """The site's own when it names one, then the one beside this Python, then the one in PATH. Raises LaunchError."""
+    """The launcher of the site, else the one beside this Python, else the one in PATH. Raises LaunchError."""
     if chosen:
         return command(chosen, "--mpiexec")
     beside = Path(sys.executable).with_name("mpiexec")
@@ -111,8 +113,8 @@ def find_mpiexec(chosen: str) -> tuple[str, ...]:
 
 
 def binding(ranks: int, threads: int, cores: Sequence[int]) -> list[str]:
-    """Words for MPICH's mpiexec that give each rank cores of its own, so that its threads share no core with those of
-    another rank; none where the run does not take all ``cores``: others may run on the rest.
+    """Options of MPICH's mpiexec that bind each rank to cores of its own. None where the run does not take all
+    ``cores``, since other runs may use the rest.
     """
     if ranks == 1 or threads == 1 or ranks * threads != len(cores):
         return []
@@ -121,8 +123,8 @@ def binding(ranks: int, threads: int, cores: Sequence[int]) -> list[str]:
 
 
 def environment(base: Mapping[str, str], job: Job) -> dict[str, str]:
-    """The worker's environment: libraries with one thread, the run's mark, its Zenoh credentials, and nothing that is
-    the server's own.
+    """The environment of a worker: libraries with one thread, the id of the run, its Zenoh credentials, and nothing
+    that is the server's own.
     """
     env = {name: value for name, value in base.items() if name not in _NOT_FOR_WORKERS}
     env.update(dict.fromkeys(_ONE_THREAD, "1"))
@@ -151,36 +153,37 @@ def _record(pid: int) -> Process:
 
 
 class LocalWorker:
-    """A worker on this machine, started by this server or by one before it."""
+    """A worker on this machine, started by this server or an earlier one."""
 
     def __init__(
         self, run: str, folder: Path, process: Process, kills: memory.Kills,
         child: subprocess.Popen[bytes] | None = None,
     ) -> None:  # fmt: skip
-        """``child`` when this server is the parent."""
+        """``child``: the process object when this server is the parent."""
         self._run, self._folder, self._kills, self._child = run, folder, kills, child
         self.process = process
 
     def alive(self) -> bool:
-        """True while ``mpiexec`` lives."""
+        """True while ``mpiexec`` runs."""
         if self._child is not None:
             return self._child.poll() is None
         return processes.start_time(self.process.pid) == self.process.started
 
     def phase(self) -> Phase:
-        """Its cores are there from the start."""
+        """It has its cores from the start."""
         return "runs"
 
     def began(self) -> float:
-        """When it was launched, Unix s."""
+        """Unix time of the launch, s."""
         return self.process.launched
 
     def note(self) -> str:
-        """There is nothing to add."""
+        """No remark."""
         return ""
 
     def exited(self) -> Exit | None:
-        """None while ``mpiexec`` lives. Ranks that it left behind are killed, so that nobody writes any more."""
+        """The end; None while ``mpiexec`` runs. Ranks that it left behind are killed, so that nothing writes any
+        more."""
         self._kills.count()
         if self.alive() or processes.end_run(self._run):
             return None
@@ -188,13 +191,13 @@ class LocalWorker:
         return Exit(self._child.returncode if self._child else None, starved, farewell.last_words(self._folder))
 
     def stop(self) -> None:
-        """SIGTERM to ``mpiexec``, which passes it on to every rank."""
+        """Sends SIGTERM to ``mpiexec``, which forwards it to every rank."""
         if self.alive():
             with suppress(ProcessLookupError):
                 os.kill(self.process.pid, signal.SIGTERM)
 
     def kill(self) -> None:
-        """SIGKILL to ``mpiexec``'s process group, then to what is left of the run."""
+        """Sends SIGKILL to the process group of ``mpiexec``, then to the rest of the run."""
         if self.alive():
             with suppress(ProcessLookupError):
                 os.killpg(self.process.pid, signal.SIGKILL)

@@ -1,7 +1,7 @@
-"""Which processes the kernel has ended for want of memory.
+"""Processes that the kernel has killed for lack of memory.
 
-The kernel counts them, for the machine and for each control group, and writes the number of each into its log, which a
-service may not be permitted to read. Only a kill that one of these proves is told as want of memory.
+The kernel counts them, for the machine and for each control group, and writes their numbers into its log, which a
+service may not be allowed to read. An end is reported as lack of memory only where one of the two proves it.
 """
 
 import ctypes
@@ -12,18 +12,19 @@ from pathlib import Path
 
 _PROC, _CGROUPS = Path("/proc"), Path("/sys/fs/cgroup")
 _READ_ALL, _LOG = 3, 1 << 20
-"""Of klogctl(3); bytes of the kernel's log that are read, its newest."""
+"""Arguments of klogctl(3); newest bytes of the kernel's log that are read."""
 _KILLED = re.compile(rb"Killed process (\d+) \(")
 _PAUSE, _RECENT = 0.25, 3.0
 """s between two counts; s before the end of the ranks in which a count must have grown. Chosen: Hydra ends the other
 ranks within a second."""
 _FIRST_NAMESPACE = "pid:[4026531836]"
-"""Of process numbers: where those of the kernel's log hold (linux/proc_ns.h, PROC_PID_INIT_INO)."""
+"""Inode of the initial namespace of process numbers, in which those of the kernel's log are valid (linux/proc_ns.h,
+PROC_PID_INIT_INO)."""
 
 
 def kills() -> int:
-    """Processes that the kernel has ended for want of memory: of this control group, where that is counted, else of
-    the machine.
+    """Number of processes that the kernel has killed for lack of memory: of this control group, where it counts
+    them, else of the machine.
     """
     own = _of_the_group()
     return own if own is not None else _count(_PROC / "vmstat") or 0
@@ -52,14 +53,14 @@ def _count(path: Path) -> int | None:
 
 
 class Kills:
-    """Belongs to the supervisor's thread."""
+    """Used in the supervisor's thread."""
 
     def __init__(self) -> None:
         """Counts for the first time."""
         self._counts: deque[tuple[float, int]] = deque([(time.monotonic(), kills())])
 
     def count(self) -> None:
-        """To be called again and again while workers live."""
+        """Counts again; called repeatedly while workers run."""
         now = time.monotonic()
         if now < self._counts[-1][0] + _PAUSE:
             return
@@ -68,8 +69,8 @@ class Kills:
             self._counts.popleft()
 
     def ended(self, pid: int | None) -> bool:
-        """Whether the kernel has just ended process ``pid``: by its log, or, where that cannot be read, because it has
-        ended some process in these seconds.
+        """Whether the kernel has just killed process ``pid``: by its log, or, where that cannot be read, by the
+        count of these seconds.
         """
         if kills() == self._counts[0][1]:
             return False
@@ -78,7 +79,7 @@ class Kills:
 
 
 def logged() -> set[int] | None:
-    """The numbers in the kernel's log; None where this process may not read it, or has other numbers."""
+    """Process numbers in the kernel's log; None where it cannot be read, or this process has another namespace."""
     room = ctypes.create_string_buffer(_LOG)
     size = ctypes.CDLL(None).klogctl(_READ_ALL, room, _LOG)
     if size <= 0 or (_PROC / "self/ns/pid").readlink().name != _FIRST_NAMESPACE:

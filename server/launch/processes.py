@@ -1,4 +1,4 @@
-"""Processes as Linux shows them under /proc: who they are, which run they belong to."""
+"""Processes by /proc of Linux: which exist, and which run they belong to."""
 
 import os
 import signal
@@ -8,21 +8,21 @@ from contextlib import suppress
 from pathlib import Path
 
 RUN_VARIABLE = "CONOID_RUN"
-"""In the environment of every process of a run. MPI launchers put their ranks into sessions of their own, so that a
-process group does not hold a run together; this does, helpers that a rank starts included."""
+"""Variable in the environment of every process of a run. MPI launchers put ranks into sessions of their own, so a
+process group does not hold a run together; this does, with helpers that a rank starts."""
 
 _PROC = Path("/proc")
 _AFTER_NAME_STATE, _AFTER_NAME_PARENT, _AFTER_NAME_START = 0, 1, 19
-"""Places of state, parent and start time among the fields of /proc/PID/stat behind the name (proc(5))."""
+"""Places of state, parent and start time among the fields of /proc/PID/stat after the name (proc(5))."""
 
 
 def boot() -> str:
-    """Differs from one start of the machine to the next."""
+    """Id of the present boot of the machine."""
     return (_PROC / "sys/kernel/random/boot_id").read_text().strip()
 
 
 def start_time(pid: int) -> int | None:
-    """Clock ticks from the boot to the start of process ``pid``; None when it has ended, reaped or not."""
+    """Clock ticks from the boot to the start of process ``pid``; None when it has ended."""
     fields = _stat(pid)
     if fields is None or fields[_AFTER_NAME_STATE] in {"Z", "X"}:
         return None
@@ -30,7 +30,7 @@ def start_time(pid: int) -> int | None:
 
 
 def parent(pid: int) -> int:
-    """The parent of process ``pid``; 0 when it has ended."""
+    """Parent of process ``pid``; 0 when it has ended."""
     fields = _stat(pid)
     return 0 if fields is None else int(fields[_AFTER_NAME_PARENT])
 
@@ -44,7 +44,7 @@ def _stat(pid: int) -> list[str] | None:
 
 
 def of_run(run: str) -> list[int]:
-    """The living processes of a run, smallest number first; those of this user only."""
+    """Running processes of a run, smallest number first; of this user only."""
     marker = f"{RUN_VARIABLE}={run}".encode()
     found = []
     for entry in _PROC.iterdir():
@@ -61,7 +61,7 @@ def leader_of(members: Collection[int]) -> int | None:
 
 
 def of_all_runs() -> dict[str, set[int]]:
-    """The living processes of every run; those of this user only."""
+    """Running processes of every run; of this user only."""
     found: dict[str, set[int]] = {}
     marker = f"{RUN_VARIABLE}=".encode()
     for entry in _PROC.iterdir():
@@ -74,7 +74,7 @@ def of_all_runs() -> dict[str, set[int]]:
 
 
 def end_run(run: str) -> int:
-    """Kills the living processes of a run; how many there were."""
+    """Kills the running processes of a run; returns how many there were."""
     members = of_run(run)
     for pid in members:
         with suppress(ProcessLookupError):
@@ -83,7 +83,7 @@ def end_run(run: str) -> int:
 
 
 def unused_shared_memory(folder: Path, prefix: str, age: float) -> list[Path]:
-    """The files of this user in ``folder``, older than ``age`` s, that no process has mapped into its memory."""
+    """Files of this user in ``folder``, older than ``age`` s, that no process has mapped."""
     old = time.time() - age
     found = {}
     for path in folder.glob(f"{prefix}*"):

@@ -1,4 +1,5 @@
-"""Workers as jobs of Slurm. Its commands run in a thread of their own: a controller that is away stops nobody."""
+"""Workers as jobs of Slurm. Its commands run in a thread of their own: a controller that does not answer blocks
+nothing."""
 
 import logging
 import sys
@@ -24,7 +25,8 @@ _log = logging.getLogger("conoid.server")
 
 
 class SlurmLauncher:
-    """The intent is on disk when ``start`` returns; the thread makes one job of it, however often it has to try."""
+    """The record is on disk when ``start`` returns; the thread makes exactly one job of it, with as many tries as it
+    takes."""
 
     queues = True
 
@@ -36,7 +38,7 @@ class SlurmLauncher:
         self._lock, self._thread = threading.Lock(), threading.Thread(target=self._work, name="slurm", daemon=True)
 
     def start(self, job: Job) -> SlurmWorker:
-        """Writes down what is to be handed over. Raises LaunchError."""
+        """Writes the record of the job to submit. Raises LaunchError."""
         try:
             profile = batch.profile_of(self._site, job.profile)
             starter = batch.starter(profile[1], job.ranks, partial(find_mpiexec, self._mpiexec), job.threads)
@@ -54,7 +56,7 @@ class SlurmLauncher:
         return self._take(job.run, SlurmWorker(job.folder, record, self._site, job.group, self._clerk))
 
     def find(self, run: str, folder: Path) -> Trace:
-        """By its record: what that says is handed over, or was about to be. Raises OSError, ValueError."""
+        """Finds the job by its record, which was submitted or was about to be. Raises OSError, ValueError."""
         try:
             record = batch.read_job(folder)
         except msgspec.MsgspecError as error:
@@ -64,7 +66,7 @@ class SlurmLauncher:
         return Trace(self._take(run, SlurmWorker(folder, record, self._site, clerk=self._clerk)), True, False)
 
     def tidy(self) -> None:
-        """Nodes are Slurm's to clean."""
+        """Nothing to do: Slurm cleans its nodes."""
 
     def _words(self, job: Job) -> list[str]:
         words = [*self._worker, str(job.case), "--out", str(job.folder), "--run", job.run, "--ranks", str(job.ranks)]
@@ -99,7 +101,7 @@ class SlurmLauncher:
             time.sleep(self._site.poll)
 
     def _round(self) -> None:
-        """One list for all runs, then what is due with each."""
+        """Gets one list for all runs, then does what is due with each."""
         with self._lock:
             self._workers = {run: worker for run, worker in self._workers.items() if not worker.over}
             workers = list(self._workers.items())
@@ -122,7 +124,7 @@ class SlurmLauncher:
                 return
 
     def _hand_over_arrays(self, workers: list[SlurmWorker]) -> set[str]:
-        """The names of those that are handed over later."""
+        """Names of runs that are submitted later."""
         try:
             return self._arrays.hand_over(workers)
         except (slurm_call.SlurmError, OSError) as error:
@@ -130,8 +132,8 @@ class SlurmLauncher:
             return {worker.name for worker in workers if worker.fresh or worker.waits_for_array}
 
     def _attend(self, run: str, worker: SlurmWorker, entries: list[Entry], arrays: Set[str]) -> bool:
-        """False when the controller has not answered, so that nobody else waits for it. A command that hangs is not
-        tried again at once, and keeps nobody from the others.
+        """False when the controller has not answered, so that no other run waits for it. A command that hangs is not
+        tried again at once, and does not delay other runs.
         """
         try:
             worker.turn(entries, arrays)
