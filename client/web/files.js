@@ -15,6 +15,7 @@ export class Files {
     this.fold = fold("files", false, "Files", this.list, this.note, again);
     this.fold.addEventListener("toggle", () => this.fold.open && !this.known && this.read());
     this.element = h("section.card", { "aria-label": "files" }, this.fold);
+    this.fold.append(h("p.hint", {}, "All of them: ", h("code", {}, `conoid get ${run}`), "; a report in one file: ", h("code", {}, `conoid report ${run}`)));
     if (this.fold.open) this.read();
   }
 

@@ -20,8 +20,25 @@ export class NewPage {
     Object.assign(this, { from: query.get("from") ?? "", onRefused, told: null, checked: null, abort: new AbortController(), key: fresh() });
     this.outbox = new Outbox(this.from, () => this.news());
     this.build();
+    this.listen();
     this.begin(query.get("case"));
     document.title = "New run · Conoid";
+  }
+
+  // Files may be dropped anywhere on the page: beside it the browser would leave the page for them.
+  listen() {
+    const { signal } = this.abort;
+    const mark = (over) => this.element.classList.toggle("dropping", over);
+    document.addEventListener("dragover", (event) => {
+      event.preventDefault();
+      mark(true);
+    }, { signal });
+    document.addEventListener("dragleave", ({ relatedTarget }) => relatedTarget || mark(false), { signal });
+    document.addEventListener("drop", (event) => {
+      event.preventDefault();
+      mark(false);
+      this.drop([...event.dataTransfer.files]);
+    }, { signal });
   }
 
   close() {
@@ -44,7 +61,7 @@ export class NewPage {
     this.verdict = h("div");
     this.files = h("div");
     const file = h("label.button", {}, "Choose files", chosen);
-    this.element = h("div.work.new", { ondragover: (event) => event.preventDefault(), ondrop: (event) => this.dropped(event), onkeydown: (event) => this.pressed(event) },
+    this.element = h("div.work.new", { onkeydown: (event) => this.pressed(event) },
       h("div.run-head", {}, h("h1", {}, this.from ? "Start again with changes" : "New run"), h("span.grow"), this.gallery, file),
       h("div.bench", {},
         h("section.card.stage-editor", { "aria-label": "case" }, h("p.hint", {}, "Paste a case, drop it here with the files that it names, or begin with a shipped one."), this.editor.element),
@@ -93,11 +110,6 @@ export class NewPage {
     this.typed();
   }
 
-  dropped(event) {
-    event.preventDefault();
-    this.drop([...event.dataTransfer.files]);
-  }
-
   // A case goes into the editor, all others are files that a case may name.
   async drop(files) {
     const cases = files.filter(({ name }) => /\.(toml|json)$/i.test(name));
@@ -136,11 +148,11 @@ export class NewPage {
   async check() {
     const { text } = this.editor;
     if (this.checking || this.checked === text || this.abort.signal.aborted) return;
-    if (!text.trim()) return this.take_in(text, null);
+    if (!text.trim()) return this.judged(text, null);
     this.checking = true;
     this.draw();
     try {
-      this.take_in(text, await this.ask("v1/cases:validate", text));
+      this.judged(text, await this.ask("v1/cases:validate", text));
     } catch (error) {
       this.checked = null;
       this.fail(error);
@@ -157,7 +169,7 @@ export class NewPage {
     return (await send(path, { method: "POST", headers: { "Content-Type": type, ...headers }, body: text, signal: this.abort.signal })).json();
   }
 
-  take_in(text, told) {
+  judged(text, told) {
     Object.assign(this, { checked: text, told });
     this.say("");
     this.news();
@@ -206,7 +218,7 @@ export class NewPage {
 
   // What is wrong; a file that is not here yet stands among the files.
   problems(named) {
-    const wanted = new Set(named.filter((file) => this.outbox.stateOf(file).state !== "sent").map(({ key }) => `${key}.sha256`));
+    const wanted = new Set(named.filter((file) => !file.sha256 || this.outbox.stateOf(file).state !== "sent").map(({ key }) => `${key}.sha256`));
     return (this.told?.problems ?? []).filter(({ key }) => !wanted.has(key));
   }
 
@@ -224,7 +236,7 @@ export class NewPage {
     if (this.seen !== state || this.shown !== this.told) {
       [this.seen, this.shown] = [state, this.told];
       this.editor.mark(lines.filter((line) => line >= 0));
-      this.verdict.replaceChildren(verdict(text, current ? "" : "checking …", this.told && { ...this.told, problems }, lines, (line) => this.editor.goTo(line)));
+      this.verdict.replaceChildren(verdict(text, current ? "" : named.length ? "checking, and reading its files …" : "checking …", this.told && { ...this.told, problems }, lines, (line) => this.editor.goTo(line)));
     }
     this.files.replaceChildren(filesTable(named, this.outbox));
   }
@@ -233,7 +245,8 @@ export class NewPage {
 // The line of a problem: that of its key, or the one that the message names.
 function place(text, { key, message }) {
   const told = /at line (\d+)/.exec(message);
-  return told ? Number(told[1]) - 1 : key ? lineOf(text, key) : -1;
+  const named = key || /^([a-z][\w.[\]]*) = /.exec(message)?.[1];
+  return told ? Number(told[1]) - 1 : named ? lineOf(text, named) : -1;
 }
 
 const fresh = () => [...crypto.getRandomValues(new Uint8Array(16))].map((byte) => byte.toString(16).padStart(2, "0")).join("");

@@ -24,7 +24,7 @@ export class Numbers {
 function five(live) {
   const { progress, counts, load, state } = live;
   const over = FINAL.has(state);
-  const left = over ? `took ${duration(live.elapsed)}` : progress ? `${duration(progress.eta)} left` : "";
+  const left = over ? `took ${duration(live.elapsed)}` : Number.isFinite(progress?.eta) ? `${duration(progress.eta)} left` : "";
   return [
     entry("time", progress ? timed(live.fraction * progress.end_time, progress.end_time) : "–", left),
     entry("dt", si(progress?.dt || live.ledger.findLast(({ dt }) => dt > 0)?.dt, "s"), progress?.limiter && `held by ${progress.limiter}`),

@@ -20,7 +20,7 @@ export class Outbox {
   async add(file) {
     const entry = { file, sha256: "", state: "hashing", done: 0, error: "" };
     this.files.set(file.name, entry);
-    await this.try(entry, async () => {
+    await this.attempt(entry, async () => {
       const sha256 = await hashed(file, (done) => this.told(entry, { done }), this.abort.signal);
       this.told(entry, { sha256, state: "ready" });
     });
@@ -36,7 +36,7 @@ export class Outbox {
     this.onChange();
   }
 
-  async try(entry, work) {
+  async attempt(entry, work) {
     try {
       await work();
     } catch (error) {
@@ -59,7 +59,7 @@ export class Outbox {
 
   send(entry) {
     this.told(entry, { state: "sending", done: 0 });
-    return this.try(entry, async () => {
+    return this.attempt(entry, async () => {
       await sendFile(entry.file, entry.sha256, (done) => this.told(entry, { done }), this.abort.signal);
       this.known.set(entry.sha256, { whole: true });
       this.told(entry, { state: "sent" });

@@ -9,13 +9,13 @@ const primes = (n) => {
   return found;
 };
 const fraction = (x) => Math.floor((x - Math.floor(x)) * 2 ** 32);
-const START = primes(8).map((p) => fraction(Math.sqrt(p)));
-const ROUNDS = new Uint32Array(primes(64).map((p) => fraction(Math.cbrt(p))));
+const START = primes(8).map((p) => fraction(Math.sqrt(p)) | 0);
+const ROUNDS = Int32Array.from(primes(64).map((p) => fraction(Math.cbrt(p)) | 0));
 
 export class Sha256 {
   constructor() {
-    this.state = new Uint32Array(START);
-    this.words = new Uint32Array(64);
+    this.state = Int32Array.from(START);
+    this.words = new Int32Array(64);
     this.rest = new Uint8Array(2 * BLOCK);
     Object.assign(this, { held: 0, length: 0 });
   }
@@ -38,16 +38,18 @@ export class Sha256 {
     return this;
   }
 
+  // Signed words throughout: engines keep those in registers, unsigned ones become floating-point numbers.
   block(bytes, at) {
     const { state, words: w } = this;
     for (let i = 0, o = at; i < 16; i += 1, o += 4) w[i] = (bytes[o] << 24) | (bytes[o + 1] << 16) | (bytes[o + 2] << 8) | bytes[o + 3];
     for (let i = 16; i < 64; i += 1) {
-      const [x, y] = [w[i - 15], w[i - 2]];
+      const x = w[i - 15];
+      const y = w[i - 2];
       const s0 = ((x >>> 7) | (x << 25)) ^ ((x >>> 18) | (x << 14)) ^ (x >>> 3);
       const s1 = ((y >>> 17) | (y << 15)) ^ ((y >>> 19) | (y << 13)) ^ (y >>> 10);
-      w[i] = w[i - 16] + s0 + w[i - 7] + s1;
+      w[i] = (w[i - 16] + s0 + w[i - 7] + s1) | 0;
     }
-    let [a, b, c, d, e, f, g, h] = state;
+    let a = state[0], b = state[1], c = state[2], d = state[3], e = state[4], f = state[5], g = state[6], h = state[7];
     for (let i = 0; i < 64; i += 1) {
       const s1 = ((e >>> 6) | (e << 26)) ^ ((e >>> 11) | (e << 21)) ^ ((e >>> 25) | (e << 7));
       const t1 = (h + s1 + ((e & f) ^ (~e & g)) + ROUNDS[i] + w[i]) | 0;
@@ -67,7 +69,7 @@ export class Sha256 {
     view.setUint32(blocks * BLOCK - 8, Math.floor(this.length / 2 ** 29));
     view.setUint32(blocks * BLOCK - 4, (this.length * 8) >>> 0);
     for (let i = 0; i < blocks; i += 1) this.block(this.rest, i * BLOCK);
-    return [...this.state].map((word) => word.toString(16).padStart(8, "0")).join("");
+    return [...this.state].map((word) => (word >>> 0).toString(16).padStart(8, "0")).join("");
   }
 }
 

@@ -7,7 +7,7 @@ import { readFileSync } from "node:fs";
 import { pathToFileURL } from "node:url";
 
 class Element {
-  constructor(tag) { Object.assign(this, { tag, children: [], style: {}, dataset: {}, options: [], classList: { add() {} }, hidden: false }); }
+  constructor(tag) { Object.assign(this, { tag, children: [], style: {}, dataset: {}, options: [], classList: { add() {} }, hidden: false, value: "" }); }
   append(...children) { for (const child of children) this.insertBefore(child); }
   prepend(child) { this.insertBefore(child, this.children[0]); }
   insertBefore(child, next) {
@@ -31,6 +31,7 @@ class Element {
   get childElementCount() { return this.children.length; }
   addEventListener() {}
   focus() {}
+  setSelectionRange() {}
 }
 
 class Observer {
@@ -40,7 +41,7 @@ class Observer {
 
 const known = {};
 const stage = {
-  document: { baseURI: "http://x/", title: "", createElement: (tag) => new Element(tag), getElementById: (id) => (known[id] ??= new Element(id)), documentElement: new Element("html") },
+  document: { baseURI: "http://x/", title: "", createElement: (tag) => new Element(tag), getElementById: (id) => (known[id] ??= new Element(id)), documentElement: new Element("html"), addEventListener() {} },
   location: { hash: "" }, sessionStorage: { getItem: () => "token", setItem() {}, removeItem() {} }, addEventListener() {},
   matchMedia: () => ({ addEventListener() {}, removeEventListener() {} }), getComputedStyle: () => ({ getPropertyValue: () => "" }),
   IntersectionObserver: Observer, ResizeObserver: Observer, requestAnimationFrame: (work) => setTimeout(work),

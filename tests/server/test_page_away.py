@@ -208,6 +208,46 @@ def test_a_run_that_is_not_there_says_so(web: Path, problem: dict[str, Any], wor
     assert words in played(web, script % json.dumps(problem))
 
 
+def test_a_case_is_checked_when_nobody_types_and_started_once(web: Path) -> None:
+    script = """
+        const { NewPage } = await load("new.js");
+        const valid = { valid: true, problems: [], warnings: [], estimate: {}, files: [] };
+        const [keys, checks] = [[], []];
+        let away = false;
+        state.served = (path, { body, headers }) => {
+            if (path === "v1/cases") return { cases: [] };
+            if (away) throw new Error("away");
+            if (path === "v1/cases:validate") checks.push(body);
+            else keys.push(headers["Idempotency-Key"]);
+            return path === "v1/runs" ? { id: "b" } : valid;
+        };
+        const page = new NewPage(new URLSearchParams(), () => {});
+        const type = (words) => {
+            page.editor.area.value = words;
+            page.typed();
+        };
+        ["a", "ab", "abc"].forEach(type);
+        const before = page.startButton.disabled;
+        await pause(800);
+        const after = page.startButton.disabled;
+        away = true;
+        await page.start();
+        const said = text(page.said);
+        away = false;
+        await page.start();
+        await page.start();
+        type("abcd");
+        await page.start();
+        page.close();
+        return [checks, before, after, said, new Set(keys).size, keys.length, location.hash];
+    """
+    checks, before, after, said, keys, starts, place = played(web, script)
+    assert (checks, before, after) == (["abc"], True, False)
+    assert "No answer from the server" in said
+    assert (keys, starts) == (2, 3), "the same case has the same key, another one another"
+    assert place == "#/runs/b"
+
+
 def test_a_file_goes_on_where_the_connection_broke(web: Path) -> None:
     script = """
         const { sendFile } = await load("sending.js");
