@@ -45,11 +45,14 @@ export class Picked {
   }
 }
 
+// Nobody knows it where erosion alone parts bodies.
+const born = (birth) => (birth === 0 ? "at the start" : si(birth, "s"));
+
 function facts(found) {
   return [
     entry("fragment", found.rest ? "the rest" : String(found.id)), entry("mass", si(found.mass, "kg")),
     entry("size", si(found.size, "m")), entry("tets", count(found.tets)),
-    entry("birth", found.birth > 0 ? si(found.birth, "s") : "from the start"),
+    entry("birth", born(found.birth)),
     entry("speed", si(Math.hypot(...found.velocity), "m/s")), entry("velocity", vector([...found.velocity], "m/s"), true),
     entry("centre", vector([...found.centre], "m"), true),
   ];
@@ -81,7 +84,7 @@ export function table({ arrays, header }, picked, onPick) {
   const rows = [...ids.keys()].filter((row) => ids[row] >= 0n).sort((a, b) => masses[b] - masses[a]).slice(0, HEAVIEST);
   const columns = [
     alike(rows.map((row) => masses[row]), "kg"), alike(rows.map((row) => Math.hypot(v[3 * row], v[3 * row + 1], v[3 * row + 2])), "m/s"),
-    alike(rows.map((row) => sizes[row]), "m"), rows.map((row) => (births[row] > 0 ? si(births[row], "s") : "start")),
+    alike(rows.map((row) => sizes[row]), "m"), rows.map((row) => born(births[row])),
   ];
   const body = rows.map((row, i) => h("tr", { "aria-selected": String(row === picked) },
     h("th", { scope: "row" }, h("button.tab", { type: "button", onclick: () => onPick(row) }, String(ids[row]))), columns.map((column) => h("td.number", {}, column[i]))));

@@ -43,7 +43,7 @@ class Shattered:
     def _share(self, mine: "np.ndarray", random: np.random.Generator) -> Share:
         ids = np.unique(self.tets[mine])
         share = {"nodes": ids, "x": self.x[ids], "v": self.v[ids], "held": np.zeros((0, 2), np.int64)}
-        share["numbers"] = np.zeros(2, np.int64)
+        share["numbers"] = np.array([1, 0])  # a record of fragments is kept, and has none yet
         for k, part in enumerate(np.unique(self.part[mine])):
             some = random.permutation(mine[self.part[mine] == part])
             share |= {

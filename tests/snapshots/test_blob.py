@@ -206,3 +206,19 @@ def test_views_need_no_numpy() -> None:
     for name, array in header.arrays.items():
         assert array.offset % 8 == 0
         assert list(snapshot.view(data, array)) == got[name].reshape(-1).tolist()
+
+
+def test_where_erosion_alone_parts_bodies_the_largest_piece_is_the_part() -> None:
+    """And keeps its number when others come and go; these have the number of their first tet."""
+    body = shattered(5, 9)
+    label, whole = pieces(body), replace(body.whole(1), initial=0)
+    data = blob.made(whole, {**TOLD, "ranks": 1}, lambda numbers: np.zeros(len(numbers)), Budget()).data
+    got = arrays(data)
+    expected = set()
+    for part in (0, 1):
+        names, tets = np.unique(label[body.part == part], return_counts=True)
+        first = {name: int(np.flatnonzero(label == name)[0]) for name in names}
+        largest = min(names, key=lambda name: (-tets[list(names).index(name)], first[name]))
+        expected |= {(part, int(tets.max()))}
+        expected |= {(len(PARTS) + first[name], int(n)) for name, n in zip(names, tets, strict=True) if name != largest}
+    assert set(zip(got["fragment_id"].tolist(), got["fragment_tets"].tolist(), strict=True)) == expected

@@ -18,10 +18,13 @@ class Births:
         self._known: dict[int, float] = {}
         self._read = 0
 
-    def at(self, t: float, numbers: Ints, initial: int) -> Floats:
+    def at(self, t: float, numbers: Ints, initial: int, *, kept: bool = True) -> Floats:
         """(g,) s, of fragments ``numbers`` at time ``t``: the first frame up to then that has them, or ``t`` itself; 0
-        for the ``initial`` ones, which were there at the start.
+        for the ``initial`` ones, which were there at the start. Where no record of fragments is ``kept``, nobody knows
+        when the others came into being: NaN.
         """
+        if not kept:
+            return np.where(numbers < initial, 0.0, np.nan)
         self._catch_up()
         born = {number: time for number, time in self._known.items() if time <= t}
         return np.array([0.0 if number < initial else born.get(number, t) for number in numbers.tolist()])

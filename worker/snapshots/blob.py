@@ -63,7 +63,7 @@ Births = Callable[[Ints], Floats]
 def made(whole: Whole, told: dict[str, Any], births: Births, budget: Budget) -> Made:
     """The snapshot of a model. ``told``: n, step, t and ranks for the header."""
     labels = np.concatenate([np.zeros(0, np.int64), *connectivity.labels(whole.model, whole.held, SerialComm())])
-    every = table.measured(whole, numbered(whole.numbers, labels, whole.next, SerialComm())[0])
+    every = table.measured(whole, _numbers(whole, labels))
     columns, row = table.columns(every, births(every.label))
     values, seen = _fields(whole), outline.find(whole.model, every.of)
     room = budget.bytes - _bytes(columns) - arrows.MOST_BYTES - _HEADER * (len(columns) + len(values) + 8)
@@ -87,6 +87,21 @@ def made(whole: Whole, told: dict[str, Any], births: Births, budget: Budget) -> 
     data = _packed(header, arrays | levels | columns)
     tets = _tets(whole, header, corners, values, row[every.of]) if 0 < len(corners) <= volume.MOST_TETS else b""
     return Made(data, tets, len(drawn.tet), len(every.label), *table.by_size(every.size), _ranges(of))
+
+
+def _numbers(whole: Whole, labels: Ints) -> Ints:
+    """(tets,) the number of the fragment of each. Where erosion alone parts bodies no record of them is kept: the largest
+    piece of each part has the number of the part, and every other one that of its first tet, behind those.
+    """
+    if whole.initial:
+        return numbered(whole.numbers, labels, whole.next, SerialComm())[0]
+    pieces = np.column_stack([_parts(whole.model).astype(np.int64), labels])
+    pairs, of, tets = np.unique(pieces, axis=0, return_inverse=True, return_counts=True)
+    order = np.lexsort((pairs[:, 1], -tets, pairs[:, 0]))
+    largest = order[np.append(True, np.diff(pairs[order, 0]) != 0)[: len(order)]]
+    number = pairs[:, 1] + len(whole.model.parts)
+    number[largest] = pairs[largest, 0]
+    return np.asarray(number[of.reshape(-1)])
 
 
 def _tets(whole: Whole, header: Header, corners: Ints, values: dict[str, Floats], row: Ints) -> bytes:

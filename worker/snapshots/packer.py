@@ -66,9 +66,11 @@ def _made(folder: Path, task: dict[str, Any], births: Births) -> dict[str, Any]:
     finally:
         for path in paths:
             path.unlink(missing_ok=True)
-    initial = whole.initial or whole.model.elements_global  # nothing breaks: all were there
+    initial = whole.initial or len(task["parts"])
     told = {name: task[name] for name in ("n", "step", "t", "ranks")}
-    made = blob.made(whole, told, lambda numbers: births.at(task["t"], numbers, initial), blob.Budget())
+    made = blob.made(
+        whole, told, lambda numbers: births.at(task["t"], numbers, initial, kept=whole.initial > 0), blob.Budget()
+    )
     place = layout.snapshot(folder, task["n"])
     whole_file.write(place, made.data)
     return {

@@ -1,0 +1,89 @@
+"""A fragment is the same one, in the same colour, in all snapshots of a real run: numbers, tables, page and pictures."""
+
+import json
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from conoid.cases import layout
+from conoid.client import snapshots
+from conoid.client.drawing import hues
+from conoid.client.snapshots import Snapshot
+
+from .visitor import DEMO_CASE
+
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(3600)]
+NODE = shutil.which("node")
+WEB = Path(__file__).parents[2] / "client" / "web"
+FOLLOWED = 20
+"""Fragments besides the steel bar and the largest of glass."""
+
+
+@pytest.fixture(scope="module")
+def seen(tmp_path_factory: pytest.TempPathFactory) -> list[Snapshot]:
+    """The snapshots of the demo to 90 us, one a second at most."""
+    folder = tmp_path_factory.mktemp("demo") / "run"
+    command = [sys.executable, "-m", "conoid.worker", str(DEMO_CASE), "--out", str(folder)]
+    for change in ("run.end_time='90 us'", "run.snapshots=400", "run.frames=60", "run.ranks=1", "reference=[]"):
+        command += ["--set", change]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return [snapshots.read(path) for path in sorted((folder / layout.SNAPSHOTS).glob("*.snap"))]
+
+
+def parts_of(one: Snapshot) -> dict[int, int]:
+    """The part of each fragment that is drawn."""
+    rows = one.array("vertex_fragment")[one.array("triangles")[:, 0]]
+    numbers = one.fragments["id"][rows]
+    return dict(zip(numbers.tolist(), one.array("triangle_part").tolist(), strict=True))
+
+
+def test_fragments_are_followed_through_fifty_snapshots(seen: list[Snapshot]) -> None:
+    assert len(seen) >= 50
+    last, parts = seen[-1].fragments, parts_of(seen[-1])
+    heaviest = [int(label) for label in last["id"][np.argsort(-last["mass"])] if label >= 0]
+    steel, glass = (next(label for label in heaviest if parts.get(label) == part) for part in (0, 1))
+    followed = [steel, glass, *[label for label in heaviest if label not in {steel, glass}][:FOLLOWED]]
+    for label in followed:
+        times, masses, centres, speeds = course(seen, label)
+        born = float(last["birth"][last["id"] == label][0])
+        assert times[-1] == seen[-1].header.t
+        assert len(times) == sum(one.header.t >= times[0] for one in seen), f"{label} is never away"
+        assert born <= times[0] * (1.0 + 1e-6)
+        assert (np.diff(masses) <= 1e-9 * masses[0]).all(), "it loses pieces and never gets any"
+        steps = np.linalg.norm(np.diff(centres, axis=0), axis=1)
+        lost = 1.0 - masses[1:] / masses[:-1]
+        assert (steps <= 2.0 * speeds[:-1] * np.diff(times) + 1e-4 + 0.06 * lost).all(), f"{label} does not jump"
+    assert len(course(seen, steel)[0]) == len(seen)
+
+
+def course(seen: list[Snapshot], label: int) -> tuple[np.ndarray, ...]:
+    """Times, masses, centres and greatest speeds around of a fragment in the snapshots that have it."""
+    rows = [(one, np.flatnonzero(one.fragments["id"] == label)) for one in seen]
+    found = [(one.header.t, one.fragments, row[0]) for one, row in rows if len(row)]
+    times, masses = np.array([t for t, *_ in found]), np.array([table["mass"][row] for _, table, row in found])
+    centres = np.array([table["centre"][row] for _, table, row in found], float)
+    speeds = np.linalg.norm([table["velocity"][row] for _, table, row in found], axis=1)
+    return times, masses, centres, np.maximum(speeds, 300.0)
+
+
+@pytest.mark.skipif(NODE is None, reason="no node on this machine")
+def test_page_and_pictures_give_each_fragment_one_colour_at_all_times(seen: list[Snapshot], tmp_path: Path) -> None:
+    for name in ("colours.js",):
+        shutil.copy(WEB / name, tmp_path)
+    (tmp_path / "package.json").write_text('{"type": "module"}')
+    colours: dict[int, tuple[int, ...]] = {}
+    for one in seen[:: max(1, len(seen) // 10)]:
+        pairs = sorted(parts_of(one).items())
+        script = "data.map(([id, part]) => page.ofFragment(BigInt(id), part, 2))"
+        told = json.dumps({"module": str(tmp_path / "colours.js"), "script": script, "data": pairs})
+        command = [str(NODE), str(Path(__file__).with_name("scripts.mjs"))]
+        drawn = json.loads(subprocess.run(command, input=told, capture_output=True, text=True, check=True).stdout)
+        numbers, parts = zip(*pairs, strict=True)
+        assert drawn == hues.of_fragments(numbers, parts, 2).tolist()
+        for (label, _), colour in zip(pairs, drawn, strict=True):
+            assert colours.setdefault(label, tuple(colour)) == tuple(colour)
