@@ -1,4 +1,4 @@
-"""A fragment is the same one, in the same colour, in all snapshots of a real run: numbers, tables, page and pictures."""
+"""A fragment is the same one, in the same colour, in all snapshots of a real run, on the page and in pictures."""
 
 import json
 import shutil

@@ -90,8 +90,8 @@ def made(whole: Whole, told: dict[str, Any], births: Births, budget: Budget) -> 
 
 
 def _numbers(whole: Whole, labels: Ints) -> Ints:
-    """(tets,) the number of the fragment of each. Where erosion alone parts bodies no record of them is kept: the largest
-    piece of each part has the number of the part, and every other one that of its first tet, behind those.
+    """(tets,) the number of the fragment of each. Where erosion alone parts bodies no record of them is kept: the
+    largest piece of each part has the number of the part, and every other one that of its first tet, behind those.
     """
     if whole.initial:
         return numbered(whole.numbers, labels, whole.next, SerialComm())[0]
