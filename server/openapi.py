@@ -1,4 +1,4 @@
-"""What OpenAPI says of the routes: the case in a body, which FastAPI sees as bytes, and each answer with its shape."""
+"""The OpenAPI document of the routes: the body of a case, which FastAPI sees as bytes, and the shape of each answer."""
 
 import math
 from functools import cache
@@ -21,7 +21,7 @@ CASE_BODY: dict[str, Any] = {
         },
     }
 }
-"""For routes that take a case."""
+"""Body of routes that take a case."""
 
 
 SWEEP_BODY: dict[str, Any] = {
@@ -30,7 +30,7 @@ SWEEP_BODY: dict[str, Any] = {
         "content": {"application/json": {"schema": {"$ref": "#/components/schemas/Wish"}}},
     }
 }
-"""For the route that takes a sweep."""
+"""Body of the route that takes a sweep."""
 FILE_BODY: dict[str, Any] = {
     "parameters": [
         {
@@ -43,7 +43,7 @@ FILE_BODY: dict[str, Any] = {
         "content": {"application/octet-stream": {"schema": {"type": "string", "format": "binary"}}},
     },
 }  # fmt: skip
-"""For the route that takes a file."""
+"""Body of the route that takes a file."""
 _JSON, _PROBLEM, _BYTES = "application/json", "application/problem+json", "application/octet-stream"
 _TEXT, _FILE = "text/plain", "*/*"
 ANSWERS: dict[tuple[str, str], dict[int, tuple[str, str]]] = {

@@ -38,17 +38,17 @@ TESTED = {
         "f55227d12dac0eb037cae13b1992091746fc017a275748e4a1bebd0f6244e7e5",
     ),
 }
-"""Address below the version: the file in the package, and its sha256 in the wheel of ``VERSION`` on PyPI."""
+"""Address below the version: file of the package, and its sha256 in the wheel of ``VERSION`` on PyPI."""
 _FOREVER = "public, max-age=31536000, immutable"
-"""The version is part of the address. One year is the longest that RFC 9111's readers take."""
+"""Cached for a year, since the version is part of the address; RFC 9111 has no longer time."""
 _WORTH = 1 << 10
-"""Bytes from which a file is compressed. Chosen: a packet has about as many."""
+"""Bytes from which a file is compressed. Chosen: the size of a packet."""
 _TYPES = {
     ".js": "text/javascript", ".css": "text/css", ".html": "text/html", ".json": "application/json",
     ".svg": "image/svg+xml", ".png": "image/png",
 }  # fmt: skip
 _LEVEL = 6
-"""Of gzip: 1.1 MB become 0.37 MB in 50 ms, once."""
+"""Level of gzip: 1.1 MB become 0.37 MB in 50 ms, once."""
 
 
 class LibraryError(Exception):
@@ -57,13 +57,13 @@ class LibraryError(Exception):
 
 @dataclass(frozen=True)
 class Library:
-    """One file as it is sent."""
+    """One file with its headers."""
 
     plain: bytes
 
     @cached_property
     def zipped(self) -> bytes:
-        """Compressed at the first request."""
+        """The compressed file, made at the first request."""
         return gzip.compress(self.plain, _LEVEL, mtime=0)
 
     @cached_property
@@ -71,12 +71,13 @@ class Library:
         return hashlib.sha256(self.plain).hexdigest()[:32]
 
     def tag(self, zipped: bool) -> str:
-        """The ETag of one of its two forms."""
+        """The ETag of the plain or the compressed form."""
         return f'"{self._digest}{"-gzip" if zipped else ""}"'
 
 
 def libraries() -> dict[str, Library]:
-    """The tested files, by address. Raises LibraryError if the package is absent or is another one."""
+    """The files of the libraries, by address. Raises LibraryError when the package is missing or has another
+    version."""
     cure = f"pip install --no-deps {PACKAGE}=={VERSION}"
     try:
         installed = metadata.distribution(PACKAGE)
@@ -100,9 +101,8 @@ def _tested(path: Path, digest: str) -> Library:
 
 
 def install(app: FastAPI, web: Path, *, auth: bool) -> str:
-    """Mounts the page at ``/`` and the libraries at ``/lib``; what is wrong with the libraries, or an empty text.
-
-    Raises OSError where the page cannot be read.
+    """Mounts the page at ``/`` and the libraries at ``/lib``; returns what is wrong with the libraries, or an empty
+    text. Raises OSError where the page cannot be read.
     """
     found: Mapping[str, Library] = {}
     problem = ""
@@ -120,21 +120,21 @@ def install(app: FastAPI, web: Path, *, auth: bool) -> str:
 
 
 def _is_shown(path: Path) -> bool:
-    """Whether a file belongs to the page, and not to the package that brings it."""
+    """Whether a file belongs to the page, not to the Python package around it."""
     return path.is_file() and not path.parent.name.startswith("_") and not path.name.startswith(("_", "."))
 
 
 class _Files:
-    """Files in memory, by address: ``fresh`` ones, of which a browser asks each time whether they are still the same (a
-    server may be a newer one), and those that are the same for ever.
+    """Serves files from memory, by address: ``fresh`` ones, which a browser revalidates each time, since a server
+    may be a newer one, and files that never change.
     """
 
     def __init__(self, fresh: Mapping[str, Library], lasting: Mapping[str, Library]) -> None:
         self._fresh, self._lasting = fresh, lasting
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Raises HTTPException 405 for what the server answers to other methods, and 404 whatever is asked of what is
-        not there: the mount sees every address that no route takes.
+        """Raises HTTPException 405 for other methods and 404 for other addresses: the mount sees every address
+        without a route.
         """
         address = scope["path"].removeprefix(scope["root_path"]).removeprefix("/")
         file, lasts = self._fresh.get(address) or self._lasting.get(address), address in self._lasting

@@ -1,4 +1,4 @@
-"""Does what ``lifecycle`` decides: writes the journal and the outcome, starts, adopts and ends workers."""
+"""Performs the actions of ``lifecycle``: writes journal and outcome, starts, adopts and stops workers."""
 
 import logging
 import os
@@ -23,19 +23,19 @@ _log = logging.getLogger("conoid.server")
 
 
 class Performer:
-    """Belongs to the thread of the supervisor; ``watches`` may be read from any thread."""
+    """Used in the supervisor's thread; ``watches`` may be read from any thread."""
 
     def __init__(self, settings: Settings, launcher: Launcher, telemetry: Telemetry | None) -> None:
-        """Watches nobody yet."""
+        """Has no workers yet."""
         self._settings, self._launcher, self._telemetry = settings, launcher, telemetry
         self._root = os.stat(settings.runs).st_ino
         self.watches: dict[str, Watch] = {}
-        """The workers that live, by run."""
+        """Running workers by run."""
         self.found: dict[str, Worker] = {}
-        """Workers that an earlier server started, until they are adopted."""
+        """Workers of an earlier server, until they are adopted."""
 
     def perform(self, run: Run, action: Action, now: float) -> None:
-        """One action of a step to ``run`` at the Unix time ``now``. Raises LaunchError, OSError and others."""
+        """Performs one action of a step to ``run`` at the Unix time ``now``. Raises LaunchError, OSError and others."""
         path = self._settings.runs / run.id
         match action:
             case Journal(state, cause, message):
@@ -57,11 +57,11 @@ class Performer:
                 self._kill(run.id, path)
 
     def probe(self, run_id: str) -> None:
-        """Raises OSError when nothing could be written of the run now."""
+        """Raises OSError when nothing of the run can be written now."""
         durable.probe(self._settings.runs / run_id)
 
     def gone(self, run_id: str) -> bool:
-        """Whether the run's folder is. False where the folder of all runs is another one: a disk is not mounted."""
+        """Whether the run's folder is gone. False where the folder of all runs is another one: its disk is missing."""
         try:
             same = os.stat(self._settings.runs).st_ino == self._root
             return same and not (self._settings.runs / run_id).is_dir()
@@ -69,12 +69,12 @@ class Performer:
             return False
 
     def lives(self, run_id: str) -> bool:
-        """Whether a worker of the run is known to live."""
+        """Whether a worker of the run is known to run."""
         watch = self.watches.get(run_id)
         return watch is not None and watch.worker.exited() is None
 
     def beyond_use(self, run_id: str) -> bool:
-        """Whether the run's folder alone is the trouble: the folder of all runs takes files."""
+        """Whether only the run's folder fails: files can be written in the folder of all runs."""
         if self.gone(run_id):
             return True
         try:
@@ -84,7 +84,7 @@ class Performer:
         return True
 
     def _stop(self, run_id: str, path: Path, why: Cause) -> None:
-        """A disk that is full keeps nobody from stopping a run: the database remembers the request as well."""
+        """A full disk does not keep a run from being stopped: the request is in the database as well."""
         try:
             folder.write_stop(path, why)
         except OSError as error:
@@ -123,8 +123,8 @@ class Performer:
         return self._watch(path, worker, made.wall_time)
 
     def _watch(self, path: Path, worker: Worker, allowed: float | None) -> Watch:
-        """The worker itself ends at ``run.max_wall_time``; the server steps in a grace later, a batch system at the
-        limit of the job.
+        """Time limit of the server: the worker itself ends at ``run.max_wall_time``, the server acts a grace period
+        later, a batch system at the limit of the job.
         """
         left = (
             None if allowed is None or self._launcher.queues else allowed + self._settings.grace - folder.runs_for(path)
@@ -133,7 +133,7 @@ class Performer:
 
 
 def _allowed(path: Path) -> float | None:
-    """The wall time of a run whose submission can be read; a worker keeps to its own in any case."""
+    """Time limit of a run whose submission can be read; the worker keeps to its own in any case."""
     try:
         return folder.submission(path).wall_time
     except (OSError, msgspec.MsgspecError):
@@ -141,7 +141,7 @@ def _allowed(path: Path) -> float | None:
 
 
 def of_launch(error: LaunchError) -> LaunchFailed | LaunchPutOff:
-    """Trouble that passes puts the launch off; a folder that does not say what to run is trouble of its disk."""
+    """An error that may pass delays the launch; a folder without a readable case is an error of its disk."""
     if passing(error):
         return LaunchPutOff(f"the launch is tried again: {error}")
     return LaunchFailed(str(error), Cause.STORAGE if isinstance(error, DamagedError) else Cause.LAUNCH)

@@ -1,4 +1,4 @@
-"""Which runs are kept for good: by the label ``keep``, or by what was said last, a hidden file in the run's folder."""
+"""Runs that are kept for good: by the label ``keep``, or by the last request, a hidden file in the run's folder."""
 
 from pathlib import Path
 
@@ -13,7 +13,7 @@ _PINNED, _YES, _NO = ".keep", "yes", "no"
 
 
 def pinned(folder: Path) -> bool:
-    """Whether the run is kept for good: by its label ``keep``, or by what was said last."""
+    """Whether the run is kept for good: by the last request, else by its label ``keep``."""
     if said := told(folder):
         return said == _YES
     try:
@@ -23,7 +23,7 @@ def pinned(folder: Path) -> bool:
 
 
 def told(folder: Path) -> str:
-    """``yes`` or ``no`` as was said last; empty when nobody has said anything."""
+    """The last request, ``yes`` or ``no``; empty without one."""
     try:
         return whole.read(folder / _PINNED, 80).decode()
     except (OSError, UnicodeDecodeError):
@@ -31,7 +31,7 @@ def told(folder: Path) -> str:
 
 
 def labels(folder: Path) -> dict[str, str]:
-    """Those that a run was submitted with, and ``keep`` as was said last; none where the folder has been removed or
+    """Labels of the submission, with ``keep`` by the last request; none where the folder has been removed or
     damaged.
     """
     try:

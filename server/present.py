@@ -1,5 +1,5 @@
-"""Which runs still have their folder. A run that has ended and whose folder is gone, however it was removed, is in no
-list, no count and no sweep, and is answered with 410."""
+"""Runs whose folder exists. A run that has ended and whose folder is gone, however it was removed, is in no list, no
+count and no sweep, and is answered with 410."""
 
 import errno
 import os
@@ -12,23 +12,23 @@ from .events import Run
 from .identity import FILE
 
 _FRESH = 1.0
-"""s for which the names that were read hold: a list shows a run at most so long after its folder was removed by hand.
-Chosen: 10,000 names take 5 ms."""
+"""s for which the list of folders is used: a run stays in lists at most so long after its folder was removed by
+hand. Chosen: 10,000 names take 5 ms."""
 
 
 class Present:
-    """May be used from any thread. Reads the names of the folder of runs, never the folders of the runs one by one."""
+    """For any thread. Reads the names in the folder of runs, never the folders of the runs one by one."""
 
     def __init__(self, runs: Path) -> None:
         """Reads nothing yet."""
         self._runs, self._reading = runs, threading.Lock()
         self._names: set[str] = set()
         self._gone: set[str] = set()
-        """Runs that were looked for one by one and not found: each is looked for once."""
+        """Runs that were looked up one by one and not found: each is looked up once."""
         self._read = -_FRESH
 
     def left(self, runs: Iterable[Run]) -> list[Run]:
-        """The runs without those that have ended and are gone, by names at most ``_FRESH`` s old. Raises OSError."""
+        """The runs without those that have ended and are gone, by a list at most ``_FRESH`` s old. Raises OSError."""
         self._refresh()
         return [run for run in runs if not (run.state.final and self._is_gone(run.id))]
 
@@ -38,7 +38,7 @@ class Present:
         return {run_id for run_id in ended - self._names if self._is_gone(run_id)}
 
     def there(self, run_id: str) -> bool:
-        """Whether the run has its folder now. Raises OSError where the folder of all runs itself is not there."""
+        """Whether the run has its folder now. Raises OSError where the folder of all runs is missing."""
         if (self._runs / run_id).is_dir():
             return True
         self._require()
@@ -47,11 +47,11 @@ class Present:
         return False
 
     def _is_gone(self, run_id: str) -> bool:
-        """A run that is newer than the names is looked for once by itself."""
+        """A run that is newer than the list is looked up once."""
         return run_id not in self._names and (run_id in self._gone or not self.there(run_id))
 
     def _refresh(self) -> None:
-        """One thread reads; the others go on with the names that are there, however long it takes."""
+        """One thread reads; the others use the previous list, however long it takes."""
         if time.monotonic() < self._read + _FRESH or not self._reading.acquire(blocking=False):
             return
         try:
@@ -63,6 +63,6 @@ class Present:
             self._reading.release()
 
     def _require(self) -> None:
-        """A folder of runs without the server's file is another one, or its disk is not mounted: no run is removed."""
+        """A folder without the server's file is another one, or its disk is not mounted: no run counts as removed."""
         if not (self._runs / FILE).exists():
             raise FileNotFoundError(errno.ENOENT, "the folder of all runs is not there now", str(self._runs))

@@ -1,15 +1,15 @@
-"""A log that says everything and repeats nothing: a flood of one message does not fill the disk."""
+"""A filter of the log against floods: repeated messages do not fill the disk."""
 
 import logging
 import threading
 import time
 
 _MOST, _WINDOW = 20, 60.0
-"""Lines of one kind that are written in so many s. Chosen: enough to see what it is."""
+"""Lines of one kind that are written in so many s. Chosen: enough to see the cause."""
 
 
 class Quiet(logging.Filter):
-    """For a handler. Lines are of one kind when they come from one place in the source."""
+    """For a handler. Lines of one kind come from one place in the source."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -17,7 +17,7 @@ class Quiet(logging.Filter):
         self._seen: dict[tuple[str, int], tuple[float, int]] = {}
 
     def filter(self, record: logging.LogRecord) -> bool:
-        """False for what has been said often enough; the first line after that says how much was left out."""
+        """False for a line above the limit; the next line that is written says how many were left out."""
         place, now = (record.pathname, record.lineno), time.monotonic()
         with self._lock:
             since, count = self._seen.get(place, (now, 0))
@@ -31,6 +31,6 @@ class Quiet(logging.Filter):
 
 
 def install() -> None:
-    """On every handler that there is."""
+    """Adds the filter to every handler."""
     for handler in logging.getLogger().handlers:
         handler.addFilter(Quiet())

@@ -1,4 +1,4 @@
-"""Has cases read by ``reading``, in processes with limits; decides who may have one read, and when."""
+"""Reads cases in separate processes with limits (``reading``), and decides whose turn it is."""
 
 import atexit
 import logging
@@ -21,20 +21,20 @@ from .reading import CPU, PID, WALL, Answer, Question, Reading, WrongCaseError
 
 _log = logging.getLogger("conoid.server")
 _LOAD = 30.0
-"""s in which the program must have loaded what it needs. Chosen: it takes half a second."""
+"""s within which the program must have loaded its modules. Chosen: it takes half a second."""
 _FORK = 10.0
-"""s in which the program must have begun with a case; one that has not is replaced. Chosen: it takes 10 ms."""
+"""s within which the program must have begun with a case; else it is replaced. Chosen: it takes 10 ms."""
 _REST = 5.0
-"""s that a case may take beyond ``WALL`` before its process is killed from here. Chosen."""
+"""s beyond ``WALL`` after which the server kills the process of a case. Chosen."""
 _WAITING = 100
-"""Bodies of one owner that wait to be read. Chosen: each may have 1 MiB."""
+"""Waiting bodies of one owner. Chosen: each may have 1 MiB."""
 CASE, SWEEP, FILES = 120.0, 900.0, 300.0
-"""s in which a case, all cases of a sweep, and a case with files must be read and taken, the waiting for a turn
-included. Chosen."""
+"""s within which a case, all cases of a sweep, and a case with files must be read, with the waiting for their turn.
+Chosen."""
 
 
 def lanes(patience: float) -> Lanes:
-    """As many cases are read at a time as there are cores; one owner alone never takes the last of the places."""
+    """As many cases at a time as there are cores; one owner alone never takes the last place."""
     places = max(2, usable_cores())
     return Lanes(each=places - 1, waiting=_WAITING, patience=patience, most=places)
 
@@ -45,8 +45,8 @@ def surveyors() -> Lanes:
 
 
 class Reader:
-    """A program that reads cases, started when it is first needed, and anew where it has ended or hangs. May be used
-    from any thread.
+    """A program that reads cases; it is started when it is first needed, and again where it has ended or hangs. For
+    any thread.
     """
 
     def __init__(self) -> None:
@@ -55,7 +55,8 @@ class Reader:
         self._program: _Program | None = None
 
     def read(self, question: Question) -> Reading:
-        """Raises CaseError with every problem, ServiceError 422 for a case that costs too much, 503; RuntimeError."""
+        """Reads a case. Raises CaseError with every problem, ServiceError 422 for a case that takes too much time or
+        memory, 503; RuntimeError."""
         told = self._ask(msgspec.msgpack.encode(question))
         if not told:
             detail = f"the case takes too long to be read: more than {CPU} s, or too much memory"
@@ -68,7 +69,7 @@ class Reader:
         return answer.reading
 
     def _ask(self, question: bytes) -> bytes:
-        """Of the program, or of the next one. Raises ServiceError 503."""
+        """A connection to the program, or to the next one. Raises ServiceError 503."""
         error: OSError | None = None
         for _ in range(2):
             try:
@@ -97,7 +98,7 @@ class Reader:
 
 
 class _Program:
-    """One that runs. It gets a connection for each case, and forks a process for it."""
+    """A running program. It gets a connection for each case, and forks a process for it."""
 
     def __init__(self) -> None:
         """Raises OSError where it does not start."""
@@ -115,7 +116,7 @@ class _Program:
         self._control.settimeout(_FORK)
 
     def begun(self) -> tuple[socket.socket, int]:
-        """A connection to a process that waits for a case, and its number. Raises OSError."""
+        """A connection to a process that waits for a case, and the number of the process. Raises OSError."""
         ours, theirs = socket.socketpair()
         try:
             with theirs:
@@ -130,14 +131,14 @@ class _Program:
             raise
 
     def close(self) -> None:
-        """Ends it."""
+        """Ends the program."""
         self._control.close()
         self._child.kill()
         self._child.wait()
 
 
 def _answer(connection: socket.socket, pid: int, question: bytes) -> bytes:
-    """What a process says of a case; empty where it was ended by its limits. Raises ServiceError 503."""
+    """The answer of a process; empty where it reached its limits. Raises ServiceError 503."""
     with connection:
         connection.settimeout(WALL + _REST)
         chunks = []
@@ -157,7 +158,7 @@ def _answer(connection: socket.socket, pid: int, question: bytes) -> bytes:
 
 @cache
 def the_reader() -> Reader:
-    """One a process: it keeps nothing between two cases."""
+    """One connection for each process, which keeps nothing between two cases."""
     made = Reader()
     atexit.register(made.close)
     return made

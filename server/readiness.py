@@ -1,4 +1,4 @@
-"""Whether the database and the folder of the runs take what the server would write."""
+"""Checks whether the database and the folder of the runs can be written."""
 
 import asyncio
 import shutil
@@ -14,13 +14,13 @@ from .settings import Settings
 from .store import Store
 
 _FRESH = 1.0
-"""s for which an answer holds: who asks needs no token, and each check writes to the disk. Chosen."""
+"""s for which a result is used: /readyz needs no token, and each check writes to the disk. Chosen."""
 _LIMIT = 2.0
-"""s that a check may take; one that takes longer has failed. Chosen: a disk that works answers within 0.1 s."""
+"""s after which a check has failed. Chosen: a disk that works answers within 0.1 s."""
 
 
 class Readiness:
-    """Belongs to the event loop."""
+    """Used in the thread of the event loop."""
 
     def __init__(self, settings: Settings, store: Store) -> None:
         """Checks nothing yet."""
@@ -31,7 +31,8 @@ class Readiness:
         }
 
     async def checks(self) -> dict[str, bool]:
-        """What can be used now: ``database``, ``runs`` (takes files), ``disk`` (as much is free as is kept)."""
+        """Results of the checks: ``database``, ``runs`` (files can be written), ``disk`` (the free space that the
+        site reserves)."""
         passed = await asyncio.gather(*(check.passes() for check in self._checks.values()))
         return dict(zip(self._checks, passed, strict=True))
 
@@ -57,7 +58,7 @@ class Readiness:
 
 
 class _Check:
-    """One of them: in a thread of its own, once for all who ask."""
+    """One check: in a thread of its own, once for all requests at the same time."""
 
     def __init__(self, look: Callable[[], bool]) -> None:
         self._look, self._thread = look, Lanes(each=1, waiting=1, patience=_LIMIT, most=1)
@@ -65,7 +66,7 @@ class _Check:
         self._asked: asyncio.Task[None] | None = None
 
     async def passes(self) -> bool:
-        """What was found less than ``_FRESH`` s ago, or is found now; False where that takes longer than ``_LIMIT``."""
+        """The result, at most ``_FRESH`` s old; False where the check takes longer than ``_LIMIT``."""
         if time.monotonic() >= self._until:
             if self._asked is None or self._asked.done():
                 self._asked = asyncio.create_task(self._ask())

@@ -23,18 +23,18 @@ from .sent import Part, Sent, SentFiles
 
 _RANGE = re.compile(r"bytes (?:(\d{1,18})-(\d{1,18})|\*)/(\d{1,18})")
 _GATHERED = 1 << 18
-"""Bytes that are gathered before they are written. Chosen: larger pieces are not faster."""
+"""Bytes that are collected before a write. Chosen: larger writes are not faster."""
 _SLICE = 1 << 25
-"""Bytes that are hashed in one piece of work. Chosen: 0.1 s, and others of the user come between."""
+"""Bytes that are hashed in one task. Chosen: 0.1 s, between which other requests of the user are served."""
 _SILENCE = 30.0
-"""s in which something of a body must arrive. Chosen, as of other bodies."""
+"""s within which a part of a body must arrive. Chosen, as for other bodies."""
 _STALLED = 5.0
-"""s of silence after which another connection may go on with a file. Chosen: one that broke without a word."""
+"""s without data after which another connection may continue with a file. Chosen: for a connection that broke."""
 
 
 @dataclass(frozen=True)
 class Span:
-    """The bytes ``first`` to ``end``, without this one, of a file of ``total`` bytes; ``anew``: whatever is there."""
+    """The bytes ``first`` to ``end``, exclusive, of a file of ``total`` bytes; ``anew``: replaces what is there."""
 
     first: int
     end: int
@@ -44,17 +44,17 @@ class Span:
 
 @dataclass
 class _Transfer:
-    """One connection that brings bytes of a file."""
+    """One connection that sends bytes of a file."""
 
     heard: float = field(default_factory=time.monotonic)
     given_up: bool = False
     busy: bool = False
-    """It has all bytes, and verifies them."""
+    """All bytes have arrived; they are verified."""
     over: asyncio.Event = field(default_factory=asyncio.Event)
     patience: asyncio.Timeout | None = None
 
     def give_up(self) -> None:
-        """Another connection goes on with the file, at once."""
+        """Another connection continues with the file, at once."""
         self.given_up = True
         if self.patience is not None:
             with suppress(RuntimeError):  # it does not wait for its body now
@@ -62,20 +62,18 @@ class _Transfer:
 
 
 class Receiver:
-    """Belongs to the event loop; disks are waited for in the lane of who sends."""
+    """Used in the thread of the event loop; disks are used in the lane of the caller."""
 
     def __init__(self, sent: SentFiles, lanes: Lanes) -> None:
-        """Nothing is on its way yet, as far as connections go."""
+        """No connection sends yet."""
         self._sent, self._lanes = sent, lanes
         self._open: dict[tuple[str, str], _Transfer] = {}
 
     async def receive(
         self, request: Request, owner: str, sha256: str, check: Callable[[], Awaitable[None]]
     ) -> tuple[Sent, bool]:
-        """Takes the body in, and says what is there then, and whether the file has become whole by it. ``check`` raises
-        where the right to send it has gone meanwhile.
-
-        Raises ServiceError: 400, 408, 409, 411, 413, 415, 422, 429, 503, 507.
+        """Receives the body; returns what is there then, and whether the file has become complete. ``check`` raises
+        where the right to send has ended. Raises ServiceError: 400, 408, 409, 411, 413, 415, 422, 429, 503, 507.
         """
         span = span_of(request)
         place_of(request).lengthen()
@@ -100,7 +98,7 @@ class Receiver:
             transfer.over.set()
 
     async def _begun(self, owner: str, sha256: str) -> _Transfer:
-        """The place of a connection that brings bytes of a file; a file has one. Raises ServiceError 409."""
+        """The connection that sends bytes of a file; a file has one at a time. Raises ServiceError 409."""
         while (other := self._open.get((owner, sha256))) is not None:
             if other.busy or time.monotonic() - other.heard < _STALLED:
                 raise _in_progress()
@@ -110,8 +108,8 @@ class Receiver:
         return made
 
     def _opened(self, owner: str, sha256: str, span: Span) -> Part | Sent:
-        """What is on its way, open where the body begins; the file where it is whole already. Raises ServiceError 409,
-        413, 429, 507, OSError.
+        """The incomplete file, open at the first byte of the body; the complete file where it exists. Raises
+        ServiceError 409, 413, 429, 507, OSError.
         """
         known = self._sent.find(owner, sha256)
         if known is not None and known.whole:
@@ -121,8 +119,8 @@ class Receiver:
     async def _taken(
         self, request: Request, transfer: _Transfer, part: Part, check: Callable[[], Awaitable[None]]
     ) -> None:
-        """Writes the body as it arrives; what has come stays, however it ends. Raises ServiceError 400, 401, 408, 409,
-        OSError, and what ``check`` raises.
+        """Writes the body as it arrives; what has arrived stays, however it ends. Raises ServiceError 400, 401, 408,
+        409, OSError, and the errors of ``check``.
         """
         gathered, chunks = bytearray(), aiter(request.stream())
         try:
@@ -138,7 +136,8 @@ class Receiver:
                 await self._lanes.run(part.write, bytes(gathered))
 
     async def _verify(self, owner: str, sha256: str, part: Part) -> None:
-        """The file is there under its name when this returns. Raises ServiceError 422: then nothing of it is left."""
+        """Gives the verified file its name, on disk on return. Raises ServiceError 422 where the hash differs: then
+        the bytes are removed."""
         total, offset = hashlib.sha256(), 0
         while offset < part.size:
             offset = await self._lanes.run(_hashed, total, part, offset)
@@ -169,7 +168,7 @@ def _in_progress() -> ServiceError:
 
 
 def _hashed(total: "hashlib._Hash", part: Part, offset: int) -> int:
-    """Adds a slice to the digest; returns where it ends. Raises OSError."""
+    """Adds a slice to the digest; returns its end. Raises OSError."""
     end = min(part.size, offset + _SLICE)
     while offset < end:
         data = part.read(min(_GATHERED, end - offset), offset)
@@ -181,7 +180,7 @@ def _hashed(total: "hashlib._Hash", part: Part, offset: int) -> int:
 
 
 def span_of(request: Request) -> Span:
-    """The bytes that a PUT brings, by its header alone. Raises ServiceError 400, 411, 415."""
+    """The range of bytes of a PUT, by its headers alone. Raises ServiceError 400, 411, 415."""
     check_encoding(request)
     length, told = request.headers.get("content-length", ""), request.headers.get("content-range")
     if not length.isdecimal():

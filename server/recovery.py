@@ -1,4 +1,4 @@
-"""What an earlier server has left of a run, from the run's folder and from the machine."""
+"""The state of a run after a restart of the server, by the run's folder and the processes of the machine."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -21,7 +21,7 @@ _STOPPABLE = {State.QUEUED, State.STARTING, State.RUNNING, State.STOPPING}
 
 @dataclass(frozen=True)
 class Left:
-    """A run as its folder tells it, the idempotency key that made it, and what became of its worker."""
+    """A run by its folder, its idempotency key, and the trace of its worker."""
 
     run: Run
     key: str | None
@@ -30,9 +30,8 @@ class Left:
 
 
 def look(path: Path, known: Run | None, launcher: Launcher) -> Left:
-    """``known`` is the database's word on the run, which fills in what a damaged folder does not tell any more.
-
-    Raises OSError, and ValueError when neither folder nor database say whose run it is.
+    """Reads a run. ``known``: its row in the database, for what a damaged folder lacks. Raises OSError, and
+    ValueError when neither has the owner of the run.
     """
     made = _submission(path)
     if made is None and known is None:
@@ -56,7 +55,7 @@ def _submission(path: Path) -> Submission | None:
 
 
 def _outcome(path: Path) -> Outcome | None:
-    """None where it is locked away, as everything beside it."""
+    """The submission; None where it may not be read."""
     try:
         return folder.outcome(path)
     except PermissionError:
@@ -64,7 +63,7 @@ def _outcome(path: Path) -> Outcome | None:
 
 
 def _told(path: Path) -> list[Status]:
-    """What the journal tells; nothing where it cannot be read."""
+    """The Status messages of the journal; none where it cannot be read."""
     try:
         return journal.statuses(path / layout.JOURNAL)
     except folder.DAMAGED:
@@ -79,15 +78,15 @@ def _as_accepted(known: Run | None) -> Run:
 
 
 def _fate(path: Path, trace: Trace) -> Literal["none", "alive", "gone"]:
-    """A record that cannot be read is the record of a launch all the same."""
+    """The process record; one that cannot be read is still a trace of a launch."""
     if trace.worker is not None:
         return "alive"
     return "gone" if trace.launched or folder.there(path / layout.WORKER) else "none"
 
 
 def _mended(run: Run, journal_there: bool, known: Run | None, path: Path, trace: Trace, queues: bool) -> Run:
-    """A run whose journal is gone, or says less than the machine: what has been launched is never launched twice. One
-    that a batch system ``queues`` may still wait for its cores.
+    """Status of a run whose journal is missing or behind the processes: a run that was started is never started
+    twice. One that a batch system ``queues`` may still wait for its cores.
     """
     if not journal_there and known is not None:
         run = replace(known, message="") if known.state is not State.STOPPING else replace(run, state=State.STARTING)
@@ -102,7 +101,7 @@ def _launched(path: Path, trace: Trace) -> bool:
 
 
 def _stopping(run: Run, known: Run | None, path: Path, queues: bool) -> Run:
-    """A job in a queue that says by itself that it stops was interrupted, and goes on, unless somebody has asked."""
+    """A waiting job that reported a stop by itself was preempted and continues, unless a stop was asked for."""
     why = folder.stop_asked(path) or (known.stopping_for if known is not None else None)
     if why is None and queues and run.state is State.STOPPING:
         return replace(run, state=State.RUNNING)

@@ -1,4 +1,4 @@
-"""A new run that goes on where another one has left a checkpoint: what it takes over of that run's folder."""
+"""Restart: a new run that continues from a checkpoint of another one, and the files that it takes over."""
 
 import json
 import os
@@ -16,19 +16,20 @@ from .folder import outcome
 _TRIES = 5
 """Times that the newest checkpoint is looked for. Chosen."""
 LABEL = "restart"
-"""Of the new run: the id of the other one."""
+"""Label of the new run: the id of the other one."""
 
 
 def body(case: Path, ranks: int | None, threads: int | None = None) -> dict[str, object]:
-    """The case of a run, on so many ranks and threads; None: as it has them. Raises CaseError, OSError."""
+    """The case of a run with other ranks and threads; None: unchanged. Raises CaseError, OSError."""
     whole.check(case)
     wanted = {"run.ranks": ranks, "run.threads": threads}
     return apply_overrides(read_data(case), {key: value for key, value in wanted.items() if value is not None})
 
 
 def fill(source: Path, folder: Path) -> None:
-    """Gives the new run the checkpoints of ``source``, its frames and its history, which the worker cuts at the
-    checkpoint that it takes: the newest whose files have their sha256. Raises ServiceError 409, 503, OSError.
+    """Links the checkpoints of ``source`` into the new run, its frames and its history. The worker takes the newest
+    checkpoint whose files have their sha256, and cuts frames and history there. Raises ServiceError 409, 503,
+    OSError.
     """
     if not any(_taken(source, folder / layout.CHECKPOINTS) for _ in range(_TRIES)):
         detail = f"the checkpoints of run {source.name} are replaced faster than they can be taken over"
@@ -40,8 +41,8 @@ def fill(source: Path, folder: Path) -> None:
 
 
 def _taken(source: Path, target: Path) -> bool:
-    """Links every checkpoint whose manifest is whole. False when they were removed meanwhile: a run that goes on keeps
-    its newest ones. Raises ServiceError 409 when there is none.
+    """Links every checkpoint with a whole manifest. False when they were removed meanwhile: a run that goes on keeps
+    its newest ones. Raises ServiceError 409 without any.
     """
     damaged: list[str] = []
     taken = 0
@@ -55,7 +56,7 @@ def _taken(source: Path, target: Path) -> bool:
             if place.is_dir():
                 damaged.append(f"{place.name}: {error}")
                 _describe(place, target / place.name)
-        except OSError:  # shutil.Error is one
+        except OSError:  # shutil.Error is an OSError, too
             shutil.rmtree(target / place.name, ignore_errors=True)
             if place.is_dir():
                 raise
@@ -66,8 +67,8 @@ def _taken(source: Path, target: Path) -> bool:
 
 
 def _describe(place: Path, target: Path) -> None:
-    """Copies the two files that describe a damaged checkpoint. The worker finds it by them, and writes the warning that
-    it is passed over.
+    """Copies the two files that describe a damaged checkpoint, from which the worker writes a warning that it is
+    skipped.
     """
     shutil.rmtree(target, ignore_errors=True)
     target.mkdir(parents=True)
@@ -76,7 +77,7 @@ def _describe(place: Path, target: Path) -> None:
 
 
 def _why(source: Path) -> str:
-    """Why a run has none, and how one gets some."""
+    """Why the run has no checkpoint, and how to get one."""
     ended = outcome(source)
     if ended is not None and ended.state == State.SUCCEEDED:
         return "one that has succeeded keeps none"
@@ -86,7 +87,7 @@ def _why(source: Path) -> str:
 
 
 def _every(source: Path) -> str:
-    """As the case has it."""
+    """``run.checkpoint_every`` of the case."""
     try:
         every = json.loads(whole.read(source / layout.RESOLVED_CASE))["run"]["checkpoint_every"]
     except (OSError, ValueError, KeyError, TypeError):
@@ -95,7 +96,7 @@ def _every(source: Path) -> str:
 
 
 def _link(source: str, target: str) -> None:
-    """A second name of the same file, which is only ever replaced as a whole; a copy of the list of frames."""
+    """Links a file that is only replaced as a whole; copies the list of frames."""
     if source.endswith(layout.FRAME_SERIES):
         _copy(source, target)
     else:
@@ -103,6 +104,6 @@ def _link(source: str, target: str) -> None:
 
 
 def _copy(source: str, target: str) -> None:
-    """Of a regular file; what is none, or is gone, is left out."""
+    """Links a regular file; anything else, or a missing file, is skipped."""
     with suppress(FileNotFoundError, IsADirectoryError), whole.opened(source) as file, open(target, "xb") as copy:
         shutil.copyfileobj(file, copy)
