@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Annotated, Any, cast
 
 import typer
-from typer.core import TyperGroup
 
 from conoid.cases.figures import counted
 from conoid.cases.load import CaseError
@@ -21,6 +20,7 @@ from .decks.command import import_deck
 from .drawing.fields import FIELDS
 from .errors import ClientError
 from .examination import examine
+from .helping import Grouped
 from .once import run_once
 from .options import (
     CaseArgument,
@@ -40,7 +40,7 @@ _Mistake = cast(type[typer.BadParameter], typer.BadParameter.__base__)
 """What typer raises for words that are no command, option or value; it has no public name."""
 
 
-class Guarded(TyperGroup):
+class Guarded(Grouped):
     """Turns what can go wrong into one clear line on standard error, and an exit code."""
 
     def main(self, *arguments: Any, **options: Any) -> Any:
@@ -139,26 +139,26 @@ def validate(case: CaseArgument, overrides: Overrides = None, as_json: Json = Fa
 
 
 app.command(short_help="Hand a case to the server.")(commands.submit)
-app.command(name="ls")(commands.list_runs)
-app.command(name="show")(commands.show_run)
+app.command(name="ls", short_help="List runs, newest first.")(commands.list_runs)
+app.command(name="show", short_help="Show one run: where it is, or how it ended.")(commands.show_run)
 app.command(name="watch", short_help="Follow a run until it ends.")(commands.watch_run)
-app.command()(commands.cancel)
-app.command()(commands.checkpoint)
-app.command()(commands.snapshot)
+app.command(short_help="Stop a run at its next step.")(commands.cancel)
+app.command(short_help="Ask a run for a checkpoint.")(commands.checkpoint)
+app.command(short_help="Ask a run for a snapshot of its fragments.")(commands.snapshot)
 app.command(short_help="Go on from a checkpoint of a run.")(commands.restart)
-app.command()(commands.get)
+app.command(short_help="Copy the files of a run here.")(commands.get)
 app.command(name="batch", short_help="Hand a case to Slurm, without a server.")(batch_run)
 app.command(name="view", short_help="Draw frames, off screen.")(viewing.view_frames)
-app.command(name="replay-balance", short_help="The loads of a run under another balance policy.")(
+app.command(name="replay-balance", short_help="Show the loads of a run under another balance policy.")(
     reports.replay_balance
 )
 app.command(short_help="Write a run as one HTML file.")(reports.report)
 app.command(short_help="Tell in what two runs differ.")(reports.compare)
 app.add_typer(reports.figures, name="figures")
-app.command(short_help="Speed against error: meshes, orders, limits, advice.")(converging.converge)
+app.command(short_help="Compare meshes: order, limit, error over cost.")(converging.converge)
 app.command(short_help="Run the suite of hard cases.")(hard.hard)
-app.command(short_help="Run a case at many points.")(sweeping.sweep)
-app.command(name="sweep-table", short_help="Print a sweep as CSV.")(sweeping.sweep_table)
+app.command(short_help="Run a case at many points, or find a threshold.")(sweeping.sweep)
+app.command(name="sweep-table", short_help="Print the table of a sweep as CSV.")(sweeping.sweep_table)
 app.command(name="sweep-plot", short_help="Draw the results of a sweep.")(sweeping.sweep_plot)
 app.command(name="sweep-cancel", short_help="Cancel the runs of a sweep.")(sweeping.sweep_cancel)
 
@@ -166,7 +166,7 @@ app.command(name="sweep-cancel", short_help="Cancel the runs of a sweep.")(sweep
 app.command(name="import", short_help="Make a case of a deck of another code.")(import_deck)
 
 
-@app.command(name="run", short_help="Do it all on this machine: run, watch, check, draw.")
+@app.command(name="run", short_help="Run a case on this machine: start, watch, check, draw.")
 def run_case(
     case: CaseArgument,
     ranks: Ranks = None,
