@@ -1,9 +1,10 @@
 """A run in the terminal: a panel that is drawn again and again, or one line an update where there is no terminal."""
 
 import time
+from collections import Counter
 from itertools import pairwise
 
-from rich.console import Group, RenderableType
+from rich.console import Console, ConsoleOptions, Group, RenderableType, RenderResult
 from rich.panel import Panel
 from rich.progress_bar import ProgressBar
 from rich.table import Table
@@ -14,7 +15,7 @@ from conoid.cases.messages import Energy, Log, Snapshot
 from conoid.cases.run import State
 
 from .console import one_line
-from .live import Live
+from .live import DESCHEDULED, Live
 
 STATE_STYLE = {
     State.RUNNING: "bold cyan", State.SUCCEEDED: "bold green", State.STOPPING: "bold yellow",
@@ -26,35 +27,62 @@ _PHASE_STYLE = {
     "exchange": "yellow",
     "output": "green",
     "wait": "bright_black",
+    DESCHEDULED: "red",
 }
 _LEVEL_STYLE = {"warning": "yellow", "error": "red"}
 _MOST_RANKS = 12
 """Ranks with a bar of their own in the panel. Chosen: more do not fit a terminal beside the rest."""
 _BAR = 36
-"""Characters of a full bar. Chosen for a terminal of 80 columns."""
+"""Characters of a full bar. Chosen for a terminal of 80 columns; a narrower one has shorter bars."""
+_FRAME = 4
+"""Characters that the border takes of a line."""
+_APART = 2
+"""Characters between two columns."""
+_REST = 17
+"""Lines of the panel besides the ranks, the log and half of the ledger."""
+_SMALL = 0.005
+"""Of the whole energy: smaller terms share a line. Chosen: their bar has no length."""
+Pair = tuple[str, str]
 
 
-def panel(live: Live, log_lines: int = 6) -> RenderableType:
-    """The whole picture of a run, for rich.live."""
-    parts: list[RenderableType] = [_bar(live), _numbers(live)]
-    if live.phases:
-        parts += [Text(), _ranks(live)]
-    if live.progress is not None:
-        parts += [Text(), _ledger(live.progress.energy)]
-    if live.log:
-        parts += [Text(), *(_log_line(entry) for entry in list(live.log)[-log_lines:])]
-    title = Text.assemble((live.title or live.run, "bold"), f"  {live.run}" if live.title else "")
-    return Panel(
-        Group(*parts), title=title, title_align="left", border_style="bright_black", padding=(0, 1),
-        subtitle=f"over {live.link}" if live.link else None, subtitle_align="right",
-    )  # fmt: skip
+class panel:  # noqa: N801
+    """The whole picture of a run, for rich.live, as wide and high as the terminal."""
+
+    def __init__(self, live: Live, log_lines: int = 6) -> None:
+        """``log_lines``: at most."""
+        self.live, self.log_lines = live, log_lines
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        """What rich asks for."""
+        live, width = self.live, options.max_width - _FRAME
+        spare = max(2, console.size.height - _REST)
+        parts: list[RenderableType] = [_bar(live), *_why(live), *_numbers(_facts(live), width)]
+        if live.phases:
+            parts += [Text(), *_ranks(live, width, min(_MOST_RANKS, spare))]
+        if live.progress is not None:
+            parts += [Text(), _ledger(live.progress.energy, width)]
+        if live.log:
+            parts += [Text(), *(_log_line(entry, times) for entry, times in _once(live)[-self.log_lines :])]
+        yield Panel(
+            Group(*parts), title=Text(live.title or live.run, style="bold", overflow="ellipsis"), title_align="left",
+            border_style="bright_black", padding=(0, 1), subtitle=_under(live), subtitle_align="right",
+        )  # fmt: skip
+
+
+def _under(live: Live) -> str | None:
+    """Run and subscription, below the panel."""
+    return " ".join([*([live.run] if live.title else []), *([f"over {live.link}"] if live.link else [])]) or None
 
 
 def _state(live: Live) -> Text:
-    text = Text(live.state.value, style=STATE_STYLE.get(live.state, "bold"))
     waiting = live.progress is None and not live.state.final and live.changed
-    told = " · ".join([*_told(live), *([duration(time.time() - live.changed)] if waiting else [])])
-    return text.append(f"  {told}", style="default") if told else text
+    text = Text(live.state.value, style=STATE_STYLE.get(live.state, "bold"))
+    return text.append(f"  {duration(time.time() - live.changed)}", style="default") if waiting else text
+
+
+def _why(live: Live) -> list[Text]:
+    """Cause and message, in lines of their own."""
+    return [Text(one_line(" · ".join(told)), overflow="fold")] if (told := _told(live)) else []
 
 
 def _told(live: Live) -> list[str]:
@@ -75,38 +103,50 @@ def _bar(live: Live) -> RenderableType:
     return row
 
 
-def _numbers(live: Live) -> RenderableType:
-    grid = Table.grid(padding=(0, 2))
-    for _ in range(3):
-        grid.add_column(style="bright_black", no_wrap=True)
-        grid.add_column(no_wrap=True)
-    for row in _number_rows(live):
-        grid.add_row(*row)
-    return grid
+def _numbers(facts: list[Pair], width: int) -> list[RenderableType]:
+    """Names and values in as many columns as there is room for; what is longer than a column has a line of its own."""
+    columns = next((n for n in (3, 2) if _fits(facts, width, n)), 1)
+    share = (width - _APART * (columns - 1)) // columns
+    name = max((len(name) for name, _ in facts), default=0)
+    long = [pair for pair in facts if name + 1 + len(pair[1]) > share]
+    short = [pair for pair in facts if pair not in long]
+    grid = Table.grid(padding=(0, _APART, 0, 0))
+    for _ in range(columns):
+        grid.add_column(no_wrap=True, width=share)
+    for first in range(0, len(short), columns):
+        grid.add_row(*(_named(pair, name) for pair in short[first : first + columns]))
+    return [grid, *(_named(pair, name) for pair in long)]
 
 
-def _number_rows(live: Live) -> list[list[str]]:
+def _fits(facts: list[Pair], width: int, columns: int) -> bool:
+    """Whether all but two of the facts fit so many columns."""
+    share, name = (width - _APART * (columns - 1)) // columns, max((len(name) for name, _ in facts), default=0)
+    return sum(name + 1 + len(value) > share for _, value in facts) <= 2
+
+
+def _named(pair: Pair, width: int) -> Text:
+    return Text(f"{pair[0]:<{width}} ", style="bright_black", overflow="fold").append(pair[1], style="default")
+
+
+def _facts(live: Live) -> list[Pair]:
     progress, counts, started = live.progress, live.counts, live.started
-    rows = []
+    facts: list[Pair] = []
     if progress is not None:
-        left = "–" if live.state.final else duration(progress.eta)
-        rows += [
-            ["time", _time(live), "step", count(progress.step), "left", left],
-            ["dt", si(progress.dt, "s"), "held by", progress.limiter, "elapsed", duration(live.elapsed)],
-        ]
-    elements = counts.elements if counts is not None else started.elements if started is not None else None
-    nodes = counts.nodes if counts is not None else started.nodes if started is not None else None
-    if elements is not None and nodes is not None:
-        speed = f"{large(progress.updates_per_second)} updates/s" if progress is not None else "–"
-        rows.append(["elements", count(elements), "nodes", count(nodes), "speed", speed])
+        facts += [("time", _time(live)), ("left", "–" if live.state.final else duration(progress.eta)),
+                  ("elapsed", duration(live.elapsed)), ("step", count(progress.step)),
+                  ("dt", si(progress.dt, "s")), ("held by", progress.limiter)]  # fmt: skip
+    size = counts or started
+    if size is not None:
+        facts += [("elements", count(size.elements)), ("nodes", count(size.nodes))]
+    if progress is not None:
+        facts.append(("speed", f"{large(progress.updates_per_second)} updates/s"))
     if counts is not None:
-        shared = counted(counts.shared, "node")
-        rows.append(["shared", shared, "fragments", count(counts.fragments), "frames", str(live.frames)])
-        if counts.particles:
-            rows.append(["particles", counted(counts.particles, "node"), "", "", "", ""])
+        facts += [("fragments", count(counts.fragments)), ("shared", counted(counts.shared, "node")),
+                  ("frames", str(live.frames))]  # fmt: skip
+        facts += [("particles", counted(counts.particles, "node"))] if counts.particles else []
     if live.snapshot is not None:
-        rows.append(["seen", seen(live.snapshot), "", "", "", ""])
-    return rows
+        facts.append(("seen", seen(live.snapshot)))
+    return facts
 
 
 def _time(live: Live) -> str:
@@ -114,24 +154,39 @@ def _time(live: Live) -> str:
     return " of ".join(alike((live.fraction * end, end), "s"))
 
 
-def _ranks(live: Live) -> RenderableType:
+def _ranks(live: Live, width: int, most: int) -> list[RenderableType]:
+    """A bar a rank, what the colours mean, the imbalance."""
     phases, busy = live.phases, live.busy
     totals = [sum(seconds) for seconds in zip(*phases.values(), strict=True)]
     longest = max(totals, default=0.0) or 1.0
+    beside = [f"{percent(busy[rank], 0):>5} busy{_helped(live, rank)}" for rank in range(min(len(totals), most))]
+    bar = min(_BAR, max(8, width - len("rank 00") - 2 - max(map(len, beside), default=0)))
     grid = Table.grid(padding=(0, 1))
     grid.add_column(justify="right", style="bright_black", no_wrap=True)
     grid.add_column(no_wrap=True)
-    grid.add_column(justify="right", no_wrap=True)
-    for rank in range(min(len(totals), _MOST_RANKS)):
+    grid.add_column(no_wrap=True)
+    for rank, told in enumerate(beside):
         parts = {name: seconds[rank] for name, seconds in phases.items()}
-        grid.add_row(f"rank {rank}", _stacked(parts, longest), f"{percent(busy[rank], 0):>5} busy{_helped(live, rank)}")
-    legend = Text("  ").join(Text(f"■ {name}", style=_PHASE_STYLE[name]) for name in phases)
-    imbalance = live.load.imbalance if live.load is not None else 1.0
-    more = len(totals) - _MOST_RANKS
-    grid.add_row(
-        "", legend.append(f"   and {counted(more, 'more rank')}" if more > 0 else ""), f"imbalance {fixed(imbalance)}"
-    )
-    return grid
+        grid.add_row(f"rank {rank}", _stacked(parts, longest, bar), told)
+    whole = sum(totals) or 1.0
+    legend = [
+        Text(f"■ {name} {percent(sum(seconds) / whole, 0)}", style=_PHASE_STYLE[name])
+        for name, seconds in phases.items()
+    ]
+    more = [Text(f"and {counted(len(totals) - most, 'more rank')}")] if len(totals) > most else []
+    imbalance = Text(f"imbalance {fixed(live.load.imbalance if live.load is not None else 1.0)}")
+    return [grid, *_flow([*more, *legend, imbalance], width)]
+
+
+def _flow(items: list[Text], width: int) -> list[Text]:
+    """As many lines as they take side by side, none of them broken."""
+    lines = [items[0]] if items else []
+    for item in items[1:]:
+        if len(lines[-1]) + _APART + len(item) <= width:
+            lines[-1] = Text(" " * _APART).join([lines[-1], item])
+        else:
+            lines.append(item)
+    return lines
 
 
 def _helped(live: Live, rank: int) -> str:
@@ -139,19 +194,20 @@ def _helped(live: Live, rank: int) -> str:
     return f", its threads {percent(live.helped[rank], 0)}" if rank < len(live.helped) else ""
 
 
-def _stacked(parts: dict[str, float], longest: float) -> Text:
-    """A bar of at most ``_BAR`` cells; its pieces end where the sum so far ends, so that rounding does not add up."""
+def _stacked(parts: dict[str, float], longest: float, cells: int) -> Text:
+    """A bar of at most so many cells; its pieces end where the sum so far ends, so that rounding does not add up."""
     edges, total = [0], 0.0
     for seconds in parts.values():
         total += seconds
-        edges.append(round(_BAR * total / longest))
+        edges.append(round(cells * total / longest))
     text = Text()
     for name, (low, high) in zip(parts, pairwise(edges), strict=True):
         text.append("█" * (high - low), style=_PHASE_STYLE[name])
-    return text.append(" " * (_BAR - edges[-1]))
+    return text.append(" " * (cells - edges[-1]))
 
 
-def _ledger(energy: Energy) -> RenderableType:
+def _ledger(energy: Energy, width: int) -> RenderableType:
+    """A bar a term; small ones share a line."""
     terms = {
         "kinetic": energy.kinetic, "elastic": energy.elastic, "plastic": energy.plastic,
         "viscous": energy.viscous, "contact": energy.contact,
@@ -164,13 +220,20 @@ def _ledger(energy: Energy) -> RenderableType:
     grid.add_column(style="bright_black", no_wrap=True)
     grid.add_column(no_wrap=True)
     grid.add_column(justify="right", no_wrap=True)
-    for name, value in terms.items():
-        if value != 0.0:
-            length = min(_BAR, round(_BAR * abs(value) / whole))
-            grid.add_row(name, Text("━" * length + " " * (_BAR - length), style="blue"), si(value, "J"))
+    bar = min(_BAR, max(8, width - 22))
+    told = {name: value for name, value in terms.items() if abs(value) >= _SMALL * whole}
+    for name, value in told.items():
+        length = min(bar, round(bar * abs(value) / whole))
+        grid.add_row(name, Text("━" * length + " " * (bar - length), style="blue"), si(value, "J"))
+    small = [
+        Text(f"{name} {si(value, 'J')}", style="bright_black")
+        for name, value in terms.items()
+        if value and name not in told
+    ]
     supplied = f"of {si(energy.initial, 'J')} at the start and {si(energy.external, 'J')} from outside"
-    grid.add_row("residual", _residual(energy.residual).append(f"  {supplied}", style="bright_black"), "")
-    return grid
+    residual = Text("residual ", style="bright_black").append(_residual(energy.residual))
+    residual.append(f"  {supplied}", style="bright_black")
+    return Group(grid, *_flow(small, width), residual)
 
 
 def _residual(residual: float) -> Text:
@@ -178,10 +241,26 @@ def _residual(residual: float) -> Text:
     return Text(rough(residual), style=style)
 
 
-def _log_line(entry: Log) -> Text:
-    text = Text(overflow="ellipsis", no_wrap=True)
+def _once(live: Live) -> list[tuple[Log, int]]:
+    """The lines of the log in their order, each text once, where it came last, with how often it came."""
+    times = Counter(entry.text for entry in live.log)
+    last = {entry.text: entry for entry in live.log}
+    ordered = sorted(last.values(), key=lambda entry: entry.seq)
+    return [(entry, times[entry.text]) for entry in ordered]
+
+
+def _log_line(entry: Log, times: int) -> Text:
+    """A warning as a whole, what else there is on one line."""
+    warns = entry.level in _LEVEL_STYLE
+    text = Text(overflow="fold" if warns else "ellipsis", no_wrap=not warns)
     text.append(f"{clock(entry.wall)} ", style="bright_black")
-    return text.append(one_line(f"[{entry.rank}] {entry.text}"), style=_LEVEL_STYLE.get(entry.level, "default"))
+    again = f" ({times} times)" if times > 1 else ""
+    return text.append(one_line(f"{_who(entry)}{entry.text}{again}"), style=_LEVEL_STYLE.get(entry.level, "default"))
+
+
+def _who(entry: Log) -> str:
+    """What kind of line it is, or of which rank."""
+    return f"{entry.level}: " if entry.level in _LEVEL_STYLE else f"[{entry.rank}] "
 
 
 def seen(snapshot: Snapshot) -> str:

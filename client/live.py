@@ -2,12 +2,16 @@
 
 import time
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from conoid.cases.messages import AnyMessage, Counts, Finished, Frame, Load, Log, Progress, Snapshot, Started, Status
 from conoid.cases.run import Cause, ExitCode, State
 
-PHASE_GROUPS = ("compute", "contact", "exchange", "output", "wait")
+DESCHEDULED = "descheduled"
+"""Wall time that costs no CPU time: the machine has not run the rank, or the rank slept."""
+PHASE_GROUPS = ("compute", "contact", "exchange", "output", "wait", DESCHEDULED)
+_IDLE = "exchange", "wait", DESCHEDULED
 _LOG_TAIL = 200
 """Lines of the log that are kept for display: some screens full. Chosen."""
 
@@ -85,7 +89,7 @@ class Live:
     def _load(self, message: Load) -> None:
         interval = message.wall - self.loaded if self.loaded else 0.0
         self.load, self.loaded = message, message.wall
-        self.phases = grouped(message.phases, interval)
+        self.phases = grouped(message.phases, interval, message.waiting)
         others = (message.threads - 1) * interval
         self.helped = [seconds / others for seconds in message.helped] if others > 0.0 else []
 
@@ -112,25 +116,31 @@ class Live:
 
     @property
     def busy(self) -> list[float]:
-        """Share of the last interval that each rank spent on the model itself: neither exchange nor wait."""
+        """Share of the last interval that each rank spent on the model itself: neither exchange nor wait, and not
+        descheduled.
+        """
         totals = [sum(seconds) for seconds in zip(*self.phases.values(), strict=True)]
-        idle = [sum(self.phases[name][rank] for name in ("exchange", "wait") if name in self.phases)
-                for rank in range(len(totals))]  # fmt: skip
+        idle = [sum(self.phases[name][rank] for name in _IDLE if name in self.phases) for rank in range(len(totals))]
         return [1.0 - lost / total if total > 0 else 0.0 for lost, total in zip(idle, totals, strict=True)]
 
 
-def grouped(phases: dict[str, list[float]], interval: float = 0.0) -> dict[str, list[float]]:
-    """Phases of the worker summed into PHASE_GROUPS; ``elements``, ``nodes`` and the like count as compute.
-
-    Where the worker does not time its waits, what is left of the ``interval``, s, is the wait.
+def grouped(
+    phases: dict[str, list[float]], interval: float = 0.0, waiting: Sequence[float] = ()
+) -> dict[str, list[float]]:
+    """Phases of the worker summed into PHASE_GROUPS, as the page has them: ``elements``, ``nodes`` and the like count
+    as compute, ``waiting`` is the part of the exchange in which a rank waits for others. What is left of the
+    ``interval``, s, is descheduled.
     """
     sums: dict[str, list[float]] = {}
     for name, seconds in phases.items():
         group = name if name in PHASE_GROUPS else "compute"
         before = sums.get(group, [0.0] * len(seconds))
         sums[group] = [a + b for a, b in zip(before, seconds, strict=True)]
-    if sums and "wait" not in sums and interval > 0:
-        sums["wait"] = [max(0.0, interval - sum(spent)) for spent in zip(*sums.values(), strict=True)]
+    if waiting and "exchange" in sums:
+        sums["wait"] = [min(pair) for pair in zip(waiting, sums["exchange"], strict=True)]
+        sums["exchange"] = [a - b for a, b in zip(sums["exchange"], sums["wait"], strict=True)]
+    if sums and interval > 0:
+        sums[DESCHEDULED] = [max(0.0, interval - sum(spent)) for spent in zip(*sums.values(), strict=True)]
     return {group: sums[group] for group in PHASE_GROUPS if group in sums}
 
 

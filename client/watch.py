@@ -20,8 +20,6 @@ from .errors import ClientError, UnreachableError
 from .link import Link
 from .live import Live
 
-LINE_EVERY = 2.0
-"""s between two plain lines of progress; changes of state and warnings are told at once."""
 REASON_EVERY = 3.0
 """s between two questions what a run in the queue waits for. Chosen: below the 8 s after which silence is broken."""
 
@@ -103,21 +101,22 @@ def show(messages: Iterable[AnyMessage], known: Live, out: Console) -> Live:
 
 
 def tell(messages: Iterable[AnyMessage], known: Live, write: Callable[[str], None]) -> Live:
-    """One plain line an update, at most one of progress every ``LINE_EVERY`` s; silence is broken."""
-    told = 0.0
+    """One plain line for each change of state, each warning and each percent of progress; silence is broken, of what
+    takes hours more and more rarely.
+    """
+    told, texts = -1, set[str]()
     with silence.broken(write, lambda: _waiting(known)) as say:
         for message in messages:
             known.take(message)
+            at = int(100.0 * known.fraction)
             if isinstance(message, Snapshot):
                 say(f"{clock(message.wall)}  {known.run}  {seen(message)}")
             elif isinstance(message, Log):
-                if message.level in {"warning", "error"}:
+                if message.level in {"warning", "error"} and message.text not in texts:
+                    texts.add(message.text)
                     say(f"{clock(message.wall)}  {known.run}  {message.level}: {message.text}")
-            elif isinstance(message, Status) or (
-                isinstance(message, Progress) and time.monotonic() - told >= LINE_EVERY
-            ):
-                if isinstance(message, Progress):
-                    told = time.monotonic()
+            elif isinstance(message, Status) or (isinstance(message, Progress) and at > told):
+                told = max(told, at) if isinstance(message, Progress) else told
                 say(line(known))
     return known
 

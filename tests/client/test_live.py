@@ -8,7 +8,7 @@ import msgspec
 import pytest
 from rich.console import Console
 
-from conoid.cases.messages import AnyMessage, Load
+from conoid.cases.messages import AnyMessage, Load, Log
 from conoid.cases.run import State
 from conoid.client import display, silence
 from conoid.client.errors import UnreachableError
@@ -36,11 +36,11 @@ def test_time_stands_still_once_the_run_has_ended() -> None:
     assert told(15).elapsed == 15 - 4
 
 
-def test_phases_are_grouped_and_the_rest_of_the_interval_is_the_wait() -> None:
+def test_phases_are_grouped_and_the_rest_of_the_interval_is_descheduled() -> None:
     live = told(7)
     assert live.phases == {
         "compute": pytest.approx([1.2, 0.7]), "exchange": [0.2, 0.8], "output": [0.1, 0.0],
-        "wait": pytest.approx([0.5, 0.5]),
+        "descheduled": pytest.approx([0.5, 0.5]),
     }  # fmt: skip
     assert live.busy == pytest.approx([1.3 / 2.0, 0.7 / 2.0])
 
@@ -54,8 +54,12 @@ def test_the_other_threads_of_a_rank_are_busy_by_the_time_of_their_tasks() -> No
     assert told(7).helped == []
 
 
-def test_a_wait_that_the_worker_times_is_taken_as_it_is() -> None:
-    assert grouped({"elements": [1.0], "wait": [0.25]}, interval=9.0) == {"compute": [1.0], "wait": [0.25]}
+def test_what_a_rank_waits_for_others_is_no_exchange() -> None:
+    """As client/web/live.js has it."""
+    phases = {"elements": [1.0, 2.0], "exchange": [0.5, 0.25]}
+    assert grouped(phases, interval=3.0, waiting=[0.25, 0.5]) == {
+        "compute": [1.0, 2.0], "exchange": [0.25, 0.0], "wait": [0.25, 0.25], "descheduled": [1.5, 0.75],
+    }  # fmt: skip
 
 
 @pytest.mark.parametrize(
@@ -80,22 +84,32 @@ def test_a_run_that_has_not_begun_says_how_long_it_waits(monkeypatch: pytest.Mon
     assert "running  42 s" not in rendered(told(6))
 
 
-def rendered(live: Live, width: int = 100) -> str:
-    out = Console(file=io.StringIO(), width=width, force_terminal=False)
+def rendered(live: Live, width: int = 100, height: int = 60) -> str:
+    out = Console(file=io.StringIO(), width=width, height=height, force_terminal=False)
     out.print(display.panel(live))
     assert isinstance(out.file, io.StringIO)
     return out.file.getvalue()
 
 
-def test_the_panel_shows_everything_that_is_watched() -> None:
-    text = rendered(told(11))
+@pytest.mark.parametrize("width", [60, 80, 100])
+def test_the_panel_shows_everything_that_is_watched(width: int) -> None:
+    text = rendered(told(11), width)
     for shown in (
         "A bar", "running", "50.0 %", "40.0 µs of 80.0 µs", "8.10 ns", "tet 7 (bar): sound speed", "30 s",
         "9.70 M updates/s", "rank 0", "65 % busy", "35 % busy", "imbalance 1.20", "kinetic", "6.00 J", "2.0e-4",
-        "the foot has folded", "310 nodes", "fragments",
+        "warning: the foot has folded", "310 nodes", "fragments", "descheduled 25 %", stories.RUN,
     ):  # fmt: skip
         assert shown in text, shown
     assert "elastic" not in text, "terms that are zero are left out"
+    assert "…" not in text, "nothing is cut off"
+
+
+def test_a_warning_is_shown_once_and_whole() -> None:
+    live, words = told(9), "contact has let some tets of the dust into each other, " * 3
+    for n in range(20, 24):
+        live.take(Log(run=stories.RUN, seq=n, wall=stories.START, level="warning", text=words + "the end"))
+    text = rendered(live, 60)
+    assert (text.count("warning: contact"), "the end (4 times)" in text) == (1, True)
 
 
 @pytest.mark.parametrize("width", [60, 100, 200])
@@ -114,14 +128,17 @@ def test_many_ranks_are_cut_and_said_so() -> None:
     assert "and 28 more ranks" in rendered(live)
 
 
-def test_plain_lines_tell_states_and_warnings_at_once_and_progress_now_and_then() -> None:
+def test_plain_lines_tell_each_state_and_percent_and_each_warning_once() -> None:
     lines: list[str] = []
-    live = tell(stories.whole(), Live(stories.RUN), lines.append)
+    story = stories.whole()
+    often = [msgspec.structs.replace(stories.progress(6, 0.25 + n / 1e4), seq=6) for n in range(100)]
+    live = tell([*story[:6], *often, *story[6:10], *story[9:]], Live(stories.RUN), lines.append)
     assert live.state is State.SUCCEEDED
     assert [line.split()[2] for line in lines] == [
-        "accepted", "queued", "starting", "running", "running", "warning:", "succeeded",
+        "accepted", "queued", "starting", "running", "running", "warning:", "running", "running", "running", "succeeded",
     ]  # fmt: skip
-    assert "25.0 %" in lines[4], "the first progress is told, the others come within two seconds"
+    told = [line.split()[3] for line in lines if "%" in line and "succeeded" not in line]
+    assert told == ["25.0", "50.0", "75.0", "100.0"]
 
 
 def test_what_a_start_is_at_is_told_and_changes_no_state() -> None:
