@@ -108,7 +108,7 @@ def tell(messages: Iterable[AnyMessage], known: Live, write: Callable[[str], Non
     with silence.broken(write, lambda: _waiting(known)) as say:
         for message in messages:
             known.take(message)
-            at = int(100.0 * known.fraction)
+            at = int(100.0 * known.fraction + 1e-9)
             if isinstance(message, Snapshot):
                 say(f"{clock(message.wall)}  {known.run}  {seen(message)}")
             elif isinstance(message, Log):

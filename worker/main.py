@@ -26,6 +26,7 @@ from .errors import CompileError, ConoidError, StoppedError
 from .lock import hold
 from .output import storage
 from .output.journal import Journal
+from .output.spoken import Speaker
 from .parallel.comm import Comm
 from .parallel.mpi import abort, connect
 from .signals import Signals
@@ -90,13 +91,16 @@ def _succeeded(folder: Path) -> bool:
 
 
 def _worked(options: argparse.Namespace, comm: Comm, signals: Signals, began: float) -> int:
-    telemetry = journal = None
+    telemetry = journal = speaker = None
     if comm.rank == 0:
         telemetry = _telemetry(options)
-        journal = Journal(options.out, options.run or options.out.resolve().name, telemetry)
+        speaker = Speaker(options.out) if options.run is None else None
+        journal = Journal(options.out, options.run or options.out.resolve().name, telemetry or speaker)
     outcome, code = _outcome(options, comm, journal, signals, began)
     if journal is not None:
         _close(outcome, options, journal, telemetry)
+    if speaker is not None:
+        speaker.close(outcome)
     comm.barrier()
     return code
 

@@ -135,7 +135,8 @@ def test_plain_lines_tell_each_state_and_percent_and_each_warning_once() -> None
     live = tell([*story[:6], *often, *story[6:10], *story[9:]], Live(stories.RUN), lines.append)
     assert live.state is State.SUCCEEDED
     assert [line.split()[2] for line in lines] == [
-        "accepted", "queued", "starting", "running", "running", "warning:", "running", "running", "running", "succeeded",
+        "accepted", "queued", "starting", "running", "running", "warning:", "running", "running", "running",
+        "succeeded",
     ]  # fmt: skip
     told = [line.split()[3] for line in lines if "%" in line and "succeeded" not in line]
     assert told == ["25.0", "50.0", "75.0", "100.0"]

@@ -1,0 +1,76 @@
+"""What a worker that nobody else watches says on its standard output: start, a line a percent, warnings, end."""
+
+import contextlib
+import sys
+from pathlib import Path
+
+from conoid.cases import layout, messages
+from conoid.cases.figures import alike, clock, count, counted, crew, duration, percent, rough, si
+from conoid.cases.outcome import Outcome
+from conoid.cases.run import State
+
+
+class Speaker:
+    """Listens to the journal of a run on rank 0."""
+
+    def __init__(self, folder: Path) -> None:
+        """``folder`` is that of the run."""
+        self._folder = folder
+        self._percent = -1
+        self._told = set[str]()
+
+    def tell(self, message: messages.AnyMessage, blob: bytes = b"") -> None:
+        """Says what is new in a message."""
+        match message:
+            case messages.Status() if message.state == State.STARTING and message.message:
+                self._say(message, message.message)
+            case messages.Started():
+                self._say(message, self._start(message))
+            case messages.Progress():
+                self._progress(message)
+            case messages.Log() if message.level in {"warning", "error"} and message.text not in self._told:
+                self._told.add(message.text)
+                self._say(message, f"{message.level}: {message.text}")
+
+    def _start(self, started: messages.Started) -> str:
+        size = f"{count(started.elements)} tets, {count(started.nodes)} nodes"
+        cores = crew(started.ranks, started.threads)
+        return f"running {size} to {si(started.end_time, 's')} on {cores}; results in {self._folder}"
+
+    def _progress(self, now: messages.Progress) -> None:
+        share = min(1.0, now.t / now.end_time) if now.end_time > 0.0 else 0.0
+        whole = int(100.0 * share + 1e-9)
+        if whole <= self._percent:
+            return
+        self._percent = whole
+        t, end = alike((now.t, now.end_time), "s")
+        left = f"  left {duration(now.eta)}" if share < 1.0 else ""
+        self._say(
+            now,
+            f"{percent(share)}  t {t} of {end}  step {count(now.step)}  dt {si(now.dt, 's')} ({now.limiter}){left}  "
+            f"residual {rough(now.energy.residual)}",
+        )
+
+    def close(self, outcome: Outcome) -> None:
+        """Says how the run has ended, and where its results are."""
+        why = outcome.message or outcome.cause or ""
+        told = f"{outcome.state}: {why}" if why else outcome.state
+        steps = f", {counted(outcome.steps, 'step')} in {duration(outcome.elapsed)}" if outcome.steps else ""
+        _write(f"{told}{steps}")
+        for check in outcome.reference:
+            verdict = "met" if check.passed else "missed"
+            value = " of ".join(alike((check.value, check.expected), check.unit))
+            _write(f"reference {verdict}: {check.name} {value}")
+        for text in outcome.warnings:
+            if text not in self._told:
+                _write(f"warning: {text}")
+        _write(f"results in {self._folder}: {layout.OUTCOME}, {layout.HISTORY}, {layout.JOURNAL}, {layout.LOGS}/")
+
+    def _say(self, message: messages.AnyMessage, text: str) -> None:
+        _write(f"{clock(message.wall)}  {text}")
+
+
+def _write(text: str) -> None:
+    """A reader who has gone stops no run."""
+    with contextlib.suppress(OSError):
+        print(text.replace("\n", "\\n"), file=sys.stdout, flush=True)
