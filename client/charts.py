@@ -8,7 +8,7 @@ from typing import Any
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from conoid.cases.figures import percent
+from conoid.cases.figures import counted, percent
 from conoid.cases.messages import AnyMessage, Balance, Load
 
 from .curves import save
@@ -71,6 +71,14 @@ def course(messages: Sequence[AnyMessage]) -> Course:
 
 def balance(told: Course, title: str, case: str, out: Path) -> None:
     """Outside nodes of each rank over time with the cuts, and CPU time by phase and rank, as a PNG."""
+    figure = balance_figure(told)
+    figure.suptitle(title, fontsize=11, color=_INK)
+    figure.supxlabel(PAPER.get(case, ""), fontsize=8, color=_INK)
+    save(figure, out)
+
+
+def balance_figure(told: Course) -> Figure:
+    """Outside nodes of each rank over time with the cuts, and CPU time by phase and rank."""
     figure = Figure(figsize=(11, 4.8), layout="constrained")
     left, right = figure.subplots(1, 2)
     _outside(left, told)
@@ -78,9 +86,7 @@ def balance(told: Course, title: str, case: str, out: Path) -> None:
     for axes in (left, right):
         axes.set_title(axes.get_title(), fontsize=10, color=_INK)
         axes.spines[["top", "right"]].set_visible(False)
-    figure.suptitle(title, fontsize=11, color=_INK)
-    figure.supxlabel(PAPER.get(case, ""), fontsize=8, color=_INK)
-    save(figure, out)
+    return figure
 
 
 def _outside(axes: Axes, told: Course) -> None:
@@ -97,7 +103,8 @@ def _outside(axes: Axes, told: Course) -> None:
         )
         axes.plot(*zip(*points, strict=True), linewidth=1.5 if rank in named else 0.7, **style)
     axes.set(xlabel="time, µs", ylabel="outside nodes", ylim=(0, None), xlim=(0, None))
-    axes.set_title(f"outside nodes: {len(told.cuts)} cuts on {ranks} ranks" if ranks else "nothing is in contact")
+    told_of = f"outside nodes: {counted(len(told.cuts), 'cut')} on {counted(ranks, 'rank')}"
+    axes.set_title(told_of if ranks else "nothing is in contact")
     if axes.get_legend_handles_labels()[0]:
         axes.legend(fontsize=8, frameon=False)
 

@@ -147,7 +147,7 @@ def overlaid(runs: Mapping[str, Columns], names: Sequence[str], spare: int = 0) 
                 if name in told:
                     label = name if told is next(iter(runs.values())) else None
                     axes.plot(_micro(told), told.numbers(name), dash, color=colour, label=label, linewidth=1.3)
-        what = ", ".join(some) if len(some) < 4 else f"{len(some)} columns"
+        what = ", ".join(some) if len(some) < 4 else f"{some[0]}, {some[1]} and {len(some) - 2} more"
         _name(axes, what if len(runs) == 1 else _dashed(runs), unit or "1")
     return figure
 

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from html import escape
 from importlib import metadata
 
-from conoid.cases.figures import count, counted, crew, duration, exacts, rough, si
+from conoid.cases.figures import count, counted, crew, duration, exacts, percent, rough, si
 from conoid.cases.outcome import Outcome
 
 
@@ -17,7 +17,7 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]], numbers: Sequence[
 
     top = f"<thead><tr>{cells(head, 'th')}</tr></thead>" if any(head) else ""
     lines = "".join(f"<tr>{cells(row, 'td')}</tr>" for row in rows)
-    return f"<div class=wide><table>{top}<tbody>{lines}</tbody></table></div>"
+    return f"<div class=wide-table tabindex=0><table>{top}<tbody>{lines}</tbody></table></div>"
 
 
 def image(data: bytes, kind: str, alt: str) -> str:
@@ -53,9 +53,11 @@ def references(ended: Outcome | None) -> str:
     for check in ended.reference:
         verdict = "<span class=good>pass</span>" if check.passed else "<span class=bad>FAIL</span>"
         value, expected, tolerance = exacts((check.value, check.expected, check.tolerance), check.unit)
-        values = (value, expected, f"± {tolerance}")
+        off = percent((check.value - check.expected) / abs(check.expected)) if check.expected else "–"
+        values = (value, expected, f"± {tolerance}", off)
         cells = "".join(f"<td class=n>{escape(each)}</td>" for each in values)
         rows.append(f"<tr><td>{escape(check.name)}</td>{cells}<td>{verdict}</td><td>{escape(check.source)}</td></tr>")
-    head = "".join(f"<th class=n>{each}</th>" for each in ("value", "expected", "tolerance"))
+    head = "".join(f"<th class=n>{each}</th>" for each in ("value", "expected", "tolerance", "deviation"))
     head = f"<th>reference</th>{head}<th></th><th>source</th>"
-    return f"<div class=wide><table><thead><tr>{head}</tr></thead><tbody>{''.join(rows)}</tbody></table></div>"
+    lines = f"<thead><tr>{head}</tr></thead><tbody>{''.join(rows)}</tbody>"
+    return f'<div class="wide-table sources" tabindex=0><table>{lines}</table></div>'

@@ -1,37 +1,53 @@
-"""``conoid report``: a run as one HTML file that needs no server, no network and nothing beside it."""
+"""``conoid report``: a run as one HTML file that needs no server, no network and nothing beside it.
 
-import json
-import tempfile
+It has the style sheets of the live page, so that it looks like one: the body at the left, what matters beside it, and
+charts below.
+"""
+
 from collections.abc import Callable, Sequence
 from html import escape
+from importlib import metadata
 from pathlib import Path
 
-from conoid.cases.figures import alike, count, counted, exact, percent, si, vector
-from conoid.cases.fragments import Fit
-from conoid.cases.messages import Balance, Load, Log
 from conoid.cases.outcome import Outcome
 
-from . import html, replay3d
-from .columns import by_part
-from .compare import summary
-from .errors import UnfinishedError, ViewError
+from . import cards, plates, replay3d
+from .errors import ClientError, UnfinishedError
 from .result import Result
 from .saving import save_text
 
-_SHOTS = 3
-"""Times of a picture, evenly over the frames. Chosen: they fit beside each other."""
-_CUTS = 50
-"""Cuts that are listed. Chosen."""
+_WEB = Path(__file__).parent / "web"
+_SHEETS = ("style.css", "body.css")
 _STYLE = """
-:root { color-scheme: light; --ink: #1d2733; --pale: #5a6775; --line: #d9e0e7; --good: #1d6b36; --bad: #a3211d }
-body { font: 15px/1.5 system-ui, sans-serif; color: var(--ink); background: #fff; max-width: 72rem; margin: 2rem auto; padding: 0 1rem }
-h1 { font-size: 1.6rem; margin: 0 0 .3rem } h2 { font-size: 1.15rem; margin: 2.2rem 0 .6rem; border-bottom: 1px solid var(--line) }
-table { border-collapse: collapse; margin: .4rem 0 } th, td { text-align: left; padding: .15rem .9rem .15rem 0; vertical-align: top }
-td.n, th.n { text-align: right; font-variant-numeric: tabular-nums } th { color: var(--pale); font-weight: 500 }
-img { max-width: 100%; height: auto } pre { overflow-x: auto; font-size: 12.5px; background: #f5f7f9; padding: .8rem }
-.good { color: var(--good); font-weight: 600 } .bad { color: var(--bad); font-weight: 600 } .pale { color: var(--pale) }
-.wide { overflow-x: auto } summary { cursor: pointer }
-"""  # noqa: E501
+:root { color-scheme: light dark }
+main { max-width: 1880px; margin: 0 auto }
+.plain { position: static; height: auto } .plain > .card { height: auto }
+.charts > .card.wide { grid-column: 1 / -1 }
+.plates { display: grid; gap: 12px; grid-template-columns: repeat(auto-fit, minmax(min(100%, 560px), 1fr)) }
+.plate { margin: 0 } .plate img { display: block; width: 100%; height: auto }
+.plate figcaption { display: flex; flex-wrap: wrap; align-items: center; gap: 4px 10px; font-size: 13.5px }
+.scale { display: inline-flex; align-items: center; gap: 8px; color: var(--soft) }
+.scale > i { width: 120px; height: 10px; border-radius: 3px; border: 1px solid var(--line) }
+.card > svg { display: block; width: 100%; height: auto; color: var(--ink) }
+.card > svg text { font-family: inherit !important; fill: currentColor !important }
+table { border-collapse: collapse; margin: 2px 0 8px; font-size: 14px } .wide-table { overflow-x: auto }
+th { text-align: left; font-weight: 500; font-size: 13px; color: var(--soft) }
+th, td { padding: 5px 14px 5px 0; vertical-align: top } tbody tr { border-top: 1px solid var(--line) }
+td.n, th.n { text-align: right; white-space: nowrap } td { overflow-wrap: break-word }
+td:first-child { min-width: 6em } .sources td:last-child { min-width: 15em }
+.digest { overflow-wrap: anywhere; font: 12.5px var(--mono) }
+span.good, span.bad { font-weight: 600 } summary { cursor: pointer }
+.now p { margin: 0 0 8px } .log { max-height: 420px }
+@media print {
+  .bench { grid-template-columns: 1fr } .stage { position: static; height: 480px } .plain { height: auto }
+  .card { break-inside: avoid; box-shadow: none } .log { max-height: none }
+  .tools3d, .controls, .scrub { display: none !important } .top { position: static }
+}
+"""
+_MARK = (
+    '<svg viewBox="0 0 32 32" width="26" height="26" aria-hidden="true"><path class="cone" d="M13 6h6l9 20H4z"/>'
+    '<path class="crack" d="M16 6l-2 7 4 4-3 9"/><circle class="ball" cx="16" cy="3.2" r="2.4"/></svg>'
+)
 
 
 def write(
@@ -42,36 +58,92 @@ def write(
 
     Raises ClientError, UnfinishedError where not even the case is there.
     """
-    case = result.case
+    case, ended = result.case, _outcome(result)
     title = str(case.get("title") or case.get("name"))
-    sections: dict[str, Callable[[], str]] = {
-        "Case": lambda: _case(case),
-        "References": lambda: html.references(_outcome(result)),
-        "Pictures": lambda: _pictures(result, fields, at),
-        "Replay": lambda: replay3d.html(result),
-        "Energy": lambda: _energy(result),
-        "Fragments": lambda: _fragments(result),
-        "Time step": lambda: _curve(result, "steps", "Length of the time step over time"),
-        "Probes": lambda: _curve(result, "columns", "Probes over time"),
-        "Ranks and balance": lambda: _balance(result),
-        "Messages": lambda: _messages(result),
-        "All keys of the case": lambda: _keys(case),
-    }
-    parts = [html.head(result.folder.name, title, _outcome(result))]
-    for name, made in sections.items():
-        at(f"writing {out}: {name.lower()}")
-        parts.append(_section(name, made()))
-    page = (
-        '<!doctype html><html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width">'
-        f"<title>{escape(title)}: {escape(result.folder.name)}</title><style>{_STYLE}</style></head>"
-        f"<body>{''.join(parts)}</body></html>"
-    )
-    save_text(out, page)
+    shown = telling(result) if fields is None else fields
+
+    def say(what: str) -> None:
+        at(f"writing {out}: {what}")
+
+    say("replay")
+    stage = replay3d.html(result)
+    say("pictures")
+    drawn = plates.pictures(result, shown, at)
+    pictured = _card("Pictures", f'<div class="plates">{drawn}</div>' if drawn else "", wide=True)
+    about = _card("Case", cards.case(case), wide=True)
+    kind = "stage" if stage else "stage plain"
+    first, *others = filter(None, [stage, pictured, about])
+    body = "".join([
+        _head(result.folder.name, title, str(case.get("name", "")), ended),
+        f'<div class="bench"><div class="{kind}">{first}</div><div class="now">{_now(ended)}</div></div>',
+        '<div class="cards charts">', _card("References", cards.references(ended), wide=True), *others,
+        _charts(result, ended, say),
+        _card("Messages", cards.messages(result) if _has_journal(result) else "", wide=True),
+        _card("All keys of the case", cards.keys(case), wide=True), "</div>",
+    ])  # fmt: skip
+    save_text(out, _page(f"{title}: {result.folder.name}", body))
     return out
 
 
-def _section(title: str, body: str) -> str:
-    return f"<section><h2>{escape(title)}</h2>{body}</section>" if body else ""
+def _page(title: str, body: str) -> str:
+    sheets = "".join((_WEB / name).read_text(encoding="utf-8") for name in _SHEETS if (_WEB / name).is_file())
+    release = escape(f"Conoid {metadata.version('conoid')}")
+    return (
+        '<!doctype html><html lang="en"><head><meta charset="utf-8">'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">'
+        f"<title>{escape(title)}</title><style>{sheets}{_STYLE}</style></head><body>"
+        f'<header class="top"><span class="brand">{_MARK}<span>Conoid</span></span><span class="grow"></span>'
+        f'<span class="who">written by {release}</span></header>'
+        f'<main><div class="work">{body}</div></main></body></html>'
+    )
+
+
+def _head(name: str, title: str, case: str, ended: Outcome | None) -> str:
+    state = ended.state if ended is not None else "not ended"
+    told = f'<p class="told">{escape(ended.message)}</p>' if ended is not None and ended.message else ""
+    kind = state if ended is not None else "running"
+    return (
+        f'<header class="head"><div class="run-head"><div class="titles"><h1>{escape(title)}</h1>'
+        f'<div class="sub">{escape(" · ".join(dict.fromkeys(filter(None, [case, name]))))}</div></div>'
+        f'<div class="side"><span class="pill {escape(kind)}">{escape(state.replace("_", " "))}</span></div></div>'
+        f"{told}</header>"
+    )
+
+
+def _now(ended: Outcome | None) -> str:
+    """What stands beside the body."""
+    return "".join([
+        _card("Run", cards.strip(ended)), _card("Warnings", cards.warnings(ended)),
+        _card("Results", cards.results(ended)),
+    ])  # fmt: skip
+
+
+def _charts(result: Result, ended: Outcome | None, say: Callable[[str], None]) -> str:
+    """Charts and the tables that belong to them."""
+    say("energy")
+    found = [_card("Cost and error", cards.cost(ended)), *_energy(result, ended)]
+    say("fragments")
+    if result.fragment_tables:
+        found += [*map(_chart, plates.fragments(result)), _card("Fragments", cards.fragments(result))]
+    say("time step and probes")
+    found += [*map(_chart, plates.curve(result, "steps")), *map(_chart, plates.curve(result, "columns"))]
+    say("balance")
+    if _has_journal(result):
+        found += [*map(_chart, plates.balance(result)), _card("Ranks and balance", cards.balance(result, ended))]
+    return "".join(found)
+
+
+def _energy(result: Result, ended: Outcome | None) -> list[str]:
+    return [*map(_chart, plates.curve(result, "energy")), _card("Energy", cards.energy(result, ended))]
+
+
+def _chart(body: str) -> str:
+    return f'<section class="card">{body}</section>'
+
+
+def _card(title: str, body: str, wide: bool = False) -> str:
+    head = f'<section class="card{" wide" if wide else ""}"><div class="card-head"><h2>{escape(title)}</h2></div>'
+    return f"{head}{body}</section>" if body else ""
 
 
 def _outcome(result: Result) -> Outcome | None:
@@ -81,20 +153,11 @@ def _outcome(result: Result) -> Outcome | None:
         return None
 
 
-def _case(case: dict[str, object]) -> str:
-    parts = case.get("parts")
-    rows = []
-    for part in parts if isinstance(parts, list) else []:
-        velocity = part.get("velocity")
-        breaks = (part.get("fracture") or {}).get("model", "")
-        mesh = part.get("mesh") or {}
-        size = mesh.get("element_size")
-        rows.append([
-            part["name"], str(part.get("material", "")), str(mesh.get("shape", "")),
-            exact(size, "m") if isinstance(size, float) else "", vector(velocity, "m/s", 6) if velocity else "", breaks,
-        ])  # fmt: skip
-    told = f"<p>{escape(str(case.get('description', '')))}</p>" if case.get("description") else ""
-    return told + html.table(["part", "material", "shape", "element size", "velocity", "breaks"], rows)
+def _has_journal(result: Result) -> bool:
+    try:
+        return bool(result.messages)
+    except ClientError:
+        return False
 
 
 def telling(result: Result) -> list[str]:
@@ -104,135 +167,3 @@ def telling(result: Result) -> list[str]:
         return ["fragment", "speed"]
     energy = ended.energy if ended is not None else None
     return ["plastic_strain" if energy is not None and energy.plastic > 0.0 else "mises", "speed"]
-
-
-def _pictures(result: Result, fields: Sequence[str] | None, at: Callable[[str], None]) -> str:
-    """Each field at some times; what cannot be drawn is said."""
-    frames, fields = [frame.index for frame in result.frames], telling(result) if fields is None else fields
-    if not frames or not fields:
-        return ""
-    chosen = sorted({frames[round((len(frames) - 1) * (k + 1) / _SHOTS)] for k in range(_SHOTS)})
-    drawn = []
-    with tempfile.TemporaryDirectory() as folder:
-        for field in fields:
-            at(f"drawing {field} at {len(chosen)} times")
-            try:
-                out = Path(folder) / f"{field}.png"
-                result.view(field, out, frame=chosen, size=(1400, 800), mirror="auto")
-                drawn.append(html.image(out.read_bytes(), "png", f"{field} at {len(chosen)} times"))
-            except ViewError as error:
-                drawn.append(f"<p class=pale>{escape(field)}: {escape(str(error))}</p>")
-    return "".join(drawn)
-
-
-def _svg(draw: Callable[[Path], object], alt: str) -> str:
-    """A chart, or what it lacks."""
-    with tempfile.TemporaryDirectory() as folder:
-        out = Path(folder) / "chart.svg"
-        try:
-            draw(out)
-        except UnfinishedError:
-            return ""
-        except ModuleNotFoundError as error:
-            return f"<p class=pale>charts need the extra 'view' of conoid: {escape(str(error))}</p>"
-        return html.image(out.read_bytes(), "svg+xml", alt)
-
-
-def _curve(result: Result, name: str, alt: str) -> str:
-    def draw(out: Path) -> None:
-        from . import curves  # matplotlib is loaded when it is needed
-
-        curves.save(getattr(curves, name)(result.history), out)
-
-    return _svg(draw, alt)
-
-
-def _energy(result: Result) -> str:
-    ended = _outcome(result)
-    rows = []
-    if ended is not None and ended.energy is not None:
-        terms = ((name, getattr(ended.energy, name)) for name in ended.energy.__struct_fields__ if name != "residual")
-        there = [(name, value) for name, value in terms if value]
-        rows = list(map(list, zip((name for name, _ in there), alike([value for _, value in there], "J"), strict=True)))
-    at_the_end = html.table(["energy at the end", ""], rows, [1]) if rows else ""
-    return _curve(result, "energy", "The energy ledger over time") + at_the_end + _parts(result)
-
-
-def _parts(result: Result) -> str:
-    """The energy of each part at the end of the history; nothing where there is one part alone."""
-    try:
-        told = by_part(result.history)
-    except UnfinishedError:
-        return ""
-    parts = next(iter(told.values()), {})
-    ended = [part for part, values in parts.items() if values]
-    columns = [alike([of[part][-1] for part in ended], "J") for of in told.values()]
-    rows = [list(row) for row in zip(ended, *columns, strict=True)]
-    return html.table(["part, at the end", *told], rows, [1, 2]) if rows else ""
-
-
-def _fragments(result: Result) -> str:
-    if not result.fragment_tables:
-        return ""
-
-    def draw(out: Path) -> None:
-        from . import curves  # matplotlib is loaded when it is needed
-
-        curves.save(curves.fragments([result.fragments_of(index) for index in result.fragment_tables]), out)
-
-    said = summary(result)
-    assert said is not None
-    rows = [
-        ["fragments of ten tets or more", count(said.fragments)],
-        ["dust", f"{count(said.dust)}, {percent(said.dust_share)} of the mass"],
-        ["largest fragment", f"{percent(said.largest_share)} of the mass"],
-        *([f"masses, {fit.law} law", _fit(fit, "kg")] for fit in said.masses),
-        *([f"extents, {fit.law} law", _fit(fit, "m")] for fit in said.sizes),
-    ]
-    return _svg(draw, "Number of fragments over time and by mass") + html.table(["", ""], rows)
-
-
-def _fit(fit: Fit, unit: str) -> str:
-    """The exponent of a power law has no unit."""
-    return f"{exact(fit.parameter, '' if fit.law == 'power' else unit, 4)}, ln L {exact(fit.log_likelihood, '', 5)}"
-
-
-def _balance(result: Result) -> str:
-    messages = result.messages
-    ended = _outcome(result)
-    if not any(isinstance(message, Load) for message in messages):
-        return ""
-
-    def draw(out: Path) -> None:
-        from . import charts  # matplotlib is loaded when it is needed
-
-        name = str(result.case.get("name", ""))
-        charts.balance(charts.course(messages), f"{name}, {result.folder.name}", name, out)
-
-    cuts = [message for message in messages if isinstance(message, Balance)]
-    some = cuts[:_CUTS]
-    times, costs, gains = (
-        alike(column, "s") for column in ([c.t for c in some], [c.cost for c in some], [c.saved for c in some])
-    )
-    rows = [
-        [t, count(cut.step), cut.cause, count(cut.tets), cost, saved]
-        for cut, t, cost, saved in zip(some, times, costs, gains, strict=True)
-    ]
-    told = f"<p>{counted(len(cuts), 'cut')}{f', the first {_CUTS} of them:' if len(cuts) > _CUTS else ''}</p>"
-    if cuts:
-        told += html.table(["time", "step", "cause", "tets moved", "cost", "saved by those before"], rows, [1, 3, 4, 5])
-    if cuts and ended is not None:
-        told += f"<p>They cost {si(ended.balancing_cost, 's')} and saved {si(ended.balancing_saved, 's')}.</p>"
-    return _svg(draw, "Outside nodes of each rank, and CPU time by phase") + told
-
-
-def _messages(result: Result) -> str:
-    ended = _outcome(result)
-    lines = [*(ended.warnings if ended is not None else [])]
-    lines += [f"{message.level}: {message.text}" for message in result.messages if isinstance(message, Log)]
-    return f"<pre tabindex=0>{escape(chr(10).join(lines))}</pre>" if lines else ""
-
-
-def _keys(case: dict[str, object]) -> str:
-    text = escape(json.dumps(case, indent=2, ensure_ascii=False))
-    return f"<details><summary>with every default filled in, in SI</summary><pre tabindex=0>{text}</pre></details>"

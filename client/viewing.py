@@ -41,7 +41,7 @@ def view_frames(
         str, typer.Option("--mirror", help="Complete a half or quarter model: auto, or planes such as x,y=0.002 (m).")
     ] = "none",
     section: Annotated[
-        str, typer.Option("--section", help="Cut away what lies before planes such as x,y=0.002 (m).")
+        str, typer.Option("--section", help="Cut away what lies before planes such as x=middle,y=0.002 (m).")
     ] = "",
     whole: Annotated[
         list[str] | None, typer.Option("--whole", metavar="PART", help="A part that sections leave whole; repeatable.")

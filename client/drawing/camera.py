@@ -56,8 +56,8 @@ def settled(picture: Picture, bounds: Array) -> Picture:
         return picture
     centre, extent = bounds.mean(axis=1), np.ptp(bounds, axis=1)
     for mirror in picture.mirrors:
-        extent[mirror.axis] = 2.0 * np.abs(bounds[mirror.axis] - mirror.at).max()
-    sides = {cut.axis: 1.0 if cut.at > centre[cut.axis] else -1.0 for cut in picture.cuts}
+        extent[mirror.axis] = 2.0 * np.abs(bounds[mirror.axis] - mirror.place).max()
+    sides = {cut.axis: 1.0 if cut.place > centre[cut.axis] else -1.0 for cut in picture.cuts}
     longest, second = np.argsort(extent)[:-3:-1].tolist()
     if picture.up is None and extent[longest] > _LONG * extent[second]:
         towards, up = _beside(longest, sides)

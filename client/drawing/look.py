@@ -27,7 +27,8 @@ class Look(msgspec.Struct, kw_only=True, frozen=True):
     mirror: str = "none"
     """``none``, ``auto`` (the planes of symmetry of the case), or planes such as ``x`` or ``x,y=0.002`` (m)."""
     section: str = ""
-    """Planes, written as in ``mirror``: what lies between one and the camera is cut away; the cut has the field."""
+    """Planes, written as in ``mirror``: or ``y=middle``: what lies between one and the camera is cut away; the cut
+    has the field."""
     whole: list[str] = []
     """Parts that sections leave whole."""
     hide: list[str] = []

@@ -13,10 +13,16 @@ Vector = tuple[float, float, float]
 
 
 class Mirror(msgspec.Struct, frozen=True):
-    """The plane ``axis = at``; ``axis`` is 0, 1 or 2, ``at`` in m."""
+    """The plane ``axis = at``; ``axis`` is 0, 1 or 2, ``at`` in m; of a section None: the middle of the body."""
 
     axis: int
-    at: float = 0.0
+    at: float | None = 0.0
+
+    @property
+    def place(self) -> float:
+        """``at`` of a plane that is settled, m."""
+        assert self.at is not None
+        return self.at
 
 
 class Wall(msgspec.Struct, frozen=True):
@@ -34,7 +40,7 @@ VIEWS: dict[str, Vector] = {
 _FARTHEST = 1e6
 """m from the origin that a plane may lie. Chosen: VTK draws in single precision."""
 _NUMBER = r"[+-]?[0-9]*\.?[0-9]+(?:[eE][+-]?\d+)?"
-_PLANE = re.compile(rf"\s*([xyz])\s*(?:=\s*({_NUMBER}))?\s*")
+_PLANE = re.compile(rf"\s*([xyz])\s*(?:=\s*({_NUMBER}|middle))?\s*")
 _AXIS = re.compile(r"\s*([+-]?)([xyz])\s*")
 _DIRECTION = re.compile(rf"\s*({_NUMBER})\s*,\s*({_NUMBER})\s*,\s*({_NUMBER})\s*")
 
@@ -54,11 +60,16 @@ def planes(text: str, option: str) -> tuple[Mirror, ...]:
     if text in {"none", ""}:
         return ()
     read = [_PLANE.fullmatch(plane) for plane in text.split(",")]
-    if None in read:
-        auto = "auto, none, or " if option == "mirror" else ""
-        raise LookError(f"{option} = {text!r}: write {auto}planes such as x or x,y=0.002 (in m)")
-    found = tuple(Mirror("xyz".index(plane[1]), float(plane[2] or 0.0)) for plane in read if plane is not None)
-    if not all(abs(plane.at) < _FARTHEST for plane in found):
+    middles = [plane[2] == "middle" for plane in read if plane is not None]
+    if None in read or (option == "mirror" and any(middles)):
+        auto, middle = ("auto, none, or ", "") if option == "mirror" else ("", ", y=middle")
+        raise LookError(f"{option} = {text!r}: write {auto}planes such as x or x,y=0.002{middle} (in m)")
+    found = tuple(
+        Mirror("xyz".index(plane[1]), None if middle else float(plane[2] or 0.0))
+        for plane, middle in zip(read, middles, strict=True)
+        if plane is not None
+    )
+    if not all(plane.at is None or abs(plane.at) < _FARTHEST for plane in found):
         raise LookError(f"{option} = {text!r}: a plane within {number(_FARTHEST)} m")
     return found
 

@@ -16,6 +16,7 @@ from ..errors import LookError, ViewError
 from . import camera, films, scales, surfaces, vtk
 from .fields import FIELDS, NAMED
 from .picture import Drawn, Picture
+from .planes import Mirror
 from .printer import Printer
 from .renderer import reason
 from .scales import Scale
@@ -46,11 +47,19 @@ def _shots(picture: Picture) -> tuple[Picture, list[Shot]]:
     for path in picture.frames:
         mesh, time = vtk.read(path)
         grid = surfaces.prepared(mesh, picture)
-        picture = camera.settled(picture, surfaces.bulk(grid, picture))
+        bulk = surfaces.bulk(grid, picture)
+        picture = camera.settled(_in_the_middle(picture, bulk), bulk)
         bounds.append(np.reshape(mesh.bounds, (3, 2)))
         surfaces.require_sections(picture, np.array([bounds[-1]]))
         shots.append(Shot(surfaces.pieces(grid, picture, picture.camera or camera.FROM), time, bounds[-1]))
     return picture, shots
+
+
+def _in_the_middle(picture: Picture, bulk: Any) -> Picture:
+    """With places for the sections that are to go through the middle of the body, or of the mirrored one."""
+    middle = dict(enumerate(bulk.mean(axis=1).tolist())) | {one.axis: one.place for one in picture.mirrors}
+    sections = [Mirror(one.axis, middle[one.axis]) if one.at is None else one for one in picture.sections]
+    return msgspec.structs.replace(picture, sections=sections)
 
 
 def _all_values(picture: Picture) -> list[Any]:

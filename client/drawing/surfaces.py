@@ -104,16 +104,16 @@ def require_sections(picture: Picture, bounds: Array) -> None:
         low, high = bounds[:, plane.axis, 0].min(), bounds[:, plane.axis, 1].max()
         for mirror in picture.mirrors:
             if mirror.axis == plane.axis:
-                low, high = min(low, 2.0 * mirror.at - high), max(high, 2.0 * mirror.at - low)
-        if not low <= plane.at <= high:
-            raise _beyond("xyz"[plane.axis], plane.at, low, high)
+                low, high = min(low, 2.0 * mirror.place - high), max(high, 2.0 * mirror.place - low)
+        if not low <= plane.place <= high:
+            raise _beyond("xyz"[plane.axis], plane.place, low, high)
 
 
 def _nothing(grid: Any, picture: Picture) -> LookError:
     if not picture.sections:
         return LookError("hide: all parts are hidden")
     plane = picture.sections[0]
-    return _beyond("xyz"[plane.axis], plane.at, *np.reshape(grid.bounds, (3, 2))[plane.axis])
+    return _beyond("xyz"[plane.axis], plane.place, *np.reshape(grid.bounds, (3, 2))[plane.axis])
 
 
 def _beyond(axis: str, at: float, low: float, high: float) -> LookError:
@@ -208,7 +208,7 @@ class Section:
         """The cut of the body whose image this cuts."""
         if mirror.axis != self.plane.axis:
             return self
-        return replace(self, plane=Mirror(mirror.axis, 2.0 * mirror.at - self.plane.at), below=not self.below)
+        return replace(self, plane=Mirror(mirror.axis, 2.0 * mirror.place - self.plane.place), below=not self.below)
 
 
 def _surface(part: Any, picture: Picture, sections: Sequence[Section]) -> Any | None:
@@ -226,7 +226,7 @@ def _surface(part: Any, picture: Picture, sections: Sequence[Section]) -> Any | 
 
 
 def _same(one: Mirror, other: Mirror, length: float) -> bool:
-    return one.axis == other.axis and abs(one.at - other.at) < _ONE * length
+    return one.axis == other.axis and abs(one.place - other.place) < _ONE * length
 
 
 def _chosen(mirrors: Sequence[Mirror]) -> Iterator[list[Mirror]]:
@@ -245,7 +245,7 @@ def _clipped(mesh: Any, sections: Sequence[Section]) -> Any:
     for section in sections:
         side, shift = (1.0 if section.below else -1.0), 0.2 * _ONE * mesh.length  # no node lies in the plane
         normal, origin = np.zeros(3), np.zeros(3)
-        normal[section.plane.axis], origin[section.plane.axis] = side, section.plane.at + side * shift
+        normal[section.plane.axis], origin[section.plane.axis] = side, section.plane.place + side * shift
         if mesh.n_cells:
             left = mesh.clip(normal=normal, origin=origin)
             thick = np.ptp(np.reshape(left.bounds, (3, 2))[section.plane.axis]) > _ONE * mesh.length
@@ -261,7 +261,7 @@ def _faces(mesh: Any, mirrors: Sequence[Mirror], length: float) -> Any:
     surface = surface.triangulate()  # a section leaves faces of three to six corners
     outer = np.ones(surface.n_cells, bool)
     for mirror in mirrors:
-        near = np.abs(np.asarray(surface.points)[:, mirror.axis] - mirror.at) < _ONE * length
+        near = np.abs(np.asarray(surface.points)[:, mirror.axis] - mirror.place) < _ONE * length
         outer &= ~near[surface.regular_faces].all(axis=1)
     return surface.extract_cells(np.flatnonzero(outer))
 
@@ -270,7 +270,7 @@ def _reflected(surface: Any, mirrors: Sequence[Mirror], field: str) -> Any:
     """Its image behind all of the mirrors."""
     image = surface.copy() if mirrors else surface
     for mirror in mirrors:
-        image.points[:, mirror.axis] = 2.0 * mirror.at - image.points[:, mirror.axis]
+        image.points[:, mirror.axis] = 2.0 * mirror.place - image.points[:, mirror.axis]
         if "vector" in image.point_data:
             image.point_data["vector"][:, mirror.axis] *= -1.0
         if FIELDS[field].turns(mirror.axis):

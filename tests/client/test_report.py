@@ -1,8 +1,10 @@
 """A run as one HTML file: what it says, and that it needs nothing else."""
 
 import base64
+import gzip
 import json
 import os
+import random
 import re
 import threading
 from html.parser import HTMLParser
@@ -85,9 +87,10 @@ def test_a_report_is_one_file_that_asks_for_nothing(folder: Path, tmp_path: Path
     page = read(out)
     assert page.addresses
     assert all(address.startswith("data:image/") for address in page.addresses)
-    assert not re.search(r"url\(|@import|<link|fetch\(", out.read_text())
-    pictures = [address for address in page.addresses if address.startswith("data:image/png")]
-    assert base64.b64decode(pictures[0].partition(",")[2]).startswith(b"\x89PNG")
+    assert not re.search(r"url\((?!#)|@import|<link|fetch\(", out.read_text())
+    pictures = [address for address in page.addresses if address.startswith("data:image/webp")]
+    assert base64.b64decode(pictures[0].partition(",")[2]).startswith(b"RIFF")
+    assert out.stat().st_size < 5_000_000
 
 
 def test_it_says_how_the_run_ended_and_whether_it_is_right(folder: Path, tmp_path: Path) -> None:
@@ -161,9 +164,9 @@ def test_what_takes_long_says_what_it_is_at(folder: Path, quiet_home: Path, monk
         if lines[0].startswith("writing bar.html: energy, "):
             heard.set()
 
-    def energy(_: Result) -> str:
+    def energy(*_: object) -> list[str]:
         assert heard.wait(30.0)
-        return ""
+        return []
 
     monkeypatch.setattr(options, "complain", told)
     monkeypatch.setattr(report, "_energy", energy)
@@ -182,24 +185,32 @@ def with_snapshots(folder: Path, n: int) -> Result:
     return Result.open(folder)
 
 
+def embedded(html: str, name: str) -> bytes:
+    """What stands packed in a page under a name."""
+    found = re.search(rf'<script type="application/octet-stream" id={name}>(.*?)</script>', html)
+    assert found is not None
+    return gzip.decompress(base64.b64decode(found[1]))
+
+
 def modules(html: str) -> dict[str, str]:
     """The embedded modules by the names by which they are imported."""
-    found = re.search(r'<script type="importmap">(.*?)</script>', html)
-    assert found is not None
-    imports: dict[str, str] = json.loads(found[1])["imports"]
-    return {name: base64.b64decode(address.partition(",")[2]).decode() for name, address in imports.items()}
+    found: dict[str, str] = json.loads(embedded(html, "modules"))
+    return found
 
 
 def test_a_replay_has_every_module_that_it_imports(folder: Path, tmp_path: Path) -> None:
     html = report.write(with_snapshots(folder, 3), tmp_path / "bar.html", []).read_text()
-    embedded = modules(html)
-    assert "conoid/view3d.js" in embedded
-    for name, code in embedded.items():
+    there = modules(html)
+    assert "conoid/view3d.js" in there
+    for name, code in there.items():
         if name != "conoid/three":
             for used in re.findall(r"""(?:from|import)\s*\(?\s*["']([^"']+)["']""", code):
-                assert used in embedded, f"{name} imports {used}"
+                assert used in there, f"{name} imports {used}"
+            for names, used in re.findall(r"""import\s*\{([^}]*)\}\s*from\s*["']([^"']+)["']""", code):
+                for one in names.split(","):
+                    assert re.search(rf"export [^;]*\b{one.split(' as ')[0].strip()}\b", there[used]), (name, one)
     assert [int(n) for n in re.findall(r"id=snapshot-(\d+)", html)] == [0, 1, 2]
-    assert base64.b64encode(b"CONOSNAP\x02").decode() in html
+    assert embedded(html, "snapshot-2") == b"CONOSNAP\x02"
 
 
 def test_of_many_snapshots_some_are_embedded_evenly(folder: Path) -> None:
@@ -209,13 +220,24 @@ def test_of_many_snapshots_some_are_embedded_evenly(folder: Path) -> None:
     assert (shown[0], shown[-1]) == (0, 99)
 
 
+def test_of_large_snapshots_there_are_fewer(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    result = with_snapshots(folder, 30)
+    for path in (folder / "snapshots").iterdir():
+        path.write_bytes(b"CONOSNAP" + random.Random(path.name).randbytes(10_000))
+    monkeypatch.setattr(replay3d, "BUDGET", 65_000)
+    html = replay3d.html(result)
+    shown = [int(n) for n in re.findall(r"id=snapshot-(\d+)", html)]
+    assert 2 < len(shown) <= 6
+    assert (shown[0], shown[-1]) == (0, 29)
+
+
 def test_without_snapshots_there_is_no_replay_and_without_three_a_line(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert replay3d.html(Result.open(folder)) == ""
     monkeypatch.setattr(replay3d, "PACKAGE", "not-there")
     assert replay3d.html(with_snapshots(folder, 1)) == (
-        "<p class=pale>no replay in 3-D: not-there 3.18.0 is not installed: pip install --no-deps not-there==3.18.0</p>"
+        "<p class=hint>No replay in 3-D: not-there 3.18.0 is not installed: pip install --no-deps not-there==3.18.0</p>"
     )
 
 
