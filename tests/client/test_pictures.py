@@ -63,7 +63,8 @@ def coloured(path: Path) -> Any:
 @pytest.mark.usefixtures("warm")
 @pytest.mark.parametrize(
     ("section", "mirror", "camera"),
-    [("x=0.0016", "none", "x"), ("y=middle", "none", "y"), ("x=0", "x", "x"), ("x=-0.0016", "x", "x"), ("x=0.0016", "x", "-x"),
+    [("x=0.0016", "none", "x"), ("y=middle", "none", "y"), ("x=0", "x", "x"),
+     ("x=-0.0016", "x", "x"), ("x=0.0016", "x", "-x"),
      ("x=-0.0016,y=0.0016", "x,y", "1,1,0.2")],
 )  # fmt: skip
 def test_a_cut_has_the_field_that_is_inside(
