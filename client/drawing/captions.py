@@ -169,14 +169,16 @@ class Painter:
 
     def triad(self, panel: Box) -> None:
         """The axes, those that point away first."""
-        eye, reach = self._laid.eye, 2.1 * self._font
-        x0, y0 = panel[0] + 3.2 * self._font, panel[1] + panel[3] - 3.0 * self._font
+        eye = self._laid.eye
         seen = np.stack([eye.right, -eye.above, eye.towards])
+        ends = 2.1 * self._font * seen[:2]
+        letters = ends * (1.0 + 0.42 / np.maximum(0.35, np.hypot(*seen[:2])))
+        room = 1.3 * self._font
+        x0 = panel[0] + room - min(0.0, float(letters[0].min()))
+        y0 = panel[1] + panel[3] - room - max(0.0, float(letters[1].max()))
         for axis in np.argsort(seen[2]).tolist():
-            x, y = x0 + reach * seen[0, axis], y0 + reach * seen[1, axis]
-            self._draw.line([(x0, y0), (x, y)], fill=_AXES[axis], width=max(2, round(0.14 * self._font)))
-            ahead = 1.0 + 0.42 / max(0.35, float(np.hypot(*seen[:2, axis])))
-            place = (x0 + ahead * (x - x0), y0 + ahead * (y - y0))
+            end, place = ((x0 + at[0, axis], y0 + at[1, axis]) for at in (ends, letters))
+            self._draw.line([(x0, y0), end], fill=_AXES[axis], width=max(2, round(0.14 * self._font)))
             self._draw.text(place, "xyz"[axis], fill=_AXES[axis], font=face(self._font), anchor="mm")
 
     def length(self, panel: Box) -> None:
