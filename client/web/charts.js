@@ -66,11 +66,15 @@ export class Chart {
     if (!option) return;
     this.chart ??= this.init();
     const panels = option.grid?.length ?? 1;
-    const other = panels !== (this.panels ?? 1);
-    if (other) this.stretch(panels);
-    this.chart.setOption({ ...common(this.alone), ...option }, { replaceMerge: other ? ["series", "grid", "xAxis", "yAxis"] : ["series"], lazyUpdate: false });
+    if (panels !== (this.panels ?? 1)) this.stretch(panels);
+    const places = new Map(option.series.map(({ name, xAxisIndex = 0 }) => [name, xAxisIndex]));
+    const moved = [...places].some(([name, place]) => (this.places?.get(name) ?? place) !== place) || panels !== (this.places?.panels ?? panels);
+    this.places = Object.assign(places, { panels });
+    const how = moved ? { notMerge: true } : { replaceMerge: ["series"] }; // ECharts fails where a line moves to another panel.
+    this.chart.setOption({ ...common(this.alone), ...option }, { ...how, lazyUpdate: false });
     this.series = option.series;
     this.reads = !this.alone && !option.tooltip?.formatter;
+    if (readout.of === this) this.read(this.cursor);
     this.points = Math.max(...option.series.map((one) => one.data?.length ?? 0));
   }
 
@@ -97,6 +101,7 @@ export class Chart {
   read(cursor) {
     const focused = document.activeElement === this.element;
     if (!this.reads || !cursor || !(this.pointer || focused)) return;
+    this.cursor = cursor;
     const { right, top, height } = this.element.getBoundingClientRect();
     readout.show(this, cursor.value, this.series, this.pointer ?? [right, top + height / 2]);
   }
@@ -113,6 +118,8 @@ export class Chart {
     event.preventDefault();
     this.at = Math.min(this.points - 1, Math.max(0, this.at + move * (event.shiftKey ? 10 : 1)));
     this.chart.dispatchAction({ type: "showTip", seriesIndex: 0, dataIndex: this.at });
+    const point = this.series[0]?.data[this.at];
+    if (point) this.read({ value: (point.value ?? point)[0] });
   }
 
   // Makes one series stand out; null: none.

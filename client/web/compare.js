@@ -125,17 +125,17 @@ export class ComparePage {
     const cases = [...new Set(this.runs.map(({ info }) => info.title || info.name))];
     this.head.replaceChildren(
       h("div.card-head", {}, h("h1", {}, `${this.runs.length} runs`), h("span.hint", {}, cases.length === 1 ? cases[0] : ""), h("span.note", {}, this.adder())),
-      h("div.lines", { role: "group", "aria-label": "runs; press to hide or show" }, this.runs.map((run, i) => this.entry(run, i))));
+      h("div.run-lines", { role: "group", "aria-label": "runs; press to hide or show" }, this.runs.map((run, i) => this.entry(run, i))));
     if (focused) this.head.querySelector(`[data-run="${CSS.escape(focused)}"]`)?.focus();
   }
 
   entry({ id, info }, i) {
     const light = (name) => { for (const { chart } of this.charts) chart.highlight(name); };
     const names = this.names;
-    return h("span.line", {},
+    return h("span.run-line", {},
       h("button.tab", { type: "button", "data-run": id, "aria-pressed": String(!this.hidden.has(id)), title: `${info.title || info.name}, ${id}`, onclick: () => this.toggle(id),
         onmouseenter: () => light(names[i]), onmouseleave: () => light(null), onfocus: () => light(names[i]), onblur: () => light(null) }, swatch(i), names[i]),
-      FINAL.has(info.state) && info.state === "succeeded" ? "" : pill(info.state), h("a.open", { href: `#/runs/${encodeURIComponent(id)}`, "aria-label": `open ${names[i]}` }, "open"));
+      FINAL.has(info.state) && info.state === "succeeded" ? "" : pill(info.state), h("a.open-run", { href: `#/runs/${encodeURIComponent(id)}`, "aria-label": `open ${names[i]}` }, "open"));
   }
 
   toggle(id) {

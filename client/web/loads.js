@@ -7,7 +7,8 @@ import { GROUPS } from "./live.js";
 
 const MOST_COLUMNS = 240; // Of the map of work; more are less than a pixel wide on a phone.
 const MOST_ROWS = 64; // Of it; neighbours among more ranks share a row.
-export const SPENT = { waiting: "waiting for other ranks", exchange: "exchange of messages", compute: "elements, nodes and facets", output: "output" };
+// What the groups of live.js are.
+export const SPENT = { compute: "elements, nodes, facets", exchange: "messages between ranks", waiting: "waiting for other ranks", descheduled: "not run by the machine" };
 
 export function ofImbalance(live) {
   const { loads, balances } = live;

@@ -2,6 +2,7 @@
 
 import { alike, count, exacts, fixed, h, legend, percent, si } from "./figures.js";
 import { GROUPS } from "./live.js";
+import { SPENT } from "./loads.js";
 
 const MOST_RANKS = 24;
 
@@ -18,13 +19,13 @@ export class Ranks {
     const rows = totals.slice(0, MOST_RANKS).flatMap((_, rank) => {
       const pieces = Object.entries(groups).map(([name, seconds]) =>
         h("i", { title: `${name} ${si(seconds[rank], "s")}`, style: { width: `${(100 * seconds[rank]) / longest}%`, background: `var(--${name})` } }));
-      return [h("span.who", {}, `rank ${rank}`), h("div.stack", {}, pieces), h("span.busy", {}, `${percent(share(rank), 0)} busy${rank in helped ? `, its threads ${percent(helped[rank], 0)}` : ""}`)];
+      return [h("span.who", {}, `rank ${rank}`), h("div.stack", {}, pieces), h("span.busy", {}, `${percent(share(rank), 0)} computes${rank in helped ? ` · other threads ${percent(helped[rank], 0)} busy` : ""}`)];
     });
     const more = totals.length - MOST_RANKS;
     this.note.textContent = more > 0 ? `${totals.length} ranks, the first ${MOST_RANKS} shown` : "";
     this.element.replaceChildren(
       totals.length ? h("div.ranks", {}, rows) : h("p.hint", {}, "waiting for the first numbers"),
-      totals.length ? legend(GROUPS.filter((name) => groups[name]).map((name) => [name === "waiting" ? "waiting for other ranks" : name, name])) : "");
+      totals.length ? legend(GROUPS.filter((name) => groups[name]).map((name) => [SPENT[name] ?? name, name])) : "");
   }
 }
 
@@ -57,8 +58,8 @@ export class Balances {
     this.element.replaceChildren(
       h("p.told", {}, event.cause),
       h("dl.facts", {}, entry("time", si(event.t, "s")), entry("tets moved", count(event.tets)), entry("nodes moved", count(event.nodes)),
-        entry("cost", si(event.cost, "s")), entry("saved before", si(event.saved, "s"))),
-      bars("before, s a step", summed(event.before)), bars("predicted", event.predicted));
+        entry("this cut took", si(event.cost, "s")), entry("earlier cuts saved", si(event.saved, "s"))),
+      bars("Work of each rank before, a step", summed(event.before)), bars("Work expected after", event.predicted));
   }
 }
 

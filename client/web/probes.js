@@ -23,8 +23,8 @@ export class Chooser {
   constructor(live, onChange) {
     Object.assign(this, { live, onChange });
     this.summary = h("summary", {}, "Choose");
-    this.list = h("div.choices", { role: "group", "aria-label": "probes in the chart" });
-    this.element = h("details.chooser", { hidden: "", onkeydown: ({ key }) => { if (key === "Escape") this.shut(); } }, this.summary, this.list);
+    this.list = h("div.probe-list", { role: "group", "aria-label": "probes in the chart" });
+    this.element = h("details.probe-chooser", { hidden: "", onkeydown: ({ key }) => { if (key === "Escape") this.shut(); } }, this.summary, this.list);
     this.element.addEventListener("focusout", ({ relatedTarget }) => { if (relatedTarget && !this.element.contains(relatedTarget)) this.element.open = false; });
   }
 
@@ -85,7 +85,7 @@ export function panels(list, last) {
   const of = kinds.map((unit) => list.filter((one) => one.unit === unit));
   const place = (i) => ({ top: `${10 + (84 * i) / number}%`, height: `${84 / number - (i < number - 1 ? 9 : 2)}%` });
   return {
-    grid: kinds.map((_, i) => ({ left: 64, right: 14, ...(number > 1 ? place(i) : { top: 34, bottom: 26 }) })),
+    grid: kinds.map((_, i) => ({ left: 64, right: 14, ...(number > 1 ? place(i) : { top: 40, bottom: 26 }) })),
     xAxis: kinds.map((_, i) => time(last, { gridIndex: i, ...(i < number - 1 ? { axisLabel: { show: false } } : {}) })),
     yAxis: kinds.map((unit, i) => axis(unit, heights(of[i]), { gridIndex: i })),
     axisPointer: { link: [{ xAxisIndex: "all" }] },

@@ -68,7 +68,7 @@ export class RunPage {
     const add = (name, title, beside, content) => this.cards.add(name, title, beside, content);
     add("checks", "Against the reference", "", this.checks);
     for (const [name, [chart, title, beside]] of this.drawn) add(name, title, h("span.beside", {}, beside, this.notes[name]), chart.element);
-    add("ranks", "What each rank does now", this.ranks.note, this.ranks.element);
+    add("ranks", "What each rank spends its time on", this.ranks.note, this.ranks.element);
     add("balances", this.balances.title, this.balances.beside, this.balances.element).setAttribute("aria-label", "balance events");
     this.cards.show("checks", false);
     this.cards.show("balances", false);

@@ -28,7 +28,7 @@ export class Sheet {
     const order = this.order();
     const head = this.columns.map((column) => this.head(column));
     const focused = document.activeElement?.dataset?.sorts;
-    this.place.replaceChildren(h("table.checks.sheet", {}, h("thead", {}, h("tr", {}, h("th", { scope: "col" }, "run"), head)),
+    this.place.replaceChildren(h("table.checks.outcomes", {}, h("thead", {}, h("tr", {}, h("th", { scope: "col" }, "run"), head)),
       h("tbody", {}, order.map((i) => h("tr", {}, h("th.row", { scope: "row" }, swatch(rows[i].line), h("a", { href: rows[i].href }, rows[i].name), rows[i].state === "succeeded" ? "" : pill(rows[i].state)),
         this.columns.map(({ values, text, key }) => h(key ? "td.value" : "td.number", {}, text(values[i]))))))));
     if (focused) this.place.querySelector(`[data-sorts="${CSS.escape(focused)}"]`)?.focus();
@@ -37,7 +37,7 @@ export class Sheet {
   head({ title, unit, key }) {
     const sorted = this.by === title ? (this.down ? "descending" : "ascending") : "none";
     const mark = { ascending: " ▲", descending: " ▼", none: "" }[sorted];
-    return h(`th${key ? "" : ".number"}`, { scope: "col", "aria-sort": sorted }, h("button.sort", { type: "button", "data-sorts": title, title: key ?? false, onclick: () => this.sort(title) }, title, unit ? h("small", {}, ` ${unit}`) : "", mark));
+    return h(`th${key ? "" : ".number"}`, { scope: "col", "aria-sort": sorted }, h("button.by-column", { type: "button", "data-sorts": title, title: key ?? false, onclick: () => this.sort(title) }, title, unit ? h("small", {}, ` ${unit}`) : "", mark));
   }
 
   sort(title) {

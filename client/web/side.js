@@ -2,10 +2,11 @@
 
 import { binary } from "./api.js";
 import { share } from "./eye.js";
-import { h, si } from "./figures.js";
+import { counted, h, si } from "./figures.js";
 import { three } from "./libraries.js";
 import { swatch } from "./lines.js";
-import { rounded, scaleOf } from "./scales.js";
+import { range } from "./ranges.js";
+import { scaleOf } from "./scales.js";
 import { colourings, decode } from "./snapshot.js";
 import { View3d } from "./view3d.js";
 
@@ -76,8 +77,10 @@ export class SideBySide {
     for (const [id, pane] of this.panes) if (!this.chosen.includes(id)) this.drop(id, pane);
     for (const id of this.chosen) if (!this.panes.has(id)) this.panes.set(id, this.pane(this.runs.find((run) => run.id === id), modules));
     this.row.replaceChildren(...this.chosen.map((id) => this.panes.get(id).element));
-    share([...this.panes.values()].map(({ view }) => view));
     await this.tick();
+    const views = this.chosen.map((id) => this.panes.get(id)?.view).filter(Boolean);
+    views.forEach((view, i) => view.set({ legend: i === 0 }));
+    share(views);
   }
 
   drop(id, { view }) {
@@ -86,8 +89,8 @@ export class SideBySide {
   }
 
   pane(run, modules) {
-    const view = new View3d(modules, () => {});
-    Object.assign(view.canvas, { tabIndex: 0 });
+    const view = new View3d(modules);
+    view.canvas.tabIndex = 0;
     view.canvas.setAttribute("role", "application");
     view.canvas.setAttribute("aria-label", `the body of ${run.called}; arrow keys turn all bodies, plus and minus zoom`);
     const caption = h("figcaption", {});
@@ -116,10 +119,10 @@ export class SideBySide {
         if (pane.shown === entry.n) continue;
         const snapshot = await this.read(pane, entry);
         if (this.closed || !this.panes.has(pane.run.id)) return;
-        pane.view.show(snapshot);
-        pane.view.colour(this.by.value, snapshot.header.fields[this.by.value] && this.range(this.by.value));
         Object.assign(pane, { shown: entry.n, snapshot });
-        pane.caption.textContent = `${si(entry.t, "s")}, ${entry.fragments} fragments`;
+        pane.view.show(snapshot);
+        this.paintOne(pane);
+        pane.caption.textContent = `${si(entry.t, "s")} · ${counted(entry.fragments, "fragment")}`;
       }
     } catch (error) {
       pane.caption.textContent = error.message;
@@ -144,15 +147,16 @@ export class SideBySide {
     this.by.value = names.includes(before) ? before : names[0];
   }
 
-  // One range of colours for all bodies that are shown.
-  range(name) {
-    const fields = [...this.panes.values()].map(({ snapshot }) => snapshot?.header.fields[name]).filter(Boolean);
-    const [low, high, number] = rounded(Math.min(...fields.map((field) => field.low)), Math.max(...fields.map((field) => field.high)));
-    return { low, high, number };
+  // One scale of colours for all bodies that are shown, and all times.
+  paintOne({ view, snapshot }) {
+    const by = this.by.value;
+    if (!snapshot.header.fields[by]) return view.colour(by);
+    const told = this.chosen.flatMap((id) => this.panes.get(id)?.run.snapshots ?? []).map(({ fields }) => fields?.[by]).filter(Boolean);
+    return view.colour(by, range({ how: "most", over: "run" }, by, snapshot, told));
   }
 
   paint() {
-    for (const { view, snapshot } of this.panes.values()) if (snapshot) view.colour(this.by.value, snapshot.header.fields[this.by.value] && this.range(this.by.value));
+    for (const pane of this.panes.values()) if (pane.snapshot) this.paintOne(pane);
   }
 
   play() {

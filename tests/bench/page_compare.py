@@ -20,12 +20,12 @@ from .many import lay
 _COMPARED = 12
 _DRAWN = """(() => {
   const charts = [...document.querySelectorAll(".charts .plot")];
-  return document.querySelectorAll("table.sheet tbody tr").length === %d && charts.length > 2 &&
+  return document.querySelectorAll("table.outcomes tbody tr").length === %d && charts.length > 2 &&
     charts.filter((one) => one.getBoundingClientRect().top < innerHeight).every((one) => one.querySelector("canvas"));
 })()"""
 _HIDDEN = """(async () => {
   const start = performance.now();
-  document.querySelector(".lines button[aria-pressed=true]").click();
+  document.querySelector(".run-lines button[aria-pressed=true]").click();
   const took = performance.now() - start;
   await new Promise(requestAnimationFrame);
   return took;

@@ -95,24 +95,24 @@ def test_twelve_runs_are_told_apart(site: tuple[Site, list[str]], browser: Brows
     page = browser.page(1280, 720)
     sign_in(page, server)
     page.go(f"{server.url}#/compare/{'/'.join(runs)}")
-    page.wait("document.querySelectorAll('table.sheet tbody tr').length === 12")
+    page.wait("document.querySelectorAll('table.outcomes tbody tr').length === 12")
     page.wait(f"{DRAWN} > 2")
-    assert len(set(page.evaluate("[...document.querySelectorAll('.line button')].map((b) => b.innerText)"))) == 12
-    swatches = "[...document.querySelectorAll('.line .swatch')].map((s) => s.className + getComputedStyle(s).color)"
+    assert len(set(page.evaluate("[...document.querySelectorAll('.run-line button')].map((b) => b.innerText)"))) == 12
+    swatches = "[...document.querySelectorAll('.run-line .swatch')].map((s) => s.className + getComputedStyle(s).color)"
     assert len(set(page.evaluate(swatches))) == 12, "colour and dashes together"
-    title = page.evaluate("document.querySelectorAll('table.sheet .sort')[2].dataset.sorts")
-    page.click(f"table.sheet [data-sorts='{title}']")
+    title = page.evaluate("document.querySelectorAll('table.outcomes .by-column')[2].dataset.sorts")
+    page.click(f"table.outcomes [data-sorts='{title}']")
     page.wait(f"document.activeElement.dataset.sorts === '{title}'")
     cells = page.evaluate(
-        "[...document.querySelectorAll('table.sheet tbody tr')].map((r) => Number(r.cells[3].innerText))"
+        "[...document.querySelectorAll('table.outcomes tbody tr')].map((r) => Number(r.cells[3].innerText))"
     )
     assert cells == sorted(cells)
     page.focus(".plot")
     page.press("ArrowRight")
     page.wait("document.querySelectorAll('.readout .number').length === 12")
-    page.focus(".line button")
+    page.focus(".run-line button")
     page.press("Enter")
-    page.wait("document.querySelector('.line button').getAttribute('aria-pressed') === 'false'")
+    page.wait("document.querySelector('.run-line button').getAttribute('aria-pressed') === 'false'")
     page.focus(".plot")
     page.press("ArrowRight")
     page.wait("document.querySelectorAll('.readout .number').length === 11")
@@ -131,7 +131,7 @@ def test_bodies_share_camera_and_clock_and_everybody_can_use_it(
     page = browser.page(width, height, dark=dark, phone=phone)
     sign_in(page, server)
     page.go(f"{server.url}#/compare/{'/'.join(runs[-3:])}")
-    page.wait("document.querySelectorAll('table.sheet tbody tr').length === 3")
+    page.wait("document.querySelectorAll('table.outcomes tbody tr').length === 3")
     page.wait("document.querySelector('.picks input')")
     page.place(".panes")
     page.wait("document.querySelectorAll('.pane canvas').length >= 2")
