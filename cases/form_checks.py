@@ -7,9 +7,14 @@ from .problems import Location, Problem, problem
 from .profile import tangent
 from .tables import Model
 
+_LEAST = 1e-6
+"""Of the radius of a body: what is smaller, and not 0, is a slip. Chosen: no element is so small."""
+_ROUNDED = "shank", "tip_radius", "meplat", "top_radius", "inner_radius", "radius"
+
 
 def check_form(form: Model, location: Location) -> Iterator[Problem]:
     """Every problem of the sizes of a form that stands at ``location``."""
+    yield from _slips(form, location)
     if isinstance(form, BoxForm):
         for d in (d for d in range(3) if form.low[d] >= form.high[d]):
             yield problem((*location, "high", d), form.high[d], f"must be above low[{d}], {form.low[d]} m")
@@ -23,6 +28,17 @@ def check_form(form: Model, location: Location) -> Iterator[Problem]:
         yield from _ogive(form, location)
     elif isinstance(form, SphericalCapForm) and form.height >= 2.0 * form.radius:
         yield problem((*location, "height"), form.height, f"must be below the diameter, {2.0 * form.radius:g} m")
+
+
+def _slips(form: Model, location: Location) -> Iterator[Problem]:
+    """Lengths that may be 0 and are nearly that."""
+    if not isinstance(form, ConeForm | OgiveForm | RingSectorForm):
+        return
+    most = max(form.radius, form.top_radius) if isinstance(form, ConeForm) else form.radius
+    for key in _ROUNDED:
+        if 0.0 < getattr(form, key, 0.0) < _LEAST * most:
+            message = f"less than a millionth of the radius, {most:g} m; set 0, or a length that elements can have"
+            yield problem((*location, key), getattr(form, key), message)
 
 
 def _ogive(form: OgiveForm, location: Location) -> Iterator[Problem]:

@@ -115,4 +115,20 @@ def bulk(part: Part, mesh: Generated, density: float) -> Bulk:
     squares = [math.fsum(c * c for c in v) for v in speeds]
     x, y, z = (mass * math.fsum(each) / len(speeds) for each in zip(*speeds, strict=True))
     energy = 0.5 * mass * math.fsum(squares) / len(squares)
-    return Bulk(mass, *body.bounds(), (x, y, z), energy, math.sqrt(max(squares)))
+    middle = [math.fsum(each) / len(speeds) for each in zip(*body.points(), strict=True)] if moving else part.velocity
+    momentum, energy = with_inertia(part, mass, (middle[0], middle[1], middle[2])) or ((x, y, z), energy)
+    return Bulk(mass, *body.bounds(), momentum, energy, math.sqrt(max(squares)))
+
+
+def with_inertia(part: Part, mass: float, middle: Vector) -> tuple[Vector, float] | None:
+    """Momentum and kinetic energy of a rigid part whose inertia is given, at the start; None for any other part.
+    ``middle``: its centre of mass, where none is given.
+    """
+    rigid = part.rigid
+    if rigid is None or rigid.inertia is None:
+        return None
+    v, (a, b, c) = velocity(part, rigid.centre or middle), part.spin.rate if part.spin is not None else (0.0, 0.0, 0.0)
+    xx, yy, zz, yz, zx, xy = rigid.inertia
+    turning = xx * a * a + yy * b * b + zz * c * c + 2.0 * (yz * b * c + zx * c * a + xy * a * b)
+    squares = math.fsum(each * each for each in v)
+    return (mass * v[0], mass * v[1], mass * v[2]), 0.5 * (mass * squares + turning)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from conoid.cases.library import material
-from conoid.cases.placed import driven
+from conoid.cases.placed import driven, with_inertia
 from conoid.cases.schema import Case
 from conoid.cases.survey import Survey, Surveyed
 
@@ -43,12 +43,15 @@ def _measured(case: Case, index: int, mesh: TetMesh, surface: Surface) -> Survey
         masses *= part.rigid.mass / float(masses.sum())
     v = velocities(part, points)
     squares = (v * v).sum(axis=1)
-    low, high, momentum = points.min(axis=0), points.max(axis=0), (masses[:, None] * v).sum(axis=0)
+    low, high, x = points.min(axis=0), points.max(axis=0), (masses[:, None] * points).sum(axis=0) / masses.sum()
+    momentum, energy = with_inertia(part, float(masses.sum()), (float(x[0]), float(x[1]), float(x[2]))) or (
+        tuple((masses[:, None] * v).sum(axis=0).tolist()), float(0.5 * (masses * squares).sum())
+    )  # fmt: skip
     return Surveyed(
         part=index, elements=len(mesh.tets), nodes=len(points), faces=len(faces),
         step_length=float(mesh.step_lengths().min()), altitude=_smallest_altitude(mesh, volumes),
         mass=float(masses.sum()), low=tuple(low.tolist()), high=tuple(high.tolist()),
-        momentum=tuple(momentum.tolist()), energy=float(0.5 * (masses * squares).sum()),
+        momentum=momentum, energy=energy,
         speed=float(np.sqrt(squares.max())), notes=list(mesh.origin.notes if mesh.origin is not None else ()),
     )  # fmt: skip
 

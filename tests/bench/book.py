@@ -57,7 +57,8 @@ def shipped_cases(quick: bool) -> dict[str, Any]:
     left = [key for key, case in cases.items() if quick and _seconds(case) > _QUICK]
     chosen = sorted((key for key in data if key not in left), key=lambda key: -_seconds(cases[key]))
     with LocalServer(OUT / "runs", CORES) as server:
-        runs = {key: server.session.submit(data[key]) for key in chosen}
+        folders = {key: shipped()[key.partition("|")[0]].parent for key in chosen}
+        runs = {key: server.session.submit(data[key], folder=folders[key]) for key in chosen}
         return {"left": left, "runs": {key: _told(key, run) for key, run in runs.items()}}
 
 

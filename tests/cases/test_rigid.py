@@ -3,6 +3,7 @@
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from conoid.cases.bonds import TiedBond
@@ -33,6 +34,18 @@ def test_a_mass_that_is_given_is_the_one_that_is_told() -> None:
     case = parse_case(scene("parts[0].rigid={mass='2 kg'}"))
     found = bulk(case.parts[0], case.parts[0].mesh, 7850.0)  # type: ignore[arg-type]
     assert (found.mass, found.momentum, found.energy) == (2.0, (0.0, 0.0, -10.0), 25.0)
+
+
+def test_a_given_inertia_is_the_one_whose_energy_is_told() -> None:
+    """1/2 M v^2 + 1/2 w . I w about the given centre, 2 mm beside the axis of the spin."""
+    inertia = "[1e-7, 2e-7, 2.5e-7, 0.2e-7, 0.1e-7, -0.3e-7]"
+    spin = "parts[0].spin={centre=[0, 0, 0], rate=[100, 200, 300]}"
+    given = f"parts[0].rigid={{mass='4 g', centre=['2 mm', 0, 0], inertia={inertia}}}"
+    found = bulk((case := parse_case(scene(given, spin))).parts[0], case.parts[0].mesh, 7850.0)  # type: ignore[arg-type]
+    w, tensor = np.array([100.0, 200.0, 300.0]), 1e-7 * np.array([[1, -0.3, 0.1], [-0.3, 2, 0.2], [0.1, 0.2, 2.5]])
+    v = np.array([0.0, 0.0, -5.0]) + np.cross(w, [2e-3, 0.0, 0.0])
+    assert found.momentum == pytest.approx(4e-3 * v)
+    assert found.energy == pytest.approx(0.5 * (4e-3 * v @ v + w @ tensor @ w))
 
 
 INERTIA = "parts[0].rigid={{mass='4 g', inertia=[{}]}}"

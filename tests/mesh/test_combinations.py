@@ -189,3 +189,17 @@ def _written(mesh: Any) -> Any:
     if isinstance(mesh, dict):
         return {key: _written(value) for key, value in mesh.items() if value is not None}
     return [_written(each) for each in mesh] if isinstance(mesh, list) else mesh
+
+
+@pytest.mark.parametrize(
+    ("low", "told"), [((4, 4, 0), "edges"), ((4, 4, 4), "points"), ((4, 0, 0), ""), ((5, 0, 0), "")]
+)
+def test_solids_that_touch_in_an_edge_or_a_point_alone_are_told(low: tuple[int, int, int], told: str) -> None:
+    boxes = [
+        {"shape": "box", "low": [1e-3 * x for x in corner], "high": [1e-3 * (x + 4) for x in corner]}
+        for corner in ((0, 0, 0), low)
+    ]
+    request = {"shape": "union", "of": boxes, "element_size": 2e-3}
+    origin = measured(TypeAdapter[Mesh](Mesh).validate_python(request), {}, "mesh").origin  # type: ignore[arg-type]
+    assert origin is not None
+    assert [f"in {told} alone" in note for note in origin.notes] == [True] * bool(told)

@@ -18,6 +18,7 @@ from .combine import Drawing, extent
 from .draw import Solids
 from .features import small_features
 from .frame import Frame, scale_of
+from .hinges import hinges
 from .meshing import meshed
 from .sizes import set_size
 from .stl import read_stl
@@ -50,7 +51,7 @@ def _of_solid(mesh: Cad | Combination, sources: Sources, key: str) -> _Made:
     with session(OPTIONS) as gmsh:
         frame = Frame(mesh.centre, mesh.axis, scale_of(extent(gmsh, mesh, sources, key)))
         solids = draw_solid(gmsh, mesh, frame, sources, key)
-        notes = list(small_features(gmsh, mesh.element_size, frame, solids))
+        notes = [*small_features(gmsh, mesh.element_size, frame, solids), *hinges(gmsh, solids)]
         set_size(gmsh, mesh.element_size, mesh.grading, frame)
         cuts = [(k, 0.0) for k in range(len(cut_by(mesh.sector, mesh.axis)))]
         made = meshed(gmsh, frame, mesh.element_size, cuts)

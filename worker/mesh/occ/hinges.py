@@ -1,0 +1,29 @@
+"""Solids of one body that touch in edges or points alone: their nodes are one there, and nothing bears a moment."""
+
+from collections.abc import Iterator
+from itertools import combinations
+from typing import Any
+
+from .draw import Solids
+
+
+def hinges(gmsh: Any, solids: Solids) -> Iterator[str]:
+    """A line where some of the solids of a body are joined to the others by no face."""
+    faces = [_boundary(gmsh, [each]) for each in solids]
+    lines = [_boundary(gmsh, sorted(each)) for each in faces]
+    points = [_boundary(gmsh, sorted(each)) for each in lines]
+    of = list(range(len(solids)))
+    for i, j in combinations(range(len(solids)), 2):
+        if faces[i] & faces[j]:
+            of = [of[i] if one == of[j] else one for one in of]
+    pairs = [(i, j) for i, j in combinations(range(len(solids)), 2) if of[i] != of[j] and points[i] & points[j]]
+    if pairs:
+        where = "edges" if any(lines[i] & lines[j] for i, j in pairs) else "points"
+        yield (
+            f"solids of it touch each other in {where} alone and are hinged there; let them overlap or touch with "
+            "faces, or make a part of each"
+        )
+
+
+def _boundary(gmsh: Any, entities: Solids) -> set[tuple[int, int]]:
+    return set(gmsh.model.getBoundary(entities, combined=False, oriented=False)) if entities else set()
