@@ -5,9 +5,11 @@ import { h } from "./figures.js";
 import { offer } from "./libraries.js";
 import { ComparePage } from "./compare.js";
 import { NewPage } from "./new.js";
-import { place } from "./place.js";
+import { addressOf, place } from "./place.js";
 import { RunPage } from "./run.js";
 import { RunsPage } from "./runs.js";
+import { SweepPage } from "./sweep.js";
+import { isShort, wholeNames } from "./whole.js";
 
 const page = document.getElementById("page");
 const who = document.getElementById("who");
@@ -54,12 +56,23 @@ const refuse = () => {
 const PAGES = {
   runs: () => new RunsPage(refuse),
   run: ([run]) => new RunPage(run, refuse),
+  sweep: ([sweep]) => new SweepPage(sweep, refuse),
   compare: (runs) => new ComparePage(runs),
   new: (_, query) => new NewPage(query, refuse),
 };
 
-function route() {
+// An id may be written short: the address gets the whole one.
+async function route() {
   const { page: name, names, query } = place(location.hash);
+  if (names.some(isShort)) {
+    const here = location.hash;
+    const found = await wholeNames(name, names);
+    if (location.hash !== here) return;
+    if (found.join() !== names.join()) {
+      location.replace(addressOf(name, found));
+      return;
+    }
+  }
   show((PAGES[name] ?? PAGES.runs)(names, query));
 }
 

@@ -47,10 +47,11 @@ export function onAxis(most, unit) {
   return (value) => tied(trimmed(significant(value / worth, 3)), name);
 }
 
-// The unit of an axis whose largest magnitude is `most`, with its prefix, and the texts of its numbers without it.
+// The unit of an axis or a column whose largest magnitude is `most`, with its prefix, what it is worth, and the texts of
+// numbers without it.
 export function scaleOf(most, unit) {
   const [worth, name] = unitOf([known(most)], unit, 3);
-  return { unit: name, text: (value) => exact(value / worth) };
+  return { worth, unit: name, text: (value) => exact(value / worth) };
 }
 
 // A number without a unit, with k, M, G or T where it is large.
@@ -131,6 +132,17 @@ export function moment(wall) {
   const day = then.toLocaleDateString("en-GB", { day: "numeric", month: "short", year: "numeric" });
   const time = then.toLocaleTimeString("en-GB", { hour: "2-digit", minute: "2-digit" });
   return today ? `today ${time}` : `${day} ${time}`;
+}
+
+const HOUR = new Intl.DateTimeFormat("en-GB", { hour: "2-digit", minute: "2-digit" });
+const DAY = new Intl.DateTimeFormat("en-GB", { day: "numeric", month: "short" });
+const DATE = new Intl.DateTimeFormat("en-GB", { day: "numeric", month: "short", year: "numeric" });
+
+// A moment in a column: the year stands there where it is another one.
+export function when(wall) {
+  const [then, now] = [new Date(1000 * wall), new Date()];
+  const day = then.getFullYear() === now.getFullYear() ? DAY : DATE;
+  return `${then.toDateString() === now.toDateString() ? "today" : day.format(then)} ${HOUR.format(then)}`;
 }
 
 export const words = (text) => String(text).replaceAll("_", " ");

@@ -24,3 +24,8 @@ export function place(hash) {
   const shown = known ? { runs: names.length ? "run" : "runs", sweeps: "sweep" }[page] ?? page : "runs";
   return { page: shown, names: known ? names : [], query: new URLSearchParams(search) };
 }
+
+const WORDS = { run: "runs", sweep: "sweeps", compare: "compare" };
+
+// The address of a page and its names.
+export const addressOf = (page, names) => `#/${[WORDS[page], ...names.map(encodeURIComponent)].join("/")}`;

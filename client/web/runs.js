@@ -1,44 +1,134 @@
-// The list of runs.
+// The page of all runs: a table that is sorted, filtered and grouped, whose marked runs are compared.
 
 import { Problem, call, refused } from "./api.js";
-import { duration, h, meter, moment, pill } from "./figures.js";
+import { columnsOf } from "./columns.js";
+import { count, counted, h } from "./figures.js";
+import { Grid } from "./grid.js";
 import { FINAL } from "./live.js";
+import { grouped, matcher, sorted } from "./order.js";
+import { recall, remember } from "./remember.js";
+import { Told, differing, shorts } from "./told.js";
+import { Toolbar } from "./toolbar.js";
 
-const MOST_ASKED = 8; // A list tells no progress; this many running ones are asked for theirs.
+const FIRST = 200; // Runs of the first answer; those after it come in larger pages.
+const PAGE = 500;
+const MOST = 10000; // Runs that are shown; more are found by the command line.
+const SOON = 2000; // ms between two answers while a run is open.
+const LATER = 6000; // ms otherwise.
+const ANEW = 60000; // ms after which the newest page is read whole: runs may have been removed, labels changed.
+const SLACK = 10; // s by which what the server saves may lag.
+const MOST_VALUES = 24; // Keys that differ and have a column.
+const MOST_TOLD = 100; // Groups of which it is told what was changed.
+const RANGES = 3; // Keys of a group that are named.
+const NEWEST = { id: "submitted", down: true };
+const kept = { text: "", state: "", days: "", open: new Set(), marked: new Set(), top: 0 }; // While the tab lives.
 
 export class RunsPage {
   // `onRefused` is called where the server does not accept the token any more.
   constructor(onRefused) {
-    this.onRefused = onRefused;
-    this.body = h("tbody");
-    this.note = h("p.hint", { hidden: "" });
-    const head = h("thead", {}, h("tr", {}, ["run", "state", "progress", "ranks", "submitted", "compare"].map((name) => h("th", { scope: "col" }, name))));
-    this.marked = []; // Ids of runs to be compared, the last two.
-    this.compare = h("button.quiet", { type: "button", disabled: "", onclick: () => { location.hash = `#/compare/${this.marked.map(encodeURIComponent).join("/")}`; } }, "Compare two");
-    this.table = h("table.runs", {}, head, this.body);
-    this.element = h("div", {}, h("div.card-head", {}, h("h1", {}, "Runs"), h("span.note", {}, this.compare)), h("div.card", {}, this.table, this.note));
-    document.title = "Conoid";
-    this.read();
-    this.timer = setInterval(() => document.hidden || this.read(), 3000);
+    Object.assign(this, { onRefused, told: new Told(), sweeps: new Map(), abort: new AbortController(), cache: {} });
+    this.build();
+    document.title = "Runs · Conoid";
+    this.start();
   }
 
   close() {
-    clearInterval(this.timer);
-    this.closed = true;
+    kept.top = this.grid.region.scrollTop;
+    this.abort.abort();
+    clearTimeout(this.timer);
+    this.tools.close();
+    this.grid.close();
+    document.removeEventListener("visibilitychange", this.woken);
   }
 
-  async read() {
+  build() {
+    this.tools = new Toolbar(kept, {
+      change: () => this.draw(), sort: (words) => this.sortBy(words), unmark: () => { kept.marked.clear(); this.draw(); },
+      compare: () => { location.hash = `#/compare/${this.chosen().map(encodeURIComponent).join("/")}`; },
+    });
+    this.number = h("span.note", { role: "status" });
+    this.note = h("p.hint", { hidden: "" });
+    this.grid = new Grid("runs", {
+      sort: (column) => this.sortBy(column.id), toggle: (key) => this.toggle(key),
+      mark: (row, on, far) => this.mark(row, on, far), markAll: (rows, on) => this.markAll(rows, on),
+    });
+    this.element = h("div.runs-page", {}, h("div.page-head", {}, h("h1", {}, "Runs"), this.number), this.tools.element, this.note, this.grid.region);
+    this.grid.region.hidden = true;
+    this.say("Loading …");
+  }
+
+  // What the server tells ----------------------------------------------------------------------------------------------
+
+  async start() {
+    document.addEventListener("visibilitychange", this.woken = () => document.hidden || this.next(0));
+    await this.turn();
+  }
+
+  next(wait) {
+    clearTimeout(this.timer);
+    if (!this.abort.signal.aborted) this.timer = setTimeout(() => this.turn(), wait);
+  }
+
+  async turn() {
+    if (document.hidden && this.read) return;
     try {
-      const { runs, next } = await call("v1/runs?limit=100");
-      await Promise.all(runs.filter((run) => run.state === "running").slice(0, MOST_ASKED).map(async (run) => {
-        Object.assign(run, await call(`v1/runs/${encodeURIComponent(run.id)}`));
-      }));
-      if (!this.closed) this.draw(runs, next);
+      const anew = !this.read || Date.now() - this.read > ANEW || this.told.pending > 0;
+      await (anew ? this.readWhole() : this.readChanged());
+      this.failed = false;
     } catch (error) {
-      if (this.closed) return;
-      if (error instanceof Problem && error.status === 401) this.onRefused();
-      else this.say(h("span.problem", {}, refused(error) ? error.message : `No answer from the server: ${error.message}`));
+      if (this.abort.signal.aborted) return;
+      if (error instanceof Problem && error.status === 401) return this.onRefused();
+      this.fail(error);
     }
+    this.next(this.told.pending ? 200 : this.open ? SOON : LATER);
+  }
+
+  get open() { return [...this.told.rows.values()].some(({ state }) => !FINAL.has(state)); }
+
+  ask(query) { return call(`v1/table?${new URLSearchParams(query)}`, { signal: this.abort.signal }); }
+
+  // Page after page, newest first; the first is shown before the others are there.
+  async readWhole() {
+    const listed = this.readSweeps().catch(() => {}); // Without them the groups have no names.
+    let next = null;
+    let pending = 0;
+    const all = [];
+    do {
+      const answer = await this.ask({ limit: next ? PAGE : FIRST, ...(next ? { cursor: next } : {}) });
+      this.told.take(answer);
+      pending += answer.pending;
+      all.push(...answer.runs);
+      next = answer.next;
+      if (all.length === answer.runs.length) { await listed; this.draw(); }
+    } while (next && all.length < MOST);
+    this.told.keepOnly(all, !next);
+    Object.assign(this.told, { pending });
+    this.more = Boolean(next);
+    this.read = Date.now();
+    this.draw();
+  }
+
+  async readChanged() {
+    const before = this.told.version;
+    let query = { limit: PAGE, changed: this.told.latest - SLACK };
+    for (;;) {
+      const answer = await this.ask(query);
+      if (answer.runs.some(({ labels, id }) => labels.sweep && !this.told.rows.has(id))) await this.readSweeps().catch(() => {});
+      this.told.take(answer);
+      if (!answer.next) break;
+      query = { ...query, cursor: answer.next };
+    }
+    if (this.told.version !== before || this.failed) this.draw();
+  }
+
+  async readSweeps() {
+    const { sweeps } = await call(`v1/sweeps?limit=${PAGE}`, { signal: this.abort.signal });
+    this.sweeps = new Map(sweeps.map((sweep) => [sweep.id, sweep]));
+  }
+
+  fail(error) {
+    this.failed = true;
+    this.say(h("span.problem", {}, refused(error) ? error.message : `No answer from the server: ${error.message}`));
   }
 
   say(...children) {
@@ -46,34 +136,139 @@ export class RunsPage {
     this.note.replaceChildren(...children);
   }
 
-  mark(id) {
-    this.marked = this.marked.includes(id) ? this.marked.filter((one) => one !== id) : [...this.marked, id].slice(-2);
-    this.compare.disabled = this.marked.length !== 2;
-    for (const box of this.body.querySelectorAll("[data-marks]")) box.checked = this.marked.includes(box.dataset.marks);
+  // What is shown ------------------------------------------------------------------------------------------------------
+
+  get sort() { return recall("runs.sort", NEWEST); }
+
+  // The columns of all runs, as far as their values differ between those that are shown, and the rows.
+  pick() {
+    const { told } = this;
+    const all = [...told.rows.values()];
+    const since = kept.days ? Date.now() / 1000 - 86400 * kept.days : 0;
+    const rough = all.filter((row) => (!kept.state || row.state === kept.state) && row.submitted >= since);
+    const every = this.columns(rough, "every");
+    const rows = rough.filter(matcher(kept.text, every));
+    return { rows, columns: rows.length === rough.length ? every : this.columns(rows, "shown") };
   }
 
-  draw(runs, next) {
-    const focused = document.activeElement?.dataset?.marks;
-    this.body.replaceChildren(...runs.map((run) => row(run, this.marked.includes(run.id), () => this.mark(run.id))));
-    if (focused) this.body.querySelector(`[data-marks="${CSS.escape(focused)}"]`)?.focus();
-    this.table.hidden = !runs.length;
-    if (next) this.say(`The newest ${runs.length} are shown; `, h("code", {}, "conoid ls --limit 1000"), " lists more.");
-    else if (runs.length) this.say();
-    else this.say("No runs yet. ", h("a", { href: "#/new?case=taylor_copper" }, "Begin with a shipped case"), ", or on the command line: ", h("code", {}, "conoid submit taylor_copper"));
+  columns(rows, name) {
+    const stamp = `${this.told.version} ${rows.length} ${rows[0]?.id} ${rows.at(-1)?.id} ${kept.text} ${kept.state} ${kept.days}`;
+    if (this.cache[name]?.stamp !== stamp) this.cache[name] = { stamp, columns: columnsOf(rows, differing(rows, MOST_VALUES), this.told.units) };
+    return this.cache[name].columns;
+  }
+
+  draw() {
+    if (this.abort.signal.aborted) return;
+    performance.mark?.("conoid:draw");
+    const { rows, columns } = this.pick();
+    const choice = recall("runs.columns", {});
+    const shown = columns.filter(({ id, shown: asIs }) => id === "run" || (choice[id] ?? asIs));
+    const column = columns.find(({ id }) => id === this.sort.id) ?? columns.find(({ id }) => id === NEWEST.id);
+    const all = sorted(rows, column, column.id === this.sort.id ? this.sort.down : NEWEST.down);
+    for (const id of [...kept.marked]) if (!this.told.rows.has(id) && this.read) kept.marked.delete(id);
+    this.shorts = this.told.version === this.shortsOf ? this.shorts : shorts(this.told.rows.keys());
+    this.shortsOf = this.told.version;
+    this.rows = all;
+    this.grid.region.hidden = !all.length;
+    this.grid.draw({ columns: shown, sort: { id: column.id, down: this.sort.down }, items: this.items(all, columns), all, marked: kept.marked, shorts: this.shorts, stamp: `${this.told.version} ${all.length}` });
+    this.tools.draw({ columns, choice, sort: this.sort, rows: this.told.rows.values() });
+    this.drawHead(all);
+    this.tell(all);
+    if (kept.top) { this.grid.region.scrollTop = kept.top; kept.top = 0; }
+    performance.measure?.("conoid:table", "conoid:draw");
+  }
+
+  items(rows, columns) {
+    const by = recall("runs.group", "");
+    if (!by) return rows.map((row) => ({ key: row.id, told: row.told, row }));
+    const groups = grouped(rows, by);
+    return groups.flatMap(({ key, rows: own }) => {
+      const open = kept.open.has(`${by} ${key}`);
+      const varied = key && groups.length <= MOST_TOLD ? ranges(own, columns) : "";
+      const group = { ...this.heading(by, key, own), key: `${by} ${key}`, varied, rows: own, open };
+      const told = JSON.stringify([group.title, group.note, varied, own.length, open]);
+      return [{ key: `${by} ${key}`, told, group }, ...(open ? own.map((row) => ({ key: row.id, told: row.told, row })) : [])];
+    });
+  }
+
+  heading(by, key, rows) {
+    if (by === "case") return { title: key };
+    if (!key) return { title: "no sweep" };
+    const sweep = this.sweeps.get(key);
+    const done = rows.filter(({ state }) => FINAL.has(state)).length;
+    const brief = shorts(this.sweeps.keys()).get(key) ?? key;
+    const failed = rows.filter(({ state }) => FINAL.has(state) && state !== "succeeded").length;
+    const told = `${done} of ${count(sweep?.total ?? rows.length)} done${failed ? `, ${count(failed)} without a result` : ""}`;
+    return { title: sweep?.name ?? rows[0].name, brief, href: `#/sweeps/${encodeURIComponent(key)}`, note: told };
+  }
+
+  drawHead(rows) {
+    const total = this.told.rows.size;
+    const reading = this.told.pending ? `, results of ${count(this.told.pending)} are being read` : "";
+    this.number.textContent = (rows.length === total ? counted(total, "run") : `${count(rows.length)} of ${counted(total, "run")}`) + reading;
+    this.tools.element.hidden = !total;
+  }
+
+  tell(rows) {
+    if (!this.told.rows.size) return this.say(beginning());
+    if (!rows.length) return this.say("No run is like this. ", h("button.quiet", { type: "button", onclick: () => this.showAll() }, "Show all runs"));
+    if (this.more) return this.say(`The newest ${count(this.told.rows.size)} are shown; `, h("code", {}, "conoid runs --until DATE"), " finds older ones.");
+    return this.say();
+  }
+
+  showAll() {
+    Object.assign(kept, { text: "", state: "", days: "" });
+    this.tools.reset();
+    this.draw();
+  }
+
+  // What is done -------------------------------------------------------------------------------------------------------
+
+  // A column, once more the other way; or "ID up", "ID down".
+  sortBy(words) {
+    const [, id, way] = /^(.*?)(?: (up|down))?$/.exec(words);
+    const { sort } = this;
+    const first = id === "submitted" || id.startsWith("result:"); // The newest, the largest.
+    remember("runs.sort", { id, down: way ? way === "down" : sort.id === id ? !sort.down : first });
+    this.draw();
+  }
+
+  toggle(key) {
+    if (!kept.open.delete(key)) kept.open.add(key);
+    this.draw();
+  }
+
+  // With the Shift key from the run that was marked last to this one.
+  mark(row, on, far) {
+    const from = far ? this.rows.findIndex(({ id }) => id === this.last) : -1;
+    const to = this.rows.findIndex(({ id }) => id === row.id);
+    this.last = row.id;
+    this.markAll(from < 0 ? [row] : this.rows.slice(Math.min(from, to), Math.max(from, to) + 1), on);
+  }
+
+  markAll(rows, on) {
+    for (const { id } of rows) {
+      if (on) kept.marked.add(id);
+      else kept.marked.delete(id);
+    }
+    this.draw();
+  }
+
+  // The marked runs in the order of the table, those that are not shown last.
+  chosen() {
+    const shown = this.rows.filter(({ id }) => kept.marked.has(id)).map(({ id }) => id);
+    return [...shown, ...[...kept.marked].filter((id) => !shown.includes(id))];
   }
 }
 
-function row(run, marked, mark) {
-  const link = `#/runs/${encodeURIComponent(run.id)}`;
-  const open = () => { location.hash = link; };
-  const share = run.state === "succeeded" ? 1 : run.progress ? run.progress.t / run.progress.end_time : 0;
-  const took = FINAL.has(run.state) && run.started ? ` · ${duration(run.finished - run.started)}` : "";
-  const box = h("input", { type: "checkbox", "data-marks": run.id, "aria-label": `compare ${run.name} ${run.id}`, checked: marked && "", onchange: mark });
-  return h("tr", { onclick: open },
-    h("td", {}, h("a.name", { href: link }, run.name), h("span.id", {}, run.id)),
-    h("td", { title: run.message || run.reason }, pill(run.state)),
-    h("td.bar", { style: { minWidth: "120px" } }, meter(run.state, share)),
-    h("td.ranks-of", {}, run.threads > 1 ? `${run.ranks}x${run.threads}` : String(run.ranks)),
-    h("td.right.when", {}, moment(run.submitted) + took),
-    h("td.mark", { onclick: (event) => event.stopPropagation() }, box));
+// What was changed within a group: "velocity[2] 60 to 300 m/s".
+function ranges(rows, columns) {
+  return differing(rows, RANGES).map((key) => columns.find(({ id }) => id === `value:${key}`)).filter(Boolean).map((column) => {
+    const there = sorted(rows.filter((row) => column.value(row) !== null), column, false);
+    return `${column.title} ${column.text(there[0])} to ${column.text(there.at(-1))} ${column.unit ?? ""}`.trim();
+  }).join(", ");
 }
+
+const beginning = () => h("div.empty", {}, h("h2", {}, "No runs yet"),
+  h("p", {}, h("a", { href: "#/new?case=taylor_copper" }, "Begin with a shipped case"), " on this page, or from a terminal:"),
+  h("pre", {}, h("code", {}, "conoid cases                      # the shipped cases\nconoid submit taylor_copper       # hands one in; it appears here\nconoid sweep taylor_copper --set \"parts[0].velocity[2]=-150 m/s,-200 m/s\"")));

@@ -11,6 +11,7 @@ from conoid.server.app import build_app, opened
 from conoid.server.settings import Caps, Settings
 from conoid.server.tokens import create_token
 
+from .node import Ask, asking
 from .running import FAKE, MakeProcess, Running, User, processes
 
 
@@ -65,3 +66,9 @@ def _like(client: TestClient, token: str) -> TestClient:
 def process(tmp_path: Path) -> Iterator[MakeProcess]:
     with processes(tmp_path) as make:
         yield make
+
+
+@pytest.fixture(scope="module")
+def ask(tmp_path_factory: pytest.TempPathFactory) -> Ask:
+    """Asks modules of the page by node."""
+    return asking(tmp_path_factory.mktemp("web"))

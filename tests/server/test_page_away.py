@@ -12,14 +12,19 @@ WEB = Path(__file__).parents[2] / "client" / "web"
 NODE = shutil.which("node")
 pytestmark = pytest.mark.skipif(NODE is None, reason="no node on this machine")
 
-RUN = {"id": "a", "name": "bar", "state": "succeeded", "ranks": 1, "submitted": 0, "started": 1, "finished": 2}
+RUN = {
+    "id": "a", "name": "bar", "title": "A bar", "state": "succeeded", "ranks": 1, "threads": 1, "submitted": 0,
+    "started": 1, "finished": 2, "labels": {}, "case": None, "values": {}, "results": None, "references": 0,
+    "missed": [], "message": "", "cause": None,
+}  # fmt: skip
 LIST = """
     const run = RUN;
     state.served = (path) => ({
-        "lib/index.json": { auth: false }, "v1/me": { owner: "ann" }, "v1/runs": answer,
+        "lib/index.json": { auth: false }, "v1/me": { owner: "ann" }, "v1/table": answer,
+        "v1/sweeps": { sweeps: [], next: null },
     })[path];
     await load("app.js");
-    await pause(50);
+    await pause(100);
     return text(document.getElementById("page"));
 """.replace("RUN", json.dumps(RUN))
 
@@ -103,11 +108,17 @@ def test_runs_are_compared_when_the_server_comes_back(web: Path) -> None:
     assert played(web, script % json.dumps(RUN)) == [True, True]
 
 
-def test_a_list_says_when_there_are_more_runs(web: Path) -> None:
-    more, all_ = "{ runs: [run], next: 'cursor' }", "{ runs: [run], next: null }"
-    words = "The newest 1 are shown"
-    assert words in played(web, LIST.replace("answer", more))
-    assert words not in played(web, LIST.replace("answer", all_))
+def told(*runs: str) -> str:
+    """An answer of the table."""
+    return f"{{ runs: [{', '.join(runs)}], cases: [], pending: 0, next: null }}"
+
+
+def test_a_list_without_runs_says_how_to_begin(web: Path) -> None:
+    assert "conoid submit taylor_copper" in played(web, LIST.replace("answer", told()))
+    shown = played(web, LIST.replace("answer", told("run")))
+    assert "conoid submit" not in shown
+    assert "1 run" in shown
+    assert "bar" in shown
 
 
 def test_a_refusal_is_no_silence(web: Path) -> None:

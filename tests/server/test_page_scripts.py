@@ -6,8 +6,6 @@ import itertools
 import json
 import math
 import re
-import shutil
-import subprocess
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -24,31 +22,11 @@ from conoid.client.snapshots import Snapshot
 from conoid.worker.snapshots import blob
 
 from ..snapshots.shattered import shattered
+from .node import NODE, Ask
 
 HERE = Path(__file__)
 WEB = HERE.parents[2] / "client" / "web"
-NODE = shutil.which("node")
 pytestmark = pytest.mark.skipif(NODE is None, reason="no node on this machine")
-
-Ask = Callable[..., Any]
-
-
-@pytest.fixture(scope="module")
-def ask(tmp_path_factory: pytest.TempPathFactory) -> Ask:
-    """ask(module, expression, data): the value of an expression in ``page``, the module, and ``data``."""
-    web = tmp_path_factory.mktemp("web")
-    for path in WEB.glob("*.js"):
-        shutil.copy(path, web)
-    (web / "package.json").write_text('{"type": "module"}')
-
-    def asked(module: str, script: str, data: Any = None) -> Any:
-        told = json.dumps({"module": str(web / module), "script": script, "data": data})
-        command = [str(NODE), str(HERE.with_name("scripts.mjs"))]
-        done = subprocess.run(command, input=told, capture_output=True, text=True, timeout=60, check=False)
-        assert done.returncode == 0, done.stderr
-        return json.loads(done.stdout)
-
-    return asked
 
 
 def test_parts_and_fragments_have_the_colours_of_pictures(ask: Ask) -> None:

@@ -1,0 +1,87 @@
+// The columns of tables of runs: what each shows of a row, and in which unit.
+
+import { count, duration, exact, scaleOf, si, UNKNOWN, when } from "./figures.js";
+import { FINAL } from "./live.js";
+import { valueOf } from "./told.js";
+
+const STATES = ["running", "stopping", "starting", "queued", "accepted", "succeeded", "cancelled", "timed_out", "failed", "lost"];
+
+export const share = (row) => (row.state === "succeeded" ? 1 : row.progress?.end_time > 0 ? row.progress.t / row.progress.end_time : 0);
+export const cores = ({ ranks, threads }) => (threads > 1 ? `${ranks}×${threads}` : String(ranks));
+export const took = (row) => (row.started && FINAL.has(row.state) ? row.finished - row.started : null);
+
+// { id, title, group, number, value(row), text(row) }: `value` is what rows are sorted by, null where there is none;
+// `number` columns stand at the right, and may have a `unit`, in which `write(value)` writes a number.
+const FIRST = [
+  { id: "run", title: "run", value: (row) => row.name, text: (row) => row.name, width: 27 },
+  { id: "state", title: "state", value: (row) => STATES.indexOf(row.state) - share(row), text: (row) => row.state, width: 24 },
+];
+const LAST = [
+  { id: "references", title: "references", value: (row) => (row.references ? row.missed.length : null), text: references },
+  { id: "labels", title: "labels", value: labels, text: labels },
+  { id: "submitted", title: "submitted", value: (row) => row.submitted, text: (row) => when(row.submitted) },
+  { id: "took", title: "took", value: took, text: (row) => (took(row) === null ? "" : duration(took(row))), number: true },
+  { id: "cores", title: "cores", full: "ranks × threads", value: (row) => row.ranks * row.threads, text: cores, number: true },
+  { id: "cost", title: "CPU time", value: (row) => row.results?.get("cpu") ?? null, text: (row) => duration(row.results?.get("cpu") ?? NaN).replace(UNKNOWN, ""), number: true },
+  { id: "title", title: "title", value: (row) => row.title, text: (row) => row.title, shown: false },
+  { id: "message", title: "message", value: (row) => row.message || null, text: (row) => row.message, shown: false },
+];
+const IF_ANY = new Set(["references", "labels"]); // Shown where a row has something there.
+const TELLING = /^(fragments|reference\.penetration.*)$/; // Results that are shown where nobody has chosen.
+const MOST_PROBES = 4; // That are shown where nobody has chosen.
+const MOST_VALUES = 6; // Likewise.
+
+function labels(row) {
+  const own = Object.entries(row.labels).filter(([name]) => name !== "sweep" && name !== "point");
+  return own.map(([name, value]) => `${name}=${value}`).join(" ");
+}
+
+function references(row) {
+  if (!row.references) return "";
+  return row.missed.length ? `${row.missed.length} of ${row.references} missed` : `${row.references} pass`;
+}
+
+// All columns of some rows. `keys`: those of cases that differ between them; `units`: of results, by name.
+export function columnsOf(rows, keys, units) {
+  const values = keys.map((key, n) => numeric(rows, {
+    id: `value:${key}`, title: key, group: "values that differ", shown: n < MOST_VALUES, value: (row) => valueOf(row, key), unit: rows.find((row) => row.kind?.units[key])?.kind.units[key] ?? "", exact: true,
+  }));
+  const names = [...units.keys()].filter((name) => name !== "cpu" && rows.some((row) => (row.results?.get(name) ?? null) !== null));
+  const probes = names.filter((name) => /^probe\.[^.]*$/.test(name)).slice(0, MOST_PROBES);
+  const telling = (name) => probes.includes(name) || TELLING.test(name);
+  names.sort((a, b) => telling(b) - telling(a));
+  const results = names.map((name) => numeric(rows, {
+    id: `result:${name}`, title: titled(name), group: "results", full: name, unit: units.get(name),
+    shown: telling(name),
+    value: (row) => row.results?.get(name) ?? null,
+  }));
+  const facts = (list) => list.map((one) => ({ group: "run", shown: !IF_ANY.has(one.id) || rows.some((row) => one.text(row)), ...one }));
+  return brief([...facts(FIRST), ...values, ...results, ...facts(LAST)]);
+}
+
+const titled = (name) => name.replace(/^probe\./, "").replace(/^reference\.(.*)$/, "$1, reference").replace(/\.(min|max)$/, " $1");
+
+// A column whose values are numbers, in the unit that fits most of them; words stay as they are.
+function numeric(rows, column) {
+  const { unit, value } = column;
+  const values = rows.map(value).filter((one) => one !== null);
+  if (values.some((one) => typeof one !== "number")) return { ...column, unit: "", text: (row) => String(value(row) ?? "") };
+  const sizes = values.filter((one) => Number.isFinite(one) && one !== 0).map(Math.abs).sort((a, b) => a - b);
+  const { worth, unit: name } = scaleOf(sizes[Math.floor(sizes.length / 2)] ?? 0, unit);
+  const measured = (one) => (!unit && Number.isInteger(one) ? count(one) : si(one / worth, "", 4));
+  const text = (one) => (one === null ? "" : column.exact ? exact(one / worth) : measured(one));
+  return { ...column, number: values.length > 0, worth, base: unit, unit: name, write: text, text: (row) => text(value(row)) };
+}
+
+// Keys are shown by their last parts, as many as tell them from each other.
+function brief(columns) {
+  const keys = columns.filter(({ id }) => id.startsWith("value:")).map(({ title }) => title);
+  const tail = (key, parts) => key.split(".").slice(-parts).join(".");
+  return columns.map((column) => {
+    if (!column.id.startsWith("value:")) return column;
+    const key = column.title;
+    let parts = 1;
+    while (tail(key, parts) !== key && keys.some((other) => other !== key && tail(other, parts) === tail(key, parts))) parts += 1;
+    return { ...column, full: key, title: tail(key, parts) };
+  });
+}

@@ -1,0 +1,118 @@
+// The table of runs as it is seen: columns that sort, rows in view, groups, marks.
+
+import { counted, exact, duration, h, meter, pill, percent } from "./figures.js";
+import { FINAL } from "./live.js";
+import { share } from "./columns.js";
+import { Windowed } from "./windowed.js";
+
+const TALL = { wide: 34, narrow: 86 }; // px of a row; runs.css has the same.
+const SAMPLED = 200; // Rows by which a column's width is chosen.
+const LETTERS = [7, 30]; // Of a column, at least and at most.
+const NARROW = matchMedia("(max-width: 760px)");
+
+export class Grid {
+  // `on`: { sort(column), mark(row, on, far), markAll(rows, on), toggle(group) }
+  constructor(label, on) {
+    Object.assign(this, { on, columns: [], marked: new Set(), shorts: new Map() });
+    this.head = h("thead");
+    this.widths = h("colgroup");
+    this.region = h("div.sheet", { tabindex: 0, role: "region", "aria-label": label });
+    this.rows = new Windowed(this.region, (item) => this.row(item), () => (NARROW.matches ? TALL.narrow : TALL.wide));
+    this.table = h("table.runs", { "aria-label": label }, this.widths, this.head, this.rows.body);
+    this.region.append(this.table);
+    NARROW.addEventListener("change", this.redraw = () => this.rows.draw());
+  }
+
+  close() {
+    this.rows.close();
+    NARROW.removeEventListener("change", this.redraw);
+  }
+
+  // `items`: { row } or { group }, in order; `all`: the rows of all of them, which are others where `stamp` is another.
+  draw({ columns, sort, items, all, marked, shorts, stamp }) {
+    Object.assign(this, { columns, marked, shorts, all });
+    this.drawHead(columns, sort);
+    this.measure(columns, `${stamp} ${columns.map(({ id }) => id).join()}`);
+    this.table.setAttribute("aria-rowcount", items.length + 1);
+    const marks = [...marked].sort().join();
+    this.rows.set(items, `${columns.map(({ id, unit }) => id + unit).join()} ${marks}`);
+  }
+
+  drawHead(columns, sort) {
+    const told = JSON.stringify([columns.map(({ id, title, unit }) => [id, title, unit]), sort]);
+    const boxes = this.all.filter(({ id }) => this.marked.has(id)).length;
+    if (this.everything) Object.assign(this.everything, { checked: boxes > 0 && boxes === this.all.length, indeterminate: boxes > 0 && boxes < this.all.length });
+    if (told === this.told) return;
+    this.told = told;
+    const focus = document.activeElement?.dataset?.column;
+    this.everything = h("input", { type: "checkbox", "aria-label": "mark all runs that are shown", onchange: ({ target }) => this.on.markAll(this.all, target.checked) });
+    this.head.replaceChildren(h("tr", { "aria-rowindex": 1 }, h("th.mark", { scope: "col" }, this.everything), columns.map((column) => this.title(column, sort))));
+    if (focus) this.head.querySelector(`[data-column="${CSS.escape(focus)}"]`)?.focus();
+  }
+
+  title(column, sort) {
+    const here = sort.id === column.id;
+    const button = h("button.sort", { type: "button", "data-column": column.id, title: column.full ?? column.title, onclick: () => this.on.sort(column) },
+      h("span", {}, column.title), column.unit ? h("small", {}, column.unit) : "", h("i", { "aria-hidden": "true" }, here ? (sort.down ? "↓" : "↑") : ""));
+    return h(`th${column.number ? ".right" : ""}${column.id === "run" ? ".first" : ""}`, { scope: "col", "aria-sort": here ? (sort.down ? "descending" : "ascending") : false }, button);
+  }
+
+  // Widths that do not change while the rows scroll.
+  measure(columns, stamp) {
+    if (stamp === this.stamp) return;
+    this.stamp = stamp;
+    const every = Math.max(1, Math.ceil(this.all.length / SAMPLED));
+    const some = this.all.filter((_, i) => i % every === 0);
+    const letters = columns.map((column) => column.width ?? Math.min(LETTERS[1], Math.max(LETTERS[0], heading(column), ...some.map((row) => column.text(row).length))) + 2);
+    this.widths.replaceChildren(h("col", { style: { width: "38px" } }), ...letters.map((n) => h("col", { style: { width: `${n}ch` } })));
+    this.table.style.width = `max(100%, calc(38px + ${letters.reduce((sum, n) => sum + n, 0)}ch))`;
+  }
+
+  row(item) {
+    return item.group ? this.groupRow(item.group) : this.runRow(item.row);
+  }
+
+  runRow(row) {
+    const marked = this.marked.has(row.id);
+    const box = h("input", { type: "checkbox", "data-marks": row.id, "aria-label": `mark ${row.name} ${this.shorts.get(row.id)}`, checked: marked && "" });
+    box.addEventListener("click", (event) => this.on.mark(row, box.checked, event.shiftKey));
+    return h(`tr${marked ? ".marked" : ""}`, { onclick: (event) => opened(event, `#/runs/${encodeURIComponent(row.id)}`) },
+      h("td.mark", { onclick: (event) => event.stopPropagation() }, box), this.columns.map((column) => this.cell(row, column)));
+  }
+
+  cell(row, column) {
+    if (column.id === "run") return h("td.first", {}, h("a.name", { href: `#/runs/${encodeURIComponent(row.id)}`, title: row.title }, column.text(row)), h("span.id", { title: row.id }, this.shorts.get(row.id)));
+    if (column.id === "state") return h("td.state", {}, state(row));
+    const text = column.text(row);
+    const tone = column.id === "references" && row.references ? (row.missed.length ? ".bad" : ".good") : "";
+    const told = column.id === "references" ? row.missed.join(", ") : column.number ? exact(column.value(row) ?? NaN) : text;
+    const words = column.unit ? `${column.title}, ${column.unit}` : column.title;
+    return h(`td${column.number ? ".right" : ""}${tone}${text ? "" : ".none"}`, { "data-name": words, title: text ? told : false }, text);
+  }
+
+  groupRow({ key, title, brief = "", href, note, varied, rows, open }) {
+    const marked = rows.filter(({ id }) => this.marked.has(id)).length;
+    const box = h("input", { type: "checkbox", "aria-label": `mark the runs of ${title}`, onchange: ({ target }) => this.on.markAll(rows, target.checked) });
+    Object.assign(box, { checked: marked === rows.length, indeterminate: marked > 0 && marked < rows.length });
+    return h("tr.group", {}, h("td.mark", {}, box), h("td.first", { colspan: this.columns.length },
+      h("button.turn", { type: "button", "aria-expanded": String(open), "aria-label": `${open ? "close" : "open"} ${title}`, onclick: () => this.on.toggle(key) }, open ? "▾" : "▸"),
+      href ? h("a.name", { href }, title) : h("b.name", {}, title), h("span.id", {}, brief), h("span.said", {}, note || counted(rows.length, "run")), varied ? h("span.said", {}, varied) : ""));
+  }
+}
+
+// A click on a row opens its run, but not on what is in it, nor where text is being marked.
+function opened(event, address) {
+  if (event.target.closest("a, button, input") || String(getSelection?.() ?? "")) return;
+  location.hash = address;
+}
+
+const heading = ({ title, unit }) => 0.9 * title.length + (unit ? 1 + 0.9 * unit.length : 0) + 2.5;
+
+// The state, and what there is to say of it: how far, what it waits for, why it has ended.
+function state(row) {
+  const going = row.progress && !FINAL.has(row.state);
+  const note = going ? percent(share(row), 0) : row.state === "succeeded" ? "" : row.message || row.reason || row.cause || "";
+  const said = note.startsWith(row.state) ? "" : note;
+  return [pill(row.state), going ? h("span.bar", {}, meter(row.state, share(row))) : "",
+    h("span.said", { title: going && row.progress.eta > 0 ? `${duration(row.progress.eta)} left` : said }, said)];
+}

@@ -1,0 +1,57 @@
+// Rows of tables of runs: sorted, filtered, grouped. No element is made here.
+
+const collator = new Intl.Collator("en", { numeric: true });
+
+// The rows by a column; what has no value comes last either way, equal ones the newest first.
+export function sorted(rows, column, down) {
+  const sign = down ? -1 : 1;
+  const keyed = rows.map((row) => [column.value(row), row]);
+  const none = (value) => value === null || value === undefined || value === "" || Number.isNaN(value);
+  const compare = (a, b) => (typeof a === "number" && typeof b === "number" ? a - b : collator.compare(String(a), String(b)));
+  keyed.sort(([a, one], [b, other]) => (none(a) || none(b) ? none(a) - none(b) : sign * compare(a, b)) || (one.id < other.id ? 1 : -1));
+  return keyed.map(([, row]) => row);
+}
+
+const COMPARED = /^(.+?)(<=|>=|<|>|=)(-?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?)$/i;
+const NEAR = 1e-9; // Of a number, by which one that is written in another unit may differ from it.
+const HOLDS = { "<": (way) => way < 0, ">": (way) => way > 0, "<=": (way) => way <= 0, ">=": (way) => way >= 0, "=": (way) => way === 0 };
+
+// A test of rows for words, all of which hold: text anywhere, the beginning of an id, state:failed, case:bar, or a
+// number of a column in its unit, such as speed_end>12.
+export function matcher(text, columns) {
+  const tests = text.trim().split(/\s+/).filter(Boolean).map((word) => tested(word.toLowerCase(), columns));
+  return (row) => tests.every((test) => test(row));
+}
+
+function tested(word, columns) {
+  const [, name, sign, number] = COMPARED.exec(word) ?? [];
+  const column = name && named(columns, name);
+  if (column) {
+    return (row) => {
+      const value = column.value(row);
+      const apart = value / (column.worth ?? 1) - Number(number);
+      return typeof value === "number" && HOLDS[sign](Math.abs(apart) <= NEAR * Math.abs(number) ? 0 : Math.sign(apart));
+    };
+  }
+  const [, field, rest] = /^(state|case):(.+)$/.exec(word) ?? [];
+  if (field === "state") return (row) => row.state.startsWith(rest);
+  if (field === "case") return (row) => row.name.toLowerCase().includes(rest);
+  return (row) => row.hay.includes(word) || row.id.startsWith(word);
+}
+
+const named = (columns, name) => {
+  const numbers = columns.filter(({ number }) => number);
+  const by = (test) => numbers.find(({ title, full = "" }) => test(title.toLowerCase()) || test(full.toLowerCase()));
+  return by((title) => title === name) ?? by((title) => title.includes(name));
+};
+
+// { key, rows } of each group, in the order of the first row of each; what is in no sweep has the key "" and comes last.
+export function grouped(rows, by) {
+  const groups = new Map();
+  for (const row of rows) {
+    const key = by === "sweep" ? row.labels.sweep ?? "" : row.name;
+    if (!groups.has(key)) groups.set(key, { key, rows: [] });
+    groups.get(key).rows.push(row);
+  }
+  return [...groups.values()].sort((a, b) => (a.key === "") - (b.key === ""));
+}

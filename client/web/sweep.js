@@ -1,0 +1,269 @@
+// The page of a sweep: how many of its points are done, a result over what was changed, each point with its values.
+
+import { Problem, call, download, refused } from "./api.js";
+import { axis, largest, lineStyle, series } from "./axes.js";
+import { Chart } from "./charts.js";
+import { columnsOf } from "./columns.js";
+import { counted, exact, h, meter, pill, si, words } from "./figures.js";
+import { Grid } from "./grid.js";
+import { FINAL } from "./live.js";
+import { sorted } from "./order.js";
+import { recall, remember } from "./remember.js";
+import { curves, matrix, telling } from "./response.js";
+import { Told, shorts } from "./told.js";
+import { fill } from "./toolbar.js";
+
+const AGAIN = 2000; // ms until a sweep that goes on is read again.
+const TALL = 320;
+const PAGE = 500;
+const BRIEF = 9; // Letters of the id that are shown.
+
+export class SweepPage {
+  // `onRefused` is called where the server does not accept the token any more.
+  constructor(id, onRefused) {
+    Object.assign(this, { id, onRefused, told: new Told(), abort: new AbortController(), marked: new Set(), points: [], columns: [], sort: { id: "point", down: false } });
+    this.path = `v1/sweeps/${encodeURIComponent(id)}`;
+    this.build();
+    document.title = "Sweep · Conoid";
+    this.read();
+  }
+
+  close() {
+    this.abort.abort();
+    clearTimeout(this.timer);
+    this.chart.close();
+    this.grid.close();
+  }
+
+  build() {
+    this.title = h("h1", {}, "Sweep");
+    this.brief = h("span.id", { title: this.id }, this.id.slice(0, BRIEF));
+    this.how = h("span.note", { role: "status" }, "Loading …");
+    this.bar = h("span");
+    this.problem = h("p.problem", { role: "status", hidden: "" });
+    this.tools = h("div.tools-row", { hidden: "" },
+      this.compare = h("button", { type: "button", disabled: "", onclick: () => this.compareMarked() }, "Compare"),
+      h("button.quiet", { type: "button", onclick: ({ currentTarget }) => this.csv(currentTarget) }, "CSV"),
+      this.stop = h("button.stop", { type: "button", onclick: () => this.cancel() }, "Cancel the sweep"));
+    this.failed = h("section.card", { hidden: "", "aria-label": "points that have failed" });
+    this.result = h("select", { "aria-label": "result", onchange: ({ target }) => { remember(this.name("result"), target.value); this.drawResponse(); } });
+    this.over = h("select", { "aria-label": "over", onchange: ({ target }) => { remember(this.name("over"), target.value); this.drawResponse(); } });
+    this.chart = new Chart(TALL, "the result over what was changed", () => this.option(), { alone: true, name: () => `${this.info.name}-sweep`, onClick: ({ data }) => { if (data?.[2]) location.hash = `#/runs/${data[2]}`; } });
+    this.squares = h("div.scroll", { tabindex: 0, role: "region", "aria-label": "matrix of two keys" });
+    this.response = h("section.card", { hidden: "" },
+      h("div.card-head", {}, h("h2", {}, "Response"), this.chart.tools, h("span.beside", {}, h("label.field", {}, "result", this.result), this.overLabel = h("label.field", {}, "over", this.over))),
+      this.chart.element);
+    this.map = h("section.card", { hidden: "" }, h("div.card-head", {}, h("h2", {}, "Matrix"), this.mapNote = h("span.note")), this.squares);
+    this.grid = new Grid("points", { sort: (column) => this.sortBy(column), mark: (row, on) => this.mark([row], on), markAll: (rows, on) => this.mark(rows, on), toggle() {} });
+    this.seen = h("div.seen", {}, this.response, this.map);
+    this.element = h("div.sweep", {}, h("div.page-head", {}, this.title, this.brief, this.how, this.bar, h("span.grow"), this.tools), this.problem, this.failed, this.seen, this.grid.region);
+    this.grid.region.hidden = true;
+  }
+
+  // What the browser keeps a choice by: the same for all sweeps of a case.
+  name(what) { return `sweep.${what}.${this.info?.name}`; }
+
+  async read() {
+    const { signal } = this.abort;
+    try {
+      this.info = await call(this.path, { signal });
+      let query = { limit: PAGE, label: `sweep=${this.id}` };
+      let pending = 0;
+      for (;;) {
+        const answer = await call(`v1/table?${new URLSearchParams(query)}`, { signal });
+        this.told.take(answer);
+        pending += answer.pending;
+        if (!answer.next) break;
+        query = { ...query, cursor: answer.next };
+      }
+      this.pending = pending;
+      this.draw();
+    } catch (error) {
+      if (signal.aborted) return;
+      if (error instanceof Problem && error.status === 401) return this.onRefused();
+      this.fail(refused(error) ? error.message : `No answer from the server: ${error.message}`);
+      if (refused(error)) return;
+    }
+    if (!this.finished || this.pending) this.timer = setTimeout(() => this.read(), this.pending ? 300 : AGAIN);
+  }
+
+  fail(words) {
+    this.problem.hidden = !words;
+    this.problem.textContent = words;
+  }
+
+  // Points whose run has ended, or has been removed after that.
+  get ended() { return Object.entries(this.info.states).reduce((sum, [state, n]) => sum + (FINAL.has(state) ? n : 0), this.info.removed); }
+
+  get finished() { return Boolean(this.info) && this.ended === this.info.total; }
+
+  draw() {
+    const { info, told } = this;
+    const there = info.points.filter(({ run }) => told.rows.has(run.id));
+    this.points = there.map(({ values, run }, n) => ({ n, values, row: { ...told.rows.get(run.id), values: { ...told.rows.get(run.id).values } } }));
+    const rows = this.points.map(({ row }) => row);
+    this.place = new Map(this.points.map(({ n, row }) => [row.id, n]));
+    this.keys = keyColumns(this.points, told.units);
+    const others = columnsOf(rows, [], told.units).filter(({ id }) => !["run", "labels", "title", "submitted", "message"].includes(id));
+    this.results = others.filter(({ id }) => id.startsWith("result:"));
+    const point = { id: "run", title: "point", value: (row) => this.place.get(row.id), text: (row) => String(1 + this.place.get(row.id)), width: 16 };
+    this.columns = [point, ...this.keys, ...others.filter(({ shown }) => shown)];
+    this.drawHead();
+    this.drawFailed();
+    this.drawGrid();
+    this.choices();
+    this.drawResponse();
+  }
+
+  drawHead() {
+    const { info, ended } = this;
+    document.title = `${info.name} · sweep · Conoid`;
+    this.title.textContent = `Sweep of ${info.name}`;
+    const states = Object.entries(info.states).sort(([a], [b]) => (b === "succeeded") - (a === "succeeded")).map(([state, n]) => `${n} ${words(state)}`);
+    this.how.textContent = `${ended} of ${counted(info.total, "point")} done: ${[...states, ...(info.removed ? [`${info.removed} removed`] : [])].join(", ")}`;
+    this.bar.replaceChildren(this.finished ? "" : meter("running", ended / info.total));
+    this.tools.hidden = false;
+    this.stop.hidden = this.finished;
+    this.fail("");
+  }
+
+  drawFailed() {
+    const failed = this.points.filter(({ row }) => FINAL.has(row.state) && row.state !== "succeeded");
+    this.failed.hidden = !failed.length;
+    this.failed.replaceChildren(h("div.card-head", {}, h("h2", {}, `${counted(failed.length, "point")} without a result`)),
+      h("ul", {}, failed.map(({ n, row }) => h("li", {}, pill(row.state), " ", h("a", { href: `#/runs/${row.id}` }, this.words(row, n)), " ", row.message || row.cause || ""))));
+  }
+
+  // A point in words: the values of its keys.
+  words(row, n) {
+    return this.keys.map((key) => `${key.title} ${key.text(row)}${key.unit ? ` ${key.unit}` : ""}`).join(", ") || `point ${n + 1}`;
+  }
+
+  drawGrid() {
+    const rows = this.points.map(({ row }) => row);
+    const column = this.columns.find(({ id }) => id === this.sort.id) ?? this.columns[0];
+    const all = sorted(rows, column, this.sort.down);
+    this.all = all;
+    this.grid.region.hidden = !all.length;
+    this.grid.draw({ columns: this.columns, sort: { ...this.sort, id: column.id }, items: all.map((row) => ({ key: row.id, told: row.told, row })), all, marked: this.marked, shorts: shorts(rows.map(({ id }) => id)), stamp: this.told.version });
+    this.compare.disabled = this.marked.size < 2;
+    this.compare.textContent = this.marked.size > 1 ? `Compare ${this.marked.size}` : "Compare";
+    this.compare.title = this.marked.size > 1 ? "" : "mark two points or more";
+  }
+
+  sortBy({ id }) {
+    this.sort = { id, down: this.sort.id === id && !this.sort.down };
+    this.drawGrid();
+  }
+
+  mark(rows, on) {
+    for (const { id } of rows) {
+      if (on) this.marked.add(id);
+      else this.marked.delete(id);
+    }
+    this.drawGrid();
+  }
+
+  compareMarked() {
+    location.hash = `#/compare/${this.all.filter(({ id }) => this.marked.has(id)).map(({ id }) => id).join("/")}`;
+  }
+
+  async csv(button) {
+    button.disabled = true;
+    try {
+      await download(`${this.path}/table`, `${this.info.name}-${this.id.slice(0, BRIEF)}.csv`, 0, () => {});
+    } catch (error) {
+      this.fail(error.message);
+    }
+    button.disabled = false;
+  }
+
+  async cancel() {
+    if (!confirm("Cancel every run of this sweep that has not ended?")) return;
+    try {
+      await call(`${this.path}:cancel`, { method: "POST" });
+    } catch (error) {
+      this.fail(error.message);
+    }
+    clearTimeout(this.timer);
+    this.read();
+  }
+
+  // The response -------------------------------------------------------------------------------------------------------
+
+  choices() {
+    const wanted = recall(this.name("result"), telling(this.points, this.results)?.id);
+    fill(this.result, this.results.map(({ id, full, title }) => [id, full ?? title]), wanted);
+    fill(this.over, this.keys.map(({ id, full, title }) => [id, full ?? title]), recall(this.name("over"), this.keys[0]?.id));
+    this.overLabel.hidden = this.keys.length < 2;
+  }
+
+  get chosen() { return this.results.find(({ id }) => id === this.result.value) ?? this.results[0]; }
+
+  get axes() {
+    const x = this.keys.find(({ id }) => id === this.over.value) ?? this.keys[0];
+    return { x, others: this.keys.filter((key) => key !== x) };
+  }
+
+  drawResponse() {
+    const there = this.results.length > 0 && this.keys.length > 0 && this.points.some(({ row }) => row.results);
+    this.response.hidden = !there;
+    this.map.hidden = !there || this.keys.length !== 2;
+    this.seen.classList.toggle("two", !this.map.hidden);
+    if (!there) return;
+    this.chart.draw(true);
+    if (!this.map.hidden) this.drawMatrix();
+  }
+
+  option() {
+    const { x, others } = this.axes;
+    const result = this.chosen;
+    if (!x || !result) return null;
+    const { words: places, curves: found } = curves(this.points, x, others, result);
+    const lines = found.map(({ name, data }, i) => ({ ...series({ name: name || result.title, data, unit: result.base, ...lineStyle(i) }), showSymbol: true, symbolSize: 8, cursor: "pointer" }));
+    const titled = (column, made) => ({ ...made, name: made.name ? `${column.title}, ${made.name}` : column.title });
+    const across = axis(x.base, Math.max(0, ...found.flatMap(({ data }) => data.map(([value]) => Math.abs(value)))), { scale: true, splitLine: { show: false } });
+    const up = axis(result.base, largest(lines), { scale: true });
+    return {
+      grid: { left: 72, right: 22, top: found.length > 1 ? 58 : 36, bottom: 46 },
+      xAxis: { ...titled(x, across), ...(places ? { type: "category", data: places, axisLabel: {} } : {}), nameLocation: "middle", nameGap: 28, nameTextStyle: { ...across.nameTextStyle, align: "center" } },
+      yAxis: { ...titled(result, up), nameTextStyle: { ...up.nameTextStyle, align: "left" } },
+      series: lines, xName: x.base ? `${x.full ?? x.title} [${x.base}]` : x.full ?? x.title,
+      ...(found.length > 1 ? {} : { legend: { show: false } }),
+      tooltip: { trigger: "item", formatter: ({ seriesName, value }) => `${x.title} ${places ? places[value[0]] : exact(value[0], x.base)}\n${result.title} ${si(value[1], result.base, 4)}${found.length > 1 ? `\n${seriesName}` : ""}` },
+    };
+  }
+
+  drawMatrix() {
+    const { x, others: [down] } = this.axes;
+    const result = this.chosen;
+    const { rows, columns, cells } = matrix(this.points, down, x, result);
+    const unit = (column) => (column.unit ? `, ${column.unit}` : "");
+    this.mapNote.textContent = `${result.full ?? result.title}${unit(result)}`;
+    this.squares.replaceChildren(h("table.matrix", {},
+      h("thead", {}, h("tr", {}, h("th", { scope: "col" }, `${down.title}${unit(down)} ↓  ${x.title}${unit(x)} →`), columns.map(({ text }) => h("th", { scope: "col" }, text)))),
+      h("tbody", {}, rows.map(({ text }, i) => h("tr", {}, h("th", { scope: "row" }, text), cells[i].map((cell) => square(cell, result)))))));
+  }
+}
+
+// A cell of the matrix: its number on the colour of its share, or the state of its run.
+function square({ points, value, share }, result) {
+  if (!points.length) return h("td");
+  const { row } = points[0];
+  const over = FINAL.has(row.state) && value === null;
+  const link = h(`a${value === null ? (over ? ".failed" : ".open") : ""}`, { href: `#/runs/${row.id}`, title: row.message || false }, value === null ? words(row.state) : result.write(value));
+  link.style.setProperty("--share", share ?? 0);
+  return h("td", {}, link);
+}
+
+// The keys of a sweep as columns: of the case with all defaults where it has a value of that name, in SI units; else as
+// they were written.
+function keyColumns(points, units) {
+  const rows = points.map(({ row }) => row);
+  const keys = [...new Set(points.flatMap(({ values }) => Object.keys(values)))];
+  const written = new Map(points.map(({ values, row }) => [row.id, values]));
+  const known = keys.filter((key) => rows.every((row) => key in row.base || key in row.values));
+  const columns = new Map(columnsOf(rows, known, units).filter(({ id }) => id.startsWith("value:")).map((column) => [column.full, column]));
+  const text = (row, key) => { const value = written.get(row.id)[key]; return typeof value === "object" ? JSON.stringify(value) : String(value ?? ""); };
+  return keys.map((key) => columns.get(key) ?? { id: `value:${key}`, title: key, full: key, value: (row) => text(row, key), text: (row) => text(row, key) });
+}

@@ -1,0 +1,71 @@
+// Many rows of a table, of which only those in view are elements. All rows are equally tall.
+
+import { h } from "./figures.js";
+
+const MORE = 8; // Rows beyond the view, above and below: the Tab key goes on there.
+
+export class Windowed {
+  // `make(item, n)` gives the row element of an item; it is made again where `item` or `version` is another one.
+  // `region` is the element that scrolls, `tall()` the height of a row, px.
+  constructor(region, make, tall) {
+    Object.assign(this, { region, make, tall, items: [], version: 0, made: new Map() });
+    this.above = h("tr.space", { "aria-hidden": "true" });
+    this.below = h("tr.space", { "aria-hidden": "true" });
+    this.body = h("tbody");
+    region.addEventListener("scroll", () => this.draw(), { passive: true });
+    this.watch = new ResizeObserver(() => this.draw());
+    this.watch.observe(region);
+  }
+
+  close() { this.watch.disconnect(); }
+
+  // Items have a `key` that no other one has, and a `told` that changes where they look otherwise.
+  set(items, version) {
+    Object.assign(this, { items, version });
+    this.draw();
+  }
+
+  draw() {
+    const tall = this.tall();
+    const seen = Math.ceil((this.region.clientHeight || 600) / tall);
+    const first = Math.max(0, Math.min(this.items.length - seen, Math.floor((this.region.scrollTop || 0) / tall)) - MORE);
+    const last = Math.min(this.items.length, first + seen + 2 * MORE);
+    const focus = this.focused();
+    const before = this.made;
+    this.made = new Map();
+    const rows = [];
+    for (let n = first; n < last; n += 1) rows.push(this.row(this.items[n], n, before));
+    this.above.style.height = `${first * tall}px`;
+    this.below.style.height = `${(this.items.length - last) * tall}px`;
+    put(this.body, [this.above, ...rows, this.below]);
+    focus?.();
+  }
+
+  row(item, n, before) {
+    const stamp = `${this.version} ${item.told}`;
+    const known = before.get(item.key);
+    const element = known?.stamp === stamp ? known.element : this.make(item, n);
+    element.setAttribute("aria-rowindex", n + 2);
+    this.made.set(item.key, { stamp, element });
+    return element;
+  }
+
+  // What puts the focus back where it is now, in a row that is made again.
+  focused() {
+    const active = document.activeElement;
+    const found = active && this.body.contains?.(active) && [...this.made].find(([, { element }]) => element.contains(active));
+    if (!found) return null;
+    const place = [...found[1].element.querySelectorAll("a, button, input")].indexOf(active);
+    return () => {
+      if (this.body.contains(active)) return;
+      this.made.get(found[0])?.element.querySelectorAll("a, button, input")[place]?.focus({ preventScroll: true });
+    };
+  }
+}
+
+// The children of an element, in order; those that are there stay where they are.
+function put(place, elements) {
+  const wanted = new Set(elements);
+  for (const child of [...place.children]) if (!wanted.has(child)) child.remove();
+  elements.forEach((element, i) => { if (place.children[i] !== element) place.insertBefore(element, place.children[i] ?? null); });
+}

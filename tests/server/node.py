@@ -1,0 +1,31 @@
+"""Modules of the page that are asked by node, without a browser."""
+
+import json
+import shutil
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from .visitor import WEB
+
+NODE = shutil.which("node")
+"""The program; None where there is none."""
+Ask = Callable[..., Any]
+"""``ask(modules, expression, data)``: the value of an expression in ``page``, what the modules have, and ``data``."""
+
+
+def asking(web: Path) -> Ask:
+    """Asks copies of the page's modules in the folder ``web``."""
+    for path in WEB.glob("*.js"):
+        shutil.copy(path, web)
+    (web / "package.json").write_text('{"type": "module"}')
+
+    def asked(modules: str, script: str, data: Any = None) -> Any:
+        told = json.dumps({"module": f"{web}/{modules}", "script": script, "data": data})
+        command = [str(NODE), str(Path(__file__).with_name("scripts.mjs"))]
+        done = subprocess.run(command, input=told, capture_output=True, text=True, timeout=60, check=False)
+        assert done.returncode == 0, done.stderr
+        return json.loads(done.stdout)
+
+    return asked

@@ -1,0 +1,204 @@
+"""The table of runs and the page of a sweep, as far as no browser is needed: asked by node."""
+
+import json
+import random
+from typing import Any
+
+import pytest
+
+from conoid.cases.flat import Scalar
+from conoid.server import card, rows
+
+from .node import NODE, Ask
+
+pytestmark = pytest.mark.skipif(NODE is None, reason="no node on this machine")
+
+SPEED, SIZE = "parts[0].velocity[2]", "parts[0].mesh.element_size"
+TOLD = """
+    const told = new page.Told();
+    told.take(data);
+    const all = [...told.rows.values()];
+"""
+
+
+def line(run: str, n: int = 0, **more: Any) -> dict[str, Any]:
+    """A run in a list."""
+    found: dict[str, Any] = {
+        "id": run, "short": run[:7], "name": "bar", "title": "A bar", "state": "succeeded", "cause": None,
+        "message": "", "reason": "", "ranks": 1, "threads": 1, "submitted": 1000.0 + n,
+        "started": 1001.0 + n, "finished": 1003.0 + n, "labels": {}, "progress": None,
+    }  # fmt: skip
+    return {**found, **more}
+
+
+def answer(*runs: tuple[dict[str, Any], card.Card]) -> dict[str, Any]:
+    """What the server sends of them."""
+    made = rows.Table()
+    for told, known in runs:
+        assert made.add(told, known)
+    listed = [json.loads(bytes(row)) for row in made.rows]
+    return {"runs": listed, "cases": [group.shown() for group in made.groups], "pending": 0, "next": None}
+
+
+def asked(ask: Ask, module: str, script: str, data: Any) -> Any:
+    return ask(module, f"(() => {{ {script} }})()", data)
+
+
+def _line_of(n: int) -> dict[str, Any]:
+    labels = {"sweep": "s", "point": str(n)} if n < 3 else {"batch": "first"}
+    ended = {"state": "failed", "message": "it broke"} if n == 1 else {}
+    return line(f"run{n}", n, labels=labels, **ended)
+
+
+def _card_of(n: int) -> card.Card:
+    values: dict[str, Scalar] = {SPEED: -100.0 * n, SIZE: 0.002 if n % 2 else 0.004, **{f"k{i}": i for i in range(20)}}
+    results = {"probe.speed": None if n == 4 else 10.0 - n, "fragments": 3.0 * n, "cpu": 5.0}
+    units = {"probe.speed": "m/s", "cpu": "s"}
+    return card.Card(values=values, results=results, units=units, references=2, missed=["extent"] if n == 2 else [])
+
+
+@pytest.fixture(scope="module")
+def some() -> dict[str, Any]:
+    """Five runs of one case at other speeds and sizes, and one of another case."""
+    bars = [(_line_of(n), _card_of(n)) for n in range(5)]
+    other = (line("other", 9, name="plate"), card.Card(values={f"q{i}": i for i in range(9)}, results={}))
+    return answer(*bars, other)
+
+
+def test_values_and_results_of_a_run_are_those_that_the_server_has(ask: Ask, some: dict[str, Any]) -> None:
+    pair = f"[page.valueOf(row, '{SPEED}'), row.results.get('fragments') ?? null]"
+    script = f"{TOLD} return all.map((row) => {pair});"
+    assert asked(ask, "told.js", script, some) == [[-100 * n, 3 * n] for n in range(5)] + [[None, None]]
+
+
+def test_columns_are_the_keys_that_differ_within_cases_that_are_alike(ask: Ask, some: dict[str, Any]) -> None:
+    some_of_them = "all.filter(({ id }) => id === 'run1' || id === 'run3')"
+    script = f"{TOLD} return [page.differing(all, 9), page.differing({some_of_them}, 9)];"
+    found = asked(ask, "told.js", script, some)
+    assert set(found[0]) == {SPEED, SIZE}
+    assert found[1] == [SPEED]
+
+
+def test_a_second_answer_changes_what_it_tells_and_removed_runs_go(ask: Ask, some: dict[str, Any]) -> None:
+    script = f"""{TOLD}
+        const same = told.take(data);
+        const after = told.take({{ ...data, runs: [{{ ...data.runs[0], state: "lost" }}] }});
+        told.keepOnly(data.runs.slice(1), true);
+        return [same, after, told.rows.size, told.rows.has("run0")];"""
+    assert asked(ask, "told.js", script, some) == [False, True, 5, False]
+
+
+MODULES = "columns.js told.js order.js response.js"
+COLUMNS = """
+    const { Told, differing } = page;
+    const told = new Told();
+    told.take(data);
+    const all = [...told.rows.values()];
+    const columns = page.columnsOf(all, differing(all, 9), told.units);
+    const by = (id) => columns.find((one) => one.id === id);
+"""
+
+
+def test_a_column_has_one_unit_and_short_names_that_are_clear(ask: Ask, some: dict[str, Any]) -> None:
+    script = f"""{COLUMNS}
+        const size = by("value:{SIZE}");
+        const speed = by("result:probe.speed");
+        return [[size.title, size.unit, all.map(size.text)], [speed.unit, speed.title],
+          columns.filter(({{ shown }}) => shown).map(({{ id }}) => id)];"""
+    size, speed, shown = ask(MODULES, f"(() => {{ {script} }})()", some)
+    assert size == ["element_size", "mm", ["4", "2", "4", "2", "4", ""]]
+    assert speed == ["m/s", "speed"]
+    assert shown[:2] == ["run", "state"]
+    assert {"value:parts[0].velocity[2]", "result:probe.speed", "result:fragments", "references"} <= set(shown)
+    assert "result:cpu" not in shown
+
+
+@pytest.mark.parametrize(
+    ("words", "found"),
+    [
+        ("", {0, 1, 2, 3, 4, 9}), ("state:failed", {1}), ("it broke", {1}), ("BATCH=first", {3, 4}),
+        ("case:plate", {9}), ("bar speed>8", {0, 1}), ("speed>=8 speed<9.5", {1, 2}), ("element_size=2", {1, 3}),
+        ("velocity[2]<-250", {3, 4}),
+        ("run2", {2}), ("nothing", set()), ("run2 run3", set()), ("fragments=0", {0}), ("speed>x", set()),
+    ],
+)  # fmt: skip
+def test_rows_are_filtered_by_words_and_numbers(ask: Ask, some: dict[str, Any], words: str, found: set[int]) -> None:
+    script = f"""{COLUMNS}
+        const {{ matcher }} = page;
+        return all.filter(matcher({json.dumps(words)}, columns)).map(({{ submitted }}) => submitted - 1000);"""
+    assert set(ask(MODULES, f"(() => {{ {script} }})()", some)) == found
+
+
+def test_rows_are_sorted_by_any_column_and_what_has_no_value_comes_last(ask: Ask, some: dict[str, Any]) -> None:
+    script = f"""{COLUMNS}
+        const {{ sorted, grouped }} = page;
+        const order = (id, down) => sorted(all, by(id), down).map((row) => row.id);
+        const groups = grouped(all, "sweep").map(({{ key, rows }}) => [key, rows.length]);
+        const speeds = [false, true].map((down) => order("result:probe.speed", down));
+        return [...speeds, order("run", false)[0], order("submitted", true), groups];"""
+    up, down, first, newest, groups = ask(MODULES, f"(() => {{ {script} }})()", some)
+    assert up == ["run3", "run2", "run1", "run0", "run4", "other"] or up == [
+        "run3",
+        "run2",
+        "run1",
+        "run0",
+        "other",
+        "run4",
+    ]
+    assert down == ["run0", "run1", "run2", "run3", "run4", "other"]
+    assert first.startswith("run")
+    assert newest == ["other", "run4", "run3", "run2", "run1", "run0"]
+    assert groups == [["s", 3], ["", 3]]
+
+
+def test_short_ids_are_those_of_the_server(ask: Ask) -> None:
+    draw = random.Random(7)
+    ids = sorted({"".join(draw.choices("ab", k=22)) for _ in range(200)})
+    assert ask("told.js", "Object.fromEntries(page.shorts(data))", ids) == rows.short(ids, 7)
+
+
+def test_a_thousand_rows_are_sorted_in_a_moment(ask: Ask) -> None:
+    """CPU time of the whole, 5,000 rows."""
+    known = [
+        (line(f"run{n:06d}", n), card.Card(values={"v": float(n % 97)}, results={"probe.x": float(n % 89)}))
+        for n in range(5000)
+    ]
+    script = f"""{COLUMNS}
+        const {{ sorted }} = page;
+        const before = process.cpuUsage().user;
+        const found = sorted(all, by("result:probe.x"), true);
+        return [found.length, (process.cpuUsage().user - before) / 1e6];"""
+    found, seconds = ask(MODULES, f"(() => {{ {script} }})()", answer(*known))
+    assert found == 5000
+    assert seconds < 0.5
+
+
+def test_a_response_leaves_out_what_has_not_come_to_its_end(ask: Ask, some: dict[str, Any]) -> None:
+    script = f"""{COLUMNS}
+        const points = all.slice(0, 5).map((row, n) => ({{ n, row }}));
+        const [v, size, speed] = ["value:{SPEED}", "value:{SIZE}", "result:probe.speed"].map(by);
+        const {{ words, curves: made }} = page.curves(points, v, [size], speed);
+        const map = page.matrix(points, size, v, speed);
+        const results = columns.filter(({{ id }}) => id.startsWith("result:"));
+        const cells = map.cells.map((row) => row.map(({{ value, points: here }}) => [value, here.length]));
+        return [words, made.map(({{ name, data }}) => [name, data]), map.rows.map(({{ text }}) => text),
+          map.columns.length, cells, page.telling(points, results).id];"""
+    words, made, down, across, cells, best = ask(MODULES, f"(() => {{ {script} }})()", some)
+    assert words is None
+    assert made == [
+        ["element_size 4 mm", [[-200, 8, "run2"], [0, 10, "run0"]]],
+        ["element_size 2 mm", [[-300, 7, "run3"]]],
+    ]
+    assert (down, across) == (["2", "4"], 5)
+    assert cells[0] == [[None, 0], [7, 1], [None, 0], [None, 1], [None, 0]]
+    assert best == "result:probe.speed"
+
+
+def test_a_key_of_words_has_places_on_the_axis(ask: Ask) -> None:
+    script = """
+        const column = { title: "form", value: (row) => row.form, text: (row) => row.form };
+        const result = { title: "y", value: (row) => row.y };
+        return page.curves(data.map((row, n) => ({ n, row: { ...row, state: "succeeded" } })), column, [], result);"""
+    told = [{"id": "a", "form": "split", "y": 2.0}, {"id": "b", "form": "nodal", "y": 1.0}]
+    found = asked(ask, "response.js", script, told)
+    assert found == {"words": ["split", "nodal"], "curves": [{"name": "", "data": [[0, 2, "a"], [1, 1, "b"]]}]}
