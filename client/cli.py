@@ -1,4 +1,4 @@
-"""The command line: ``conoid serve | validate | submit | ls | show | watch | cancel | get | view | run``, and more."""
+"""The command line: ``conoid serve | validate | submit | runs | show | watch | get | view | run``, and more."""
 
 import os
 import sys
@@ -13,7 +13,7 @@ from conoid.cases.load import CaseError
 from conoid.cases.loaded import loads
 from conoid.cases.run import ExitCode
 
-from . import benches, commands, converging, hard, reports, shelf, sweeping, validated, viewing
+from . import benches, commands, converging, hard, listing, reports, shelf, sweeping, validated, viewing
 from .batch import batch_run
 from .console import echo, echo_json, one_line, prepare
 from .decks.command import import_deck
@@ -139,7 +139,8 @@ def validate(case: CaseArgument, overrides: Overrides = None, as_json: Json = Fa
 
 
 app.command(short_help="Hand a case to the server.")(commands.submit)
-app.command(name="ls", short_help="List runs, newest first.")(commands.list_runs)
+app.command(name="runs", short_help="List runs: which run was it.")(listing.runs)
+app.command(name="ls", hidden=True)(listing.runs)
 app.command(name="show", short_help="Show one run: where it is, or how it ended.")(commands.show_run)
 app.command(name="watch", short_help="Follow a run until it ends.")(commands.watch_run)
 app.command(short_help="Stop a run at its next step.")(commands.cancel)

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from conoid.cases import layout
-from conoid.cases.run import ExitCode, State
+from conoid.cases.run import ExitCode
 
 from . import local_run, tables
 from .batch import cancel_folder, slurm_of
@@ -34,7 +34,6 @@ from .options import (
     named,
     on_cores,
     show,
-    show_lines,
     warn_of,
 )
 from .run import Run
@@ -98,25 +97,6 @@ def restart(
             echo_json(made.status())
         else:
             echo(made.id)
-
-
-def list_runs(
-    state: Annotated[list[State] | None, typer.Option("--state", help="Only runs in this state.")] = None,
-    limit: Annotated[int, typer.Option("--limit", min=1, help="At most so many.")] = 20,
-    label: Labels = None,
-    url: Url = None,
-    token: Token = None,
-    as_json: Json = False,
-) -> None:
-    """List runs, newest first."""
-    with connect(url, token) as session:
-        runs = session.runs([one.value for one in state or ()], limit, labels_of(label))
-    if as_json:
-        echo_json([run.listed for run in runs])
-    elif runs:
-        show_lines(tables.runs_table(runs))
-    else:
-        echo("no runs")
 
 
 def show_run(run: SourceArgument, url: Url = None, token: Token = None, as_json: Json = False) -> None:

@@ -1,6 +1,7 @@
 """A server and the words of its API."""
 
 import re
+import time
 import uuid
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import islice, takewhile
@@ -15,6 +16,7 @@ from conoid.cases.load import CaseError, Overrides, Problem
 from conoid.cases.problems import shown
 
 from .adaptive import MOST, found_by
+from .asked import Moment, query_of, words_of
 from .config import target
 from .errors import MissingError, NotFoundError, ServiceError, UsageError
 from .found import Found
@@ -22,6 +24,7 @@ from .goal import span_of
 from .http import NOT_FOUND, Http
 from .outbox import SURVEY, Outbox, place_of
 from .places import quoted
+from .rows import RunRow, TablePage, rows_of
 from .run import Run
 from .submission import CaseSource, data_of, to_json
 from .sweep import Point, Sweep, SweepInfo, SweepPage, listed, points_along
@@ -37,6 +40,10 @@ _POINT = 0.5
 """s that a server may take for each point of a sweep, which it reads, checks and writes to disk before it answers.
 Chosen: ten times what one takes on two cores at a load of 4.
 """
+_PAGE = 500
+"""Rows of a page of the table: as many as a server gives."""
+_READING, _REST = 60.0, 0.2
+"""s for which results that a server still reads are waited for, and between two questions. Chosen."""
 
 
 class _Known(Protocol):
@@ -99,7 +106,7 @@ class Session(Http):
         higher ``priority`` comes first. Raises CaseError, ServiceError, UnreachableError.
         """
         kind, body, more = self.outbox.body(case, overrides, folder)
-        words = [("label", word) for word in _words(labels)]
+        words = [("label", word) for word in words_of(labels)]
         words += [("profile", profile)] if profile else []
         words += [("priority", str(priority))] if priority else []
         path = f"/v1/runs?{urlencode(words)}" if words else "/v1/runs"
@@ -228,14 +235,17 @@ class Session(Http):
             return []
 
     def runs(
-        self, states: Sequence[str] = (), limit: int = 50, labels: Mapping[str, str] | None = None
-    ) -> list[RunInfo]:
-        """Our runs, newest first, at most ``limit``; with ``labels``, those that have all of them."""
+        self, states: Sequence[str] = (), limit: int = 50, labels: Mapping[str, str] | None = None, *, case: str = "",
+        text: str = "", since: Moment = None, until: Moment = None,
+    ) -> list[RunInfo]:  # fmt: skip
+        """Our runs, newest first, at most ``limit``; with ``labels``, those that have all of them.
+
+        ``case`` is the name of their case, with ``*`` for any letters; ``text`` are words, each of which stands in the
+        name, the title, a label, the state or the message, or begins the id; ``since`` and ``until`` bound when they
+        were submitted: Unix s, or a datetime.
+        """
         found: list[RunInfo] = []
-        wanted = states if isinstance(states, str) else ",".join(states)
-        query: dict[str, str | list[str]] = {"state": wanted} if wanted else {}
-        if labels:
-            query["label"] = _words(labels)
+        query = query_of(states, labels, case, text, since, until)
         for _ in range(_MOST_PAGES):
             page = self.get(Page, "/v1/runs", limit=min(100, limit - len(found)), **query)
             found += page.runs
@@ -244,12 +254,27 @@ class Session(Http):
             query["cursor"] = page.next
         raise self.endless("runs")
 
+    def table(
+        self, states: Sequence[str] = (), limit: int = 50, labels: Mapping[str, str] | None = None, *, case: str = "",
+        text: str = "", since: Moment = None, until: Moment = None,
+    ) -> list[RunRow]:  # fmt: skip
+        """The same runs with the values of their cases and their results, in SI units."""
+        found: list[RunRow] = []
+        query = query_of(states, labels, case, text, since, until)
+        for _ in range(_MOST_PAGES):
+            page = self._table(min(_PAGE, limit - len(found)), query)
+            found += rows_of(page)
+            if page.next is None or len(found) >= limit:
+                return found[:limit]
+            query["cursor"] = page.next
+        raise self.endless("runs")
 
-def _words(labels: Mapping[str, str] | None) -> list[str]:
-    """``name=value`` of each label. Raises UsageError."""
-    if labels is not None and not isinstance(labels, Mapping):
-        raise UsageError(f"labels = {shown(labels)}: write names with their values, such as {{'batch': 'first'}}")
-    return [f"{name}={value}" for name, value in (labels or {}).items()]
+    def _table(self, limit: int, query: Mapping[str, Any]) -> TablePage:
+        """A page of the table; asked again while the server still reads results, for a while."""
+        until = time.monotonic() + _READING
+        while (page := self.get(TablePage, "/v1/table", limit=limit, **query)).pending and time.monotonic() < until:
+            time.sleep(_REST)
+        return page
 
 
 def connect(url: str | None = None, token: str | None = None) -> Session:

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Collection, Mapping, Sequence
-from typing import Literal
+from typing import Any, Literal, TypeGuard
 
 from rich import box
 from rich.table import Table
@@ -16,6 +16,7 @@ from conoid.cases.figures import (
     crew,
     day,
     duration,
+    exact,
     exacts,
     fixed,
     large,
@@ -25,6 +26,7 @@ from conoid.cases.figures import (
     si,
     size,
 )
+from conoid.cases.flat import Scalar
 from conoid.cases.library import Constant
 from conoid.cases.materials import Material
 from conoid.cases.outcome import Check, Compressed, Outcome
@@ -34,6 +36,7 @@ from conoid.cases.schema import Case
 from .compare import AT_THE_END, Comparison
 from .display import STATE_STYLE
 from .replay import Account
+from .rows import RunRow
 from .told import RunInfo
 
 _LONGEST = 60
@@ -74,17 +77,59 @@ def state_text(state: State, cause: str | None = None) -> Text:
     return text.append(f" ({cause})", style="default") if cause and cause != state.value else text
 
 
-def runs_table(runs: Sequence[RunInfo]) -> Table:
-    """One line a run: where the terminal is too narrow, names and causes end in an ellipsis."""
-    made = table("run", "case", "state", "ranks", "submitted", "took", right=("ranks", "took"), wide=("case", "state"))
+def runs_table(rows: Sequence[RunRow], keys: Sequence[str]) -> Table:
+    """One line a run, with the values of ``keys``: where the terminal is too narrow, texts end in an ellipsis."""
+    last = ("cores", "submitted", "took")
+    told = [_differs(row, keys) for row in rows]
+    labels = [" ".join(f"{name}={value}" for name, value in _own(row.info).items()) for row in rows]
+    more = [name for name, texts in (("values", told), ("labels", labels)) if any(texts)]
+    made = table("run", "case", "state", *more, *last, right=("cores", "took"), wide=("case", "state", *more))
     made.padding = 0
-    for run in runs:
+    for row, values, words in zip(rows, told, labels, strict=True):
+        run = row.info
         took = duration((run.finished or 0) - run.started) if run.started and run.finished else ""
-        name, state = Text(run.name), state_text(run.state, run.cause)
-        for text in (name, state):
-            text.no_wrap, text.overflow = True, "ellipsis"
-        made.add_row(run.id, name, state, _cores(run), day(run.submitted), took)
+        some = [text for name, text in (("values", values), ("labels", words)) if name in more]
+        cells = [Text(run.name), _how(row), *map(Text, some)]
+        for cell in cells:
+            cell.no_wrap, cell.overflow = True, "ellipsis"
+        made.add_row(run.short or run.id, *cells, _cores(run), day(run.submitted), took)
     return made
+
+
+def row_of(row: RunRow) -> dict[str, Any]:
+    """A row of the table as plain data."""
+    return {
+        **row.info.listed, "values": row.values, "results": row.results, "units": row.units,
+        "references": row.references, "missed": row.missed,
+    }  # fmt: skip
+
+
+def _own(run: RunInfo) -> dict[str, str]:
+    """Labels without those that a sweep gives its runs."""
+    return {name: value for name, value in run.labels.items() if name not in ("sweep", "point")}
+
+
+def _how(row: RunRow) -> Text:
+    """The state, how far it is, how many reference numbers it misses."""
+    run, text = row.info, state_text(row.info.state, row.info.cause)
+    if run.progress is not None and not run.state.final and run.progress.end_time > 0.0:
+        text.append(f" {percent(run.progress.t / run.progress.end_time, 0)}", style="default")
+    if row.missed:
+        text.append(f" {len(row.missed)} of {row.references} missed", style="red")
+    return text
+
+
+def _differs(row: RunRow, keys: Sequence[str]) -> str:
+    """The values of some keys, each called by the end of its key."""
+    there = [(key, row.values[key]) for key in keys if key in row.values]
+    return ", ".join(
+        f"{key.rpartition('.')[2]} {exact(value, row.units.get(key, '')) if _is_number(value) else value}"
+        for key, value in there
+    )
+
+
+def _is_number(value: Scalar) -> TypeGuard[int | float]:
+    return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def _cores(run: RunInfo) -> str:

@@ -15,7 +15,7 @@ from .result import outcome_of
 
 ID = r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,127}\Z"
 """Of a run or a sweep: a name of a folder, too."""
-_OF_ONE = {"title", "estimate", "progress", "outcome_json"}
+_OF_ONE = {"estimate", "progress", "outcome_json"}
 """What is told of one run, not in a list."""
 
 
@@ -38,8 +38,10 @@ class RunInfo(msgspec.Struct, kw_only=True, frozen=True):
     threads: int = 1
     """Of each rank."""
     title: str = ""
-    """This and what follows is told of one run, not in a list (_OF_ONE)."""
+    short: str = ""
+    """The beginning of the id that no other run has; told in lists alone."""
     estimate: dict[str, Any] = {}
+    """This and what follows is told of one run, not in a list (_OF_ONE)."""
     progress: Progress | None = None
     outcome_json: msgspec.Raw = msgspec.field(name="outcome", default=msgspec.Raw(b"null"))
 

@@ -106,19 +106,10 @@ class RunPage(msgspec.Struct, kw_only=True):
     next: str | None
 
 
-class Share(msgspec.Struct, kw_only=True):
-    """How far a run is; ``t`` and ``end_time`` are simulated time, ``eta`` wall time left, s."""
-
-    t: float
-    end_time: float
-    eta: float
-    step: int
-
-
 class TableRow(ListedRun, kw_only=True):
     """A run in the table: where its case is among those that are alike, what it has otherwise, its results."""
 
-    progress: Share | None
+    progress: Progress | None
     case: int | None
     values: dict[str, bool | int | float | str | None]
     results: list[float | None] | None

@@ -107,14 +107,6 @@ def short_ids(service: Service, runs: Sequence[Run]) -> dict[str, str]:
     return short(service.store.ids_about(runs[0].owner, min(ids), max(ids)), _SHORT)
 
 
-def progress(service: Service, run_id: str) -> dict[str, float] | None:
-    """How far a run is whose worker lives."""
-    told = service.supervisor.progress(run_id)
-    if told is None:
-        return None
-    return {"t": told.t, "end_time": told.end_time, "eta": told.eta, "step": told.step}
-
-
 def to_cursor(run: Run) -> str:
     """Where the next page begins; an opaque word for the client."""
     return base64.urlsafe_b64encode(run.id.encode()).decode().rstrip("=")

@@ -16,7 +16,7 @@ export class Grid {
     Object.assign(this, { on, columns: [], marked: new Set(), shorts: new Map() });
     this.head = h("thead");
     this.widths = h("colgroup");
-    this.region = h("div.sheet", { tabindex: 0, role: "region", "aria-label": label });
+    this.region = h("div.rows-view", { tabindex: 0, role: "region", "aria-label": label });
     this.rows = new Windowed(this.region, (item) => this.row(item), () => (NARROW.matches ? TALL.narrow : TALL.wide));
     this.table = h("table.runs", { "aria-label": label }, this.widths, this.head, this.rows.body);
     this.region.append(this.table);

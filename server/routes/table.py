@@ -40,7 +40,7 @@ def table(
     cards, made = service.cards.of(runs[:limit]), Table()
     lines = view.briefs(service, runs[:limit])
     for line in lines:
-        if not made.add({**line, "progress": view.progress(service, line["id"])}, cards.get(line["id"])):
+        if not made.add({**line, "progress": service.supervisor.progress(line["id"])}, cards.get(line["id"])):
             break
     last = runs[len(made.rows) - 1] if len(made.rows) < len(runs) else None
     body: dict[str, Any] = {

@@ -242,6 +242,6 @@ def test_an_address_may_have_a_path(url: str, used: str) -> None:
 
 
 def test_what_is_asked_lies_below_the_path_of_the_address(server: Hostile) -> None:
-    server.answers["/conoid/v1/runs"] = said({"runs": [], "next": None})
-    result = CliRunner().invoke(app, ["ls", "--url", f"{server.url}/conoid/"])
+    server.answers["/conoid/v1/table"] = said({"runs": [], "cases": [], "pending": 0, "next": None})
+    result = CliRunner().invoke(app, ["runs", "--url", f"{server.url}/conoid/"])
     assert result.stdout == "no runs\n"

@@ -166,11 +166,11 @@ def test_submit_show_ls_get(user: Path) -> None:
     assert run in shown.stdout
     assert "succeeded" in shown.stdout
     assert "FAIL" in shown.stdout, "a reference number that is missed is told"
-    listed = conoid("ls", "--limit", 5)
-    assert run in listed.stdout
-    told = read(conoid("ls", "--json"))[0]
+    told = read(conoid("runs", "--json"))[0]
     assert told["id"] == run
-    assert not told.keys() & {"title", "estimate", "outcome"}, "a list does not know them"
+    assert told["results"]["steps"] == 2
+    assert not told.keys() & {"estimate", "outcome"}, "a list does not know them"
+    assert told["short"] in conoid("ls", "--limit", 5).stdout
     assert read(conoid("show", run, "--json"))["outcome"]["steps"] == 2
     got = conoid("get", run, "outcome.json", "history.csv", "--out", "here")
     assert got.stdout.split() == ["here/outcome.json", "here/history.csv"]

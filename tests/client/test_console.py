@@ -82,8 +82,11 @@ def test_one_module_prints() -> None:
 TABLE = f"{EVIL},run,state\n".encode()
 TEXTS = dict.fromkeys(("owner", "name", "message", "reason", "title", "cause"), EVIL)
 RUN = run_info(**TEXTS, labels={EVIL: EVIL})
+ROW = {**RUN, "short": EVIL, "case": 0, "values": {"x": EVIL}, "results": None, "references": 2, "missed": [EVIL]}
+ALIKE = {"values": {"x": 1.0, EVIL: EVIL}, "units": {"x": EVIL}, "results": []}
 ASKED = {
     "/v1/runs": {"runs": [RUN], "next": None},
+    "/v1/table": {"runs": [ROW, {**ROW, "values": {}}], "cases": [ALIKE], "pending": 0, "next": None},
     "/v1/runs/a": RUN,
     "/v1/runs/a/files": {"files": [{"path": EVIL.replace("\0", ""), "size": 1}]},
     "/v1/runs/a:cancel": RUN,
@@ -94,7 +97,7 @@ ASKED = {
 @pytest.mark.parametrize(
     "words",
     [
-        ("ls",), ("ls", "--json"), ("show", "a"), ("show", "a", "--json"), ("show", "last"), ("cancel", "a"),
+        ("runs",), ("runs", "--json"), ("show", "a"), ("show", "a", "--json"), ("show", "last"), ("cancel", "a"),
         ("cancel", "a", "--json"), ("get", "a", "--json"), ("get", "a"), ("get", "a", "none"), ("sweep-table", "b"),
         ("checkpoint", "a"), ("submit", "demo"), ("view", "a"), ("report", "a"), ("compare", "a", "a"),
     ],

@@ -9,32 +9,54 @@ from conoid.cases.outcome import Compressed, Outcome
 from conoid.cases.run import State
 from conoid.client.console import PlainConsole
 from conoid.client.options import show_lines
+from conoid.client.rows import Alike, RunRow, differing
 from conoid.client.tables import outcome_table, runs_table
 from conoid.client.told import RunInfo
 
 NAME, ID = "glass_steel_bar_at_210_metres_a_second", "0mb3k2d9x7f1q0a5z8w4ty"
-RUNS = [
+SHORT = ID[:9]
+INFOS = [
     RunInfo(
-        id=ID, owner="ann", name=name, state=State.TIMED_OUT, cause="walltime", ranks=128, submitted=1.8e9,
-        started=1.0, finished=7e4,
+        id=ID, short=SHORT, owner="ann", name=name, state=State.TIMED_OUT, cause="walltime", ranks=128, submitted=1.8e9,
+        started=1.0, finished=7e4, labels={"sweep": "s", "batch": "first"},
     )
     for name in (NAME, NAME.replace("_", "-"), "demo")
 ]  # fmt: skip
+SPEED = "parts[0].velocity[2]"
+COMMON = Alike(values={SPEED: 210.0}, units={SPEED: "m/s"}, results=[])
+RUNS = [
+    RunRow(
+        info=info, values={SPEED: 100.0 * n}, results={}, units={SPEED: "m/s"}, references=2, missed=[], alike=COMMON
+    )
+    for n, info in enumerate(INFOS, 1)
+]
 
 
 @pytest.mark.parametrize("width", [72, 80, 100])
-def test_a_run_is_one_line_with_its_whole_id(width: int) -> None:
+def test_a_run_is_one_line_with_its_short_id(width: int) -> None:
     out = io.StringIO()
-    PlainConsole(file=out, width=width, highlight=False).print(runs_table(RUNS))
+    PlainConsole(file=out, width=width, highlight=False).print(runs_table(RUNS, [SPEED]))
     _, _, *lines = out.getvalue().splitlines()
-    assert [line.split()[0] for line in lines] == [ID] * len(RUNS)
+    assert [line.split()[0] for line in lines] == [SHORT] * len(RUNS)
     assert [line.split()[1][:4] for line in lines] == ["glas", "glas", "demo"]
-    assert all(" timed_o" in line for line in lines)
+    assert all(" timed_" in line for line in lines)
 
 
 def test_a_pipe_gets_whole_names(capsys: pytest.CaptureFixture[str]) -> None:
-    show_lines(runs_table(RUNS))
-    assert [line.split()[1] for line in capsys.readouterr().out.splitlines()[2:]] == [run.name for run in RUNS]
+    show_lines(runs_table(RUNS, [SPEED]))
+    lines = capsys.readouterr().out.splitlines()[2:]
+    assert [line.split()[1] for line in lines] == [run.name for run in INFOS]
+    assert ["velocity[2] 100 m/s" in lines[0], "velocity[2] 300 m/s" in lines[2]] == [True, True]
+    assert all("batch=first" in line and "sweep" not in line for line in lines)
+
+
+def test_the_values_that_are_told_are_those_that_differ_within_cases_that_are_alike() -> None:
+    other = Alike(values={"x": 1.0}, units={}, results=[])
+    alone = RunRow(
+        info=INFOS[0], values={"x": 1.0, "run.ranks": 2}, results={}, units={}, references=0, missed=[], alike=other
+    )
+    assert differing([*RUNS, alone], 9) == [SPEED]
+    assert differing(RUNS[:1], 9) == []
 
 
 def test_the_end_of_a_run_says_how_much_compression_matter_of_tension_alone_has_met() -> None:

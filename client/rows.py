@@ -1,0 +1,95 @@
+"""The table of runs: the values of their cases and their results, as the server tells them of many runs at once."""
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import msgspec
+
+from conoid.cases.flat import Scalar
+
+from .told import RunInfo
+
+_NEVER = frozenset({"run.ranks", "run.threads", "run.profile"})
+"""Keys of a case that other columns of a list have."""
+
+
+class Result(msgspec.Struct, kw_only=True, frozen=True):
+    """What a number of a run is."""
+
+    name: str
+    unit: str = ""
+
+
+class Alike(msgspec.Struct, kw_only=True, frozen=True):
+    """What cases that are alike have in common: values and units by key, and the results of their runs."""
+
+    values: dict[str, Scalar]
+    units: dict[str, str]
+    results: list[Result]
+
+
+class TableRow(RunInfo, kw_only=True, frozen=True):
+    """A run as the table tells of it: ``case`` is its place among those that are alike."""
+
+    case: int | None
+    values: dict[str, Scalar | None]
+    results: list[float | None] | None
+    references: int
+    missed: list[str]
+
+
+class TablePage(msgspec.Struct, kw_only=True, frozen=True):
+    """A page of the table; ``pending`` of its runs are not read yet."""
+
+    runs: list[TableRow]
+    cases: list[Alike]
+    pending: int = 0
+    next: str | None = None
+
+
+@dataclass(frozen=True)
+class RunRow:
+    """A run with the values of its case and its results."""
+
+    info: RunInfo
+    values: dict[str, Scalar]
+    """By key, such as ``parts[0].velocity[2]``, in SI units."""
+    results: dict[str, float | None]
+    """By name, such as ``probe.speed``, in SI units; empty before the end."""
+    units: dict[str, str]
+    """Of values and results that have one."""
+    references: int
+    """Reference numbers that it was compared with."""
+    missed: list[str]
+    """Names of those that it misses."""
+    alike: Alike | None
+    """What its case has in common with others of the same answer."""
+
+
+def rows_of(page: TablePage) -> Iterator[RunRow]:
+    """The rows of a page."""
+    for run in page.runs:
+        alike = page.cases[run.case] if run.case is not None else None
+        values = {**(alike.values if alike is not None else {}), **run.values}
+        names = alike.results if alike is not None else []
+        measured = {each.name: each.unit for each in names if each.unit}
+        yield RunRow(
+            info=run,
+            values={key: value for key, value in values.items() if value is not None},
+            results={each.name: value for each, value in zip(names, run.results or (), strict=False)},
+            units={**(alike.units if alike is not None else {}), **measured},
+            references=run.references, missed=run.missed, alike=alike,
+        )  # fmt: skip
+
+
+def differing(rows: Sequence[RunRow], most: int) -> list[str]:
+    """Keys of which two of the rows with cases that are alike have different values; those of most rows first."""
+    found = Counter[str]()
+    for alike in {id(row.alike): row.alike for row in rows if row.alike is not None}.values():
+        own = [row for row in rows if row.alike is alike]
+        keys = dict.fromkeys(key for row in own for key in (*alike.values, *row.values))
+        for key in keys:
+            if len({row.values.get(key) for row in own}) > 1 and key not in _NEVER:
+                found[key] += len(own)
+    return [key for key, _ in found.most_common(most)]
