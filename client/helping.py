@@ -6,7 +6,7 @@ from typer.core import TyperCommand, TyperGroup
 GROUPS: dict[str, tuple[str, ...]] = {
     "Cases and meshes": ("cases", "validate", "import", "schema", "materials"),
     "Run": ("run", "submit", "batch", "restart"),
-    "Follow and steer": ("ls", "runs", "show", "watch", "cancel", "checkpoint", "snapshot"),
+    "Follow and steer": ("runs", "ls", "show", "watch", "cancel", "checkpoint", "snapshot"),
     "Look at results": ("view", "figures", "report", "get", "replay-balance"),
     "Compare": ("compare", "sweep", "sweep-table", "sweep-plot", "sweep-cancel", "converge"),
     "Server": ("serve",),
@@ -23,7 +23,8 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "submit": ("conoid submit my_case.toml --label batch=first", "conoid submit demo --ranks 4 --threads 2"),
     "batch": ("conoid batch my_case.toml --ranks 16",),
     "restart": ("conoid restart last --ranks 4",),
-    "ls": ("conoid ls --state running", "conoid ls --label batch=first --limit 100"),
+    "runs": ("conoid runs --case 'glass*' --since 3d", "conoid runs failed --label batch=first --limit 100"),
+    "ls": ("conoid ls --state running",),
     "show": ("conoid show last", "conoid show runs/local/RUN --json"),
     "watch": ("conoid watch last", "conoid watch runs/local/RUN --plain"),
     "cancel": ("conoid cancel last",),
