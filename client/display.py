@@ -38,8 +38,8 @@ _FRAME = 4
 """Characters that the border takes of a line."""
 _APART = 2
 """Characters between two columns."""
-_REST = 17
-"""Lines of the panel besides the ranks, the log and half of the ledger."""
+_DETAILS = (_MOST_RANKS, 6, True), (4, 3, True), (2, 2, True), (2, 2, False), (1, 1, False)
+"""Ranks, lines of the log, whether there are terms of the energy: the first for which the terminal is high enough."""
 _SMALL = 0.005
 """Of the whole energy: smaller terms share a line. Chosen: their bar has no length."""
 Pair = tuple[str, str]
@@ -54,16 +54,22 @@ class panel:  # noqa: N801
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
         """What rich asks for."""
-        live, width = self.live, options.max_width - _FRAME
-        spare = max(2, console.size.height - _REST)
+        for detail in _DETAILS:
+            drawn = self._drawn(options.max_width - _FRAME, detail)
+            if len(console.render_lines(drawn, options, pad=False)) < console.size.height:
+                break
+        yield drawn
+
+    def _drawn(self, width: int, detail: tuple[int, int, bool]) -> Panel:
+        live, (ranks, lines, terms) = self.live, detail
         parts: list[RenderableType] = [_bar(live), *_why(live), *_numbers(_facts(live), width)]
         if live.phases:
-            parts += [Text(), *_ranks(live, width, min(_MOST_RANKS, spare))]
+            parts += [Text(), *_ranks(live, width, ranks)]
         if live.progress is not None:
-            parts += [Text(), _ledger(live.progress.energy, width)]
+            parts += [Text(), _ledger(live.progress.energy, width, terms=terms)]
         if live.log:
-            parts += [Text(), *(_log_line(entry, times) for entry, times in _once(live)[-self.log_lines :])]
-        yield Panel(
+            parts += [Text(), *(_log_line(entry, times) for entry, times in _once(live)[-min(lines, self.log_lines) :])]
+        return Panel(
             Group(*parts), title=Text(live.title or live.run, style="bold", overflow="ellipsis"), title_align="left",
             border_style="bright_black", padding=(0, 1), subtitle=_under(live), subtitle_align="right",
         )  # fmt: skip
@@ -119,9 +125,9 @@ def _numbers(facts: list[Pair], width: int) -> list[RenderableType]:
 
 
 def _fits(facts: list[Pair], width: int, columns: int) -> bool:
-    """Whether all but two of the facts fit so many columns."""
+    """Whether most of the facts fit so many columns: all but a quarter."""
     share, name = (width - _APART * (columns - 1)) // columns, max((len(name) for name, _ in facts), default=0)
-    return sum(name + 1 + len(value) > share for _, value in facts) <= 2
+    return sum(name + 1 + len(value) > share for _, value in facts) <= max(2, len(facts) // 4)
 
 
 def _named(pair: Pair, width: int) -> Text:
@@ -206,33 +212,35 @@ def _stacked(parts: dict[str, float], longest: float, cells: int) -> Text:
     return text.append(" " * (cells - edges[-1]))
 
 
-def _ledger(energy: Energy, width: int) -> RenderableType:
-    """A bar a term; small ones share a line."""
-    terms = {
+def _ledger(energy: Energy, width: int, *, terms: bool) -> RenderableType:
+    """A bar a term; small ones share a line. Without ``terms`` the residual alone."""
+    residual = Text("residual ", style="bright_black").append(_residual(energy.residual))
+    supplied = f"of {si(energy.initial, 'J')} at the start and {si(energy.external, 'J')} from outside"
+    residual.append(f"  {supplied}", style="bright_black")
+    if not terms:
+        return residual
+    every = {
         "kinetic": energy.kinetic, "elastic": energy.elastic, "plastic": energy.plastic,
         "viscous": energy.viscous, "contact": energy.contact,
         "friction": energy.friction, "eroded": energy.eroded,
         "fracture": energy.fracture, "cohesive": energy.cohesive, "stepping": energy.stepping,
         "averaging": energy.averaging,
     }  # fmt: skip
-    whole = max(abs(energy.initial + energy.external), *(abs(value) for value in terms.values()), 1e-300)
+    whole = max(abs(energy.initial + energy.external), *(abs(value) for value in every.values()), 1e-300)
     grid = Table.grid(padding=(0, 1))
     grid.add_column(style="bright_black", no_wrap=True)
     grid.add_column(no_wrap=True)
     grid.add_column(justify="right", no_wrap=True)
     bar = min(_BAR, max(8, width - 22))
-    told = {name: value for name, value in terms.items() if abs(value) >= _SMALL * whole}
+    told = {name: value for name, value in every.items() if abs(value) >= _SMALL * whole}
     for name, value in told.items():
         length = min(bar, round(bar * abs(value) / whole))
         grid.add_row(name, Text("━" * length + " " * (bar - length), style="blue"), si(value, "J"))
     small = [
         Text(f"{name} {si(value, 'J')}", style="bright_black")
-        for name, value in terms.items()
+        for name, value in every.items()
         if value and name not in told
     ]
-    supplied = f"of {si(energy.initial, 'J')} at the start and {si(energy.external, 'J')} from outside"
-    residual = Text("residual ", style="bright_black").append(_residual(energy.residual))
-    residual.append(f"  {supplied}", style="bright_black")
     return Group(grid, *_flow(small, width), residual)
 
 
@@ -242,10 +250,10 @@ def _residual(residual: float) -> Text:
 
 
 def _once(live: Live) -> list[tuple[Log, int]]:
-    """The lines of the log in their order, each text once, where it came last, with how often it came."""
+    """The lines of the log, warnings last: each text once, where it came last, with how often it came."""
     times = Counter(entry.text for entry in live.log)
     last = {entry.text: entry for entry in live.log}
-    ordered = sorted(last.values(), key=lambda entry: entry.seq)
+    ordered = sorted(last.values(), key=lambda entry: (entry.level in _LEVEL_STYLE, entry.seq))
     return [(entry, times[entry.text]) for entry in ordered]
 
 

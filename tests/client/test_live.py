@@ -117,6 +117,18 @@ def test_the_panel_fits_the_terminal(width: int) -> None:
     assert max(map(len, rendered(told(13), width).splitlines())) <= width
 
 
+def test_the_panel_fits_the_height_of_the_terminal() -> None:
+    live = told(11)
+    live.phases = {"compute": [1.0] * 40}
+    for n in range(20, 30):
+        live.take(Log(run=stories.RUN, seq=n, wall=stories.START, level="warning", text=f"tet {n} is flat"))
+    text = rendered(live, 60, height=24)
+    assert len(text.splitlines()) < 24
+    assert "tet 29 is flat" in text
+    assert "residual 2.0e-4" in text
+    assert "kinetic" in rendered(live, 60, height=60)
+
+
 def test_bars_of_the_ranks_are_in_proportion() -> None:
     lines = [line for line in rendered(told(7)).splitlines() if "rank" in line and "busy" in line]
     assert [line.count("█") for line in lines] == [36, 36], "both ranks took the whole interval"
