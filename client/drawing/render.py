@@ -49,7 +49,7 @@ def _shots(picture: Picture) -> tuple[Picture, list[Shot]]:
         grid = surfaces.prepared(mesh, picture)
         bulk = surfaces.bulk(grid, picture)
         picture = camera.settled(_in_the_middle(picture, bulk), bulk)
-        bounds.append(np.reshape(mesh.bounds, (3, 2)))
+        bounds.append(surfaces.extent(grid, np.ones(grid.n_cells, bool)))
         surfaces.require_sections(picture, np.array([bounds[-1]]))
         shots.append(Shot(surfaces.pieces(grid, picture, picture.camera or camera.FROM), time, bounds[-1]))
     return picture, shots

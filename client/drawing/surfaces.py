@@ -94,8 +94,16 @@ def bulk(grid: Any, picture: Picture) -> Array:
     """(3, 2) lowest and highest coordinates, m, of a ``prepared`` frame without debris, as far as it is to be seen."""
     parts = np.asarray(grid["part"])
     seen = np.isin(parts, picture.focus) if picture.focus else ~np.isin(parts, picture.hidden)
-    near = grid.extract_cells(np.flatnonzero(seen & (np.asarray(grid["far"]) == 0)))
-    return np.reshape((near if near.n_cells else grid).bounds, (3, 2))
+    return extent(grid, seen & (np.asarray(grid["far"]) == 0))
+
+
+def extent(grid: Any, cells: Any) -> Array:
+    """(3, 2) lowest and highest coordinates, m, of the corners of some cells, of all where ``cells`` (n,) has none:
+    nodes that have left the body are points of the frame, too.
+    """
+    chosen = np.repeat(cells if cells.any() else np.ones(grid.n_cells, bool), np.diff(grid.offset))
+    corners = np.asarray(grid.points, float)[np.asarray(grid.cell_connectivity)[chosen]]
+    return np.stack([corners.min(axis=0), corners.max(axis=0)], axis=1)
 
 
 def require_sections(picture: Picture, bounds: Array) -> None:
@@ -113,7 +121,8 @@ def _nothing(grid: Any, picture: Picture) -> LookError:
     if not picture.sections:
         return LookError("hide: all parts are hidden")
     plane = picture.sections[0]
-    return _beyond("xyz"[plane.axis], plane.place, *np.reshape(grid.bounds, (3, 2))[plane.axis])
+    low, high = extent(grid, np.ones(grid.n_cells, bool))[plane.axis]
+    return _beyond("xyz"[plane.axis], plane.place, low, high)
 
 
 def _beyond(axis: str, at: float, low: float, high: float) -> LookError:

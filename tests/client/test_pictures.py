@@ -63,7 +63,7 @@ def coloured(path: Path) -> Any:
 @pytest.mark.usefixtures("warm")
 @pytest.mark.parametrize(
     ("section", "mirror", "camera"),
-    [("x=0.0016", "none", "x"), ("y=middle", "none", "y"), ("x=0", "x", "x"),
+    [("x=0.0016", "none", "x"), ("z=middle", "none", "z"), ("x=0", "x", "x"),
      ("x=-0.0016", "x", "x"), ("x=0.0016", "x", "-x"),
      ("x=-0.0016,y=0.0016", "x,y", "1,1,0.2")],
 )  # fmt: skip
@@ -155,6 +155,27 @@ def test_debris_far_away_does_not_shrink_the_body_and_is_counted(frame: Path, tm
     found = drawn(far, "part", tmp_path / "b.png", camera="x", up="z")
     assert found.beyond == 1
     assert coloured(tmp_path / "b.png").sum() > 0.9 * coloured(tmp_path / "a.png").sum()
+
+
+@pytest.mark.usefixtures("warm")
+def test_nodes_that_have_left_are_no_part_of_the_body(frame: Path, tmp_path: Path) -> None:
+    """A long body lies along the picture all the same, and a section has to be within its tets."""
+    lost = tmp_path / "lost.vtkhdf"
+    lost.write_bytes(frame.read_bytes())
+    with h5py.File(lost, "r+") as file:
+        root = file["VTKHDF"]
+        points = np.concatenate([np.asarray(root["Points"]), [[0.5, 0.4, 0.0]]])
+        del root["Points"]
+        root["Points"], root["NumberOfPoints"][0] = points, len(points)
+        for name in ("velocity", "displacement"):
+            values = np.asarray(root["PointData"][name])
+            del root["PointData"][name]
+            root["PointData"][name] = np.concatenate([values, values[:1]])
+    drawn(frame, "part", tmp_path / "a.png")
+    drawn(lost, "part", tmp_path / "b.png")
+    assert (coloured(tmp_path / "a.png") == coloured(tmp_path / "b.png")).mean() > 0.999
+    with pytest.raises(LookError, match=r"section = x=0\.4: the body is between x=0 and"):
+        drawn(lost, "part", tmp_path / "c.png", section="x=0.4")
 
 
 @pytest.mark.usefixtures("warm")

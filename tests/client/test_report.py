@@ -202,6 +202,9 @@ def test_a_replay_has_every_module_that_it_imports(folder: Path, tmp_path: Path)
     html = report.write(with_snapshots(folder, 3), tmp_path / "bar.html", []).read_text()
     there = modules(html)
     assert "conoid/view3d.js" in there
+    for name in ("colours.js", "shaders.js"):
+        own = (Path(replay3d.__file__).parent / "web" / name).read_text(encoding="utf-8")
+        assert own.replace('"./', '"conoid/') == there[f"conoid/{name}"], "the report has the colours of the page"
     for name, code in there.items():
         if name != "conoid/three":
             for used in re.findall(r"""(?:from|import)\s*\(?\s*["']([^"']+)["']""", code):
