@@ -11,7 +11,7 @@ precision highp int;
 uniform mat4 modelViewMatrix, projectionMatrix;
 uniform vec3 low, span, middle;
 uniform vec4 mirrors[3];
-uniform float explode;
+uniform float explode, edges;
 uniform int image, layer;
 uniform sampler2D centres, tints, shown;
 in vec4 corner;
@@ -27,8 +27,9 @@ void main() {
   place = low + span * corner.xyz / 65535.0;
   vec3 seenAt = place + explode * (texelFetch(centres, texel, 0).xyz - middle);
   turned = 1.0;
-  for (int k = 0; k < 3; k += 1) {
-    if ((((image + gl_InstanceID) >> k) & 1) == 1) {
+  int mirrored = image + gl_InstanceID;
+  for (int k = 0; mirrored >> k > 0; k += 1) {
+    if (((mirrored >> k) & 1) == 1) {
       place -= 2.0 * (dot(mirrors[k].xyz, place) - mirrors[k].w) * mirrors[k].xyz;
       seenAt -= 2.0 * (dot(mirrors[k].xyz, seenAt) - mirrors[k].w) * mirrors[k].xyz;
       turned = -turned;
@@ -37,10 +38,13 @@ void main() {
   vec4 seen = modelViewMatrix * vec4(seenAt, 1.0);
   view = seen.xyz;
   level = value;
-  int number = gl_VertexID % 3;
-  edge = vec3(number == 0, number == 1, number == 2);
-  if (omit == 1.0) edge.y = 1.0;
-  if (omit == 2.0) edge.z = 1.0;
+  edge = vec3(0.0);
+  if (edges > 0.0) {
+    int number = gl_VertexID % 3;
+    edge = vec3(number == 0, number == 1, number == 2);
+    if (omit == 1.0) edge.y = 1.0;
+    if (omit == 2.0) edge.z = 1.0;
+  }
   tint = texelFetch(tints, texel, 0);
   opacity = texelFetch(shown, ivec2(int(part + 0.5), 0), 0).r;
   bool solid = opacity > 0.995;
@@ -75,7 +79,7 @@ bool between() {
   return false;
 }
 void main() {
-  if (cap == 0 && (dot(plane.xyz, place) > plane.w || between())) discard;
+  if (cap == 0 && (dot(plane.xyz, place) > plane.w || (planes > 0 && between()))) discard;
   if (mode == 2) {
     colour = vec4(float(row & 255), float((row >> 8) & 255), cap == 0 ? 255.0 : 254.0, 255.0) / 255.0;
     return;
