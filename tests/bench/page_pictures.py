@@ -1,7 +1,7 @@
 """Pictures of the page: ``python -m tests.bench.page_pictures RUN``, where RUN is the folder of a run that has ended.
 
-docs/pictures/page.png is the body on its page. ``--all FOLDER`` makes others to be looked at: whole pages, light and
-dark, on a phone, with 16 ranks (a run that no solver has made), and the list of runs.
+docs/pictures/page.png is the page of a run. ``--all FOLDER`` makes others to be looked at: whole pages, light and
+dark, wide, on a phone, at 200 %, with 16 ranks (a run that no solver has made), the list of runs, a case in the editor.
 """
 
 import argparse
@@ -17,8 +17,11 @@ from .page_scene import lay, take
 
 OUT = Path(__file__).parents[2] / "docs" / "pictures" / "page.png"
 _OF_16 = "1k0aaaaaaaaaaaaaaaaaaa"
-_WINDOW, _PHONE = (1280, 720), (390, 844)
-_LOOKS = (("light", _WINDOW, False), ("dark", _WINDOW, True), ("phone", _PHONE, False), ("phone dark", _PHONE, True))
+_WINDOW, _WIDE, _PHONE, _ZOOMED = (1280, 720), (1920, 1080), (390, 844), (640, 360)
+_LOOKS = (
+    ("light", _WINDOW, False), ("dark", _WINDOW, True), ("wide", _WIDE, False), ("phone", _PHONE, False),
+    ("phone dark", _PHONE, True), ("zoomed", _ZOOMED, False),
+)  # fmt: skip
 _DRAWN = "[...document.querySelectorAll('.plot')].every((plot) => plot.querySelector('canvas'))"
 _SETTLED = 2.0
 """s after which nothing moves any more. Chosen."""
@@ -58,10 +61,10 @@ def _opened(page: Page, site: Site, run: str) -> Page:
 
 
 def _draw(browser: Browser, site: Site, run: str, out: Path) -> None:
-    """The body pulled apart a little, in a window that shows it with its controls."""
-    page = _opened(browser.page(1280, 900), site, run)
+    """The body pulled apart a little, beside the numbers and a chart."""
+    page = _opened(browser.page(1440, 810), site, run)
     page.slide("input[aria-label=explode]", 0.06)
-    page.place("section[data-shown]")
+    page.evaluate("scrollTo(0, 0)")
     time.sleep(_SETTLED)
     page.draw(out)
     page.close()
@@ -75,6 +78,9 @@ def _draw_all(browser: Browser, site: Site, run: str, folder: Path) -> None:
         page.go(f"{site.url}#/")
         page.wait("document.querySelector('td a.name')")
         page.draw(folder / f"{name} list.png")
+        page.go(f"{site.url}#/new?from={run}")
+        page.wait("document.body.innerText.includes('This case can be run')")
+        page.draw(folder / f"{name} new.png")
         page.close()
     _draw_whole(_opened(browser.page(*_WINDOW), site, _OF_16), folder / "16 ranks.png")
 

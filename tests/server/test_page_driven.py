@@ -50,6 +50,7 @@ def watched(site: Site, browser: Browser) -> tuple[str, Page]:
     page.wait("document.querySelector('form.sign-in')")
     assert (page.errors, [told for told in page.answers if told[0] >= 400]) == ([], [])
     sign_in(page, site)
+    page.evaluate("localStorage.setItem('conoid.fold.numbers', 'true')")
     run = site.submit(demo(ranks="2"))
     page.click("td a.name")
     page.wait("document.querySelectorAll('.cards > section').length > 5")
@@ -122,7 +123,8 @@ def test_the_body_is_cut_pulled_apart_picked_and_played(watched: tuple[str, Page
     page.slide("input[aria-label=explode]", 0.6)
     page.slide("select[aria-label='section across']", "y")
     page.slide("input[aria-label='place of the section']", 0.0005)
-    assert page.text(".place") == "500 µm"
+    place = "document.querySelector('input[aria-label=\"place of the section\"]').value"
+    assert page.text(".place") == page.evaluate(f"import('./figures.js').then((m) => m.si(Number({place}), 'm'))")
     choices = "[...document.querySelector('select[aria-label^=colour]').options].map((o) => o.value)"
     for by in page.evaluate(choices):
         page.slide("select[aria-label='colour by']", by)
