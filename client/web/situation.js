@@ -16,9 +16,10 @@ const HELP = {
   diverged: "Look at the last snapshot and at dt before the end; a smaller numerics.dt_safety or erosion of worn tets helps.",
   energy: "Look at the energy by term: the term that grows is the one that fails; a smaller numerics.dt_safety helps.",
   memory: "Use larger elements, or a machine with more memory.", walltime: "Go on from the last checkpoint, or allow more in run.wall_time.",
-  steps: "Go on with a larger run.max_steps; the log says which tet holds the time step down.", storage: "Make room on the disk, then go on from the last checkpoint.",
+  steps: "Open the case, allow more in run.max_steps, and start again; dt is held down by what stands beside it.", storage: "Make room on the disk, then go on from the last checkpoint.",
 };
 const POINT = /^checkpoints\/(\d+)\/manifest\.json$/;
+const FATED = new Set(["input", "mesh", "diverged", "energy", "steps"]); // Causes that the same case meets again.
 const BAD = new Set(["failed", "lost", "timed_out", "cancelled"]);
 
 export class Situation {
@@ -45,9 +46,9 @@ export class Situation {
     this.element.replaceChildren(h("div", {}, h("h2", {}, sentence(live)), live.message ? h("p", {}, live.message) : "",
       h("p.hint", {}, reached(live)), HELP[live.cause] ? h("p", {}, HELP[live.cause]) : "", actions), log);
     const [files, lines] = await Promise.all([this.files(), this.end(live)]);
-    const point = files?.filter(({ path }) => POINT.test(path)).at(-1);
+    const point = FATED.has(live.cause) ? null : files?.filter(({ path }) => POINT.test(path)).at(-1);
     if (point) actions.append(this.restart(POINT.exec(point.path)[1]));
-    else if (files) actions.append(h("span.hint", {}, "It has left no checkpoint to go on from; open the case, change it and start again."));
+    else if (files && !FATED.has(live.cause)) actions.append(h("span.hint", {}, "It has left no checkpoint to go on from; open the case, change it and start again."));
     log.hidden = !lines;
     log.replaceChildren(lines);
     log.scrollTop = log.scrollHeight;

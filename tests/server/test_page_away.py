@@ -165,7 +165,7 @@ def test_a_token_lasts_for_the_tab_or_until_the_user_signs_out(web: Path) -> Non
 ENDED = {
     **RUN,
     "state": "failed",
-    "cause": "diverged",
+    "cause": "node",
     "message": "tet 7 is inside out",
     "outcome": {"warnings": ["a", "c"]},
 }
@@ -189,7 +189,7 @@ def test_a_run_that_has_ended_says_why_and_what_it_was_warned_of(web: Path) -> N
         return told;
     """
     told, warnings, log_shown, files = played(web, script % json.dumps([ENDED, history]))
-    assert "Failed: its numbers have grown beyond all bounds" in told
+    assert "Failed: a process or a machine of it is gone" in told
     assert "tet 7 is inside out" in told
     assert "Go on from step 120" in told
     assert warnings.split() == ["a", "b", "c"]
