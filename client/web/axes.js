@@ -17,7 +17,7 @@ export function common(alone) {
     animation: false,
     textStyle: { fontFamily: "system-ui, sans-serif", color: colour("ink") },
     grid: { left: 64, right: 14, top: 40, bottom: 26 },
-    legend: { top: 0, left: 0, right: 4, type: "scroll", itemWidth: 18, itemHeight: 9, textStyle: { color: colour("soft"), fontSize: FONT }, inactiveColor: colour("faint"),
+    legend: { top: 0, left: 0, right: 4, type: "scroll", itemWidth: 18, itemHeight: 9, textStyle: { color: colour("soft"), fontSize: FONT, lineHeight: 18 }, inactiveColor: colour("faint"),
       pageIconColor: colour("soft"), pageIconInactiveColor: colour("line"), pageTextStyle: { color: colour("soft"), fontSize: FONT } },
     tooltip: {
       trigger: alone ? "item" : "axis", showContent: alone, renderMode: alone ? "richText" : "html", confine: true, backgroundColor: colour("card"), borderColor: colour("line"),

@@ -70,7 +70,7 @@ export function ofWork(live) {
     tooltip: { ...common(true).tooltip, formatter: ({ value: [from, to, row, share] }) => `${names[row]}\n${si(from, "s")} to ${si(to, "s")}\n${percent(share, 0)} of the work of the busiest rank` },
     xAxis: time(end(live)),
     yAxis: { type: "category", data: names, inverse: true, axisLine: { show: false }, axisTick: { show: false }, axisLabel: label((name) => name) },
-    visualMap: { min: 0, max: 1, dimension: 3, orient: "horizontal", top: 0, left: 92, itemWidth: 10, itemHeight: 120, text: ["as much as the busiest rank", "no work"], textStyle: { color: colour("soft"), fontSize: FONT },
+    visualMap: { min: 0, max: 1, dimension: 3, orient: "horizontal", top: 0, left: 92, itemWidth: 10, itemHeight: 120, text: ["as the busiest rank", "no work"], textStyle: { color: colour("soft"), fontSize: FONT },
       calculable: false, hoverLink: false, inRange: { color: [colour("track"), colour("compute")] } },
     series: [{ type: "custom", name: "work", aside: true, renderItem: drawCell, encode: { x: [0, 1], y: 2, tooltip: 3 }, data, progressive: 0, clip: true }],
   };
