@@ -27,14 +27,14 @@ _MANY = 64
 """Corners that are looked at together: their rows, 10 kB, stay in the first cache."""
 _WORD = 8
 """Flags in a word, and numbers in the longest vectors there are."""
-_CORNER, _TO_F, _TO_G, _TO_TOP, _INWARD = (_MANY * row for row in (0, 3, 6, 9, 12))
-"""Rows of three: the corner, from there the ends of the other two edges of the side, clockwise seen from outside, and
-the node across; the normal of the side."""
-_SQUARE, _FF, _GG, _FG, _TWIN = (_MANY * row for row in (15, 16, 17, 18, 19))
+_CORNER, _TO_F, _TO_G, _INWARD = (_MANY * row for row in (0, 3, 6, 9))
+"""Rows of three: the corner, from there the ends of the other two edges of the side, clockwise seen from outside; the
+normal of the side."""
+_SQUARE, _FF, _GG, _FG, _TWIN = (_MANY * row for row in (12, 13, 14, 15, 16))
 """Rows: dot products of the normal and of the two edges, and the number of the corner's twin among the members."""
-_ROWS = 20
-_SOON, _NEXT, _NOW = 16, 8, 4
-"""How many corners ahead is brought near where a corner is, its tet and the ends of its side, and the node across."""
+_ROWS = 17
+_SOON, _NEXT = 16, 8
+"""How many corners ahead is brought near where a corner is, and the nodes of its side."""
 _LATER = np.array([0, 1, 2, 0, 1])
 """Corners of a side, one after the other."""
 _I, _F, _F1, _F2 = types.int64, types.float64, types.float64[::1], types.float64[:, ::1]
@@ -72,28 +72,15 @@ def _opened(tets, across, bond, e, f, g):  # type: ignore[no-untyped-def]
     return one + 2 * ((across[e, second] < 0) | (bond[e, second] != INTACT))
 
 
-@njit(
-    types.void(_N1, _I, _N2, _N3, types.uint32[:, ::1], _N2, types.uint8[:, ::1], _N1, types.float64[:, :]),
-    cache=True,
-    forceinline=True,
-)
-def _bring(corners, i, cracks, sides, tets, across, bond, place, ahead):  # type: ignore[no-untyped-def]
+@njit(types.void(_N1, _I, _N2, _N1, types.float64[:, :]), cache=True, forceinline=True)
+def _bring(corners, i, cracks, place, ahead):  # type: ignore[no-untyped-def]
     """Has what corners behind the place ``i`` need brought near: it is apart in memory, and one leads to the other."""
     last = len(corners) - 1
-    c = corners[min(i + _SOON, last)] >> 3
-    prefetch(cracks, 6 * c)
-    prefetch(sides, 6 * c)
+    prefetch(cracks, 6 * (corners[min(i + _SOON, last)] >> 3))
     m = corners[min(i + _NEXT, last)]
     c, h = m >> 3, m >> 2 & 1
-    e = sides[c, h, 1]
-    prefetch(tets, 4 * e)
-    prefetch(across, 4 * e)
-    prefetch(bond, 4 * e)
     for k in range(3):
         prefetch(ahead, LINE * place[cracks[c, 3 * h + k]])
-    m = corners[min(i + _NOW, last)]
-    c, h = m >> 3, m >> 2 & 1
-    prefetch(ahead, LINE * place[tets[sides[c, h, 1], sides[c, h, 2]]])
 
 
 @njit(f"UniTuple(float64, 2)({VECTOR}, {VECTOR}, {VECTOR})", cache=True, forceinline=True)
@@ -147,7 +134,7 @@ def _set(w, row, i, a):  # type: ignore[no-untyped-def]
 @njit(types.void(_F1, _I), cache=True, error_model="numpy")
 def _measure(w, n):  # type: ignore[no-untyped-def]
     """Edges and what follows from them, of the first ``n`` corners, whose edges are still positions of their ends."""
-    for row in (_TO_F, _TO_G, _TO_TOP):
+    for row in (_TO_F, _TO_G):
         to, o = w[row:], w[_CORNER:]
         for i in range(n):
             to[i] -= o[i]
@@ -242,7 +229,7 @@ def entering(out, base, each, narrow, of, step, first, stop):  # type: ignore[no
     begins, end = base + each * start[first], base + each * start[stop]
     n = begins
     w, flags, some = np.zeros(_ROWS * _MANY), np.zeros(_MANY, np.uint8), np.empty(_WORD, np.int64)
-    words, opened, rest = flags.view(np.uint64), np.empty(_MANY, np.int64), np.empty((_MANY, 3), np.int32)
+    words, rest = flags.view(np.uint64), np.empty((_MANY, 3), np.int32)
     for family in range(first, stop):
         kind = part[place[members[begin[family]]]]
         if not mu[kind, kind] >= 0.0:
@@ -251,17 +238,15 @@ def entering(out, base, each, narrow, of, step, first, stop):  # type: ignore[no
             many = min(start[family + 1] - head, _MANY)
             full = (many + _WORD - 1) // _WORD
             for i in range(many):
-                _bring(corners, head + i, cracks, sides, tets, across, bond, place, ahead)
+                _bring(corners, head + i, cracks, place, ahead)
                 m = corners[head + i]
                 c, h, k = m >> 3, m >> 2 & 1, m & 3
-                e, p = sides[c, h, 1], cracks[c, 3 * h + k]
+                p, w[_TWIN + i] = cracks[c, 3 * h + k], among[cracks[c, 3 - 3 * h + k]]
                 f, g = cracks[c, 3 * h + _LATER[k + 2 - h]], cracks[c, 3 * h + _LATER[k + 1 + h]]
-                opened[i], w[_TWIN + i] = _opened(tets, across, bond, e, f, g), among[cracks[c, 3 - 3 * h + k]]
                 rest[i, 0], rest[i, 1], rest[i, 2] = p, f, g
                 _set(w, _CORNER, i, at(ahead, place[p]))
                 _set(w, _TO_F, i, at(ahead, place[f]))
                 _set(w, _TO_G, i, at(ahead, place[g]))
-                _set(w, _TO_TOP, i, at(ahead, place[tets[e, sides[c, h, 2]]]))
             for i in range(many, full * _WORD):
                 w[_CORNER + i] = np.nan
             _measure(w, full * _WORD)
@@ -278,13 +263,18 @@ def entering(out, base, each, narrow, of, step, first, stop):  # type: ignore[no
                         found += flags[i]
                     for u in range(found):
                         i = some[u]
-                        r, to_f, to_g = minus((x, y, z), _of(w, _CORNER, i)), _of(w, _TO_F, i), _of(w, _TO_G, i)
-                        if opened[i] and _beside(r, _of(w, _INWARD, i), _of(w, _TO_TOP, i), to_f, to_g, opened[i]):
-                            continue
+                        p, f, g, o = rest[i, 0], rest[i, 1], rest[i, 2], _of(w, _CORNER, i)
+                        r, to_f, to_g = minus((x, y, z), o), _of(w, _TO_F, i), _of(w, _TO_G, i)
+                        c, h = corners[head + i] >> 3, corners[head + i] >> 2 & 1
+                        e = sides[c, h, 1]
+                        opened = _opened(tets, across, bond, e, f, g)
+                        if opened:
+                            to_top = minus(at(ahead, place[tets[e, sides[c, h, 2]]]), o)
+                            if _beside(r, _of(w, _INWARD, i), to_top, to_f, to_g, opened):
+                                continue
                         along_f, along_g = dot(to_f, r), dot(to_g, r)
                         w_f = max(w[_GG + i] * along_f - w[_FG + i] * along_g, 0.0) / w[_SQUARE + i]
                         w_g = max(w[_FF + i] * along_g - w[_FG + i] * along_f, 0.0) / w[_SQUARE + i]
-                        p, f, g = rest[i, 0], rest[i, 1], rest[i, 2]
                         if n < end:
                             nodes[n, 0], nodes[n, 1], nodes[n, 2], nodes[n, 3] = d, place[p], place[f], place[g]
                             weights[n, 0], weights[n, 1], weights[n, 2] = 1.0 - w_f - w_g, w_f, w_g
