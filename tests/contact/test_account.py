@@ -90,7 +90,7 @@ def test_the_cost_of_an_impulse_is_the_work_between_two_half_steps() -> None:
     before, v = np.zeros((4, 3)), np.zeros((4, 3))
     before[:2, 0], v[:2, 0] = (2.0, -1.0), (-1.0, 0.0)
     loaded, active, account = Loaded.of(2, 1), ActiveNodes.of(4), Account(1.0)
-    loaded.normal[:, :3], loaded.normal[:, PUSH], loaded.many[0, 0] = (-1.0, 0.0, 0.0), (3.0, 0.0), 2
+    loaded.normal[:, :3], loaded.normal[:, PUSH], loaded.many[0] = (-1.0, 0.0, 0.0), (3.0, 0.0), 2
     loaded.tangent[:, :4], loaded.slots[:] = (1.0, -1.0, 0.0, 0.0), [[0, 1, 2, 3], [1, 0, 2, 3]]
     active.moving[:, :3] = v
     booking.cost(account.words, loaded, active, before, np.arange(4, dtype=np.int32), account.scale, 0)

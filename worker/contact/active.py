@@ -33,7 +33,8 @@ class ActiveContacts(NamedTuple):
     slots: Indices
     """(contacts, 4) the third is -1 in a row of two nodes, of weights 1 and -1."""
     reach: Floats
-    """(contacts,) the sum of the paths of its nodes up to which an idle contact stays idle, m/s."""
+    """(contacts,) the sum of the paths of its nodes up to which an idle contact stays idle, m/s; infinite for a loaded
+    one."""
     weights: Floats
     """(room, 4)."""
     normals: Floats
@@ -78,8 +79,8 @@ class ActiveNodes(NamedTuple):
 
 
 class Loaded(NamedTuple):
-    """Contacts that have asked for an impulse in the step, and those that are idle, in the order of their sets
-    (zones.py): set k has the places from ``begin[k]`` on, and no more than that many contacts.
+    """Contacts that have asked for an impulse in the step, in the order of their sets (zones.py): those of set k stand
+    from ``begin[k]`` on.
     """
 
     normal: Floats
@@ -91,19 +92,16 @@ class Loaded(NamedTuple):
     """(contacts, 4) the third is -1 in a row of two nodes, of weights 1 and -1."""
     row: Indices
     """(contacts,) row of each that is loaded."""
-    idle: Indices
-    """(contacts,) which active contacts have not asked for an impulse yet."""
     begin: Ints
-    """(sets + 1,)."""
+    """(sets + 1,) which of all active contacts are those of each set."""
     many: Ints
-    """(sets, 2) how many are loaded, how many idle."""
+    """(sets,) how many of these are loaded."""
 
     @classmethod
     def of(cls, room: int, sets: int) -> "Loaded":
         """Room for as many."""
-        lines, numbers = np.empty((2, room, 8)), np.empty((2, room), np.int32)
-        ends, many = np.zeros(sets + 1, np.int64), np.zeros((sets, 2), np.int64)
-        return cls(lines[0], lines[1], np.empty((room, 4), np.int32), numbers[0], numbers[1], ends, many)
+        lines, slots, row = np.empty((2, room, 8)), np.empty((room, 4), np.int32), np.empty(room, np.int32)
+        return cls(lines[0], lines[1], slots, row, np.zeros(sets + 1, np.int64), np.zeros(sets, np.int64))
 
 
 _I2, _N1, _N2 = types.int64[:, ::1], types.int32[::1], types.int32[:, ::1]
@@ -111,4 +109,4 @@ _F1, _F2 = types.float64[::1], types.float64[:, ::1]
 CONTACTS = record(ActiveContacts, _N1, _N2, _F1, _F2, _F2, _F1, _F1, _N1)
 NODES = record(ActiveNodes, _F2, _I2, _F2, _I2, _I2, _F1)
 KEPT = record(Kept, _F2, _F2)
-LOADED = record(Loaded, _F2, _F2, _N2, _N1, _N1, types.int64[::1], _I2)
+LOADED = record(Loaded, _F2, _F2, _N2, _N1, types.int64[::1], types.int64[::1])

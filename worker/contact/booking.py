@@ -19,7 +19,7 @@ def cost(words, loaded, active, before, places, joule, k):  # type: ignore[no-un
     """
     values, normal, tangent, slots = active.moving, loaded.normal, loaded.tangent, loaded.slots
     value = np.empty(2)
-    for q in range(loaded.begin[k], loaded.begin[k] + loaded.many[k, 0]):
+    for q in range(loaded.begin[k], loaded.begin[k] + loaded.many[k]):
         push = normal[q, PUSH]
         if push > 0.0:
             early, late = 0.0, 0.0
@@ -44,7 +44,7 @@ def heat(words, loaded, active, before, places, joule, k):  # type: ignore[no-un
     """
     values, normal, tangent, slots = active.moving, loaded.normal, loaded.tangent, loaded.slots
     value = np.empty(2)
-    for q in range(loaded.begin[k], loaded.begin[k] + loaded.many[k, 0]):
+    for q in range(loaded.begin[k], loaded.begin[k] + loaded.many[k]):
         if normal[q, MU] > 0.0 and normal[q, PUSH] > 0.0:
             early, late, many = 0.0, 0.0, 2 if slots[q, 2] < 0 else 4
             for i in range(3):
@@ -67,7 +67,7 @@ def between(words, loaded, places, part, scale, k):  # type: ignore[no-untyped-d
     nodes at the ``places`` of the slots.
     """
     normal, tangent, slots = loaded.normal, loaded.tangent, loaded.slots
-    for q in range(loaded.begin[k], loaded.begin[k] + loaded.many[k, 0]):
+    for q in range(loaded.begin[k], loaded.begin[k] + loaded.many[k]):
         many, one = 2 if slots[q, 2] < 0 else 4, part[places[slots[q, 0]]]
         other, share = one, 0.0
         for j in range(many):

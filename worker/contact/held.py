@@ -74,8 +74,8 @@ def number(places, slot, touched):  # type: ignore[no-untyped-def]
     return n
 
 
-@njit(types.void(_N1, _N1, _N2, _F1, _I2, _N1, _N1, _N2, _N1, _I, _I, _I), cache=True)
-def sort(idle, row, slots, reach, begins, set_of, found, nodes, slot, task, first, stop):  # type: ignore[no-untyped-def]
+@njit(types.void(_N1, _N2, _F1, _I2, _N1, _N1, _N2, _N1, _I, _I, _I), cache=True)
+def sort(row, slots, reach, begins, set_of, found, nodes, slot, task, first, stop):  # type: ignore[no-untyped-def]
     """Puts the contacts ``found`` from ``first`` to ``stop`` into the order of their sets, all idle: their rows, slots,
     and ``reach``, -1, for none is known to stay so. ``begins`` (tasks, sets): where those of this task begin, and after
     it where they end; ``slot`` (crowd,): see ``number``.
@@ -84,7 +84,7 @@ def sort(idle, row, slots, reach, begins, set_of, found, nodes, slot, task, firs
         p, kind = found[q], set_of[q]
         at = begins[task, kind]
         begins[task, kind] += 1
-        idle[at], row[at], reach[at] = at, p, -1.0
+        row[at], reach[at] = p, -1.0
         for k in range(4):
             slots[at, k] = slot[nodes[p, k]]
         if nodes[p, 1] == nodes[p, 2]:

@@ -97,10 +97,10 @@ class ActiveSet:
         begin = np.cumsum(counts) - counts
         begins = np.cumsum(many, axis=0) - many + begin
         self._passes.sort.run(
-            n, room.loaded.idle, room.row, room.slots, room.reach, begins, room.set_of, rows.found, nodes, room.slot
+            n, room.row, room.slots, room.reach, begins, room.set_of, rows.found, nodes, room.slot
         )  # fmt: skip
         room.loaded.begin[:-1], room.loaded.begin[-1] = begin, n
-        room.loaded.many[:, 0], room.loaded.many[:, 1] = 0, counts
+        room.loaded.many[:] = 0
 
     def _loaded(self, crowd: Crowd) -> float:
         fastest = np.zeros(self._passes.load.many(len(self.places)))
@@ -195,7 +195,7 @@ class ActiveSet:
         friction, N s.
         """
         loaded = self._room.loaded
-        ranges = [range(a, a + n) for a, n in zip(loaded.begin[:-1], loaded.many[:, 0], strict=True)]
+        ranges = [range(a, a + n) for a, n in zip(loaded.begin[:-1], loaded.many, strict=True)]
         some = np.concatenate([np.asarray(each, np.int64) for each in ranges])
         return loaded.row[some], np.column_stack([loaded.normal[some, PUSH], loaded.tangent[some, PUSH_T:]])
 

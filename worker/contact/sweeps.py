@@ -11,7 +11,8 @@ node and a face, and nodes across a crack, begin with their impulses of the step
 what is under pressure does not sink in, however few the sweeps are.
 
 A contact that has had no impulse in the step and closes no faster than it may is idle: it changes nothing until sweeps
-have moved its nodes by as much as it has left. The others are loaded: their data lie together, and only they are swept.
+have moved its nodes by as much as it has left, its reach. The others are loaded, and have an infinite one: their data
+lie together, and only they are swept.
 
 Kernels call no kernel within a loop over contacts: records of arrays are counted as references at each call.
 """
@@ -51,14 +52,14 @@ _ACROSS = (1.0, -1.0, 0.0, 0.0)
 _ROUNDING = 2.0**-40
 """Of the velocities: far more than what a contact's speed, a sum of twelve products, may be off by."""
 
-_ROWS, _F2, _F, _I = types.int32[::1], types.float64[:, ::1], types.float64, types.int64
+_ROWS, _F1, _F, _I = types.int32[::1], types.float64[::1], types.float64, types.int64
 
 
 @njit(types.void(NODES, CONTACTS, LOADED, _I), cache=True)
 def add_row_weights(active, contacts, loaded, k):  # type: ignore[no-untyped-def]
-    """Adds |w| |n_i| and |w| of the contacts of set ``k``, all idle, to the row weights of their nodes, in quanta."""
+    """Adds |w| |n_i| and |w| of the contacts of set ``k`` to the row weights of their nodes, in quanta."""
     sums, slots, weights, normals = active.row_weights, contacts.slots, contacts.weights, contacts.normals
-    for q in range(loaded.begin[k], loaded.begin[k] + loaded.many[k, 1]):
+    for q in range(loaded.begin[k], loaded.begin[k + 1]):
         p, two = contacts.row[q], slots[q, 2] < 0
         for m in range(2 if two else 4):
             a, weight = slots[q, m], SHARES if two else abs(weights[p, m]) * SHARES
@@ -99,6 +100,22 @@ def fill(loaded, contacts, active, first, end):  # type: ignore[no-untyped-def]
         tangent[q, ROW_NORM_T] = across if across > 0.0 else np.inf
 
 
+@njit(_I(_ROWS, CONTACTS, _F1, _I, _I), cache=True)
+def _due(due, contacts, path, first, end):  # type: ignore[no-untyped-def]
+    """Which of the contacts from ``first`` to ``end`` have nodes of ``path`` (slots,) that may have used up their
+    reach; returns how many. Few have, and every sweep asks: one takes 1 ns, 2 if the number of a slot might be negative.
+    """
+    slots, reach, n = contacts.slots, contacts.reach, 0
+    for q in range(first, end):
+        paths = path[np.uint32(slots[q, 0])] + path[np.uint32(slots[q, 1])]
+        if slots[q, 2] >= 0:
+            paths = paths + path[np.uint32(slots[q, 2])] + path[np.uint32(slots[q, 3])]
+        if paths >= reach[q]:
+            due[n] = q
+            n += 1
+    return n
+
+
 @njit(types.void(LOADED, CONTACTS, NODES, _F, _I), cache=True, error_model="numpy")
 def load(loaded, contacts, active, fastest, k):  # type: ignore[no-untyped-def]
     """Takes those of the idle contacts of set ``k`` among the loaded that close faster than they may.
@@ -108,35 +125,33 @@ def load(loaded, contacts, active, fastest, k):  # type: ignore[no-untyped-def]
     the beginning of the step, m/s.
     """
     slots, weights, normals, wanted = contacts.slots, contacts.weights, contacts.normals, contacts.wanted
-    moving, path, reach, count, first = active.moving, active.path, contacts.reach, loaded.many, loaded.begin[k]
-    idle, row = loaded.idle[first:], loaded.row[first:]
-    n, m = count[k, 0], 0
-    for q in range(count[k, 1]):
-        each = idle[q]
+    moving, path, reach, first, end = active.moving, active.path, contacts.reach, loaded.begin[k], loaded.begin[k + 1]
+    before = first + loaded.many[k]
+    row = loaded.row[before:]
+    n = 0
+    for q in range(_due(row, contacts, path, first, end)):
+        each = row[q]
         a, b, c, d = slots[each, 0], slots[each, 1], slots[each, 2], slots[each, 3]
-        two = c < 0
-        paths = path[a] + path[b] if two else path[a] + path[b] + path[c] + path[d]
-        asks = False
-        if paths >= reach[each]:
-            p, speed, most = contacts.row[each], 0.0, 1.0
-            for i in range(3):
-                if two:
-                    rate = 0.0 + moving[a, V + i] - moving[b, V + i]
-                else:
-                    rate = 0.0 + weights[p, 0] * moving[a, V + i] + weights[p, 1] * moving[b, V + i]
-                    rate = rate + weights[p, 2] * moving[c, V + i] + weights[p, 3] * moving[d, V + i]
-                speed += normals[p, i] * rate
-            asks = wanted[p] > speed
-            if not two:
-                for j in range(4):
-                    most = max(most, abs(weights[p, j]))
-            left = (speed - wanted[p]) / most
-            reach[each] = paths + left - _ROUNDING * (fastest + paths + left + abs(wanted[p]))
-        row[n], idle[m] = each, each
-        n += asks
-        m += not asks
-    fill(loaded, contacts, active, first + count[k, 0], first + n)
-    count[k, 0], count[k, 1] = n, m
+        p, speed, most, paths, two = contacts.row[each], 0.0, 1.0, path[a] + path[b], c < 0
+        for i in range(3):
+            if two:
+                rate = 0.0 + moving[a, V + i] - moving[b, V + i]
+            else:
+                rate = 0.0 + weights[p, 0] * moving[a, V + i] + weights[p, 1] * moving[b, V + i]
+                rate = rate + weights[p, 2] * moving[c, V + i] + weights[p, 3] * moving[d, V + i]
+            speed += normals[p, i] * rate
+        if wanted[p] > speed:
+            row[n], reach[each] = each, np.inf
+            n += 1
+            continue
+        if not two:
+            paths = paths + path[c] + path[d]
+            for j in range(4):
+                most = max(most, abs(weights[p, j]))
+        left = (speed - wanted[p]) / most
+        reach[each] = paths + left - _ROUNDING * (fastest + paths + left + abs(wanted[p]))
+    fill(loaded, contacts, active, before, before + n)
+    loaded.many[k] += n
 
 
 @njit(types.void(LOADED, CONTACTS, NODES, KEPT, _I), cache=True)
@@ -144,20 +159,15 @@ def load_kept(loaded, contacts, active, kept, k):  # type: ignore[no-untyped-def
     """Takes those of the contacts of set ``k``, all idle, among the loaded that have ``kept`` an impulse of the step
     before.
     """
-    pair, idle, count, pairs, cracks = contacts.pair, loaded.idle, loaded.many, kept.pairs, kept.cracks
-    first = loaded.begin[k]
-    n, m = first, first
-    for q in range(first, first + count[k, 1]):
-        each = idle[q]
+    pair, pairs, cracks, first = contacts.pair, kept.pairs, kept.cracks, loaded.begin[k]
+    n = first
+    for each in range(first, loaded.begin[k + 1]):
         j = pair[contacts.row[each]]
         if (j >= 0 and pairs[j, 0] > 0.0) or (j <= CRACK and cracks[CRACK - j, 0] > 0.0):
-            loaded.row[n] = each
+            loaded.row[n], contacts.reach[each] = each, np.inf
             n += 1
-        else:
-            idle[m] = each
-            m += 1
     fill(loaded, contacts, active, first, n)
-    count[k, 0], count[k, 1] = n - first, m - first
+    loaded.many[k] = n - first
 
 
 @njit(types.void(NODES, LOADED, KEPT, _ROWS, _F, _F, _I), cache=True)
@@ -168,7 +178,7 @@ def resume(active, loaded, kept, pair, ratio, scale, k):  # type: ignore[no-unty
     """
     words, normal, tangent, slots, row = active.moving_words, loaded.normal, loaded.tangent, loaded.slots, loaded.row
     pairs, cracks, last = kept.pairs, kept.cracks, np.empty(4)
-    for q in range(loaded.begin[k], loaded.begin[k] + loaded.many[k, 0]):
+    for q in range(loaded.begin[k], loaded.begin[k] + loaded.many[k]):
         p, along = pair[row[q]], 0.0
         for i in range(4):
             last[i] = pairs[p, i] if p >= 0 else cracks[CRACK - p, i]
@@ -203,7 +213,7 @@ def sweep(active, loaded, ahead, scale, k):  # type: ignore[no-untyped-def]
     first = loaded.begin[k]
     normal, tangent, slots = loaded.normal[first:], loaded.tangent[first:], loaded.slots[first:]
     rate, change = np.empty(3), np.empty(3)
-    for q in range(loaded.many[k, 0]):
+    for q in range(loaded.many[k]):
         a, b, c, d = slots[q, 0], slots[q, 1], slots[q, 2], slots[q, 3]
         speed = 0.0
         for i in range(3):
@@ -253,7 +263,7 @@ def give(active, scale, last, first, stop):  # type: ignore[no-untyped-def]
     those of the step and clears them; keeps how much they are in the ``last`` sweep of a step.
     """
     v, words, path = active.moving[first:stop], active.moving_words[first:stop], active.path[first:stop]
-    mobility, total = active.fixed[first:stop], active.fixed_words[first:stop]
+    mobility, total, a_quantum = active.fixed[first:stop], active.fixed_words[first:stop], 1.0 / scale
     if last:
         for s in range(stop - first):
             total[s, CHANGED] = abs(words[s, IMPULSE]) + abs(words[s, IMPULSE + 1]) + abs(words[s, IMPULSE + 2])
@@ -262,7 +272,7 @@ def give(active, scale, last, first, stop):  # type: ignore[no-untyped-def]
             length = 0.0
             for i in range(3):
                 j = words[s, IMPULSE + i]
-                change = j * (mobility[s, MOBILITY + i] / scale)
+                change = j * (mobility[s, MOBILITY + i] * a_quantum)
                 length += abs(change)
                 v[s, V + i] += change
                 total[s, TOTAL + i] += j
@@ -286,7 +296,7 @@ def store(kept, loaded, pair, k):  # type: ignore[no-untyped-def]
     """What the loaded contacts of set ``k`` have ``kept``: their impulses times their row norms."""
     pairs, cracks, normal, tangent, row = kept.pairs, kept.cracks, loaded.normal, loaded.tangent, loaded.row
     last = np.empty(4)
-    for q in range(loaded.begin[k], loaded.begin[k] + loaded.many[k, 0]):
+    for q in range(loaded.begin[k], loaded.begin[k] + loaded.many[k]):
         p = pair[row[q]]
         last[0] = normal[q, PUSH] * normal[q, ROW_NORM]
         if not last[0] > 0.0:

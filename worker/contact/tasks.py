@@ -30,7 +30,7 @@ ENTERING = CONTACT_ROWS, _I, _I, NARROW, CORNERS, STEP, _I1
 APPROACH = CONTACT_ROWS, _N1, PAIRS, FACES, STEP, _F1
 REBOUND = CONTACT_ROWS, _N1, _F2, _F2, _F, types.boolean
 MARK = _U1, _N1, _N2, _N1, _N1, _U1, _I2
-SORT = _N1, _N1, _N2, _F1, _I2, _N1, _N1, _N2, _N1
+SORT = _N1, _N2, _F1, _I2, _N1, _N1, _N2, _N1
 LOAD = NODES, _N1, _F2, _F2, _F1
 WEIGH = NODES, CONTACTS, LOADED
 RESUME = NODES, CONTACTS, LOADED, KEPT, _F, _F
@@ -113,9 +113,9 @@ def mark(table, first, stop, thread):  # type: ignore[no-untyped-def]
 @njit(TASK, cache=True)
 def sort(table, first, stop, thread):  # type: ignore[no-untyped-def]
     """``held.sort``."""
-    idle, row, slots, reach, begins, set_of, found, nodes, slot = _sort(table)
+    row, slots, reach, begins, set_of, found, nodes, slot = _sort(table)
     task = first // CONTACTS_OF_A_TASK
-    held.sort(idle, row, slots, reach, begins, set_of, found, nodes, slot, task, first, stop)
+    held.sort(row, slots, reach, begins, set_of, found, nodes, slot, task, first, stop)
 
 
 @njit(TASK, cache=True)
