@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from conoid.worker.contact.edge_edge import beyond_ends
 from conoid.worker.contact.narrow_phase import DEEP, DEEP_SELF, NEAR, ContactRows
 
 from ..worker.meshes import Floats
@@ -72,6 +73,37 @@ def test_edges_that_cross_beyond_an_end_do_not_meet() -> None:
         assert many(meets(shift=shift)) == 0
     for shift in ((0.9, 0.0), (0.0, -0.9)):
         assert many(meets(shift=shift)) == 1
+
+
+def crossings(ends: Floats) -> tuple[Floats, Floats]:
+    """Where edges of ``ends`` (..., 4, 3), two each, cross: as shares of the lengths of both, (...)."""
+    u, w, r = ends[..., 1, :] - ends[..., 0, :], ends[..., 3, :] - ends[..., 2, :], ends[..., 2, :] - ends[..., 0, :]
+    uu, uw, ww, ur, wr = ((a * b).sum(axis=-1) for a, b in ((u, u), (u, w), (w, w), (u, r), (w, r)))
+    return (ww * ur - uw * wr) / (uu * ww - uw * uw), (uw * ur - uu * wr) / (uu * ww - uw * uw)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_edges_that_cross_beyond_an_end_do_so_while_ends_move_by_less_than_is_told(seed: int) -> None:
+    """Ends near each other, at any angle. The most that is told is not far from what is true: ends that move by 20
+    times as much let some of them cross between their ends.
+    """
+    random = np.random.default_rng(seed)
+    ends = random.normal(size=(400, 4, 3))
+    ends[:, 2] = ends[:, 0] + 10.0 ** random.uniform(-3.0, 0.0, (400, 1)) * random.normal(size=(400, 3))
+    s, t = crossings(ends)
+    told = np.array([
+        beyond_ends(tuple(e[1] - e[0]), tuple(e[3] - e[2]), tuple(e[2] - e[0]), *at)
+        for e, at in zip(ends, zip(s, t, strict=True), strict=True)
+    ])  # fmt: skip
+    apart = (np.minimum(s, t) < 0.0) | (np.maximum(s, t) > 1.0)
+    assert apart.sum() > 200
+    assert (told[apart] > 0.0).all()
+    assert (told[~apart] == 0.0).all()
+    ways = random.normal(size=(200, 4, 3))
+    ways /= 2.0 * np.linalg.norm(ways, axis=-1, keepdims=True)
+    for share, meet in ((1.0, False), (20.0, True)):
+        s, t = crossings(ends[apart][:, None] + share * told[apart][:, None, None, None] * ways)
+        assert ((np.minimum(s, t) >= 0.0) & (np.maximum(s, t) <= 1.0)).any() == meet
 
 
 def test_edges_meet_where_they_cross_not_where_they_end_the_step() -> None:

@@ -6,8 +6,9 @@ one slides along a surface.
 
 import numpy as np
 
-from ..jit import njit, types
-from .geometry import VECTOR, at, beyond, cross, distance, dot, lowest_height, minus, segments
+from ..cache_lines import LINE
+from ..jit import njit, prefetch, types
+from .geometry import VECTOR, at, beyond, cross, distance, dot, lowest_height, minus, plus, segments
 from .narrow_phase import CONTACT_ROWS, DEEP, DEEP_SELF, EDGES, NEAR, PAIRS, STEP, bonded, needed
 
 _PARALLEL = 1e-3
@@ -24,6 +25,13 @@ _ROUND = 0.01
 """Of the length of an edge: added to the distance at which a pair may meet."""
 _WORTH = 0.02
 """The same: a pair with less to spare is tested in every step, which costs less than to measure it."""
+_STRETCH = 0.1
+"""Largest motion of nodes against each other, of the lengths of two edges, that ``beyond_ends`` allows for."""
+_SPARE = 0.006
+"""Of the length of an edge: as _WORTH, of pairs that cross beyond an end. Chosen: ends of glass that shatters leave
+their short lines by a fifth of that."""
+_SOON, _NEXT = 16, 8
+"""How many pairs ahead the edges and their ends are brought near."""
 _X2, _V2, _N2 = "float64[:, :]", "float64[:, ::1]", "int32[:, ::1]"
 _SECTOR = f"Tuple((float64, {VECTOR}, {VECTOR}))"
 _I = types.int64
@@ -81,6 +89,32 @@ def _fastest(course, a, b, c, d):  # type: ignore[no-untyped-def]
     return max(distance(p, r), distance(p, s), distance(q, r), distance(q, s))
 
 
+@njit(f"float64({VECTOR}, {VECTOR}, {VECTOR}, float64, float64)", cache=True, error_model="numpy")
+def beyond_ends(u, w, r, s, t):  # type: ignore[no-untyped-def]
+    """How far the ends of edge u may move against those of edge w, m, while the edges cross beyond an end of one of
+    them: at ``s`` of u and ``t`` of w as they are, with ``r`` from the beginning of u to that of w. 0 if they do not.
+
+    Of the edge a beyond an end of which they cross, a share S of its length from there, with k from that end to one of
+    the other edge b and n = a x b: (k x b) . n = -S n . n, and they cross there while that is negative. If ends move by
+    h against each other, a and b change by 2 h and k by h, so n by no more than B h and k x b by no more than A h with
+    the bounds below, in which h is a small share (_STRETCH) of |a| and |b|.
+    """
+    past_s, past_t, uu, ww = max(-s, s - 1.0), max(-t, t - 1.0), dot(u, u), dot(w, w)
+    share, a, b, k = past_s, u, w, r if s < 0.0 else minus(r, u)
+    if not past_s > 0.0 or (past_t > 0.0 and past_t * past_t * ww > past_s * past_s * uu):
+        back = r if t < 0.0 else plus(r, w)
+        share, a, b, k = past_t, w, u, (-back[0], -back[1], -back[2])
+    if not share > 0.0:
+        return 0.0
+    n, across, other = cross(a, b), cross(k, b), plus(k, b)
+    long_a, long_b, near = np.sqrt(dot(a, a)), np.sqrt(dot(b, b)), np.sqrt(min(dot(k, k), dot(other, other)))
+    A = (1.0 + 2.0 * _STRETCH) * long_b + 2.0 * near
+    B = 2.0 * long_b + 2.0 * (1.0 + 2.0 * _STRETCH) * long_a
+    nn = dot(n, n)
+    p = np.sqrt(dot(across, across)) * B + np.sqrt(nn) * A
+    return min(2.0 * share * nn / (p + np.sqrt(p * p + 4.0 * A * B * share * nn)), _STRETCH * min(long_a, long_b))
+
+
 @njit(types.float64(types.float64[:, :], EDGES, types.int64), cache=True, error_model="numpy")
 def _deep(x, edges, e):  # type: ignore[no-untyped-def]
     """How deep edge e holds, m: no deeper than DEEP of the lowest height of the tets of its faces."""
@@ -118,13 +152,20 @@ def edge_edge(out, base, pairs, edges, step, course, end, first, stop):  # type:
     corners, size, left = edges.corners, edges.size, edges.left
     nodes, weights, normals, wanted = out.nodes, out.weights, out.normals, out.wanted
     x, v, ahead, dt = step.x, step.v, step.ahead, step.dt
-    n, tested = base + first, 0
+    due, n, tested = 0, base + first, 0
     for p in range(stop - first):
+        one, two = rows[p, 0], rows[p, 1]
+        active[due] = p
+        due += fresh[one] | fresh[two] | (not until[p] > left[one] + left[two] + speed[p] * end)
+    for q in range(due):
+        p, soon, later = active[q], active[min(q + _NEXT, due - 1)], active[min(q + _SOON, due - 1)]
+        for k in range(2):
+            prefetch(corners, 6 * rows[later, k])
+            prefetch(x, LINE * corners[rows[soon, k], 0])
+            prefetch(x, LINE * corners[rows[soon, k], 1])
         one, two = rows[p, 0], rows[p, 1]
         if fresh[one] or fresh[two]:
             until[p], speed[p] = -np.inf, np.nan
-        if until[p] > left[one] + left[two] + speed[p] * end:
-            continue
         a, b, c, d = corners[one, 0], corners[one, 1], corners[two, 0], corners[two, 1]
         if not (meets[one] and meets[two]) or a == b or c == d or _opposite(corners, one, two):
             until[p], speed[p] = np.inf, 0.0
@@ -133,7 +174,8 @@ def edge_edge(out, base, pairs, edges, step, course, end, first, stop):  # type:
         tested += 1
         if len(step.tied) > 0 and bonded(step, a, b, c, d):
             continue
-        if not np.isnan(until[p]):  # left alone while it cannot meet
+        known = not np.isnan(until[p])
+        if known:  # left alone while it cannot meet
             if np.isnan(speed[p]):
                 speed[p] = _fastest(course, a, b, c, d)
             slack = segments(at(ahead, a), at(ahead, b), at(ahead, c), at(ahead, d))
@@ -154,6 +196,10 @@ def edge_edge(out, base, pairs, edges, step, course, end, first, stop):  # type:
             continue
         s, t = (ww * ur - uw * wr) / area, (uw * ur - uu * wr) / area
         if not (min(s, t) >= _END and max(s, t) <= 1.0 - _END):
+            if known and share == 1.0 and np.isnan(until[p]):
+                slack = beyond_ends(u, w, r, s, t)
+                if slack > _SPARE * size[one]:
+                    until[p] = slack - left[one] - left[two] + speed[p] * end
             continue
         h, m, length = share * dt, cross(u, w), np.sqrt(area)
         m = m[0] / length, m[1] / length, m[2] / length

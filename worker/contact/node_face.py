@@ -6,7 +6,8 @@ handed over.
 
 import numpy as np
 
-from ..jit import njit, types
+from ..cache_lines import LINE
+from ..jit import njit, prefetch, types
 from .beside import RIM, TOUCHING, facing, in_front, outside, plane, reaches_over
 from .geometry import VECTOR, at, beyond, distance, dot, foot, height, minus, off
 from .haste import fastest_of, haste
@@ -19,6 +20,8 @@ _WORTH = 0.02
 _BEND = 0.1
 """Largest motion of two corners of a face against each other, of the face's two sides, that is allowed for."""
 
+_SOON, _NEXT = 8, 4
+"""How many pairs ahead a node and a face, and the corners of a face, are brought near."""
 _X2, _V2, _N2 = "float64[:, :]", "float64[:, ::1]", "int32[:, ::1]"
 _F, _I, _N1 = types.float64, types.int64, types.int32[::1]
 _VECTOR = types.UniTuple(types.float64, 3)  # type: ignore[no-untyped-call]
@@ -163,7 +166,13 @@ def node_face(out, depth, base, pairs, slots, faces, step, end, first, stop):  #
     x, v, ahead, part = step.x, step.v, step.ahead, step.part
     chains, n, most = slots.first, base + first, 0.0
     for q in range(first, stop):
-        p = active[q]
+        p, soon, later = active[q], active[min(q + _NEXT, stop - 1)], active[min(q + _SOON, stop - 1)]
+        prefetch(corners, 4 * rows[later, 1])
+        prefetch(normals, 12 * rows[later, 0])
+        prefetch(normals, 12 * rows[later, 0] + 11)
+        prefetch(x, LINE * rows[later, 0])
+        for k in range(3):
+            prefetch(x, LINE * corners[rows[soon, 1], k])
         s, f = rows[p, 0], rows[p, 1]
         i, j, k = corners[f, 0], corners[f, 1], corners[f, 2]
         if len(step.tied) > 0 and bonded(step, s, i, j, k):

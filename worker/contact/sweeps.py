@@ -103,7 +103,7 @@ def fill(loaded, contacts, active, first, end):  # type: ignore[no-untyped-def]
 @njit(_I(_ROWS, CONTACTS, _F1, _I, _I), cache=True)
 def _due(due, contacts, path, first, end):  # type: ignore[no-untyped-def]
     """Which of the contacts from ``first`` to ``end`` have nodes of ``path`` (slots,) that may have used up their
-    reach; returns how many. Few have, and every sweep asks: one takes 1 ns, 2 if the number of a slot might be negative.
+    reach; returns how many. Few have, and every sweep asks: one takes 1 ns, and 2 if numbers of slots may be negative.
     """
     slots, reach, n = contacts.slots, contacts.reach, 0
     for q in range(first, end):
