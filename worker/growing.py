@@ -1,8 +1,39 @@
-"""Tables that grow by a few rows at a time: their columns stand in rooms that are larger than they are."""
+"""Room for what grows by a few rows at a time, so that it need not be made anew."""
 
 from typing import Any
 
 import numpy as np
+
+
+class Scratch:
+    """Room for arrays that every step fills anew, by name. While its length stays an array is the same object, so that
+    tables of arguments (parallel/arguments.py) that have it stay as they are.
+    """
+
+    def __init__(self) -> None:
+        self._rooms: dict[str, np.ndarray] = {}
+        self._some: dict[str, np.ndarray] = {}
+
+    def of(self, name: str, n: int, kind: "type[np.generic]" = np.int64, *columns: int) -> Any:
+        """(n, *columns), whatever is in it; of one name always of one type and as many columns."""
+        some = self._some.get(name)
+        if some is None or n != len(some):
+            room = self._rooms.get(name)
+            if room is None or n > len(room):
+                room = self._rooms[name] = np.empty((n + n // 2, *columns), kind)
+            some = self._some[name] = room[:n]
+        return some
+
+    def zeros(self, name: str, n: int, *columns: int) -> Any:
+        """The same of integers, all zero."""
+        some = self.of(name, n, np.int64, *columns)
+        some.fill(0)
+        return some
+
+
+def same_memory(one: np.ndarray, two: np.ndarray) -> bool:
+    """Whether two arrays of one type, both in C order, are the same one."""
+    return one.shape == two.shape and one.__array_interface__["data"] == two.__array_interface__["data"]
 
 
 class Rooms:

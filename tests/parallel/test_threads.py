@@ -42,7 +42,10 @@ def test_a_kernel_gets_what_the_table_was_given_last() -> None:
     assert told(table.set((values, True, np.array([7, 8])), 0.5, -3)) == (5.0, 1.0, 8.0, 0.5, -3.0)
     values[1, 2] = 9.0
     grown = np.array([1, 2, 3])
-    assert told(table.set((values, False, grown), 0.25, 4)) == (9.0, 0.0, 3.0, 0.25, 4.0)
+    last = values, False, grown
+    assert told(table.set(last, 0.25, 4)) == (9.0, 0.0, 3.0, 0.25, 4.0)
+    assert told(table.set(last, 0.5, 4)) == (9.0, 0.0, 3.0, 0.5, 4.0)
+    assert told(table.set((values, True, grown[:2]), 0.5, 4)) == (9.0, 1.0, 2.0, 0.5, 4.0)
 
 
 def test_arrays_of_a_table_lie_in_c_order() -> None:

@@ -173,12 +173,12 @@ class SceneEdges:
             corners, sides, faces, lengths, opened, meets, sharp, own, rank, *np.zeros((3, len(corners)), bool)
         )  # fmt: skip
 
-    @property
+    @cached_property
     def size(self) -> Floats:
         """(e,) initial length, m."""
         return np.asarray(self.lengths[0])
 
-    @property
+    @cached_property
     def deep(self) -> Floats:
         """(e,) depth beyond which it holds nothing, m."""
         return np.asarray(self.lengths[1])

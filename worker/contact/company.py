@@ -31,6 +31,8 @@ class Company:
         self._comm = comm
         self._words = np.zeros(0, np.int64)
         self._exchange: Exchange | None = None
+        none = np.zeros(0, np.int32)
+        self._nothing = ActiveSum([], none, none, np.zeros((0, 2), np.int64), comm)
         self.take(neighbours)
 
     def take(self, neighbours: list[Neighbour]) -> None:
@@ -53,8 +55,7 @@ class Company:
     def agree(self, contacts: ActiveRows, local: Indices) -> "ActiveSum":
         """The sums of a step with active ``contacts``; ``local`` (crowd,): -1 for what is not held."""
         if not self.neighbours:
-            nothing = np.zeros(0, np.int32)
-            return ActiveSum([], nothing, nothing, np.zeros((0, 2), np.int64), self._comm)
+            return self._nothing
         assert self._exchange is not None
         _tell(self._out, self._every, self._ends, self._words, contacts.nodes, local)
         self._exchange.begin()

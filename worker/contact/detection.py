@@ -13,7 +13,7 @@ from .entering import Narrow
 from .exterior import Exterior
 from .families import Corners
 from .haste import spread
-from .narrow_phase import HASTY, Step
+from .narrow_phase import HASTY, Step, StepRoom
 from .node_face import nearest
 from .scene import Scene
 from .tasks import CONTACTS_OF_A_TASK, CRACKS_OF_A_TASK, FAMILIES_OF_A_TASK, PAIRS_OF_A_TASK, SLOTS_OF_A_TASK
@@ -85,6 +85,7 @@ class Detection:
         self._approach = Pass(team, tasks.approach, *tasks.APPROACH, size=some)
         self._across = Pass(team, tasks.across_cracks, *tasks.ACROSS, size=CRACKS_OF_A_TASK)
         self._entering = Pass(team, tasks.entering_nodes, *tasks.ENTERING, size=FAMILIES_OF_A_TASK)
+        self._scratch = StepRoom()
         self._rows_of_corner = 1
         """Rows that there is room for, for each corner of a narrow side in the mean of a task."""
 
@@ -119,8 +120,8 @@ class Detection:
             now.edge_edge.wake()
         tracks.measure(crowd.x, crowd.v, now.faces.corners, now.edges.corners)
         stray = _renewed(now, together)
-        step = Step.of(crowd.x, crowd.v, crowd.part, mu, give, ahead.dt, now.step_room)
-        step = step.followed(beyond, HASTY * ahead.size, ahead.rebound, now.face_table())
+        step = Step.of(crowd.x, crowd.v, crowd.part, mu, give, ahead.dt, self._scratch)
+        step = step.followed(beyond, HASTY * ahead.size, ahead.rebound, now.face_table(), self._scratch)
         if self.tied is not None:
             step = step._replace(tied=self.tied.bits(crowd))
         now.active.begin(len(now.node_face), len(now.edge_edge), 3 * len(now.cracks))
@@ -137,8 +138,9 @@ class Detection:
         """Adds contacts of nodes and faces; returns the largest speed over the altitude of a tet, 1/s."""
         table, rows, slots, faces, end = now.node_face, now.active, now.slot_table(), now.face_table(), now.tracks.end
         pairs, n = table.arrays(), len(table)
-        due, counts = np.zeros((2, self._due_faces.many(n)), np.int64)
-        coming, depth = np.zeros(len(counts)), rows.depth
+        many, depth = self._due_faces.many(n), rows.depth
+        due, counts = self._scratch.of("due", many), self._scratch.of("on faces", many)
+        coming = self._scratch.of("coming", many, np.float64)
         self._due_faces.run(n, pairs, slots, faces, end + step.beyond, due)
         some = rows.room, depth, rows.begins(_FACES), pairs, slots, faces, step, end
         self._node_face.run(n, *some, due, counts, coming)
@@ -149,7 +151,7 @@ class Detection:
         found, holder = rows.found[before : rows.n], rows.holder(now.crowd.n)
         m = int(nearest(found, rows.room, depth, pairs, faces, step.part, holder))
         rows.n = before + m
-        most = np.zeros(self._approach.many(m))
+        most = self._scratch.of("most", self._approach.many(m), np.float64)
         self._approach.run(m, rows.room, found, pairs, faces, step, most)
         return float(np.sqrt(max(coming.max(initial=0.0), most.max(initial=0.0))))
 
@@ -157,7 +159,8 @@ class Detection:
         """Adds contacts of edges."""
         table, rows, tracks = now.edge_edge, now.active, now.tracks
         pairs, n = table.arrays(), len(table)
-        due, counts = np.zeros((2, self._edge_edge.many(n)), np.int64)
+        many = self._edge_edge.many(n)
+        due, counts = self._scratch.of("tested", many), self._scratch.of("on edges", many)
         some = rows.room, rows.begins(_EDGES), pairs, now.edge_table(), step, tracks.short.course, tracks.end
         self._edge_edge.run(n, *some, due, counts)
         begins = PAIRS_OF_A_TASK * np.arange(len(due))
@@ -167,8 +170,8 @@ class Detection:
     def _cracks(self, now: Scene, size: float, step: Step) -> Ints:
         """Adds contacts across cracks; returns which cracks open."""
         rows, n = now.active, len(now.cracks)
-        counts, wide = np.zeros((2, self._across.many(n)), np.int64)
-        opening = np.empty(n, np.int64)
+        many, scratch = self._across.many(n), self._scratch
+        counts, wide, opening = scratch.of("across", many), scratch.of("wide", many), scratch.of("opening", n)
         self._across.run(n, rows.room, rows.begins(_CRACKS), opening, now.cracks, size, step, counts, wide)
         begins = CRACKS_OF_A_TASK * np.arange(len(wide))
         rows.collect(_CRACKS, 3 * begins, counts)

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..cache_lines import cache_lines
+from ..growing import Scratch
 from ..jit import njit, record, types
 from ..state import Flags, Floats, Indices, Ints
 from .geometry import at, cross, dot, minus
@@ -33,6 +34,9 @@ CRACK = -2
 """The first number that stands for a pair of nodes across a crack, others are below."""
 _FEWEST = 2
 """Rows of a table that is more than one line: numba takes a part of a single one for an array of its own."""
+
+
+_NONE = np.empty(0)
 
 
 class ContactRows(NamedTuple):
@@ -59,9 +63,30 @@ class ContactRows(NamedTuple):
         return cls(rows, np.empty((n, 4)), np.empty((n, 3)), np.empty(n), np.empty(n), numbers)
 
 
-def step_room(slots: int) -> Floats:
-    """Room for a step of so many ``slots``. Kept for many steps, it saves the system clearing its pages."""
-    return cache_lines(max(slots, _FEWEST))
+class StepRoom(Scratch):
+    """Room for the step ahead, and for what is found in it. Kept for many steps, it saves the system clearing its pages;
+    tables of arguments stay as they are while there are as many slots.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._room = self._places = cache_lines(0)
+
+    def lines(self, slots: int) -> tuple[Floats, Floats, Floats]:
+        """Lines of so many slots, and their parts for positions at the beginning of the step and at its end."""
+        n = max(slots, _FEWEST)
+        if n != len(self._places):
+            if n > len(self._room):
+                self._room = cache_lines(2 * n)
+            self._places = self._room[:n]
+            self._halves = self._places[:, :3], self._places[:, 3:6]
+        return self._places, *self._halves
+
+    def least(self, slots: int) -> Floats:
+        """(slots,) infinite: see Step.least."""
+        least: Floats = self.of("least", slots, np.float64)
+        least.fill(np.inf)
+        return least
 
 
 class Step(NamedTuple):
@@ -95,17 +120,18 @@ class Step(NamedTuple):
 
     @classmethod
     def of(
-        cls, x: Floats, v: Floats, part: Indices, mu: Floats, give: float, dt: float, room: Floats | None = None
+        cls, x: Floats, v: Floats, part: Indices, mu: Floats, give: float, dt: float, room: StepRoom | None = None
     ) -> "Step":  # fmt: skip
-        """A step ``dt`` from ``x`` on; ``room``: see step_room."""
-        places = (step_room(len(x)) if room is None else room)[: max(len(x), _FEWEST)]
+        """A step ``dt`` from ``x`` on."""
+        places, begin, end = (room or StepRoom()).lines(len(x))
         _place(places, x, v, dt)
-        return cls(places[:, :3], v, places[:, 3:6], part, mu, give, dt, 0.0, 0.0, 1.0, np.empty(0), NOTHING)
+        return cls(begin, v, end, part, mu, give, dt, 0.0, 0.0, 1.0, _NONE, NOTHING)
 
-    def followed(self, beyond: float, hasty: float, rebound: float, faces: "FaceTable") -> "Step":
+    def followed(self, beyond: float, hasty: float, rebound: float, faces: "FaceTable", room: StepRoom) -> "Step":
         """And a step of up to ``beyond`` that may follow, see there."""
-        least = np.full(len(self.x) if beyond > 0.0 else 0, np.inf)
+        least = _NONE
         if beyond > 0.0:
+            least = room.least(len(self.x))
             least_altitudes(least, self.x, faces.corners, faces.exposed)
         return self._replace(beyond=beyond, hasty=hasty, rebound=rebound, least=least)
 

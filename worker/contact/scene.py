@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ..growing import same_memory
 from ..ids import among, places
 from ..jit import njit
 from ..parallel.comm import Comm
@@ -11,10 +12,11 @@ from ..parallel.ownership import Neighbour, same
 from ..parallel.tags import Tag
 from ..state import Flags, Floats, Indices, Ints, Nodes
 from . import ghosts, held, sharp
+from .active import Kept
 from .columns import OwnSlots, SceneEdges, SceneFaces, SceneSlots
 from .company import Company
 from .ghosts import Copies
-from .narrow_phase import EdgeTable, FaceTable, SlotTable, step_room
+from .narrow_phase import EdgeTable, FaceTable, SlotTable
 from .pairs import PairTable
 from .records import AGED, OPEN, Crowd
 from .rows import ActiveRows
@@ -56,7 +58,7 @@ class Scene:
     active: ActiveRows = field(default_factory=ActiveRows)
     """Of the last step."""
     messages: Messages = field(init=False)
-    _step_room: Floats = field(default_factory=lambda: step_room(0), init=False)
+    _stored: Kept | None = field(default=None, init=False)
 
     def connect(self, company: list[Neighbour], nodes: Nodes, comm: Comm) -> None:
         """Sets up the messages: sums over the nodes of the company, copies of what is not held here; all ranks take
@@ -77,12 +79,12 @@ class Scene:
         held.gather(self.slots.before, nodes.v, self.own.slots, self.own.local)
         self.messages.copies.note(nodes)
 
-    @property
-    def step_room(self) -> Floats:
-        """Room for a step of all slots."""
-        if len(self._step_room) < self.crowd.n:
-            self._step_room = step_room(2 * self.crowd.n)
-        return self._step_room
+    def stored(self, cracks: Floats) -> Kept:
+        """Where pairs, and ``cracks`` (m, 12), keep their impulses: the same object while that is the same memory."""
+        before, pairs, rows = self._stored, self.node_face.kept, cracks.reshape(-1, 4)
+        if before is None or before.pairs is not pairs or not same_memory(before.cracks, rows):
+            self._stored = before = Kept(pairs, rows)
+        return before
 
     @property
     def kept(self) -> tuple[Ints, Floats]:

@@ -4,6 +4,7 @@ from typing import Protocol
 
 import numpy as np
 
+from ..growing import Scratch
 from ..parallel.fixed_point import Tally
 from ..parallel.team import Team
 from ..state import Flags, Floats, Indices, Ints, Nodes
@@ -59,6 +60,7 @@ class ActiveSet:
         """(slots,) where the nodes of the last step stand in the crowd."""
         self._zones, self._passes = Zones(team.threads), Slots(team)
         self._sets, self._room = Sets(team, self._zones.many), _Room(0, 0, 0, self._zones.many)
+        self._scratch = Scratch()
 
     def go_on(self, scale: float, sides: Floats) -> None:
         """Of a run that goes on; ``sides`` as of its stops."""
@@ -87,15 +89,19 @@ class ActiveSet:
     def _number(self, rows: ActiveRows, zone: Indices) -> None:
         """The contacts by sets, all idle, and the slots of their nodes and of shared ones."""
         room, n, shared, nodes = self._room, rows.n, self._sum.shared, rows.room.nodes
-        many = np.zeros((self._passes.mark.many(n), len(room.loaded.many)), np.int64)
+        many = self._scratch.zeros("many", self._passes.mark.many(n), len(room.loaded.many))
         room.touched[shared] = room.shared[shared] = 1
         self._passes.mark.run(n, room.touched, room.set_of, nodes, rows.found, zone, room.shared, many)
         room.shared[shared] = 0
-        self.places = room.places[: held.number(room.places, room.slot, room.touched)]
+        slots = held.number(room.places, room.slot, room.touched)
+        if slots != len(self.places) or self.places.base is not room.places.base:
+            self.places = room.places[:slots]
         self._sum.number(room.slot)
         counts = many.sum(axis=0)
         begin = np.cumsum(counts) - counts
-        begins = np.cumsum(many, axis=0) - many + begin
+        begins = self._scratch.of("begins", len(many), np.int64, len(counts))
+        np.cumsum(many, axis=0, out=begins)
+        begins += begin - many
         self._passes.sort.run(
             n, room.row, room.slots, room.reach, begins, room.set_of, rows.found, nodes, room.slot
         )  # fmt: skip
@@ -103,7 +109,7 @@ class ActiveSet:
         room.loaded.many[:] = 0
 
     def _loaded(self, crowd: Crowd) -> float:
-        fastest = np.zeros(self._passes.load.many(len(self.places)))
+        fastest = self._scratch.of("fastest", self._passes.load.many(len(self.places)), np.float64)
         self._passes.load.run(len(self.places), self._room.active, self.places, crowd.v, crowd.mobility, fastest)
         return float(fastest.max(initial=0.0))
 
@@ -158,7 +164,7 @@ class ActiveSet:
 
     def _add(self, words: Ints, before: Floats, joule: float, *, rubs: bool) -> None:
         room = self._room
-        each = np.zeros((len(room.loaded.many), *words.shape), np.int64)
+        each = self._scratch.zeros("words", len(room.loaded.many), *words.shape)
         table = self._sets.cost.set(each, room.loaded, room.active, before, self.places, joule, rubs)
         self._sets.run(tasks.cost, table)
         words += each.sum(axis=0)
@@ -175,7 +181,7 @@ class ActiveSet:
         room, n = self._room, len(self.places)
         stops.let_go(room.active, room.braced)
         many = self._passes.leave.many(n)
-        left, pushes = np.zeros((many, 3), np.int64), np.zeros((many, *parts.shape), np.int64)
+        left, pushes = self._scratch.zeros("left", many, 3), self._scratch.zeros("pushes", many, *parts.shape)
         some = crowd.local, state.part, state.owned
         self._passes.leave.run(n, state.v, pushes, left, total, room.active, self.places, *some)
         parts += pushes.sum(axis=0)

@@ -24,7 +24,6 @@ from ..state import Flags, Floats, Indices, Ints, Model, Nodes
 from ..timers import Timers
 from ..topology import Split
 from . import normals, pairing, sharp
-from .active import Kept
 from .books import Books
 from .detection import Ahead, Detected, Detection
 from .exterior import Exterior
@@ -262,7 +261,7 @@ class Contact:
         shared = now.messages.company.agree(now.active, crowd.local)
         active.begin(now.active, crowd, self.exterior.flight.loose, shared, self.exterior.size, dt)
         active.weigh()
-        kept = Kept(now.node_face.kept, self.exterior.cracks.kept.reshape(-1, 4))
+        kept = now.stored(self.exterior.cracks.kept)
         active.resume(kept, self._resume(give))
         active.sweep(self.need.sweeps)
         active.store(kept)

@@ -38,28 +38,30 @@ class Arguments:
         self._is_real = [kind == types.float64 for kind in self._kinds]
         leaves = [_words(kind) for kind in self._kinds]
         self._places = np.cumsum([0, *leaves])[:-1].tolist()
+        self._values: list[Any] = []
+        self._begins: list[int] = []
         words = np.zeros(sum(leaves), np.int64)
         self._words = words.data
         self._reals = self._words.cast("B").cast("d")
         self._kept: list[Any] = [None] * len(leaves)
-        self._all = range(len(leaves))
         self.address = int(words.ctypes.data)
         """Of the table: what kernels take."""
 
     def set(self, *values: Any) -> int:
-        """Takes the arguments, tuples of them among them; returns the address. Only what is not the object that the
-        table had before is written. Raises ValueError where an array is not of its type, or does not lie in C order
-        and is declared to.
+        """Takes the arguments, tuples of them at the same places as before; returns the address. Only what is not the
+        object that the table had before is written. Raises ValueError where an array is not of its type, or does not
+        lie in C order and is declared to.
         """
-        flat: list[Any] = []
-        for value in values:
-            if isinstance(value, tuple):
-                flat += value
-            else:
-                flat.append(value)
-        for k in compress(self._all, map(is_not, flat, self._kept)):
-            self._put(k, flat[k])
-        self._kept = flat
+        if len(values) != len(self._values):
+            sizes = [len(value) if isinstance(value, tuple) else 1 for value in values]
+            self._begins, self._values = np.cumsum([0, *sizes])[:-1].tolist(), [None] * len(values)
+        kept = self._kept
+        for k, value in compress(zip(self._begins, values, strict=True), map(is_not, values, self._values)):
+            for at, leaf in enumerate(value if isinstance(value, tuple) else (value,), k):
+                if leaf is not kept[at]:
+                    self._put(at, leaf)
+                    kept[at] = leaf
+        self._values[:] = values
         return self.address
 
     def _put(self, k: int, value: Any) -> None:
