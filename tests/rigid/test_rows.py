@@ -5,7 +5,7 @@ import numpy.typing as npt
 import pytest
 
 from conoid.worker.contact.active import IMPULSE, MOBILITY, ActiveNodes
-from conoid.worker.contact.sweeps import SHARES
+from conoid.worker.contact.loading import SHARES
 from conoid.worker.rigid import rows
 
 Floats = npt.NDArray[np.float64]

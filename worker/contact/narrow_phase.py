@@ -64,8 +64,8 @@ class ContactRows(NamedTuple):
 
 
 class StepRoom(Scratch):
-    """Room for the step ahead, and for what is found in it. Kept for many steps, it saves the system clearing its pages;
-    tables of arguments stay as they are while there are as many slots.
+    """Room for the step ahead, and for what is found in it. Kept for many steps, it saves the system clearing its
+    pages; tables of arguments stay as they are while there are as many slots.
     """
 
     def __init__(self) -> None:

@@ -12,7 +12,7 @@ from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour, complete
 from ..parallel.tags import Tag
 from ..state import WIDE, Flags, Floats, Indices, Ints, Model
-from .sweeps import SHARES
+from .loading import SHARES
 
 EVERY = 16
 """Steps. A fragment that turns at 1e5 rad/s (100 m/s over 1 mm) turns by 3 degrees meanwhile."""

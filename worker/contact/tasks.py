@@ -6,7 +6,7 @@ Each task puts its rows behind each other from a place of its own on, and into `
 from ..jit import njit, types
 from ..parallel.arguments import reader
 from ..parallel.team import TASK
-from . import booking, cracks, edge_edge, entering, haste, held, node_face, restitution, sweeps
+from . import booking, cracks, edge_edge, entering, haste, held, loading, node_face, restitution, sweeps
 from .active import CONTACTS, KEPT, LOADED, NODES
 from .entering import NARROW
 from .families import CORNERS
@@ -135,19 +135,19 @@ def weigh(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def resume(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``sweeps.load_kept`` and ``sweeps.resume`` of some sets of contacts."""
+    """``loading.load_kept`` and ``sweeps.resume`` of some sets of contacts."""
     active, contacts, loaded, kept, ratio, scale = _resume(table)
     for k in range(first, stop):
-        sweeps.load_kept(loaded, contacts, active, kept, k)
+        loading.load_kept(loaded, contacts, active, kept, k)
         sweeps.resume(active, loaded, kept, contacts.pair, ratio, scale, k)
 
 
 @njit(TASK, cache=True)
 def sweep(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``sweeps.load`` and ``sweeps.sweep`` of some sets of contacts."""
+    """``loading.load`` and ``sweeps.sweep`` of some sets of contacts."""
     active, contacts, loaded, fastest, ahead, scale = _sweep(table)
     for k in range(first, stop):
-        sweeps.load(loaded, contacts, active, fastest, k)
+        loading.load(loaded, contacts, active, fastest, k)
         sweeps.sweep(active, loaded, ahead, scale, k)
 
 

@@ -11,7 +11,7 @@ bit.
 import numpy as np
 
 from ..contact.active import IMPULSE, MOBILITY, NODES, V
-from ..contact.sweeps import SHARES
+from ..contact.loading import SHARES
 from ..jit import njit, types
 
 WEIGHTS = 8
