@@ -369,6 +369,24 @@ def plainly_numbered(before: Ints, labels: Ints, following: int) -> tuple[Ints, 
     return np.array([named[label] for label in labels.tolist()]), rows
 
 
+@pytest.mark.parametrize("ranks", [1, 3])
+def test_the_part_of_a_fragment_does_not_follow_from_its_number(ranks: int) -> None:
+    """A number that lasts says nothing of the tets: here they fall as those of the tets rise."""
+    b = body(5, parts=3)
+    of_tet, last = b.labels(), len(b.tets) + 1000
+
+    def work(comm: Comm) -> "np.ndarray | None":
+        model, labels = labels_of(b, owners(b, ranks, 4), comm)
+        return fragments.table(model, [last - each for each in labels], comm)
+
+    rows = on_ranks(ranks, work)[0] if ranks > 1 else work(SerialComm())
+    assert rows is not None
+    smallest = last - rows["label"]
+    assert set(smallest.tolist()) == set(of_tet.tolist())
+    assert rows["part"].tolist() == b.part[smallest].tolist()
+    assert len(set(rows["part"].tolist())) == 3
+
+
 def test_a_table_reads_back_to_the_same_bits(tmp_path: Path) -> None:
     rows = table_of(body(19))
     path = tmp_path / fragments.write(tmp_path, 12, 1.25e-6, ["plate"], rows)

@@ -101,7 +101,8 @@ def table(model: Model, labels: list[Ints], comm: Comm) -> "np.ndarray | None":
     groups = Groups(np.concatenate([np.zeros(0, np.int64), *labels]), comm)
     rows = np.zeros(len(groups.label), FRAGMENT)
     rows["label"] = groups.label
-    rows["part"] = np.searchsorted(model.part_starts, rows["label"], side="right") - 1
+    part = np.concatenate([np.zeros(0), *(np.full(block.n, float(block.part)) for block in blocks)])
+    rows["part"] = -groups.largest(-part[:, None])[:, 0]  # the first one, where parts share nodes
     rows["tets"] = groups.count(np.ones((len(tets), 1), np.int64))[:, 0]
     rows["nodes"] = _node_counts(model, tets, groups, comm)
     _move(rows, groups, tets, mass, nodes.x, nodes.v)
