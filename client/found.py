@@ -83,6 +83,8 @@ class Found(msgspec.Struct, kw_only=True, frozen=True):
         told = [self._first(), *self._passes()]
         if self.fit is not None:
             told.append(_curve(self.fit, self.unit))
+            if not self._within(self.fit.limit):
+                told.append("the curve has its limit outside of the bracket: near it the results do not follow the law")
         if self.why:
             told.append(f"not as close as asked for ({self._x(self.tolerance)}): {self.why}")
         failed = f", {self.failed} of them without a result" if self.failed else ""
@@ -104,6 +106,11 @@ class Found(msgspec.Struct, kw_only=True, frozen=True):
         a, b = self.mixed
         again = f"passed {self.changes} times between {number(min(a, b))} and {self._x(max(a, b))}"
         return [f"not monotonic, or it scatters: the threshold is {again}; the first of them is given"]
+
+    def _within(self, limit: float) -> bool:
+        """Whether the limit of a curve lies in the bracket; a curve of velocities has magnitudes."""
+        low, high = sorted(abs(x) for x, _ in self.ends)
+        return low <= abs(limit) <= high
 
     def _x(self, x: float) -> str:
         return f"{number(x)} {self.unit}".strip()

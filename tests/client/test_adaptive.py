@@ -14,10 +14,11 @@ from conoid.cases.load import CaseError
 from conoid.cases.outcome import Measured, Outcome, to_json
 from conoid.cases.run import State
 from conoid.client.adaptive import found_by
+from conoid.client.ballistic import Fit
 from conoid.client.bracket import Sample, between, bracket, widest
 from conoid.client.errors import ClientError, MissingError, UsageError
 from conoid.client.found import Found, read, table
-from conoid.client.goal import span_of, spans_of, tolerance_of
+from conoid.client.goal import Goal, span_of, spans_of, tolerance_of
 from conoid.client.http import Me
 from conoid.client.told import RunInfo
 
@@ -298,3 +299,14 @@ def test_points_divide_what_is_left_as_evenly_as_can_be() -> None:
     assert found is not None
     assert (found.low.x, found.high.x) == (2.0, 4.0), "what bounces back is before the limit"
     assert bracket([Sample(1.0, 1.0), Sample(2.0, 3.0)]) is None
+
+
+@pytest.mark.parametrize(("limit", "outside"), [(265.0, False), (-265.0, False), (272.1, True), (250.0, True)])
+def test_a_curve_that_does_not_begin_in_the_bracket_is_said_to(limit: float, outside: bool) -> None:
+    fit = Fit(law="Lambert and Jonas", limit=limit, error=1.0, points=6, factor=1.0, exponent=2.0)
+    found = Found(
+        key="v", unit="m/s", goal=Goal(result="probe.speed", threshold=0.0, unit="m/s"), limit=-264.0,
+        uncertainty=3.0, tolerance=10.0,
+        ends=((-267.0, -0.6), (-261.0, 4.1)), changes=1, fit=fit, points=9, fresh=9, failed=0, cpu=1.0,
+    )  # fmt: skip
+    assert any("outside of the bracket" in line for line in found.lines()) == outside
