@@ -51,14 +51,15 @@ def touch(path: Path) -> None:
     os.close(os.open(path, os.O_WRONLY | os.O_CREAT | _NO_LINK | _AT_ONCE, 0o666))
 
 
-def opened(path: str | Path, *, folder: int | None = None) -> FileIO:
-    """A regular file, unbuffered, to read; ``folder``: the descriptor of the directory that ``path`` is relative to.
+def opened(path: str | Path, *, folder: int | None = None, links: bool = True) -> FileIO:
+    """A regular file, unbuffered, to read; ``folder``: the descriptor of the directory that ``path`` is relative to;
+    ``links``: whether the file may be a symbolic link.
 
     A pipe, a socket or a device would keep the reader waiting, or never end: each is refused as a directory is, with
     IsADirectoryError. Raises OSError.
     """
     try:
-        handle = os.open(path, os.O_RDONLY | os.O_CLOEXEC | _AT_ONCE, dir_fd=folder)
+        handle = os.open(path, os.O_RDONLY | os.O_CLOEXEC | _AT_ONCE | (0 if links else _NO_LINK), dir_fd=folder)
     except OSError as error:
         raise (_no_file(path, "is not a regular file") if error.errno in _NO_FILE else error) from None
     return _regular(handle, path, "rb")

@@ -15,6 +15,7 @@ from conoid.cases.outcome import Outcome
 from conoid.cases.points import results
 
 from . import folder
+from .journal import DAMAGED
 
 FORM = 1
 """Of a card as it is kept; one of another form is made again."""
@@ -60,7 +61,7 @@ def of(path: Path, final: bool) -> Card:
     """The card of the run in the folder ``path``; what is gone or damaged there is left out."""
     ended = _ended(path) if final else None
     found = {
-        pair: None if value is None else float(value)
+        pair: _number(value)
         for pair, value in results(ended).items()
         if not pair[0].endswith(_LEFT_OUT) and not isinstance(value, str)
     }
@@ -74,6 +75,14 @@ def of(path: Path, final: bool) -> Card:
     )  # fmt: skip
 
 
+def _number(value: float | None) -> float | None:
+    """None for a whole number that is larger than any float, too."""
+    try:
+        return None if value is None else float(value)
+    except OverflowError:
+        return None
+
+
 def _title(path: Path) -> str:
     try:
         return folder.submission(path).title[:_LETTERS]
@@ -85,7 +94,7 @@ def _values(path: Path) -> dict[str, Scalar]:
     try:
         case: dict[str, Any] = msgspec.json.decode(whole.read(path / layout.RESOLVED_CASE, _MOST_BYTES), type=dict)
         return flat(case, _KEYS, _LETTERS)
-    except (OSError, msgspec.MsgspecError, RecursionError):
+    except (OSError, *DAMAGED):
         return {}
 
 

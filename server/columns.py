@@ -29,6 +29,7 @@ _AT_ONCE = 32
 """Blocks that are read for one answer, at most: some 100,000 lines, half a second. Chosen."""
 _TEXT = frozenset({"limiter"})
 """Columns that have no numbers."""
+csv.field_size_limit(1 << 30)  # What is longer than a number is none; it is no error.
 
 
 class Columns:
@@ -72,7 +73,7 @@ class Columns:
     def _is_another(self) -> bool:
         """Whether this is not the file of the last time: a run that goes on from a checkpoint writes a new one."""
         try:
-            with whole.opened(self._path) as file:
+            with whole.opened(self._path, links=False) as file:
                 now = os.fstat(file.fileno())
         except FileNotFoundError:
             return self.lines > 0
@@ -96,7 +97,8 @@ class Columns:
     def _head(self, names: Sequence[str]) -> None:
         pairs = [history.split(name) for name in names]
         self._width = len(names)
-        self._places = [k for k, (name, _) in enumerate(pairs) if name not in _TEXT]
+        places = {name: k for k, (name, _) in reversed([*enumerate(pairs)]) if name not in _TEXT}
+        self._places = sorted(places.values())  # Of columns with the same name the first.
         self.units = dict(pairs[k] for k in self._places)
         number = len(self._places)
         self._kept = [array("d") for _ in range(number)]
@@ -134,7 +136,8 @@ class Columns:
         """Columns by name, of about ``points`` lines at most: all there are, or of each group of lines the least and
         the greatest value, in their order, and the last line.
         """
-        places = {name: at for at, name in enumerate(self.units) if name in names}
+        chosen = frozenset(names)
+        places = {name: at for at, name in enumerate(self.units) if name in chosen}
         points = max(4, min(points, _SENT // max(1, len(places))))
         groups = len(self._kept[0]) // 2 if self._kept else 0
         if self._every == 1 and groups <= points:

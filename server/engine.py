@@ -52,9 +52,15 @@ def engine_of(url: str | sa.URL) -> sa.Engine:
 
 
 def _tune(connection: Any, _record: object) -> None:
-    """Switches SQLite to WAL, so that readers do not wait for a writer."""
+    """Switches SQLite to WAL, so that readers do not wait for a writer, and gives it lower() for all letters."""
     for pragma in ("journal_mode=wal", f"busy_timeout={_BUSY}"):
         connection.execute(f"pragma {pragma}").close()
+    connection.create_function("lower", 1, _lower, deterministic=True)
+
+
+def _lower(text: str | None) -> str | None:
+    """SQLite's own knows the letters of ASCII alone."""
+    return text if text is None else str(text).lower()
 
 
 def identity_of(engine: sa.Engine) -> tuple[int, int] | None:

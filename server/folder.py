@@ -187,7 +187,10 @@ def there(path: Path) -> bool:
 
 def submission(folder: Path) -> Submission:
     """Reads submission.json. Raises OSError, or msgspec.MsgspecError when it is damaged."""
-    return _submission.decode(whole.read(folder / layout.SUBMISSION))
+    try:
+        return _submission.decode(whole.read(folder / layout.SUBMISSION))
+    except (UnicodeDecodeError, RecursionError) as error:
+        raise msgspec.DecodeError(str(error)) from None
 
 
 def run(folder: Path) -> Run:
@@ -219,7 +222,7 @@ def outcome(folder: Path) -> Outcome | None:
     """The outcome of outcome.json; None when it is missing or damaged."""
     try:
         return outcome_from_json(whole.read(folder / layout.OUTCOME))
-    except (*_NO_FILE, msgspec.MsgspecError, UnicodeDecodeError):
+    except (*_NO_FILE, msgspec.MsgspecError, UnicodeDecodeError, RecursionError):
         return None
 
 
@@ -229,10 +232,8 @@ def outcome_error(folder: Path) -> str:
         outcome_from_json(whole.read(folder / layout.OUTCOME))
     except FileNotFoundError:
         return ""
-    except (IsADirectoryError, NotADirectoryError, PermissionError) as error:
-        return str(error.strerror)
-    except (msgspec.MsgspecError, UnicodeDecodeError) as error:
-        return str(error)
+    except (*_NO_FILE, PermissionError, msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
+        return str(getattr(error, "strerror", error))
     return ""
 
 
@@ -244,9 +245,7 @@ def write_outcome(folder: Path, ended: Outcome) -> None:
 
 
 def put_away(path: Path, kept: Path | None = None) -> None:
-    """Frees the name of a file that is about to be written; the present one is renamed where a name for it is given.
-    Raises OSError.
-    """
+    """Frees the name of a file that is about to be written; a present one is renamed to ``kept``. Raises OSError."""
     if kept is not None and not kept.exists():
         os.replace(path, kept)
     elif path.is_dir():

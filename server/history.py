@@ -5,6 +5,7 @@ the reports a few thousand are kept as they stand, every so many of them, and mo
 the run goes on. The rare events (cuts, snapshots, states) are all kept.
 """
 
+import re
 import threading
 from collections import OrderedDict
 from dataclasses import dataclass, field
@@ -17,7 +18,7 @@ from conoid.cases.messages import Snapshot, Status
 from conoid.cases.run import State
 
 from .columns import Columns
-from .journal import Tail, seq_of
+from .journal import DAMAGED, Tail, seq_of
 from .notes import KINDS, Notes
 
 _SAMPLES = 4096
@@ -33,6 +34,7 @@ _BLOCK = 4 << 20
 _TYPE = slice(9, 13)
 """The first letters of a message's type in a line, after ``{"type":"``."""
 
+_SHA256 = re.compile("[0-9a-f]{64}")
 _snapshot = msgspec.json.Decoder(Snapshot)
 _status = msgspec.json.Decoder(Status)
 
@@ -116,11 +118,13 @@ class History:
             if kind == b"stat":
                 self._state(_status.decode(line))
             elif kind == b"snap":
-                self.snapshots[_snapshot.decode(line).n] = self._snapshot = line
-            elif msgspec.json.decode(line, type=msgspec.Raw):
+                told = _snapshot.decode(line.decode())
+                if Path(told.path).name and _SHA256.fullmatch(told.sha256):
+                    self.snapshots[told.n] = self._snapshot = line
+            elif msgspec.json.decode(line.decode(), type=msgspec.Raw):
                 self.cuts.append(line)
                 del self.cuts[:-_CUTS]
-        except (msgspec.MsgspecError, ValueError):
+        except DAMAGED:
             return
 
     def _state(self, status: Status) -> None:

@@ -14,6 +14,8 @@ from conoid.cases.run import Cause, State
 
 _CHUNK = 1 << 18
 """Bytes of one read: some hundred lines. Chosen."""
+DAMAGED = msgspec.MsgspecError, ValueError, RecursionError
+"""What msgspec raises for JSON that is damaged: a text that is no UTF-8, and lists within lists without end, too."""
 
 
 class _Head(msgspec.Struct):
@@ -66,7 +68,7 @@ class Tail:
     def _chunk(self, size: int = _CHUNK) -> bytes:
         """The next complete lines. A line longer than the chunk is read whole."""
         try:
-            with whole.opened(self._path) as file:
+            with whole.opened(self._path, links=False) as file:
                 while True:
                     data = os.pread(file.fileno(), size, self._offset)
                     end = data.rfind(b"\n") + 1
@@ -97,8 +99,8 @@ def _line_before(path: Path, after: int) -> int:
 
 def _line(raw: bytes) -> Line | None:
     try:
-        head = _head.decode(raw)
-    except msgspec.MsgspecError:
+        head = _head.decode(raw.decode())
+    except DAMAGED:
         return None
     return Line(head.seq, head.type, raw)
 
@@ -127,7 +129,7 @@ def _status_in(raw: bytes) -> Status | None:
         status = _status.decode(raw)
         State(status.state)
         Cause(status.cause) if status.cause else None
-    except ValueError:
+    except DAMAGED:
         return None
     return status
 

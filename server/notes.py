@@ -7,6 +7,8 @@ import msgspec
 
 from conoid.cases.messages import Checkpoint, Log, Status, to_json
 
+from .journal import DAMAGED
+
 _FIRST, _NEWEST = 200, 800
 """Lines that are kept, from the beginning and from the end. Chosen: what somebody reads, and little to send."""
 _LONGEST = 2000
@@ -32,13 +34,13 @@ class Notes:
     def take(self, line: bytes) -> None:
         """Keeps a line of the journal; one that is damaged is passed over."""
         try:
-            message = _decode(line)
-        except (msgspec.MsgspecError, ValueError):
+            message = _decode(line.decode())
+        except DAMAGED:
             return
-        if isinstance(message, Log):
-            line = _shortened(message, line)
-            if message.level in {"warning", "error"} and len(self.warnings) < _WARNINGS:
-                self.warnings.setdefault(message.text[:_LONGEST], line)
+        line = _shortened(message, line)
+        room = len(self.warnings) < _WARNINGS
+        if room and isinstance(message, Log) and message.level in {"warning", "error"}:
+            self.warnings.setdefault(message.text[:_LONGEST], line)
         if len(self.first) < _FIRST:
             self.first.append(line)
         else:
@@ -51,7 +53,10 @@ class Notes:
         return {"log": lines, "log_left_out": self.left_out, "warnings": list(map(msgspec.Raw, self.warnings.values()))}
 
 
-def _shortened(message: Log, line: bytes) -> bytes:
-    if len(message.text) <= _LONGEST:
+def _shortened(message: Log | Status | Checkpoint, line: bytes) -> bytes:
+    """A line without what is too long of its text, and without what is no part of the message then."""
+    if len(line) <= _LONGEST:
         return line
-    return to_json(msgspec.structs.replace(message, text=f"{message.text[:_LONGEST]} ..."))
+    texts = {name: text for name in message.__struct_fields__ if isinstance(text := getattr(message, name), str)}
+    cut = {name: f"{text[:_LONGEST]} ..." for name, text in texts.items() if len(text) > _LONGEST}
+    return to_json(msgspec.structs.replace(message, **cut))

@@ -10,6 +10,7 @@ from conoid.cases.history import OF_PARTS
 from conoid.cases.messages import Counts, Energy, Load, Progress, Snapshot
 
 from .history import History, Sample
+from .journal import DAMAGED
 
 T = TypeVar("T")
 _NUMBERS = 100_000
@@ -84,7 +85,7 @@ def _sound(decoder: msgspec.json.Decoder[T], line: bytes) -> T | None:
     """The message of a line; None where there is none, or where it is none."""
     try:
         return decoder.decode(line) if line else None
-    except (msgspec.MsgspecError, ValueError):
+    except DAMAGED:
         return None
 
 

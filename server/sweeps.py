@@ -192,6 +192,7 @@ class Sweeps:
             self._complete_later([plan])
             raise
         self._filling.discard(plan.id)
+        self._cancelled.discard(plan.id)  # Asked for when all runs were there: it has cancelled these.
         return filled
 
     def held(self, need: Need, active: Iterable[Need]) -> str:

@@ -10,6 +10,12 @@ export const colour = (name) => getComputedStyle(document.documentElement).getPr
 // Colour and dash of the line number `i`: no two of the first eighteen have both alike.
 export const lineStyle = (i) => ({ colour: `line-${i % HUES}`, dash: DASHES[Math.floor(i / HUES) % DASHES.length] });
 
+// The option of a chart with what all charts have; its own tooltip adds to theirs, so that names in it stay text.
+export function whole(alone, option) {
+  const all = common(alone);
+  return { ...all, ...option, tooltip: { ...all.tooltip, ...option.tooltip } };
+}
+
 // What all charts have: the theme's colours, zoom with Ctrl and the wheel; those that stand `alone` a tooltip of one item,
 // the others the cursor, for which readout.js has the values.
 export function common(alone) {

@@ -1,6 +1,6 @@
 // A chart of a run on ECharts: one cursor and one zoom for all of a page, keys as well as the pointer, saved as CSV and SVG.
 
-import { colour, common } from "./axes.js";
+import { colour, whole } from "./axes.js";
 import { h } from "./figures.js";
 import { echarts } from "./libraries.js";
 import { readout } from "./readout.js";
@@ -71,7 +71,7 @@ export class Chart {
     const moved = [...places].some(([name, place]) => (this.places?.get(name) ?? place) !== place) || panels !== (this.places?.panels ?? panels);
     this.places = Object.assign(places, { panels });
     const how = moved ? { notMerge: true } : { replaceMerge: ["series"] }; // ECharts fails where a line moves to another panel.
-    this.chart.setOption({ ...common(this.alone), ...option }, { ...how, lazyUpdate: false });
+    this.chart.setOption(whole(this.alone, option), { ...how, lazyUpdate: false });
     this.series = option.series;
     this.reads = !this.alone && !option.tooltip?.formatter;
     if (readout.of === this) this.read(this.cursor);
@@ -135,7 +135,7 @@ export class Chart {
 
   savePicture() {
     const chart = this.kit.init(null, null, { renderer: "svg", ssr: true, ...PICTURE, height: PICTURE.height * (this.panels ?? 1) });
-    chart.setOption({ ...common(this.alone), ...this.option(), backgroundColor: colour("card") });
+    chart.setOption({ ...whole(this.alone, this.option()), backgroundColor: colour("card") });
     save(`${this.name()}.svg`, chart.renderToSVGString(), "image/svg+xml");
     chart.dispose();
   }

@@ -102,8 +102,8 @@ export class ComparePage {
   chosen() {
     const { Probes: probes, ...rest } = this.offered();
     const all = [...probes, ...Object.values(rest).flat()];
-    const kept = recall(this.key, null)?.filter((name) => all.includes(name));
-    if (kept?.length) return kept;
+    const kept = recall(this.key, []).filter((name) => all.includes(name));
+    if (kept.length) return kept;
     const broken = this.runs.some(({ info }) => (info.outcome?.fragments ?? 0) > 2);
     return [...probes.slice(0, broken ? 2 : 3), "kinetic", ...(broken ? ["fragments"] : []), "residual"].filter((name) => all.includes(name)).slice(0, 5);
   }

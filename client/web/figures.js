@@ -149,7 +149,7 @@ export const words = (text) => String(text).replaceAll("_", " ");
 
 // h("p.hint#id", { title: "…" }, "text", child, …): text is always set as text, never as markup.
 export function h(what, attributes = {}, ...children) {
-  const [, tag, rest] = /^([a-z0-9]+)(.*)$/.exec(what);
+  const [, tag, rest] = /^([a-z0-9]+)(.*)$/s.exec(what);
   const element = document.createElement(tag);
   for (const [, kind, name] of rest.matchAll(/([.#])([\w-]+)/g)) {
     if (kind === ".") element.classList.add(name);

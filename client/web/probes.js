@@ -32,7 +32,7 @@ export class Chooser {
 
   get chosen() {
     const { probes: told, momenta } = choices(this.live);
-    const kept = recall(this.key, null)?.filter((name) => told.includes(name) || momenta.includes(name));
+    const kept = [recall(this.key, null)].find(Array.isArray)?.filter((name) => told.includes(name) || momenta.includes(name));
     return kept ?? told.slice(0, MOST_AT_FIRST);
   }
 

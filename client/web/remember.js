@@ -5,13 +5,26 @@ import { h } from "./figures.js";
 
 const here = new Map();
 
+// A value of another kind than `otherwise`, which another version of the page may have left, counts as none.
 export function recall(key, otherwise) {
+  const there = stored(key) ?? here.get(key);
+  return there !== undefined && alike(there, otherwise) ? there : otherwise;
+}
+
+function stored(key) {
   try {
-    const text = localStorage.getItem(`conoid.${key}`);
-    return text === null ? here.get(key) ?? otherwise : JSON.parse(text);
+    return JSON.parse(localStorage.getItem(`conoid.${key}`)) ?? undefined;
   } catch {
-    return here.get(key) ?? otherwise;
+    return undefined;
   }
+}
+
+// Whether a value has the kind of an example, an object the kinds of its fields, a list texts alone; all are like none.
+function alike(value, example) {
+  if (example === null || example === undefined) return true;
+  if (Array.isArray(example)) return Array.isArray(value) && value.every((one) => typeof one === "string");
+  if (typeof example !== "object") return typeof value === typeof example;
+  return typeof value === "object" && !Array.isArray(value) && Object.entries(example).every(([name, one]) => alike(value[name], one));
 }
 
 export function remember(key, value) {

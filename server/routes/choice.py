@@ -22,13 +22,16 @@ def chosen(
         str,
         Query(max_length=_LONGEST, description="words, all of which the name, title, labels, state or message have"),
     ] = "",
-    since: Annotated[float | None, Query(description="submitted then or later, Unix s")] = None,
-    until: Annotated[float | None, Query(description="submitted before, Unix s")] = None,
+    since: Annotated[float | None, Query(allow_inf_nan=False, description="submitted then or later, Unix s")] = None,
+    until: Annotated[float | None, Query(allow_inf_nan=False, description="submitted before, Unix s")] = None,
 ) -> Chosen:
     """What a request asks for. Raises ServiceError 400."""
     words = text.split()
     if len(words) > _MOST_WORDS:
         raise ServiceError(400, "bad_parameter", f"text has {len(words)} words; allowed: {_MOST_WORDS}", pointer="text")
+    for name, value in (("case", case), ("text", text), *(("label", each) for each in label or ())):
+        if "\0" in value:
+            raise ServiceError(400, "bad_parameter", f"{name} = {value[:80]!r}: no text has a null byte", pointer=name)
     return Chosen(_states(state), labels_of(label or ()), case, words, since, until)
 
 

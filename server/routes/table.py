@@ -25,7 +25,9 @@ def table(
     chosen: ChosenOf,
     cursor: Cursor = None,
     limit: Annotated[int, Query(ge=1, le=500)] = 500,
-    changed: Annotated[float | None, Query(description="open, or submitted or ended then or later, Unix s")] = None,
+    changed: Annotated[
+        float | None, Query(allow_inf_nan=False, description="open, or submitted or ended then or later, Unix s")
+    ] = None,
     if_none_match: Annotated[str, Header(alias="If-None-Match")] = "",
 ) -> Response:
     """Own runs, newest first, with title, progress, the values of their cases and their results.

@@ -449,3 +449,36 @@ def test_the_ends_of_a_scale_are_those_that_are_chosen(ask: Ask, made: bytes) ->
     one = ask("ranges.js", "page.range({ how: 'all', over: 'now' }, 'speed', data, [])", decoded(ask, made))
     assert one["low"] <= header.low
     assert one["high"] >= header.high
+
+
+def test_what_the_browser_keeps_is_used_where_it_has_the_kind_that_is_wanted(ask: Ask) -> None:
+    script = """((globalThis.localStorage = { getItem: () => data[0] }), page.recall("x", data[1]))"""
+    sort = {"id": "submitted", "down": True}
+    for text in ("null", "5", '"a"', "[]", "{", "[1]", '{"id":5,"down":true}', '{"id":"a"}', "\u202e"):
+        assert ask("remember.js", script, [text, sort]) == sort, text
+    for text, otherwise in (
+        ("null", []),
+        ("[null]", []),
+        ("{}", []),
+        ("[]", {}),
+        ("null", {}),
+        ("{}", ""),
+        ("1", False),
+    ):
+        assert ask("remember.js", script, [text, otherwise]) == otherwise, text
+    for kept, wanted in (
+        ({"id": "a", "down": False}, sort),
+        (["a"], []),
+        ({"a": True}, {}),
+        ("b", ""),
+        (True, False),
+    ):
+        assert ask("remember.js", script, [json.dumps(kept), wanted]) == kept
+
+
+def test_the_tooltip_of_a_chart_stays_text_whatever_a_chart_adds_to_it(ask: Ask) -> None:
+    globals_ = "globalThis.getComputedStyle = () => ({ getPropertyValue: () => '' }); globalThis.document = {};"
+    script = f"(() => {{ {globals_} return page.whole(true, {{ tooltip: {{ trigger: 'axis' }} }}).tooltip; }})()"
+    told = ask("axes.js", script)
+    assert (told["renderMode"], told["trigger"]) == ("richText", "axis")
+    assert "common(" not in (WEB / "charts.js").read_text()
