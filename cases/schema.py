@@ -205,7 +205,7 @@ class Run(Model):
     than 1/200 of it; the first and the last are always made."""
     max_steps: Annotated[Count, Field(ge=1)] = 100_000_000
     """The run stops, with a checkpoint, when it needs more: state ``timed_out``, cause ``steps``. A restart with a
-    larger number goes on."""
+    larger number goes on (``conoid restart RUN --max-steps NUMBER``)."""
     max_wall_time: Annotated[Time, Positive] | None = None
     """The run stops, with a checkpoint, when it has taken longer.
     Counted from the first step."""

@@ -20,6 +20,7 @@ from .options import (
     CaseArgument,
     Json,
     Labels,
+    MaxSteps,
     Overrides,
     Ranks,
     SourceArgument,
@@ -86,13 +87,14 @@ def restart(
     run: RunArgument,
     ranks: Ranks = None,
     threads: Threads = None,
+    max_steps: MaxSteps = None,
     url: Url = None,
     token: Token = None,
     as_json: Json = False,
 ) -> None:
     """Go on from the newest checkpoint of a run, as a new run with the same answer; prints its id."""
     with connect(url, token) as session:
-        made = session.restart(find(session, run).id, ranks, threads=threads)
+        made = session.restart(find(session, run).id, ranks, threads=threads, max_steps=max_steps)
         if as_json:
             echo_json(made.status())
         else:

@@ -22,7 +22,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "run": ("conoid run demo --ranks 2 --view bar.png", "conoid run my_case.toml --set run.end_time='20 us' --check"),
     "submit": ("conoid submit my_case.toml --label batch=first", "conoid submit demo --ranks 4 --threads 2"),
     "batch": ("conoid batch my_case.toml --ranks 16",),
-    "restart": ("conoid restart last --ranks 4",),
+    "restart": ("conoid restart last --ranks 4", "conoid restart last --max-steps 20000"),
     "runs": ("conoid runs --case 'glass*' --since 3d", "conoid runs failed --label batch=first --limit 100"),
     "ls": ("conoid ls --state running",),
     "show": ("conoid show last", "conoid show runs/local/RUN --json"),

@@ -101,6 +101,9 @@ Ranks = Annotated[int | None, typer.Option("--ranks", min=1, help="MPI ranks; th
 Threads = Annotated[
     int | None, typer.Option("--threads", min=1, help="Threads of each rank; the case's own number if not given.")
 ]
+MaxSteps = Annotated[
+    int | None, typer.Option("--max-steps", min=1, help="run.max_steps of the new run; the case's own if not given.")
+]
 Labels = Annotated[
     list[str] | None,
     typer.Option("--label", metavar="NAME=VALUE", help="By which runs are found again; may be repeated."),

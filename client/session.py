@@ -114,15 +114,16 @@ class Session(Http):
 
     def restart(
         self, run: str, ranks: int | None = None, key: str | None = None, profile: str = "", priority: int = 0,
-        threads: int | None = None,
+        threads: int | None = None, max_steps: int | None = None,
     ) -> Run:  # fmt: skip
         """A new run of the same case that goes on from the newest checkpoint of ``run``, on so many ranks of so many
-        threads; as the case has them where they are not given.
+        threads, to ``max_steps`` (``run.max_steps``); as the case has them where they are not given.
 
-        Its answer is that of a run that nothing has interrupted. Raises ServiceError when there is no checkpoint.
+        Its answer is that of a run that nothing has interrupted. Raises ServiceError when there is no checkpoint, and
+        when ``run`` has used up its steps and ``max_steps`` is not larger.
         """
-        cores = {"ranks": ranks, "threads": threads}
-        words = {name: str(number) for name, number in cores.items() if number is not None}
+        numbers = {"ranks": ranks, "threads": threads, "max_steps": max_steps}
+        words = {name: str(number) for name, number in numbers.items() if number is not None}
         words |= {name: str(value) for name, value in (("profile", profile), ("priority", priority)) if value}
         path = f"/v1/runs/{quoted(run)}:restart?{urlencode(words)}"
         return Run(self, self.post(RunInfo, path, key=key or str(uuid.uuid4()), more=SURVEY).id)

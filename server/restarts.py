@@ -8,7 +8,7 @@ from pathlib import Path
 
 from conoid.cases import checkpoints, fragments, layout, whole
 from conoid.cases.load import apply_overrides, read_data
-from conoid.cases.run import State
+from conoid.cases.run import Cause, State
 
 from .errors import ServiceError
 from .folder import outcome
@@ -19,11 +19,25 @@ LABEL = "restart"
 """Label of the new run: the id of the other one."""
 
 
-def body(case: Path, ranks: int | None, threads: int | None = None) -> dict[str, object]:
-    """The case of a run with other ranks and threads; None: unchanged. Raises CaseError, OSError."""
+def body(case: Path, ranks: int | None, threads: int | None = None, max_steps: int | None = None) -> dict[str, object]:
+    """The case of a run with other ranks, threads and ``run.max_steps``; None: unchanged. Raises CaseError, OSError."""
     whole.check(case)
-    wanted = {"run.ranks": ranks, "run.threads": threads}
+    wanted = {"run.ranks": ranks, "run.threads": threads, "run.max_steps": max_steps}
     return apply_overrides(read_data(case), {key: value for key, value in wanted.items() if value is not None})
+
+
+def check(source: Path, max_steps: int | None) -> None:
+    """Raises ServiceError 409 where no step is left for a run that goes on from ``source``. ``max_steps``: None for
+    that of its case.
+    """
+    ended = outcome(source)
+    spent = ended is not None and ended.cause == Cause.STEPS
+    newest = next((int(place.name) for place in checkpoints.found(source)), 0)
+    reached = (ended.steps or newest) if ended is not None and spent else newest
+    if spent if max_steps is None else max_steps <= reached:
+        given = "" if max_steps is None else f"max_steps = {max_steps}: "
+        detail = f"{given}run {source.name} has gone {reached} steps; give max_steps a number above {reached}"
+        raise ServiceError(409, "no_steps_left", detail, pointer="max_steps")
 
 
 def fill(source: Path, folder: Path) -> None:

@@ -16,10 +16,10 @@ const HELP = {
   diverged: "Look at the last snapshot and at dt before the end; a smaller numerics.dt_safety or erosion of worn tets helps.",
   energy: "Look at the energy by term: the term that grows is the one that fails; a smaller numerics.dt_safety helps.",
   memory: "Use larger elements, or a machine with more memory.", walltime: "Go on from the last checkpoint, or allow more in run.wall_time.",
-  steps: "Open the case, allow more in run.max_steps, and start again; dt is held down by what stands beside it.", storage: "Make room on the disk, then go on from the last checkpoint.",
+  steps: "Go on with a larger run.max_steps; dt is held down by what stands beside it.", storage: "Make room on the disk, then go on from the last checkpoint.",
 };
 const POINT = /^checkpoints\/(\d+)\/manifest\.json$/;
-const FATED = new Set(["input", "mesh", "diverged", "energy", "steps"]); // Causes that the same case meets again.
+const FATED = new Set(["input", "mesh", "diverged", "energy"]); // Causes that the same case meets again.
 const BAD = new Set(["failed", "lost", "timed_out", "cancelled"]);
 
 export class Situation {
@@ -47,24 +47,26 @@ export class Situation {
       h("p.hint", {}, reached(live)), HELP[live.cause] ? h("p", {}, HELP[live.cause]) : "", actions), log);
     const [files, lines] = await Promise.all([this.files(), this.end(live)]);
     const point = FATED.has(live.cause) ? null : files?.filter(({ path }) => POINT.test(path)).at(-1);
-    if (point) actions.append(this.restart(POINT.exec(point.path)[1]));
+    if (point) actions.append(this.restart(Number(POINT.exec(point.path)[1]), live));
     else if (files && !FATED.has(live.cause)) actions.append(h("span.hint", {}, "It has left no checkpoint to go on from; open the case, change it and start again."));
     log.hidden = !lines;
     log.replaceChildren(lines);
     log.scrollTop = log.scrollHeight;
   }
 
-  restart(step) {
+  // A run that has used up its steps goes on with twice as many.
+  restart(step, { cause, finished }) {
+    const most = cause === "steps" ? 2 * Math.max(step, finished?.steps ?? 0) : 0;
     const button = h("button", { type: "button", onclick: async () => {
       button.disabled = true;
       try {
-        const { id } = await call(`${this.path}:restart`, { method: "POST" });
+        const { id } = await call(`${this.path}:restart${most ? `?max_steps=${most}` : ""}`, { method: "POST" });
         location.hash = `#/runs/${encodeURIComponent(id)}`;
       } catch (error) {
         button.after(h("span.problem", {}, error.message));
         button.disabled = false;
       }
-    } }, `Go on from step ${Number(step)}`);
+    } }, `Go on from step ${step}${most ? ` with run.max_steps = ${most}` : ""}`);
     return button;
   }
 

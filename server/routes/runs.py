@@ -31,6 +31,7 @@ from .choice import ChosenOf
 router = APIRouter()
 Body = Annotated[bytes, Depends(read_body)]
 _MOST_RANKS = _MOST_THREADS = 1_000_000
+_MOST_STEPS = 2**53
 """That a number may be; the server has its own limit. Chosen."""
 _LAST = "z" * 22
 """Behind the beginning of an id: no id that begins so comes after it."""
@@ -223,24 +224,27 @@ async def restart(
     idempotency_key: Annotated[str | None, Header()] = None,
     ranks: Annotated[int | None, Query(ge=1, le=_MOST_RANKS, description="those of the case if not given")] = None,
     threads: Annotated[int | None, Query(ge=1, le=_MOST_THREADS, description="of each rank, likewise")] = None,
+    max_steps: Annotated[int | None, Query(ge=1, le=_MOST_STEPS, description="run.max_steps, likewise")] = None,
     profile: Annotated[str, Query(description="of the site's batch system")] = "",
     priority: Annotated[int, Query(ge=-PRIORITY, le=PRIORITY, description="among your own runs")] = 0,
 ) -> Response:
     """A new run of the same case that goes on from the newest checkpoint of this one, and ends with the same answer.
-    This one stays as it is."""
+    This one stays as it is. One that has used up run.max_steps needs a larger max_steps: 409 without."""
     run = await service.lanes.run(find, service, identity, run_id)
     wishes = Wishes({restarts.LABEL: run.id}, profile, priority, run.id)
-    receipt = await service.surveyors.run(_restarted, service, run, (ranks, threads), idempotency_key, wishes)
+    numbers = ranks, threads, max_steps
+    receipt = await service.surveyors.run(_restarted, service, run, numbers, idempotency_key, wishes)
     return JSONResponse(receipt, 202, {"Location": receipt["url"]})
 
 
 def _restarted(
-    service: Service, run: Run, cores: tuple[int | None, int | None], key: str | None, wishes: Wishes
+    service: Service, run: Run, numbers: tuple[int | None, int | None, int | None], key: str | None, wishes: Wishes
 ) -> dict[str, Any]:
     path = service.settings.runs / run.id
     try:
         case = path / folder.submission(path).case_file
-        body = json.dumps(restarts.body(case, *cores)).encode()
+        body = json.dumps(restarts.body(case, *numbers)).encode()
+        restarts.check(path, numbers[-1])
     except (OSError, msgspec.MsgspecError) as error:
         raise ServiceError(409, "no_case", f"run {run.id}: its case cannot be read") from error
     except CaseError as error:

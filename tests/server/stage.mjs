@@ -29,7 +29,7 @@ class Element {
   querySelectorAll() { return []; }
   querySelector() { return null; }
   get childElementCount() { return this.children.length; }
-  addEventListener() {}
+  addEventListener(name, work) { this[`on${name}`] = work; }
   focus() {}
   setSelectionRange() {}
 }

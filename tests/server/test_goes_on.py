@@ -1,5 +1,6 @@
 """``:restart``: a new run goes on from a checkpoint of another one."""
 
+import json
 import os
 import shutil
 from pathlib import Path
@@ -8,9 +9,11 @@ import pytest
 
 from conoid.cases import layout
 from conoid.cases.checkpoints import MANIFEST, SEAL
-from conoid.cases.run import State
+from conoid.cases.outcome import Outcome
+from conoid.cases.run import Cause, State
 from conoid.server import restarts
 from conoid.server.errors import ServiceError
+from conoid.server.folder import write_outcome
 from conoid.worker.migration.checkpoint import latest
 
 from .checkpointed import made, with_checkpoint, with_checkpoint_in
@@ -38,6 +41,21 @@ def test_a_new_run_takes_over_the_checkpoints(server: Running, tmp_path: Path) -
     assert history.stat().st_ino != (source / layout.HISTORY).stat().st_ino, "this one is appended to"
     assert server.ann.show(fresh)["labels"] == {"restart": run}
     assert server.ann.wait_for(run)["state"] == "cancelled"
+
+
+def test_a_run_that_has_used_up_its_steps_needs_more_of_them(server: Running) -> None:
+    run = server.ann.submit(end="crash")
+    server.ann.wait_for(run)
+    source = with_checkpoint(server, run, 40)
+    write_outcome(source, Outcome(state=State.TIMED_OUT, cause=Cause.STEPS, steps=40))
+    for more, given in (("", ""), ("?max_steps=40", "max_steps = 40: "), ("?ranks=1&max_steps=7", "max_steps = 7: ")):
+        answer = server.ann.http.post(f"/v1/runs/{run}:restart{more}")
+        assert (answer.status_code, answer.json()["code"]) == (409, "no_steps_left")
+        assert answer.json()["detail"] == f"{given}run {run} has gone 40 steps; give max_steps a number above 40"
+    answer = server.ann.http.post(f"/v1/runs/{run}:restart?max_steps=41")
+    assert answer.status_code == 202
+    case = server.ann.runs / answer.json()["id"] / "case.json"
+    assert json.loads(case.read_text())["run"]["max_steps"] == 41
 
 
 def test_without_a_checkpoint_there_is_nothing_to_go_on_from(server: Running) -> None:

@@ -197,6 +197,27 @@ def test_a_run_that_has_ended_says_why_and_what_it_was_warned_of(web: Path) -> N
     assert "2.00 MB" in files
 
 
+def test_a_run_that_has_used_up_its_steps_goes_on_with_more(web: Path) -> None:
+    script = """
+        const { Situation } = await load("situation.js");
+        state.served = (path) => path.endsWith(":restart") ? { id: "b" } : 404;
+        const point = { path: "checkpoints/000000500/manifest.json" };
+        const shown = new Situation("a", async () => [point]);
+        const one = { state: "timed_out", cause: "steps", message: "", snapshots: [], finished: { steps: 500 } };
+        const asked = [];
+        const real = fetch;
+        globalThis.fetch = (url, options) => { asked.push(new URL(url).search); return real(url, options); };
+        await shown.fill(one);
+        const button = shown.restart(500, one);
+        await button.onclick?.();
+        return [text(shown.element), text(button), asked.at(-1)];
+    """
+    told, button, asked = played(web, script)
+    assert button in told
+    assert button == "Go on from step 500 with run.max_steps = 1000"
+    assert asked == "?max_steps=1000"
+
+
 @pytest.mark.parametrize(
     ("problem", "words"),
     [
