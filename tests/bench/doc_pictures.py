@@ -38,7 +38,7 @@ PICTURES = {
     "tutorial": Shown("pictures/tutorial.png", "tutorial", "fragment", {"mirror": "auto", "size": (1400, 900)}),
     "bullet": Shown(
         "tutorial/bullet/bullet.png", "tutorial/bullet/bullet_tile.toml", "plastic_strain",
-        {"mirror": "y", "time": ["0 us", "15 us", "50 us"], "size": (1500, 500)},
+        {"mirror": "y", "time": ["0 us", "20 us", "60 us"], "size": (1500, 500)},
     ),
     "long_rod": Shown(
         "pictures/long_rod.png", "long_rod", "plastic_strain", {"size": (1600, 700)}, takes="a quarter of an hour"

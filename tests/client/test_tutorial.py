@@ -34,7 +34,7 @@ def test_the_pieces_of_the_bullet_stand_in_its_case() -> None:
     folder = Path(__file__).parents[2] / "docs" / "tutorial" / "bullet"
     text, case = (folder.parent / "bullet.md").read_text(), (folder / "bullet_tile.toml").read_text()
     pieces = re.findall(r"```toml\n(.*?)```", text, re.DOTALL)
-    assert len(pieces) == 3
+    assert len(pieces) == 4
     assert all(piece in case for piece in pieces)
     parts = parse_case(toml_data(case)).parts
     solids = [solid for part in parts if isinstance(part.mesh, Cad) for solid in part.mesh.solids]
