@@ -33,7 +33,7 @@ _NEVER = frozenset({"time", "elapsed", "cpu", "elements", "nodes", "worst_residu
 def figure(rows: Sequence[Row], keys: Sequence[str], x: str | None, columns: Sequence[str]) -> Figure:
     """``rows`` of a table, of which ``keys`` were changed; over the key ``x``, the first that varies when it is None.
 
-    One curve for each combination of the other keys. Raises ClientError.
+    One curve for each combination of the other keys; keys that go together are one of them. Raises ClientError.
     """
     titles = {split(title)[0]: title for title in rows[0]} if rows else {}
     changed = {key: titles[key] for key in keys if key in titles}
@@ -46,10 +46,24 @@ def figure(rows: Sequence[Row], keys: Sequence[str], x: str | None, columns: Seq
     across = min(len(shown), 3)
     down = -(-len(shown) // across)
     made = Figure(figsize=(4.6 * across, 3.4 * down), layout="constrained")
-    others = [title for title in changed.values() if title != over and len({row[title] for row in rows}) > 1]
+    groups = _together(rows, list(changed.values()))
+    more = next((len(group) - 1 for group in groups if over in group), 0)
+    others = [group[0] for group in groups if over not in group]
     for index, name in enumerate(shown):
         _panel(made.add_subplot(down, across, index + 1), rows, over, others, name)
+    for axes in made.axes if more else ():
+        axes.set_xlabel(f"{axes.get_xlabel()}\nand {more} more that {'goes' if more == 1 else 'go'} with it")
     return made
+
+
+def _together(rows: Sequence[Row], titles: Sequence[str]) -> list[list[str]]:
+    """The columns that vary, in groups: each value of one belongs to one value of each of the others in its group."""
+    groups: dict[tuple[int, ...], list[str]] = {}
+    for title in titles:
+        order = list(dict.fromkeys(row[title] for row in rows))
+        if len(order) > 1:
+            groups.setdefault(tuple(order.index(row[title]) for row in rows), []).append(title)
+    return list(groups.values())
 
 
 def _axis(rows: Sequence[Row], changed: Mapping[str, str], x: str | None) -> str:

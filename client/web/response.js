@@ -11,6 +11,23 @@ export function levels(points, column) {
   return (numbers ? found.sort(([, a], [, b]) => a - b) : found).map(([text, value]) => ({ text, value }));
 }
 
+// The keys that vary, each with those that go together with it: each value of one belongs to one value of the other. The
+// first of them stands for all; `named` says how many more there are. Where no key varies, the first one is the axis.
+export function together(points, keys) {
+  const course = (key) => {
+    const texts = points.map(({ row }) => key.text(row));
+    const order = [...new Set(texts)];
+    return texts.map((text) => order.indexOf(text)).join();
+  };
+  const groups = new Map();
+  const varying = keys.filter((key) => new Set(points.map(({ row }) => key.text(row))).size > 1);
+  for (const key of varying.length ? varying : keys.slice(0, 1)) groups.set(course(key), [...(groups.get(course(key)) ?? []), key]);
+  return [...groups.values()].map(([first, ...more]) => {
+    const also = more.length ? ` and ${more.length} more that ${more.length > 1 ? "go" : "goes"} with it` : "";
+    return { ...first, members: [first, ...more], named: `${first.title}${also}`, full: `${first.full ?? first.title}${also}` };
+  });
+}
+
 // { words, curves: [{ name, data: [[x, y, id]] }] } of a result over the column `x`, both in SI units, a curve for each
 // combination of the `others`; `words` names the places on the axis where the values of `x` are no numbers.
 export function curves(points, x, others, result) {

@@ -9,7 +9,7 @@ import { Grid } from "./grid.js";
 import { FINAL } from "./live.js";
 import { sorted } from "./order.js";
 import { recall, remember } from "./remember.js";
-import { curves, matrix, telling } from "./response.js";
+import { curves, matrix, telling, together } from "./response.js";
 import { Told, shorts } from "./told.js";
 import { fill } from "./toolbar.js";
 
@@ -105,6 +105,7 @@ export class SweepPage {
     this.place = new Map(this.points.map(({ n, row }) => [row.id, n]));
     this.keys = keyColumns(this.points, told.units);
     const others = columnsOf(rows, [], told.units).filter(({ id }) => !["run", "labels", "title", "submitted", "message"].includes(id));
+    this.groups = together(this.points, this.keys);
     this.results = others.filter(({ id }) => id.startsWith("result:"));
     const point = { id: "run", title: "point", value: (row) => this.place.get(row.id), text: (row) => String(1 + this.place.get(row.id)), width: 16 };
     this.columns = [point, ...this.keys, ...others.filter(({ shown }) => shown)];
@@ -194,21 +195,21 @@ export class SweepPage {
   choices() {
     const wanted = recall(this.name("result"), telling(this.points, this.results)?.id);
     fill(this.result, this.results.map(({ id, full, title }) => [id, full ?? title]), wanted);
-    fill(this.over, this.keys.map(({ id, full, title }) => [id, full ?? title]), recall(this.name("over"), this.keys[0]?.id));
-    this.overLabel.hidden = this.keys.length < 2;
+    fill(this.over, this.groups.map(({ id, full }) => [id, full]), recall(this.name("over"), this.groups[0]?.id));
+    this.overLabel.hidden = this.groups.length < 2;
   }
 
   get chosen() { return this.results.find(({ id }) => id === this.result.value) ?? this.results[0]; }
 
   get axes() {
-    const x = this.keys.find(({ id }) => id === this.over.value) ?? this.keys[0];
-    return { x, others: this.keys.filter((key) => key !== x) };
+    const x = this.groups.find(({ id }) => id === this.over.value) ?? this.groups[0];
+    return { x, others: this.groups.filter((key) => key !== x) };
   }
 
   drawResponse() {
     const there = this.results.length > 0 && this.keys.length > 0 && this.points.some(({ row }) => row.results);
     this.response.hidden = !there;
-    this.map.hidden = !there || this.keys.length !== 2;
+    this.map.hidden = !there || this.groups.length !== 2;
     this.seen.classList.toggle("two", !this.map.hidden);
     if (!there) return;
     this.chart.draw(true);
@@ -221,14 +222,14 @@ export class SweepPage {
     if (!x || !result) return null;
     const { words: places, curves: found } = curves(this.points, x, others, result);
     const lines = found.map(({ name, data }, i) => ({ ...series({ name: name || result.title, data, unit: result.base, ...lineStyle(i) }), showSymbol: true, symbolSize: 8, cursor: "pointer" }));
-    const titled = (column, made) => ({ ...made, name: made.name ? `${column.title}, ${made.name}` : column.title });
+    const titled = (column, made) => ({ ...made, name: made.name ? `${column.named ?? column.title}, ${made.name}` : column.named ?? column.title });
     const across = axis(x.base, Math.max(0, ...found.flatMap(({ data }) => data.map(([value]) => Math.abs(value)))), { scale: true, splitLine: { show: false } });
     const up = axis(result.base, largest(lines), { scale: true });
     return {
       grid: { left: 72, right: 22, top: found.length > 1 ? 58 : 36, bottom: 46 },
       xAxis: { ...titled(x, across), ...(places ? { type: "category", data: places, axisLabel: {} } : {}), nameLocation: "middle", nameGap: 28, nameTextStyle: { ...across.nameTextStyle, align: "center" } },
       yAxis: { ...titled(result, up), nameTextStyle: { ...up.nameTextStyle, align: "left" } },
-      series: lines, xName: x.base ? `${x.full ?? x.title} [${x.base}]` : x.full ?? x.title,
+      series: lines, xName: x.base ? `${x.full} [${x.base}]` : x.full,
       ...(found.length > 1 ? {} : { legend: { show: false } }),
       tooltip: { trigger: "item", formatter: ({ seriesName, value }) => `${x.title} ${places ? places[value[0]] : exact(value[0], x.base)}\n${result.title} ${si(value[1], result.base, 4)}${found.length > 1 ? `\n${seriesName}` : ""}` },
     };
@@ -241,7 +242,7 @@ export class SweepPage {
     const unit = (column) => (column.unit ? `, ${column.unit}` : "");
     this.mapNote.textContent = `${result.full ?? result.title}${unit(result)}`;
     this.squares.replaceChildren(h("table.matrix", {},
-      h("thead", {}, h("tr", {}, h("th", { scope: "col" }, `${down.title}${unit(down)} ↓  ${x.title}${unit(x)} →`), columns.map(({ text }) => h("th", { scope: "col" }, text)))),
+      h("thead", {}, h("tr", {}, h("th", { scope: "col" }, `${down.named}${unit(down)} ↓  ${x.named}${unit(x)} →`), columns.map(({ text }) => h("th", { scope: "col" }, text)))),
       h("tbody", {}, rows.map(({ text }, i) => h("tr", {}, h("th", { scope: "row" }, text), cells[i].map((cell) => square(cell, result)))))));
   }
 }

@@ -102,6 +102,16 @@ def test_what_differs_is_drawn_over_what_was_changed() -> None:
     assert [float(y) for y in np.asarray(made.axes[0].lines[0].get_ydata())] == [1e4, 4e4, 9e4]
 
 
+@pytest.mark.parametrize("x", [None, "w"])
+def test_keys_that_go_together_are_one_axis(x: str | None) -> None:
+    rows = [{"v [m/s]": row["v [m/s]"], "w [K]": f"{9000 / float(row['v [m/s]']):g}", **row} for row in ROWS]
+    made = swept.figure(rows, ["v", "w", "run.ranks"], x, ["cpu"])
+    assert made.axes[0].get_xlabel() == f"{'w, K' if x else 'v, m/s'}\nand 1 more that goes with it"
+    assert [(line.get_label(), len(np.asarray(line.get_xydata()))) for line in made.axes[0].lines] == [
+        ("run.ranks 1", 3), ("run.ranks 2", 3)
+    ]  # fmt: skip
+
+
 def test_words_on_the_axis_and_columns_by_name() -> None:
     made = swept.figure(
         [{**row, "v [m/s]": f"law {row['v [m/s]'][0]}"} for row in ROWS], ["v", "run.ranks"], "v", ["cpu"]

@@ -194,6 +194,26 @@ def test_a_response_leaves_out_what_has_not_come_to_its_end(ask: Ask, some: dict
     assert best == "result:probe.speed"
 
 
+def test_keys_that_go_together_are_one_axis(ask: Ask) -> None:
+    script = """(() => {
+        const key = (name) => ({ id: name, title: name, value: (row) => row[name], text: (row) => String(row[name]) });
+        const points = data.map((row, n) => ({ n, row: { ...row, state: "succeeded" } }));
+        const groups = page.together(points, ["fixed", "v", "w", "size", "word"].map(key));
+        const drawn = page.curves(points, groups[0], groups.slice(1), key("y")).curves;
+        return [groups.map(({ id, named, members }) => [id, named, members.length]),
+          drawn.map(({ name, data }) => [name, data.length]),
+          page.together(points, [key("fixed")]).map(({ id }) => id)];
+    })()"""
+    told = [
+        {"id": f"{v}{size}", "fixed": 1, "v": v, "w": 9 - v, "word": f"law {v}", "size": size, "y": v * size}
+        for v in (1, 2, 3) for size in (4, 5)
+    ]  # fmt: skip
+    groups, drawn, alone = ask("response.js", script, told)
+    assert groups == [["v", "v and 2 more that go with it", 3], ["size", "size", 1]]
+    assert drawn == [["size 4", 3], ["size 5", 3]]
+    assert alone == ["fixed"]
+
+
 def test_a_key_of_words_has_places_on_the_axis(ask: Ask) -> None:
     script = """
         const column = { title: "form", value: (row) => row.form, text: (row) => row.form };
