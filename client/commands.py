@@ -1,6 +1,8 @@
 """Commands on the runs of a server: hand one in, list, show and follow runs, ask something of one, fetch its files."""
 
 import sys
+from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Annotated
 
@@ -12,7 +14,7 @@ from conoid.cases.run import ExitCode
 from . import local_run, tables
 from .batch import cancel_folder, slurm_of
 from .console import echo, echo_json
-from .errors import UnfinishedError, UsageError
+from .errors import ClientError, UnfinishedError, UsageError
 from .folders import LocalFolder
 from .following import FolderRun
 from .live import Live, exit_code
@@ -114,10 +116,8 @@ def show_run(run: SourceArgument, url: Url = None, token: Token = None, as_json:
     show(tables.run_table(info))
     if info.outcome is not None:
         show("")
-        show(tables.outcome_table(info.outcome))
-        if info.outcome.reference:
-            show("")
-            show(tables.checks_table(info.outcome.reference))
+        for part in tables.end_tables(info.outcome):
+            show(part)
 
 
 def watch_run(
@@ -132,6 +132,8 @@ def watch_run(
         LocalFolder(folder).path(layout.JOURNAL)
         followed = FolderRun(folder, slurm_of(None).bin)
         known = _print_messages(followed) if as_json else watch(followed, False if plain else None)
+        if not as_json:
+            _tell_probes(lambda: local_run.status(folder))
     else:
         known = _watched(run, plain, url, token, as_json)
     if not as_json and (known.message or known.cause):
@@ -147,10 +149,20 @@ def _watched(run: str, plain: bool, url: str | None, token: str | None, as_json:
             if not known.state.final:  # a journal that has lost its end
                 info = found.status()
                 known.state, known.cause, known.message = info.state, info.cause, info.message
+            if not as_json:
+                _tell_probes(found.status)
             return known
         except KeyboardInterrupt:
             complain(f"the run goes on; conoid watch {found.id} shows it again")
             raise
+
+
+def _tell_probes(status: Callable[[], RunInfo]) -> None:
+    """What the probes have measured, where that can be asked: the run has been shown to its end already."""
+    with suppress(ClientError):
+        ended = status().outcome
+        if ended is not None and ended.probes:
+            show(tables.probes_table(ended.probes))
 
 
 def _print_messages(run: Run | FolderRun) -> Live:

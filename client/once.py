@@ -117,10 +117,8 @@ def _follow(run: Run, case: Case, out: Console, plain: bool) -> tuple[RunInfo, s
 def _report(result: Result, outcome: Outcome, told: set[str], out: Console) -> None:
     """``told``: warnings that need not be printed again."""
     out.print()
-    out.print(tables.outcome_table(outcome, told))
-    if outcome.reference:
-        out.print()
-        out.print(tables.checks_table(outcome.reference))
+    for part in tables.end_tables(outcome, told):
+        out.print(part)
     out.print()
     out.print(f"results    {result.folder.path('outcome.json').parent}", soft_wrap=True)
 

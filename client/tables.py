@@ -1,6 +1,7 @@
 """What the command line prints once: lists of runs, one run, outcomes, reference numbers; estimates: ``validated``."""
 
 import math
+from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from typing import Any, Literal, TypeGuard
 
@@ -29,7 +30,7 @@ from conoid.cases.figures import (
 from conoid.cases.flat import Scalar
 from conoid.cases.library import Constant
 from conoid.cases.materials import Material
-from conoid.cases.outcome import Check, Compressed, Outcome
+from conoid.cases.outcome import Check, Compressed, Measured, Outcome
 from conoid.cases.run import State
 from conoid.cases.schema import Case
 
@@ -80,7 +81,8 @@ def state_text(state: State, cause: str | None = None) -> Text:
 def runs_table(rows: Sequence[RunRow], keys: Sequence[str]) -> Table:
     """One line a run, with the values of ``keys``: where the terminal is too narrow, texts end in an ellipsis."""
     last = ("cores", "submitted", "took")
-    told = [_differs(row, keys) for row in rows]
+    named = short_names(keys)
+    told = [_differs(row, named) for row in rows]
     labels = [" ".join(f"{name}={value}" for name, value in _own(row.info).items()) for row in rows]
     more = [name for name, texts in (("values", told), ("labels", labels)) if any(texts)]
     made = table("run", "case", "state", *more, *last, right=("cores", "took"), wide=("case", "state", *more))
@@ -119,12 +121,18 @@ def _how(row: RunRow) -> Text:
     return text
 
 
-def _differs(row: RunRow, keys: Sequence[str]) -> str:
-    """The values of some keys, each called by the end of its key."""
-    there = [(key, row.values[key]) for key in keys if key in row.values]
+def short_names(keys: Sequence[str]) -> dict[str, str]:
+    """Each key by its last parts, as many as no other one of them ends with."""
+    tails = {key: [".".join(key.split(".")[-n:]) for n in range(1, key.count(".") + 2)] for key in keys}
+    times = Counter(tail for own in tails.values() for tail in own)
+    return {key: next((tail for tail in own if times[tail] == 1), key) for key, own in tails.items()}
+
+
+def _differs(row: RunRow, named: Mapping[str, str]) -> str:
+    """The values of some keys, each with its short name."""
+    there = [(key, name, row.values[key]) for key, name in named.items() if key in row.values]
     return ", ".join(
-        f"{key.rpartition('.')[2]} {exact(value, row.units.get(key, '')) if _is_number(value) else value}"
-        for key, value in there
+        f"{name} {exact(value, row.units.get(key, '')) if _is_number(value) else value}" for key, name, value in there
     )
 
 
@@ -257,6 +265,24 @@ def checks_table(checks: Sequence[Check]) -> Table:
         value, expected, tolerance = exacts((check.value, check.expected, check.tolerance), check.unit)
         made.add_row(check.name, value, expected, f"± {tolerance}", verdict)
     return made
+
+
+def probes_table(probes: Sequence[Measured]) -> Table:
+    """The last value of each probe, its smallest and its largest."""
+    made = table("probe", "at the end", "min", "max", right=("at the end", "min", "max"), wide=("probe",))
+    for probe in probes:
+        made.add_row(probe.name, *exacts((probe.value, probe.least, probe.most), probe.unit))
+    return made
+
+
+def end_tables(outcome: Outcome, told: Collection[str] = ()) -> list[Table | str]:
+    """How a run ended, its probes and reference numbers, with an empty line between them."""
+    parts: list[Table | str] = [outcome_table(outcome, told)]
+    if outcome.probes:
+        parts += ["", probes_table(outcome.probes)]
+    if outcome.reference:
+        parts += ["", checks_table(outcome.reference)]
+    return parts
 
 
 def _brief(text: str) -> str:

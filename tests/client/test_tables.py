@@ -5,12 +5,12 @@ import io
 import msgspec
 import pytest
 
-from conoid.cases.outcome import Compressed, Outcome
+from conoid.cases.outcome import Compressed, Measured, Outcome
 from conoid.cases.run import State
 from conoid.client.console import PlainConsole
 from conoid.client.options import show_lines
 from conoid.client.rows import Alike, RunRow, differing
-from conoid.client.tables import outcome_table, runs_table
+from conoid.client.tables import end_tables, outcome_table, runs_table, short_names
 from conoid.client.told import RunInfo
 
 NAME, ID = "glass_steel_bar_at_210_metres_a_second", "0mb3k2d9x7f1q0a5z8w4ty"
@@ -84,3 +84,23 @@ def test_the_end_of_a_run_says_what_one_thread_did_alone() -> None:
         PlainConsole(file=out, width=160, highlight=False).print(outcome_table(outcome))
         (line,) = [line for line in out.getvalue().splitlines() if line.startswith("a step")]
         assert line.removeprefix("a step").strip() == said
+
+
+def test_the_end_of_a_run_has_its_probes_with_units_and_extremes() -> None:
+    probes = [
+        Measured(name="speed", value=120.0, unit="m/s", least=-5.0, most=400.0),
+        Measured(name="count", value=3.0, least=0.0),
+    ]
+    out = io.StringIO()
+    for part in end_tables(Outcome(state="succeeded", steps=10, probes=probes)):
+        PlainConsole(file=out, width=120, highlight=False).print(part)
+    head, _, *lines = out.getvalue().splitlines()[-4:]
+    assert head.split() == ["probe", "at", "the", "end", "min", "max"]
+    assert [line.split() for line in lines] == [
+        ["speed", "120", "m/s", "-5", "m/s", "400", "m/s"], ["count", "3", "0", "–"]
+    ]  # fmt: skip
+
+
+def test_keys_are_short_as_far_as_they_are_told_apart() -> None:
+    keys = ["parts[0].velocity[2]", "parts[1].velocity[2]", "run.end_time", "a.b.c", "x.b.c", "c"]
+    assert list(short_names(keys).values()) == [*keys[:2], "end_time", "a.b.c", "x.b.c", "c"]
