@@ -31,6 +31,7 @@ told = @echo "$(1)"; began=$$(date +%s); \
 
 demo: $(READY)
 	$(BIN)/conoid run glass_steel_demo --ranks 2 --view demo.png --check
+	@echo 'on the page: $(BIN)/conoid serve --runs runs/local --no-auth, then open the address that it prints'
 
 test: style
 	@$(MAKE) --no-print-directory --jobs 2 check-solver check-services types

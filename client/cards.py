@@ -28,7 +28,7 @@ def strip(ended: Outcome | None) -> str:
     cost = f"{duration(ended.elapsed)}<small>on {escape(crew(ended.ranks, ended.threads))}</small>"
     entries = [
         ("simulated", f"{escape(si(ended.time, 's'))}<small>{escape(counted(ended.steps, 'step'))}</small>"),
-        ("took", cost), ("worst residual", f"{escape(rough(ended.worst_residual))}<small>of the energy</small>"),
+        ("took", cost), ("energy residual", f"{escape(rough(ended.worst_residual))}<small>at worst</small>"),
         ("fragments", f"{count(ended.fragments)}<small>{escape(counted(ended.broken, 'facet'))} broken</small>"),
         ("references", f"{passed} of {len(ended.reference)}<small>pass</small>" if ended.reference else "none"),
     ]  # fmt: skip
@@ -84,7 +84,7 @@ def cost(ended: Outcome | None) -> str:
         ["clock time", f"{duration(ended.elapsed)} on {crew(ended.ranks, ended.threads)}"],
         ["tets", f"{count(ended.elements)}, of which {count(ended.eroded)} eroded"],
         ["nodes", f"{count(ended.nodes_initial)} at first, {count(ended.nodes)} at the end"],
-        ["core time a tet and step", si(each, "s")], ["worst residual of the energy", rough(ended.worst_residual)],
+        ["core time a tet and step", si(each, "s")], ["worst energy residual", rough(ended.worst_residual)],
     ]  # fmt: skip
     off = [
         (abs(check.value - check.expected) / abs(check.expected), check.name)

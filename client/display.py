@@ -214,7 +214,7 @@ def _stacked(parts: dict[str, float], longest: float, cells: int) -> Text:
 
 def _ledger(energy: Energy, width: int, *, terms: bool) -> RenderableType:
     """A bar a term; small ones share a line. Without ``terms`` the residual alone."""
-    residual = Text("residual ", style="bright_black").append(_residual(energy.residual))
+    residual = Text("energy residual ", style="bright_black").append(_residual(energy.residual))
     supplied = f"of {si(energy.initial, 'J')} at the start and {si(energy.external, 'J')} from outside"
     residual.append(f"  {supplied}", style="bright_black")
     if not terms:
@@ -286,7 +286,7 @@ def line(live: Live) -> str:
             percent(live.fraction), f"t {_time(live)}",
             f"step {progress.step}", f"dt {si(progress.dt, 's')} ({progress.limiter})",
             "" if live.state.final else f"left {duration(progress.eta)}",
-            f"residual {rough(progress.energy.residual)}", f"{large(progress.updates_per_second)} updates/s",
+            f"energy residual {rough(progress.energy.residual)}", f"{large(progress.updates_per_second)} updates/s",
         ]  # fmt: skip
     if live.load is not None:
         parts.append(f"imbalance {fixed(live.load.imbalance)}")

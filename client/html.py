@@ -39,7 +39,7 @@ def head(name: str, title: str, ended: Outcome | None) -> str:
             ["tets", f"{count(ended.elements)}, of which {count(ended.eroded)} eroded"],
             ["nodes", f"{count(ended.nodes_initial)} at first, {count(ended.nodes)} at the end"],
             ["fragments", f"{count(ended.fragments)}; {counted(ended.broken, 'facet')} broken"],
-            ["energy", f"worst residual {rough(ended.worst_residual)}"], ["digest", ended.digest],
+            ["worst energy residual", rough(ended.worst_residual)], ["digest", ended.digest],
             ["written by", release],
         ]  # fmt: skip
     return f"<header><h1>{escape(title)}</h1><p>{state}</p>{table(['', ''], rows)}</header>"

@@ -262,7 +262,7 @@ class Http:
             hint = (
                 "none was sent: set CONOID_TOKEN, or give --token; the operator makes one with conoid serve token add"
             )
-        return {**told, "hint": hint}
+        return {**told, "hint": f"server {self.url}: {hint}"}
 
     def _decoded(self, kind: type[T], content: bytes) -> T:
         try:
@@ -306,7 +306,7 @@ def _most(response: httpx2.Response, target: Path) -> int:
 
 def _reason(error: Exception) -> str:
     if isinstance(error, httpx2.ConnectError):
-        return "is it running there? (conoid serve)"
+        return "is it running there? (conoid serve; another address: CONOID_URL or --url)"
     return " ".join(str(error).split()) or type(error).__name__
 
 

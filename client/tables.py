@@ -209,7 +209,7 @@ def outcome_table(outcome: Outcome, told: Collection[str] = ()) -> Table:
             "model": f"{counted(outcome.elements, 'tet')}, {counted(outcome.nodes, 'node')}",
             "speed": "" if math.isnan(speed) else f"{large(speed)} element updates a CPU-second and core",
             "memory": f"{size(max(outcome.peak_memory))} in the largest rank" if outcome.peak_memory else "",
-            "energy": "" if energy is None else f"residual {rough(energy.residual)}, worst {worst}",
+            "energy residual": "" if energy is None else f"{rough(energy.residual)} at the end, {worst} at worst",
             "compression": "; ".join(map(_compressed, outcome.compressed)),
             "digest": outcome.digest[:16],
         }

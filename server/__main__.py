@@ -43,7 +43,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser("python -m conoid.server", description="The job server.", allow_abbrev=False)
+    parser = argparse.ArgumentParser("conoid serve", description="The job server.", allow_abbrev=False)
     parser.set_defaults(act=_serve)
     _common(parser)
     add = parser.add_argument

@@ -69,6 +69,7 @@ class _Server(uvicorn.Server):
         self._service = service
         self._app = build_app(service)
         self._writing: asyncio.Task[None] | None = None
+        self._why = ""
         super().__init__(
             uvicorn.Config(
                 self._app,
@@ -98,7 +99,14 @@ class _Server(uvicorn.Server):
                 _log.error("%s: not written, and tried again in %g s: %s", path, _AGAIN, error.strerror)
             await asyncio.sleep(_AGAIN)
 
+    def handle_exit(self, sig: int, frame: FrameType | None) -> None:
+        """Remembers why the server ends."""
+        self._why = signal.Signals(sig).name
+        super().handle_exit(sig, frame)
+
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        left = "are cancelled" if self._service.settings.end_runs else "go on"
+        _log.info("the server ends: %s; its runs %s", self._why or "no signal", left)
         self._service.bell.close()
         if self._writing is not None:
             self._writing.cancel()

@@ -59,7 +59,7 @@ export function columnsOf(rows, keys, units) {
   return brief([...facts(FIRST), ...values, ...results, ...facts(LAST)]);
 }
 
-const titled = (name) => name.replace(/^probe\./, "").replace(/^reference\.(.*)$/, "$1, reference").replace(/\.(min|max)$/, " $1");
+const titled = (name) => name.replace(/worst_residual/, "worst energy residual").replace(/^probe\./, "").replace(/^reference\.(.*)$/, "$1, reference").replace(/\.(min|max)$/, " $1");
 
 // A column whose values are numbers, in the unit that fits most of them; words stay as they are.
 function numeric(rows, column) {

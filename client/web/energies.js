@@ -51,5 +51,5 @@ export const ofParts = (live, view) => parts(live).map((part, i) =>
 export function ofResidual(live) {
   const data = course(live, "residual").map(([t, value]) => [t, value > FLOOR ? value : null]);
   if (!data.some(([, value]) => value)) return null;
-  return { xAxis: time(end(live)), yAxis: logarithmic(""), series: [series({ name: "residual", colour: "accent", data, text: (value) => rough(Number(value)), markLine: limit(RESIDUAL) })] };
+  return { xAxis: time(end(live)), yAxis: logarithmic(""), series: [series({ name: "energy residual", colour: "accent", data, text: (value) => rough(Number(value)), markLine: limit(RESIDUAL) })] };
 }

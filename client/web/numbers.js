@@ -28,7 +28,7 @@ function five(live) {
   return [
     entry("time", progress ? timed(live.fraction * progress.end_time, progress.end_time) : "–", left),
     entry("dt", si(progress?.dt || live.ledger.findLast(({ dt }) => dt > 0)?.dt, "s"), progress?.limiter && `held by ${progress.limiter}`),
-    entry("residual", progress ? residual(progress.energy.residual) : "–"),
+    entry("energy residual", progress ? residual(progress.energy.residual) : "–"),
     entry("fragments", count(counts?.fragments)),
     entry("imbalance", load ? fixed(load.imbalance) : "–"),
   ];

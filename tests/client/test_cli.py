@@ -115,7 +115,8 @@ def test_a_case_that_is_about_to_run_is_doubted_too(user: Path) -> None:
 def test_no_server_is_one_line(words: tuple[str, ...], quiet_home: Path) -> None:
     result = conoid(*words, "--url", "http://127.0.0.1:1")
     assert result.exit_code == 1
-    assert result.stderr == "conoid: no answer from http://127.0.0.1:1: is it running there? (conoid serve)\n"
+    told = "is it running there? (conoid serve; another address: CONOID_URL or --url)"
+    assert result.stderr == f"conoid: no answer from http://127.0.0.1:1: {told}\n"
 
 
 def test_a_label_is_a_name_and_a_value(quiet_home: Path) -> None:

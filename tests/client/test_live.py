@@ -125,7 +125,7 @@ def test_the_panel_fits_the_height_of_the_terminal() -> None:
     text = rendered(live, 60, height=24)
     assert len(text.splitlines()) < 24
     assert "tet 29 is flat" in text
-    assert "residual 2.0e-4" in text
+    assert "energy residual 2.0e-4" in text
     assert "kinetic" in rendered(live, 60, height=60)
 
 

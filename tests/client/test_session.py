@@ -89,9 +89,10 @@ def test_a_refusal_is_its_detail_and_hint() -> None:
 )
 def test_a_token_that_is_missing_or_wrong_names_where_it_comes_from(token: str | None, said: str) -> None:
     answer = problem(401, detail="this needs a valid token", hint="send the header 'Authorization: Bearer <token>'")
+    session = served(answer, token)
     with pytest.raises(ServiceError) as caught:
-        served(answer, token).me()
-    assert str(caught.value).startswith(f"this needs a valid token ({said}")
+        session.me()
+    assert str(caught.value).startswith(f"this needs a valid token (server {session.url}: {said}")
     assert "header" not in str(caught.value)
 
 
@@ -127,7 +128,8 @@ def test_an_answer_that_is_no_problem_json_is_still_one_line() -> None:
 def test_no_server_says_how_to_start_one() -> None:
     with Session("http://127.0.0.1:1") as session, pytest.raises(UnreachableError) as caught:
         session.me()
-    assert str(caught.value) == "no answer from http://127.0.0.1:1: is it running there? (conoid serve)"
+    told = "is it running there? (conoid serve; another address: CONOID_URL or --url)"
+    assert str(caught.value) == f"no answer from http://127.0.0.1:1: {told}"
 
 
 def test_a_submission_is_tried_again_with_the_same_key() -> None:
