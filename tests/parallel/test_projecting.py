@@ -39,10 +39,10 @@ def test_teams_of_powers_of_two_and_the_whole_one() -> None:
 
 def test_timed_tasks_are_done_once_and_more_threads_never_take_longer(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(projecting, "measured", lambda: Costs(turn=0, call=0, wake=0))
-    done, team = np.zeros(600_000, np.int64), Team(6)
+    done, team, table = np.zeros(600_000, np.int64), Team(6), Arguments(*KINDS)
     team.projecting = made = Projecting(6)
     tasks = np.column_stack([np.arange(0, 600_000, 10_000), np.arange(10_000, 610_000, 10_000)])
-    team.run(count, Arguments(*KINDS).set(done), tasks, np.array([0, 1, 30, 30, 60]))
+    team.run(count, table.set(done), tasks, np.array([0, 1, 30, 30, 60]))
     assert (done == 1).all()
     assert (made.regions, made.colours, made.tasks) == (1, 4, 60)
     one, two, four, six = made.spans
