@@ -63,17 +63,26 @@ const PAGES = {
 
 // An id may be written short: the address gets the whole one.
 async function route() {
+  clearTimeout(again);
   const { page: name, names, query } = place(location.hash);
   if (names.some(isShort)) {
     const here = location.hash;
-    const found = await wholeNames(name, names);
-    if (location.hash !== here) return;
+    const found = await wholeNames(name, names).catch((error) => {
+      if (location.hash === here) away(error);
+    });
+    if (!found || location.hash !== here) return;
     if (found.join() !== names.join()) {
       location.replace(addressOf(name, found));
       return;
     }
   }
   show((PAGES[name] ?? PAGES.runs)(names, query));
+}
+
+function away(error) {
+  show({ element: h("section.card.missing", {}, h("h1", {}, "The server does not answer"), h("p.problem", { role: "status" }, `No answer from the server: ${error.message}`),
+    h("p.hint", {}, "It is asked again every few seconds.")) });
+  again = setTimeout(start, AWAY);
 }
 
 // A server with tokens is not asked before there is one. One that is away is asked again until it answers.
@@ -92,9 +101,7 @@ async function start() {
       token.clear();
       return signIn(told);
     }
-    show({ element: h("section.card.missing", {}, h("h1", {}, "The server does not answer"), h("p.problem", { role: "status" }, `No answer from the server: ${error.message}`),
-      h("p.hint", {}, "It is asked again every few seconds.")) });
-    again = setTimeout(start, AWAY);
+    away(error);
   }
   return undefined;
 }

@@ -30,13 +30,13 @@ export class Headline {
     say(this.sub, [info.name !== info.title && info.name, live.run].filter(Boolean).join(" · "));
     say(this.link, [words, old].filter(Boolean).join(", "));
     this.link.className = `link ${kind || "over"}`;
-    if (this.shown !== state) this.state.replaceChildren(pill(this.shown = state));
-    this.progress.replaceChildren(meter(state, live.fraction), h("b", {}, percent(live.fraction)));
+    if (this.shown !== state) this.state.replaceChildren((this.shown = state) ? pill(state) : "");
+    this.progress.replaceChildren(...(live.state ? [meter(state, live.fraction), h("b", {}, percent(live.fraction))] : []));
     const told = [!over && live.message, live.state === "queued" && info.reason, notice].filter(Boolean).join(" · ");
     say(this.told, told);
     this.told.hidden = !told;
     for (const button of this.buttons) {
-      button.hidden = over || (button.dataset.verb !== "cancel" && state !== "running");
+      button.hidden = !state || over || (button.dataset.verb !== "cancel" && state !== "running");
       button.disabled = kind !== "live" || busy.has(button.dataset.verb);
     }
   }

@@ -10,7 +10,7 @@ const OWN = new Set(["contact", "exchange", "output"]); // Phases with a group o
 
 export class Live {
   constructor(run) {
-    Object.assign(this, { run, seq: 0, state: "accepted", cause: null, message: "", began: null, wall: 0, heard: 0 });
+    Object.assign(this, { run, seq: 0, state: "", cause: null, message: "", began: null, wall: 0, heard: 0 });
     Object.assign(this, { started: null, progress: null, load: null, counts: null, finished: null, loaded: 0 });
     this.plan = null; // The case with every default, null before it is there
     this.columns = { units: {}, values: { t: [] }, lines: 0 }; // Of history.csv: by name, as many values as t has

@@ -14,31 +14,32 @@ export class Numbers {
     this.element = h("section.card", { "aria-label": "numbers" }, this.strip, fold("numbers", false, "All numbers", this.rest));
   }
 
-  draw(live, info) {
-    this.strip.replaceChildren(...five(live));
-    this.rest.replaceChildren(...others(live, info));
+  draw(live, info, outcome) {
+    this.strip.replaceChildren(...five(live, outcome));
+    this.rest.replaceChildren(...others(live, info, outcome));
   }
 }
 
 // Time and time left, dt and what holds it, residual, fragments, imbalance.
-function five(live) {
+function five(live, outcome) {
   const { progress, counts, load, state } = live;
   const over = FINAL.has(state);
   const left = over ? `took ${duration(live.elapsed)}` : Number.isFinite(progress?.eta) ? `${duration(progress.eta)} left` : "";
+  const { t, residual: told } = ended(progress, outcome);
   return [
-    entry("time", progress ? timed(live.fraction * progress.end_time, progress.end_time) : "–", left),
+    entry("time", progress ? timed(t, progress.end_time) : "–", left),
     entry("dt", si(progress?.dt || live.ledger.findLast(({ dt }) => dt > 0)?.dt, "s"), progress?.limiter && `held by ${progress.limiter}`),
-    entry("energy residual", progress ? residual(progress.energy.residual) : "–"),
+    entry("energy residual", told ? residual(...told) : "–"),
     entry("fragments", count(counts?.fragments)),
     entry("imbalance", load ? fixed(load.imbalance) : "–"),
   ];
 }
 
-function others(live, info) {
+function others(live, info, outcome) {
   const { progress, counts, started } = live;
   return [
     entry("elapsed", duration(live.elapsed)),
-    entry("step", count(progress?.step)),
+    entry("step", count(ended(progress, outcome).step)),
     entry("updates a second", large(progress?.updates_per_second)),
     entry("elements", count(counts?.elements ?? started?.elements)),
     entry("nodes", count(counts?.nodes ?? started?.nodes)),
@@ -51,13 +52,21 @@ function others(live, info) {
   ].filter(Boolean);
 }
 
+// Where a run is: as its outcome has it, else as its newest report has it. `residual`: [value, whether it has failed by it].
+export function ended(progress, outcome) {
+  const failed = outcome?.cause === "energy";
+  const energy = failed ? outcome.worst_residual : outcome?.energy?.residual;
+  const value = energy ?? progress?.energy?.residual;
+  return { t: outcome?.time ?? progress?.t, step: outcome?.steps ?? progress?.step, residual: Number.isFinite(value) ? [value, failed] : null };
+}
+
 // The time so far and "of …" the end, in one unit.
 function timed(now, end) {
   const [first, last] = alike([now, end], "s");
   return first === last ? last : `${first} of ${last}`;
 }
 
-export function residual(value) {
-  const tone = value < 1e-3 ? "good" : value < 1e-2 ? "warn" : "bad";
+export function residual(value, failed = false) {
+  const tone = failed ? "bad" : value < 1e-3 ? "good" : value < 1e-2 ? "warn" : "bad";
   return h(`span.${tone}`, {}, rough(value));
 }

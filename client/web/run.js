@@ -9,14 +9,14 @@ import { Headline } from "./headline.js";
 import { fill, followColumns, readPlan } from "./history.js";
 import { FINAL, Live } from "./live.js";
 import { Logs, Warnings } from "./logs.js";
-import { Numbers, residual } from "./numbers.js";
+import { Numbers, ended, residual } from "./numbers.js";
 import { Balances, Ranks, checksTable } from "./panels.js";
 import { nothing, plots } from "./plots.js";
 import { Situation } from "./situation.js";
 
 const CHARTS_EVERY = 500; // ms; the head and the bars are drawn with every message.
 const QUEUE_EVERY = 3; // s after which the place in the queue is asked for.
-const STAGES = { accepted: "This run is taken in.", queued: "This run waits for its turn.", starting: "This run starts: its mesh and its program are made ready." };
+const STAGES = { "": "Nothing of this run has been read yet.", accepted: "This run is taken in.", queued: "This run waits for its turn.", starting: "This run starts: its mesh and its program are made ready." };
 const pause = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 
 export class RunPage {
@@ -195,14 +195,14 @@ export class RunPage {
   draw() {
     const { live } = this;
     this.drawHead();
-    this.numbers.draw(live, this.info);
+    this.numbers.draw(live, this.info, this.outcome);
     this.ranks.draw(live);
     this.balances.draw();
     this.cards.show("balances", live.balances.length > 0);
     for (const [name, missing] of Object.entries(nothing(live))) this.cards.show(name, !missing);
     this.logs.draw(this.info.ranks ?? 0);
     this.warnings.draw(live);
-    this.situation.draw(live);
+    this.situation.draw(live, this.outcome);
     this.body.update(live.snapshots);
     this.drawStage();
     this.drawChecks();
@@ -211,7 +211,7 @@ export class RunPage {
       [this.plotted, this.charted] = [performance.now(), live.seq];
       setTimeout(() => this.drawCharts());
     }
-    document.title = `${percent(live.fraction)} ${this.info.name ?? live.run} · Conoid`;
+    document.title = `${live.state ? `${percent(live.fraction)} ` : ""}${this.info.name ?? live.run} · Conoid`;
   }
 
   // After the frame that has the news in the head and the bars.
@@ -221,14 +221,14 @@ export class RunPage {
 
   drawNotes() {
     const { progress, load, counts } = this.live;
-    if (progress) this.notes.residual.replaceChildren(residual(progress.energy.residual));
+    if (progress) this.notes.residual.replaceChildren(residual(...ended(progress, this.outcome).residual));
     this.notes.imbalance.textContent = load ? fixed(load.imbalance) : "";
     this.notes.counts.textContent = counts ? counted(counts.fragments, "fragment") : "";
   }
 
   drawHead() {
     const { live, connection, notice, busy } = this;
-    const state = this.cancelling && !FINAL.has(live.state) ? "stopping" : live.state;
+    const state = this.cancelling && !FINAL.has(live.state) ? "stopping" : live.state || (this.info.state ?? "");
     this.head.draw(live, this.info, { connection, state, notice, busy });
   }
 

@@ -2,7 +2,8 @@
 // and what can be done next.
 
 import { call, tail } from "./api.js";
-import { h, si } from "./figures.js";
+import { h, percent, si, words } from "./figures.js";
+import { ended } from "./numbers.js";
 
 const LINES = 12; // Of the end of the log.
 const CAUSES = {
@@ -14,7 +15,7 @@ const CAUSES = {
 const HELP = {
   input: "Change the keys that the message names, and start again.", mesh: "Change the mesh, and start again.",
   diverged: "Look at the last snapshot and at dt before the end; a smaller numerics.dt_safety or erosion of worn tets helps.",
-  energy: "Look at the energy by term: the term that grows is the one that fails; a smaller numerics.dt_safety helps.",
+  energy: "The energy by term shows what has grown until then.",
   memory: "Use larger elements, or a machine with more memory.", walltime: "Go on from the last checkpoint, or allow more in run.wall_time.",
   steps: "Go on with a larger run.max_steps; dt is held down by what stands beside it.", storage: "Make room on the disk, then go on from the last checkpoint.",
 };
@@ -30,22 +31,24 @@ export class Situation {
     this.element = h("section.card.situation", { "aria-label": "what has happened", hidden: "" });
   }
 
-  draw(live) {
+  draw(live, outcome = null) {
     const state = BAD.has(live.state) ? live.state : "";
-    const key = `${state} ${live.cause} ${live.message}`;
+    const key = `${state} ${live.cause} ${live.message} ${Boolean(outcome)}`;
     this.element.hidden = !state;
     if (!state || this.told === key) return;
     this.told = key;
     this.element.className = `card situation ${state}`;
-    this.fill(live);
+    this.fill(live, outcome);
   }
 
-  async fill(live) {
+  async fill(live, outcome = null) {
+    const turn = (this.turn = (this.turn ?? 0) + 1);
     const log = h("pre.log", { tabindex: 0, role: "region", "aria-label": "end of the log", hidden: "" });
     const actions = h("div.actions");
     this.element.replaceChildren(h("div", {}, h("h2", {}, sentence(live)), live.message ? h("p", {}, live.message) : "",
-      h("p.hint", {}, reached(live)), HELP[live.cause] ? h("p", {}, HELP[live.cause]) : "", actions), log);
+      h("p.hint", {}, reached(live, outcome)), advice(live.cause, outcome), actions), log);
     const [files, lines] = await Promise.all([this.files(), this.end(live)]);
+    if (turn !== this.turn) return;
     const point = FATED.has(live.cause) ? null : files?.filter(({ path }) => POINT.test(path)).at(-1);
     if (point) actions.append(this.restart(Number(POINT.exec(point.path)[1]), live));
     else if (files && !FATED.has(live.cause)) actions.append(h("span.hint", {}, "It has left no checkpoint to go on from; open the case, change it and start again."));
@@ -82,8 +85,15 @@ export class Situation {
 
 export const sentence = ({ state, cause }) => `${{ failed: "Failed", lost: "Lost", timed_out: "Timed out", cancelled: "Cancelled" }[state]}${cause && cause !== state ? `: ${CAUSES[cause] ?? cause}` : ""}`;
 
-function reached({ progress, snapshots }) {
+function advice(cause, outcome) {
+  const made = cause === "energy" ? outcome?.made?.[0] : null;
+  const most = made ? `Of the lines of the ledger ${words(made.line)} has made the most: ${percent(made.share)} of the energy, at ${si(made.time, "s")}.` : "";
+  return HELP[cause] || most ? h("p", {}, [HELP[cause], most].filter(Boolean).join(" ")) : "";
+}
+
+function reached({ progress, snapshots }, outcome) {
   if (!progress) return "It had not begun its first step.";
+  const { t, step } = ended(progress, outcome);
   const last = snapshots.at(-1);
-  return `It had come to ${si(progress.t, "s")} of ${si(progress.end_time, "s")}, step ${progress.step}${last ? `; the last snapshot, of ${si(last.t, "s")}, is shown below` : ""}.`;
+  return `It had come to ${si(t, "s")} of ${si(progress.end_time, "s")}, step ${step}${last ? `; the last snapshot, of ${si(last.t, "s")}, is shown below` : ""}.`;
 }

@@ -1,6 +1,6 @@
 // Ids that are written short: the shortest beginning that no other one has, as the table shows them.
 
-import { call } from "./api.js";
+import { call, refused } from "./api.js";
 
 const LENGTH = 22;
 const LAST = "z".repeat(LENGTH);
@@ -15,11 +15,12 @@ async function whole(name, list) {
 const runs = async (name) => (await call(`v1/runs?limit=2&prefix=${name}`)).runs;
 const sweeps = async (name) => (await call(`v1/sweeps?limit=2&before=${name}${LAST}`)).sweeps.filter(({ id }) => id.startsWith(name));
 
-// Of the names of a page. Where nobody answers they stay: the page says so.
+// Of the names of a page; they stay where the server refuses. Throws where it does not answer.
 export async function wholeNames(page, names) {
   try {
     return await Promise.all(names.map((name) => whole(name, page === "sweep" ? sweeps : runs)));
-  } catch {
+  } catch (error) {
+    if (!refused(error)) throw error;
     return names;
   }
 }

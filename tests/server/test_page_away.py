@@ -218,6 +218,59 @@ def test_a_run_that_has_used_up_its_steps_goes_on_with_more(web: Path) -> None:
     assert asked == "?max_steps=1000"
 
 
+def test_a_page_by_a_short_id_waits_for_the_server_and_claims_nothing(web: Path) -> None:
+    """The server is away as the page is opened by its address; then it knows the run."""
+    script = """
+        const soon = globalThis.setTimeout;
+        globalThis.setTimeout = (work, ms) => soon(work, Math.min(ms ?? 0, 40));
+        const here = { "lib/index.json": { auth: false }, "v1/me": { owner: "ann" } };
+        state.served = (path) => { if (path in here) return here[path]; throw new Error("away"); };
+        location.hash = "#/runs/1k1ffx9";
+        let went = "";
+        location.replace = (address) => { went = address; };
+        await load("app.js");
+        await pause(100);
+        const page = document.getElementById("page");
+        const before = text(page);
+        const { RunPage } = await load("run.js");
+        const shown = new RunPage("a");
+        await pause(100);
+        const unread = text(shown.element);
+        shown.close();
+        here["v1/runs"] = { runs: [{ id: "1k1ffx9000000000000000" }] };
+        await new Promise((done) => soon(done, 300));
+        return [before, unread, went];
+    """
+    before, unread, went = played(web, script)
+    assert "The server does not answer" in before
+    assert "Nothing of this run has been read yet" in unread
+    assert not any(words in unread for words in ("accepted", "taken in", "0.0 %", "0 %", "no such run"))
+    assert went.endswith("1k1ffx9000000000000000")
+
+
+def test_what_stands_beside_a_failure_is_of_the_outcome(web: Path) -> None:
+    script = """
+        const { Situation } = await load("situation.js");
+        const { Numbers } = await load("numbers.js");
+        const { Live } = await load("live.js");
+        const energy = { residual: 6.4e-8 };
+        const live = Object.assign(new Live("a"), { state: "failed", cause: "energy", progress: { t: 3.42e-7, end_time: 1e-6, step: 14, energy } });
+        const outcome = { cause: "energy", steps: 20, time: 5.11e-7, energy, worst_residual: 1.02e-6, made: [{ line: "contact", share: 0.25, time: 5e-7 }] };
+        const [shown, numbers] = [new Situation("a", async () => []), new Numbers()];
+        shown.draw(live, outcome);
+        numbers.draw(live, {}, outcome);
+        await pause(50);
+        return [text(shown.element), text(numbers.element)];
+    """
+    told, numbers = played(web, script)
+    assert "511 ns of 1.00 µs, step 20" in told
+    assert "contact has made the most: 25" in told
+    assert "dt_safety" not in told
+    assert "511" in numbers
+    assert "1.0e-6" in numbers
+    assert "6.4e-8" not in numbers
+
+
 @pytest.mark.parametrize(
     ("problem", "words"),
     [
