@@ -27,6 +27,7 @@ const LAST = [
   { id: "message", title: "message", value: (row) => row.message || null, text: (row) => row.message, shown: false },
 ];
 const IF_ANY = new Set(["references", "labels"]); // Shown where a row has something there.
+const unsure = ({ state }) => state !== "succeeded"; // A result of such a run is that of an earlier time than the end.
 const TELLING = /^(fragments|reference\.penetration.*)$/; // Results that are shown where nobody has chosen.
 const MOST_PROBES = 4; // That are shown where nobody has chosen.
 const MOST_VALUES = 6; // Likewise.
@@ -53,7 +54,7 @@ export function columnsOf(rows, keys, units) {
   const results = names.map((name) => numeric(rows, {
     id: `result:${name}`, title: titled(name), group: "results", full: name, unit: units.get(name),
     shown: telling(name),
-    value: (row) => row.results?.get(name) ?? null,
+    value: (row) => row.results?.get(name) ?? null, unsure,
   }));
   const facts = (list) => list.map((one) => ({ group: "run", shown: !IF_ANY.has(one.id) || rows.some((row) => one.text(row)), ...one }));
   return brief([...facts(FIRST), ...values, ...results, ...facts(LAST)]);

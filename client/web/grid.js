@@ -86,8 +86,9 @@ export class Grid {
     const text = column.text(row);
     const tone = column.id === "references" && row.references ? (row.missed.length ? ".bad" : ".good") : "";
     const told = column.id === "references" ? row.missed.join(", ") : column.number ? exact(column.value(row) ?? NaN) : text;
+    const unsure = Boolean(text && column.unsure?.(row));
     const words = column.unit ? `${column.title}, ${column.unit}` : column.title;
-    return h(`td${column.number ? ".right" : ""}${tone}${text ? "" : ".none"}`, { "data-name": words, title: text ? told : false }, text);
+    return h(`td${column.number ? ".right" : ""}${tone}${text ? "" : ".none"}${unsure ? ".unsure" : ""}`, { "data-name": words, title: text ? `${told}${unsure ? `, ${row.state.replaceAll("_", " ")}` : ""}` : false }, text);
   }
 
   groupRow({ key, title, brief = "", href, note, varied, rows, open }) {

@@ -225,12 +225,12 @@ export class NewPage {
   draw() {
     const { text } = this.editor;
     const current = this.checked === text;
-    const named = this.told?.files ?? [];
+    const named = once(this.told?.files ?? []);
     const waits = named.filter((file) => this.outbox.stateOf(file).state !== "sent").length;
     this.startButton.disabled = !(current && this.told?.valid && !waits && !this.starting);
     this.startButton.textContent = this.starting ? "Starting …" : waits ? `Waits for ${counted(waits, "file")}` : "Start";
     for (const { input, table, name } of this.fields) if (document.activeElement !== input) input.value = valueOf(text, table, name);
-    const problems = this.problems(named);
+    const problems = this.problems(this.told?.files ?? []);
     const lines = problems.map((one) => place(text, one));
     const state = `${text.length} ${current} ${this.checking} ${waits} ${lines}`;
     if (this.seen !== state || this.shown !== this.told) {
@@ -248,5 +248,8 @@ function place(text, { key, message }) {
   const named = key || /^([a-z][\w.[\]]*) = /.exec(message)?.[1];
   return told ? Number(told[1]) - 1 : named ? lineOf(text, named) : -1;
 }
+
+// A file that several parts name is one file.
+export const once = (named) => [...new Map(named.map((file) => [file.path, file])).values()];
 
 const fresh = () => [...crypto.getRandomValues(new Uint8Array(16))].map((byte) => byte.toString(16).padStart(2, "0")).join("");

@@ -2,13 +2,13 @@
 
 const collator = new Intl.Collator("en", { numeric: true });
 
-// The rows by a column; what has no value comes last either way, equal ones the newest first.
+// The rows by a column; what has no value comes last either way, before it what is `unsure`; equal ones the newest first.
 export function sorted(rows, column, down) {
   const sign = down ? -1 : 1;
-  const keyed = rows.map((row) => [column.value(row), row]);
+  const keyed = rows.map((row) => [column.value(row), row, column.unsure?.(row) ?? false]);
   const none = (value) => value === null || value === undefined || value === "" || Number.isNaN(value);
   const compare = (a, b) => (typeof a === "number" && typeof b === "number" ? a - b : collator.compare(String(a), String(b)));
-  keyed.sort(([a, one], [b, other]) => (none(a) || none(b) ? none(a) - none(b) : sign * compare(a, b)) || (one.id < other.id ? 1 : -1));
+  keyed.sort(([a, one, early], [b, other, soon]) => (none(a) || none(b) ? none(a) - none(b) : early - soon || sign * compare(a, b)) || (one.id < other.id ? 1 : -1));
   return keyed.map(([, row]) => row);
 }
 

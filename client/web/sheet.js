@@ -30,7 +30,7 @@ export class Sheet {
     const focused = document.activeElement?.dataset?.sorts;
     this.place.replaceChildren(h("table.checks.outcomes", {}, h("thead", {}, h("tr", {}, h("th", { scope: "col" }, "run"), head)),
       h("tbody", {}, order.map((i) => h("tr", {}, h("th.row", { scope: "row" }, swatch(rows[i].line), h("a", { href: rows[i].href }, rows[i].name), rows[i].state === "succeeded" ? "" : pill(rows[i].state)),
-        this.columns.map(({ values, text, key }) => h(key ? "td.value" : "td.number", {}, text(values[i]))))))));
+        this.columns.map(({ values, text, key }) => h(key ? "td.value" : `td.number${this.unsure(i) ? ".unsure" : ""}`, {}, text(values[i]))))))));
     if (focused) this.place.querySelector(`[data-sorts="${CSS.escape(focused)}"]`)?.focus();
   }
 
@@ -45,16 +45,20 @@ export class Sheet {
     this.draw();
   }
 
-  // Places of the rows; what has no value stands last.
+  // A result of a run that has not succeeded is that of an earlier time than the end.
+  unsure(i) { return this.rows[i].state !== "succeeded"; }
+
+  // Places of the rows; what has no value stands last, before it results of runs that have not succeeded.
   order() {
     const places = this.rows.map((_, i) => i);
     const column = this.columns.find(({ title }) => title === this.by);
     if (!column) return places;
     const value = (i) => column.values[i];
     const missing = (one) => one === null || one === undefined;
-    return places.sort((a, b) => {
-      const [one, other] = [value(a), value(b)];
+    return places.sort((i, j) => {
+      const [one, other] = [value(i), value(j)];
       if (missing(one) || missing(other)) return missing(one) - missing(other);
+      if (!column.key && this.unsure(i) !== this.unsure(j)) return this.unsure(i) - this.unsure(j);
       const less = typeof one === "number" && typeof other === "number" ? one - other : String(one).localeCompare(String(other), undefined, { numeric: true });
       return this.down ? -less : less;
     });

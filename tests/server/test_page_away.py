@@ -248,6 +248,39 @@ def test_a_page_by_a_short_id_waits_for_the_server_and_claims_nothing(web: Path)
     assert went.endswith("1k1ffx9000000000000000")
 
 
+def test_results_of_runs_that_have_not_succeeded_are_marked_and_come_last(web: Path) -> None:
+    script = """
+        const { columnsOf } = await load("columns.js");
+        const { sorted } = await load("order.js");
+        const { Sheet } = await load("sheet.js");
+        const states = ["failed", "succeeded", "running", "succeeded"];
+        const rows = states.map((state, i) => ({ ...RUN, id: String(i), state, results: new Map([["probe.speed", i < 1 ? 0 : 10 - i]]) }));
+        const column = columnsOf(rows, [], new Map([["probe.speed", "m/s"]])).find(({ id }) => id === "result:probe.speed");
+        const ids = (down) => sorted(rows, column, down).map(({ id }) => id).join("");
+        const sheet = new Sheet();
+        sheet.draw(rows.map(({ state }, i) => ({ name: String(i), href: "", line: i, state })), [], () => [{ title: "speed", unit: "", values: [0, 9, 8, 7], text: String }]);
+        const orders = [false, true].map((down) => { Object.assign(sheet, { by: "speed", down }); return sheet.order().join(""); });
+        return [ids(false), ids(true), ...orders, rows.map((row) => column.unsure(row))];
+    """.replace("RUN", json.dumps(RUN))
+    assert played(web, script) == ["3102", "1320", "3102", "1320", [True, False, True, False]]
+
+
+def test_a_file_that_two_parts_name_is_one_file(web: Path) -> None:
+    script = """
+        const { NewPage } = await load("new.js");
+        const page = new NewPage(new URLSearchParams(), () => {});
+        page.editor.text = "x";
+        page.told = { valid: false, problems: ["a", "b"].map((part) => ({ key: `${part}.sha256`, message: "lacks it" })),
+            files: ["a", "b"].map((key) => ({ key, path: "bullet.step", sha256: "" })) };
+        page.checked = page.editor.text;
+        page.draw();
+        const told = [text(page.startButton), text(page.files).split("bullet.step").length - 1, page.problems(page.told.files).length];
+        page.close();
+        return told;
+    """
+    assert played(web, script) == ["Waits for 1 file", 1, 0]
+
+
 def test_what_stands_beside_a_failure_is_of_the_outcome(web: Path) -> None:
     script = """
         const { Situation } = await load("situation.js");
