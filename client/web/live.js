@@ -129,6 +129,15 @@ export class Live {
   get age() { return this.heard ? Date.now() / 1000 - this.heard : undefined; }
 }
 
+// [noun, number] of the pieces of a run. The solver counts fragments where something can fracture; elsewhere only the
+// snapshots count the pieces that erosion leaves.
+export function pieces({ plan, counts, snapshots }) {
+  return breaks(plan) ? ["fragment", counts?.fragments] : ["piece", snapshots.at(-1)?.fragments ?? counts?.fragments];
+}
+
+// Whether something of a case can fracture; true where the case is not known.
+export const breaks = (plan) => !plan?.parts || plan.parts.some(({ fracture }) => fracture);
+
 // A series that grows too long loses every second point of its older half.
 function keep(series, point) {
   series.push(point);

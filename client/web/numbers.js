@@ -1,7 +1,7 @@
 // The numbers of a run: the five that matter now, and all others.
 
 import { alike, count, duration, fixed, h, large, moment, rough, si } from "./figures.js";
-import { FINAL } from "./live.js";
+import { FINAL, pieces } from "./live.js";
 import { fold } from "./remember.js";
 
 const entry = (name, value, note) =>
@@ -22,7 +22,8 @@ export class Numbers {
 
 // Time and time left, dt and what holds it, residual, fragments, imbalance.
 function five(live, outcome) {
-  const { progress, counts, load, state } = live;
+  const { progress, load, state } = live;
+  const [noun, number] = pieces(live);
   const over = FINAL.has(state);
   const left = over ? `took ${duration(live.elapsed)}` : Number.isFinite(progress?.eta) ? `${duration(progress.eta)} left` : "";
   const { t, residual: told } = ended(progress, outcome);
@@ -30,7 +31,7 @@ function five(live, outcome) {
     entry("time", progress ? timed(t, progress.end_time) : "–", left),
     entry("dt", si(progress?.dt || live.ledger.findLast(({ dt }) => dt > 0)?.dt, "s"), progress?.limiter && `held by ${progress.limiter}`),
     entry("energy residual", told ? residual(...told) : "–"),
-    entry("fragments", count(counts?.fragments)),
+    entry(`${noun}s`, count(number)),
     entry("imbalance", load ? fixed(load.imbalance) : "–"),
   ];
 }
