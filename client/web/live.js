@@ -135,8 +135,8 @@ export function pieces({ plan, counts, snapshots }) {
   return breaks(plan) ? ["fragment", counts?.fragments] : ["piece", snapshots.at(-1)?.fragments ?? counts?.fragments];
 }
 
-// Whether something of a case can fracture; true where the case is not known.
-export const breaks = (plan) => !plan?.parts || plan.parts.some(({ fracture }) => fracture);
+// Whether something of a case, or a bond of it, can break; true where the case is not known.
+export const breaks = (plan) => !plan?.parts || plan.bond?.length > 0 || plan.parts.some(({ fracture }) => fracture);
 
 // A series that grows too long loses every second point of its older half.
 function keep(series, point) {

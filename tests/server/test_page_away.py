@@ -254,12 +254,16 @@ def test_results_of_runs_that_have_not_succeeded_are_marked_and_come_last(web: P
         const { sorted } = await load("order.js");
         const { Sheet } = await load("sheet.js");
         const states = ["failed", "succeeded", "running", "succeeded"];
-        const rows = states.map((state, i) => ({ ...RUN, id: String(i), state, results: new Map([["probe.speed", i < 1 ? 0 : 10 - i]]) }));
-        const column = columnsOf(rows, [], new Map([["probe.speed", "m/s"]])).find(({ id }) => id === "result:probe.speed");
+        const rows = states.map((state, i) => ({ ...RUN, id: String(i), state, results: new Map([["probe.speed",
+            i < 1 ? 0 : 10 - i]]) }));
+        const column = columnsOf(rows, [], new Map([["probe.speed", "m/s"]])).find(({
+            id }) => id === "result:probe.speed");
         const ids = (down) => sorted(rows, column, down).map(({ id }) => id).join("");
         const sheet = new Sheet();
-        sheet.draw(rows.map(({ state }, i) => ({ name: String(i), href: "", line: i, state })), [], () => [{ title: "speed", unit: "", values: [0, 9, 8, 7], text: String }]);
-        const orders = [false, true].map((down) => { Object.assign(sheet, { by: "speed", down }); return sheet.order().join(""); });
+        sheet.draw(rows.map(({ state }, i) => ({ name: String(i), href: "", line: i, state })), [], () => [{
+            title: "speed", unit: "", values: [0, 9, 8, 7], text: String }]);
+        const orders = [false, true].map((down) => { Object.assign(sheet, { by: "speed", down });
+            return sheet.order().join(""); });
         return [ids(false), ids(true), ...orders, rows.map((row) => column.unsure(row))];
     """.replace("RUN", json.dumps(RUN))
     assert played(web, script) == ["3102", "1320", "3102", "1320", [True, False, True, False]]
@@ -270,11 +274,13 @@ def test_a_file_that_two_parts_name_is_one_file(web: Path) -> None:
         const { NewPage } = await load("new.js");
         const page = new NewPage(new URLSearchParams(), () => {});
         page.editor.text = "x";
-        page.told = { valid: false, problems: ["a", "b"].map((part) => ({ key: `${part}.sha256`, message: "lacks it" })),
+        page.told = { valid: false, problems: ["a", "b"].map((part) => ({ key: `${part}.sha256`,
+            message: "lacks it" })),
             files: ["a", "b"].map((key) => ({ key, path: "bullet.step", sha256: "" })) };
         page.checked = page.editor.text;
         page.draw();
-        const told = [text(page.startButton), text(page.files).split("bullet.step").length - 1, page.problems(page.told.files).length];
+        const told = [text(page.startButton), text(page.files).split("bullet.step").length - 1,
+            page.problems(page.told.files).length];
         page.close();
         return told;
     """
@@ -302,8 +308,10 @@ def test_what_stands_beside_a_failure_is_of_the_outcome(web: Path) -> None:
         const { Numbers } = await load("numbers.js");
         const { Live } = await load("live.js");
         const energy = { residual: 6.4e-8 };
-        const live = Object.assign(new Live("a"), { state: "failed", cause: "energy", progress: { t: 3.42e-7, end_time: 1e-6, step: 14, energy } });
-        const outcome = { cause: "energy", steps: 20, time: 5.11e-7, energy, worst_residual: 1.02e-6, made: [{ line: "contact", share: 0.25, time: 5e-7 }] };
+        const live = Object.assign(new Live("a"), { state: "failed", cause: "energy", progress: { t: 3.42e-7,
+            end_time: 1e-6, step: 14, energy } });
+        const outcome = { cause: "energy", steps: 20, time: 5.11e-7, energy, worst_residual: 1.02e-6, made: [{
+            line: "contact", share: 0.25, time: 5e-7 }] };
         const [shown, numbers] = [new Situation("a", async () => []), new Numbers()];
         shown.draw(live, outcome);
         numbers.draw(live, {}, outcome);
