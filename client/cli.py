@@ -159,7 +159,7 @@ app.add_typer(reports.figures, name="figures")
 app.command(short_help="Compare meshes: order, limit, error over cost.")(converging.converge)
 app.command(short_help="Run the suite of hard cases.")(hard.hard)
 app.command(short_help="Run a case at many points, or find a threshold.")(sweeping.sweep)
-app.command(name="sweep-table", short_help="Print the table of a sweep as CSV.")(sweeping.sweep_table)
+app.command(name="sweep-table", short_help="Print the table of a sweep.")(sweeping.sweep_table)
 app.command(name="sweep-plot", short_help="Draw the results of a sweep.")(sweeping.sweep_plot)
 app.command(name="sweep-cancel", short_help="Cancel the runs of a sweep.")(sweeping.sweep_cancel)
 

@@ -129,6 +129,10 @@ class Sweep:
             )
         return text
 
+    def keys(self) -> list[str]:
+        """The keys that it changes."""
+        return list(dict.fromkeys(key for point in self.status().points for key in point.values))
+
     def table(self) -> list[dict[str, str]]:
         """The lines of the table by column, as text."""
         return text_rows(self.csv())
@@ -149,8 +153,7 @@ class Sweep:
         """
         from . import curves, swept
 
-        keys = list(dict.fromkeys(key for point in self.status().points for key in point.values))
-        return curves.save(swept.figure(self.table(), keys, x, columns), Path(out))
+        return curves.save(swept.figure(self.table(), self.keys(), x, columns), Path(out))
 
 
 def text_rows(text: str) -> list[dict[str, str]]:

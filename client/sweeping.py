@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import sys
 import uuid
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
@@ -17,11 +18,11 @@ from conoid.cases.load import CaseError, parse_case
 from conoid.cases.points import KEY, to_csv
 from conoid.cases.run import State
 
-from . import adapting
+from . import adapting, points_table
 from .console import echo, echo_json
 from .errors import ServiceError, UsageError
 from .local import LocalServer
-from .options import CaseArgument, Json, Ranks, Threads, Token, Url, aloud, complain, on_cores, sweep_named
+from .options import CaseArgument, Json, Ranks, Threads, Token, Url, aloud, complain, on_cores, show, sweep_named
 from .reports import drawing
 from .saving import save_text
 from .session import Session, connect
@@ -195,17 +196,30 @@ def told(failed: list[SweepPoint], total: int) -> str:
 
 def sweep_table(
     sweep: SweepArgument,
+    columns: Annotated[
+        list[str] | None, typer.Option("--column", help="Of the table; may be given again. If none: what differs.")
+    ] = None,
     out: Annotated[Path | None, typer.Option("--out", help="CSV file to write; standard output if not given.")] = None,
     url: Url = None,
     token: Token = None,
 ) -> None:
-    """Print a sweep as CSV: a line a point with its values, the state of its run and its results."""
+    """Print a sweep: a line a point with its values, the state of its run and its results.
+
+    A terminal gets a table of the results that differ, or of the columns that are named; a pipe and --out get CSV of
+    all columns, or of the keys, the state and the columns that are named.
+    """
     if (path := file_named(sweep)) is not None:
-        text = to_csv(columns_of(path))
+        made = columns_of(path)
+        text, keys = to_csv(made), [column.name for column in made if column.kind == KEY]
     else:
         with connect(url, token) as session, aloud("reading the sweep"):
-            text = session.find_sweep(sweep).csv()
-    if out is None:
+            found = session.find_sweep(sweep)
+            text, keys = found.csv(), found.keys()
+    if columns:
+        text = points_table.narrowed(text, keys, columns)
+    if out is None and sys.stdout.isatty():
+        show(points_table.table_of(text_rows(text), keys, whole=bool(columns)))
+    elif out is None:
         echo(text, nl=False)
     else:
         save_text(out, text)

@@ -8,26 +8,11 @@ from matplotlib.figure import Figure
 from conoid.cases.history import split
 
 from .errors import ClientError, UsageError
-
-Row = Mapping[str, str]
+from .telling import Row, known, number_of, telling
 
 _COLOURS = ("#4c78a8", "#f58518", "#54a24b", "#e45756", "#72b7b2", "#b279a2", "#eeca3b", "#9d755d", "#ff9da6")
 _PANELS = 6
 """Results that are drawn when nobody names any. Chosen: as many as are read on one page."""
-_FIRST = (
-    "reference.",
-    "probe.",
-    "fragments",
-    "broken",
-    "eroded",
-    "energy.fracture",
-    "energy.plastic",
-    "energy.kinetic",
-)
-"""What is drawn rather than other columns."""
-_NEVER = frozenset({"time", "elapsed", "cpu", "elements", "nodes", "worst_residual", "reference.worst_residual",
-                    "energy.residual", "energy.initial", "steps", "warnings"})  # fmt: skip
-"""What is drawn only when it is asked for: it tells of the machine or of the mesh."""
 
 
 def figure(rows: Sequence[Row], keys: Sequence[str], x: str | None, columns: Sequence[str]) -> Figure:
@@ -40,7 +25,7 @@ def figure(rows: Sequence[Row], keys: Sequence[str], x: str | None, columns: Seq
     if not changed:
         raise ClientError("no run of the sweep is there any more")
     over = _axis(rows, changed, x)
-    shown = [_known(rows, name) for name in columns] or _telling(rows, list(changed.values()))
+    shown = [known(rows, name) for name in columns] or telling(rows, list(changed.values()))[:_PANELS]
     if not shown:
         raise ClientError("no run of the sweep has ended with a number that differs between its points")
     across = min(len(shown), 3)
@@ -74,40 +59,14 @@ def _axis(rows: Sequence[Row], changed: Mapping[str, str], x: str | None) -> str
     return changed[x] if x is not None else next(iter([*varies, *changed.values()]))
 
 
-def _known(rows: Sequence[Row], name: str) -> str:
-    there = [column for column in rows[0] if any(_number(row[column]) is not None for row in rows)]
-    known = {_bare(column): column for column in there} | {column: column for column in there}
-    if name not in known:
-        raise UsageError(f"{name!r}: the table has the numbers {', '.join(map(_bare, there))}")
-    return known[name]
-
-
-def _telling(rows: Sequence[Row], titles: Sequence[str]) -> list[str]:
-    """The columns of numbers that differ between the points, the most telling ones first."""
-
-    def differs(name: str) -> bool:
-        found = {value for row in rows if (value := _number(row[name])) is not None}
-        return len(found) > 1
-
-    left_out = {*map(_bare, titles), *_NEVER, "run", "digest"}
-    names = [name for name in rows[0] if _bare(name) not in left_out and differs(name)]
-    return sorted(names, key=_rank)[:_PANELS]
-
-
-def _rank(title: str) -> tuple[bool, int]:
-    """The least comes first; extremes of probes come last."""
-    first = next((n for n, begins in enumerate(_FIRST) if title.startswith(begins)), len(_FIRST))
-    return _bare(title).endswith((".min", ".max")), first
-
-
 def _panel(axes: Axes, rows: Sequence[Row], over: str, others: Sequence[str], name: str) -> None:
     curves: dict[str, list[Row]] = {}
     for row in rows:
-        if _number(row[name]) is not None:
+        if number_of(row[name]) is not None:
             curves.setdefault(", ".join(_valued(row, title) for title in others), []).append(row)
     words, places = _places(rows, over)
     for number, (label, some) in enumerate(curves.items()):
-        points = sorted((places[row[over]], _number(row[name]) or 0.0) for row in some)
+        points = sorted((places[row[over]], number_of(row[name]) or 0.0) for row in some)
         colour = _COLOURS[number % len(_COLOURS)]
         axes.plot(*zip(*points, strict=True), "o-", color=colour, markersize=4, linewidth=1.2, label=label)
     if words:
@@ -116,11 +75,6 @@ def _panel(axes: Axes, rows: Sequence[Row], over: str, others: Sequence[str], na
     axes.grid(alpha=0.3)
     if others:
         axes.legend(fontsize=7, frameon=False)
-
-
-def _bare(column: str) -> str:
-    """The name of a column without its unit."""
-    return split(column)[0]
 
 
 def _labelled(column: str) -> str:
@@ -138,12 +92,5 @@ def _valued(row: Row, title: str) -> str:
 def _places(rows: Sequence[Row], over: str) -> tuple[bool, dict[str, float]]:
     """Whether the values are words, and where each of them lies."""
     texts = list(dict.fromkeys(row[over] for row in rows))
-    numbers = {text: value for text in texts if (value := _number(text)) is not None}
+    numbers = {text: value for text in texts if (value := number_of(text)) is not None}
     return (False, numbers) if len(numbers) == len(texts) else (True, {text: float(n) for n, text in enumerate(texts)})
-
-
-def _number(text: str) -> float | None:
-    try:
-        return float(text)
-    except ValueError:
-        return None

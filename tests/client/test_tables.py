@@ -7,9 +7,12 @@ import pytest
 
 from conoid.cases.outcome import Compressed, Measured, Outcome
 from conoid.cases.run import State
+from conoid.client import points_table
 from conoid.client.console import PlainConsole
+from conoid.client.errors import UsageError
 from conoid.client.options import show_lines
 from conoid.client.rows import Alike, RunRow, differing
+from conoid.client.sweep import text_rows
 from conoid.client.tables import end_tables, outcome_table, runs_table, short_names
 from conoid.client.told import RunInfo
 
@@ -104,3 +107,40 @@ def test_the_end_of_a_run_has_its_probes_with_units_and_extremes() -> None:
 def test_keys_are_short_as_far_as_they_are_told_apart() -> None:
     keys = ["parts[0].velocity[2]", "parts[1].velocity[2]", "run.end_time", "a.b.c", "x.b.c", "c"]
     assert list(short_names(keys).values()) == [*keys[:2], "end_time", "a.b.c", "x.b.c", "c"]
+
+
+SWEEP = (
+    "a.v [m/s],b.v [m/s],run,state,cause,probe.x [mm],probe.x.min [mm],fragments,broken,energy.kinetic [J],digest\n"
+    + "".join(f"{v},{2 * v},r{v},succeeded,,{v / 3},{v / 9},{v},{v},{v * v},d{v}\n" for v in (100, 200))
+)
+
+
+def test_a_sweep_in_a_terminal_has_keys_state_and_what_differs() -> None:
+    def printed(text: str, *, whole: bool) -> list[str]:
+        out = io.StringIO()
+        PlainConsole(file=out, width=120, highlight=False).print(
+            points_table.table_of(text_rows(text), ["a.v", "b.v"], whole=whole)
+        )
+        return out.getvalue().splitlines()
+
+    head, _, first, _, more = printed(SWEEP, whole=False)
+    assert head.split() == [
+        "a.v",
+        "[m/s]",
+        "b.v",
+        "[m/s]",
+        "state",
+        "probe.x",
+        "[mm]",
+        "fragments",
+        "broken",
+        "energy.kinetic",
+        "[J]",
+    ]
+    assert first.split() == ["100", "200", "succeeded", "33.3333", "100", "100", "10000"]
+    assert more == "1 more result differs: --column NAME, or all with --out FILE.csv"
+    some = points_table.narrowed(SWEEP, ["a.v", "b.v"], ["broken", "probe.x [mm]"])
+    assert some.splitlines()[0] == "a.v [m/s],b.v [m/s],run,state,broken,probe.x [mm]"
+    assert printed(some, whole=True)[2].split() == ["100", "200", "succeeded", "100", "33.3333"]
+    with pytest.raises(UsageError, match=r"'mass': the table has a.v, b.v, run"):
+        points_table.narrowed(SWEEP, ["a.v"], ["mass"])
