@@ -91,7 +91,7 @@ def test_what_is_shown_is_what_the_files_say(site: Site, watched: tuple[str, Pag
     page.wait("[...document.querySelectorAll('.plot')].every((plot) => plot.querySelector('canvas'))")
     assert number(shown["fragments"]) == len(rows)
     assert number(shown["step"]) == int(line["step"])
-    assert shown["residual"] == page.evaluate(f"({line['residual']}).toExponential(1)")
+    assert shown["energy residual"] == page.evaluate(f"({line['residual']}).toExponential(1)")
     course = (
         "fetch(`v1/runs/%s/columns?name=kinetic`, { headers: { Authorization: `Bearer %s` } }).then((a) => a.json())"
     )
