@@ -14,7 +14,6 @@ from conoid.cases.messages import Load
 from . import html
 from .drawing.fields import FIELDS
 from .drawing.picture import Drawn
-from .drawing.scales import blend
 from .errors import ClientError, UnfinishedError, ViewError
 from .result import Result
 
@@ -81,7 +80,7 @@ def _key(drawn: Drawn) -> str:
     if drawn.limits is None:
         return f"<span class=hint>{escape(low)} everywhere</span>"
     first, last = exacts(drawn.limits, drawn.unit, 4)
-    stripe = f'<i style="background:linear-gradient(90deg,{",".join(blend(field.colours, 12))})"></i>'
+    stripe = f'<i style="background:linear-gradient(90deg,{",".join(field.colours)})"></i>'
     beyond = drawn.low < drawn.limits[0] or drawn.high > drawn.limits[1]
     said = f" <span class=hint>values from {escape(low)} to {escape(high)}</span>" if beyond else ""
     return f"<span class=scale>{escape(first)} {stripe} {escape(last)}</span>{said}"

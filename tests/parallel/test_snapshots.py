@@ -169,9 +169,10 @@ def test_a_run_that_goes_on_goes_on_counting_and_tidies_up(tmp_path: Path) -> No
     assert after[: len(before)] == before
     assert [message.n for message in after] == list(range(len(after)))
     assert len(after) > len(before)
-    assert sorted(path.name for path in (folder / layout.SNAPSHOTS).iterdir()) == [
-        f"{message.n:06d}.snap" for message in after
-    ]
+    numbers = [f"{message.n:06d}" for message in after]
+    assert sorted(path.name for path in (folder / layout.SNAPSHOTS).iterdir()) == sorted(
+        f"{number}.{kind}" for number in numbers for kind in ("snap", "tets")
+    )
 
 
 def test_what_a_killed_run_tells_of_is_whole(tmp_path: Path) -> None:
