@@ -11,8 +11,10 @@ from conoid.server.app import build_app, opened
 from conoid.server.settings import Caps, Settings
 from conoid.server.tokens import create_token
 
+from .chromium import Browser
 from .node import Ask, asking
 from .running import FAKE, MakeProcess, Running, User, processes
+from .visitor import Site
 
 
 def settings_in(place: Path) -> Settings:
@@ -72,3 +74,19 @@ def process(tmp_path: Path) -> Iterator[MakeProcess]:
 def ask(tmp_path_factory: pytest.TempPathFactory) -> Ask:
     """Asks modules of the page by node."""
     return asking(tmp_path_factory.mktemp("web"))
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
+    """A server in a process of its own, without runs; tests that need others have a fixture of this name."""
+    made = Site(tmp_path_factory.mktemp("site") / "runs")
+    yield made
+    made.process.terminate()
+    made.process.wait(60)
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    """A Chromium with an empty profile."""
+    with Browser(tmp_path_factory.mktemp("profile")) as running:
+        yield running

@@ -46,12 +46,6 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Site, list[
     made.process.wait(60)
 
 
-@pytest.fixture(scope="module")
-def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
-    with Browser(tmp_path_factory.mktemp("profile")) as running:
-        yield running
-
-
 def chosen(page: Page) -> list[str]:
     found: list[str] = page.evaluate(f"[...document.querySelectorAll('{PROBES} input:checked')].map((b) => b.value)")
     return found

@@ -3,7 +3,6 @@
 import csv
 import json
 import time
-from collections.abc import Iterator
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -26,20 +25,6 @@ GRID, END_TIME = (64, 14), 60e-6
 """px of a chart left and right of its axes (charts.js); s of the demo."""
 DEMO = 1800.0
 """s that the demo may take: it takes one minute on two free cores."""
-
-
-@pytest.fixture(scope="module")
-def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
-    made = Site(tmp_path_factory.mktemp("site") / "runs")
-    yield made
-    made.process.terminate()
-    made.process.wait(60)
-
-
-@pytest.fixture(scope="module")
-def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
-    with Browser(tmp_path_factory.mktemp("profile")) as running:
-        yield running
 
 
 @pytest.fixture(scope="module")

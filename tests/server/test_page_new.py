@@ -22,20 +22,6 @@ LONG = 600.0
 """s that a run of seconds may take where others use the machine."""
 
 
-@pytest.fixture(scope="module")
-def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
-    made = Site(tmp_path_factory.mktemp("site") / "runs")
-    yield made
-    made.process.terminate()
-    made.process.wait(60)
-
-
-@pytest.fixture(scope="module")
-def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
-    with Browser(tmp_path_factory.mktemp("profile")) as running:
-        yield running
-
-
 @pytest.fixture
 def page(site: Site, browser: Browser) -> Iterator[Page]:
     """Signed in, at a new run."""

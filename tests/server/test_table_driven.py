@@ -3,6 +3,7 @@
 import json
 import time
 from collections.abc import Iterator
+from statistics import median
 from typing import Any
 
 import pytest
@@ -20,7 +21,8 @@ pytestmark = [
 ROWS = "document.querySelectorAll('.runs tbody tr:not(.space)').length"
 FIRST = "document.querySelector('.runs tbody tr:not(.space) td.first').innerText"
 OPENS, SORTS = 1.5, 100.0
-"""s until the table stands, and ms of a sort (issue 12). Under the load of other work they are only told."""
+"""s until the table stands, the least of some times, and ms of a sort, the median."""
+OPENED = 3
 
 
 @pytest.fixture(scope="module")
@@ -34,12 +36,6 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
         yield made
         made.process.terminate()
         made.process.wait(60)
-
-
-@pytest.fixture(scope="module")
-def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
-    with Browser(tmp_path_factory.mktemp("profile")) as running:
-        yield running
 
 
 @pytest.fixture
@@ -84,11 +80,16 @@ def column(page: Page, title: str) -> list[str]:
     )
 
 
-def test_it_opens_and_sorts_at_once(site: Site, page: Page) -> None:
+def opening(site: Site, page: Page, k: int) -> float:
+    """s until the table of a page that is loaded anew stands."""
     began = time.perf_counter()
-    page.go(f"{site.url}?again#/")
+    page.go(f"{site.url}?again{k}#/")
     page.wait(f"{ROWS} > 5")
-    opened = time.perf_counter() - began
+    return time.perf_counter() - began
+
+
+def test_it_opens_and_sorts_at_once(site: Site, page: Page) -> None:
+    opened = min(opening(site, page, k) for k in range(OPENED))
     assert page.text(".page-head .note").startswith("200 runs")
     page.evaluate("performance.clearMeasures()")
     for title in ("fragments", "velocity[2]", "state", "submitted", "took"):
@@ -96,8 +97,8 @@ def test_it_opens_and_sorts_at_once(site: Site, page: Page) -> None:
     spent = page.evaluate("performance.getEntriesByName('conoid:table').map(({ duration }) => duration)")
     print(f"\nopens in {opened:.2f} s; {len(spent)} sorts, the slowest {max(spent):.0f} ms")
     assert page.evaluate("document.querySelectorAll('.runs tbody tr').length") < 60
-    assert min(spent) < SORTS
-    assert opened < 20 * OPENS
+    assert median(spent) < SORTS
+    assert opened < OPENS
 
 
 def test_rows_are_sorted_filtered_and_grouped(page: Page) -> None:
