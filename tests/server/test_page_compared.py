@@ -98,9 +98,11 @@ def test_twelve_runs_are_told_apart(site: tuple[Site, list[str]], browser: Brows
     page.click(f"table.outcomes [data-sorts='{title}']")
     page.wait(f"document.activeElement.dataset.sorts === '{title}'")
     cells = page.evaluate(
-        "[...document.querySelectorAll('table.outcomes tbody tr')].map((r) => Number(r.cells[3].innerText))"
+        "[...document.querySelectorAll('table.outcomes tbody tr')].map("
+        "(r) => [r.cells[0].querySelector('.pill') !== null, Number(r.cells[3].innerText)])"
     )
-    assert cells == sorted(cells)
+    assert cells == sorted(cells), "results of runs that have not succeeded come last"
+    assert {unsure for unsure, _ in cells} == {False, True}
     page.focus(".plot")
     page.press("ArrowRight")
     page.wait("document.querySelectorAll('.readout .number').length === 12")
