@@ -65,7 +65,7 @@ accuracy: $(READY)
 reference: $(READY)
 	$(BIN)/conoid schema --out cases/case.schema.json
 	$(BIN)/conoid schema --page --out docs/reference/case.md
-	$(BIN)/python -m conoid.server.reference > docs/reference/http.md
+	$(BIN)/python -m conoid.server.answers.reference > docs/reference/http.md
 
 docs: $(READY)
 	@$(PIP) --no-deps -r docs/requirements.lock
@@ -84,7 +84,7 @@ $(READY): requirements.lock pyproject.toml
 	$(call told,making .venv,$(PYTHON) -m venv .venv)
 	$(call told,installing what the worker needs,$(PIP) -c requirements.lock setuptools \
 		&& $(PIP) -c requirements.lock --no-build-isolation -e ".[worker]")
-	$(call told,installing the rest,$(KEPT) -m conoid.worker.compile & kernels=$$!; \
+	$(call told,installing the rest,$(KEPT) -m conoid.worker.kernels.compile & kernels=$$!; \
 		$(PIP) --no-deps -r requirements.lock || { kill $$kernels; exit 1; }; wait $$kernels)
 	@$(KEPT) -c "import conoid.client.cli, conoid.client.drawing.render, conoid.server.serve, matplotlib.pyplot, pandas"
 	@mkdir -p build/types/conoid

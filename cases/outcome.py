@@ -39,7 +39,7 @@ class Made(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class Compressed(msgspec.Struct, kw_only=True, frozen=True):
-    """The hardest compression that a part without a law of compressive failure has met (worker/crushing.py)."""
+    """The highest compression in a part without a law of compressive failure (worker/elements/crushing.py)."""
 
     part: str
     times: float
@@ -81,7 +81,7 @@ class Outcome(msgspec.Struct, kw_only=True, frozen=True):
     """How a run ended; times in s, energies in J.
 
     A count that is not known is None, another number NaN: null in the file. A run that was lost, or that never started,
-    knows no more than its journal has told (server/ends.py).
+    knows no more than its journal has told (server/runs/ends.py).
     """
 
     state: str

@@ -11,7 +11,7 @@ from .loaded import Load
 from .placed import Bulk
 from .touching import Touch
 
-PROGRAM = "conoid.worker.survey"
+PROGRAM = "conoid.worker.scene.survey"
 """The program that reads mesh files, one case a process."""
 
 

@@ -7,12 +7,12 @@ and gives its result; a result is viewed.
 from conoid.cases.problems import CaseError, ConoidError
 
 from .errors import ClientError, NotFoundError, ServiceError, UnfinishedError, UnreachableError, ViewError
-from .found import Found
+from .remote.session import Session, connect
+from .remote.told import RunInfo
 from .result import Result
 from .run import Run
-from .session import Session, connect
-from .sweep import Sweep
-from .told import RunInfo
+from .sweeps.found import Found
+from .sweeps.sweep import Sweep
 
 __all__ = [
     "CaseError", "ClientError", "ConoidError", "Found", "NotFoundError", "Result", "Run", "RunInfo", "ServiceError",

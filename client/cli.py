@@ -13,28 +13,17 @@ from conoid.cases.load import CaseError
 from conoid.cases.loaded import loads
 from conoid.cases.run import ExitCode
 
-from . import benches, commands, converging, hard, listing, reports, shelf, sweeping, validated, viewing
-from .batch import batch_run
-from .console import echo, echo_json, one_line, prepare
+from .commands import benches, commands, converging, hard, listing, reports, shelf, sweeping, validated, viewing
+from .commands.batch import batch_run
+from .commands.console import echo, echo_json, one_line, prepare
+from .commands.helping import Grouped
+from .commands.once import run_once
+from .commands.options import CaseArgument, Json, Overrides, Ranks, Threads, aloud, complain, on_cores, show, warn
 from .decks.command import import_deck
 from .drawing.fields import FIELDS
 from .errors import ClientError
 from .examination import examine
-from .helping import Grouped
-from .once import run_once
-from .options import (
-    CaseArgument,
-    Json,
-    Overrides,
-    Ranks,
-    Threads,
-    aloud,
-    complain,
-    on_cores,
-    show,
-    warn,
-)
-from .submission import data_of, locate
+from .remote.submission import data_of, locate
 
 _Mistake = cast(type[typer.BadParameter], typer.BadParameter.__base__)
 """What typer raises for words that are no command, option or value; it has no public name."""

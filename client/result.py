@@ -18,15 +18,15 @@ from conoid.cases.outcome import Outcome
 from conoid.cases.run import State
 from conoid.cases.units import parse_quantity
 
-from . import html
 from .columns import Columns, joined, read_columns
 from .drawing.look import FILMS
 from .drawing.picture import Drawn
 from .drawing.planes import Mirror, Wall
 from .drawing.scene import Scene, draw
 from .errors import ClientError, LookError, NotFoundError, UnfinishedError, ViewError
-from .folders import Folder, LocalFolder
 from .journal import from_line
+from .local.folders import Folder, LocalFolder
+from .reports import html
 
 _TABLE = re.compile(rf"{fragments.FOLDER}/fragments_(\d+)\.csv")
 _BEYOND = 0.01

@@ -17,13 +17,13 @@ from conoid.cases.messages import AnyMessage
 from conoid.cases.messages import Snapshot as Told
 
 from .errors import ClientError, NotFoundError, ServiceError, UnfinishedError, UnreachableError, passes
-from .http import Http
-from .link import Link
 from .live import Live
-from .places import inside, quoted
+from .local.places import inside, quoted
+from .remote.http import Http
+from .remote.link import Link
+from .remote.told import EventPage, FileInfo, Listing, RunInfo, SnapshotPage
 from .result import Result
 from .snapshots import Snapshot
-from .told import EventPage, FileInfo, Listing, RunInfo, SnapshotPage
 
 _WAIT = 20.0
 """s of a single request that waits for the end of a run: below the 30 s after which a request is given up (http.py)."""
@@ -112,13 +112,13 @@ class Run:
 
         Over Zenoh where it can be reached, else over SSE; ``link`` chooses.
         """
-        from .stream import follow  # zenoh is loaded when it is needed
+        from .remote.stream import follow  # zenoh is loaded when it is needed
 
         return follow(link or self.link(), self.events, lambda: self.status().state.final, after)
 
     def link(self) -> Link:
         """A subscription to the run: over Zenoh where it can be reached, else over SSE."""
-        from .stream import SseLink, StreamError, ZenohLink  # zenoh is loaded when it is needed
+        from .remote.stream import SseLink, StreamError, ZenohLink  # zenoh is loaded when it is needed
 
         me = self.session.me()
         if me.zenoh is not None:

@@ -13,12 +13,12 @@ from conoid.cases.figures import clock, duration
 from conoid.cases.messages import AnyMessage, Log, Progress, Snapshot, Status
 from conoid.cases.run import State
 
-from . import silence
-from .console import PlainConsole, one_line
-from .display import line, panel, seen
+from .commands import silence
+from .commands.console import PlainConsole, one_line
+from .commands.display import line, panel, seen
 from .errors import ClientError, UnreachableError
-from .link import Link
 from .live import Live
+from .remote.link import Link
 
 REASON_EVERY = 3.0
 """s between two questions what a run in the queue waits for. Chosen: below the 8 s after which silence is broken."""

@@ -13,12 +13,12 @@ from typing import Any
 
 from sqlalchemy.exc import SQLAlchemyError
 
-from . import identity
 from .alone import only_one
-from .engine import failure
+from .database import identity
+from .database.engine import failure
+from .database.store import Store
+from .requests.tokens import SCOPES, TokenError, create_token
 from .settings import Caps, Settings, SettingsError, StartError, capped, command, site_of
-from .store import Store
-from .tokens import SCOPES, TokenError, create_token
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

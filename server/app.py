@@ -8,33 +8,38 @@ from fastapi import Depends, FastAPI
 from starlette.datastructures import MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from . import connections, errors, identity, keeper, limits, openapi, page, reader
-from .bell import Bell
-from .cards import Cards
-from .crowd import Crowd
-from .door import Door
-from .download import Downloads
-from .farewells import Farewells
-from .heads import Heads
-from .history import Histories
-from .keeper import Keeper
-from .lanes import Lanes
+from . import errors
+from .answers import openapi, page
+from .answers.cards import Cards
+from .answers.download import Downloads
+from .answers.history import Histories
+from .answers.metrics import Metrics, Timed
+from .database import identity
+from .database.store import Store
+from .intake import reader
+from .intake.receiving import Receiver
+from .intake.sent import SentFiles
+from .intake.submission import Desk
+from .intake.sweeps import Sweeps
+from .keeping import keeper
+from .keeping.farewells import Farewells
+from .keeping.keeper import Keeper
 from .launch import Launcher
 from .launch.local import LocalLauncher
 from .launch.slurm import SlurmLauncher
-from .metrics import Metrics, Timed
-from .present import Present
 from .readiness import Readiness
-from .receiving import Receiver
+from .requests import connections, limits
+from .requests.crowd import Crowd
+from .requests.door import Door
+from .requests.heads import Heads
+from .requests.lanes import Lanes
 from .routes import cases, events, files, health, history, logs, me, runs, sent, snapshots, table
 from .routes import sweeps as sweep_routes
-from .sent import SentFiles
+from .runs.bell import Bell
+from .runs.present import Present
+from .runs.supervisor import Supervisor
 from .service import Service
 from .settings import Settings
-from .store import Store
-from .submission import Desk
-from .supervisor import Supervisor
-from .sweeps import Sweeps
 from .telemetry import Telemetry
 
 ROUTERS = (

@@ -23,7 +23,7 @@ from starlette.exceptions import HTTPException
 
 from conoid.cases.problems import Problem
 
-from .holds import DAMAGE
+from .runs.holds import DAMAGE
 
 MEDIA_TYPE = "application/problem+json"
 _log = logging.getLogger("conoid.server")

@@ -8,10 +8,10 @@ from collections.abc import Callable
 from sqlalchemy.exc import SQLAlchemyError
 
 from . import durable
+from .database.store import Store
 from .errors import ServiceError
-from .lanes import Lanes
+from .requests.lanes import Lanes
 from .settings import Settings
-from .store import Store
 
 _FRESH = 1.0
 """s for which a result is used: /readyz needs no token, and each check writes to the disk. Chosen."""

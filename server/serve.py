@@ -13,9 +13,10 @@ from types import FrameType
 
 import uvicorn
 
-from . import connections, durable, heap, quiet
+from . import durable, heap
 from .alone import only_one
 from .app import build_app, opened
+from .requests import connections, quiet
 from .service import Service
 from .settings import Settings, StartError
 

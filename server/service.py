@@ -5,23 +5,23 @@ from typing import Annotated
 
 from fastapi import Depends, Request
 
-from .bell import Bell
-from .cards import Cards
-from .crowd import Crowd
-from .download import Downloads
-from .farewells import Farewells
-from .history import Histories
-from .keeper import Keeper
-from .lanes import Lanes
-from .present import Present
+from .answers.cards import Cards
+from .answers.download import Downloads
+from .answers.history import Histories
+from .database.store import Store
+from .intake.receiving import Receiver
+from .intake.sent import SentFiles
+from .intake.submission import Desk
+from .intake.sweeps import Sweeps
+from .keeping.farewells import Farewells
+from .keeping.keeper import Keeper
 from .readiness import Readiness
-from .receiving import Receiver
-from .sent import SentFiles
+from .requests.crowd import Crowd
+from .requests.lanes import Lanes
+from .runs.bell import Bell
+from .runs.present import Present
+from .runs.supervisor import Supervisor
 from .settings import Settings
-from .store import Store
-from .submission import Desk
-from .supervisor import Supervisor
-from .sweeps import Sweeps
 from .telemetry import Telemetry
 
 

@@ -25,10 +25,10 @@ from conoid.cases.batch import Slurm
 from conoid.cases.messages import Status, to_msgpack
 
 from . import durable
-from .connections import raise_limit
+from .database.store import Token
 from .launch import Access
+from .requests.connections import raise_limit
 from .settings import StartError, loopback
-from .store import Token
 
 _log = logging.getLogger("conoid.server")
 _SECRET, _USERS = "server.secret", ".zenoh-users"

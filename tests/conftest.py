@@ -8,7 +8,7 @@ without job control that runs them in the background has SIGINT ignored by all b
 import os
 import signal
 
-from conoid.worker.kernels import use_cache
+from conoid.worker.kernels.store import use_cache
 
 use_cache()
 os.environ.setdefault("MPIR_CVAR_ENABLE_HEAVY_YIELD", "1")

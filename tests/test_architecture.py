@@ -5,7 +5,7 @@ import re
 import subprocess
 import sys
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -88,10 +88,10 @@ def test_tests_mirror_the_houses() -> None:
     assert folders - set(HOUSES) - inside == {"verification", "bench", "drill"}
 
 
-def relatives(path: Path) -> set[Path]:
-    """Files of its house that a file imports, anywhere in it."""
+def relatives(path: Path, nodes: Iterable[ast.AST] | None = None) -> set[Path]:
+    """Files of its house that a file imports in the ``nodes``, or anywhere in it."""
     found: set[Path] = set()
-    for node in ast.walk(tree(path)):
+    for node in ast.walk(tree(path)) if nodes is None else nodes:
         if isinstance(node, ast.ImportFrom) and node.level:
             base = path.parents[node.level - 1].joinpath(*(node.module or "").split(".") if node.module else ())
             names = [base.joinpath(alias.name) for alias in node.names]
@@ -264,10 +264,8 @@ for module in {modules!r}:
 @cache
 def is_heavy(path: Path) -> bool:
     """Whether a module needs VTK or a library of the worker, or one beside it that does, when it is imported."""
-    beside = [node for node in tree(path).body if isinstance(node, ast.ImportFrom) and node.level == 1]
-    names = {name for node in beside for name in ([node.module] if node.module else [one.name for one in node.names])}
-    files = [path.with_name(f"{name}.py") for name in names]
-    return bool(heads(path) & HEAVY) or any(is_heavy(file) for file in files if file.is_file())
+    at_import = [node for node in tree(path).body if isinstance(node, ast.ImportFrom)]
+    return bool(heads(path) & HEAVY) or any(is_heavy(file) for file in relatives(path, at_import))
 
 
 def module_of(path: Path) -> str:
@@ -331,9 +329,10 @@ BLURRED = {
 and what fuses or reorders sums of products."""
 TELLS = {
     "worker/contact/common_volume.py", "worker/contact/inside.py", "worker/contact/overlap.py",
-    "worker/fracture/fragments.py", "worker/gauges/shapes.py", "worker/groups.py", "worker/job.py", "worker/meter.py",
-    "worker/output/fields.py", "worker/output/frames.py", "worker/penetration.py", "worker/reference.py",
-    "worker/snapshots/decimate.py", "worker/snapshots/invariants.py", "worker/snapshots/table.py",
+    "worker/fracture/fragments.py", "worker/gauges/penetration.py", "worker/gauges/reference.py",
+    "worker/gauges/shapes.py", "worker/migration/groups.py", "worker/migration/meter.py", "worker/output/fields.py",
+    "worker/output/frames.py", "worker/run/job.py", "worker/snapshots/decimate.py", "worker/snapshots/invariants.py",
+    "worker/snapshots/table.py",
 }  # fmt: skip
 """They report, refuse and balance; what they compute is in no answer, but for parts that are pushed apart at the start
 (docs/theory/sums.md)."""
@@ -361,7 +360,7 @@ def blurred(path: Path) -> set[str]:
 
 
 def test_what_an_answer_depends_on_has_the_same_bits_on_every_processor() -> None:
-    """Use worker/materials/elementary.py and worker/turning.py, and write sums of products out."""
+    """Use worker/materials/elementary.py and worker/materials/turning.py, and write sums of products out."""
     for path in (path for path in SOURCES if name_of(path).startswith("worker/")):
         if name_of(path) not in TELLS | {POWERS_OF_TWO, REFUSES, WINDS}:
             assert not blurred(path)

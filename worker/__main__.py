@@ -3,7 +3,7 @@
 import sys
 
 if __name__ == "__main__":
-    from .main import main
     from .parallel.mpi import leave
+    from .run.main import main
 
     leave(main(sys.argv[1:]))

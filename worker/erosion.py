@@ -11,7 +11,7 @@ import numpy as np
 
 from conoid.cases.schema import Case
 
-from .boundaries import Boundary
+from .boundaries.boundaries import Boundary
 from .clock import Clock
 from .contact import bare
 from .contact.stage import Contact
@@ -21,11 +21,7 @@ from .materials.models import EQUATIONS
 from .mesh.faces import FACES
 from .mesh.faces import normals as face_normals
 from .migration.parcel import Parcel
-from .parallel.comm import Comm
-from .parallel.fixed_point import Tally
-from .parallel.ownership import Neighbour, complete
-from .parallel.tags import Tag
-from .state import (
+from .model.state import (
     CHUNK,
     DAMAGE,
     PRESSURE,
@@ -47,7 +43,11 @@ from .state import (
     Nodes,
     extended,
 )
-from .topology import Split
+from .model.topology import Split
+from .parallel.comm import Comm
+from .parallel.fixed_point import Tally
+from .parallel.ownership import Neighbour, complete
+from .parallel.tags import Tag
 
 GATHERED = 10
 """Steps in which worn tets are gathered. Chosen: every removal calls for mean normals and tests of all pairs."""

@@ -1,10 +1,10 @@
 """Nodes: forces to velocities, velocities to positions. Increments are added, positions never recomputed."""
 
-from .jit import njit, types
+from .kernels.jit import njit, types
+from .model.state import Nodes
 from .parallel.arguments import reader
 from .parallel.passes import Pass
 from .parallel.team import TASK, Team
-from .state import Nodes
 
 _F, _F1, _F2 = types.float64, types.float64[::1], types.float64[:, ::1]
 _KICK = _F2, types.int64[:, ::1], _F1, _F1, _F, _F

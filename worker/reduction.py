@@ -12,8 +12,8 @@ from typing import Self
 
 import numpy as np
 
+from .model.state import Ints
 from .parallel.comm import Comm, Pending
-from .state import Ints
 
 _COSTS, _UNSETTLED = 4, 2
 """Words of the sum: what contact has taken, and what its sweeps leave undone."""
@@ -29,7 +29,7 @@ class Fields:
         self.force = 0.0
         """Largest contribution to a nodal force, N."""
         self.stop = 0
-        """Reason to stop, 0 for none (worker/loop.py): the largest wins."""
+        """Reason to stop, 0 for none (worker/run/loop.py): the largest wins."""
         self.report = False
         """Rank 0 wants the loads of all ranks."""
         self.groups = False

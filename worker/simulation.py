@@ -10,47 +10,47 @@ import numpy as np
 from conoid.cases.library import material as find_material
 from conoid.cases.schema import Case, Symmetry
 
-from . import conditions, domain
-from .assembly import Say, quiet
+from .accounts.energy import Ledger
+from .accounts.timers import Timers, worked
 from .bonds.interface import tied_pairs
 from .bonds.pieces import Pieces
 from .bonds.stage import Bonds
-from .boundaries import Acts, Boundary
+from .boundaries.boundaries import Acts, Boundary
+from .boundaries.mirrors import Mirrors
+from .boundaries.wall_shapes import Walls
 from .clock import Clock
 from .contact.stage import Contact
 from .contact.tied import Tied
-from .crushing import Crushing
 from .elements.averages import Averages, volumes
 from .elements.averaging import AveragedElements
+from .elements.crushing import Crushing
 from .elements.forms import Elements
 from .elements.matter import whose
-from .energy import Ledger
 from .erosion import Erosion
 from .fracture.record import Record
 from .fracture.stage import Fracture
 from .gauges.gauge import Scene
+from .gauges.probes import Probes
 from .materials.elementary import power
 from .materials.law import BULK, DENSITY, SHEAR
 from .materials.models import eos_of, equation_of, parameters
 from .migration import model as model_of
 from .migration.parcel import Parcel
 from .migration.route import Arrived
-from .mirrors import Mirrors
+from .model.state import MASS, Floats, Model
+from .model.topology import KeptByNode
 from .motion import Leapfrog
 from .parallel import fixed_point
 from .parallel.comm import Comm
 from .parallel.ownership import Neighbour
 from .parallel.passes import Ranges
 from .parallel.team import Team, team
-from .probes import Probes
 from .reduction import StepReduction
 from .rigid.bodies import measured
 from .rigid.motion import Held
 from .rigid.stage import Rigid
-from .state import MASS, Floats, Model
-from .timers import Timers, worked
-from .topology import KeptByNode
-from .wall_shapes import Walls
+from .scene import conditions, domain
+from .scene.assembly import Say, quiet
 
 _SMALLEST_STRAIN = 1e-12
 """Forces of a smaller strain than this need no finer quantum. Chosen: its stress in steel is 0.2 Pa."""

@@ -35,13 +35,13 @@ import math
 
 import numpy as np
 
-from . import failed
-from .boundaries import Acts
+from .boundaries.boundaries import Acts
+from .elements import failed
 from .errors import PhysicsError
 from .fracture.stage import BREAKS, NOTHING, OVERSTRESSED, Fracture
+from .model.state import Floats
 from .parallel import fixed_point
 from .simulation import Simulation
-from .state import Floats
 
 
 def prepare(sim: Simulation) -> None:

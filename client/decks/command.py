@@ -11,10 +11,10 @@ from conoid.cases import reference
 from conoid.cases.figures import counted
 from conoid.cases.run import ExitCode
 
-from ..console import echo
+from ..commands.console import echo
+from ..commands.options import Json, aloud, complain
 from ..errors import ClientError, UsageError
-from ..options import Json, aloud, complain
-from ..saving import save_text
+from ..local.saving import save_text
 from .dialects import DIALECTS
 from .importing import Imported, as_json, lines, read_deck
 from .toml import NOTE

@@ -6,7 +6,7 @@ from conoid.cases.batch import Job
 from conoid.cases.run import Cause, State
 from conoid.cases.slurm import Entry
 
-from .. import farewell
+from ..runs import farewell
 from . import Exit, Reading
 
 _READINGS: dict[str, Reading] = {

@@ -14,9 +14,9 @@ from typing import BinaryIO
 from conoid.cases import checkpoints, layout, whole
 from conoid.cases.cores import core_numbers, usable_cores
 
-from .. import farewell
-from .. import folder as run_folder
-from ..folder import Process
+from ..runs import farewell
+from ..runs import folder as run_folder
+from ..runs.folder import Process
 from ..settings import Settings, command
 from . import DamagedError, Exit, Job, LaunchError, Phase, Trace, Worker, memory, processes
 

@@ -11,12 +11,12 @@ from conoid.cases import reference
 from conoid.cases.files import files_of
 from conoid.cases.load import CaseError, read_case, read_data, shipped
 
-from .. import openapi
-from ..auth import Reader, Submitter
-from ..copies import names_files
+from ..answers import openapi
 from ..errors import entry, not_found
-from ..lanes import blocking
-from ..reading import WrongCaseError
+from ..intake.copies import names_files
+from ..intake.reading import WrongCaseError
+from ..requests.auth import Reader, Submitter
+from ..requests.lanes import blocking
 from ..service import ServiceOf
 from .runs import Body
 

@@ -6,9 +6,9 @@ from fastapi import Depends, Query
 
 from conoid.cases.run import State
 
-from ..chosen import Chosen
+from ..answers.chosen import Chosen
 from ..errors import ServiceError
-from ..submission import labels_of
+from ..intake.submission import labels_of
 
 _MOST_WORDS, _LONGEST = 8, 200
 """Words that are looked for, and characters of all of them. Chosen."""

@@ -7,11 +7,12 @@ from fastapi.responses import StreamingResponse
 
 from conoid.cases import layout
 
-from .. import journal, stream
-from ..auth import Pass, Reader
-from ..crowd import place_of
+from ..answers import stream
 from ..errors import ServiceError
-from ..lanes import blocking
+from ..requests.auth import Pass, Reader
+from ..requests.crowd import place_of
+from ..requests.lanes import blocking
+from ..runs import journal
 from ..service import ServiceOf
 from .runs import OwnedRun
 

@@ -8,9 +8,9 @@ from urllib.parse import quote, unquote_to_bytes
 from fastapi import APIRouter, Request, Response
 from starlette.convertors import PathConvertor, register_url_convertor
 
-from .. import download
-from ..events import Run
-from ..lanes import blocking
+from ..answers import download
+from ..requests.lanes import blocking
+from ..runs.events import Run
 from ..service import ServiceOf
 from .runs import OwnedRun
 

@@ -6,9 +6,9 @@ from fastapi import APIRouter, Depends, Request, Response
 from fastapi.responses import JSONResponse
 from prometheus_client import CONTENT_TYPE_PLAIN_0_0_4
 
-from ..auth import Identity, requires
-from ..lanes import blocking
-from ..metrics import Metrics
+from ..answers.metrics import Metrics
+from ..requests.auth import Identity, requires
+from ..requests.lanes import blocking
 from ..service import ServiceOf
 
 router = APIRouter()

@@ -7,10 +7,10 @@ from fastapi import APIRouter, Header, Query, Response
 
 from conoid.cases import layout
 
-from .. import download, series
-from ..columns import Columns
+from ..answers import download, series
+from ..answers.columns import Columns
 from ..errors import ServiceError
-from ..lanes import blocking
+from ..requests.lanes import blocking
 from ..service import ServiceOf
 from .runs import OwnedRun
 

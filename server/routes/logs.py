@@ -11,10 +11,10 @@ from fastapi.responses import StreamingResponse
 
 from conoid.cases import layout
 
-from .. import download, stream
-from ..auth import Pass, Reader
-from ..crowd import place_of
+from ..answers import download, stream
 from ..errors import ServiceError
+from ..requests.auth import Pass, Reader
+from ..requests.crowd import place_of
 from ..service import Service, ServiceOf
 from .events import Seconds
 from .runs import OwnedRun

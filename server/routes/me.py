@@ -4,10 +4,10 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Request
 
-from ..auth import Identity, identify
-from ..connections import BODY
 from ..errors import ServiceError
-from ..lanes import blocking
+from ..requests.auth import Identity, identify
+from ..requests.connections import BODY
+from ..requests.lanes import blocking
 from ..service import Service, ServiceOf
 from ..settings import loopback
 from ..telemetry import TelemetryError

@@ -15,17 +15,18 @@ from conoid.cases.load import CaseError
 from conoid.cases.policy import PRIORITY
 from conoid.cases.run import State
 
-from .. import download, folder, openapi, pins, restarts, view
-from ..auth import Identity, Pass, Reader, Submitter, unauthorized
-from ..chosen import Chosen
-from ..copies import names_files
-from ..crowd import place_of
+from ..answers import download, openapi, view
+from ..answers.chosen import Chosen
 from ..errors import ServiceError, invalid_case, not_found
-from ..events import Run
-from ..lanes import blocking
-from ..limits import read_body
+from ..intake.copies import names_files
+from ..intake.submission import Wishes, labels_of
+from ..requests.auth import Identity, Pass, Reader, Submitter, unauthorized
+from ..requests.crowd import place_of
+from ..requests.lanes import blocking
+from ..requests.limits import read_body
+from ..runs import folder, pins, restarts
+from ..runs.events import Run
 from ..service import Service, ServiceOf
-from ..submission import Wishes, labels_of
 from .choice import ChosenOf
 
 router = APIRouter()

@@ -6,11 +6,11 @@ from fastapi import APIRouter, Request, Response
 from fastapi import Path as PathParameter
 from fastapi.responses import JSONResponse
 
-from .. import openapi
-from ..auth import Pass, Submitter, unauthorized
+from ..answers import openapi
 from ..errors import not_found
-from ..lanes import blocking
-from ..sent import Sent
+from ..intake.sent import Sent
+from ..requests.auth import Pass, Submitter, unauthorized
+from ..requests.lanes import blocking
 from ..service import ServiceOf
 
 router = APIRouter()

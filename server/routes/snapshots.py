@@ -10,10 +10,10 @@ from fastapi import Path as PathParameter
 from conoid.cases import layout
 from conoid.cases.messages import Snapshot
 
-from .. import download, pieces, series
+from ..answers import download, pieces, series
 from ..errors import not_found
-from ..events import Run
-from ..lanes import blocking
+from ..requests.lanes import blocking
+from ..runs.events import Run
 from ..service import Service, ServiceOf
 from .history import Known
 from .runs import OwnedRun

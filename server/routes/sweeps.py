@@ -11,14 +11,14 @@ from conoid.cases.points import Point, results, to_csv
 from conoid.cases.points import table as points_table
 from conoid.cases.run import State
 
-from .. import openapi, view
-from ..auth import Identity, Reader, Submitter
+from ..answers import openapi, view
 from ..errors import not_found
-from ..events import Run
-from ..lanes import blocking
-from ..limits import read_body
+from ..intake.sweeps import Plan
+from ..requests.auth import Identity, Reader, Submitter
+from ..requests.lanes import blocking
+from ..requests.limits import read_body
+from ..runs.events import Run
 from ..service import Service, ServiceOf
-from ..sweeps import Plan
 from .runs import ask_to_stop
 
 router = APIRouter()

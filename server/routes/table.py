@@ -6,10 +6,10 @@ from typing import Annotated, Any
 import msgspec
 from fastapi import APIRouter, Header, Query, Response
 
-from .. import download, view
-from ..auth import Reader
-from ..lanes import blocking
-from ..rows import Table
+from ..answers import download, view
+from ..answers.rows import Table
+from ..requests.auth import Reader
+from ..requests.lanes import blocking
 from ..service import ServiceOf
 from .choice import ChosenOf
 from .runs import Cursor, listed

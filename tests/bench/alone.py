@@ -13,9 +13,9 @@ import tempfile
 from pathlib import Path
 
 from conoid.cases.outcome import from_json
-from conoid.client.projection import Network
-from conoid.client.scaling import CORES, mpiexec
-from conoid.client.study import table
+from conoid.client.studies.projection import Network
+from conoid.client.studies.scaling import CORES, mpiexec
+from conoid.client.studies.study import table
 
 from .tape import calls
 from .timeline import Timeline

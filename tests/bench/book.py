@@ -23,12 +23,12 @@ from conoid.cases.estimate import estimate
 from conoid.cases.load import CaseError, apply_overrides, parse_case, read_data, shipped
 from conoid.cases.schema import Case
 from conoid.cases.suite import suite
-from conoid.client import hard
+from conoid.client.commands import hard
 from conoid.client.errors import ClientError
-from conoid.client.local import LocalServer
+from conoid.client.local.local import LocalServer
 from conoid.client.run import Run
-from conoid.client.scaling import CORES
-from conoid.client.variants import sizes
+from conoid.client.studies.scaling import CORES
+from conoid.client.studies.variants import sizes
 
 from . import machine, pages
 

@@ -20,7 +20,7 @@ import numpy.typing as npt
 from conoid.cases import layout, load
 from conoid.cases.library import library
 from conoid.cases.outcome import Outcome, from_json
-from conoid.worker import penetration
+from conoid.worker.gauges import penetration
 
 from .table import Cell, table
 

@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
-from conoid.worker import kernels
+from conoid.worker.kernels import store
 
-kernels.use_cache()
+store.use_cache()
 
 from conoid.cases import load  # noqa: E402
 from conoid.worker import simulation, step  # noqa: E402

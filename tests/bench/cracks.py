@@ -19,7 +19,7 @@ from conoid.cases.geometry import bounds
 from conoid.cases.materials import Material
 from conoid.cases.messages import Energy
 from conoid.cases.schema import Case
-from conoid.worker import assembly, simulation, step
+from conoid.worker import simulation, step
 from conoid.worker.fracture import connectivity
 from conoid.worker.materials.law import DENSITY
 from conoid.worker.mesh import build
@@ -27,9 +27,10 @@ from conoid.worker.mesh.faces import FACES, areas
 from conoid.worker.mesh.model import TetMesh, check, step_lengths
 from conoid.worker.mesh.order import morton_ordered
 from conoid.worker.mesh.structured import divisions
+from conoid.worker.model.state import INTACT, MASS, Floats, Ints
 from conoid.worker.parallel.comm import SerialComm
+from conoid.worker.scene import assembly
 from conoid.worker.simulation import Simulation
-from conoid.worker.state import INTACT, MASS, Floats, Ints
 
 from .table import Cell, table
 

@@ -12,7 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
-from conoid.worker.state import Floats
+from conoid.worker.model.state import Floats
 
 from .cracks import Crack, Kind, Plan, Run, rayleigh, watch
 from .table import Cell, table

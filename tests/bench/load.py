@@ -24,11 +24,11 @@ from typing import Any
 
 import httpx2
 
-from conoid.client.session import Session
-from conoid.server import folder
-from conoid.server.folder import Submission
-from conoid.server.store import Store
-from conoid.server.tokens import create_token
+from conoid.client.remote.session import Session
+from conoid.server.database.store import Store
+from conoid.server.requests.tokens import create_token
+from conoid.server.runs import folder
+from conoid.server.runs.folder import Submission
 
 from . import machine
 from .gates import Gate, report

@@ -20,8 +20,8 @@ from typing import Any
 import msgspec
 
 from conoid.cases import load
-from conoid.server import folder
-from conoid.server.sweeps import FOLDER, Plan
+from conoid.server.intake.sweeps import FOLDER, Plan
+from conoid.server.runs import folder
 from tests.server.visitor import OWNER
 
 from .story import Story

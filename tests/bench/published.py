@@ -7,8 +7,8 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-from conoid.client import chart
-from conoid.client.study import Study, from_json, table
+from conoid.client.studies import chart
+from conoid.client.studies.study import Study, from_json, table
 
 
 @dataclass(frozen=True)

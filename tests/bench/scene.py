@@ -13,9 +13,11 @@ from unittest.mock import patch
 import numpy as np
 
 from conoid.cases import bodies, schema
-from conoid.worker import assembly, simulation, state, step
+from conoid.worker import simulation, step
 from conoid.worker.mesh.model import TetMesh
+from conoid.worker.model import state
 from conoid.worker.parallel.comm import SerialComm
+from conoid.worker.scene import assembly
 
 Form = Literal["standard", "nodal", "split"]
 Generator = Literal["gmsh", "structured"]

@@ -22,10 +22,12 @@ import numpy as np
 
 from conoid.cases import schema
 from conoid.cases.load import parse_case
-from conoid.worker import assembly, penetration, reference, simulation, step
+from conoid.worker import simulation, step
+from conoid.worker.gauges import penetration, reference
 from conoid.worker.mesh.build import build
 from conoid.worker.mesh.model import TetMesh
 from conoid.worker.parallel.comm import SerialComm
+from conoid.worker.scene import assembly
 from conoid.worker.simulation import Simulation
 
 MM = 1e-3

@@ -97,8 +97,8 @@ def _read(endpoint: str, number: int) -> None:
 
 def _work(steps: int, arguments: list[str]) -> int:
     """The worker, whose snapshots are switched on and off every so many ``steps``; leaves marks at the borders."""
-    from conoid.worker import main
-    from conoid.worker.timers import worked
+    from conoid.worker.accounts.timers import worked
+    from conoid.worker.run import main
 
     begin = main.ready_kernels
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from conoid.cases import layout, messages
-from conoid.client.local import LocalServer
+from conoid.client.local.local import LocalServer
 
 from .startup_phases import PHASES
 from .table import Cell, table

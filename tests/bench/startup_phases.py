@@ -56,8 +56,8 @@ def main(launched: float, case: str) -> None:
     """Goes the way and prints the seconds of each phase."""
     stamps = Stamps(launched)
     from conoid.cases import load
-    from conoid.worker import main as worker
     from conoid.worker.parallel.mpi import connect
+    from conoid.worker.run import main as worker
 
     scene = load.read_case(load.shipped_path(case))
     stamps.stamp("interpreter and contract")
@@ -65,7 +65,9 @@ def main(launched: float, case: str) -> None:
     stamps.stamp("MPI")
     worker.ready_kernels(comm, None)
     stamps.stamp("kernels hashed and compiled")
-    from conoid.worker import assembly, compute, domain, simulation, step
+    from conoid.worker import simulation, step
+    from conoid.worker.run import compute
+    from conoid.worker.scene import assembly, domain
 
     assert compute
     stamps.stamp("numba")

@@ -15,11 +15,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from conoid.cases import load, messages
-from conoid.worker.compute import compute
 from conoid.worker.output.journal import Journal
 from conoid.worker.output.telemetry import Telemetry
 from conoid.worker.parallel.comm import SerialComm
-from conoid.worker.signals import Signals
+from conoid.worker.run.compute import compute
+from conoid.worker.run.signals import Signals
 
 _WARM = 4
 """Blocks with telemetry before the first that counts."""

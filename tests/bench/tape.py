@@ -14,12 +14,12 @@ from typing import Any
 
 import numpy as np
 
-from conoid.client.scaling import CORES
-from conoid.worker import main as worker
+from conoid.client.studies.scaling import CORES
+from conoid.worker.model.state import Ints
 from conoid.worker.parallel.comm import Comm, Exchange, Pending, Sent
 from conoid.worker.parallel.mpi import connect, leave
 from conoid.worker.parallel.tags import Tag
-from conoid.worker.state import Ints
+from conoid.worker.run import main as worker
 
 from .timeline import Call
 
@@ -57,7 +57,7 @@ class Recorder:
 
     def begin_maximum(self, words: Ints, result: Ints) -> Pending:
         """See Comm. Where ranks take turns, reports come as many steps apart as with a core for each."""
-        from conoid.worker import loop  # numba, see Player.begin
+        from conoid.worker.run import loop  # numba, see Player.begin
 
         if self._crowd > 1.0:
             vars(loop)["_REPORT_EVERY"] *= self._crowd
@@ -113,7 +113,9 @@ class Player:
 
     def begin(self) -> None:
         """The first step begins: calls count from here on."""
-        from conoid.worker.jit import cpu_time  # numba, which must not be there before the worker has named its cache
+        from conoid.worker.kernels.jit import (
+            cpu_time,  # numba, which must not be there before the worker has named its cache
+        )
 
         self._clock, self._last = cpu_time, cpu_time()
 

@@ -9,9 +9,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from conoid.cases import load, schema
-from conoid.worker import state, step
+from conoid.worker import step
 from conoid.worker.mesh.build import build as build_mesh
 from conoid.worker.mesh.model import TetMesh
+from conoid.worker.model import state
 
 from .gather_scatter import GatherScatter
 from .refine import Refined, refined

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from conoid.client.projection import Network, Projection
-from conoid.client.study import Study, to_json
+from conoid.client.studies.projection import Network, Projection
+from conoid.client.studies.study import Study, to_json
 
 from .published import compared, drawn, main
 

@@ -7,8 +7,8 @@ import pytest
 from conoid.cases import layout, outcome
 from conoid.cases.messages import to_json
 from conoid.cases.outcome import Outcome
-from conoid.client.scaling import Trial
-from conoid.client.submission import case_of
+from conoid.client.remote.submission import case_of
+from conoid.client.studies.scaling import Trial
 from tests.client import studies
 
 from . import threads

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from conoid.client.projection import Network
+from conoid.client.studies.projection import Network
 from conoid.worker.parallel.tags import Tag
 
 from .tape import Player, tape

@@ -20,12 +20,12 @@ from conoid.cases import layout
 from conoid.cases.figures import duration
 from conoid.cases.outcome import from_json
 from conoid.cases.run import State
-from conoid.client import study
-from conoid.client.benches import layouts_of
+from conoid.client.commands.benches import layouts_of
 from conoid.client.errors import ClientError
-from conoid.client.projection import Network
-from conoid.client.scaling import CORES, Layout, Trial, found, run, trials
-from conoid.client.submission import case_of
+from conoid.client.remote.submission import case_of
+from conoid.client.studies import study
+from conoid.client.studies.projection import Network
+from conoid.client.studies.scaling import CORES, Layout, Trial, found, run, trials
 
 RANKS = "1,1x16,16,4x4,1x4,2x8,1x8,1x2"
 """Those that say most first."""

@@ -10,7 +10,7 @@ from collections import defaultdict, deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
-from conoid.client.projection import Network
+from conoid.client.studies.projection import Network
 
 CALL = 3e-6
 """s: of a call of the communicator, from Python to MPI and back. Chosen: what a call from Python to a kernel takes."""

@@ -9,12 +9,12 @@ from scipy.spatial import Delaunay
 
 from conoid.cases import load
 from conoid.cases.load import parse_case
-from conoid.worker.assembly import assemble
 from conoid.worker.bonds import clipping, interface
 from conoid.worker.bonds.rows import Rows, assembled
 from conoid.worker.errors import InputError
 from conoid.worker.mesh.faces import FACES, across, areas
 from conoid.worker.mesh.model import TetMesh
+from conoid.worker.scene.assembly import assemble
 
 from ..worker.meshes import Floats, block
 from . import scenes

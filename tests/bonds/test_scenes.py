@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from conoid.cases import load
-from conoid.worker.assembly import assemble
 from conoid.worker.errors import InputError
+from conoid.worker.scene.assembly import assemble
 
 from .scenes import BOND, block, built, moved, run, start
 

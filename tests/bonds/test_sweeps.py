@@ -7,8 +7,8 @@ from conoid.worker.bonds import law, sweeps
 from conoid.worker.bonds.layout import Layout, laid_out
 from conoid.worker.bonds.records import DAMAGE, KEPT, NORMAL, OPENING, PUSH, WIDEST
 from conoid.worker.bonds.rows import Rows
+from conoid.worker.model.state import Nodes
 from conoid.worker.parallel.comm import SerialComm
-from conoid.worker.state import Nodes
 
 from ..worker.meshes import Floats
 

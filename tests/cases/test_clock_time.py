@@ -10,7 +10,7 @@ from conoid.cases.estimate import estimate
 from conoid.cases.load import apply_overrides, parse_case, read_data, shipped_path
 from conoid.cases.schema import Case
 from conoid.cases.stages import CONTACT, STEPS, TETS
-from conoid.client.validated import estimate_table
+from conoid.client.commands.validated import estimate_table
 
 COSTS = {TETS: 60.0, CONTACT: 30.0, STEPS: 10.0}
 

@@ -7,8 +7,8 @@ import pytest
 
 from conoid.cases.load import CaseError, parse_case
 from conoid.cases.overlap import grazes
-from conoid.worker import assembly
 from conoid.worker.errors import InputError
+from conoid.worker.scene import assembly
 
 BALL = {"shape": "sphere", "radius": 3e-3, "centre": [0, 0, 3e-3], "element_size": 1e-3}
 BLOCK = {"shape": "box", "low": [-5e-3, -5e-3, -4e-3], "high": [5e-3, 5e-3, 0], "element_size": 1e-3,

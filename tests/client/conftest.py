@@ -9,8 +9,8 @@ import zenoh
 
 from conoid.client.drawing import renderer
 from conoid.client.drawing.picture import Picture
-from conoid.client.http import Router
-from conoid.client.local import LocalServer
+from conoid.client.local.local import LocalServer
+from conoid.client.remote.http import Router
 
 from .fakes import FAKE_WORKER, Broker, free_port
 from .studio import Ended, studio

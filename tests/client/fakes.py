@@ -11,7 +11,7 @@ import zenoh
 
 from conoid.cases import keys
 from conoid.cases.messages import AnyMessage, to_msgpack
-from conoid.client.http import Router
+from conoid.client.remote.http import Router
 
 OWNER = "ann"
 

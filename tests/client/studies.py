@@ -4,8 +4,8 @@ from typing import Any
 
 from conoid.cases.messages import AnyMessage, Counts, Load
 from conoid.cases.outcome import Outcome, Sharing
-from conoid.client.projection import Network, Projection, project
-from conoid.client.study import Study
+from conoid.client.studies.projection import Network, Projection, project
+from conoid.client.studies.study import Study
 
 SLOW = Network(latency=1e-3, bandwidth=1e6)
 """A millisecond a message and a microsecond a byte."""

@@ -13,14 +13,14 @@ import pytest
 from conoid.cases.load import CaseError
 from conoid.cases.outcome import Measured, Outcome, to_json
 from conoid.cases.run import State
-from conoid.client.adaptive import found_by
-from conoid.client.ballistic import Fit
-from conoid.client.bracket import Sample, between, bracket, widest
 from conoid.client.errors import ClientError, MissingError, UsageError
-from conoid.client.found import Found, read, table
-from conoid.client.goal import Goal, span_of, spans_of, tolerance_of
-from conoid.client.http import Me
-from conoid.client.told import RunInfo
+from conoid.client.remote.http import Me
+from conoid.client.remote.told import RunInfo
+from conoid.client.sweeps.adaptive import found_by
+from conoid.client.sweeps.ballistic import Fit
+from conoid.client.sweeps.bracket import Sample, between, bracket, widest
+from conoid.client.sweeps.found import Found, read, table
+from conoid.client.sweeps.goal import Goal, span_of, spans_of, tolerance_of
 
 KEY = "parts[0].velocity[2]"
 CASE = {

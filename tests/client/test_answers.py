@@ -12,12 +12,12 @@ from urllib.parse import quote
 import pytest
 from typer.testing import CliRunner
 
-from conoid.client import http
 from conoid.client.cli import app
-from conoid.client.config import address
 from conoid.client.errors import AnswerError, ClientError, UsageError
-from conoid.client.http import Http
-from conoid.client.places import inside
+from conoid.client.local.places import inside
+from conoid.client.remote import http
+from conoid.client.remote.config import address
+from conoid.client.remote.http import Http
 from conoid.client.run import Run
 
 from .hostile import Answer, Hostile, head, hostile, run_info, said

@@ -7,8 +7,8 @@ from matplotlib.figure import Figure
 from matplotlib.image import imread
 
 from conoid.cases.messages import AnyMessage, Balance, Load
-from conoid.client import charts
 from conoid.client.errors import ClientError, UsageError
+from conoid.client.reports import charts
 
 
 def load(t: float, outside: list[int]) -> Load:

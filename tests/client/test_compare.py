@@ -10,11 +10,11 @@ import pandas
 import pytest
 from typer.testing import CliRunner
 
-from conoid.client import curves
 from conoid.client.cli import app
 from conoid.client.columns import read_columns
-from conoid.client.compare import Value, compare, differing, material
 from conoid.client.errors import ClientError, UnfinishedError
+from conoid.client.reports import curves
+from conoid.client.reports.compare import Value, compare, differing, material
 from conoid.client.result import Result
 
 from .bodies import write_fragments, write_history, write_run

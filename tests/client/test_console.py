@@ -14,7 +14,7 @@ from typer.testing import CliRunner, Result
 
 from conoid.cases import layout, messages
 from conoid.client.cli import app
-from conoid.client.console import PlainConsole, one_line, plain
+from conoid.client.commands.console import PlainConsole, one_line, plain
 
 from .hostile import EVIL, OBEYED, Hostile, hostile, run_info, said
 

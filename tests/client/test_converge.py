@@ -11,14 +11,15 @@ from conoid.cases.load import parse_case, read_data, shipped_path
 from conoid.cases.messages import Energy
 from conoid.cases.outcome import Check, Outcome
 from conoid.cases.schema import Case
-from conoid.client import cli, converged, pareto, trade
+from conoid.client import cli
 from conoid.client.columns import read_columns
-from conoid.client.converged import Book
-from conoid.client.convergence import Done, series
 from conoid.client.errors import ClientError
-from conoid.client.quantities import Number, names, of_run
-from conoid.client.richardson import Trend
-from conoid.client.variants import SEEDS, Plan, Point, Variant, chaotic
+from conoid.client.studies import converged, pareto, trade
+from conoid.client.studies.converged import Book
+from conoid.client.studies.convergence import Done, series
+from conoid.client.studies.quantities import Number, names, of_run
+from conoid.client.studies.richardson import Trend
+from conoid.client.studies.variants import SEEDS, Plan, Point, Variant, chaotic
 
 NODAL, STANDARD = Variant("nodal", 0.9), Variant("standard", 0.9)
 LENGTH, COUNT = Number("length", 0.0, "m", expected=2.0, tolerance=0.1), Number("broken, number", 0.0)
@@ -151,7 +152,7 @@ def test_tables_and_json_have_every_mesh_and_name_what_failed() -> None:
 
 
 def test_the_picture_has_a_panel_a_quantity(tmp_path: Path) -> None:
-    from conoid.client import pareto
+    from conoid.client.studies import pareto
 
     drawn = pareto.figure(book(two_forms()))
     assert [axes.get_title() for axes in drawn.axes] == ["length"]

@@ -8,8 +8,8 @@ from conoid.cases.outcome import Check, Outcome
 from conoid.cases.schema import Case
 from conoid.cases.suite import Hard, drift, faults, is_free, suite
 from conoid.client import cli
+from conoid.client.commands.hard import Verdict, chosen, to_markdown
 from conoid.client.errors import ClientError
-from conoid.client.hard import Verdict, chosen, to_markdown
 
 GOOD = Outcome(state="succeeded", steps=10, elements=6, worst_residual=1e-6)
 

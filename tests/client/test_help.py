@@ -9,7 +9,7 @@ import typer
 from typer.testing import CliRunner
 
 from conoid.client.cli import app
-from conoid.client.helping import EXAMPLES, GROUPS
+from conoid.client.commands.helping import EXAMPLES, GROUPS
 
 ROOT: Any = typer.main.get_command(app)
 NAMES = [name for name in ROOT.commands if not ROOT.commands[name].hidden]

@@ -23,7 +23,9 @@ def python(code: str, *words: str) -> subprocess.CompletedProcess[str]:
 
 def test_the_command_line_and_the_stream_need_no_heavy_package() -> None:
     ended = python(
-        "import conoid.client, conoid.client.stream\nfrom conoid.client.cli import main\nmain()", "validate", "demo"
+        "import conoid.client, conoid.client.remote.stream\nfrom conoid.client.cli import main\nmain()",
+        "validate",
+        "demo",
     )
     assert ended.returncode == 0, ended.stderr
     assert "demo: valid" in ended.stdout

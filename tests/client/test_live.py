@@ -10,10 +10,10 @@ from rich.console import Console
 
 from conoid.cases.messages import AnyMessage, Load, Log
 from conoid.cases.run import State
-from conoid.client import display, silence
+from conoid.client.commands import display, silence
 from conoid.client.errors import UnreachableError
-from conoid.client.link import Link
 from conoid.client.live import Live, exit_code, grouped
+from conoid.client.remote.link import Link
 from conoid.client.watch import show, tell, watch
 
 from . import stories
@@ -79,7 +79,7 @@ def test_exit_codes(state: State, cause: str | None, code: int) -> None:
 
 
 def test_a_run_that_has_not_begun_says_how_long_it_waits(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("conoid.client.display.time.time", lambda: stories.START + 3 + 42)
+    monkeypatch.setattr("conoid.client.commands.display.time.time", lambda: stories.START + 3 + 42)
     assert "starting  42 s" in rendered(told(3))
     assert "running  42 s" not in rendered(told(6))
 

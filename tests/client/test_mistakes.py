@@ -8,14 +8,16 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from conoid.cases import layout, messages
-from conoid.client import cli, http, sweeping
+from conoid.client import cli
 from conoid.client.cli import app
-from conoid.client.config import DEFAULT_URL
+from conoid.client.commands import sweeping
 from conoid.client.errors import ClientError
-from conoid.client.following import FolderRun
-from conoid.client.places import inside
-from conoid.client.session import Session
-from conoid.client.sweep import SweepInfo
+from conoid.client.local.following import FolderRun
+from conoid.client.local.places import inside
+from conoid.client.remote import http
+from conoid.client.remote.config import DEFAULT_URL
+from conoid.client.remote.session import Session
+from conoid.client.sweeps.sweep import SweepInfo
 
 
 def conoid(*words: object) -> Result:

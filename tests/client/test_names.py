@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 from conoid.cases import layout, messages
 from conoid.client.cli import app
 from conoid.client.errors import AnswerError, NotFoundError, UsageError
-from conoid.client.session import Session
+from conoid.client.remote.session import Session
 
 from .hostile import Hostile, hostile, run_info, said
 
@@ -85,7 +85,7 @@ def test_a_server_too_old_for_beginnings_says_what_it_said(server: Hostile) -> N
 
 
 def test_a_list_without_end_is_given_up(server: Hostile, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("conoid.client.session._MOST_PAGES", 5)
+    monkeypatch.setattr("conoid.client.remote.session._MOST_PAGES", 5)
     server.answers["/v1/runs"] = said({"runs": [], "next": "x"})
     server.answers["/v1/sweeps"] = said({"sweeps": [], "next": "x"})
     server.answers["/v1/runs/1kaaa/events"] = said({"events": [], "last": 0, "more": True})

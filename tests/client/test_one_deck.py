@@ -11,11 +11,11 @@ from pydantic import TypeAdapter
 from conoid.cases.bodies import MeshFile
 from conoid.cases.cards import Deck
 from conoid.cases.load import CaseError
-from conoid.client import one_deck
 from conoid.client.decks.importing import read_deck
 from conoid.client.decks.toml import bare
 from conoid.client.errors import UsageError
-from conoid.client.local_files import Hashes, keep_copies, with_hashes
+from conoid.client.local import one_deck
+from conoid.client.local.local_files import Hashes, keep_copies, with_hashes
 from conoid.worker.mesh.read import read
 
 from .deck_texts import abaqus, r20, radioss

@@ -5,7 +5,7 @@ import random
 import pytest
 
 from conoid.cases.messages import AnyMessage, Log
-from conoid.client.order import InOrder
+from conoid.client.remote.order import InOrder
 
 
 def message(seq: int) -> Log:

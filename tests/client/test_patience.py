@@ -9,12 +9,12 @@ import pytest
 from conoid.cases.messages import AnyMessage, Status
 from conoid.cases.run import State
 from conoid.client.errors import ServiceError, UnreachableError
-from conoid.client.http import Http
+from conoid.client.remote.http import Http
+from conoid.client.remote.session import Session
+from conoid.client.remote.stream import follow
+from conoid.client.remote.told import RunInfo
 from conoid.client.run import Run
-from conoid.client.session import Session
-from conoid.client.stream import follow
-from conoid.client.sweep import SweepInfo
-from conoid.client.told import RunInfo
+from conoid.client.sweeps.sweep import SweepInfo
 
 
 class Away(httpx2.BaseTransport):

@@ -11,9 +11,9 @@ from typer.testing import CliRunner
 
 from conoid.cases.messages import AnyMessage, Balance, Groups, Load, to_json
 from conoid.cases.schema import Balance as Spec
-from conoid.client import replay
 from conoid.client.cli import app
 from conoid.client.errors import ClientError
+from conoid.client.studies import replay
 from conoid.worker.parallel import decompose
 from conoid.worker.parallel.comm import SerialComm
 

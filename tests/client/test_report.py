@@ -13,12 +13,13 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from conoid.client import options, replay3d, report, silence
 from conoid.client.cli import app
+from conoid.client.commands import options, silence
 from conoid.client.errors import ClientError, UnfinishedError
+from conoid.client.local.saving import save_text
+from conoid.client.reports import replay3d, report
 from conoid.client.result import Result
-from conoid.client.saving import save_text
-from conoid.server import page
+from conoid.server.answers import page
 
 from .bodies import write_fragments, write_history, write_run
 

@@ -5,8 +5,8 @@ import math
 import pytest
 from scipy import stats
 
-from conoid.client.richardson import Trend, extrapolated, fitted, grid_convergence_index, limit, observed_order
-from conoid.client.scatter import Sample, differ, perturbations, runs_needed, student
+from conoid.client.studies.richardson import Trend, extrapolated, fitted, grid_convergence_index, limit, observed_order
+from conoid.client.studies.scatter import Sample, differ, perturbations, runs_needed, student
 
 
 def made(sizes: list[float], order: float, exact: float = 3.0, slope: float = 0.7) -> list[float]:

@@ -10,11 +10,12 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from conoid.cases.outcome import Outcome
-from conoid.client import benches, cli
-from conoid.client.chart import speed_up
-from conoid.client.projection import Projection, bandwidth, project
-from conoid.client.scaling import Trial, trials
-from conoid.client.study import from_json, to_json, to_markdown
+from conoid.client import cli
+from conoid.client.commands import benches
+from conoid.client.studies.chart import speed_up
+from conoid.client.studies.projection import Projection, bandwidth, project
+from conoid.client.studies.scaling import Trial, trials
+from conoid.client.studies.study import from_json, to_json, to_markdown
 
 from .studies import SLOW, by_tasks, load, one_rank, study, two_ranks, two_threads
 

@@ -13,12 +13,12 @@ from typer.testing import CliRunner
 from conoid.cases import layout
 from conoid.cases.files import Named
 from conoid.cases.load import CaseError
-from conoid.client import sending
 from conoid.client.cli import app
 from conoid.client.errors import ClientError, ServiceError
-from conoid.client.local import LocalServer
-from conoid.client.local_files import Hashes, LocalFile, state_of
-from conoid.client.session import Session
+from conoid.client.local.local import LocalServer
+from conoid.client.local.local_files import Hashes, LocalFile, state_of
+from conoid.client.remote import sending
+from conoid.client.remote.session import Session
 
 from .line import line_to
 

@@ -7,9 +7,9 @@ import pytest
 from conoid.cases.problems import CaseError
 from conoid.cases.run import State
 from conoid.client.errors import NotFoundError, ServiceError, UnfinishedError
-from conoid.client.local import LocalServer
-from conoid.client.session import Session
-from conoid.client.stream import SseLink, ZenohLink
+from conoid.client.local.local import LocalServer
+from conoid.client.remote.session import Session
+from conoid.client.remote.stream import SseLink, ZenohLink
 
 from .fakes import case_file
 

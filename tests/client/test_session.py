@@ -13,13 +13,13 @@ import pytest
 
 from conoid.cases.load import CaseError
 from conoid.cases.problems import ConoidError
-from conoid.client.config import DEFAULT_URL, target
 from conoid.client.errors import AnswerError, ClientError, NotFoundError, ServiceError, UnreachableError, UsageError
-from conoid.client.places import inside
+from conoid.client.local.places import inside
+from conoid.client.remote.config import DEFAULT_URL, target
+from conoid.client.remote.session import Session
+from conoid.client.remote.submission import body_of
 from conoid.client.result import Result
 from conoid.client.run import Run
-from conoid.client.session import Session
-from conoid.client.submission import body_of
 
 Answer = Callable[[httpx2.Request], httpx2.Response]
 RECEIPT = {"id": "r1", "owner": "ann", "name": "bar", "state": "accepted", "ranks": 1, "submitted": 1.0}
@@ -35,7 +35,7 @@ def problem(status: int, **body: Any) -> Answer:
 
 @pytest.fixture(autouse=True)
 def _no_pauses(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("conoid.client.http.time.sleep", lambda _: None)
+    monkeypatch.setattr("conoid.client.remote.http.time.sleep", lambda _: None)
 
 
 def test_a_damaged_file_of_a_server_is_named_by_its_run() -> None:
@@ -337,7 +337,7 @@ def test_a_file_that_is_not_as_large_as_it_is_listed_is_refused(tmp_path: Path) 
 def test_a_server_that_hangs_is_asked_once(seconds: float, times: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """It took 93 s until a server that never answers was given up."""
     asked, clock = [0], [0.0]
-    monkeypatch.setattr("conoid.client.http.time.monotonic", lambda: clock[0])
+    monkeypatch.setattr("conoid.client.remote.http.time.monotonic", lambda: clock[0])
 
     def answer(_: httpx2.Request) -> httpx2.Response:
         asked[0] += 1

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from conoid.client.errors import ClientError, ServiceError, UnfinishedError
-from conoid.client.local import LocalServer
-from conoid.client.session import Session
+from conoid.client.local.local import LocalServer
+from conoid.client.remote.session import Session
+from conoid.client.remote.stream import SseLink, ZenohLink
 from conoid.client.snapshots import read
-from conoid.client.stream import SseLink, ZenohLink
 
 from .fakes import case_file
 

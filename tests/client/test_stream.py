@@ -9,11 +9,11 @@ import pytest
 
 from conoid.cases import keys
 from conoid.cases.messages import AnyMessage, Log
-from conoid.client import stream
 from conoid.client.errors import AnswerError, UnreachableError
-from conoid.client.http import Router
-from conoid.client.link import Link
-from conoid.client.stream import SseLink, StreamError, ZenohLink, follow
+from conoid.client.remote import stream
+from conoid.client.remote.http import Router
+from conoid.client.remote.link import Link
+from conoid.client.remote.stream import SseLink, StreamError, ZenohLink, follow
 
 from . import stories
 from .fakes import OWNER, Broker, free_port
@@ -159,7 +159,7 @@ def test_sse_tells_the_same_and_its_break_is_bridged_by_the_journal() -> None:
 
 
 def test_a_server_that_restarts_is_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("conoid.client.stream.time.sleep", lambda _: None)
+    monkeypatch.setattr("conoid.client.remote.stream.time.sleep", lambda _: None)
     journal = Journal()
     journal.lines = stories.whole()
     failures = iter([True, True, False])

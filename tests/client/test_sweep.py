@@ -7,10 +7,11 @@ import pytest
 
 from conoid.cases.load import CaseError
 from conoid.cases.run import State
-from conoid.client import sweeping, swept
+from conoid.client.commands import sweeping
 from conoid.client.errors import ClientError
-from conoid.client.sweep import SweepPoint, listed, points_along, points_in, points_of
-from conoid.client.told import RunInfo
+from conoid.client.remote.told import RunInfo
+from conoid.client.sweeps import swept
+from conoid.client.sweeps.sweep import SweepPoint, listed, points_along, points_in, points_of
 
 
 def test_keys_go_together_or_each_with_each() -> None:

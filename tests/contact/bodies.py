@@ -10,13 +10,13 @@ import numpy as np
 import numpy.typing as npt
 
 from conoid.cases import schema
-from conoid.worker import assembly, domain
 from conoid.worker.contact import surface
 from conoid.worker.contact.records import CrackSides, Crowd
 from conoid.worker.contact.surface import Surface
 from conoid.worker.mesh.model import TetMesh
+from conoid.worker.model.state import Model
 from conoid.worker.parallel.comm import Comm, SerialComm
-from conoid.worker.state import Model
+from conoid.worker.scene import assembly, domain
 
 from ..worker.kernels import DUMMY, scene
 

@@ -11,11 +11,12 @@ import pytest
 
 from conoid.cases import schema
 from conoid.cases.messages import Energy
-from conoid.worker import assembly, simulation, step
-from conoid.worker.digest import digest
+from conoid.worker import simulation, step
+from conoid.worker.accounts.digest import digest
 from conoid.worker.errors import InputError
 from conoid.worker.mesh.model import TetMesh
 from conoid.worker.parallel.comm import Comm, SerialComm
+from conoid.worker.scene import assembly
 from conoid.worker.simulation import Simulation
 
 from ..worker.kernels import Watch, build, run

@@ -5,8 +5,8 @@ import pytest
 
 from conoid.worker.contact.common_volume import CommonVolume, intersection, measure
 from conoid.worker.mesh.model import TetMesh
+from conoid.worker.model.state import Floats
 from conoid.worker.simulation import Simulation
-from conoid.worker.state import Floats
 
 from ..worker.kernels import build
 from ..worker.meshes import block

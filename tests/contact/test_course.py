@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from conoid.worker.contact.course import courses
+from conoid.worker.model.state import Block, Floats, Nodes
 from conoid.worker.parallel.comm import SerialComm
-from conoid.worker.state import Block, Floats, Nodes
 
 TET = np.array([[0.0, 0.0, 0.0], [1.1, 0.1, 0.0], [0.2, 0.9, 0.1], [0.1, 0.2, 1.2]]) * 1e-3
 QUANTUM = 2.0**-16

@@ -8,8 +8,8 @@ from conoid.worker.contact.families import Families
 from conoid.worker.contact.kin import Family, apart_from_edges, families, inherited
 from conoid.worker.contact.node_face import chain
 from conoid.worker.migration.parcel import joined, once
-from conoid.worker.state import Copies, Nodes
-from conoid.worker.topology import Split
+from conoid.worker.model.state import Copies, Nodes
+from conoid.worker.model.topology import Split
 
 
 def cracks_of(n: int) -> Cracks:

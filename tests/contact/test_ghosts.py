@@ -8,10 +8,10 @@ import pytest
 
 from conoid.worker.contact import ghosts
 from conoid.worker.contact.records import Crowd, Edges, Faces, merged
+from conoid.worker.model.state import Flags, Model
 from conoid.worker.parallel.comm import SerialComm
 from conoid.worker.parallel.ownership import Neighbour
 from conoid.worker.parallel.tags import Tag
-from conoid.worker.state import Flags, Model
 
 from ..worker.meshes import block
 from .bodies import crowd_of, meeting_of, moved, pieces_of

@@ -7,10 +7,10 @@ import pytest
 
 from conoid.cases.load import parse_case, read_data
 from conoid.worker import simulation, step
+from conoid.worker.accounts.digest import digest
 from conoid.worker.contact.narrow_phase import ContactRows, EdgeTable, FaceTable, Pairs, SlotTable, Step
 from conoid.worker.contact.pairs import PairTable
 from conoid.worker.contact.tracks import Lines, Tracks
-from conoid.worker.digest import digest
 from conoid.worker.parallel.comm import SerialComm
 
 from ..worker.meshes import Floats

@@ -17,8 +17,8 @@ from conoid.worker.contact.narrow_phase import DEEP, DEEP_SELF
 from conoid.worker.contact.records import OPEN, Edges, Faces
 from conoid.worker.contact.scene import Scene
 from conoid.worker.contact.sides import Rules, Sides
+from conoid.worker.model.state import Ints
 from conoid.worker.parallel.comm import SerialComm
-from conoid.worker.state import Ints
 
 from ..worker.meshes import Floats
 from .bodies import Flags, Indices, crowd_of, rotation

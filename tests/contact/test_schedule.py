@@ -9,8 +9,8 @@ import pytest
 
 from conoid.cases.load import apply_overrides, parse_case, read_data
 from conoid.worker import simulation, step
+from conoid.worker.accounts.digest import digest
 from conoid.worker.contact import bare, cracks, flight, searches
-from conoid.worker.digest import digest
 from conoid.worker.parallel.comm import Comm, SerialComm
 from conoid.worker.simulation import Simulation
 

@@ -10,7 +10,7 @@ from conoid.worker.contact.records import Edges
 from conoid.worker.contact.surface import Surface
 from conoid.worker.mesh.faces import FACES, across
 from conoid.worker.mesh.model import TetMesh
-from conoid.worker.state import Model
+from conoid.worker.model.state import Model
 
 from ..worker.meshes import Floats, block, positive
 from .bodies import meeting_of, moved, pieces_of, rotation, surface_of

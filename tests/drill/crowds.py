@@ -22,11 +22,11 @@ import httpx2
 from conoid.cases import layout
 from conoid.cases.messages import Log, Status, to_json
 from conoid.cases.run import State
-from conoid.server import folder
-from conoid.server.folder import Submission
+from conoid.server.database.store import Store
+from conoid.server.requests.tokens import create_token
+from conoid.server.runs import folder
+from conoid.server.runs.folder import Submission
 from conoid.server.settings import Settings
-from conoid.server.store import Store
-from conoid.server.tokens import create_token
 
 from ..server.spoken import told, write
 from .attacker import KINDS

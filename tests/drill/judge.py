@@ -5,8 +5,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from conoid.cases import layout
-from conoid.server import folder, journal
 from conoid.server.launch import processes
+from conoid.server.runs import folder, journal
 
 from .situations import Truth
 from .stand import FINAL, Stand

@@ -17,10 +17,10 @@ from typing import Any
 import httpx2
 
 from conoid.cases.run import State
+from conoid.server.database.store import Store
 from conoid.server.launch import processes
+from conoid.server.requests.tokens import create_token
 from conoid.server.settings import Settings
-from conoid.server.store import Store
-from conoid.server.tokens import create_token
 
 from ..server.running import TOML, case_text
 

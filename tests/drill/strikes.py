@@ -345,7 +345,7 @@ def reader_gets(stand: Stand, number: signal.Signals) -> None:
     assert stand.child is not None
     for entry in Path("/proc").iterdir():
         with suppress(OSError):
-            mine = entry.name.isdigit() and b"conoid.server.reading" in (entry / "cmdline").read_bytes()
+            mine = entry.name.isdigit() and b"conoid.server.intake.reading" in (entry / "cmdline").read_bytes()
             if mine and processes.parent(int(entry.name)) == stand.child.pid:
                 os.kill(int(entry.name), number)
 

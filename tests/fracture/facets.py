@@ -4,7 +4,7 @@ import numpy as np
 
 from conoid.worker.mesh.faces import FACES, across
 from conoid.worker.mesh.model import TetMesh
-from conoid.worker.state import Ints
+from conoid.worker.model.state import Ints
 
 
 def inner(mesh: TetMesh) -> Ints:

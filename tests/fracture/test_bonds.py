@@ -7,7 +7,8 @@ from unittest.mock import patch
 import numpy as np
 import pytest
 
-from conoid.worker import digest, step
+from conoid.worker import step
+from conoid.worker.accounts import digest
 from conoid.worker.simulation import Simulation
 
 from ..worker.joints import bar, joint

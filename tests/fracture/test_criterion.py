@@ -8,15 +8,16 @@ import pytest
 from scipy import stats
 
 from conoid.cases import materials, schema
-from conoid.worker import state, step
+from conoid.worker import step
 from conoid.worker.elements import hot, tet4
 from conoid.worker.fracture import criterion
 from conoid.worker.fracture.facets import facet_ids
 from conoid.worker.fracture.strength import Toughness, toughness
 from conoid.worker.fracture.strength import required as required_traction
 from conoid.worker.mesh.faces import FACES
+from conoid.worker.model import state
+from conoid.worker.model.state import CHUNK, MASS, PRESSURE, S_XX, S_XY, VISCOUS, Floats, Ints
 from conoid.worker.simulation import Simulation
-from conoid.worker.state import CHUNK, MASS, PRESSURE, S_XX, S_XY, VISCOUS, Floats, Ints
 
 from ..contact.bodies import meeting_of
 from ..worker.formulas import at_nodes

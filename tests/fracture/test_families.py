@@ -10,12 +10,13 @@ import numpy as np
 import pytest
 
 from conoid.cases import materials, schema
-from conoid.worker import state, step
+from conoid.worker import step
 from conoid.worker.fracture.strength import Toughness
 from conoid.worker.mesh.model import TetMesh
+from conoid.worker.model import state
+from conoid.worker.model.state import Floats, Ints
 from conoid.worker.parallel.fixed_point import exact_sums
 from conoid.worker.simulation import Simulation
-from conoid.worker.state import Floats, Ints
 
 from ..contact.bodies import meeting_of
 from ..worker.kernels import build

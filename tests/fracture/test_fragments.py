@@ -16,8 +16,8 @@ from scipy.sparse.csgraph import connected_components
 from conoid.cases import fragments as tables
 from conoid.worker.fracture import connectivity, fragments, numbers
 from conoid.worker.mesh.faces import FACES, across
+from conoid.worker.model.state import MASS, Block, Model, Nodes, chunked
 from conoid.worker.parallel.comm import Comm, SerialComm
-from conoid.worker.state import MASS, Block, Model, Nodes, chunked
 
 from ..contact.ranks import on_ranks
 from ..worker.meshes import block

@@ -14,9 +14,9 @@ import pytest
 from conoid.worker.fracture.cohesive import Cohesion
 from conoid.worker.fracture.columns import Facets
 from conoid.worker.fracture.insertion import inserted
+from conoid.worker.model.state import Nodes
 from conoid.worker.parallel.comm import SerialComm
 from conoid.worker.parallel.fixed_point import exact_sums
-from conoid.worker.state import Nodes
 
 Floats = npt.NDArray[np.float64]
 

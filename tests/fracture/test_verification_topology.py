@@ -9,9 +9,9 @@ import pytest
 from conoid.cases import load
 from conoid.worker import simulation
 from conoid.worker.mesh.faces import FACES, across
+from conoid.worker.model.state import INTACT, MASS, Ints
 from conoid.worker.parallel.comm import SerialComm
 from conoid.worker.simulation import Simulation
-from conoid.worker.state import INTACT, MASS, Ints
 
 from ..worker.kernels import run
 from ..worker.meshes import Floats

@@ -2,7 +2,7 @@
 
 import pytest
 
-from conoid.worker.kernels import cache_folder
+from conoid.worker.kernels.store import cache_folder
 
 
 @pytest.fixture(autouse=True, scope="package")

@@ -9,11 +9,11 @@ import pytest
 from conoid.cases.bodies import Shards, TwoTets
 from conoid.cases.geometry import bounds, pitch, surface, volume
 from conoid.cases.mesh_size import mesh_size
-from conoid.worker.hashing import uniform
 from conoid.worker.mesh.faces import areas, boundary_faces, normals
 from conoid.worker.mesh.loose import rotations
 from conoid.worker.mesh.model import REGULAR_STEP, Floats, TetMesh, check
 from conoid.worker.mesh.structured import structured
+from conoid.worker.model.hashing import uniform
 
 from .quality import face_counts, quality
 

@@ -11,10 +11,10 @@ from conoid.cases.geometry import volume
 from conoid.cases.load import parse_case
 from conoid.cases.problems import CaseError
 from conoid.cases.schema import Case
-from conoid.worker.assembly import Whole, assemble
 from conoid.worker.errors import InputError, MeshError
 from conoid.worker.mesh.faces import FACES, across, areas
-from conoid.worker.survey import surveyed
+from conoid.worker.scene.assembly import Whole, assemble
+from conoid.worker.scene.survey import surveyed
 
 from .cad_files import written
 

@@ -3,13 +3,13 @@
 import itertools
 import sys
 
-from conoid.worker import kernels
+from conoid.worker.kernels import store
 
 if __name__ == "__main__":
-    kernels.use_cache()
+    store.use_cache()
     from conoid.worker import step
-    from conoid.worker.main import main
     from conoid.worker.parallel.mpi import connect
+    from conoid.worker.run.main import main
     from conoid.worker.simulation import Simulation
 
     whole, calls = step.second_half, itertools.count(1)

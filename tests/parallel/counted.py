@@ -1,6 +1,6 @@
 """A kernel of tasks that can be checked: it counts what it goes over."""
 
-from conoid.worker.jit import njit, types
+from conoid.worker.kernels.jit import njit, types
 from conoid.worker.parallel.arguments import reader
 from conoid.worker.parallel.team import TASK
 

@@ -7,7 +7,7 @@ import json
 import sys
 from pathlib import Path
 
-from conoid.worker.main import main
+from conoid.worker.run.main import main
 
 if __name__ == "__main__":
     codes = [main(arguments) for arguments in json.loads(Path(sys.argv[1]).read_text(encoding="utf-8"))]

@@ -2,13 +2,13 @@
 
 import sys
 
-from conoid.worker import kernels
+from conoid.worker.kernels import store
 
 if __name__ == "__main__":
-    kernels.use_cache()
-    from conoid.worker.loop import Loop
-    from conoid.worker.main import main
+    store.use_cache()
     from conoid.worker.parallel.mpi import leave
+    from conoid.worker.run.loop import Loop
+    from conoid.worker.run.main import main
 
     last, attend = int(sys.argv[1]), Loop._attend
 

@@ -90,5 +90,7 @@ def test_a_processor_without_wide_vectors_and_fused_products_has_the_same(
         "CONOID_CACHE_DIR": str(tmp_path / "cache"),
     }.items():  # fmt: skip
         monkeypatch.setenv(name, value)
-    subprocess.run([sys.executable, "-m", "conoid.worker.compile"], check=True, capture_output=True, timeout=1800)
+    subprocess.run(
+        [sys.executable, "-m", "conoid.worker.kernels.compile"], check=True, capture_output=True, timeout=1800
+    )
     assert ended(tmp_path, 3, 1) == KNOWN

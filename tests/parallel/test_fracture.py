@@ -13,9 +13,9 @@ from conoid.cases import layout
 from conoid.cases.load import parse_case, read_data
 from conoid.cases.outcome import Outcome, from_json
 from conoid.worker import simulation, step
+from conoid.worker.model.topology import Split
 from conoid.worker.parallel.comm import Comm
 from conoid.worker.simulation import Simulation
-from conoid.worker.topology import Split
 
 from ..contact.ranks import on_ranks
 from .scenes import CASE, FAST, SCENES

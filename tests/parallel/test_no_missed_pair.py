@@ -26,9 +26,9 @@ from conoid.worker.contact.records import AGED, OPEN
 from conoid.worker.contact.scene import Scene
 from conoid.worker.contact.search import Things
 from conoid.worker.contact.sides import Sides
+from conoid.worker.model.state import Ints
 from conoid.worker.parallel.comm import Comm, SerialComm
 from conoid.worker.simulation import Simulation
-from conoid.worker.state import Ints
 
 from ..contact.bodies import Flags, Indices
 from ..contact.kernels import edge_table, edges_met, face_table, faces_met, slot_table, taken

@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from conoid.worker import preload
 from conoid.worker.contact import detection, follower, held, kin, tasks
+from conoid.worker.kernels import preload
 
 from .launching import command, ended
 

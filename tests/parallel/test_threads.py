@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from conoid.worker import main
 from conoid.worker.elements.colours import coloured
-from conoid.worker.jit import njit, several, types
+from conoid.worker.kernels.jit import njit, several, types
 from conoid.worker.mesh.structured import structured
+from conoid.worker.model.state import CHUNK, Block
 from conoid.worker.parallel.arguments import Arguments, reader
 from conoid.worker.parallel.team import TASK, team
-from conoid.worker.state import CHUNK, Block
+from conoid.worker.run import main
 from tests.bench.scene import box
 
 _I1, _F2 = types.int64[::1], types.float64[:, ::1]

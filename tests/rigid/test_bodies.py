@@ -10,7 +10,8 @@ import pytest
 
 from conoid.cases import schema
 from conoid.cases.messages import Energy
-from conoid.worker import digest, step
+from conoid.worker import step
+from conoid.worker.accounts import digest
 from conoid.worker.errors import PhysicsError
 from conoid.worker.mesh.model import TetMesh
 from conoid.worker.simulation import Simulation

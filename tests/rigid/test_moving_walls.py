@@ -9,7 +9,7 @@ import pytest
 from conoid.cases import schema
 from conoid.cases.materials import Elastic, Material
 from conoid.cases.messages import Energy
-from conoid.worker.moving_walls import MovingWalls
+from conoid.worker.boundaries.moving_walls import MovingWalls
 from conoid.worker.simulation import Simulation
 
 from ..worker.kernels import build, run, scene

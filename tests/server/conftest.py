@@ -8,8 +8,8 @@ import pytest
 from starlette.testclient import TestClient
 
 from conoid.server.app import build_app, opened
+from conoid.server.requests.tokens import create_token
 from conoid.server.settings import Caps, Settings
-from conoid.server.tokens import create_token
 
 from .chromium import Browser
 from .node import Ask, asking

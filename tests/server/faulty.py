@@ -15,13 +15,13 @@ from pathlib import Path
 
 from conoid.cases import layout, outcome
 from conoid.cases.messages import Status
-from conoid.server import folder, journal
-from conoid.server.events import Run
-from conoid.server.folder import Process, Submission
+from conoid.server.database.store import Store
 from conoid.server.launch import Exit, Job, LaunchError, Phase, Trace, Worker
+from conoid.server.runs import folder, journal
+from conoid.server.runs.events import Run
+from conoid.server.runs.folder import Process, Submission
+from conoid.server.runs.supervisor import Supervisor
 from conoid.server.settings import Settings
-from conoid.server.store import Store
-from conoid.server.supervisor import Supervisor
 
 
 class CrashError(BaseException):

@@ -15,10 +15,10 @@ from typing import Any
 import httpx2
 
 from conoid.cases.run import State
+from conoid.server.database.store import Store
+from conoid.server.requests.tokens import create_token
 from conoid.server.service import Service
 from conoid.server.settings import Settings
-from conoid.server.store import Store
-from conoid.server.tokens import create_token
 
 FAKE = (sys.executable, str(Path(__file__).with_name("fake_worker.py")))
 PATIENCE = 20.0

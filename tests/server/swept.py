@@ -6,8 +6,8 @@ import tomllib
 from typing import Any
 
 from conoid.cases.run import State
-from conoid.server import folder
-from conoid.server.events import Run
+from conoid.server.runs import folder
+from conoid.server.runs.events import Run
 from conoid.server.service import Service
 
 from .running import PATIENCE, User, case_text

@@ -16,10 +16,10 @@ from typer.testing import CliRunner, Result
 from conoid.cases import batch, layout, whole
 from conoid.cases.files import located
 from conoid.cases.run import Cause, State
-from conoid.client import following
-from conoid.client.batch import slurm_of
 from conoid.client.cli import app
-from conoid.client.following import FolderRun
+from conoid.client.commands.batch import slurm_of
+from conoid.client.local import following
+from conoid.client.local.following import FolderRun
 
 from . import real_slurm
 from .fake_slurm import ACCEPT, commands

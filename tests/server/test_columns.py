@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 
 from conoid.cases import history, layout
-from conoid.server import columns
-from conoid.server.columns import Columns, extremes
+from conoid.server.answers import columns
+from conoid.server.answers.columns import Columns, extremes
 
 from .running import Running
 

@@ -13,12 +13,12 @@ import pytest
 
 from conoid.cases.cores import usable_cores
 from conoid.server.__main__ import main
-from conoid.server.engine import StoreError
+from conoid.server.database.engine import StoreError
+from conoid.server.database.store import Store
 from conoid.server.launch import Access, Job, LaunchError, processes
 from conoid.server.launch.local import binding, environment, find_mpiexec
+from conoid.server.requests.tokens import check_token
 from conoid.server.settings import Settings, SettingsError, loopback
-from conoid.server.store import Store
-from conoid.server.tokens import check_token
 
 from .running import MakeProcess
 

@@ -11,8 +11,8 @@ from sqlalchemy.exc import OperationalError
 
 from conoid.cases import layout
 from conoid.cases.run import State
-from conoid.server import farewell, folder, holds, index
-from conoid.server.events import Run
+from conoid.server.runs import farewell, folder, holds, index
+from conoid.server.runs.events import Run
 
 from .faulty import House, Plan, faults
 from .running import TOML, Running, case_text

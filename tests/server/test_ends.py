@@ -13,10 +13,10 @@ from conoid.cases.messages import AnyMessage, Counts, Progress, Started, Status,
 from conoid.cases.outcome import Outcome, from_json
 from conoid.cases.outcome import to_json as outcome_to_json
 from conoid.cases.run import State
-from conoid.server import ends
-from conoid.server.events import Run, WorkerExited
 from conoid.server.launch import Exit, Phase
-from conoid.server.watch import Watch
+from conoid.server.runs import ends
+from conoid.server.runs.events import Run, WorkerExited
+from conoid.server.runs.watch import Watch
 
 from .fake_worker import progress
 from .running import Running

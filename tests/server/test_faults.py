@@ -14,10 +14,11 @@ import pytest
 
 from conoid.cases import layout
 from conoid.cases.run import State
-from conoid.server import durable, folder, holds
+from conoid.server import durable
 from conoid.server.alone import AloneError, only_one
-from conoid.server.events import Run
 from conoid.server.launch import processes
+from conoid.server.runs import folder, holds
+from conoid.server.runs.events import Run
 
 from .faulty import House
 from .running import PATIENCE, TOML, MakeProcess, Running, User, case_text
@@ -26,7 +27,7 @@ from .running import PATIENCE, TOML, MakeProcess, Running, User, case_text
 @pytest.fixture(autouse=True)
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(holds, "_AGAIN", 0.02)
-    monkeypatch.setattr("conoid.server.supervisor._TIDY", 0.2)
+    monkeypatch.setattr("conoid.server.runs.supervisor._TIDY", 0.2)
 
 
 def full(*_: object) -> None:

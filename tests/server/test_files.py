@@ -14,9 +14,9 @@ from starlette.requests import Request
 from starlette.types import Message
 
 from conoid.cases.run import State
-from conoid.server import stream
-from conoid.server.download import Downloads
-from conoid.server.lanes import Lanes
+from conoid.server.answers import stream
+from conoid.server.answers.download import Downloads
+from conoid.server.requests.lanes import Lanes
 
 from .running import PATIENCE, Running
 

@@ -14,13 +14,13 @@ import pytest
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from conoid.cases.run import State
-from conoid.server import auth, connections
 from conoid.server.app import opened
-from conoid.server.connections import Connection
-from conoid.server.quiet import Quiet
+from conoid.server.requests import auth, connections
+from conoid.server.requests.connections import Connection
+from conoid.server.requests.quiet import Quiet
+from conoid.server.requests.tokens import create_token
 from conoid.server.serve import ADDRESS_FILE, _listening, _Server
 from conoid.server.settings import Settings
-from conoid.server.tokens import create_token
 
 from .running import PATIENCE, User
 
@@ -147,7 +147,7 @@ def test_a_stream_ends_when_it_was_told_to(ann: User, tmp_path: Path) -> None:
 
 def revoke(user: User) -> None:
     """By the operator, in the database."""
-    from conoid.server.store import Store
+    from conoid.server.database.store import Store
 
     store = Store(f"sqlite:///{user.runs / 'server.sqlite'}")
     assert store.revoke(user.name.split("_")[1])

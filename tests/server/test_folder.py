@@ -6,8 +6,8 @@ from pathlib import Path
 from conoid.cases import layout, messages
 from conoid.cases.outcome import Check, Outcome, to_json
 from conoid.cases.run import State
-from conoid.server import folder
-from conoid.server.folder import Submission
+from conoid.server.runs import folder
+from conoid.server.runs.folder import Submission
 
 
 def submission(run: str, now: float) -> Submission:

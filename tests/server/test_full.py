@@ -13,11 +13,12 @@ from typing import Any
 import httpx2
 import pytest
 
-from conoid.server import engine, serve
+from conoid.server import serve
 from conoid.server.__main__ import main
+from conoid.server.database import engine
+from conoid.server.database.store import Store
+from conoid.server.requests.tokens import create_token
 from conoid.server.settings import Settings
-from conoid.server.store import Store
-from conoid.server.tokens import create_token
 
 from .faulty import Plan, faults
 from .running import PATIENCE, TOML, case_text

@@ -11,9 +11,9 @@ from conoid.cases import layout
 from conoid.cases.checkpoints import MANIFEST, SEAL
 from conoid.cases.outcome import Outcome
 from conoid.cases.run import Cause, State
-from conoid.server import restarts
 from conoid.server.errors import ServiceError
-from conoid.server.folder import write_outcome
+from conoid.server.runs import restarts
+from conoid.server.runs.folder import write_outcome
 from conoid.worker.migration.checkpoint import latest
 
 from .checkpointed import made, with_checkpoint, with_checkpoint_in

@@ -14,15 +14,15 @@ from conoid.cases.batch import Job, Profile, Slurm
 from conoid.cases.messages import Status
 from conoid.cases.run import Cause, State
 from conoid.cases.slurm import Entry
-from conoid.server import journal, recovery
-from conoid.server.events import Run
-from conoid.server.folder import Submission, create, new_id
 from conoid.server.launch.arrays import Arrays
 from conoid.server.launch.handed import SlurmWorker
 from conoid.server.launch.slurm import SlurmLauncher
+from conoid.server.runs import journal, recovery
+from conoid.server.runs.events import Run
+from conoid.server.runs.folder import Submission, create, new_id
 from conoid.server.settings import Settings
-from conoid.worker import job as attempt
-from conoid.worker.lock import hold
+from conoid.worker.run import job as attempt
+from conoid.worker.run.lock import hold
 
 from .fake_slurm import ACCEPT, commands
 

@@ -13,8 +13,8 @@ import pytest
 from conoid.cases import layout, messages
 from conoid.cases.run import State
 from conoid.cases.snapshot import Column, Header, pack
-from conoid.server import history
-from conoid.server.history import History
+from conoid.server.answers import history
+from conoid.server.answers.history import History
 
 from .running import Running
 from .spoken import snapshot, told, write

@@ -15,7 +15,7 @@ from typing import Any
 import httpx2
 import pytest
 
-from conoid.server.reading import CPU
+from conoid.server.intake.reading import CPU
 from conoid.server.settings import Caps, Settings
 
 from .hostile import Body, corpus, quadratic
@@ -69,8 +69,8 @@ def test_a_sample_of_hostile_bodies_is_answered(server: Running) -> None:
 def test_what_cannot_be_counted_is_not_accepted(tmp_path_factory: pytest.TempPathFactory, size: str) -> None:
     """Also where the site has set no caps at all."""
     from conoid.cases.load import CaseError
-    from conoid.server import limits
-    from conoid.server.reading import Question, read
+    from conoid.server.intake.reading import Question, read
+    from conoid.server.requests import limits
 
     from .running import case_text
 

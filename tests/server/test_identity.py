@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from conoid.server import identity
 from conoid.server.__main__ import main
-from conoid.server.identity import IdentityError
-from conoid.server.store import Store
+from conoid.server.database import identity
+from conoid.server.database.identity import IdentityError
+from conoid.server.database.store import Store
 
 from .running import MakeProcess
 

@@ -14,8 +14,8 @@ import pytest
 
 from conoid.cases import layout
 from conoid.cases.run import State
-from conoid.server import folder, holds
-from conoid.server.events import CancelAsked, Run
+from conoid.server.runs import folder, holds
+from conoid.server.runs.events import CancelAsked, Run
 
 from .faulty import CrashError, House, Plan, faults, fsync, write
 

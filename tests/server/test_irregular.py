@@ -13,8 +13,8 @@ import pytest
 from conoid.cases import layout, whole
 from conoid.cases.messages import Status
 from conoid.cases.run import State
-from conoid.server import ends, farewell, folder, journal, pins, restarts
-from conoid.server.farewells import Farewells
+from conoid.server.keeping.farewells import Farewells
+from conoid.server.runs import ends, farewell, folder, journal, pins, restarts
 from conoid.worker.output import hdf5, storage
 from conoid.worker.output.journal import Journal
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from conoid.cases.messages import Status, from_json, to_json
-from conoid.server.journal import Tail, append, lines, statuses
+from conoid.server.runs.journal import Tail, append, lines, statuses
 
 
 def status(text: str = "") -> Status:
@@ -80,7 +80,7 @@ def test_no_journal_yet(tmp_path: Path) -> None:
 
 
 def test_reading_from_any_number_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("conoid.server.journal._CHUNK", 400)
+    monkeypatch.setattr("conoid.server.runs.journal._CHUNK", 400)
     path, last = tmp_path / "journal.jsonl", 300
     for seq in range(1, last + 1):
         length = 3000 if seq in {100, 101} else seq % 37

@@ -14,11 +14,12 @@ import pytest
 from conoid.cases.batch import Site
 from conoid.cases.policy import Retention
 from conoid.cases.run import State
-from conoid.server import keeper, pins, present
-from conoid.server.farewells import FILE, Farewells
-from conoid.server.keeper import Keeper
-from conoid.server.present import Present
-from conoid.server.store import Store
+from conoid.server.database.store import Store
+from conoid.server.keeping import keeper
+from conoid.server.keeping.farewells import FILE, Farewells
+from conoid.server.keeping.keeper import Keeper
+from conoid.server.runs import pins, present
+from conoid.server.runs.present import Present
 
 from .running import TOML, Running, User, case_text
 

@@ -12,13 +12,14 @@ from starlette.testclient import TestClient
 
 from conoid.cases.batch import Site
 from conoid.cases.policy import Http
-from conoid.server import durable, readiness, view
+from conoid.server import durable, readiness
+from conoid.server.answers import view
 from conoid.server.app import build_app, opened
-from conoid.server.crowd import Crowd
 from conoid.server.errors import ServiceError
-from conoid.server.lanes import Lanes, asking
+from conoid.server.requests.crowd import Crowd
+from conoid.server.requests.lanes import Lanes, asking
+from conoid.server.requests.tokens import create_token
 from conoid.server.settings import Caps, Settings
-from conoid.server.tokens import create_token
 
 from .running import FAKE, PATIENCE, User
 

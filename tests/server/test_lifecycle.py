@@ -7,7 +7,7 @@ import pytest
 
 from conoid.cases.outcome import Outcome
 from conoid.cases.run import FOLLOWERS, Cause, ExitCode, State
-from conoid.server.events import (
+from conoid.server.runs.events import (
     Admitted,
     Adopt,
     CancelAsked,
@@ -28,7 +28,7 @@ from conoid.server.events import (
     WorkerWaits,
     WriteOutcome,
 )
-from conoid.server.lifecycle import advance
+from conoid.server.runs.lifecycle import advance
 
 RUN = Run("a", "ann", "bar", 2, submitted=1.0)
 DONE = Outcome(state="succeeded", steps=7)

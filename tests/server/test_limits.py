@@ -12,14 +12,15 @@ import sqlalchemy as sa
 from conoid.cases import layout
 from conoid.cases.messages import Log, to_json
 from conoid.cases.run import State
-from conoid.server import digests, folder, series, view
+from conoid.server.answers import digests, series, view
+from conoid.server.answers.chosen import Chosen
 from conoid.server.app import opened
-from conoid.server.chosen import Chosen
-from conoid.server.events import Run
+from conoid.server.database.store import Store
+from conoid.server.queue.usage import Took
 from conoid.server.routes import events
 from conoid.server.routes.cases import _gallery
-from conoid.server.store import Store
-from conoid.server.usage import Took
+from conoid.server.runs import folder
+from conoid.server.runs.events import Run
 
 from .running import TOML, Running, case_text
 

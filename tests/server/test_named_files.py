@@ -10,7 +10,9 @@ import pytest
 
 from conoid.cases import layout, survey
 from conoid.cases.survey import Survey, Surveyed
-from conoid.server import limits, sent, submission, weights
+from conoid.server.intake import sent, submission
+from conoid.server.keeping import weights
+from conoid.server.requests import limits
 from conoid.server.settings import Caps, Settings
 
 from .checkpointed import with_checkpoint
@@ -205,7 +207,7 @@ def test_a_sweep_that_is_being_handed_in_needs_its_files(server: Running, quick:
 
 
 def submission_wish() -> Any:
-    from conoid.server.sweep_wish import Wish
+    from conoid.server.intake.sweep_wish import Wish
 
     return Wish(case=case(), points=[{"parts[0].mesh.sha256": "0" * 64}])
 

@@ -12,7 +12,7 @@ import zenoh
 
 from conoid.cases.batch import Slurm
 from conoid.cases.messages import Log
-from conoid.server.store import Token
+from conoid.server.database.store import Token
 from conoid.server.telemetry import Telemetry
 from conoid.worker.output import telemetry as worker
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from starlette.testclient import TestClient
 
-from conoid.server import page
+from conoid.server.answers import page
 from conoid.server.app import build_app, opened
 from conoid.server.settings import Settings
 

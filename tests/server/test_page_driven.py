@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from conoid.cases import history, layout
-from conoid.client import report
+from conoid.client.reports import report
 from conoid.client.result import Result
 
 from .chromium import Browser, Page, program

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from conoid.cases.flat import Scalar
-from conoid.server import card, rows
+from conoid.server.answers import card, rows
 
 from .node import NODE, Ask
 

@@ -16,9 +16,9 @@ from starlette.testclient import TestClient
 
 from conoid.cases.run import State
 from conoid.server.app import build_app, opened
+from conoid.server.database.store import Store
+from conoid.server.requests.tokens import create_token
 from conoid.server.settings import Caps, Settings
-from conoid.server.store import Store
-from conoid.server.tokens import create_token
 
 from .running import FAKE, User
 

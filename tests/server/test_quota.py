@@ -15,9 +15,9 @@ from conoid.cases.batch import Site, SiteError, read_site
 from conoid.cases.policy import Queue, Quota, RunCaps, Share
 from conoid.cases.run import State
 from conoid.server.app import build_app, opened
+from conoid.server.queue.usage import Took
+from conoid.server.requests.tokens import create_token
 from conoid.server.settings import Caps, Settings, capped
-from conoid.server.tokens import create_token
-from conoid.server.usage import Took
 
 from .running import FAKE, PATIENCE, TOML, Running, User, case_text
 
@@ -64,7 +64,7 @@ def test_too_many_open_runs_are_refused(server: Running, tmp_path: Path) -> None
 
 
 def test_a_run_that_writes_too_much_is_stopped(server: Running, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("conoid.server.watch._WEIGHED", 0.05)
+    monkeypatch.setattr("conoid.server.runs.watch._WEIGHED", 0.05)
     run = server.ann.submit(steps=100_000, pace=0.01)
     server.ann.wait_for(run, State.RUNNING)
     (server.ann.runs / run / "log" / "rank-0.log").write_bytes(b"x" * 300_000)

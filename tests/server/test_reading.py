@@ -13,12 +13,12 @@ from typing import Any
 import msgspec
 import pytest
 
-from conoid.server import reader
 from conoid.server.errors import ServiceError
-from conoid.server.limits import Limits
-from conoid.server.reader import Reader
-from conoid.server.reading import Question
-from conoid.server.submission import Desk
+from conoid.server.intake import reader
+from conoid.server.intake.reader import Reader
+from conoid.server.intake.reading import Question
+from conoid.server.intake.submission import Desk
+from conoid.server.requests.limits import Limits
 
 from .running import PATIENCE, Running, case_text
 from .swept import ENDS, handed_in, wish

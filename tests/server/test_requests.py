@@ -17,13 +17,13 @@ from starlette.testclient import TestClient
 
 from conoid.cases.load import shipped_path
 from conoid.cases.reference import json_schema
-from conoid.server import reference, shapes
+from conoid.server.answers import reference, shapes
 from conoid.server.app import ROUTERS, build_app, opened
-from conoid.server.connections import BODY
 from conoid.server.errors import ServiceError
-from conoid.server.limits import read_body
+from conoid.server.requests.connections import BODY
+from conoid.server.requests.limits import read_body
+from conoid.server.requests.tokens import check_token, create_token
 from conoid.server.settings import Caps, Settings
-from conoid.server.tokens import check_token, create_token
 
 from .running import TOML, Running, case_text
 

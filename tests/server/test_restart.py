@@ -15,7 +15,7 @@ import pytest
 
 from conoid.cases.run import State
 from conoid.server.__main__ import main
-from conoid.server.folder import Submission, create, new_id
+from conoid.server.runs.folder import Submission, create, new_id
 
 from .running import PATIENCE, TOML, MakeProcess, Process, User, case_text, processes
 
@@ -246,7 +246,7 @@ def test_a_server_leaves_nothing_of_its_reader(
     ann = server.user(server.start()["url"])
     ann.wait_for(ann.submit(steps=1))
     assert server.child is not None
-    reader = [pid for pid in children(server.child.pid) if b"conoid.server.reading" in command_of(pid)]
+    reader = [pid for pid in children(server.child.pid) if b"conoid.server.intake.reading" in command_of(pid)]
     assert len(reader) == 1
     assert not list(passing.iterdir())
     server.end(signal.SIGKILL)

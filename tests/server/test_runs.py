@@ -167,7 +167,7 @@ def test_wall_time(server: Running) -> None:
 
 
 def test_a_finished_worker_whose_launcher_hangs(server: Running, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("conoid.server.watch._FAREWELL", 0.2)
+    monkeypatch.setattr("conoid.server.runs.watch._FAREWELL", 0.2)
     run = server.ann.submit(end="hang")
     assert server.ann.wait_for(run)["state"] == "succeeded"
 
@@ -207,7 +207,7 @@ def test_wait_with_a_known_etag_answers_when_anything_changes(server: Running, t
 
 
 def test_a_full_disk_delays_and_loses_nothing(server: Running, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    from conoid.server import holds, journal
+    from conoid.server.runs import holds, journal
 
     run = server.ann.submit(wait=str(tmp_path / "go"))
     server.ann.wait_for(run, State.RUNNING)

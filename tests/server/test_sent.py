@@ -15,8 +15,8 @@ import pytest
 
 from conoid.cases.batch import Site
 from conoid.cases.policy import Files
-from conoid.server import receiving, sent
-from conoid.server.sent import Part, SentFiles
+from conoid.server.intake import receiving, sent
+from conoid.server.intake.sent import Part, SentFiles
 from conoid.server.settings import Settings
 
 from .faulty import Plan, faults

@@ -15,7 +15,7 @@ from conoid.cases import layout
 from conoid.cases.messages import AnyMessage, Finished, Progress
 from conoid.cases.run import State
 from conoid.client import connect
-from conoid.client.link import Link
+from conoid.client.remote.link import Link
 from conoid.server.settings import WORKER
 
 from ..parallel.launching import command, ended

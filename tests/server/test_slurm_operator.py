@@ -85,7 +85,9 @@ def test_a_task_that_is_cancelled_by_hand_while_it_waits_is_cancelled(site: Site
 
 def script_of(run: str) -> list[int]:
     """The process that the script of the run's job has become."""
-    found = subprocess.run(["pgrep", "-f", f"conoid.worker.job .*{run}"], capture_output=True, text=True, check=True)
+    found = subprocess.run(
+        ["pgrep", "-f", f"conoid.worker.run.job .*{run}"], capture_output=True, text=True, check=True
+    )
     return [int(pid) for pid in found.stdout.split()]
 
 

@@ -11,10 +11,10 @@ import pytest
 from sqlalchemy.exc import SQLAlchemyError
 
 from conoid.cases.run import Cause, State
-from conoid.server.events import Broken, Kill, Run
+from conoid.server.database.store import Store
 from conoid.server.launch import memory
-from conoid.server.lifecycle import advance
-from conoid.server.store import Store
+from conoid.server.runs.events import Broken, Kill, Run
+from conoid.server.runs.lifecycle import advance
 from conoid.server.telemetry import TelemetryError, _read_secret
 
 

@@ -21,14 +21,17 @@ from starlette.testclient import TestClient
 
 from conoid.cases.problems import CaseError
 from conoid.cases.run import State
-from conoid.client.sweep import SweepInfo
-from conoid.server import folder, limits, reader, view
+from conoid.client.sweeps.sweep import SweepInfo
+from conoid.server.answers import view
 from conoid.server.app import build_app, opened
 from conoid.server.errors import ServiceError
+from conoid.server.intake import reader
+from conoid.server.intake.submission import Desk
+from conoid.server.intake.sweeps import Sweeps
+from conoid.server.requests import limits
+from conoid.server.requests.tokens import create_token
+from conoid.server.runs import folder
 from conoid.server.settings import Caps, Settings
-from conoid.server.submission import Desk
-from conoid.server.sweeps import Sweeps
-from conoid.server.tokens import create_token
 
 from .running import Running, User, case_text
 from .swept import ENDS, Killed, Never, after, handed_in, wish
@@ -141,7 +144,7 @@ def test_a_damaged_file_harms_no_other_sweep(server: Running) -> None:
 
 
 def test_the_same_from_python(server: Running, tmp_path: Path) -> None:
-    from conoid.client.session import Session
+    from conoid.client.remote.session import Session
 
     with Session("http://127.0.0.1") as session:
         session._http.close()
@@ -157,7 +160,7 @@ def test_the_same_from_python(server: Running, tmp_path: Path) -> None:
 
 
 def test_a_number_that_is_none_is_named(server: Running) -> None:
-    from conoid.client.session import Session
+    from conoid.client.remote.session import Session
 
     with Session("http://127.0.0.1") as session:
         session._http.close()

@@ -9,12 +9,12 @@ from typing import Any
 import pytest
 
 from conoid.cases.run import State
-from conoid.server import limits
 from conoid.server.app import opened
 from conoid.server.errors import ServiceError
+from conoid.server.intake.submission import Desk
+from conoid.server.intake.sweeps import Sweeps
+from conoid.server.requests import limits
 from conoid.server.settings import Settings
-from conoid.server.submission import Desk
-from conoid.server.sweeps import Sweeps
 
 from .running import Running, User, case_text
 from .swept import ENDS, Killed, Never, after, handed_in, wish

@@ -12,10 +12,11 @@ import pytest
 
 from conoid.cases import layout, outcome
 from conoid.cases.run import State
-from conoid.server import card, cards, folder, rows
-from conoid.server.chosen import Chosen
-from conoid.server.events import Run
-from conoid.server.store import Store
+from conoid.server.answers import card, cards, rows
+from conoid.server.answers.chosen import Chosen
+from conoid.server.database.store import Store
+from conoid.server.runs import folder
+from conoid.server.runs.events import Run
 
 from .running import TOML, Running, User, case_text
 from .swept import handed_in, wish

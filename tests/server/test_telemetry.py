@@ -13,7 +13,7 @@ import pytest
 import zenoh
 
 from conoid.cases.messages import from_msgpack
-from conoid.server.store import Token
+from conoid.server.database.store import Token
 from conoid.server.telemetry import Telemetry, TelemetryError
 
 from .running import PATIENCE, MakeProcess

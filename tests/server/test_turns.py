@@ -8,11 +8,11 @@ import pytest
 from starlette.types import Message, Receive, Scope, Send
 
 from conoid.server.app import opened
-from conoid.server.door import ALIVE, Door
+from conoid.server.requests.door import ALIVE, Door
+from conoid.server.requests.tokens import create_token
+from conoid.server.requests.turns import Turns
 from conoid.server.service import Service
 from conoid.server.settings import Settings
-from conoid.server.tokens import create_token
-from conoid.server.turns import Turns
 
 CROWD = 30
 

@@ -13,7 +13,7 @@ from pathlib import Path
 import httpx2
 import pytest
 
-from conoid.worker.kernels import cache_folder
+from conoid.worker.kernels.store import cache_folder
 
 from . import sandbox, syscalls
 from .running import START, TOML, case_text

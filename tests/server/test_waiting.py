@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import pytest
 
 from conoid.cases.policy import Share
-from conoid.server.folder import Submission
-from conoid.server.usage import Took, Usage
-from conoid.server.waiting import Busy, Need, Room, ordered, plan
-from conoid.server.waitlist import need_of
+from conoid.server.queue.usage import Took, Usage
+from conoid.server.queue.waiting import Busy, Need, Room, ordered, plan
+from conoid.server.queue.waitlist import need_of
+from conoid.server.runs.folder import Submission
 
 NOW = 1000.0
 

@@ -12,8 +12,8 @@ from typing import Any
 
 import httpx2
 
-from conoid.server.store import Store
-from conoid.server.tokens import create_token
+from conoid.server.database.store import Store
+from conoid.server.requests.tokens import create_token
 
 from .chromium import Page
 

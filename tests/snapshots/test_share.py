@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from conoid.worker.model.state import CHUNK, DAMAGE, Block, Model, Nodes
 from conoid.worker.snapshots.share import copied
-from conoid.worker.state import CHUNK, DAMAGE, Block, Model, Nodes
 
 
 def model_of(rows: int) -> Model:

@@ -11,9 +11,10 @@ from conoid.cases import materials
 from conoid.cases.library import library
 from conoid.cases.load import apply_overrides, parse_case, read_data, shipped
 from conoid.cases.schema import Case
-from conoid.worker import simulation, state, step
+from conoid.worker import simulation, step
 from conoid.worker.contact import common_volume
 from conoid.worker.mesh.model import TetMesh
+from conoid.worker.model import state
 from conoid.worker.parallel.comm import SerialComm
 from conoid.worker.simulation import Simulation
 

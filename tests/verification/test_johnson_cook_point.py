@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from conoid.cases.materials import JohnsonCook
-from conoid.worker.state import PLASTIC_STRAIN, TEMPERATURE
+from conoid.worker.model.state import PLASTIC_STRAIN, TEMPERATURE
 
 from ..worker import formulas
 from ..worker.kernels import STEEL_42CRMO4, drive

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from conoid.cases import materials
-from conoid.worker.drivers import Course, PrescribedVelocity
+from conoid.worker.boundaries.drivers import Course, PrescribedVelocity
 from conoid.worker.mesh.model import TetMesh
+from conoid.worker.model.state import Indices, Nodes
 from conoid.worker.simulation import Simulation
-from conoid.worker.state import Indices, Nodes
 
 from ..worker.kernels import FORMS, Floats, Form, build, run, scene
 from ..worker.meshes import block

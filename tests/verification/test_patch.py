@@ -12,9 +12,9 @@ from scipy.optimize import brentq
 
 from conoid.cases import load
 from conoid.worker import simulation
+from conoid.worker.model.state import PRESSURE, S_ZZ
 from conoid.worker.parallel.comm import SerialComm
 from conoid.worker.simulation import Simulation
-from conoid.worker.state import PRESSURE, S_ZZ
 
 from ..worker import formulas
 from ..worker.kernels import run

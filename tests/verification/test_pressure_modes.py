@@ -9,8 +9,8 @@ import pytest
 from conoid.cases import bodies, materials
 from conoid.worker.mesh.build import build as build_mesh
 from conoid.worker.mesh.structured import structured
+from conoid.worker.model.state import PLASTIC_STRAIN, PRESSURE, S_XX, S_XY
 from conoid.worker.simulation import Simulation
-from conoid.worker.state import PLASTIC_STRAIN, PRESSURE, S_XX, S_XY
 
 from ..worker import formulas
 from ..worker.kernels import COPPER, FORMS, Form, build, run, scene

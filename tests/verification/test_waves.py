@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
+from conoid.worker.model.state import WORK
 from conoid.worker.simulation import Simulation
-from conoid.worker.state import WORK
 
 from ..worker.kernels import FORMS, STEEL, Form, build, run, scene
 from ..worker.meshes import Floats, block

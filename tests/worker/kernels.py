@@ -13,12 +13,14 @@ import numpy as np
 import numpy.typing as npt
 
 from conoid.cases import bodies, materials, schema
-from conoid.worker import assembly, domain, simulation, state, step
-from conoid.worker.boundaries import Boundary
+from conoid.worker import simulation, step
+from conoid.worker.boundaries.boundaries import Boundary
 from conoid.worker.materials import law
 from conoid.worker.mesh.model import TetMesh
+from conoid.worker.model import state
 from conoid.worker.parallel import fixed_point
 from conoid.worker.parallel.comm import SerialComm
+from conoid.worker.scene import assembly, domain
 from conoid.worker.simulation import Simulation
 
 from . import formulas

@@ -8,13 +8,14 @@ from unittest.mock import patch
 import numpy as np
 
 from conoid.cases import schema
-from conoid.worker import assembly, simulation, step
+from conoid.worker import simulation, step
+from conoid.worker.accounts.timers import Timers
 from conoid.worker.mesh.model import TetMesh
 from conoid.worker.migration import checkpoint
 from conoid.worker.migration.route import route
 from conoid.worker.parallel.team import team
+from conoid.worker.scene import assembly
 from conoid.worker.simulation import Simulation
-from conoid.worker.timers import Timers
 
 from ..contact.ranks import on_ranks
 

@@ -10,8 +10,8 @@ from conoid.cases import schema
 from conoid.cases.bodies import Box
 from conoid.worker import simulation
 from conoid.worker.elements.barrier import SQUEEZED, STIFF
+from conoid.worker.model.state import PRESSURE, VISCOUS, WORK
 from conoid.worker.parallel.comm import SerialComm
-from conoid.worker.state import PRESSURE, VISCOUS, WORK
 
 from . import formulas
 from .kernels import HARD, STEEL, Floats, Patch, run

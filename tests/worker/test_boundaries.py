@@ -9,14 +9,15 @@ import pytest
 
 from conoid.cases import materials, schema
 from conoid.cases.load import parse_case
-from conoid.worker import domain, simulation, step
-from conoid.worker.drivers import Traction
+from conoid.worker import simulation, step
+from conoid.worker.boundaries.drivers import Traction
+from conoid.worker.boundaries.walls import RigidWalls
 from conoid.worker.errors import InputError
 from conoid.worker.mesh.faces import boundary_faces
+from conoid.worker.model.state import PRESSURE, S_ZZ, WORK, Flags, Load
 from conoid.worker.parallel.comm import SerialComm
+from conoid.worker.scene import domain
 from conoid.worker.simulation import Simulation
-from conoid.worker.state import PRESSURE, S_ZZ, WORK, Flags, Load
-from conoid.worker.walls import RigidWalls
 
 from ..contact.bodies import meeting_of, moved
 from .kernels import COPPER, FORMS, STEEL, Form, Watch, around, build, run, scene, whole_of

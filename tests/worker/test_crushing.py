@@ -9,9 +9,9 @@ from conoid.cases import materials, schema
 from conoid.cases.compression import borne, griffith
 from conoid.cases.outcome import Compressed
 from conoid.worker import step
-from conoid.worker.crushing import crushed, hardest, principal
+from conoid.worker.elements.crushing import crushed, hardest, principal
+from conoid.worker.model.state import CHUNK, PRESSURE, S_XX, S_XY, S_YY, S_YZ, S_ZX, S_ZZ
 from conoid.worker.simulation import Simulation
-from conoid.worker.state import CHUNK, PRESSURE, S_XX, S_XY, S_YY, S_YZ, S_ZX, S_ZZ
 
 from . import formulas
 from .brittle import random_deviators

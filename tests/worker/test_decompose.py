@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from conoid.worker.model.state import Indices
 from conoid.worker.parallel import decompose
 from conoid.worker.parallel.comm import SerialComm
-from conoid.worker.state import Indices
 
 from ..contact.ranks import ThreadComm, on_ranks
 from .meshes import Floats

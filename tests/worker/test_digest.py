@@ -3,10 +3,10 @@
 import numpy as np
 import numpy.typing as npt
 
-from conoid.worker.digest import digest
+from conoid.worker.accounts.digest import digest
+from conoid.worker.model.state import WORK
 from conoid.worker.parallel.comm import SerialComm
 from conoid.worker.simulation import Simulation
-from conoid.worker.state import WORK
 
 from .kernels import build, run, scene
 from .meshes import block

@@ -10,8 +10,8 @@ from conoid.cases import load, materials
 from conoid.cases.library import library
 from conoid.worker import simulation
 from conoid.worker.mesh.model import TetMesh
+from conoid.worker.model.state import DILATION, PLASTIC_STRAIN, PRESSURE, S_ZZ, WORK, WORK_AVERAGED, WORK_PLASTIC
 from conoid.worker.parallel.comm import SerialComm
-from conoid.worker.state import DILATION, PLASTIC_STRAIN, PRESSURE, S_ZZ, WORK, WORK_AVERAGED, WORK_PLASTIC
 
 from . import formulas
 from .brittle import BULK, DT, PHI, SHEAR, C, brittle, free, random_deviators, stretched

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 
 from conoid.cases.load import parse_toml
-from conoid.worker import domain
-from conoid.worker.assembly import Whole
-from conoid.worker.domain import Piece
 from conoid.worker.errors import InputError
 from conoid.worker.mesh.model import TetMesh
+from conoid.worker.model.state import CHUNK, Ints
 from conoid.worker.parallel.comm import SerialComm
 from conoid.worker.parallel.ownership import SharedSum
 from conoid.worker.parallel.tags import Tag
-from conoid.worker.state import CHUNK, Ints
+from conoid.worker.scene import domain
+from conoid.worker.scene.assembly import Whole
+from conoid.worker.scene.domain import Piece
 
 from .kernels import pieces_of, whole_of
 from .meshes import block, free_tets

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from conoid.worker.materials import elementary
-from conoid.worker.state import CHUNK
+from conoid.worker.model.state import CHUNK
 
 from .meshes import Floats
 

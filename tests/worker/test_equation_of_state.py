@@ -9,8 +9,8 @@ import pytest
 from conoid.cases.materials import MieGruneisen
 from conoid.worker import step
 from conoid.worker.errors import PhysicsError
+from conoid.worker.model.state import MASS, PRESSURE, VOLUME_RATIO, WORK, WORK_VISCOUS
 from conoid.worker.simulation import Simulation
-from conoid.worker.state import MASS, PRESSURE, VOLUME_RATIO, WORK, WORK_VISCOUS
 
 from . import formulas
 from .kernels import COPPER_GAS, FORMS, STEEL, Form, Patch, build, drive, scene

@@ -9,11 +9,14 @@ import pytest
 
 from conoid.cases import materials, schema
 from conoid.cases.materials import Material
-from conoid.worker import digest, reference, state, step
+from conoid.worker import step
+from conoid.worker.accounts import digest
+from conoid.worker.boundaries.mirrors import Mirrors
+from conoid.worker.gauges import reference
+from conoid.worker.gauges.probes import tet_volumes
 from conoid.worker.mesh.faces import across, boundary_faces
 from conoid.worker.mesh.model import TetMesh
-from conoid.worker.mirrors import Mirrors
-from conoid.worker.probes import tet_volumes
+from conoid.worker.model import state
 from conoid.worker.simulation import Simulation
 
 from ..contact.bodies import meeting_of, moved

@@ -13,6 +13,7 @@ import pytest
 from conoid.cases import history, layout
 from conoid.cases.messages import Energy
 from conoid.worker.fracture.columns import FacetConstants, Facets, PairState, Softening
+from conoid.worker.model.state import Model, Nodes
 from conoid.worker.output import frames, storage
 from conoid.worker.output.damage import spent_energy
 from conoid.worker.output.frames import principal
@@ -21,7 +22,6 @@ from conoid.worker.output.journal import Journal
 from conoid.worker.output.losses import Losses
 from conoid.worker.output.rewind import rewind
 from conoid.worker.parallel.comm import Comm, SerialComm
-from conoid.worker.state import Model, Nodes
 
 from ..contact.ranks import on_ranks
 from .kernels import Patch

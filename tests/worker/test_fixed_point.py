@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from conoid.worker.elements.tet4 import quanta
+from conoid.worker.model.state import WORK
 from conoid.worker.parallel import fixed_point
 from conoid.worker.parallel.comm import SerialComm
 from conoid.worker.parallel.fixed_point import (
@@ -22,7 +23,6 @@ from conoid.worker.parallel.fixed_point import (
     totals_and_words,
 )
 from conoid.worker.simulation import Simulation
-from conoid.worker.state import WORK
 
 from .kernels import COPPER, FORMS, Form, build, run, scene
 from .meshes import Floats, block

@@ -5,11 +5,13 @@ from functools import cache
 import numpy as np
 import pytest
 
-from conoid.worker import digest, state, step
+from conoid.worker import step
+from conoid.worker.accounts import digest
 from conoid.worker.elements import rest
 from conoid.worker.elements.flat import THINNEST, flat_tets
+from conoid.worker.gauges.probes import tet_volumes
 from conoid.worker.mesh.model import TetMesh
-from conoid.worker.probes import tet_volumes
+from conoid.worker.model import state
 from conoid.worker.simulation import Simulation
 
 from .brittle import brittle, stretched

@@ -7,10 +7,11 @@ import pytest
 
 from conoid.cases import materials, schema
 from conoid.cases.balancing import WORK
-from conoid.worker import domain, step
-from conoid.worker.balance import Balance, Window
-from conoid.worker.groups import Groups
-from conoid.worker.meter import Costs, Meter, _candidates, on_parts
+from conoid.worker import step
+from conoid.worker.migration.balance import Balance, Window
+from conoid.worker.migration.groups import Groups
+from conoid.worker.migration.meter import Costs, Meter, _candidates, on_parts
+from conoid.worker.scene import domain
 from conoid.worker.simulation import Simulation
 
 from ..contact.bodies import meeting_of, moved

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 import conoid.worker
-from conoid.worker.boundaries import FREE, MIRRORED, PRESCRIBED, Boundary, SymmetryPlane
+from conoid.worker.boundaries.boundaries import FREE, MIRRORED, PRESCRIBED, Boundary, SymmetryPlane
+from conoid.worker.boundaries.drivers import Course, Driver, Gravity, PrescribedRotation, PrescribedVelocity
+from conoid.worker.boundaries.mirrors import Mirrors
+from conoid.worker.boundaries.walls import RigidWalls
 from conoid.worker.contact.exterior import mobilities, symmetry_planes
-from conoid.worker.drivers import Course, Driver, Gravity, PrescribedRotation, PrescribedVelocity
-from conoid.worker.mirrors import Mirrors
-from conoid.worker.state import Bits, Floats, Nodes
-from conoid.worker.walls import RigidWalls
+from conoid.worker.model.state import Bits, Floats, Nodes
 
 HOUSE = Path(str(conoid.worker.__file__)).parent
 SOME = np.array([1, 3], np.int32)

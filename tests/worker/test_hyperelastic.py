@@ -9,8 +9,8 @@ import pytest
 from conoid.cases.materials import Material
 from conoid.worker.materials.hyperelastic import inverse_sixth_root
 from conoid.worker.mesh.model import TetMesh
+from conoid.worker.model.state import DISTORTION, PRESSURE, TET_VOLUME, WORK
 from conoid.worker.simulation import Simulation
-from conoid.worker.state import DISTORTION, PRESSURE, TET_VOLUME, WORK
 
 from . import formulas
 from .kernels import COPPER_GAS, FORMS, HARD, STEEL, Form, Patch, build, run, scene

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from conoid.worker import ids
+from conoid.worker.model import ids
 
 KNOWN = np.array([0, 3, 4, 90, 4000])
 WANTED = np.array([[3, 4000], [-2, 5], [-1, 4001], [0, 1 << 62]])

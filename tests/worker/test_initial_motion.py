@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from conoid.worker import assembly, domain
-from conoid.worker.hashing import splitmix64, uniform
+from conoid.worker.model.hashing import splitmix64, uniform
+from conoid.worker.scene import assembly, domain
 
 from .kernels import scene, whole_of
 from .meshes import Floats, block

@@ -10,7 +10,7 @@ from conoid.cases.materials import JohnsonCook
 from conoid.worker.elements.tet4 import TRIAL, VOLUME_MID
 from conoid.worker.materials.johnson_cook import gather, increments, initial_yield
 from conoid.worker.mesh.model import TetMesh
-from conoid.worker.state import CHUNK, FLOW, MASS, PLASTIC_STRAIN, TEMPERATURE, WORK_PLASTIC, YIELD
+from conoid.worker.model.state import CHUNK, FLOW, MASS, PLASTIC_STRAIN, TEMPERATURE, WORK_PLASTIC, YIELD
 
 from . import formulas
 from .kernels import STEEL_42CRMO4, Patch, drive

@@ -10,8 +10,8 @@ from conoid.cases.materials import Elastic, JohnsonCook, JohnsonCookDamage, Mate
 from conoid.cases.schema import Erosion
 from conoid.worker.elements import wear
 from conoid.worker.mesh.model import TetMesh
-from conoid.worker.state import DAMAGE, FLOW, PLASTIC_STRAIN, PRESSURE
-from conoid.worker.state import TEMPERATURE as HEAT
+from conoid.worker.model.state import DAMAGE, FLOW, PLASTIC_STRAIN, PRESSURE
+from conoid.worker.model.state import TEMPERATURE as HEAT
 
 from . import formulas
 from .kernels import Patch

@@ -10,8 +10,8 @@ from scipy.integrate import solve_ivp
 from conoid.cases.laws.johnson_holmquist import JohnsonHolmquist
 from conoid.cases.library import library
 from conoid.cases.materials import Material
+from conoid.worker.model.state import BULKING, DAMAGE, MASS, PLASTIC_STRAIN, PRESSURE, S_ZZ, WORK, WORK_PLASTIC
 from conoid.worker.simulation import Simulation
-from conoid.worker.state import BULKING, DAMAGE, MASS, PLASTIC_STRAIN, PRESSURE, S_ZZ, WORK, WORK_PLASTIC
 
 from .kernels import Form, Patch, build, run, scene
 from .meshes import Floats, block, free_tets

@@ -10,11 +10,13 @@ import pytest
 
 from conoid.cases.library import library
 from conoid.cases.schema import Case
-from conoid.worker import assembly, digest, step
+from conoid.worker import step
+from conoid.worker.accounts import digest
 from conoid.worker.errors import InputError, MeshError
 from conoid.worker.mesh.model import TetMesh
+from conoid.worker.model.state import PRESSURE, S_ZZ, VISCOUS, Load
+from conoid.worker.scene import assembly
 from conoid.worker.simulation import Simulation
-from conoid.worker.state import PRESSURE, S_ZZ, VISCOUS, Load
 
 from .joints import bar, halves, joint, one_part
 from .kernels import FORMS, Form

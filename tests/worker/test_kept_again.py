@@ -15,7 +15,7 @@ from conoid.cases.checkpoints import FORMAT, Manifest
 from conoid.cases.load import apply_overrides, parse_case, read_data, resolved_json
 from conoid.cases.messages import Energy
 from conoid.worker import simulation, step
-from conoid.worker.digest import digest
+from conoid.worker.accounts.digest import digest
 from conoid.worker.errors import InputError
 from conoid.worker.migration import checkpoint
 from conoid.worker.parallel.comm import Comm

@@ -15,10 +15,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from conoid.worker import compile as ahead
-from conoid.worker import jit, kernels, main
 from conoid.worker.errors import CompileError, StoppedError
+from conoid.worker.kernels import compile as ahead
+from conoid.worker.kernels import jit, store
 from conoid.worker.parallel.comm import SerialComm
+from conoid.worker.run import main
 
 BELOW = """
 from conoid.worker.jit import njit
@@ -65,21 +66,21 @@ def tree(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.mark.parametrize(("edited", "another"), [("above", True), ("numbers", True), ("beside", False)])
 def test_an_edited_source_of_a_kernel_names_another_folder(tree: Path, edited: str, another: bool) -> None:
-    before = kernels.source_hash(tree)
+    before = store.source_hash(tree)
     with (tree / f"{edited}.py").open("a") as file:
         file.write("# edited\n")
-    kernels.source_hash.cache_clear()
-    assert (kernels.source_hash(tree) != before) == another
-    assert (kernels.cache_folder(kernels.source_hash(tree)) != kernels.cache_folder(before)) == another
+    store.source_hash.cache_clear()
+    assert (store.source_hash(tree) != before) == another
+    assert (store.cache_folder(store.source_hash(tree)) != store.cache_folder(before)) == another
 
 
 def test_a_copy_elsewhere_and_one_that_was_written_again_have_the_same_folder(tree: Path, tmp_path: Path) -> None:
-    before = kernels.source_hash(tree)
+    before = store.source_hash(tree)
     copied = shutil.copytree(tree, tmp_path / "copied")
-    assert kernels.source_hash(copied) == before
+    assert store.source_hash(copied) == before
     os.utime(tree / "above.py", (1e9, 1e9))
-    kernels.source_hash.cache_clear()
-    assert kernels.source_hash(tree) == before
+    store.source_hash.cache_clear()
+    assert store.source_hash(tree) == before
 
 
 def test_ranks_but_the_first_hash_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -93,11 +94,11 @@ def test_ranks_but_the_first_hash_nothing(monkeypatch: pytest.MonkeyPatch) -> No
     def refuse(*_: object) -> str:
         raise AssertionError("rank 1 hashes")
 
-    monkeypatch.setenv(kernels.VARIABLE, "")
+    monkeypatch.setenv(store.VARIABLE, "")
     monkeypatch.delitem(sys.modules, "numba")
-    monkeypatch.setattr(kernels, "source_hash", refuse)
+    monkeypatch.setattr(store, "source_hash", refuse)
     main.ready_kernels(Second(), None)
-    assert os.environ[kernels.VARIABLE] == str(kernels.cache_folder("0" * 64))
+    assert os.environ[store.VARIABLE] == str(store.cache_folder("0" * 64))
 
 
 # The loading ----------------------------------------------------------------------------------------------------------
@@ -206,7 +207,7 @@ def test_modules_that_have_not_changed_are_linked_from_an_earlier_folder(tree: P
     for folder, (name, edited) in zip(folders, edits, strict=True):
         (tree / f"{name}.py").write_text(edited)
         assert ahead.compile_all(folder, lambda *_: None, tree, "tiny")
-        environment = os.environ | {kernels.VARIABLE: str(folder)}
+        environment = os.environ | {store.VARIABLE: str(folder)}
         ask = [sys.executable, "-c", text]
         told.append(subprocess.run(ask, env=environment, capture_output=True, text=True, check=True).stdout)
     assert told == ["[2. 2.] 1\n", "[3. 3.] 1\n", "[4. 4.] 1\n"]
@@ -219,20 +220,20 @@ def test_modules_that_have_not_changed_are_linked_from_an_earlier_folder(tree: P
 
 
 def test_every_kernel_of_the_worker_is_counted() -> None:
-    files = kernels.kernel_files(kernels.ROOT)
+    files = store.kernel_files(store.ROOT)
     for path in files:
-        importlib.import_module(ahead._Module.of(path, kernels.ROOT, "conoid.worker").name)
+        importlib.import_module(ahead._Module.of(path, store.ROOT, "conoid.worker").name)
     mine = [kernel for kernel in jit.DECLARED if kernel.py_func.__module__.startswith("conoid.worker.")]
-    assert sum(path.read_text(encoding="utf-8").count(kernels.DECLARATION) for path in files) == len(mine)
+    assert sum(path.read_text(encoding="utf-8").count(store.DECLARATION) for path in files) == len(mine)
 
 
 def test_a_module_comes_after_those_that_it_imports() -> None:
-    order = ahead._order(set(kernels.kernel_files(kernels.ROOT)))
+    order = ahead._order(set(store.kernel_files(store.ROOT)))
     done: set[Path] = set()
     while ready := [path for path, needs in order.items() if needs <= done and path not in done]:
         done |= set(ready)
     assert done == set(order)
-    assert kernels.ROOT / "elements" / "tet4.py" in order[kernels.ROOT / "elements" / "sweep.py"]
+    assert store.ROOT / "elements" / "tet4.py" in order[store.ROOT / "elements" / "sweep.py"]
 
 
 @pytest.mark.parametrize(
@@ -309,10 +310,10 @@ def test_the_worker_tells_what_it_waits_for(monkeypatch: pytest.MonkeyPatch, tmp
 
 def test_numba_is_not_imported_before_its_cache_has_a_name() -> None:
     """Else it keeps kernels beside their sources, where an edited callee goes unseen."""
-    text = "import sys, conoid.worker.main; assert 'numba' not in sys.modules"
+    text = "import sys, conoid.worker.run.main; assert 'numba' not in sys.modules"
     subprocess.run([sys.executable, "-c", text], check=True)
-    text = "import numba; from conoid.worker import kernels; kernels.use_cache()"
-    clean = {key: value for key, value in os.environ.items() if key != kernels.VARIABLE}
+    text = "import numba; from conoid.worker.kernels import store; store.use_cache()"
+    clean = {key: value for key, value in os.environ.items() if key != store.VARIABLE}
     told = subprocess.run([sys.executable, "-c", text], env=clean, capture_output=True, text=True, check=False)
     assert "numba was imported before" in told.stderr
 

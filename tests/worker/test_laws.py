@@ -8,9 +8,9 @@ import pytest
 from conoid.cases.laws.law import Law as Constants
 from conoid.cases.library import library
 from conoid.cases.materials import Material, MieGruneisen, Strength
-from conoid.worker import state
 from conoid.worker.elements import tet4
 from conoid.worker.materials import law, models
+from conoid.worker.model import state
 
 from .kernels import COPPER, COPPER_GAS, GLASS, STEEL, STEEL_42CRMO4
 

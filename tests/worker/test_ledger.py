@@ -10,8 +10,8 @@ import pytest
 from conoid.cases import materials
 from conoid.cases.messages import Energy
 from conoid.worker.errors import EnergyError
+from conoid.worker.model.state import WORK, WORK_PLASTIC, WORK_VISCOUS
 from conoid.worker.simulation import Simulation
-from conoid.worker.state import WORK, WORK_PLASTIC, WORK_VISCOUS
 
 from .kernels import COPPER, COPPER_GAS, FORMS, GLASS, HARD, STEEL, STEEL_42CRMO4, Form, build, run, scene
 from .meshes import Floats, block

@@ -6,8 +6,8 @@ import re
 import pytest
 
 from conoid.cases.messages import Energy
+from conoid.worker.accounts.making import LASTING, RETURNED, TOLD, Making
 from conoid.worker.errors import EnergyError
-from conoid.worker.making import LASTING, RETURNED, TOLD, Making
 
 from .kernels import COPPER, build, scene
 from .meshes import block

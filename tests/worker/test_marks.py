@@ -8,7 +8,7 @@ import pytest
 from conoid.cases.load import parse_case
 from conoid.cases.problems import CaseError
 from conoid.cases.survey import Survey
-from conoid.worker.survey import surveyed
+from conoid.worker.scene.survey import surveyed
 
 from ..mesh.bars import bar
 

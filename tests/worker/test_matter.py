@@ -8,8 +8,8 @@ import pytest
 from conoid.cases import materials
 from conoid.worker.elements.averaging import AveragedElements
 from conoid.worker.elements.matter import PORES_AT, PRESSURE_AT
+from conoid.worker.model.state import PORES, PRESSURE
 from conoid.worker.simulation import Simulation
-from conoid.worker.state import PORES, PRESSURE
 
 from .kernels import COPPER, Form, build, run, scene
 from .meshes import Floats, block

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from conoid.worker import step
+from conoid.worker.boundaries.mirrors import Mirrors
 from conoid.worker.mesh.model import TetMesh
-from conoid.worker.mirrors import Mirrors
 from conoid.worker.simulation import Simulation
 
 from ..contact.bodies import meeting_of, moved

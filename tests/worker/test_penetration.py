@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 
 from conoid.cases import schema
-from conoid.worker import assembly, reference, simulation
+from conoid.worker import simulation
+from conoid.worker.gauges import reference
+from conoid.worker.gauges.penetration import LINES, MEASURED, bottoms, depth, spans, thickness
 from conoid.worker.mesh.model import TetMesh
-from conoid.worker.penetration import LINES, MEASURED, bottoms, depth, spans, thickness
+from conoid.worker.scene import assembly
 from conoid.worker.simulation import Simulation
 
 from ..contact.bodies import meeting_of, moved

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from conoid.cases import schema
-from conoid.worker import digest, step
+from conoid.worker import step
+from conoid.worker.accounts import digest
+from conoid.worker.boundaries.mirrors import Mirrors
 from conoid.worker.mesh.model import TetMesh
-from conoid.worker.mirrors import Mirrors
 from conoid.worker.simulation import Simulation
 
 from ..contact.bodies import meeting_of, moved

@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 
 from conoid.cases.materials import Material
-from conoid.worker import digest, state, step
+from conoid.worker import step
+from conoid.worker.accounts import digest
 from conoid.worker.elements import rest
 from conoid.worker.mesh.model import TetMesh
+from conoid.worker.model import state
 from conoid.worker.simulation import Simulation
 
 from .kernels import COPPER_GAS, FORMS, GLASS, STEEL, STEEL_42CRMO4, Form, build, scene

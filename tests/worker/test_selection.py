@@ -13,13 +13,13 @@ import pytest
 from conoid.cases.load import CaseError, parse_case
 from conoid.cases.loaded import loads
 from conoid.cases.schema import Case, Prescribed
-from conoid.worker import assembly, conditions, selection
-from conoid.worker.assembly import Whole
 from conoid.worker.errors import InputError
 from conoid.worker.mesh.model import TetMesh
 from conoid.worker.mesh.scale import scaled
 from conoid.worker.mesh.structured import structured
-from conoid.worker.state import Load
+from conoid.worker.model.state import Load
+from conoid.worker.scene import assembly, conditions, selection
+from conoid.worker.scene.assembly import Whole
 
 from .kernels import build
 

@@ -9,8 +9,8 @@ import pytest
 from conoid.worker.elements.tet4 import LENGTH_FACTOR
 from conoid.worker.materials.law import BREAKS
 from conoid.worker.mesh.model import TetMesh
+from conoid.worker.model.state import PRESSURE, VISCOUS, WORK, WORK_VISCOUS
 from conoid.worker.simulation import Simulation
-from conoid.worker.state import PRESSURE, VISCOUS, WORK, WORK_VISCOUS
 
 from . import formulas
 from .kernels import FORMS, STEEL, Form, Patch, build, run, scene

@@ -18,8 +18,7 @@ from conoid.cases.schema import Erosion
 from conoid.worker.elements.averaging import AveragedElements
 from conoid.worker.elements.matter import PRESSURE_AT, RATIO
 from conoid.worker.materials import law
-from conoid.worker.simulation import Simulation
-from conoid.worker.state import (
+from conoid.worker.model.state import (
     BULKING,
     CORNERS,
     DAMAGE,
@@ -33,6 +32,7 @@ from conoid.worker.state import (
     WORK_AVERAGED,
     WORK_PLASTIC,
 )
+from conoid.worker.simulation import Simulation
 
 from . import formulas
 from .brittle import PHI, C, brittle

@@ -10,10 +10,10 @@ import pytest
 from conoid.cases import materials, schema
 from conoid.cases.load import CaseError, parse_case
 from conoid.worker import step
+from conoid.worker.boundaries.surface_pressure import SurfacePressure
 from conoid.worker.mesh.faces import boundary_faces
+from conoid.worker.model.state import MASS, PRESSURE, S_XX, S_XY, S_YY, WIDE, Ints
 from conoid.worker.simulation import Simulation
-from conoid.worker.state import MASS, PRESSURE, S_XX, S_XY, S_YY, WIDE, Ints
-from conoid.worker.surface_pressure import SurfacePressure
 
 from .kernels import COPPER, STEEL, Floats, build, run, scene
 from .meshes import block, ring

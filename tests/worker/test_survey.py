@@ -11,11 +11,11 @@ import pytest
 from conoid.cases import survey
 from conoid.cases.bodies import Mesh
 from conoid.cases.load import parse_case
-from conoid.worker.assembly import assemble
 from conoid.worker.errors import MeshError
 from conoid.worker.mesh.child import Limits, perform
 from conoid.worker.mesh.sources import Sources
-from conoid.worker.survey import surveyed
+from conoid.worker.scene.assembly import assemble
+from conoid.worker.scene.survey import surveyed
 
 TWO = """*NODE
 1, 0, 0, 0
@@ -156,5 +156,5 @@ def test_a_box_in_which_a_file_has_nothing_is_refused(folder: Path) -> None:
 
 def test_the_program_names_the_cache_of_kernels_before_numba_is_imported() -> None:
     """Numba asks for it when it is imported; what the program imports at its head must not import it."""
-    asked = "import sys, conoid.worker.survey; sys.exit('numba' in sys.modules)"
+    asked = "import sys, conoid.worker.scene.survey; sys.exit('numba' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", asked], check=False).returncode == 0

@@ -14,8 +14,8 @@ from conoid.cases.materials import Material
 from conoid.cases.motion import Stretch
 from conoid.cases.schema import Erosion
 from conoid.worker import simulation
+from conoid.worker.model.state import MASS, PORES, PRESSURE, VOLUME_RATIO, WORK, WORK_PLASTIC
 from conoid.worker.parallel.comm import SerialComm
-from conoid.worker.state import MASS, PORES, PRESSURE, VOLUME_RATIO, WORK, WORK_PLASTIC
 
 from .kernels import COPPER_GAS, STEEL, Patch, run
 from .meshes import Floats, free_tets

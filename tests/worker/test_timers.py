@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from conoid.worker import timers
-from conoid.worker.jit import njit
+from conoid.worker.accounts import timers
+from conoid.worker.accounts.timers import Timers
+from conoid.worker.kernels.jit import njit
 from conoid.worker.parallel.comm import SerialComm
 from conoid.worker.parallel.team import TASK, team
-from conoid.worker.timers import Timers
 
 
 @dataclass

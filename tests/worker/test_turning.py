@@ -6,7 +6,7 @@ from decimal import Decimal, getcontext
 import numpy as np
 import pytest
 
-from conoid.worker.turning import sine_and_cosine, sines_and_cosines
+from conoid.worker.materials.turning import sine_and_cosine, sines_and_cosines
 
 
 @pytest.mark.parametrize(

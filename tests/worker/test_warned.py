@@ -19,7 +19,7 @@ from conoid.worker.mesh.child import Limits, perform
 from conoid.worker.mesh.sources import Sources
 from conoid.worker.mesh.structured import structured
 from conoid.worker.parallel.comm import SerialComm
-from conoid.worker.survey import surveyed
+from conoid.worker.scene.survey import surveyed
 
 BLOCK = {"shape": "box", "low": [0, 0, 0], "high": [2e-3, 2e-3, 2e-3], "element_size": 5e-4, "generator": "structured"}
 GRIP = {"kind": "velocity", "parts": ["bar"], "low": [0, 0, 0], "high": ["2 mm", "2 mm", 0]}

@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 
 from conoid.cases import schema
-from conoid.worker import state, step
+from conoid.worker import step
 from conoid.worker.elements import tet4, wear
+from conoid.worker.model import state
+from conoid.worker.model.state import CHUNK, Block
 from conoid.worker.parallel.comm import Comm, SerialComm
 from conoid.worker.parallel.fixed_point import Tally
-from conoid.worker.state import CHUNK, Block
 
 from ..contact.bodies import meeting_of, moved
 from ..contact.ranks import on_ranks

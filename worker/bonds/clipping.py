@@ -8,7 +8,7 @@ the sides integrate them exactly.
 
 import numpy as np
 
-from ..jit import njit, types
+from ..kernels.jit import njit, types
 
 _MOST = 9
 """Corners of a triangle that is cut by three lines, at most six, and room."""

@@ -3,8 +3,8 @@
 import numpy as np
 
 from ..mesh.faces import FACES
+from ..model.state import Flags, Ints, Model
 from ..parallel.comm import Comm
-from ..state import Flags, Ints, Model
 
 
 class Faces:

@@ -21,7 +21,7 @@ from ..contact.search import Things
 from ..errors import InputError
 from ..mesh.faces import FACES
 from ..mesh.faces import areas as face_areas
-from ..state import Flags, Floats, Indices, Ints
+from ..model.state import Flags, Floats, Indices, Ints
 from . import clipping
 from .pieces import Pieces
 from .rows import assembled

@@ -12,7 +12,7 @@ stored in it, and none comes back. What has slid stays where it is.
 import numpy as np
 
 from ..contact.geometry import at, cross, dot, minus
-from ..jit import njit, types
+from ..kernels.jit import njit, types
 from .records import (
     BREAKS,
     DAMAGE,

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..model.state import Flags, Floats, Indices, Ints, Nodes
 from ..parallel.comm import Comm, Exchange
 from ..parallel.tags import Tag
-from ..state import Flags, Floats, Indices, Ints, Nodes
 from .records import BREAKS, KEPT, NORMAL, STATE, TiedNodes, TiedRows
 from .rows import Rows
 

@@ -6,7 +6,7 @@ from typing import Self
 import numpy as np
 
 from ..migration.parcel import Table
-from ..state import Flags, Floats, Ints
+from ..model.state import Flags, Floats, Ints
 
 
 @dataclass

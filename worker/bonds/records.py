@@ -2,8 +2,8 @@
 
 from typing import NamedTuple
 
-from ..jit import record, types
-from ..state import Floats, Indices, Ints
+from ..kernels.jit import record, types
+from ..model.state import Floats, Indices, Ints
 
 PUSH, LAST, SPEED, DAMAGE, OPENING, WIDEST, NORMAL = 0, 3, 6, 9, 10, 11, 12
 """First words of a row's ``TiedRows.state``: impulse on the tied node (3), N s, and before momentum took it ahead (3);

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..state import Flags, Floats, Ints
+from ..model.state import Flags, Floats, Ints
 from .pieces import Pieces
 
 _NOTHING = 1e-12

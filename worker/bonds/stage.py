@@ -11,17 +11,17 @@ import numpy as np
 from conoid.cases.bonds import TiedBond
 from conoid.cases.schema import Case
 
-from ..boundaries import Boundary, mirrored
+from ..boundaries.boundaries import Boundary, mirrored
 from ..clock import Clock
 from ..contact.exterior import mobilities
-from ..ids import places
 from ..migration.parcel import Parcel
+from ..model.ids import places
+from ..model.state import Floats, Indices, Ints, Model, Nodes, extended
+from ..model.topology import Split
 from ..parallel import fixed_point
 from ..parallel.comm import Comm
 from ..parallel.passes import Pass
 from ..parallel.team import Team
-from ..state import Floats, Indices, Ints, Model, Nodes, extended
-from ..topology import Split
 from . import law, sweeps
 from .faces import Faces
 from .layout import Layout, laid_out

@@ -11,7 +11,7 @@ from ..contact import overlap
 from ..errors import InputError
 from ..mesh.faces import FACES
 from ..mesh.faces import areas as face_areas
-from ..state import Flags, Floats, Indices
+from ..model.state import Flags, Floats, Indices
 from .interface import corners, tied_pairs
 from .pieces import Pieces
 

@@ -12,7 +12,7 @@ another task of it reads, and sums are of integers.
 
 import numpy as np
 
-from ..jit import njit, types
+from ..kernels.jit import njit, types
 from ..parallel.arguments import reader
 from ..parallel.team import TASK
 from . import law

@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from ..model.state import Ints
 from ..parallel.fixed_point import Tally
-from ..state import Ints
 
 _AHEAD = 2.0
 """How many times what one step has given back at most, so far, must be left for the next one."""

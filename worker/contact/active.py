@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..cache_lines import LINE, cache_lines
-from ..jit import record, types
-from ..state import Floats, Indices, Ints
+from ..kernels.jit import record, types
+from ..model.cache_lines import LINE, cache_lines
+from ..model.state import Floats, Indices, Ints
 
 V, IMPULSE = 0, 3
 """First word of a slot's velocity, m/s, and of its impulse of the sweep, quanta, in ``ActiveNodes.moving``."""

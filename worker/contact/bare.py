@@ -11,11 +11,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ..elements.wear import DAMAGED, STRAIN
-from ..ids import among
 from ..mesh.faces import FACES
+from ..model.ids import among
+from ..model.state import DAMAGE, LAID_BARE, PLASTIC_STRAIN, Block, Flags, Indices, Ints
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour
-from ..state import DAMAGE, LAID_BARE, PLASTIC_STRAIN, Block, Flags, Indices, Ints
 
 TIRING = 0.5
 """Of the plastic strain or the damage at which a tet leaves. Of the tets that left in the long rod to 20 us, 1.6 to

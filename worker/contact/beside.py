@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..jit import njit, types
+from ..kernels.jit import njit, types
 from .geometry import MARGIN, VECTOR, at, dot, foot, height, minus, off
 from .narrow_phase import DEEP, DEEP_SELF, FACES, NEAR, PAIRS, STEP
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..jit import njit, types
+from ..kernels.jit import njit, types
 from .active import LOADED, MU, NODES, PUSH, PUSH_T, V
 
 _I2, _N1 = types.int64[:, ::1], types.int32[::1]

@@ -5,11 +5,11 @@ import numpy as np
 from conoid.cases.schema import Case
 
 from ..migration.parcel import Parcel
+from ..model.state import Floats, Indices, Ints, Nodes, extended
 from ..parallel import fixed_point
 from ..parallel.comm import Comm
 from ..parallel.passes import Pass
 from ..parallel.team import Team
-from ..state import Floats, Indices, Ints, Nodes, extended
 from . import tasks
 from .account import Account
 from .scene import Scene

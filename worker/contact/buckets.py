@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..jit import njit, types
-from ..state import Floats, Indices, Ints
+from ..kernels.jit import njit, types
+from ..model.state import Floats, Indices, Ints
 
 _MOST = 2.0**20
 """Cells along an axis: codes of three stay far below 2^63."""

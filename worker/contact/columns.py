@@ -5,8 +5,8 @@ from functools import cached_property
 
 import numpy as np
 
-from ..growing import Rooms
-from ..state import Bits, Flags, Floats, Indices, Ints
+from ..model.growing import Rooms
+from ..model.state import Bits, Flags, Floats, Indices, Ints
 from .normals import COLUMNS
 from .records import AGED, OPEN, Crowd
 

@@ -11,11 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..jit import njit
+from ..kernels.jit import njit
 from ..mesh.faces import FACES
+from ..model.state import Floats, Ints, Model
 from ..parallel.comm import Comm
 from ..parallel.fixed_point import exact_sums
-from ..state import Floats, Ints, Model
 from . import search
 from .geometry import at, cross, dot, minus
 from .inside import outermost

@@ -8,11 +8,11 @@ is zero.
 
 import numpy as np
 
-from ..jit import njit
+from ..kernels.jit import njit
+from ..model.state import Indices, Ints
 from ..parallel.comm import Comm, Exchange
 from ..parallel.ownership import Neighbour
 from ..parallel.tags import Tag
-from ..state import Indices, Ints
 from .rows import ActiveRows
 
 _WORD = 63

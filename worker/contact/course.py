@@ -8,11 +8,11 @@ the angular momentum of its tets.
 
 import numpy as np
 
-from ..jit import njit
+from ..kernels.jit import njit
+from ..model.state import Block, Floats, Nodes
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour, complete
 from ..parallel.tags import Tag
-from ..state import Block, Floats, Nodes
 
 _QUANTA = 2.0**16
 """A m/s: room for 1e14 m/s."""

@@ -12,11 +12,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..cache_lines import LINE
-from ..jit import njit, prefetch, types
+from ..kernels.jit import njit, prefetch, types
 from ..migration.parcel import Table, once
-from ..state import WIDE, Block, Flags, Floats, Indices, Ints, Nodes, extended
-from ..topology import Split
+from ..model.cache_lines import LINE
+from ..model.state import WIDE, Block, Flags, Floats, Indices, Ints, Nodes, extended
+from ..model.topology import Split
 from .families import Corners, Families, by_family
 from .geometry import at, cross, dot, half, minus, plus
 from .kin import touching

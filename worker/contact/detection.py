@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..model.state import Block, Floats, Ints, Nodes
 from ..parallel.passes import Pass
 from ..parallel.team import Team
-from ..state import Block, Floats, Ints, Nodes
 from . import registration, tasks
 from .cracks import Cracks
 from .entering import Narrow

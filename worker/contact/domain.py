@@ -8,9 +8,9 @@ occupied cell is an outside cell already, and the paper's test of a cell's neigh
 
 import numpy as np
 
-from ..jit import njit
+from ..kernels.jit import njit
+from ..model.state import Flags, Floats
 from ..parallel.comm import Comm
-from ..state import Flags, Floats
 from .buckets import bucket_at
 from .search import Boxes
 

@@ -6,8 +6,8 @@ one slides along a surface.
 
 import numpy as np
 
-from ..cache_lines import LINE
-from ..jit import njit, prefetch, types
+from ..kernels.jit import njit, prefetch, types
+from ..model.cache_lines import LINE
 from .geometry import VECTOR, at, beyond, cross, distance, dot, lowest_height, minus, plus, segments
 from .narrow_phase import CONTACT_ROWS, DEEP, DEEP_SELF, EDGES, NEAR, PAIRS, STEP, bonded, needed
 

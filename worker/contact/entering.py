@@ -13,9 +13,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..cache_lines import LINE
-from ..jit import njit, prefetch, record, types
-from ..state import INTACT, Bits, Indices, Tets
+from ..kernels.jit import njit, prefetch, record, types
+from ..model.cache_lines import LINE
+from ..model.state import INTACT, Bits, Indices, Tets
 from .families import CORNERS
 from .geometry import VECTOR, at, cross, dot, height, minus
 from .narrow_phase import CONTACT_ROWS, DEEP_SELF, STEP, needed

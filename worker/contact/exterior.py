@@ -2,14 +2,14 @@
 
 import numpy as np
 
-from ..boundaries import FREE, Boundary
+from ..boundaries.boundaries import FREE, Boundary
 from ..errors import InputError
-from ..ids import among
 from ..migration.parcel import Parcel
+from ..model.ids import among
+from ..model.state import Block, Flags, Floats, Indices, Ints, Model, Nodes, extended
+from ..model.topology import Split
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour
-from ..state import Block, Flags, Floats, Indices, Ints, Model, Nodes, extended
-from ..topology import Split
 from . import bare, normals, surface
 from .cracks import Cracks
 from .families import Corners

@@ -5,9 +5,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..jit import njit, record, types
-from ..state import Flags, Indices, Ints, extended
-from ..topology import Split
+from ..kernels.jit import njit, record, types
+from ..model.state import Flags, Indices, Ints, extended
+from ..model.topology import Split
 
 _N1, _N2 = types.int32[::1], types.int32[:, ::1]
 

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from ..ids import located
-from ..jit import njit
+from ..kernels.jit import njit
+from ..model.ids import located
+from ..model.state import Flags, Floats, Indices, Ints, Nodes, extended
 from ..parallel.comm import Comm
 from ..parallel.fixed_point import exact_sums
-from ..state import Flags, Floats, Indices, Ints, Nodes, extended
 from . import ghosts
 from .records import Crowd, merged
 from .sides import HALO, Sides

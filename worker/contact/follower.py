@@ -6,10 +6,10 @@ has the candidates of the node that it was part of, with the rank that computes 
 
 import numpy as np
 
-from ..jit import njit
+from ..kernels.jit import njit
+from ..model.state import Block, Flags, Indices, Ints, Nodes, extended
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour
-from ..state import Block, Flags, Indices, Ints, Nodes, extended
 from . import ghosts, kin
 from .cracks import Cracks, computed
 from .kin import Family

@@ -4,7 +4,7 @@ one.
 
 import numpy as np
 
-from ..jit import njit
+from ..kernels.jit import njit
 
 MARGIN = 1e-3
 """Of the area coordinates: how far outside of a face the foot of a node may lie."""

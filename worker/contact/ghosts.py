@@ -4,11 +4,11 @@ from itertools import pairwise
 
 import numpy as np
 
-from ..jit import njit
+from ..kernels.jit import njit
+from ..model.state import Flags, Floats, Indices, Ints, Nodes
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour, ranks
 from ..parallel.tags import Tag
-from ..state import Flags, Floats, Indices, Ints, Nodes
 from .records import Crowd, Edges, Faces
 
 _CROWD_WORDS = 15

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..jit import njit, types
+from ..kernels.jit import njit, types
 from .narrow_phase import CONTACT_ROWS, FACES, PAIRS, STEP, altitude
 
 _F = types.float64

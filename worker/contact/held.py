@@ -7,7 +7,7 @@ copy.
 
 import numpy as np
 
-from ..jit import njit, prefetch, types
+from ..kernels.jit import njit, prefetch, types
 from .active import CHANGED, IMPULSE, MOBILITY, NODES, TOTAL, V
 
 _SMALL = 16

@@ -18,8 +18,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..mesh.faces import FACES
+from ..model.state import INTACT, Block, Flags, Floats, Indices, Ints, Model
 from ..parallel.comm import Comm
-from ..state import INTACT, Block, Flags, Floats, Indices, Ints, Model
 from . import search
 from .overlap import to_borders
 from .search import Things

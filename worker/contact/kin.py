@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..jit import njit, several, types
-from ..state import Indices
-from ..topology import KEY
+from ..kernels.jit import njit, several, types
+from ..model.state import Indices
+from ..model.topology import KEY
 
 _I, _I1, _I2, _N1, _N2, _B1 = (
     types.int64, types.int64[::1], types.int64[:, ::1], types.int32[::1], types.int32[:, ::1], types.boolean[::1],

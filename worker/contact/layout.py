@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from ..ids import places
+from ..model.ids import places
+from ..model.state import Floats, Nodes
 from ..parallel.comm import Comm
-from ..state import Floats, Nodes
 from . import buckets
 from .columns import OwnSlots, SceneEdges, SceneFaces, SceneSlots
 from .scene import Scene

@@ -6,7 +6,7 @@ its nodes by as much as it has left, its reach. The loaded ones have an infinite
 
 import numpy as np
 
-from ..jit import njit, types
+from ..kernels.jit import njit, types
 from .active import CONTACTS, KEPT, LAST, LOADED, MOBILITY, MU, NODES, PUSH, PUSH_T, ROW_NORM, ROW_NORM_T, WANTED, V
 from .narrow_phase import CRACK
 

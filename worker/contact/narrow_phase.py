@@ -9,10 +9,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..cache_lines import cache_lines
-from ..growing import Scratch
-from ..jit import njit, record, types
-from ..state import Flags, Floats, Indices, Ints
+from ..kernels.jit import njit, record, types
+from ..model.cache_lines import cache_lines
+from ..model.growing import Scratch
+from ..model.state import Flags, Floats, Indices, Ints
 from .geometry import at, cross, dot, minus
 from .tied import NOTHING
 

@@ -4,7 +4,7 @@ import numpy as np
 
 from conoid.cases.impact import Sweeps
 
-from ..state import Ints
+from ..model.state import Ints
 
 _SETTLED = 0.0015
 """Of the impulses of a step, the most that its last sweep may have changed them by. Chosen by rubble between a ram and

@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..jit import njit
+from ..kernels.jit import njit
+from ..model.state import Indices, Ints
+from ..model.topology import Split
 from ..parallel.comm import Comm
-from ..state import Indices, Ints
-from ..topology import Split
 from . import ghosts
 from .records import Crowd
 from .scene import Scene

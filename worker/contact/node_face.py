@@ -6,8 +6,8 @@ handed over.
 
 import numpy as np
 
-from ..cache_lines import LINE
-from ..jit import njit, prefetch, types
+from ..kernels.jit import njit, prefetch, types
+from ..model.cache_lines import LINE
 from .beside import RIM, TOUCHING, facing, in_front, outside, plane, reaches_over
 from .geometry import VECTOR, at, beyond, distance, dot, foot, height, minus, off
 from .haste import fastest_of, haste

@@ -6,12 +6,12 @@ between adds its share to its nodes. So they depend on the steps alone, not on w
 
 import numpy as np
 
-from ..jit import njit
+from ..kernels.jit import njit
 from ..mesh.faces import FACES
+from ..model.state import WIDE, Flags, Floats, Indices, Ints, Model
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour, complete
 from ..parallel.tags import Tag
-from ..state import WIDE, Flags, Floats, Indices, Ints, Model
 from .loading import SHARES
 
 EVERY = 16

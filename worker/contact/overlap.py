@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..mesh.faces import normals as face_normals
-from ..state import Flags, Floats, Indices
+from ..model.state import Flags, Floats, Indices
 from . import search
 from .beside import FACING
 from .search import Things

@@ -5,9 +5,9 @@ import numpy as np
 from conoid.cases.joined import bodies, meeting
 from conoid.cases.schema import Case
 
+from ..model.state import Flags, Floats, Nodes
 from ..parallel.comm import Comm
 from ..rigid.stage import Rigid
-from ..state import Flags, Floats, Nodes
 
 
 def friction(case: Case) -> Floats:

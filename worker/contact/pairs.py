@@ -18,9 +18,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..growing import Rooms
-from ..jit import njit
-from ..state import Flags, Floats, Indices, Ints
+from ..kernels.jit import njit
+from ..model.growing import Rooms
+from ..model.state import Flags, Floats, Indices, Ints
 from .narrow_phase import Pairs
 from .node_face import chain
 

@@ -12,9 +12,9 @@ from typing import Self
 
 import numpy as np
 
-from ..growing import Rooms
-from ..ids import located
-from ..state import Bits, Flags, Floats, Indices, Ints
+from ..model.growing import Rooms
+from ..model.ids import located
+from ..model.state import Bits, Flags, Floats, Indices, Ints
 
 AGED, OPEN = 1, 2
 """How far a face of an edge is open."""

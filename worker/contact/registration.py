@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..ids import places
-from ..state import Flags, Floats, Indices, Ints
+from ..model.ids import places
+from ..model.state import Flags, Floats, Indices, Ints
 from . import search, sift
 from .narrow_phase import DEEP, DEEP_SELF
 from .scene import Scene

@@ -6,7 +6,7 @@ nothing, however many contacts share nodes, since those without an impulse take 
 in the metric of the masses of Cirak and West (2005), Decomposition contact response, Int. J. Numer. Meth. Engng 64.
 """
 
-from ..jit import njit, types
+from ..kernels.jit import njit, types
 from .narrow_phase import CONTACT_ROWS
 
 _V, _N1, _I = types.float64[:, ::1], types.int32[::1], types.int64

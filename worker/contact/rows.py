@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..state import Floats, Indices, Ints
+from ..model.state import Floats, Indices, Ints
 from .narrow_phase import ContactRows
 from .tasks import collected
 

@@ -4,13 +4,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..growing import same_memory
-from ..ids import among, places
-from ..jit import njit
+from ..kernels.jit import njit
+from ..model.growing import same_memory
+from ..model.ids import among, places
+from ..model.state import Flags, Floats, Indices, Ints, Nodes
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour, same
 from ..parallel.tags import Tag
-from ..state import Flags, Floats, Indices, Ints, Nodes
 from . import ghosts, held, sharp
 from .active import Kept
 from .columns import OwnSlots, SceneEdges, SceneFaces, SceneSlots

@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..jit import njit, types
-from ..state import Flags, Floats, Indices, Ints, extended
+from ..kernels.jit import njit, types
+from ..model.state import Flags, Floats, Indices, Ints, extended
 from . import buckets
 from .buckets import TABLE, bucket_at, bucket_of
 

@@ -9,10 +9,10 @@ from conoid.cases.schema import Case
 
 from ..clock import Clock
 from ..migration.parcel import Parcel
+from ..model.state import Flags, Floats, Ints, Model, Nodes
+from ..model.topology import Split
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour
-from ..state import Flags, Floats, Ints, Model, Nodes
-from ..topology import Split
 from . import layout, normals, pairing, registration
 from .course import courses
 from .cracks import AGE, widening

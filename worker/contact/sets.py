@@ -1,10 +1,10 @@
 """The work of the solver as the threads of a rank share it: by sets of contacts (zones.py), and by slots."""
 
-from ..jit import Kernel
+from ..kernels.jit import Kernel
+from ..model.state import Ints
 from ..parallel.arguments import Arguments
 from ..parallel.passes import Pass
 from ..parallel.team import Team
-from ..state import Ints
 from . import tasks, zones
 from .company import ActiveSum
 from .tasks import CONTACTS_OF_A_TASK, SLOTS_OF_A_TASK

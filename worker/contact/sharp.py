@@ -10,12 +10,12 @@ import math
 
 import numpy as np
 
-from ..ids import among
-from ..jit import njit
+from ..kernels.jit import njit
+from ..materials.turning import sine_and_cosine
+from ..model.ids import among
+from ..model.state import Bits, Flags, Floats, Indices, Ints, Model
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour, ranks
-from ..state import Bits, Flags, Floats, Indices, Ints, Model
-from ..turning import sine_and_cosine
 from .geometry import at, cross, dot, lowest_height, minus
 from .narrow_phase import DEEP, DEEP_SELF
 from .records import Edges, Faces

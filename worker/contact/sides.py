@@ -5,8 +5,8 @@ from functools import cached_property
 
 import numpy as np
 
+from ..model.state import Flags, Floats, Indices, Ints
 from ..parallel.comm import Comm
-from ..state import Flags, Floats, Indices, Ints
 from . import domain, ghosts, search
 from .narrow_phase import DEEP
 from .records import Crowd, Edges, Faces, merged

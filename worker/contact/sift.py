@@ -10,8 +10,8 @@ stays.
 
 import numpy as np
 
-from ..jit import njit
-from ..state import Flags, Floats, Indices
+from ..kernels.jit import njit
+from ..model.state import Flags, Floats, Indices
 from .geometry import VECTOR, at, beyond, cross, dot, minus, nearest
 from .narrow_phase import DEEP, DEEP_SELF
 

@@ -4,10 +4,10 @@ from typing import Protocol
 
 import numpy as np
 
-from ..growing import Scratch
+from ..model.growing import Scratch
+from ..model.state import Flags, Floats, Indices, Ints, Nodes
 from ..parallel.fixed_point import Tally
 from ..parallel.team import Team
-from ..state import Flags, Floats, Indices, Ints, Nodes
 from . import booking, held, stops, sweeps, tasks
 from .active import IMPULSE, PUSH, PUSH_T, ActiveContacts, ActiveNodes, Kept, Loaded
 from .books import Books

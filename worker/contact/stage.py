@@ -12,17 +12,17 @@ import numpy as np
 from conoid.cases.impact import pressed, sweeps
 from conoid.cases.schema import Case
 
-from ..boundaries import Boundary
+from ..accounts.timers import Timers
+from ..boundaries.boundaries import Boundary
 from ..clock import Clock
 from ..migration.parcel import Parcel
+from ..model.state import Flags, Floats, Indices, Ints, Model, Nodes
+from ..model.topology import Split
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour
 from ..parallel.team import Team
 from ..reduction import StepReduction
 from ..rigid.stage import Rigid
-from ..state import Flags, Floats, Indices, Ints, Model, Nodes
-from ..timers import Timers
-from ..topology import Split
 from . import normals, pairing, sharp
 from .books import Books
 from .detection import Ahead, Detected, Detection

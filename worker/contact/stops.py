@@ -15,12 +15,12 @@ import numpy as np
 from conoid.cases import schema
 from conoid.cases.schema import Case
 
-from ..conditions import AXES, part_sides
-from ..jit import njit, record, types
+from ..boundaries.walls import ACROSS
+from ..kernels.jit import njit, record, types
+from ..model.state import Flags, Floats, Indices, Ints, Model
 from ..parallel.comm import Comm
-from ..selection import named
-from ..state import Flags, Floats, Indices, Ints, Model
-from ..walls import ACROSS
+from ..scene.conditions import AXES, part_sides
+from ..scene.selection import named
 from .active import MOBILITY, NODES, V
 
 _NEAR = 0.25

@@ -4,13 +4,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..ids import among
-from ..jit import njit
+from ..kernels.jit import njit
 from ..mesh.faces import FACES
+from ..model.ids import among
+from ..model.state import LAID_BARE, WIDE, Bits, Flags, Indices, Ints, Model
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour, complete
 from ..parallel.tags import Tag
-from ..state import LAID_BARE, WIDE, Bits, Flags, Indices, Ints, Model
 from . import sharp
 from .records import CrackSides, Edges, Faces
 

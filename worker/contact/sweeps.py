@@ -17,7 +17,7 @@ Kernels call no kernel within a loop over contacts: records of arrays are counte
 
 import numpy as np
 
-from ..jit import njit, types
+from ..kernels.jit import njit, types
 from .active import (
     CHANGED,
     CONTACTS,

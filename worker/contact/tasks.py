@@ -3,7 +3,7 @@
 Each task puts its rows behind each other from a place of its own on, and into ``counts`` how many they are.
 """
 
-from ..jit import njit, types
+from ..kernels.jit import njit, types
 from ..parallel.arguments import reader
 from ..parallel.team import TASK
 from . import booking, cracks, edge_edge, entering, haste, held, loading, node_face, restitution, sweeps

@@ -4,7 +4,7 @@ from typing import Protocol
 
 import numpy as np
 
-from ..state import Ints
+from ..model.state import Ints
 from .records import Crowd
 
 NOTHING: Ints = np.zeros(0, np.int64)

@@ -10,9 +10,9 @@ mean velocities of these steps they are much closer to the slots, and nobody has
 
 import numpy as np
 
-from ..growing import Rooms
-from ..jit import njit
-from ..state import Flags, Floats, Indices
+from ..kernels.jit import njit
+from ..model.growing import Rooms
+from ..model.state import Flags, Floats, Indices
 
 _V1, _V2, _N2 = "float64[::1]", "float64[:, ::1]", "int32[:, ::1]"
 

@@ -7,7 +7,7 @@ are one set more, which is swept after these. With one thread there is one zone.
 
 import numpy as np
 
-from ..state import Floats, Indices, Ints
+from ..model.state import Floats, Indices, Ints
 from .records import Crowd
 
 _PER_THREAD = 4

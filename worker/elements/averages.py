@@ -14,9 +14,9 @@ from conoid.cases.joined import shared_bonds
 from conoid.cases.schema import MOST_PARTS, Case
 
 from ..migration.parcel import Table
+from ..model.state import Block, Floats, Indices, Ints, Model, Nodes, Tets, extended
+from ..model.topology import Split
 from ..parallel.ownership import Neighbour
-from ..state import Block, Floats, Indices, Ints, Model, Nodes, Tets, extended
-from ..topology import Split
 
 
 def kinds(case: Case) -> Indices:

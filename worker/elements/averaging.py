@@ -2,17 +2,17 @@
 
 import numpy as np
 
-from ..boundaries import Boundary
+from ..accounts.timers import Timers
+from ..boundaries.boundaries import Boundary
 from ..materials.law import BULK
 from ..migration.parcel import Parcel
+from ..model.state import Floats, Indices, Ints, Model, extended
+from ..model.topology import Split
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour, SharedSum
 from ..parallel.passes import Pass
 from ..parallel.tags import Tag
 from ..parallel.team import Team
-from ..state import Floats, Indices, Ints, Model, extended
-from ..timers import Timers
-from ..topology import Split
 from . import matter, nodal, tasks
 from .averages import Averages
 from .flat import flat_tets

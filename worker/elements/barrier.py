@@ -11,9 +11,9 @@ Its energy is elastic. Tets of parts that erode leave instead (docs/theory/eleme
 
 import numpy as np
 
-from ..jit import njit
+from ..kernels.jit import njit
 from ..materials.law import BULK, DENSITY, Q_LINEAR, Q_QUADRATIC, Q_SHOCK
-from ..state import CHUNK, MASS, VISCOUS, WORK, WORK_VISCOUS
+from ..model.state import CHUNK, MASS, VISCOUS, WORK, WORK_VISCOUS
 from .tet4 import CHANGE, LIMIT, MODULUS, VOLUME
 
 SQUEEZED = 0.2

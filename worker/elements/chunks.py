@@ -3,7 +3,7 @@
 ``t`` (n, 4) are the tets of the chunk, ``s`` is its state, ``w`` and ``wi`` are the scratch of records.py.
 """
 
-from ..jit import njit, types
+from ..kernels.jit import njit, types
 from ..materials.elastic import deviatoric_work, predict
 from ..materials.hyperelastic import stiffen
 from ..materials.law import (

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..jit import njit
-from ..state import CHUNK, Block, Ints
+from ..kernels.jit import njit
+from ..model.state import CHUNK, Block, Ints
 
 _BITS = 63
 """Colours that a word has bits for; a chunk that finds none free has a colour for itself alone."""

@@ -7,11 +7,11 @@ that. With its own pressure it resists as in the ``standard`` form; the few of t
 
 import numpy as np
 
-from ..jit import njit
+from ..kernels.jit import njit
 from ..materials.law import BULK, DENSITY, DILATES
 from ..materials.models import press
 from ..mesh.faces import FACES, normals
-from ..state import CHUNK, DILATION, HEAT, MASS, TOLD, Block, Flags, Floats
+from ..model.state import CHUNK, DILATION, HEAT, MASS, TOLD, Block, Flags, Floats
 from .heat_and_bulking import stretch_corner
 from .mean import book_averaged
 from .pressure import STABILISE

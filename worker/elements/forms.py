@@ -9,16 +9,16 @@ from typing import Protocol
 
 import numpy as np
 
-from ..jit import cpu_time
+from ..accounts.timers import Timers
+from ..kernels.jit import cpu_time
 from ..migration.parcel import Parcel
+from ..model.state import Block, Floats, Ints, Model
+from ..model.topology import Split
 from ..parallel import fixed_point
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour, SharedSum
 from ..parallel.tags import Tag
 from ..parallel.team import Team
-from ..state import Block, Floats, Ints, Model
-from ..timers import Timers
-from ..topology import Split
 from . import chunks, records, tasks
 from .colours import Coloured, coloured, whole
 from .passes import BlockPass, Values

@@ -6,9 +6,9 @@ against its neighbours, and volumes of nodes would not resist. So would bulking 
 
 import numpy as np
 
-from ..jit import njit
+from ..kernels.jit import njit
 from ..materials.law import BULK, DENSITY
-from ..state import BULKING, CHUNK, CORNERS, HEAT, MASS, TOLD, UNTOLD, WORK, WORK_AVERAGED, WORK_VISCOUS
+from ..model.state import BULKING, CHUNK, CORNERS, HEAT, MASS, TOLD, UNTOLD, WORK, WORK_AVERAGED, WORK_VISCOUS
 from .pressure import QUANTA
 from .tet4 import CORNER_CHANGE, VOLUME_MID
 

@@ -13,19 +13,10 @@ with the tet; so does the pressure of an equation of state with heat.
 
 import numpy as np
 
-from ..jit import njit
+from ..kernels.jit import njit
 from ..materials.elastic import sheared
 from ..materials.law import BULK, DENSITY, DILATES, FROM_SHAPE, ORDER, SHEAR, SPALL
-from ..state import (
-    CHUNK,
-    MASS,
-    PORES,
-    PRESSURE,
-    WORK,
-    WORK_AVERAGED,
-    WORK_PLASTIC,
-    Floats,
-)
+from ..model.state import CHUNK, MASS, PORES, PRESSURE, WORK, WORK_AVERAGED, WORK_PLASTIC, Floats
 from .tet4 import CHANGE, MODULUS
 
 RATIO, PORES_AT, PRESSURE_AT, WORKED, TORN, OPENED, STIFF = range(7)

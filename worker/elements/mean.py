@@ -7,10 +7,10 @@ lost for good, where neighbours yield, tear or leave at different times; and wha
 dissipate (docs/theory/elements.md, What averaging takes).
 """
 
-from ..jit import njit
+from ..kernels.jit import njit
 from ..materials.elastic import sheared, squeezed
 from ..materials.law import BULK, DILATES
-from ..state import CHUNK, DILATION, PRESSURE, WORK_AVERAGED
+from ..model.state import CHUNK, DILATION, PRESSURE, WORK_AVERAGED
 from .tet4 import BEFORE, CHANGE, CHANGE_SEEN, SEEN, VOLUME_MID, VOLUME_SEEN
 
 _P, _GROWN, _TAKEN = PRESSURE * CHUNK, DILATION * CHUNK, WORK_AVERAGED * CHUNK

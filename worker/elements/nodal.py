@@ -1,6 +1,6 @@
 """The nodes of the averaged pressure forms: what is done with their sums between the passes over the tets, as tasks."""
 
-from ..jit import njit, types
+from ..kernels.jit import njit, types
 from ..parallel.arguments import reader
 from ..parallel.team import TASK
 from .matter import press_node

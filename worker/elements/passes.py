@@ -2,9 +2,9 @@
 
 from typing import Any
 
-from ..jit import Kernel
+from ..kernels.jit import Kernel
+from ..model.state import Block, Nodes
 from ..parallel.arguments import Arguments
-from ..state import Block, Nodes
 from .records import Scratches, body_of, marks_of, motion_of
 
 Values = tuple[Any, ...]

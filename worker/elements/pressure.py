@@ -14,9 +14,9 @@ whatever the size of the tets: one fixed scale, QUANTA, serves every scene.
 
 import numpy as np
 
-from ..jit import njit
+from ..kernels.jit import njit
 from ..materials.law import BULK
-from ..state import CHUNK, DILATION, MASS, PRESSURE, TET_VOLUME, VOLUME_FLUX, WORK
+from ..model.state import CHUNK, DILATION, MASS, PRESSURE, TET_VOLUME, VOLUME_FLUX, WORK
 from .tet4 import (
     CHANGE,
     DILATATION,

@@ -5,8 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..jit import record, types
-from ..state import CHUNK, Bits, Flags, Floats, Ints, Tets
+from ..kernels.jit import record, types
+from ..model.state import CHUNK, Bits, Flags, Floats, Ints, Tets
 from . import tet4
 
 LARGEST_LIMIT, LIMITING_TET, LARGEST_FORCE, WORN, HOT = range(5)

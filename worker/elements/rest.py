@@ -8,7 +8,7 @@ stable step.
 
 import numpy as np
 
-from ..jit import njit
+from ..kernels.jit import njit
 from .tet4 import LIMIT, MAGNITUDE
 
 NOTED, TET, STEADY = range(3)

@@ -10,10 +10,10 @@ of two passes finds volumes alone.
 Chunks at rest, which no wave has reached, are passed over (rest.py).
 """
 
-from ..jit import njit, types
+from ..kernels.jit import njit, types
 from ..materials.law import AFTER_PRESSURE, DILATES, FROM_SHAPE, ORDER
 from ..materials.models import press, strengthen, swell
-from ..state import CHUNK, UNTOLD
+from ..model.state import CHUNK, UNTOLD
 from . import chunks, rest, tet4
 from . import matter as matter_of
 from . import pressure as averaged

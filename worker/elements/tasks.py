@@ -1,6 +1,6 @@
 """The passes over the elements as tasks of a team (parallel/team.py): each thread has a scratch of its own."""
 
-from ..jit import njit, types
+from ..kernels.jit import njit, types
 from ..parallel.arguments import reader
 from ..parallel.team import TASK
 from . import sweep

@@ -11,9 +11,9 @@ import numpy as np
 
 from conoid.cases.schema import Erosion
 
-from ..jit import njit
+from ..kernels.jit import njit
 from ..materials.law import DENSITY
-from ..state import (
+from ..model.state import (
     CHUNK,
     DAMAGE,
     MASS,

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from ..jit import njit
+from ..kernels.jit import njit
+from ..model.state import CHUNK, WORKS, Block, Floats, Ints
 from ..parallel.fixed_point import limbs, magnitude, most
-from ..state import CHUNK, WORKS, Block, Floats, Ints
 
 
 class ElementWork:

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..jit import njit, types
+from ..kernels.jit import njit, types
 from ..mesh.faces import FACES
-from ..state import CHUNK, MASS, Flags, Floats, Ints
+from ..model.state import CHUNK, MASS, Flags, Floats, Ints
 from .facets import Body
 from .records import BREAKING, CANDIDATES, INTERFACE, MESH, BreakingFacets, Candidates, InterfaceFacets
 

@@ -29,9 +29,9 @@ A facet whose nodes have not separated holds by itself: its pairs are one node, 
 import numpy as np
 
 from ..migration.parcel import Parcel
+from ..model.state import Flags, Floats, Indices, Ints, Nodes
+from ..model.topology import Split
 from ..parallel.fixed_point import Tally
-from ..state import Flags, Floats, Indices, Ints, Nodes
-from ..topology import Split
 from . import law
 from .columns import FacetConstants, Facets, PairState, Softening
 

@@ -5,8 +5,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..jit import record, types
-from ..state import Flags, Floats, Indices, Ints, extended
+from ..kernels.jit import record, types
+from ..model.state import Flags, Floats, Indices, Ints, extended
 
 
 class FacetConstants(NamedTuple):

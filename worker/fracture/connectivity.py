@@ -6,10 +6,10 @@ to their roots are laid into one (Patwary, Blair and Manne, Experiments on union
 
 import numpy as np
 
-from ..ids import located, places, unique
-from ..jit import njit
+from ..kernels.jit import njit
+from ..model.ids import located, places, unique
+from ..model.state import Block, Indices, Ints, Model
 from ..parallel.comm import Comm
-from ..state import Block, Indices, Ints, Model
 
 _PART = 1 << 62
 """Added to the number of a part: the name of what joins its tets, above all tet ids."""

@@ -8,9 +8,9 @@ two tractions passes only where one of them does. So the pass over the elements 
 
 import numpy as np
 
-from ..jit import njit, types
+from ..kernels.jit import njit, types
 from ..mesh.faces import FACES
-from ..state import CHUNK, INTACT, PRESSURE, S_XX, S_XY, S_YY, S_YZ, S_ZX, S_ZZ
+from ..model.state import CHUNK, INTACT, PRESSURE, S_XX, S_XY, S_YY, S_YZ, S_ZX, S_ZZ
 from .records import CANDIDATES, INTERFACE, LAW, MESH, POINTS, TABLE
 from .strength import required
 

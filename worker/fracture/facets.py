@@ -6,10 +6,10 @@ import numpy as np
 
 from conoid.cases.schema import Fracture as Spec
 
-from ..ids import among, located, places
 from ..migration.parcel import Table
-from ..state import INTACT, Bits, Block, Flags, Floats, Indices, Ints
-from ..topology import Split
+from ..model.ids import among, located, places
+from ..model.state import INTACT, Bits, Block, Flags, Floats, Indices, Ints
+from ..model.topology import Split
 from . import criterion
 from .records import FacetTable, Law, Mesh
 from .strength import Toughness

@@ -21,10 +21,10 @@ import numpy as np
 
 from conoid.cases import fragments as tables
 
-from ..ids import places
 from ..mesh.faces import FACES, areas
+from ..model.ids import places
+from ..model.state import MASS, Block, Floats, Ints, Model
 from ..parallel.comm import Comm
-from ..state import MASS, Block, Floats, Ints, Model
 
 _NODE_BITS = 40
 """A node's global id stays below 2^40."""

@@ -5,11 +5,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ..elements.tet4 import EDGE, SCRATCH, end_gradients, gather, internal_forces
-from ..jit import njit, record, types
+from ..kernels.jit import njit, record, types
+from ..model.state import CHUNK, VISCOUS, Floats, Ints, Model, Tets
+from ..model.topology import Split
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour
-from ..state import CHUNK, VISCOUS, Floats, Ints, Model, Tets
-from ..topology import Split
 from .cohesive import Cohesion
 from .columns import Facets
 from .law import scatter_copies

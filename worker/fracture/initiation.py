@@ -6,10 +6,10 @@ from conoid.cases.schema import Fracture
 
 from ..clock import Clock
 from ..migration.parcel import Parcel
+from ..model.state import MASS, Flags, Model
+from ..model.topology import Split
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour
-from ..state import MASS, Flags, Model
-from ..topology import Split
 from . import criterion, facets, nodal
 from .breaking import Breaking, gathered
 from .facets import Body

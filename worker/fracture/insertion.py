@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from ..state import Floats, Indices, Ints, Nodes
-from ..topology import Split
+from ..model.state import Floats, Indices, Ints, Nodes
+from ..model.topology import Split
 from . import criterion
 from .breaking import Breaking
 from .cohesive import frames, fresh

@@ -6,10 +6,10 @@ such a facet is among those they share. Whether there is one they tell each othe
 
 import numpy as np
 
+from ..model.state import MASS, Floats, Ints
 from ..parallel.comm import Comm, Exchange
 from ..parallel.ownership import Neighbour
 from ..parallel.tags import Tag
-from ..state import MASS, Floats, Ints
 from . import criterion
 from .facets import ELSEWHERE, Body
 from .records import InterfaceFacets

@@ -14,7 +14,7 @@ what could be given back is the same, or nothing. What is left of the energy lie
 import numpy as np
 
 from ..elements.tet4 import largest_of, quanta
-from ..jit import njit, types
+from ..kernels.jit import njit, types
 from .columns import FACETS
 
 _SLACK = 1e-6

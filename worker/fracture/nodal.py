@@ -7,12 +7,12 @@ such facets are candidates (criterion.py).
 
 import numpy as np
 
-from ..jit import njit, types
+from ..kernels.jit import njit, types
 from ..mesh.faces import FACES
+from ..model.state import CHUNK, MASS, PRESSURE, S_XX, S_XY, S_YY, S_YZ, S_ZX, S_ZZ, Flags, Floats, Nodes
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour, complete
 from ..parallel.tags import Tag
-from ..state import CHUNK, MASS, PRESSURE, S_XX, S_XY, S_YY, S_YZ, S_ZX, S_ZZ, Flags, Floats, Nodes
 from .criterion import effective, outward
 from .facets import Body
 from .records import CANDIDATES, INTERFACE, MESH, POINTS, Candidates, InterfaceFacets

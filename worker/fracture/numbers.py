@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from ..ids import places
+from ..model.ids import places
+from ..model.state import Ints
 from ..parallel.comm import Comm
-from ..state import Ints
 
 UNKNOWN = -1
 """The number of a tet that has none yet."""

@@ -6,9 +6,9 @@ facet waits for every one that shares a node with it and is loaded more strongly
 
 import numpy as np
 
+from ..model.state import Flags, Floats, Indices, Ints
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour
-from ..state import Flags, Floats, Indices, Ints
 
 
 def strongest(facets: Ints, load: Floats, nodes: Indices, ids: Ints, neighbours: list[Neighbour], comm: Comm) -> Flags:

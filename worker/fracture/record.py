@@ -7,10 +7,10 @@ import numpy as np
 
 from conoid.cases import fragments as tables
 
-from ..ids import places
 from ..migration.parcel import Parcel, length
+from ..model.ids import places
+from ..model.state import Ints, Model
 from ..parallel.comm import Comm
-from ..state import Ints, Model
 from . import connectivity, fragments
 from .numbers import UNKNOWN, numbered
 from .stage import Fracture

@@ -4,8 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..jit import record, types
-from ..state import Bits, Flags, Floats, Indices, Ints, Tets
+from ..kernels.jit import record, types
+from ..model.state import Bits, Flags, Floats, Indices, Ints, Tets
 
 
 class Mesh(NamedTuple):

@@ -8,10 +8,10 @@ first a pair gives up what alone would keep it from moving back, in the second t
 import numpy as np
 
 from ..clock import Clock
+from ..model.state import Nodes
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour, SharedSum
 from ..parallel.tags import Tag
-from ..state import Nodes
 from .cohesive import Cohesion
 
 

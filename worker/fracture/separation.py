@@ -11,12 +11,12 @@ others go on with their step meanwhile. Which ranks have some is known before, f
 
 import numpy as np
 
-from ..jit import njit, several, types
+from ..kernels.jit import njit, several, types
 from ..mesh.faces import FACES
+from ..model.state import BROKEN, Copies, Indices, Ints, Model, extended
+from ..model.topology import KEY, Split, keys
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour
-from ..state import BROKEN, Copies, Indices, Ints, Model, extended
-from ..topology import KEY, Split, keys
 from . import stars
 from .records import MESH, Mesh
 from .stars import Stars

@@ -19,10 +19,10 @@ from ..clock import Clock
 from ..contact.stage import Contact
 from ..elements.forms import Elements
 from ..migration.parcel import Parcel
+from ..model.state import Ints, Model
+from ..model.topology import KeptByNode
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour
-from ..state import Ints, Model
-from ..topology import KeptByNode
 from . import facets
 from .breaking import Breaking
 from .cohesive import Cohesion

@@ -8,12 +8,12 @@ facet inside a body separates nothing; a closed sheet of them round a node does.
 
 import numpy as np
 
-from ..growing import Rooms
-from ..jit import njit, several, types
+from ..kernels.jit import njit, several, types
 from ..mesh.faces import FACES
-from ..state import CHUNK, INTACT, Indices, Ints, Tets
-from ..state import MASS as MASS_ROW
-from ..topology import keys
+from ..model.growing import Rooms
+from ..model.state import CHUNK, INTACT, Indices, Ints, Tets
+from ..model.state import MASS as MASS_ROW
+from ..model.topology import keys
 from .records import MESH
 
 NODE, TET, RANK, MASS, BEHIND = 0, 1, 2, 3, 4

@@ -16,10 +16,10 @@ from conoid.cases.bonds import SharedBond
 from conoid.cases.materials import Brittle, Material, Scatter
 from conoid.cases.schema import Fracture
 
-from ..hashing import uniform
-from ..jit import njit
+from ..kernels.jit import njit
 from ..materials.elementary import exp_less_one, log, power
-from ..state import Floats, Ints
+from ..model.hashing import uniform
+from ..model.state import Floats, Ints
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from conoid.cases.library import material as find_material
 from conoid.cases.schema import Case, Fracture
 
 from ..materials.elementary import power
-from ..state import Model
+from ..model.state import Model
 from . import facets, resolution
 from .strength import UNBREAKABLE, Toughness, of_bond, terms, toughness
 

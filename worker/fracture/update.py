@@ -2,8 +2,8 @@
 
 from ..contact.stage import Contact
 from ..elements.forms import Elements
-from ..state import Model
-from ..topology import KeptByNode, Split
+from ..model.state import Model
+from ..model.topology import KeptByNode, Split
 from .breaking import Breaking
 from .cohesive import Cohesion
 from .columns import Facets

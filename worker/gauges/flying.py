@@ -7,7 +7,7 @@ import numpy as np
 from conoid.cases.schema import Case
 
 from ..fracture import connectivity, fragments
-from ..state import Floats, Ints
+from ..model.state import Floats, Ints
 from .gauge import Scene
 from .sums import ahead, way
 

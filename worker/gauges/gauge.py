@@ -2,14 +2,14 @@
 
 from typing import Any, NamedTuple, Protocol
 
-from ..boundaries import Boundary
+from ..boundaries.boundaries import Boundary
 from ..clock import Clock
 from ..contact.stage import Contact
 from ..erosion import Erosion
 from ..fracture.stage import Fracture
+from ..model.state import Floats, Model
 from ..parallel.comm import Comm
 from ..rigid.stage import Rigid
-from ..state import Floats, Model
 
 
 class Scene(NamedTuple):

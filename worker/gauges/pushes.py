@@ -7,9 +7,9 @@ import numpy as np
 from conoid.cases.measures import PUSHES, Probe, kind
 from conoid.cases.schema import Case, Wall
 
-from ..boundaries import Boundary
+from ..boundaries.boundaries import Boundary
+from ..model.state import Floats
 from ..parallel.fixed_point import exact_sums
-from ..state import Floats
 from .gauge import Scene
 
 _AXES = "xyz"

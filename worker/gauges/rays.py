@@ -2,9 +2,9 @@
 
 import numpy as np
 
+from ..materials.turning import sines_and_cosines
 from ..mesh.faces import FACES
-from ..state import Floats, Tets
-from ..turning import sines_and_cosines
+from ..model.state import Floats, Tets
 
 RAYS = 360
 """Chosen: an opening of a hundred tets round has three or four rays each."""

@@ -8,13 +8,12 @@ import numpy as np
 from conoid.cases.measures import SHAPES, Probe
 from conoid.cases.schema import Case
 
-from .. import penetration
 from ..fracture import connectivity, fragments
 from ..mesh.faces import FACES, areas
+from ..model.state import Block, Floats
 from ..output.damage import damage
 from ..parallel.fixed_point import exact_sums
-from ..state import Block, Floats
-from . import rays
+from . import penetration, rays
 from .flying import held
 from .gauge import Scene
 

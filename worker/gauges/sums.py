@@ -10,9 +10,9 @@ from conoid.cases.on import bits
 from conoid.cases.region import Region
 from conoid.cases.schema import Case
 
-from ..marks import held
+from ..model.state import Flags, Floats
 from ..parallel.fixed_point import exact_sums
-from ..state import Flags, Floats
+from ..scene.marks import held
 from .gauge import Scene
 
 _AXES = "xyz"

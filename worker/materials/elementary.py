@@ -6,8 +6,8 @@ depends on a C library. Derived in docs/theory/sums.md.
 
 import numpy as np
 
-from ..jit import njit
-from ..state import CHUNK
+from ..kernels.jit import njit
+from ..model.state import CHUNK
 
 _LN2_HIGH, _LN2_LOW = 0.693147180369123816490, 1.90821492927058770002e-10
 """ln 2 in two parts: the first has 33 bits, so that its product with an exponent is exact; together they have 86."""

@@ -9,8 +9,8 @@ import numpy as np
 from conoid.cases.materials import MieGruneisen
 
 from ..elements.tet4 import CHANGE, MODULUS, NODAL, SEEN, VOLUME_SEEN
-from ..jit import njit
-from ..state import (
+from ..kernels.jit import njit
+from ..model.state import (
     CHUNK,
     DILATION,
     HEAT,

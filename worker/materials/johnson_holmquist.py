@@ -29,8 +29,8 @@ from ..elements.tet4 import (
     VOLUME,
     VOLUME_MID,
 )
-from ..jit import njit
-from ..state import (
+from ..kernels.jit import njit
+from ..model.state import (
     BULKING,
     CHUNK,
     CORNERS,

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from ..state import Floats
+from ..model.state import Floats
 
 DENSITY, BULK, SHEAR, Q_LINEAR, Q_SHOCK, Q_QUADRATIC, ORDER, SPALL, DILATES, BREAKS = range(10)
 """Places in a block's constants: what every material has. ORDER says when its law acts; SPALL is infinite where the
@@ -30,7 +30,7 @@ class Law:
     order: int
     """FROM_SHAPE, BEFORE_PRESSURE or AFTER_PRESSURE."""
     rows: Callable[[Any], int]
-    """How many rows of state a tet needs (worker/state.py), from its table in the case."""
+    """How many rows of state a tet needs (worker/model/state.py), from its table in the case."""
     constants: Callable[[Any], tuple[float, ...]]
     """Its constants from its table; they stand from FIRST on."""
     begin: Callable[[Any, float], dict[int, float]]

@@ -11,9 +11,9 @@ import numpy as np
 from conoid.cases.materials import Material
 from conoid.cases.schema import Viscosity
 
-from .. import state
-from ..jit import njit
-from ..state import Floats
+from ..kernels.jit import njit
+from ..model import state
+from ..model.state import Floats
 from . import equation_of_state, hyperelastic, johnson_cook, johnson_holmquist, mohr_coulomb, plastic
 from .law import (
     BREAKS,
@@ -117,7 +117,7 @@ def parameters(material: Material, viscosity: Viscosity | None, *, breaks: bool 
 
 
 def rows_of(material: Material, pressure: str) -> int:
-    """How many rows of state an element of this material needs (worker/state.py)."""
+    """How many rows of state an element of this material needs (worker/model/state.py)."""
     equation = equation_of(material)
     averaged = 0 if pressure == "standard" else max(state.WORK_AVERAGED + 1, equation.averaged)
     porous = 0 if material.spall is None else state.PORES + 1

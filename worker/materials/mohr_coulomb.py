@@ -13,8 +13,8 @@ import numpy as np
 from conoid.cases.laws.mohr_coulomb import MohrCoulomb
 
 from ..elements.tet4 import CHANGE, D_XX, D_XY, D_YY, D_YZ, D_ZX, D_ZZ, SEEN, TRIAL, VOLUME_MID, VOLUME_SEEN
-from ..jit import njit
-from ..state import (
+from ..kernels.jit import njit
+from ..model.state import (
     CHUNK,
     DILATION,
     PLASTIC_STRAIN,
@@ -29,10 +29,10 @@ from ..state import (
     WORK,
     WORK_PLASTIC,
 )
-from ..turning import sine_and_cosine
 from .elastic import squeezed
 from .law import AFTER_PRESSURE, BULK, DILATES, FIRST, SHEAR, SPALL, Law
 from .plastic import equivalent_stress
+from .turning import sine_and_cosine
 
 _SINE, _COHESION, _CAP, _FAILURE = FIRST, FIRST + 1, FIRST + 4, FIRST + 5
 _RESIDUAL = 2

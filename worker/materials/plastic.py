@@ -5,19 +5,8 @@ import numpy as np
 from conoid.cases.laws.linear_hardening import LinearHardening
 
 from ..elements.tet4 import D_XX, D_XY, D_YY, D_YZ, D_ZX, D_ZZ, TRIAL, VOLUME_MID
-from ..jit import njit
-from ..state import (
-    CHUNK,
-    PLASTIC_STRAIN,
-    S_XX,
-    S_XY,
-    S_YY,
-    S_YZ,
-    S_ZX,
-    S_ZZ,
-    WORK_PLASTIC,
-    YIELD,
-)
+from ..kernels.jit import njit
+from ..model.state import CHUNK, PLASTIC_STRAIN, S_XX, S_XY, S_YY, S_YZ, S_ZX, S_ZZ, WORK_PLASTIC, YIELD
 from .law import BEFORE_PRESSURE, FIRST, SHEAR, Law
 
 _HARDENING = FIRST

@@ -3,8 +3,8 @@
 import numpy as np
 
 from ..elements.tet4 import AREAS, CHANGE, LENGTH_FACTOR, LIMIT, MODULUS, SEEN, VOLUME, VOLUME_SEEN
-from ..jit import njit
-from ..state import CHUNK, MASS, PRESSURE, VISCOUS, WORK_VISCOUS
+from ..kernels.jit import njit
+from ..model.state import CHUNK, MASS, PRESSURE, VISCOUS, WORK_VISCOUS
 
 HALF = 0.01
 """Of the wave speed: a difference of speed over a tet at which half of the shock term is there. Chosen between elastic

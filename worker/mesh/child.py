@@ -25,7 +25,7 @@ from conoid.cases.run import ExitCode
 from conoid.cases.solids import Cad, Combination, Measured
 
 from ..errors import InputError, MeshError, StoppedError
-from ..signals import REQUESTS
+from ..run.signals import REQUESTS
 from .sources import Sources
 
 _PASSED_ON = ("HOME", "LANG", "LC_ALL", "LD_LIBRARY_PATH", "PATH", "PYTHONPATH", "TMPDIR", "VIRTUAL_ENV")

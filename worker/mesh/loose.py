@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from conoid.cases.bodies import Shards, TwoTets
 from conoid.cases.geometry import altitude, pitch
 
-from ..hashing import uniform
-from ..turning import sine_and_cosine, sines_and_cosines
+from ..materials.turning import sine_and_cosine, sines_and_cosines
+from ..model.hashing import uniform
 from .model import Floats, TetMesh
 
 _CORNERS = np.array([[1, 1, 1], [1, -1, -1], [-1, -1, 1], [-1, 1, -1]]) / math.sqrt(8.0)

@@ -13,7 +13,7 @@ from conoid.cases.bodies import Box, Cylinder, Plate, Shards, Tube, TwoTets
 from conoid.cases.geometry import Generated
 
 from ..errors import MeshError
-from ..turning import sines_and_cosines
+from ..materials.turning import sines_and_cosines
 from .frame import block, refuse_impossible, to_space
 from .loose import shards, two_tets
 from .model import Floats, Ints, TetMesh

@@ -7,11 +7,11 @@ import numpy as np
 from conoid.cases.on import ons
 from conoid.cases.schema import MOST_PARTS, Case
 
-from .. import domain
-from ..ids import located
+from ..model.ids import located
+from ..model.shares import Shares, ranks
+from ..model.state import CHUNK, Bits, Block, Indices, Ints, Model, Nodes, Tets
 from ..parallel.comm import Comm
-from ..shares import Shares, ranks
-from ..state import CHUNK, Bits, Block, Indices, Ints, Model, Nodes, Tets
+from ..scene import domain
 from .parcel import Parcel, Table, length, take
 from .route import Arrived
 

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ..state import Ints
+from ..model.state import Ints
 
 Table = dict[str, "np.ndarray"]
 """Columns of equal length."""

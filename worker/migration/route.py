@@ -10,11 +10,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import ConoidError
-from ..ids import among, located, unique
+from ..model.ids import among, located, unique
+from ..model.state import Flags, Floats, Indices, Ints
 from ..parallel.comm import Comm
 from ..parallel.decompose import Cut, bisect, place
 from ..parallel.ownership import Neighbour
-from ..state import Flags, Floats, Indices, Ints
 from .parcel import Parcel, Table, joined, length, once, take
 
 _NOBODY = np.iinfo(np.int64).max

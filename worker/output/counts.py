@@ -14,12 +14,12 @@ import numpy as np
 
 from conoid.cases.joined import bodies
 
-from ..ids import located, unique
-from ..jit import njit
+from ..kernels.jit import njit
+from ..model.ids import located, unique
+from ..model.state import Floats, Ints, Model
 from ..parallel.comm import Comm
 from ..simulation import Simulation
 from ..snapshots.table import by_size
-from ..state import Floats, Ints, Model
 
 SHARE = 1.0 / 50.0
 """Of the wall time, for finding fragments between frames. Chosen: a run of a minute takes a second longer."""

@@ -13,8 +13,8 @@ from conoid.cases.schema import Case
 
 from ..fracture.cohesive import Cohesion
 from ..fracture.columns import Facets
+from ..model.state import DAMAGE, PLASTIC_STRAIN, Block, Floats, Ints, Model
 from ..parallel.comm import Comm
-from ..state import DAMAGE, PLASTIC_STRAIN, Block, Floats, Ints, Model
 
 
 def damage(case: Case, model: Model, cohesion: Cohesion | None, comm: Comm) -> list[Floats] | None:

@@ -13,19 +13,8 @@ import numpy as np
 
 from conoid.cases import layout
 
+from ..model.state import CHUNK, PLASTIC_STRAIN, PRESSURE, S_XX, S_XY, TEMPERATURE, Block, Floats, Ints, Model
 from ..parallel.comm import Comm
-from ..state import (
-    CHUNK,
-    PLASTIC_STRAIN,
-    PRESSURE,
-    S_XX,
-    S_XY,
-    TEMPERATURE,
-    Block,
-    Floats,
-    Ints,
-    Model,
-)
 from . import fields, hdf5
 
 _TETRA = 10

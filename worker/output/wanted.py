@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from ..moving_walls import MovingWalls
+from ..boundaries.moving_walls import MovingWalls
+from ..boundaries.walls import RigidWalls
+from ..model.state import Floats
 from ..simulation import Simulation
-from ..state import Floats
-from ..walls import RigidWalls
 from .fields import Wanted
 
 

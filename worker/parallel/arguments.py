@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from llvmlite import ir
 
-from ..jit import intrinsic, packed, several, types
+from ..kernels.jit import intrinsic, packed, several, types
 
 _WORD, _BIT = ir.IntType(64), ir.IntType(1)
 """LLVM's types of a word of the table, and of a flag."""

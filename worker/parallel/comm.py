@@ -10,7 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from ..state import Ints
+from ..model.state import Ints
 from .tags import Tag
 
 

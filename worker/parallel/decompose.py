@@ -14,9 +14,9 @@ from itertools import product
 
 import numpy as np
 
-from ..hashing import splitmix64
-from ..jit import njit
-from ..state import Flags, Floats, Indices, Ints
+from ..kernels.jit import njit
+from ..model.hashing import splitmix64
+from ..model.state import Flags, Floats, Indices, Ints
 from .comm import Comm
 
 _LEVELS = 2.0**31 - 1.0

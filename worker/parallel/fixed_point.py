@@ -12,9 +12,9 @@ from typing import Protocol
 
 import numpy as np
 
-from ..jit import njit
+from ..kernels.jit import njit
 from ..materials.elementary import NEAREST
-from ..state import Floats, Indices, Ints
+from ..model.state import Floats, Indices, Ints
 from .comm import Comm
 
 CONTRIBUTION_BITS = 51

@@ -10,7 +10,7 @@ from typing import Any, NoReturn
 import numpy as np
 import numpy.typing as npt
 
-from ..state import Ints
+from ..model.state import Ints
 from .comm import Comm, Exchange, Pending, Sent, SerialComm
 from .tags import Tag
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..jit import njit
-from ..state import Indices, Ints
+from ..kernels.jit import njit
+from ..model.state import Indices, Ints
 from .comm import Comm
 from .tags import Tag
 

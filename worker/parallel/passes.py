@@ -4,8 +4,8 @@ from typing import Any
 
 import numpy as np
 
-from ..jit import Kernel
-from ..state import Ints
+from ..kernels.jit import Kernel
+from ..model.state import Ints
 from .arguments import Arguments
 from .team import Team
 

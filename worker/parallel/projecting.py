@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..jit import Kernel, njit, types
-from ..state import Ints
+from ..kernels.jit import Kernel, njit, types
+from ..model.state import Ints
 from .arguments import Arguments, reader
 from .team import Team
 from .words import TASK, call_task, now

@@ -20,8 +20,8 @@ from typing import Protocol
 
 import numpy as np
 
-from ..jit import Kernel, njit
-from ..state import Ints
+from ..kernels.jit import Kernel, njit
+from ..model.state import Ints
 from .words import SECOND, TASK, add, call_task, load, now, sched_yield, sem_post, sem_wait, swap, word_at
 
 __all__ = ["TASK", "Team", "team"]

@@ -4,7 +4,7 @@ from typing import Any
 
 from llvmlite import ir
 
-from ..jit import intrinsic, types
+from ..kernels.jit import intrinsic, types
 
 _WORD = ir.IntType(64)
 _MONOTONIC, SECOND = 1, 1_000_000_000

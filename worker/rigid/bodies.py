@@ -7,9 +7,9 @@ import numpy as np
 
 from conoid.cases.schema import Case, Part
 
+from ..model.state import Flags, Floats, Indices, Ints, Nodes
 from ..parallel.comm import Comm
 from ..parallel.fixed_point import exact_sums
-from ..state import Flags, Floats, Indices, Ints, Nodes
 from . import rotation
 from .motion import Held
 

@@ -9,9 +9,9 @@ import numpy as np
 from conoid.cases.geometry import AXES
 from conoid.cases.schema import Boundary, Case, Gravity, Part, Prescribed, Rotation, Symmetry
 
-from ..drivers import Course
-from ..state import Floats
-from ..turning import sine_and_cosine
+from ..boundaries.drivers import Course
+from ..materials.turning import sine_and_cosine
+from ..model.state import Floats
 
 
 @dataclass

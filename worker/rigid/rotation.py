@@ -13,7 +13,7 @@ IV.2: the midpoint rule keeps quadratic invariants). The error of the phase is o
 
 import numpy as np
 
-from ..jit import njit
+from ..kernels.jit import njit
 
 _ENOUGH = 1e-16
 """Change of the mean, over its size, below which it is found."""

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..contact.active import IMPULSE, MOBILITY, NODES, V
 from ..contact.loading import SHARES
-from ..jit import njit, types
+from ..kernels.jit import njit, types
 
 WEIGHTS = 8
 """Words of a body: sums over its slots of |w| |n_i|, of |arm x (|w| |n|)|_i over the reach, of |w|, of |arm| |w|."""

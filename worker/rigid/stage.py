@@ -14,12 +14,12 @@ from conoid.cases.estimate import RIGID_STEPS
 from conoid.cases.region import GENERATED
 from conoid.cases.schema import Case, Wall
 
+from ..boundaries.wall_shapes import Walls
 from ..contact.active import IMPULSE, ActiveNodes
 from ..contact.records import Crowd
 from ..errors import InputError
+from ..model.state import Floats, Indices, Ints, Nodes
 from ..parallel.comm import Comm
-from ..state import Floats, Indices, Ints, Nodes
-from ..wall_shapes import Walls
 from . import rotation, rows
 from .bodies import STATE, Bodies, dot, of_nodes, times
 from .stopped import stopped

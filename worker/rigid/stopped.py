@@ -4,8 +4,8 @@ import numpy as np
 
 from conoid.cases.schema import Case, Symmetry, Wall
 
+from ..model.state import Flags, Floats, Indices, Ints, Nodes
 from ..parallel.comm import Comm
-from ..state import Flags, Floats, Indices, Ints, Nodes
 from .bodies import Bodies, of_nodes
 
 

@@ -10,10 +10,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..boundaries.wall_shapes import SHAPES, Walls, gap
 from ..errors import PhysicsError
-from ..jit import njit, record, types
-from ..state import Flags, Floats, Indices, Ints
-from ..wall_shapes import SHAPES, Walls, gap
+from ..kernels.jit import njit, record, types
+from ..model.state import Flags, Floats, Indices, Ints
 from .bodies import Bodies, dot
 
 _NEAR = 2.0

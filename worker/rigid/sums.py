@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from ..state import Floats
-from ..wall_shapes import Walls
+from ..boundaries.wall_shapes import Walls
+from ..model.state import Floats
 from .stage import Rigid
 
 

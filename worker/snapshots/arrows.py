@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..state import Floats, Ints
+from ..model.state import Floats, Ints
 from .outline import Outline
 
 _MOST = 1000

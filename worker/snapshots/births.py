@@ -6,7 +6,7 @@ import numpy as np
 
 from conoid.cases import fragments
 
-from ..state import Floats, Ints
+from ..model.state import Floats, Ints
 
 
 class Births:

@@ -11,8 +11,8 @@ from conoid.cases.snapshot import FIELD, Array, Column, Field, Header, pack, siz
 
 from ..fracture import connectivity
 from ..fracture.numbers import numbered
+from ..model.state import Floats, Ints, Model
 from ..parallel.comm import SerialComm
-from ..state import Floats, Ints, Model
 from . import arrows, decimate, outline, table, volume
 from .outline import Outline
 from .share import Whole

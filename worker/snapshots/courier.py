@@ -15,7 +15,7 @@ from typing import Any
 
 from conoid.cases import layout
 
-from ..signals import REQUESTS
+from ..run.signals import REQUESTS
 from . import share
 from .share import Share
 

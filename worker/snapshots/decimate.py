@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..state import Floats, Ints
+from ..model.state import Floats, Ints
 from .outline import Outline
 
 _FINENESS = 2.0**0.25

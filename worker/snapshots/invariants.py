@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..state import Floats
+from ..model.state import Floats
 
 
 def of(rows: "np.ndarray") -> dict[str, Floats]:

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..ids import places
 from ..mesh.faces import FACES, across
-from ..state import WIDE, Block, Floats, Ints, Model
+from ..model.ids import places
+from ..model.state import WIDE, Block, Floats, Ints, Model
 
 
 @dataclass

@@ -14,8 +14,8 @@ import numpy as np
 from conoid.cases.whole import named
 
 from ..fracture.numbers import UNKNOWN
-from ..ids import located
-from ..state import DAMAGE, MASS, PLASTIC_STRAIN, PRESSURE, S_XX, TEMPERATURE, Block, Floats, Ints, Model, Nodes
+from ..model.ids import located
+from ..model.state import DAMAGE, MASS, PLASTIC_STRAIN, PRESSURE, S_XX, TEMPERATURE, Block, Floats, Ints, Model, Nodes
 from . import invariants
 
 ROWS = {"plastic_strain": PLASTIC_STRAIN, "temperature": TEMPERATURE, "damage": DAMAGE}

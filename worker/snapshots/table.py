@@ -7,8 +7,8 @@ import numpy as np
 from conoid.cases.snapshot import REST
 
 from ..fracture import fragments
+from ..model.state import Floats, Ints
 from ..parallel.comm import SerialComm
-from ..state import Floats, Ints
 from .share import Whole
 
 MOST_ROWS = 2048

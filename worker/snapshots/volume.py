@@ -8,7 +8,7 @@ import gzip
 
 import numpy as np
 
-from ..state import Floats, Ints
+from ..model.state import Floats, Ints
 
 MOST_TETS = 400_000
 """Of a model that has such a file. Chosen: a page cuts them in 20 ms."""

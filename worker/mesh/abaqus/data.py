@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from conoid.cases.inp import fields, is_whole, numbers, whole, wholes
 
 from ...errors import MeshError
-from ...turning import sine_and_cosine
+from ...materials.turning import sine_and_cosine
 from .elements import ElementType, Kind
 
 _AXIS = 7

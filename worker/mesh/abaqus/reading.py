@@ -10,7 +10,7 @@ import numpy as np
 from conoid.cases.inp import InpError
 
 from ...errors import MeshError
-from ...turning import sine_and_cosine
+from ...materials.turning import sine_and_cosine
 from ..model import Floats, Ids
 from ..solid import Content
 from .choosing import Chosen, everything, grouped

@@ -1,0 +1,59 @@
+"""``conoid sweep --adaptive``: what is looked for from the words of the command, the answer as lines or JSON."""
+
+import hashlib
+from collections.abc import Sequence
+from pathlib import Path
+
+import typer
+
+from conoid.cases.load import apply_overrides
+from conoid.cases.run import ExitCode
+
+from ..errors import UsageError
+from ..remote.session import Session
+from ..remote.submission import data_of, folder_of, locate
+from ..sweeps.adaptive import MOST, found_by
+from ..sweeps.found import Found
+from ..sweeps.goal import spans_of
+from .console import echo, echo_json
+from .options import aloud, complain
+
+
+def file_of(case: str, goal: str, sets: Sequence[str]) -> Path:
+    """Where an adaptive sweep is kept if nothing else is said: the same file for the same words."""
+    keys = sorted(word.partition("=")[0].strip() for word in sets)
+    told = hashlib.sha256("\n".join([goal.replace(" ", ""), *keys]).encode()).hexdigest()[:6]
+    return Path(f"{locate(case).stem}-{told}.sweep.json")
+
+
+def adaptive(
+    session: Session, case: str, goal: str, sets: Sequence[str], more: Sequence[str], tolerance: str | None,
+    at_once: int | None, most: int | None, out: Path | None, *, new: bool, as_json: bool,
+) -> Found:  # fmt: skip
+    """Looks for the threshold and prints what was found. ``more``: further overrides. Raises CaseError, ClientError."""
+    if not sets:
+        raise UsageError("--adaptive takes --set KEY=LOW:HIGH, the key that varies")
+    spans, constants = spans_of(sets)
+    data = apply_overrides(data_of(case, more), constants)
+    path = out or file_of(case, goal, sets)
+    if new:
+        path.unlink(missing_ok=True)
+    try:
+        with aloud("handing the first runs in") as name:
+            found = found_by(
+                session, data, folder_of(case), goal, spans, tolerance, at_once, most or MOST, path, complain, name
+            )
+    except KeyboardInterrupt:
+        complain(f"{path} has what was found so far; the same command goes on from there")
+        raise
+    if as_json:
+        echo_json(found)
+    else:
+        echo("\n".join([*found.lines(), f"kept in {path}"]))
+    return found
+
+
+def finish(found: Found) -> None:
+    """Ends the command: 0 where the bracket is as narrow as was asked for, else 1."""
+    if not found.reached:
+        raise typer.Exit(ExitCode.CRASHED)

@@ -1,0 +1,208 @@
+"""``conoid batch``: a run as a job of Slurm, without a server. The folder is the same, and so is the result."""
+
+import json
+import os
+import shutil
+import sys
+import time
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import msgspec
+import typer
+
+from conoid.cases import batch, layout, messages, slurm, slurm_call, whole
+from conoid.cases.batch import Job, Slurm
+from conoid.cases.load import parse_case, resolved_json
+from conoid.cases.run import State
+from conoid.cases.schema import Run
+
+from ..errors import ClientError
+from ..examination import examine
+from ..local.folders import LocalFolder
+from ..local.local_files import Hashes, keep_copies, with_hashes
+from ..remote.submission import data_of, folder_of
+from .console import echo, echo_json
+from .options import CaseArgument, Json, Overrides, Ranks, Threads, aloud, on_cores, warn
+
+_CASE = "case.json"
+"""What is asked for, as it is handed to the worker."""
+_PLACES = ("~/.config/conoid/site.toml", "/etc/conoid/site.toml")
+
+
+@dataclass(frozen=True)
+class Handed:
+    """What was handed over."""
+
+    folder: Path
+    job: str
+    profile: str
+    attempt: int
+
+
+def batch_run(
+    case: CaseArgument,
+    ranks: Ranks = None,
+    threads: Threads = None,
+    profile: Annotated[
+        str, typer.Option("--slurm", metavar="PROFILE", help="A profile of the site; its default.")
+    ] = "",
+    out: Annotated[Path | None, typer.Option("--out", help="The run's folder; runs/<name> when not given.")] = None,
+    overrides: Overrides = None,
+    site: Annotated[
+        Path | None, typer.Option("--site", help="The site's settings file [CONOID_SITE, or where the site has it].")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Hand a case to Slurm, without a server; prints the job's number. conoid watch FOLDER follows it.
+
+    The same command again makes no second job: it tells the one that there is, or goes on with a run that was lost.
+    """
+    words = [*(overrides or ()), *on_cores(ranks, threads)]
+    with aloud("reading mesh files"):
+        found = examine(data_of(case, words), folder_of(case))
+    warn(found.odd)
+    handed = hand_over(case, words, out, profile, slurm_of(site))
+    if as_json:
+        echo_json({"folder": str(handed.folder), "job": handed.job, "attempt": handed.attempt})
+    else:
+        echo(f"job {handed.job}  profile {handed.profile}  folder {handed.folder}")
+
+
+def slurm_of(site: Path | None) -> Slurm:
+    """The site's Slurm; without a settings file one profile that leaves everything to Slurm. Raises ClientError."""
+    named = site or (Path(os.environ["CONOID_SITE"]) if os.environ.get("CONOID_SITE") else None)
+    found = named or next((path for place in _PLACES if (path := Path(place).expanduser()).is_file()), None)
+    try:
+        settings = batch.read_site(found).slurm if found is not None else None
+    except batch.SiteError as error:
+        raise ClientError(str(error)) from None
+    return settings or Slurm(profiles={"default": batch.Profile()})
+
+
+def job_of(folder: Path) -> Job | None:
+    """The record in a run's folder; None when there is none. Raises ClientError for one that cannot be read."""
+    try:
+        return batch.read_job(folder)
+    except msgspec.MsgspecError as error:
+        raise ClientError(f"{folder / layout.JOB}: this record cannot be read: {error}") from None
+
+
+def hand_over(case: str, overrides: Iterable[str], out: Path | None, profile: str, site: Slurm) -> Handed:
+    """One job for the run in a folder, whatever happened before. Raises CaseError, ClientError."""
+    data = data_of(case, overrides)
+    files = Hashes().of(data, folder_of(case))
+    data = with_hashes(data, files)
+    checked = parse_case(data)
+    resolved = resolved_json(checked)
+    folder = (out or Path("runs") / checked.name).resolve()
+    try:
+        chosen = batch.profile_of(site, profile or checked.run.profile)
+        if shutil.which("sbatch", path=site.bin or None) is None:
+            raise ClientError("sbatch: there is none; Slurm's commands are in PATH, or [slurm] bin names their folder")
+        job = _known(folder, resolved, profile, site) if folder.exists() else None
+        if job is None:
+            keep_copies(files, folder)
+            job = _prepared(folder, data, resolved, checked.run, chosen, site.bin)
+        number = slurm.submit(site.bin, folder, job, batch.profile_of(site, job.profile)[1])
+        noted = batch.Job(**{**{name: getattr(job, name) for name in job.__struct_fields__}, "job": number})
+        whole.write(folder / layout.JOB, batch.to_json(noted))
+    except slurm_call.AwayError as error:
+        raise ClientError(f"{error}; nobody knows whether there is a job: the same command again finds out") from None
+    except (slurm_call.SlurmError, ValueError) as error:
+        raise ClientError(str(error)) from None
+    except OSError as error:
+        raise ClientError(f"{error.filename or folder}: {error.strerror}") from None
+    return Handed(folder, number, job.profile, job.attempt)
+
+
+def _known(folder: Path, resolved: bytes, profile: str, site: Slurm) -> Job | None:
+    """The record of a folder that was handed over before: of its job, or of a next one when that is lost. Raises
+    ClientError where it is of another case, or of another ``profile`` than the one that is asked for.
+    """
+    job = job_of(folder)
+    if job is None:
+        if any(folder.iterdir()):
+            raise ClientError(f"{folder}: not empty, and no run of Slurm; --out names another folder")
+        return None
+    if (folder / layout.OUTCOME).exists():
+        raise ClientError(f"{folder}: this run has ended; --out names another folder")
+    if resolved_json(parse_case(json.loads((folder / _CASE).read_bytes()))) != resolved:
+        raise ClientError(
+            f"{folder}: handed to Slurm with another case, other ranks or threads; --out names another folder"
+        )
+    if profile not in ("", job.profile):
+        raise ClientError(f"{folder}: handed to Slurm with the profile {job.profile!r}; --out names another folder")
+    chosen = batch.profile_of(site, job.profile)
+    command = _command(folder, job.ranks, job.threads, chosen[1])
+    known = slurm.jobs(site.bin, job.name)
+    if not job.job or any(entry.state not in slurm.FINAL for entry in known) or slurm.held(folder):
+        return _written(folder, msgspec.structs.replace(job, command=command, bin=site.bin), chosen[1])
+    (folder / layout.STOP_REQUEST).unlink(missing_ok=True)
+    fresh = batch.new_job(folder.name, job.ranks, chosen, command, time.time(), job.attempt + 1, site.bin, job.threads)
+    return _written(folder, fresh, chosen[1])
+
+
+def _prepared(
+    folder: Path, data: dict[str, Any], resolved: bytes, run: Run, profile: tuple[str, batch.Profile], place: str
+) -> Job:  # fmt: skip
+    """The run's folder, complete on disk before Slurm hears of it."""
+    (folder / layout.LOGS).mkdir(parents=True, exist_ok=True)
+    case = folder / _CASE
+    case.write_text(json.dumps(data, indent=2, default=str), encoding="utf-8")
+    (folder / layout.RESOLVED_CASE).write_bytes(resolved)
+    command = _command(folder, run.ranks, run.threads, profile[1])
+    job = batch.new_job(folder.name, run.ranks, profile, command, time.time(), place=place, threads=run.threads)
+    told = messages.Status(run=folder.name, seq=1, wall=time.time(), state=State.QUEUED, message="handed to Slurm")
+    (folder / layout.JOURNAL).write_bytes(messages.to_json(told) + b"\n")
+    return _written(folder, job, profile[1])
+
+
+def _command(folder: Path, ranks: int, threads: int, profile: batch.Profile) -> list[str]:
+    """What starts the ranks. It is made anew for every job: a record that lies in a folder chooses no program."""
+    worker = [sys.executable, "-m", "mpi4py", "-m", "conoid.worker", str(folder / _CASE), "--out", str(folder)]
+    words = ["--run", folder.name, "--ranks", str(ranks), "--interruptible"]
+    return [*batch.starter(profile, ranks, _mpiexec, threads), *worker, *words]
+
+
+def _written(folder: Path, job: Job, profile: batch.Profile) -> Job:
+    """The record and the script of a job, on disk."""
+    whole.write(folder / layout.JOB_SCRIPT, batch.script(profile, sys.executable).encode(), 0o755)
+    whole.write(folder / layout.JOB, batch.to_json(job))
+    return job
+
+
+def _mpiexec() -> list[str]:
+    beside = Path(sys.executable).with_name("mpiexec")
+    found = str(beside) if beside.is_file() else shutil.which("mpiexec")
+    if found is None:
+        raise ClientError("no mpiexec: install conoid[mpich], or name the site's own in the profile")
+    return [found]
+
+
+def cancel_folder(folder: Path) -> str:
+    """Asks the run in a folder to stop for good, and Slurm to end its job when that waits; one line that says so.
+
+    Slurm's commands are those of the site's file, or of PATH; a number in the folder's record is only taken for that of
+    a job whose name is in the record, too. Raises UnfinishedError for a folder that is none of a run, ClientError,
+    OSError.
+    """
+    LocalFolder(folder).path(layout.JOURNAL)
+    if (folder / layout.OUTCOME).exists():
+        return f"{folder} has ended"
+    job = job_of(folder)
+    if job is None and not slurm.held(folder):
+        return f"{folder}: no worker writes into it; a run of a server is cancelled by its id"
+    whole.touch(folder / layout.STOP_REQUEST)
+    if job is None or not job.job:
+        return f"{folder} is asked to stop"
+    place = slurm_of(None).bin
+    try:
+        if not any((entry.job, entry.name) == (job.job, job.key) for entry in slurm.jobs(place, job.name)):
+            return f"{folder} is asked to stop; Slurm has no job {job.job} of the name {job.name}"
+        slurm.notify(place, job.job)
+    except slurm_call.SlurmError as error:
+        return f"{folder} is asked to stop; Slurm does not answer: {error}"
+    return f"{folder} is asked to stop, job {job.job}"

@@ -1,0 +1,92 @@
+"""Commands that measure."""
+
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from conoid.cases.figures import counted, duration
+from conoid.cases.problems import shown
+from conoid.cases.run import ExitCode
+from conoid.cases.schema import MOST_RANKS, MOST_THREADS
+from conoid.cases.units import parse_quantity
+
+from ..errors import UsageError
+from ..local.saving import save_text
+from ..remote.submission import case_of
+from ..studies import chart, study
+from ..studies.projection import Network, bandwidth
+from ..studies.scaling import CORES, Layout, scale
+from .console import echo
+from .options import CaseArgument, Overrides, aloud, complain
+
+bench = typer.Typer(no_args_is_help=True, help="Measure.")
+
+
+@bench.command(name="scale", short_help="A case on several ranks and threads: speed-up, projected beyond the cores.")
+def bench_scale(
+    case: CaseArgument,
+    ranks: Annotated[
+        str,
+        typer.Option("--ranks", metavar="R,RxT,...", help="Numbers of ranks, or ranks x threads; 1 is always there."),
+    ] = "1,2,4,8",
+    overrides: Overrides = None,
+    latency: Annotated[str, typer.Option("--latency", help="Of a message, for the projection.")] = "2 us",
+    width: Annotated[str, typer.Option("--bandwidth", help="Of a rank's messages, for the projection.")] = "5 GB/s",
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out", help="Folder for scale.md, .json and .svg and for the runs; those of an earlier call are read."
+        ),
+    ] = None,
+) -> None:
+    """Run a case on several numbers of ranks and threads: speed-up, where it is lost, whether all answers are equal.
+
+    Where there are fewer cores than threads, what they would take is projected from the tasks of one. Ends with 1 when
+    answers differ.
+    """
+    layouts = layouts_of(ranks)
+    network = Network(_read("--latency", latency, _time), _read("--bandwidth", width, bandwidth))
+    with tempfile.TemporaryDirectory() as passing, aloud("the first run") as name:
+        runs = []
+        for run in scale(case, overrides or (), layouts, out or Path(passing), network):
+            complain(f"{run.name}: {counted(run.steps, 'step')} in {duration(run.wall)}")
+            runs.append(run)
+            name(f"the run after {run.name}")
+    done = study.Study(case_of(case, overrides or ()).name, overrides or (), CORES, network, runs)
+    if out is not None:
+        save_text(out / "scale.md", study.to_markdown(done))
+        save_text(out / "scale.json", study.to_json(done))
+        save_text(out / "scale.svg", chart.speed_up(done))
+    echo(study.to_markdown(done), nl=False)
+    raise typer.Exit(ExitCode.SUCCEEDED if done.equal else ExitCode.CRASHED)
+
+
+def layouts_of(text: str) -> list[Layout]:
+    """Ranks, and threads of each, of ``1,2,4x4``. Raises ClientError."""
+    found = []
+    for word in text.split(","):
+        numbers = [int(each[:9]) if each.isascii() and each.isdigit() else 0 for each in word.strip().split("x")]
+        ranks, threads = (*numbers, 1)[:2]
+        if len(numbers) > 2 or not 1 <= ranks <= MOST_RANKS or not 1 <= threads <= MOST_THREADS:
+            most = f"up to {MOST_RANKS} ranks, up to {MOST_THREADS} threads"
+            message = (
+                f"allowed: numbers of ranks, or ranks x threads, with commas between them, such as 1,2,4x4; {most}"
+            )
+            raise UsageError(f"--ranks = {shown(text)}: {message}")
+        found.append((ranks, threads))
+    return found
+
+
+def _read(option: str, text: str, reading: Callable[[str], float]) -> float:
+    """What an option says. Raises ClientError that names it."""
+    try:
+        return reading(text)
+    except ValueError as error:
+        raise UsageError(f"{option} = {shown(text)}: {str(error).removeprefix(f'{text!r} ')}") from None
+
+
+def _time(text: str) -> float:
+    return parse_quantity(text, "s")

@@ -1,0 +1,136 @@
+"""The command ``conoid hard``: the suite of hard cases, several at once, with what came of each."""
+
+import json
+import math
+import tempfile
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import msgspec
+import typer
+
+from conoid.cases.figures import count, duration, fixed, rough
+from conoid.cases.load import apply_overrides, parse_case, read_data
+from conoid.cases.outcome import Outcome
+from conoid.cases.run import ExitCode
+from conoid.cases.schema import Case
+from conoid.cases.similar import allowed
+from conoid.cases.suite import Hard, drift, faults, is_free, suite
+
+from ..columns import Columns
+from ..errors import UsageError
+from ..local.local import LocalServer
+from ..local.saving import save_text
+from ..remote.session import Session
+from ..run import Run
+from ..studies.scaling import CORES
+from ..studies.study import table
+from .console import echo
+from .options import aloud, complain
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """How a hard case ended."""
+
+    hard: Hard
+    title: str
+    outcome: Outcome
+    drifted: float | None
+    """Of the momentum; None where something from outside pushes."""
+    faults: list[str]
+
+
+def hard(
+    names: Annotated[
+        list[str] | None, typer.Argument(metavar="[NAME]...", help="Some of them, or rows as H14.")
+    ] = None,
+    ranks: Annotated[int, typer.Option("--ranks", min=1, help="Of each run; the answers are the same.")] = 1,
+    threads: Annotated[int, typer.Option("--threads", min=1, help="Of each rank; the answers are the same.")] = 1,
+    listed: Annotated[bool, typer.Option("--list", help="List them and run none.")] = False,
+    out: Annotated[Path | None, typer.Option("--out", help="Folder for hard.md, hard.json and the runs.")] = None,
+) -> None:
+    """Run the hard cases: state, worst energy residual, drift of the momentum, steps.
+
+    Ends with 1 when one ends badly.
+    """
+    some = chosen(suite(), names or ())
+    if listed:
+        rows = [[each.name, " ".join(each.rows), each.case, " ".join(each.changes)] for each in some]
+        echo(table(("name", "rows", "case", "changes"), rows))
+        return
+    with (
+        tempfile.TemporaryDirectory() as passing,
+        aloud(f"0 of {len(some)} runs have ended") as name,
+        LocalServer((out or Path(passing)) / "runs", max(ranks * threads, CORES)) as at,
+    ):
+        ended = []
+        for verdict in run_all(at.session, some, ranks, threads):
+            ended.append(verdict)
+            name(f"{len(ended)} of {len(some)} runs have ended")
+            complain(f"{len(ended)} of {len(some)}: {verdict.hard.name}: {'; '.join(verdict.faults) or 'ended well'}")
+    text = to_markdown(ended)
+    if out is not None:
+        save_text(out / "hard.md", text)
+        save_text(out / "hard.json", msgspec.json.format(msgspec.json.encode(ended), indent=1))
+    echo(text, nl=False)
+    raise typer.Exit(ExitCode.CRASHED if any(verdict.faults for verdict in ended) else ExitCode.SUCCEEDED)
+
+
+def chosen(known: Sequence[Hard], words: Sequence[str]) -> list[Hard]:
+    """Those of these names or rows; all without words. Raises ClientError for a word that is none of them."""
+    for word in words:
+        if not any(word == each.name or word in each.rows for each in known):
+            names = allowed(word, [each.name for each in known])
+            raise UsageError(f"hard = {word!r}: a row as H14, or a name; {names}")
+    return [each for each in known if not words or each.name in words or set(each.rows) & set(words)]
+
+
+def run_all(session: Session, some: Sequence[Hard], ranks: int, threads: int = 1) -> Iterator[Verdict]:
+    """Hands in all, and yields each when it has ended. Raises CaseError for a case that is none."""
+    quiet = {
+        "run.ranks": ranks, "run.threads": threads, "run.frames": 0, "run.snapshots": 0,
+        "run.checkpoint_every": "none",
+    }  # fmt: skip
+    made = [apply_overrides(apply_overrides(read_data(each.path), each.changes), quiet) for each in some]
+    cases = [parse_case(data) for data in made]
+    runs = [session.submit(json.loads(json.dumps(data, default=str))) for data in made]
+    for each, case, run in zip(some, cases, runs, strict=True):
+        yield _ended(each, case, run)
+
+
+def _ended(each: Hard, case: Case, run: Run) -> Verdict:
+    info = run.wait()
+    outcome = info.outcome or Outcome(state=info.state.value, message=info.message or str(info.cause))
+    drifted = drift(case, _momenta(run.result().history)) if is_free(case) and info.outcome is not None else None
+    return Verdict(each, case.title, outcome, drifted, faults(each, outcome, drifted))
+
+
+def _momenta(told: Columns) -> list[tuple[float, float, float]]:
+    x, y, z = (told.numbers(f"momentum_{axis}") for axis in "xyz")
+    return list(zip(x, y, z, strict=True))
+
+
+def to_markdown(ended: Sequence[Verdict]) -> str:
+    """One line each, then what is wrong."""
+    head = ("case", "rows", "state", "worst residual", "momentum drift", "steps", "tets", "CPU s", "references")
+    rows = [
+        [
+            verdict.hard.name, " ".join(verdict.hard.rows), verdict.outcome.state,
+            rough(verdict.outcome.worst_residual), rough(verdict.drifted),
+            count(verdict.outcome.steps), count(verdict.outcome.elements), fixed(verdict.outcome.cpu, 1),
+            _references(verdict.outcome),
+        ]
+        for verdict in ended
+    ]  # fmt: skip
+    bad = [f"- **{verdict.hard.name}**: {'; '.join(verdict.faults)}" for verdict in ended if verdict.faults]
+    spent = sum(v.outcome.cpu for v in ended if not math.isnan(v.outcome.cpu))
+    said = f"{len(ended) - len(bad)} of {len(ended)} ended well, in {duration(spent)} of CPU time."
+    return "\n\n".join(filter(None, [table(head, rows), said, "\n".join(bad)])) + "\n"
+
+
+def _references(outcome: Outcome) -> str:
+    met = sum(check.passed for check in outcome.reference)
+    return f"{met} of {len(outcome.reference)}" if outcome.reference else "-"

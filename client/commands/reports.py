@@ -1,0 +1,164 @@
+"""Commands that tell and draw what a run has said of itself, and what two runs have."""
+
+import importlib
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from conoid.cases.figures import counted, percent, si
+from conoid.cases.schema import Balance
+
+from ..drawing.fields import require_field
+from ..errors import ViewError
+from ..reports import compare as comparing
+from ..reports import report as reporting
+from ..studies import replay
+from . import tables
+from .console import echo, echo_json
+from .options import Json, SourceArgument, Token, Url, aloud, named, opened, show
+
+figures = typer.Typer(no_args_is_help=True, help="Charts from what a run has told.")
+
+
+OutArgument = Annotated[Path, typer.Argument(metavar="OUT.png", help="The PNG, or SVG, or PDF.")]
+
+
+def drawing(module: str) -> Any:
+    """``charts`` or ``curves``, which need matplotlib. Raises ViewError where it is missing."""
+    try:
+        return importlib.import_module(f"..reports.{module}", __package__)
+    except ModuleNotFoundError as error:
+        raise ViewError(f"charts need the extra 'view' of conoid: {error}") from None
+
+
+@figures.command(name="energy")
+def energy_figure(source: SourceArgument, out: OutArgument, url: Url = None, token: Token = None) -> None:
+    """Draw the energy ledger over time, also without its kinetic term, the residual, and each part's energy."""
+    curves = drawing("curves")
+    with opened(source, url, token) as result, aloud(f"drawing {out}"):
+        echo(curves.save(curves.energy(result.history), out))
+
+
+@figures.command(name="dt")
+def dt_figure(source: SourceArgument, out: OutArgument, url: Url = None, token: Token = None) -> None:
+    """Draw the length of the time step, and what holds it down."""
+    curves = drawing("curves")
+    with opened(source, url, token) as result, aloud(f"drawing {out}"):
+        echo(curves.save(curves.steps(result.history), out))
+
+
+@figures.command(name="fragments")
+def fragments_figure(source: SourceArgument, out: OutArgument, url: Url = None, token: Token = None) -> None:
+    """Draw how many fragments there are over time, and how many of which mass in the end."""
+    curves = drawing("curves")
+    with opened(source, url, token) as result, aloud(f"drawing {out}"):
+        tables_of = [result.fragments_of(index) for index in result.fragment_tables]
+        echo(curves.save(curves.fragments(tables_of), out))
+
+
+@figures.command(name="history")
+def history_figure(
+    source: SourceArgument,
+    out: OutArgument,
+    column: Annotated[
+        list[str] | None,
+        typer.Option("--column", help="A column of history.csv; may be repeated. Default: probes."),
+    ] = None,
+    url: Url = None,
+    token: Token = None,
+) -> None:
+    """Draw columns of history.csv over time, those of one unit in one panel."""
+    curves = drawing("curves")
+    with opened(source, url, token) as result, aloud(f"drawing {out}"):
+        echo(curves.save(curves.columns(result.history, column or ()), out))
+
+
+def report(
+    source: SourceArgument,
+    out: Annotated[Path | None, typer.Option("--out", help="The HTML file; named after the run if not given.")] = None,
+    field: Annotated[
+        list[str] | None, typer.Option("--field", help="A field to draw; may be repeated. Default: what tells most.")
+    ] = None,
+    pictures: Annotated[bool, typer.Option("--pictures/--no-pictures", help="Draw frames.")] = True,
+    url: Url = None,
+    token: Token = None,
+) -> None:
+    """Write a run as one HTML file that needs no server and no network."""
+    with opened(source, url, token) as result:
+        for each in field or ():
+            require_field(each)
+        target = out or Path(f"{result.folder.name}.html")
+        with aloud("reading the run") as at:
+            written = reporting.write(result, target, field if pictures else (), at)
+        echo(written)
+
+
+def compare(
+    a: SourceArgument,
+    b: Annotated[str, typer.Argument(metavar="OTHER", callback=named, help="Another run, likewise.")],
+    out: Annotated[Path | None, typer.Option("--out", help="Draw both histories and fragment masses here.")] = None,
+    column: Annotated[
+        list[str] | None,
+        typer.Option("--column", help="A column of history.csv to draw; may be repeated. Default: energies, probes."),
+    ] = None,
+    url: Url = None,
+    token: Token = None,
+    as_json: Json = False,
+) -> None:
+    """Tell in what two runs differ: keys, final values, fragments; draw their histories over each other."""
+    with opened(a, url, token) as first, opened(b, url, token) as second, aloud("comparing the runs"):
+        found = comparing.compare(first, second)
+        if out is not None:
+            curves = drawing("curves")
+            curves.save(curves.comparison(comparing.material(first, second, column or ())), out)
+    if as_json:
+        echo_json(found)
+        return
+    for each in tables.comparison_tables(found):
+        show(each)
+    if out is not None:
+        echo(out)
+
+
+@figures.command(name="balance")
+def balance_figure(source: SourceArgument, out: OutArgument, url: Url = None, token: Token = None) -> None:
+    """Draw the outside nodes of each rank with the cuts, and where the CPU time went."""
+    charts = drawing("charts")
+    with opened(source, url, token) as result, aloud(f"drawing {out}"):
+        name = str(result.case["name"])
+        charts.balance(charts.course(result.messages), f"{name}, {result.folder.name}", name, out)
+    echo(out)
+
+
+def replay_balance(
+    source: SourceArgument,
+    policy: Annotated[
+        str | None,
+        typer.Option("--policy", help="measured, outside, every, every:N or never; the run's own if not given."),
+    ] = None,
+    alpha: Annotated[float | None, typer.Option("--alpha", help="Of the policy 'outside'.")] = None,
+    ranks: Annotated[int | None, typer.Option("--ranks", min=1, help="Ranks; those of the run if not given.")] = None,
+    cost: Annotated[
+        float | None, typer.Option("--cost", min=0.0, help="Of a cut, s; what the run has measured if not given.")
+    ] = None,
+    url: Url = None,
+    token: Token = None,
+    as_json: Json = False,
+) -> None:
+    """Tell what other balance policies would have cost and saved, from the loads that a run has told."""
+    with opened(source, url, token) as result, aloud("reading the run"):
+        spec = Balance.model_validate(result.case.get("balance", {}))
+        record = replay.read(result.messages, replay.named(spec))
+        x, y, z = result.case["run"].get("cut_scale", (1.0, 1.0, 1.0))
+    other, each = replay.chosen(spec, policy or spec.policy, alpha), record.cost if cost is None else cost
+    accounts = replay.compare(record, other, ranks or record.happened.ranks, each, (x, y, z))
+    if as_json:
+        echo_json({"policies": accounts, "run": record.happened, "cost": each, "heaviest_group": record.heaviest})
+        return
+    show(tables.balance_table(accounts, record.happened))
+    echo(
+        f"on {counted(accounts[0].ranks, 'rank')}, the run had {record.happened.ranks}; a cut costs {si(each, 's')}; "
+        f"{counted(len(record.moments), 'moment')}, {counted(len(record.centres), 'group')}, "
+        f"of which the heaviest has {percent(record.heaviest)} of the work"
+    )

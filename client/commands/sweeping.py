@@ -1,0 +1,262 @@
+"""``conoid sweep``: hand in, look at, cancel, the table and the plot."""
+
+import hashlib
+import json
+import sys
+import uuid
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from conoid.cases.cores import usable_cores
+from conoid.cases.figures import counted
+from conoid.cases.load import CaseError, parse_case
+from conoid.cases.points import KEY, to_csv
+from conoid.cases.run import State
+
+from ..errors import ServiceError, UsageError
+from ..local.local import LocalServer
+from ..local.saving import save_text
+from ..remote.session import Session, connect
+from ..remote.submission import data_of, folder_of, locate
+from ..sweeps.sweep import Point, Sweep, SweepInfo, SweepPoint, points_in, points_of, text_rows
+from ..sweeps.sweep_files import columns_of, file_named
+from . import adapting, points_table
+from .console import echo, echo_json
+from .options import CaseArgument, Json, Ranks, Threads, Token, Url, aloud, complain, on_cores, show, sweep_named
+from .reports import drawing
+
+SweepArgument = Annotated[
+    str,
+    typer.Argument(
+        metavar="SWEEP", callback=sweep_named, help="The id of a sweep or its beginning, 'last', or the file of one."
+    ),
+]
+Sets = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set", metavar="KEY=A,B,C",
+        help="Values of a key, or one for all points; KEY=LOW:HIGH with --adaptive. May be given again.",
+    ),
+]  # fmt: skip
+Adaptive = Annotated[
+    str | None,
+    typer.Option("--adaptive", metavar="'RESULT = VALUE'", help="Find where a result of the table passes a value."),
+]
+Tolerance = Annotated[
+    str | None, typer.Option("--tolerance", help="With --adaptive: width of the bracket; 1 % of the larger end.")
+]
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where the runs are made: on a server, or with one of our own in a folder of this machine."""
+
+    local: bool
+    runs: Path
+    url: str | None
+    token: str | None
+
+    @contextmanager
+    def session(self, data: Mapping[str, Any]) -> Iterator[Session]:
+        """A session; a server of our own has a slot for each core, and as many as the case takes."""
+        if not self.local:
+            with connect(self.url, self.token) as session:
+                yield session
+            return
+        cores = usable_cores()
+        with suppress(CaseError):  # what is wrong is told when the points are made
+            cores = max(cores, parse_case(data).run.cores)
+        with LocalServer(self.runs, cores) as server:
+            yield server.session
+
+
+def sweep(
+    case: CaseArgument,
+    sets: Sets = None,
+    grid: Annotated[bool, typer.Option("--grid", help="Each value of a key with each of the others.")] = False,
+    listed: Annotated[
+        Path | None, typer.Option("--list", metavar="FILE", help="Points from a CSV file; its first line has the keys.")
+    ] = None,
+    adaptive: Adaptive = None,
+    tolerance: Tolerance = None,
+    most: Annotated[int | None, typer.Option("--most", min=2, help="With --adaptive: runs at most; 40.")] = None,
+    ranks: Ranks = None,
+    threads: Threads = None,
+    at_once: Annotated[int | None, typer.Option("--at-once", min=1, help="Runs of it that run at a time.")] = None,
+    wait: Annotated[bool, typer.Option("--wait", help="Return when all runs have ended; 1 when one failed.")] = False,
+    new: Annotated[bool, typer.Option("--new", help="Begin anew, also where the same sweep is there.")] = False,
+    local: Annotated[bool, typer.Option("--local", help="Run on this machine, without a server.")] = False,
+    runs: Annotated[Path, typer.Option("--runs", help="With --local: folder of the runs.")] = Path("runs/local"),
+    out: Annotated[
+        Path | None, typer.Option("--out", help="Write the table here (CSV); with --adaptive what was found (JSON).")
+    ] = None,
+    url: Url = None,
+    token: Token = None,
+    as_json: Json = False,
+) -> None:
+    """Run a case at many points, or look for the point where a result passes a value.
+
+    The same command goes on with a sweep that was interrupted: points that have succeeded are not run again.
+    """
+    cores, place = on_cores(ranks, threads), Place(local, runs, url, token)
+    if adaptive is not None:
+        if grid or listed is not None:
+            raise UsageError("--adaptive takes --set KEY=LOW:HIGH, and neither --grid nor --list")
+        with place.session(data_of(case, cores)) as session:
+            found = adapting.adaptive(
+                session, case, adaptive, sets or (), cores, tolerance, at_once, most, out, new=new, as_json=as_json
+            )
+        adapting.finish(found)
+        return
+    if tolerance is not None or most is not None:
+        raise UsageError("--tolerance and --most are for --adaptive 'RESULT = VALUE'")
+    if (listed is None) == (not sets):
+        raise UsageError("give the points with --set KEY=A,B,C, or with --list FILE")
+    points = points_in(listed) if listed is not None else points_of(sets or (), grid=grid)
+    data = data_of(case, cores)
+    key = str(uuid.uuid4()) if new else _same(case, points, cores, at_once)
+    with place.session(data) as session:
+        made = _handed_in(session, case, data, points, at_once, key)
+        info = _waited(made) if wait or local or out is not None else made.status()
+        _end(made, info, out, as_json=as_json)
+
+
+def _same(case: str, points: Sequence[Point], cores: Sequence[str], at_once: int | None) -> str:
+    """The key of the sweep that these words mean."""
+    told = json.dumps([locate(case).stem, points, list(cores), at_once], default=str)
+    return f"sweep-{hashlib.sha256(told.encode()).hexdigest()[:40]}"
+
+
+def _handed_in(
+    session: Session, case: str, data: Mapping[str, Any], points: Sequence[Point], at_once: int | None, key: str
+) -> Sweep:
+    try:
+        with aloud(f"handing {counted(len(points), 'point')} in") as session.outbox.say:
+            return session.sweep(data, points, at_once=at_once, folder=folder_of(case), key=key, again=True)
+    except ServiceError as error:
+        if error.problem.get("code") != "key_reused":
+            raise
+        raise UsageError(f"{case}: the case has changed since this sweep was begun; --new begins another one") from None
+    except KeyboardInterrupt:
+        complain("the server may have the points already; conoid sweep-cancel last stops them once it has taken all in")
+        raise
+
+
+def _waited(made: Sweep) -> SweepInfo:
+    try:
+        with aloud(f"sweep {made.id}: waiting for its runs") as name:
+
+            def say(info: SweepInfo, point: SweepPoint) -> None:
+                ended = sum(each.run.state.final for each in info.points)
+                name(f"{ended} of {info.total} runs have ended")
+                complain(f"{ended} of {info.total}: {_how(point)}")
+
+            return made.wait(say=say)
+    except KeyboardInterrupt:
+        complain(
+            f"the same command goes on; conoid sweep-table {made.id} shows the runs, conoid sweep-cancel {made.id} "
+            "stops them"
+        )
+        raise
+
+
+def _end(made: Sweep, info: SweepInfo, out: Path | None, *, as_json: bool) -> None:
+    if out is not None:
+        save_text(out, made.csv())
+    if as_json:
+        echo_json(info)
+    else:
+        echo(info.id)
+    failed = [point for point in info.points if point.run.state.final and point.run.state is not State.SUCCEEDED]
+    if failed and info.over:
+        complain(told(failed, info.total))
+        raise typer.Exit(1)
+
+
+def _how(point: SweepPoint) -> str:
+    """A point and how its run has ended."""
+    values = ", ".join(f"{key} = {value}" for key, value in point.values.items())
+    why = f": {point.run.message or point.run.cause}" if point.run.state is not State.SUCCEEDED else ""
+    return f"{values}: {point.run.state.value}{why}"
+
+
+def told(failed: list[SweepPoint], total: int) -> str:
+    """How many runs have not succeeded, and the first of them."""
+    values, run = failed[0].values, failed[0].run
+    point = ", ".join(f"{key} = {value}" for key, value in values.items())
+    why = run.message or run.cause
+    how = f"{run.state.value}: {why}" if why else run.state.value
+    return f"{len(failed)} of {total} runs have not succeeded; {run.id} ({point}) {how}"
+
+
+def sweep_table(
+    sweep: SweepArgument,
+    columns: Annotated[
+        list[str] | None, typer.Option("--column", help="Of the table; may be given again. If none: what differs.")
+    ] = None,
+    out: Annotated[Path | None, typer.Option("--out", help="CSV file to write; standard output if not given.")] = None,
+    url: Url = None,
+    token: Token = None,
+) -> None:
+    """Print a sweep: a line a point with its values, the state of its run and its results.
+
+    A terminal gets a table of the results that differ, or of the columns that are named; a pipe and --out get CSV of
+    all columns, or of the keys, the state and the columns that are named.
+    """
+    if (path := file_named(sweep)) is not None:
+        made = columns_of(path)
+        text, keys = to_csv(made), [column.name for column in made if column.kind == KEY]
+    else:
+        with connect(url, token) as session, aloud("reading the sweep"):
+            found = session.find_sweep(sweep)
+            text, keys = found.csv(), found.keys()
+    if columns:
+        text = points_table.narrowed(text, keys, columns)
+    if out is None and sys.stdout.isatty():
+        show(points_table.table_of(text_rows(text), keys, whole=bool(columns)))
+    elif out is None:
+        echo(text, nl=False)
+    else:
+        save_text(out, text)
+        echo(str(out))
+
+
+def sweep_plot(
+    sweep: SweepArgument,
+    out: Annotated[Path, typer.Option("--out", help="PNG file to write, or what its name ends in.")] = Path(
+        "sweep.png"
+    ),
+    columns: Annotated[
+        list[str] | None, typer.Option("--column", help="Of the table; may be given again. If none: what differs.")
+    ] = None,
+    x: Annotated[str | None, typer.Option("--x", metavar="KEY", help="On the axis; the first that varies.")] = None,
+    url: Url = None,
+    token: Token = None,
+) -> None:
+    """Draw the results of a sweep over what was changed: a panel a result, a curve a value of other keys."""
+    with aloud(f"drawing {out}"):
+        if (path := file_named(sweep)) is not None:
+            made = columns_of(path)
+            keys = [column.name for column in made if column.kind == KEY]
+            drawn = drawing("curves").save(
+                drawing("swept").figure(text_rows(to_csv(made)), keys, x, columns or ()), out
+            )
+        else:
+            with connect(url, token) as session:
+                drawn = session.find_sweep(sweep).plot(out, columns or (), x)
+    echo(str(drawn))
+
+
+def sweep_cancel(sweep: SweepArgument, url: Url = None, token: Token = None, as_json: Json = False) -> None:
+    """Cancel every run of a sweep that has not ended."""
+    with connect(url, token) as session:
+        info: SweepInfo = session.find_sweep(sweep).cancel()
+    if as_json:
+        echo_json(info)
+    else:
+        echo(f"{info.id} {'has ended' if info.over else 'cancelling'}")

@@ -1,0 +1,310 @@
+"""What the command line prints once: lists of runs, one run, outcomes, reference numbers; estimates: ``validated``."""
+
+import math
+from collections import Counter
+from collections.abc import Collection, Mapping, Sequence
+from typing import Any, Literal, TypeGuard
+
+from rich import box
+from rich.table import Table
+from rich.text import Text
+
+from conoid.cases.estimate import estimate
+from conoid.cases.figures import (
+    alike,
+    count,
+    counted,
+    crew,
+    day,
+    duration,
+    exact,
+    exacts,
+    fixed,
+    large,
+    number,
+    percent,
+    rough,
+    si,
+    size,
+)
+from conoid.cases.flat import Scalar
+from conoid.cases.library import Constant
+from conoid.cases.materials import Material
+from conoid.cases.outcome import Check, Compressed, Measured, Outcome
+from conoid.cases.run import State
+from conoid.cases.schema import Case
+
+from ..remote.rows import RunRow
+from ..remote.told import RunInfo
+from ..reports.compare import AT_THE_END, Comparison
+from ..studies.replay import Account
+from .display import STATE_STYLE
+
+_LONGEST = 60
+"""Characters of the value of a key that are shown. Chosen: two lines beside another one; a description is a page."""
+_NUMBERS = ("A", "B", "B - A", "% of A")
+_LEAST = 26
+"""Characters of names beside numbers. Chosen: what they leave of 80, and most names fit."""
+
+
+def table(*columns: str, right: Sequence[str] = (), wide: Sequence[str] = ("case",), least: int | None = None) -> Table:
+    """An open table with these columns; those named in ``right`` are numbers, ``wide`` ones are wrapped where need be,
+    the first of them to ``least`` characters.
+    """
+    made = Table(box=box.SIMPLE_HEAD, header_style="bold", pad_edge=False, show_edge=False, padding=(0, 1, 0, 0))
+    for column in columns:
+        justify: Literal["left", "right"] = "right" if column in right else "left"
+        made.add_column(
+            column, justify=justify, overflow="fold", no_wrap=column not in wide,
+            min_width=least if column == wide[0] else None,
+        )  # fmt: skip
+    return made
+
+
+def pairs(entries: Mapping[str, str] | Mapping[str, str | Text]) -> Table:
+    """Names and values in two columns; entries without a value are left out."""
+    grid = Table.grid(padding=(0, 2))
+    grid.add_column(style="bright_black", no_wrap=True)
+    grid.add_column(overflow="fold")
+    for name, value in entries.items():
+        if value:
+            grid.add_row(name, value)
+    return grid
+
+
+def state_text(state: State, cause: str | None = None) -> Text:
+    """The state in its colour, with the cause of the end."""
+    text = Text(state.value, style=STATE_STYLE.get(state, "bold"))
+    return text.append(f" ({cause})", style="default") if cause and cause != state.value else text
+
+
+def runs_table(rows: Sequence[RunRow], keys: Sequence[str]) -> Table:
+    """One line a run, with the values of ``keys``: where the terminal is too narrow, texts end in an ellipsis."""
+    last = ("cores", "submitted", "took")
+    named = short_names(keys)
+    told = [_differs(row, named) for row in rows]
+    labels = [" ".join(f"{name}={value}" for name, value in _own(row.info).items()) for row in rows]
+    more = [name for name, texts in (("values", told), ("labels", labels)) if any(texts)]
+    made = table("run", "case", "state", *more, *last, right=("cores", "took"), wide=("case", "state", *more))
+    made.padding = 0
+    for row, values, words in zip(rows, told, labels, strict=True):
+        run = row.info
+        took = duration((run.finished or 0) - run.started) if run.started and run.finished else ""
+        some = [text for name, text in (("values", values), ("labels", words)) if name in more]
+        cells = [Text(run.name), _how(row), *map(Text, some)]
+        for cell in cells:
+            cell.no_wrap, cell.overflow = True, "ellipsis"
+        made.add_row(run.short or run.id, *cells, _cores(run), day(run.submitted), took)
+    return made
+
+
+def row_of(row: RunRow) -> dict[str, Any]:
+    """A row of the table as plain data."""
+    return {
+        **row.info.listed, "values": row.values, "results": row.results, "units": row.units,
+        "references": row.references, "missed": row.missed,
+    }  # fmt: skip
+
+
+def _own(run: RunInfo) -> dict[str, str]:
+    """Labels without those that a sweep gives its runs."""
+    return {name: value for name, value in run.labels.items() if name not in ("sweep", "point")}
+
+
+def _how(row: RunRow) -> Text:
+    """The state, how far it is, how many reference numbers it misses."""
+    run, text = row.info, state_text(row.info.state, row.info.cause)
+    if run.progress is not None and not run.state.final and run.progress.end_time > 0.0:
+        text.append(f" {percent(run.progress.t / run.progress.end_time, 0)}", style="default")
+    if row.missed:
+        text.append(f" {len(row.missed)} of {row.references} missed", style="red")
+    return text
+
+
+def short_names(keys: Sequence[str]) -> dict[str, str]:
+    """Each key by its last parts, as many as no other one of them ends with."""
+    tails = {key: [".".join(key.split(".")[-n:]) for n in range(1, key.count(".") + 2)] for key in keys}
+    times = Counter(tail for own in tails.values() for tail in own)
+    return {key: next((tail for tail in own if times[tail] == 1), key) for key, own in tails.items()}
+
+
+def _differs(row: RunRow, named: Mapping[str, str]) -> str:
+    """The values of some keys, each with its short name."""
+    there = [(key, name, row.values[key]) for key, name in named.items() if key in row.values]
+    return ", ".join(
+        f"{name} {exact(value, row.units.get(key, '')) if _is_number(value) else value}" for key, name, value in there
+    )
+
+
+def _is_number(value: Scalar) -> TypeGuard[int | float]:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _cores(run: RunInfo) -> str:
+    return str(run.ranks) if run.threads == 1 else f"{run.ranks}x{run.threads}"
+
+
+def run_table(run: RunInfo) -> Table:
+    """Everything about one run."""
+    progress = run.progress
+    done = progress.t / progress.end_time if progress is not None and progress.end_time > 0.0 else None
+    return pairs({
+        "run": run.id,
+        "case": f"{run.name}  {run.title}".strip(),
+        "state": state_text(run.state, run.cause),
+        "why": run.message or run.reason,
+        "owner": run.owner,
+        "ranks": crew(run.ranks, run.threads),
+        "submitted": day(run.submitted),
+        "started": day(run.started) if run.started else "",
+        "finished": day(run.finished) if run.finished else "",
+        "progress": "" if progress is None or done is None else (
+            f"{percent(done)}, step {count(progress.step)}, dt {si(progress.dt, 's')} held by {progress.limiter}, "
+            f"{duration(progress.eta)} left"
+        ),
+    })  # fmt: skip
+
+
+def cases_table(cases: Mapping[str, Case]) -> Table:
+    """One line a shipped case, with the CPU time that it takes, about."""
+    made = table("case", "title", "tets", "core time", right=("tets", "core time"), wide=("title",))
+    for name, case in cases.items():
+        expected = estimate(case)
+        tets, core = expected.elements, expected.core_seconds
+        made.add_row(name, case.title, count(tets), duration(core))
+    return made
+
+
+def materials_table(materials: Mapping[str, Material]) -> Table:
+    """One line a material of the library."""
+    made = table("material", "kg/m^3", "what it is", right=("kg/m^3",), wide=("what it is",))
+    for name, each in sorted(materials.items()):
+        made.add_row(name, number(each.density), each.description)
+    return made
+
+
+def constants_table(constants: Sequence[Constant]) -> Table:
+    """One line a constant: how sure it is, and the key of its source."""
+    made = table("key", "value", "known", "source", right=("value",))
+    for each in constants:
+        made.add_row(each.key, each.value, each.confidence, each.source)
+    return made
+
+
+def sources_table(constants: Sequence[Constant]) -> Table:
+    """What the keys of the sources stand for."""
+    return pairs({each.source: each.cited for each in constants})
+
+
+def outcome_table(outcome: Outcome, told: Collection[str] = ()) -> Table:
+    """How a run ended, with its warnings but for those that are ``told`` already."""
+    energy, ranks = outcome.energy, crew(outcome.ranks, outcome.threads)
+    entries: dict[str, str | Text] = {"state": state_text(State(outcome.state), outcome.cause), "why": outcome.message}
+    speed, setup, worst = outcome.element_updates_per_second, outcome.setup, rough(outcome.worst_residual)
+    if outcome.steps:
+        entries |= {
+            "simulated": f"{si(outcome.time, 's')} in {counted(outcome.steps, 'step')}",
+            "took": f"{duration(outcome.elapsed)} on {ranks}, {duration(setup)} to the first step",
+            "a step": _a_step(outcome),
+            "model": f"{counted(outcome.elements, 'tet')}, {counted(outcome.nodes, 'node')}",
+            "speed": "" if math.isnan(speed) else f"{large(speed)} element updates a CPU-second and core",
+            "memory": f"{size(max(outcome.peak_memory))} in the largest rank" if outcome.peak_memory else "",
+            "energy residual": "" if energy is None else f"{rough(energy.residual)} at the end, {worst} at worst",
+            "compression": "; ".join(map(_compressed, outcome.compressed)),
+            "digest": outcome.digest[:16],
+        }
+    return pairs({**entries, "warnings": "\n".join(each for each in outcome.warnings if each not in told)})
+
+
+def _a_step(outcome: Outcome) -> str:
+    """What one thread does alone, and what threads share, of the rank that is alone for longest."""
+    alone, steps = [sum(each) for each in zip(*outcome.serial.values(), strict=True)], outcome.steps
+    if not alone or not steps:
+        return ""
+    rank = alone.index(max(alone))
+    shared = sum(each[rank] for each in outcome.parallel.values())
+    serial, regions = alike((alone[rank] / steps, shared / steps), "s")
+    told = f"{serial} by one thread alone, {regions} in what threads share"
+    if outcome.threads == 1 or not shared:
+        return told
+    busy = outcome.helped[rank] / ((outcome.threads - 1) * shared)
+    return f"{told}, in which the others are busy for {percent(busy, 0)}"
+
+
+def _compressed(met: Compressed) -> str:
+    """The compression that a part without a law against it has met."""
+    beyond = f", {counted(met.tets, 'tet')} beyond it at once" if met.tets else ""
+    return f"{met.part} up to {si(met.most, 'Pa')}, {fixed(met.times)} times Griffith's criterion{beyond}"
+
+
+def balance_table(accounts: Sequence[Account], happened: Account) -> Table:
+    """What balance policies come to, beside what happened; the time saved is against no cut at all."""
+    made = table(
+        "policy", "cuts", "lost", "cost of cuts", "total", "saved", "imbalance",
+        right=("cuts", "lost", "cost of cuts", "total", "saved", "imbalance"),
+    )  # fmt: skip
+    never = next((account.total for account in accounts if account.policy == "never"), math.nan)
+    every = (*accounts, happened)
+    columns = (
+        [each.lost for each in every], [each.cost for each in every], [each.total for each in every],
+        [never - each.total for each in every],
+    )  # fmt: skip
+    texts = zip(*(alike(column, "s") for column in columns), strict=True)
+    for account, (lost, cost, total, saved) in zip(every, texts, strict=True):
+        own = account is happened
+        name, gain = (f"the run: {account.policy}", "") if own else (account.policy, saved)
+        made.add_row(name, count(len(account.cuts)), lost, cost, total, gain, fixed(account.imbalance, 3))
+    return made
+
+
+def checks_table(checks: Sequence[Check]) -> Table:
+    """The reference numbers: value, expected, tolerance, and whether they agree."""
+    made = table("reference", "value", "expected", "tolerance", "", right=("value", "expected", "tolerance"))
+    for check in checks:
+        verdict = Text("pass", style="bold green") if check.passed else Text("FAIL", style="bold red")
+        value, expected, tolerance = exacts((check.value, check.expected, check.tolerance), check.unit)
+        made.add_row(check.name, value, expected, f"± {tolerance}", verdict)
+    return made
+
+
+def probes_table(probes: Sequence[Measured]) -> Table:
+    """The last value of each probe, its smallest and its largest."""
+    made = table("probe", "at the end", "min", "max", right=("at the end", "min", "max"), wide=("probe",))
+    for probe in probes:
+        made.add_row(probe.name, *exacts((probe.value, probe.least, probe.most), probe.unit))
+    return made
+
+
+def end_tables(outcome: Outcome, told: Collection[str] = ()) -> list[Table | str]:
+    """How a run ended, its probes and reference numbers, with an empty line between them."""
+    parts: list[Table | str] = [outcome_table(outcome, told)]
+    if outcome.probes:
+        parts += ["", probes_table(outcome.probes)]
+    if outcome.reference:
+        parts += ["", checks_table(outcome.reference)]
+    return parts
+
+
+def _brief(text: str) -> str:
+    return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 1]}…"
+
+
+def comparison_tables(found: Comparison) -> list[Table | str]:
+    """What differs between two runs, what their ends are, and what is said of their fragments."""
+    same = "the same answer, to the bit" if found.same_answer else "different answers"
+    keys = table("key", "A", "B", wide=("A", "B"))
+    for each in found.keys:
+        keys.add_row(each.key, *("–" if value is None else _brief(str(value)) for value in (each.a, each.b)))
+    runs = pairs(dict(zip("AB", found.names, strict=True)))
+    parts: list[Table | str] = [runs, same, "", keys if found.keys else "no key of the case differs"]
+    for title, values in (("at the end", found.ends), ("fragments", found.sizes)):
+        if values:
+            made = table(title, "unit", *_NUMBERS, right=_NUMBERS, wide=(title,), least=_LEAST)
+            made.padding = 0
+            for one in values:
+                share = fixed(100 * one.relative) if one.difference else ""
+                share = f"+{share}" if one.relative > 0 else share
+                change = number(one.difference) if one.difference else "same"
+                made.add_row(one.name.removesuffix(AT_THE_END), one.unit, number(one.a), number(one.b), change, share)
+            parts += ["", made]
+    return parts

@@ -1,0 +1,65 @@
+"""Which columns of the table of a sweep tell most; its lines are mappings of titles to texts."""
+
+from collections.abc import Mapping, Sequence
+from typing import TypeAlias
+
+from conoid.cases.history import split
+
+from ..errors import UsageError
+
+Row: TypeAlias = Mapping[str, str]
+
+_FIRST = (
+    "reference.",
+    "probe.",
+    "fragments",
+    "broken",
+    "eroded",
+    "energy.fracture",
+    "energy.plastic",
+    "energy.kinetic",
+)
+"""What is drawn rather than other columns."""
+_NEVER = frozenset({"time", "elapsed", "cpu", "elements", "nodes", "worst_residual", "reference.worst_residual",
+                    "energy.residual", "energy.initial", "steps", "warnings"})  # fmt: skip
+"""What is drawn only when it is asked for: it tells of the machine or of the mesh."""
+
+
+def known(rows: Sequence[Row], name: str) -> str:
+    """The title of a column of numbers, by its name. Raises UsageError."""
+    there = [column for column in rows[0] if any(number_of(row[column]) is not None for row in rows)]
+    titles = {_bare(column): column for column in there} | {column: column for column in there}
+    if name not in titles:
+        raise UsageError(f"{name!r}: the table has the numbers {', '.join(map(_bare, there))}")
+    return titles[name]
+
+
+def telling(rows: Sequence[Row], titles: Sequence[str]) -> list[str]:
+    """The columns of numbers that differ between the points, the most telling ones first."""
+
+    def differs(name: str) -> bool:
+        found = {value for row in rows if (value := number_of(row[name])) is not None}
+        return len(found) > 1
+
+    left_out = {*map(_bare, titles), *_NEVER, "run", "digest"}
+    names = [name for name in rows[0] if _bare(name) not in left_out and differs(name)]
+    return sorted(names, key=_rank)
+
+
+def _rank(title: str) -> tuple[bool, int]:
+    """The least comes first; extremes of probes come last."""
+    first = next((n for n, begins in enumerate(_FIRST) if title.startswith(begins)), len(_FIRST))
+    return _bare(title).endswith((".min", ".max")), first
+
+
+def _bare(column: str) -> str:
+    """The name of a column without its unit."""
+    return split(column)[0]
+
+
+def number_of(text: str) -> float | None:
+    """None for a text that is no number."""
+    try:
+        return float(text)
+    except ValueError:
+        return None

@@ -1,0 +1,153 @@
+"""``conoid watch FOLDER``: follows a run by the journal in its folder, without a server; asks Slurm why it waits."""
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from conoid.cases import batch, layout, slurm, slurm_call, whole
+from conoid.cases.messages import AnyMessage, Status
+from conoid.cases.outcome import from_json
+from conoid.cases.run import Cause, State
+
+from ..journal import from_line
+from ..remote.link import Link
+
+_PAUSE = 0.5
+"""s between two looks at the journal. Chosen: a run reports four times a second."""
+_ASK_EVERY = 10.0
+"""s of silence after which Slurm is asked. Chosen: a few hundred watchers are one request in 30 ms."""
+_AT_WORK = {State.STARTING, State.RUNNING}
+"""States in which a worker writes into the folder."""
+
+
+@dataclass(frozen=True)
+class Titled:
+    """What ``watch`` shows above all."""
+
+    title: str
+
+
+class _File:
+    name, trouble = "journal", ""
+
+    def get(self, timeout: float) -> AnyMessage | None:
+        """Nothing comes by itself."""
+        return None
+
+    def close(self) -> None:
+        """There is nothing to let go."""
+
+
+class FolderRun:
+    """A run in a folder, as ``watch`` wants one."""
+
+    def __init__(self, folder: Path, place: str = "") -> None:
+        """``place``: the folder of Slurm's commands; empty: they are in PATH."""
+        self.folder, self._place = folder.resolve(), place
+        self.id = self.folder.name
+        self._asked, self._told = time.monotonic(), ""
+
+    def status(self) -> Titled:
+        """The title of its case, when that is there already."""
+        try:
+            case = msgspec.json.decode(whole.read(self.folder / layout.RESOLVED_CASE), type=dict[str, Any])
+        except (OSError, msgspec.MsgspecError):
+            return Titled("")
+        return Titled(str(case.get("title") or case.get("name", "")))
+
+    def link(self) -> Link:
+        """The journal itself."""
+        return _File()
+
+    def messages(
+        self, *, link: Link | None = None, pause: Callable[[float], None] = time.sleep
+    ) -> Iterator[AnyMessage]:
+        """Every line once and in order, then how the run has ended."""
+        offset, state = 0, State.QUEUED
+        while True:
+            end = self._outcome()  # written last: all that there is to read is there before
+            raw, offset = self._read(offset)
+            for line in raw:
+                try:
+                    message = from_line(line)
+                except msgspec.DecodeError:  # a killed worker has left it half written
+                    continue
+                yield message
+                if isinstance(message, Status):
+                    state = State(message.state)
+                    if state.final:
+                        return
+            if end is not None:
+                yield end
+                return
+            if not raw:
+                for told in self._ask(state):
+                    yield told
+                    if State(told.state).final:
+                        return
+                pause(_PAUSE)
+            else:
+                self._asked = time.monotonic()
+
+    def _read(self, offset: int) -> tuple[list[bytes], int]:
+        """The complete lines from ``offset`` on, and where the next one begins."""
+        try:
+            with (self.folder / layout.JOURNAL).open("rb") as file:
+                file.seek(offset)
+                data = file.read()
+        except FileNotFoundError:
+            return [], offset
+        lines = data[: data.rfind(b"\n") + 1]
+        return lines.splitlines(), offset + len(lines)
+
+    def _job(self) -> batch.Job | None:
+        try:
+            return batch.read_job(self.folder)
+        except (OSError, msgspec.MsgspecError):
+            return None
+
+    def _pending(self, state: State, message: str) -> Iterator[Status]:
+        """That a run in the queue waits, where it is news."""
+        if state is State.QUEUED and message != self._told:
+            self._told = message
+            yield self._said(state, message)
+
+    def _outcome(self) -> Status | None:
+        try:
+            end = from_json(whole.read(self.folder / layout.OUTCOME))
+        except (OSError, msgspec.MsgspecError):
+            return None
+        return self._said(end.state, end.message, end.cause)
+
+    def _said(self, state: str, message: str, cause: str | None = None) -> Status:
+        return Status(run=self.id, wall=time.time(), state=state, cause=cause, message=message)
+
+    def _ask(self, state: State) -> Iterator[Status]:
+        """What Slurm says of a job that is silent, only what is new; without a job, whether the worker is still there
+        that has begun, by the ``state`` that was told last.
+        """
+        if time.monotonic() - self._asked <= _ASK_EVERY:
+            return
+        self._asked = time.monotonic()
+        job = self._job()
+        if job is None:
+            if state in _AT_WORK and not slurm.held(self.folder) and self._outcome() is None:
+                yield self._said(
+                    State.LOST, "no worker writes into its folder, and none has left an outcome", Cause.NODE
+                )
+            return
+        try:
+            entries = slurm.jobs(self._place, job.name)
+        except slurm_call.SlurmError as error:
+            yield from self._pending(state, f"Slurm does not answer: {error}")
+            return
+        for entry in entries[:1]:
+            if entry.state in slurm.PENDING:
+                yield from self._pending(State.QUEUED, f"Slurm job {entry.job} is pending: {entry.reason}")
+            elif entry.state in slurm.FINAL and not slurm.held(self.folder):
+                message = f"Slurm job {entry.job} ended as {entry.state} and left no outcome"
+                yield self._outcome() or self._said(State.LOST, message, Cause.NODE)

@@ -1,0 +1,145 @@
+"""A server of one's own for the time of one run: started as a process, known by its server.json, stopped after."""
+
+import os
+import subprocess
+import sys
+import time
+from contextlib import suppress
+from pathlib import Path
+from typing import Self
+
+import msgspec
+
+from conoid.cases.figures import duration
+from conoid.cases.run import State
+
+from ..errors import ClientError
+from ..remote.session import Session
+
+ADDRESS_FILE = "server.json"
+LOG_FILE = "server.log"
+OWNER = "local"
+_START_SECONDS = 60.0
+"""s that a server may take to start. Chosen: it takes one or two, and many times that on a busy machine."""
+_STOP_SECONDS = 15.0
+"""s that it may take to stop before it is killed: ``GRACE`` for its workers, and five for itself."""
+GRACE = 10.0
+"""s that a cancelled worker gets before it is killed."""
+
+
+class Address(msgspec.Struct, kw_only=True, frozen=True):
+    """What a server writes when it answers."""
+
+    url: str
+    pid: int
+
+
+class LocalServer:
+    """A server on loopback ports of its own choosing, with a token only this process knows.
+
+    A context manager: it is up inside, and stopped after. It is not in the terminal's process group, so that Ctrl-C
+    reaches this process alone; on Linux it ends when this process dies.
+    """
+
+    def __init__(self, runs: Path, slots: int) -> None:
+        """``runs`` is the folder of the runs, ``slots`` how many cores runs may take at a time."""
+        self.runs = runs.resolve()
+        self.slots = slots
+        self._process: subprocess.Popen[bytes] | None = None
+
+    def __enter__(self) -> Self:
+        """Starts the server and waits until it answers. Raises ClientError with its own last words."""
+        self.runs.mkdir(parents=True, exist_ok=True)
+        self.token = _token(self.runs)
+        options = ["--port", "0", "--zenoh-port", "0", "--slots", str(self.slots), "--grace", str(GRACE)]
+        with (self.runs / LOG_FILE).open("wb") as log:
+            self._process = subprocess.Popen(
+                [*_TETHERED, str(os.getpid()), "--runs", str(self.runs), *options], stdin=subprocess.DEVNULL,
+                stdout=log, stderr=log, start_new_session=True, env=_environment(),
+            )  # fmt: skip
+        try:
+            self.session = Session(self._await().url, self.token)
+        except BaseException:
+            self.stop()
+            raise
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Cancels what still runs, then stops the server: its workers would go on without it."""
+        with suppress(ClientError, TimeoutError):
+            for run in self.session.runs([state.value for state in State if not state.final]):
+                self.session.run(run.id).cancel()
+                self.session.run(run.id).wait(2 * GRACE)
+        self.session.close()
+        self.stop()
+
+    def _await(self) -> Address:
+        assert self._process is not None
+        deadline = time.monotonic() + _START_SECONDS
+        while time.monotonic() < deadline:
+            if self._process.poll() is not None:
+                raise ClientError(f"the server did not start: {_last_line(self.runs / LOG_FILE)}")
+            address = _address(self.runs / ADDRESS_FILE)
+            if address is not None and address.pid == self._process.pid:
+                return address
+            time.sleep(0.05)
+        raise ClientError(f"the server did not start within {duration(_START_SECONDS)}; see {self.runs / LOG_FILE}")
+
+    def stop(self) -> None:
+        """Asks the server to end, and ends it when it does not."""
+        if self._process is None or self._process.poll() is not None:
+            return
+        self._process.terminate()
+        try:
+            self._process.wait(_STOP_SECONDS)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait(_STOP_SECONDS)
+
+
+_SERVER = [sys.executable, "-m", "conoid.server"]
+_TETHER = """
+import ctypes, os, runpy, signal, sys
+parent = int(sys.argv.pop(1))
+if sys.platform == "linux":
+    PR_SET_PDEATHSIG = 1
+    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
+    if os.getppid() != parent:
+        sys.exit(1)
+runpy.run_module("conoid.server", run_name="__main__", alter_sys=True)
+"""
+_TETHERED = [sys.executable, "-c", _TETHER]
+"""The server, to which the kernel sends SIGTERM when the process of the first argument dies, however it dies."""
+
+
+def _token(runs: Path) -> str:
+    """A token for this server. Raises ClientError with the server's own last words."""
+    command = [*_SERVER, "token", "add", OWNER, "--runs", str(runs)]
+    try:
+        made = subprocess.run(
+            command, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=_START_SECONDS,
+            env=_environment(), check=False,
+        )  # fmt: skip
+    except subprocess.TimeoutExpired:
+        raise ClientError(f"the server did not start within {duration(_START_SECONDS)}") from None
+    if made.returncode != 0 or not made.stdout.strip():
+        said = made.stderr.strip().splitlines()
+        raise ClientError(f"the server did not start: {said[-1] if said else f'it ended with code {made.returncode}'}")
+    return made.stdout.split()[-1]
+
+
+def _environment() -> dict[str, str]:
+    """A site's database is not for a server of one run."""
+    return {name: value for name, value in os.environ.items() if name not in {"CONOID_DATABASE", "CONOID_RUNS"}}
+
+
+def _address(path: Path) -> Address | None:
+    try:
+        return msgspec.json.decode(path.read_bytes(), type=Address)
+    except (FileNotFoundError, msgspec.MsgspecError):
+        return None
+
+
+def _last_line(path: Path) -> str:
+    lines = path.read_text(errors="replace").strip().splitlines() if path.is_file() else []
+    return lines[-1] if lines else "it said nothing"

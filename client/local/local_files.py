@@ -1,0 +1,165 @@
+"""The files that a case names, on this machine: found, hashed, copied."""
+
+import copy
+import hashlib
+import os
+import shutil
+import tempfile
+import weakref
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from conoid.cases import layout, whole
+from conoid.cases.files import Named, files_of, located
+from conoid.cases.load import CaseError, Problem
+from conoid.cases.problems import problem
+
+from ..errors import ClientError
+from . import one_deck
+from .saving import whole as whole_file
+
+_CHUNK = 1 << 20
+State = tuple[int, int, int, int]
+"""Device, inode, size in bytes, and time of the last change in ns."""
+
+
+@dataclass(frozen=True)
+class LocalFile:
+    """A file that a case names, as it was when it was hashed."""
+
+    named: Named
+    path: Path
+    sha256: str
+    state: State
+    named_in: str = ""
+    """Of a deck that includes others, which is written out as one file at ``path``: the hash of the deck itself."""
+
+    @property
+    def size(self) -> int:
+        """Bytes."""
+        return self.state[2]
+
+    def check(self, file: int) -> None:
+        """Raises ClientError where the open file is another one than that which was hashed."""
+        if state_of(file) != self.state:
+            raise self.changed()
+
+    def changed(self) -> ClientError:
+        """The line that says so."""
+        return ClientError(f"{self.path}: has changed since it was hashed; nothing is handed in: try again")
+
+
+class Hashes:
+    """The hashes of files, each computed once for every state of a file."""
+
+    def __init__(self) -> None:
+        """None is known yet."""
+        self._known: dict[State, str] = {}
+        self._decks: dict[tuple[Path, State], _Deck] = {}
+        self._place: Path | None = None
+        """Where decks are written out as one file, while this is there."""
+
+    def of(self, case: Mapping[str, Any], folder: Path) -> list[LocalFile]:
+        """The files that a case in plain data names, from its ``folder`` on; one that is not here and whose hash stands
+        in the case is left out: who runs the case may have it. Raises CaseError with every one that cannot be used.
+        """
+        found, problems = [], list[Problem]()
+        for named in files_of(case):
+            path = located(named.path, named.sha256, folder)
+            try:
+                found.append(self._hashed(named, path))
+            except FileNotFoundError:
+                if named.sha256 is None:
+                    problems.append(_wrong(named, "path", named.path, f"no such file ({path.absolute()})"))
+            except (OSError, ValueError) as error:  # a name with a null byte
+                said = error.strerror if isinstance(error, OSError) else str(error)
+                problems.append(_wrong(named, "path", named.path, f"{said} ({path.absolute()})"))
+            else:
+                if named.sha256 not in {None, found[-1].sha256, found[-1].named_in or None}:
+                    told = f"{named.path!r} has {found[-1].sha256}"
+                    problems.append(_wrong(named, "sha256", named.sha256, told))
+        if problems:
+            raise CaseError(problems)
+        return found
+
+    def _hashed(self, named: Named, path: Path) -> LocalFile:
+        """Raises OSError; IsADirectoryError for what is no regular file, be it behind a link; ValueError for a deck
+        that cannot be followed.
+        """
+        itself = self._read(named, path)
+        if not one_deck.includes(path):
+            return itself
+        deck = self._decks.get((path, itself.state))
+        if deck is None or any(state_at(each) != state for each, state in deck.files.items()):
+            deck = self._decks[path, itself.state] = self._written(path)
+        return replace(self._read(named, deck.path), named_in=itself.sha256)
+
+    def _written(self, path: Path) -> "_Deck":
+        """A deck with all that it includes, as one file."""
+        if self._place is None:
+            self._place = Path(tempfile.mkdtemp(prefix="conoid-decks-"))
+            weakref.finalize(self, shutil.rmtree, self._place, True)
+        target = self._place / str(len(self._decks)) / path.name
+        target.parent.mkdir(exist_ok=True)
+        return _Deck(target, {each: state_at(each) for each in one_deck.write(path, target)})
+
+    def _read(self, named: Named, path: Path) -> LocalFile:
+        with whole.opened(path) as file:
+            state = state_of(file.fileno())
+            if state not in self._known:
+                self._known[state] = hashlib.file_digest(file, "sha256").hexdigest()
+            made = LocalFile(named, path, self._known[state], state)
+            made.check(file.fileno())
+        return made
+
+
+@dataclass(frozen=True)
+class _Deck:
+    """A deck that was written out, and the states of the files that it was made of."""
+
+    path: Path
+    files: dict[Path, State]
+
+
+def state_at(path: Path) -> State:
+    """Of a file by its path. Raises OSError."""
+    with whole.opened(path) as file:
+        return state_of(file.fileno())
+
+
+def _wrong(named: Named, key: str, value: object, said: str) -> Problem:
+    return problem((*named.table, key), value, said)
+
+
+def state_of(file: int) -> State:
+    """Of an open file, by its descriptor."""
+    status = os.fstat(file)
+    return status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns
+
+
+def with_hashes(case: Mapping[str, Any], files: Iterable[LocalFile]) -> dict[str, Any]:
+    """The case with the hash of each file in the table that names it."""
+    made: dict[str, Any] = copy.deepcopy(dict(case))
+    for file in files:
+        table: Any = made
+        for item in file.named.table:
+            table = table[item]
+        table["sha256"] = file.sha256
+    return made
+
+
+def keep_copies(files: Iterable[LocalFile], folder: Path) -> None:
+    """Copies files into the folder of a run, under their hashes. Raises ClientError for one that has changed since it
+    was hashed, OSError.
+    """
+    for file in files:
+        target = folder / layout.FILES / Named(file.named.table, file.named.path, file.sha256).copy
+        target.parent.mkdir(parents=True, exist_ok=True)
+        with whole_file(target) as part:
+            with whole.opened(file.path) as source, part.open("wb") as made:
+                shutil.copyfileobj(source, made, _CHUNK)
+            with part.open("rb") as made:
+                if hashlib.file_digest(made, "sha256").hexdigest() != file.sha256:
+                    raise file.changed()

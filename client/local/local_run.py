@@ -1,0 +1,105 @@
+"""A run in a folder of this machine, as the commands want one: its status, and what can be asked of its worker."""
+
+import re
+import shutil
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from conoid.cases import layout, slurm, whole
+from conoid.cases.run import Cause, State
+
+from ..errors import ClientError, UnfinishedError
+from ..live import Live
+from ..remote.told import FileInfo, RunInfo
+from ..result import Result
+from .folders import LocalFolder
+from .places import inside
+from .saving import whole as whole_file
+
+_ID = re.compile(r"[0-9a-z]{22}")
+"""The id of a run of a server, by which ``conoid get`` calls the folder that it copies into."""
+_AT_WORK = {State.STARTING, State.RUNNING, State.STOPPING}
+"""States in which a worker writes into the folder."""
+
+
+def status(folder: Path) -> RunInfo:
+    """What the folder tells of the run. Raises UnfinishedError for a folder that is none of a run."""
+    result = Result.open(folder)
+    messages = result.messages
+    known = Live(result.folder.name)
+    for message in messages:
+        known.take(message)
+    try:
+        ended = result.outcome
+        known.state, known.cause, known.message = State(ended.state), ended.cause, ended.message
+        text = result.folder.path(layout.OUTCOME).read_bytes()
+    except UnfinishedError:
+        text = b"null"
+        if known.state in _AT_WORK and not slurm.held(folder):
+            known.state, known.cause = State.LOST, Cause.NODE
+            known.message = "no worker writes into its folder, and none has left an outcome"
+    case = result.case if (folder / layout.RESOLVED_CASE).is_file() else {}
+    first, last = (messages[0].wall, messages[-1].wall) if messages else (0.0, 0.0)
+    return RunInfo(
+        id=result.folder.name, owner="", name=str(case.get("name") or ""), title=str(case.get("title") or ""),
+        state=known.state, cause=known.cause, message=known.message, submitted=first,
+        ranks=_cores(case, known, "ranks"), threads=_cores(case, known, "threads"),
+        started=known.began, finished=last if known.state.final else None,
+        progress=None if known.state.final else known.progress, outcome_json=msgspec.Raw(text),
+    )  # fmt: skip
+
+
+def _cores(case: dict[str, Any], known: Live, what: str) -> int:
+    """The ``ranks`` or ``threads`` that have started, or that the case asks for."""
+    if known.started is not None:
+        return int(getattr(known.started, what))
+    asked = case.get("run", {}).get(what, 1) if isinstance(case.get("run"), dict) else 1
+    return asked if isinstance(asked, int) else 1
+
+
+def ask(folder: Path, request: str, wish: str) -> str:
+    """Leaves a request where the worker looks for it; one line that says so. Raises UnfinishedError where there is no
+    worker, OSError.
+    """
+    LocalFolder(folder).path(layout.JOURNAL)
+    if not slurm.held(folder):
+        raise UnfinishedError(f"{folder}: no worker writes into it; a run that is running can be asked")
+    whole.touch(folder / request)
+    return f"{folder} asked for {wish}"
+
+
+def at_hand(folder: Path) -> bool:
+    """Whether the run is of this folder: not where it may be a copy that ``conoid get`` has made of a server's."""
+    copied = _ID.fullmatch(str(folder)) is not None
+    return not copied or (folder / layout.JOB).exists() or slurm.held(folder)
+
+
+class FolderFiles:
+    """The files of a run in a folder, as those of a run of a server are had."""
+
+    def __init__(self, folder: Path) -> None:
+        """Reads nothing yet."""
+        self._folder = LocalFolder(folder)
+        self.id = self._folder.name
+
+    def files(self) -> list[FileInfo]:
+        """What lies in the folder."""
+        return [FileInfo(path=name, size=(self._folder.root / name).stat().st_size) for name in self._folder.names()]
+
+    def over(self) -> bool:
+        """Nothing is known of its end, and nothing lost on the way from a folder."""
+        return False
+
+    def fetch(self, folder: Path, file: FileInfo, final: bool) -> Path:
+        """Copies a file and returns the path of the copy. Raises UnfinishedError, ClientError, OSError."""
+        name = file.path
+        inside(self._folder.root, name)
+        source, target = self._folder.path(name), inside(folder, name)
+        if target.exists() and source.samefile(target):
+            raise ClientError(f"{target}: is the file itself; --out names another folder")
+        target.parent.mkdir(parents=True, exist_ok=True)
+        with whole_file(target) as part:
+            shutil.copyfile(source, part)
+        return target

@@ -1,0 +1,42 @@
+"""Names of files and parts of addresses that a server or a user has given."""
+
+import os
+from pathlib import Path, PurePosixPath, PureWindowsPath
+from urllib.parse import quote
+
+from conoid.cases.problems import shown
+
+from ..errors import ClientError
+
+_LONGEST_NAME = 255
+"""Bytes of the name of a file: NAME_MAX of Linux."""
+
+
+def quoted(text: str, safe: str = "") -> str:
+    """``text`` as a part of an address."""
+    return quote(text, safe=safe)
+
+
+def inside(root: Path, name: str) -> Path:
+    """The path of ``name``, which a server or a user has given, below ``root``.
+
+    Raises ClientError for a name that would leave it, here or on another system, also by a link that lies in ``root``,
+    and for one that no file can have.
+    """
+    path, other = PurePosixPath(name), PureWindowsPath(name)
+    if path.is_absolute() or other.anchor or ".." in (*path.parts, *other.parts) or not path.parts:
+        raise ClientError(f"{shown(name)} lies outside the run's folder")
+    if "\0" in name or not _writable(name):
+        raise ClientError(f"{shown(name)}: no file can have this name")
+    target = root.joinpath(*path.parts)
+    if not target.parent.resolve().is_relative_to(root.resolve()):
+        raise ClientError(f"{shown(name)}: a link in {root} leads out of it")
+    return target
+
+
+def _writable(name: str) -> bool:
+    """Whether each part of it fits a file system."""
+    try:
+        return all(len(os.fsencode(part)) <= _LONGEST_NAME for part in name.split("/"))
+    except UnicodeEncodeError:
+        return False

@@ -1,0 +1,96 @@
+"""Cases on their way to a server, with the files that they name: these are sent first, where the server lacks them."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from conoid.cases.files import files_of
+from conoid.cases.load import CaseError, Overrides, apply_overrides
+from conoid.cases.problems import dotted
+
+from ..local.local_files import Hashes, with_hashes
+from ..sweeps.sweep import Point
+from .http import Http
+from .sending import send
+from .submission import CaseSource, body_of, data_of, folder_of, to_json
+
+SURVEY = 330.0
+"""s that a server may take to read the files of a case before it answers: server/intake/reader.py has 300. Chosen."""
+_POINT = 30.0
+"""s that it may take for a point of a sweep whose files are others than those of the points before. Chosen."""
+
+
+class Outbox:
+    """Hashes each file once for each state of it."""
+
+    def __init__(self, http: Http) -> None:
+        """Sends nothing yet."""
+        self._http, self._hashes = http, Hashes()
+        self.say: Callable[[str], None] = lambda text: None
+        """Hears how far the sending is."""
+
+    def ready(self, case: Mapping[str, Any], folder: Path) -> dict[str, Any]:
+        """A case in plain data with the hash of each file that it names, all of which the server has when this returns.
+
+        Relative paths begin in ``folder``. Raises CaseError for files that cannot be used, ClientError.
+        """
+        files = self._hashes.of(case, folder)
+        for file in {file.sha256: file for file in files}.values():
+            send(self._http, file, self.say)
+        return with_hashes(case, files)
+
+    def body(
+        self, case: CaseSource, overrides: Overrides = (), folder: Path | str | None = None
+    ) -> tuple[str, bytes, float]:
+        """Content type and body of a case, and s by which its answer may be late because the server reads its files.
+
+        A case without files is sent as it is written, and what is wrong with it is told by the server.
+        """
+        changes = list(overrides) if isinstance(overrides, Iterator) else overrides
+        try:
+            data = data_of(case, changes)
+        except CaseError:
+            data = {}
+        if not files_of(data):
+            return *body_of(case, changes), 0.0
+        ready = self.ready(data, place_of(case, folder))
+        return *(body_of(case, changes) if ready == data else ("application/json", to_json(ready))), SURVEY
+
+    def sweep(
+        self, case: CaseSource, points: Sequence[Point], folder: Path | str | None = None
+    ) -> tuple[dict[str, Any], Sequence[Point], float]:
+        """The case and the points of a sweep with the hashes of their files, in a point where it names another file
+        than the case; and the s as of ``body``.
+        """
+        data = data_of(case)
+        try:
+            made = [apply_overrides(data, point) for point in points]
+        except CaseError:
+            return data, points, 0.0
+        if not any(map(files_of, made)):
+            return data, points, 0.0
+        ready = [self.ready(each, place_of(case, folder)) for each in made]
+        data = _with_those_of(data, ready)
+        return (
+            data,
+            [_told(point, each, data) for point, each in zip(points, ready, strict=True)],
+            SURVEY + _POINT * len(made),
+        )
+
+
+def place_of(case: CaseSource, folder: Path | str | None) -> Path:
+    """The folder in which relative paths begin: the one that is given, else that of the case. Raises CaseError."""
+    return folder_of(case) if folder is None else Path(folder)
+
+
+def _with_those_of(data: dict[str, Any], ready: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """The case with the hashes of those of its files that some point leaves as they are."""
+    hashes = {(file.table, file.path): file.sha256 for each in ready for file in files_of(each)}
+    known = {file.table: hashes[file.table, file.path] for file in files_of(data) if (file.table, file.path) in hashes}
+    return apply_overrides(data, {f"{dotted(table)}.sha256": sha256 for table, sha256 in known.items()})
+
+
+def _told(point: Point, ready: Mapping[str, Any], data: Mapping[str, Any]) -> Point:
+    """A point with the hashes of the files that it alone names."""
+    own = [file for file in files_of(ready) if file not in files_of(data)]
+    return {**point, **{f"{dotted(file.table)}.sha256": file.sha256 for file in own}}

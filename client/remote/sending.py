@@ -1,0 +1,130 @@
+"""Files on their way to a server: what it lacks is sent in pieces, and goes on where a broken connection has ended."""
+
+import time
+from collections.abc import Callable
+from io import FileIO
+
+import msgspec
+
+from conoid.cases import whole
+from conoid.cases.figures import size
+
+from ..errors import ClientError, MissingError, ServiceError, UnreachableError
+from ..local.local_files import LocalFile
+from .http import Http
+
+_LARGEST, _SMALLEST = 1 << 20, 1 << 14
+"""Bytes of a piece. Chosen: a proxy takes bodies of 1 MiB; at 1 kB/s 16 KiB are sent before an answer is late."""
+_FIRST = 1 << 17
+"""Bytes of the first piece, until it is known how fast the line is. Chosen."""
+_WANTED = 2.0
+"""s that a piece should take; it becomes smaller where it takes longer. Chosen: what is lost by a break is as much."""
+_PATIENCE = 60.0
+"""s without a byte after which the sending is given up. Chosen: a server that is started anew is back by then."""
+_PAUSE = 0.5
+"""s after a break before the server is asked how much it has."""
+_LAST = 120.0
+"""s that the answer to the last piece may take: the server reads the whole file again, and has it on disk."""
+_PASSING = frozenset({408, 500, 502, 503, 504})
+"""Statuses after which the same piece may be taken."""
+
+
+class SentFile(msgspec.Struct, kw_only=True, frozen=True):
+    """What a server has of a file: ``offset`` of its bytes, all of them, verified, where it is ``whole``."""
+
+    offset: int
+    whole: bool
+
+
+def send(http: Http, file: LocalFile, say: Callable[[str], None] = lambda text: None) -> None:
+    """The server has the file, as it was hashed, when this returns. ``say`` hears how far it is.
+
+    Raises ClientError where the file has changed, ServiceError, UnreachableError.
+    """
+    told = _status(http, file)
+    if told is not None and told.whole:
+        return
+    with whole.opened(file.path) as opened:
+        file.check(opened.fileno())
+        _Sending(http, file, opened, say).go_on(told.offset if told is not None else 0)
+
+
+def _status(http: Http, file: LocalFile) -> SentFile | None:
+    try:
+        return http.get(SentFile, _place(file))
+    except MissingError:
+        return None
+
+
+def _place(file: LocalFile) -> str:
+    return f"/v1/files/{file.sha256}"
+
+
+class _Sending:
+    """One file on its way."""
+
+    def __init__(self, http: Http, file: LocalFile, opened: FileIO, say: Callable[[str], None]) -> None:
+        self._http, self._file, self._opened, self._say = http, file, opened, say
+        self._piece, self._again = min(_FIRST, _LARGEST), True
+
+    def go_on(self, offset: int) -> None:
+        """Sends piece after piece; waits, and goes on, where the connection breaks or another one sends the file."""
+        moved = time.monotonic()
+        while True:
+            self._say(f"sending {self._file.path.name}, {size(offset)} of {size(self._file.size)}")
+            try:
+                told = self._sent(offset)
+                if told.whole:
+                    return
+            except (ServiceError, UnreachableError) as error:
+                if not self._passes(error) or time.monotonic() - moved > _PATIENCE:
+                    raise
+                self._piece = max(_SMALLEST, self._piece // 2)
+                time.sleep(_PAUSE)
+                there = self._offset(offset)
+            else:
+                there = told.offset
+            if there is None:
+                return
+            if there > offset:
+                moved = time.monotonic()
+            offset = there
+
+    def _sent(self, offset: int) -> SentFile:
+        """One piece, which becomes larger or smaller after the time that it takes."""
+        self._opened.seek(offset)
+        data = self._opened.read(min(self._piece, self._file.size - offset)) or b""
+        end = offset + len(data)
+        if end < self._file.size and not data:
+            raise self._file.changed()
+        span = f"{offset}-{end - 1}" if data else "*"
+        headers = {"Content-Range": f"bytes {span}/{self._file.size}"} if self._file.size else {}
+        began = time.monotonic()
+        told = self._http.put(SentFile, _place(self._file), data, headers, _LAST if end == self._file.size else 0.0)
+        spent = time.monotonic() - began
+        if spent > _WANTED:
+            self._piece = max(_SMALLEST, self._piece // 2)
+        elif spent < _WANTED / 4:
+            self._piece = min(_LARGEST, self._piece * 2)
+        return told
+
+    def _passes(self, error: ClientError) -> bool:
+        """Whether the sending may go on. Raises ClientError where the file has changed since it was hashed."""
+        if not isinstance(error, ServiceError):
+            return isinstance(error, UnreachableError)
+        code = error.problem.get("code")
+        if code == "wrong_hash":
+            self._file.check(self._opened.fileno())
+            if not self._again:
+                raise self._file.changed()
+            self._again = False  # what the server had before may have been damaged: once from the first byte on
+            return True
+        return code in {"wrong_offset", "in_progress", "incomplete", "busy"} or error.status in _PASSING
+
+    def _offset(self, known: int) -> int | None:
+        """The byte to go on with, None where the server has the file; ``known`` where it cannot be asked now."""
+        try:
+            told = _status(self._http, self._file)
+        except (ServiceError, UnreachableError):
+            return known
+        return 0 if told is None else None if told.whole else told.offset

@@ -1,0 +1,284 @@
+"""A server and the words of its API."""
+
+import re
+import time
+import uuid
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from itertools import islice, takewhile
+from pathlib import Path
+from typing import Any, Protocol
+from urllib.parse import urlencode
+
+import httpx2
+import msgspec
+
+from conoid.cases.load import CaseError, Overrides, Problem
+from conoid.cases.problems import shown
+
+from ..errors import MissingError, NotFoundError, ServiceError, UsageError
+from ..local.places import quoted
+from ..run import Run
+from ..sweeps.adaptive import MOST, found_by
+from ..sweeps.found import Found
+from ..sweeps.goal import span_of
+from ..sweeps.sweep import Point, Sweep, SweepInfo, SweepPage, listed, points_along
+from .asked import Moment, query_of, words_of
+from .config import target
+from .http import NOT_FOUND, Http
+from .outbox import SURVEY, Outbox, place_of
+from .rows import RunRow, TablePage, rows_of
+from .submission import CaseSource, data_of, to_json
+from .told import ID, RunInfo
+
+_CANDIDATES = 8
+"""Ids that are named where several begin as one was given. Chosen: as many as a line has room for."""
+_LAST = "z" * 22
+"""Behind the beginning of an id: no id that begins so comes after it."""
+_MOST_PAGES = 10_000
+"""Of a list. Chosen: a million runs; a server that has more pages has no end."""
+_POINT = 0.5
+"""s that a server may take for each point of a sweep, which it reads, checks and writes to disk before it answers.
+Chosen: ten times what one takes on two cores at a load of 4.
+"""
+_PAGE = 500
+"""Rows of a page of the table: as many as a server gives."""
+_READING, _REST = 60.0, 0.2
+"""s for which results that a server still reads are waited for, and between two questions. Chosen."""
+
+
+class _Known(Protocol):
+    """A run or a sweep that a server tells of."""
+
+    @property
+    def id(self) -> str:
+        """Its id."""
+
+
+class Verdict(msgspec.Struct, kw_only=True, frozen=True):
+    """What the server says of a case."""
+
+    valid: bool
+    problems: list[dict[str, str]] = []
+    estimate: dict[str, Any] = {}
+
+
+class Page(msgspec.Struct, kw_only=True, frozen=True):
+    """A page of a list of runs; ``next`` is the cursor of the following one."""
+
+    runs: list[RunInfo]
+    next: str | None = None
+
+
+class Session(Http):
+    """A server, and the right to ask it. Use it as a context manager, or close it."""
+
+    def __init__(self, url: str, token: str | None = None, transport: httpx2.BaseTransport | None = None) -> None:
+        """As an ``Http``."""
+        super().__init__(url, token, transport)
+        self.outbox = Outbox(self)
+        """Sends the files that cases name."""
+
+    def validate(self, case: CaseSource, overrides: Overrides = (), folder: Path | str | None = None) -> dict[str, Any]:
+        """The server's estimate of a case; ``folder`` as for ``submit``. Raises CaseError with every problem."""
+        kind, body, more = self.outbox.body(case, overrides, folder)
+        answer = self.post(Verdict, "/v1/cases:validate", body, kind, more=more)
+        if not answer.valid:
+            raise CaseError(Problem(one["key"], one["value"], one["message"]) for one in answer.problems)
+        return answer.estimate
+
+    def submit(
+        self,
+        case: CaseSource,
+        overrides: Overrides = (),
+        key: str | None = None,
+        labels: Mapping[str, str] | None = None,
+        profile: str = "",
+        priority: int = 0,
+        folder: Path | str | None = None,
+    ) -> Run:
+        """Hands a case in: a file, the name of a shipped case, or plain data. The files that it names are sent first,
+        where the server lacks them; relative paths begin in the ``folder`` of the case, for plain data in the working
+        one, where none is given.
+
+        ``overrides`` change keys: ``["run.ranks=2"]``, ``{"run.ranks": 2}``. ``key`` is the Idempotency-Key; one is
+        made up when it is None, so that a retry never makes a second run. ``labels`` are words of your own by which
+        runs are found again, ``profile`` is one of the site's batch system; of two of your runs the one with the
+        higher ``priority`` comes first. Raises CaseError, ServiceError, UnreachableError.
+        """
+        kind, body, more = self.outbox.body(case, overrides, folder)
+        words = [("label", word) for word in words_of(labels)]
+        words += [("profile", profile)] if profile else []
+        words += [("priority", str(priority))] if priority else []
+        path = f"/v1/runs?{urlencode(words)}" if words else "/v1/runs"
+        return Run(self, self.post(RunInfo, path, body, kind, key or str(uuid.uuid4()), more).id)
+
+    def restart(
+        self, run: str, ranks: int | None = None, key: str | None = None, profile: str = "", priority: int = 0,
+        threads: int | None = None, max_steps: int | None = None,
+    ) -> Run:  # fmt: skip
+        """A new run of the same case that goes on from the newest checkpoint of ``run``, on so many ranks of so many
+        threads, to ``max_steps`` (``run.max_steps``); as the case has them where they are not given.
+
+        Its answer is that of a run that nothing has interrupted. Raises ServiceError when there is no checkpoint, and
+        when ``run`` has used up its steps and ``max_steps`` is not larger.
+        """
+        numbers = {"ranks": ranks, "threads": threads, "max_steps": max_steps}
+        words = {name: str(number) for name, number in numbers.items() if number is not None}
+        words |= {name: str(value) for name, value in (("profile", profile), ("priority", priority)) if value}
+        path = f"/v1/runs/{quoted(run)}:restart?{urlencode(words)}"
+        return Run(self, self.post(RunInfo, path, key=key or str(uuid.uuid4()), more=SURVEY).id)
+
+    def sweep(
+        self, case: CaseSource, points: Sequence[Point] | Mapping[str, Iterable[Any]], at_once: int | None = None,
+        key: str | None = None, *, grid: bool = False, folder: Path | str | None = None, again: bool = False,
+    ) -> Sweep:  # fmt: skip
+        """Hands a case in at many points, each a mapping of keys to values: all become runs, or none.
+
+        A mapping of keys to as many values each is one point after the other, or each with each for a ``grid``.
+        ``at_once`` of them run at a time; ``key`` and ``folder`` as for ``submit``: the same key is the same sweep, of
+        which ``again`` runs the points once more that have ended without success. Raises CaseError, ServiceError.
+        """
+        chosen = listed(points_along(points, grid=grid) if isinstance(points, Mapping) else points)
+        data, told, more = self.outbox.sweep(case, chosen, folder)
+        body = to_json({"case": data, "points": told, "at_once": at_once})
+        kind, more = "application/json", more + _POINT * len(chosen)
+        made = self.post(SweepInfo, "/v1/sweeps", body, kind, key or str(uuid.uuid4()), more)
+        if again and made.failed:
+            made = self.post(SweepInfo, f"/v1/sweeps/{quoted(made.id)}:again", body, kind, more=more)
+        return Sweep(self, made.id)
+
+    def adaptive_sweep(
+        self, case: CaseSource, spans: Mapping[str, Sequence[Any]], goal: str, tolerance: Any = None, *,
+        overrides: Overrides = (), at_once: int | None = None, most: int = MOST, out: Path | str | None = None,
+        folder: Path | str | None = None, say: Callable[[str], None] = lambda text: None,
+    ) -> Found:  # fmt: skip
+        """Where a result passes a threshold, ``goal``: ``"probe.core_speed = 0"``, any column of the table of a sweep.
+
+        ``spans`` has the keys that vary, together, and both ends of each: ``{"parts[0].velocity[2]": ("-200 m/s",
+        "-800 m/s")}``. Runs are made, ``at_once`` of them at a time (None: as the server has room), at most ``most``,
+        until the threshold lies in a bracket of ``tolerance``, by the first key: a quantity, a hundredth of the larger
+        end when it is None. ``out`` is a JSON file from which a later call goes on: what has succeeded is not run
+        again. ``say`` hears of each run. Raises CaseError, UsageError for a file of another sweep, ClientError.
+        """
+        data = data_of(case, overrides)
+        return found_by(
+            self, data, place_of(case, folder), goal, [span_of(key, ends) for key, ends in spans.items()], tolerance,
+            at_once, most, None if out is None else Path(out), say,
+        )  # fmt: skip
+
+    def sweeps(self) -> list[SweepInfo]:
+        """Our sweeps, newest first, without their points."""
+        return list(self._sweeps())
+
+    def _sweeps(self, beginning: str = "") -> Iterator[SweepInfo]:
+        """Newest first, from those that begin so on."""
+        query = {"before": beginning + _LAST} if beginning else {}
+        for _ in range(_MOST_PAGES):
+            page = self.get(SweepPage, "/v1/sweeps", limit=500, **query)
+            yield from page.sweeps
+            if page.next is None:
+                return
+            query = {"before": page.next}
+        raise self.endless("sweeps")
+
+    def find_sweep(self, sweep_id: str) -> Sweep:
+        """A handle of a sweep: by its id, by a beginning of it that no other has, or of the newest one for ``last``.
+
+        Raises NotFoundError where there is none, UsageError where several begin so.
+        """
+        if sweep_id == "last":
+            newest = next(self._sweeps(), None)
+            if newest is None:
+                raise NotFoundError("there is no sweep yet")
+            return Sweep(self, newest.id)
+        return Sweep(self, self._named("sweep", "/v1/sweeps", sweep_id, self._sweeps))
+
+    def run(self, run_id: str) -> Run:
+        """A handle of a run: by its id, by a beginning of it that no other one has, or of the newest one for ``last``.
+
+        Raises NotFoundError where there is none, UsageError where several begin so.
+        """
+        if run_id == "last":
+            newest = self.runs(limit=1)
+            if not newest:
+                raise NotFoundError("there is no run yet")
+            return Run(self, newest[0].id)
+        return Run(self, self._named("run", "/v1/runs", run_id, self._beginning))
+
+    def _beginning(self, beginning: str) -> Iterable[RunInfo]:
+        return self.get(Page, "/v1/runs", limit=_CANDIDATES + 1, prefix=beginning).runs
+
+    def _named(self, what: str, path: str, name: str, after: Callable[[str], Iterable[_Known]]) -> str:
+        """The id that is meant; ``after`` gives runs, or sweeps, from a beginning of an id on."""
+        if not re.fullmatch(ID, name):
+            raise NotFoundError(f"{what} {shown(name)}: there is none; an id has letters and digits")
+        try:
+            self.get(dict[str, Any], f"{path}/{quoted(name)}")
+        except MissingError as error:
+            if error.status != NOT_FOUND:
+                raise
+            found = self._candidates(name, after)
+            if not found:
+                raise
+        else:
+            return name
+        if len(found) > 1:
+            more = " and more" if len(found) > _CANDIDATES else ""
+            raise UsageError(f"{what} = {name!r}: several begin so: {', '.join(found[:_CANDIDATES])}{more}")
+        return found[0]
+
+    def _candidates(self, name: str, after: Callable[[str], Iterable[_Known]]) -> list[str]:
+        """Ids that begin so, some of them; none where the server is too old to be asked."""
+        try:
+            named = takewhile(lambda one: one.id.startswith(name), after(name))
+            return [one.id for one in islice(named, _CANDIDATES + 1)]
+        except ServiceError:
+            return []
+
+    def runs(
+        self, states: Sequence[str] = (), limit: int = 50, labels: Mapping[str, str] | None = None, *, case: str = "",
+        text: str = "", since: Moment = None, until: Moment = None,
+    ) -> list[RunInfo]:  # fmt: skip
+        """Our runs, newest first, at most ``limit``; with ``labels``, those that have all of them.
+
+        ``case`` is the name of their case, with ``*`` for any letters; ``text`` are words, each of which stands in the
+        name, the title, a label, the state or the message, or begins the id; ``since`` and ``until`` bound when they
+        were submitted: Unix s, or a datetime.
+        """
+        found: list[RunInfo] = []
+        query = query_of(states, labels, case, text, since, until)
+        for _ in range(_MOST_PAGES):
+            page = self.get(Page, "/v1/runs", limit=min(100, limit - len(found)), **query)
+            found += page.runs
+            if page.next is None or len(found) >= limit:
+                return found[:limit]
+            query["cursor"] = page.next
+        raise self.endless("runs")
+
+    def table(
+        self, states: Sequence[str] = (), limit: int = 50, labels: Mapping[str, str] | None = None, *, case: str = "",
+        text: str = "", since: Moment = None, until: Moment = None,
+    ) -> list[RunRow]:  # fmt: skip
+        """The same runs with the values of their cases and their results, in SI units."""
+        found: list[RunRow] = []
+        query = query_of(states, labels, case, text, since, until)
+        for _ in range(_MOST_PAGES):
+            page = self._table(min(_PAGE, limit - len(found)), query)
+            found += rows_of(page)
+            if page.next is None or len(found) >= limit:
+                return found[:limit]
+            query["cursor"] = page.next
+        raise self.endless("runs")
+
+    def _table(self, limit: int, query: Mapping[str, Any]) -> TablePage:
+        """A page of the table; asked again while the server still reads results, for a while."""
+        until = time.monotonic() + _READING
+        while (page := self.get(TablePage, "/v1/table", limit=limit, **query)).pending and time.monotonic() < until:
+            time.sleep(_REST)
+        return page
+
+
+def connect(url: str | None = None, token: str | None = None) -> Session:
+    """A session with the server of the arguments, of CONOID_URL and CONOID_TOKEN, or of the configuration file."""
+    chosen = target(url, token)
+    return Session(chosen.url, chosen.token)

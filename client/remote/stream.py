@@ -1,0 +1,230 @@
+"""A run's messages, live: over Zenoh where it can be reached, else over SSE; gaps are refilled over REST.
+
+The only module of the client that knows Zenoh. A late joiner subscribes first, then reads the history, then the
+stream: nothing is missed and nothing told twice.
+"""
+
+import hashlib
+import json
+import queue
+import threading
+import time
+from collections.abc import Callable, Generator, Iterator
+from contextlib import suppress
+from typing import TypeVar, cast
+
+import msgspec
+import zenoh
+
+from conoid.cases import keys
+from conoid.cases.figures import duration
+from conoid.cases.messages import AnyMessage, Log, Snapshot, Status, fragments_from_msgpack, from_msgpack
+from conoid.cases.run import State
+
+from ..errors import AnswerError, ClientError, passes
+from .http import Router
+from .link import Link
+from .order import InOrder, Refill
+
+T = TypeVar("T")
+
+_CAPACITY = 4096
+"""Messages that wait to be read. Chosen: minutes of a run, which sends some ten a second."""
+_BLOBS = 4
+"""Snapshots of fragments that are kept until they are asked for. Chosen: who reads is seconds behind at most."""
+_OPEN_SECONDS = 5.0
+"""s that a router may take to answer before SSE is used. Chosen."""
+_CLOSE_SECONDS = 2.0
+"""s that a subscription may take to close. Chosen: nothing is lost when it does not."""
+_SILENCE = 3.0
+"""s without a message after which the journal is read. Chosen: a run reports four times a second."""
+_PATIENCE = 60.0
+"""s that a server may be away while a run is followed. Chosen: time for a restart."""
+
+
+class StreamError(ClientError):
+    """Zenoh cannot be used: no router, or it refuses the user."""
+
+
+class Mailbox:
+    """A bounded queue between the threads that receive and the one that reads; when it is full, the new are dropped.
+
+    What is dropped leaves a gap in ``seq``, and gaps are refilled.
+    """
+
+    def __init__(self) -> None:
+        """Empty."""
+        self._queue: queue.Queue[AnyMessage] = queue.Queue(_CAPACITY)
+
+    def put(self, message: AnyMessage) -> None:
+        """Never waits."""
+        with suppress(queue.Full):
+            self._queue.put_nowait(message)
+
+    def get(self, timeout: float) -> AnyMessage | None:
+        """The oldest message, or None after ``timeout`` s."""
+        try:
+            return self._queue.get(timeout=timeout)
+        except queue.Empty:
+            return None
+
+
+class ZenohLink:
+    """A native subscription to everything that a run says."""
+
+    name, trouble = "Zenoh", ""
+
+    def __init__(self, router: Router, prefix: str) -> None:
+        """Opens a session and subscribes. Raises StreamError when that does not succeed within seconds."""
+        self._mailbox = Mailbox()
+        self.blobs: dict[str, bytes] = {}
+        """The newest snapshots of the fragments that have come, by their sha256."""
+        self._session = _within(_OPEN_SECONDS, lambda: zenoh.open(_config(router)))
+        self._subscriber = self._session.declare_subscriber(keys.everything(prefix), self._receive)
+
+    def _receive(self, sample: zenoh.Sample) -> None:
+        with suppress(msgspec.MsgspecError):
+            payload = sample.payload.to_bytes()
+            message = from_msgpack(payload)
+            if isinstance(message, Snapshot):
+                self._keep(message, payload)
+            self._mailbox.put(message)
+
+    def _keep(self, message: Snapshot, payload: bytes) -> None:
+        """Its bytes, where they have come with it and are whole."""
+        with suppress(msgspec.MsgspecError):
+            data = fragments_from_msgpack(payload).blob
+            if hashlib.sha256(data).hexdigest() == message.sha256:
+                kept = list(self.blobs.items())[1 - _BLOBS :]
+                self.blobs = dict([*kept, (message.sha256, data)])
+
+    def get(self, timeout: float) -> AnyMessage | None:
+        """The next message; None after ``timeout`` s without one."""
+        return self._mailbox.get(timeout)
+
+    def close(self) -> None:
+        """Closes the session; a router that does not answer is not waited for."""
+        with suppress(StreamError):
+            _within(_CLOSE_SECONDS, self._session.close)
+
+
+def _config(router: Router) -> zenoh.Config:
+    config = zenoh.Config()
+    settings: dict[str, object] = {
+        "mode": "client", "connect/endpoints": [router.endpoint], "connect/timeout_ms": 500,
+        "scouting/multicast/enabled": False, "scouting/gossip/enabled": False,
+        "transport/shared_memory/enabled": False, "transport/unicast/open_timeout": 3000,
+    }  # fmt: skip
+    if router.user is not None:
+        settings |= {"transport/auth/usrpwd/user": router.user, "transport/auth/usrpwd/password": router.password}
+    for key, value in settings.items():
+        config.insert_json5(key, json.dumps(value))
+    return config
+
+
+def _within(seconds: float, work: Callable[[], T]) -> T:
+    """The value of ``work``, done in a thread of its own. Raises StreamError when it fails or takes longer."""
+    done: queue.Queue[tuple[T | None, Exception | None]] = queue.Queue()
+
+    def attempt() -> None:
+        try:
+            done.put((work(), None))
+        except Exception as error:
+            done.put((None, error))
+
+    threading.Thread(target=attempt, name="zenoh", daemon=True).start()
+    try:
+        value, error = done.get(timeout=seconds)
+    except queue.Empty:
+        raise StreamError(f"the Zenoh router did not answer within {duration(seconds)}") from None
+    if error is not None:
+        raise StreamError(f"the Zenoh router refused or cannot be reached: {' '.join(str(error).split())}") from None
+    return cast(T, value)
+
+
+class SseLink:
+    """The server's SSE bridge, read in a thread; when it breaks off it says no more, and the journal is polled."""
+
+    name, trouble = "SSE", ""
+
+    def __init__(self, events: Callable[[], Iterator[AnyMessage]]) -> None:
+        """``events`` opens the stream and gives its messages."""
+        self._mailbox = Mailbox()
+        self._closed = threading.Event()
+        threading.Thread(target=self._read, args=(events,), name="sse", daemon=True).start()
+
+    def _read(self, events: Callable[[], Iterator[AnyMessage]]) -> None:
+        try:
+            for message in events():
+                if self._closed.is_set():
+                    return
+                self._mailbox.put(message)
+        except AnswerError as error:
+            self.trouble = f"the events cannot be followed, and the journal is read instead: {error}"
+        except ClientError:  # it has broken off, or is refused: so will the journal be
+            return
+
+    def get(self, timeout: float) -> AnyMessage | None:
+        """The next message; None after ``timeout`` s without one."""
+        return self._mailbox.get(timeout)
+
+    def close(self) -> None:
+        """The thread ends with its next message, or with the process."""
+        self._closed.set()
+
+
+def follow(link: Link, refill: Refill, ended: Callable[[], bool], after: int = 0) -> Generator[AnyMessage]:
+    """Every message after ``after``, once and in order, to the run's final status; closes ``link``.
+
+    ``refill`` reads the journal, ``ended`` asks the server whether the run is over. While the link is silent both are
+    asked every few seconds, so a dead router delays messages and loses none. A server that does not answer, or answers
+    that it cannot now, is waited for, a minute long; then UnreachableError or ServiceError is raised. Where the link
+    gives what nobody can read, a warning comes before the next message; it is in no journal and has no number.
+    """
+    order, said = InOrder(_patient(refill), after), False
+    try:
+        for message in _told(link, order, ended):
+            if link.trouble and not said:
+                said = True
+                yield Log(run=message.run, level="warning", text=link.trouble)
+            yield message
+            if isinstance(message, Status) and State(message.state).final:
+                return
+    finally:
+        link.close()
+
+
+def _told(link: Link, order: InOrder, ended: Callable[[], bool]) -> Iterator[AnyMessage]:
+    yield from order.catch_up()
+    over = False
+    while not over:
+        message = link.get(_SILENCE)
+        if message is not None:
+            yield from order.take(message)
+            continue
+        over = _asked(ended)
+        yield from order.catch_up()
+
+
+def _asked(ended: Callable[[], bool]) -> bool:
+    """Whether the run is over; not while nobody can say."""
+    try:
+        return ended()
+    except ClientError as error:
+        if not passes(error):
+            raise
+        return False
+
+
+def _patient(refill: Refill) -> Refill:
+    def refilled(after: int) -> list[AnyMessage]:
+        deadline = time.monotonic() + _PATIENCE
+        while True:
+            try:
+                return refill(after)
+            except ClientError as error:
+                if not passes(error) or time.monotonic() > deadline:
+                    raise
+                time.sleep(1.0)
+
+    return refilled

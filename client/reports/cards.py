@@ -1,0 +1,180 @@
+"""What a report says in words and tables, card by card; pictures and charts are in ``plates``."""
+
+import json
+from collections.abc import Sequence
+from html import escape
+
+from conoid.cases.figures import alike, count, counted, crew, duration, exact, percent, rough, si, vector
+from conoid.cases.fragments import Fit
+from conoid.cases.messages import Balance, Log
+from conoid.cases.outcome import Outcome
+
+from ..columns import by_part
+from ..errors import UnfinishedError
+from ..result import Result
+from . import html
+from .compare import summary
+
+_CUTS = 50
+"""Cuts that are listed. Chosen."""
+_PARAMETERS = {"rayleigh": "mode", "exponential": "mean", "power": "exponent"}
+
+
+def strip(ended: Outcome | None) -> str:
+    """The five numbers that matter most."""
+    if ended is None:
+        return ""
+    passed = sum(check.passed for check in ended.reference)
+    cost = f"{duration(ended.elapsed)}<small>on {escape(crew(ended.ranks, ended.threads))}</small>"
+    entries = [
+        ("simulated", f"{escape(si(ended.time, 's'))}<small>{escape(counted(ended.steps, 'step'))}</small>"),
+        ("took", cost), ("energy residual", f"{escape(rough(ended.worst_residual))}<small>at worst</small>"),
+        ("fragments", f"{count(ended.fragments)}<small>{escape(counted(ended.broken, 'facet'))} broken</small>"),
+        ("references", f"{passed} of {len(ended.reference)}<small>pass</small>" if ended.reference else "none"),
+    ]  # fmt: skip
+    shown = "".join(f"<div><dt>{name}</dt><dd>{told}</dd></div>" for name, told in entries)
+    return f'<dl class="facts strip">{shown}</dl>'
+
+
+def references(ended: Outcome | None) -> str:
+    """Each reference with its value, what is expected, the deviation, the verdict and the source."""
+    return html.references(ended)
+
+
+def results(ended: Outcome | None) -> str:
+    """The last value of each probe and its extremes."""
+    rows = []
+    for probe in ended.probes if ended is not None else ():
+        last, least, most = alike((probe.value, probe.least, probe.most), probe.unit)
+        rows.append([probe.name, last, least, most])
+    return html.table(["probe", "at the end", "least", "most"], rows, [1, 2, 3]) if rows else ""
+
+
+def warnings(ended: Outcome | None) -> str:
+    """What the run has warned of."""
+    told = ended.warnings if ended is not None else []
+    return f"<ul class=warnings tabindex=0>{''.join(f'<li>{escape(line)}</li>' for line in told)}</ul>" if told else ""
+
+
+def case(told: dict[str, object]) -> str:
+    """What the case is about, and its parts."""
+    parts = told.get("parts")
+    rows = []
+    for part in parts if isinstance(parts, list) else []:
+        velocity = part.get("velocity")
+        mesh = part.get("mesh") or {}
+        size = mesh.get("element_size")
+        rows.append([
+            part["name"], str(part.get("material", "")), str(mesh.get("shape", "")),
+            exact(size, "m") if isinstance(size, float) else "", vector(velocity, "m/s", 6) if velocity else "",
+            (part.get("fracture") or {}).get("model", ""),
+        ])  # fmt: skip
+    about = f"<p>{escape(str(told.get('description', '')))}</p>" if told.get("description") else ""
+    return about + html.table(["part", "material", "shape", "element size", "velocity", "breaks"], rows)
+
+
+def cost(ended: Outcome | None) -> str:
+    """What the run took, and beside it how far off it is."""
+    if ended is None:
+        return ""
+    updates = (ended.steps or 0) * (ended.elements or 0)
+    each = ended.cpu / updates if updates else None
+    rows = [
+        ["core time of the steps", duration(ended.cpu)],
+        ["clock time", f"{duration(ended.elapsed)} on {crew(ended.ranks, ended.threads)}"],
+        ["tets", f"{count(ended.elements)}, of which {count(ended.eroded)} eroded"],
+        ["nodes", f"{count(ended.nodes_initial)} at first, {count(ended.nodes)} at the end"],
+        ["core time a tet and step", si(each, "s")], ["worst energy residual", rough(ended.worst_residual)],
+    ]  # fmt: skip
+    off = [
+        (abs(check.value - check.expected) / abs(check.expected), check.name)
+        for check in ended.reference
+        if check.expected
+    ]
+    if off:
+        worst, name = max(off)
+        rows.append(["largest deviation of a reference", f"{percent(worst)} ({name})"])
+    if ended.peak_memory:
+        rows.append(["memory of the largest rank", si(max(ended.peak_memory), "B")])
+    return html.table(["", ""], rows) + f'<p class="hint digest">digest {escape(ended.digest)}</p>'
+
+
+def energy(result: Result, ended: Outcome | None) -> str:
+    """The ledger and the energies of the parts at the end."""
+    rows = []
+    if ended is not None and ended.energy is not None:
+        terms = ((name, getattr(ended.energy, name)) for name in ended.energy.__struct_fields__ if name != "residual")
+        there = [(name, value) for name, value in terms if value]
+        rows = list(map(list, zip((name for name, _ in there), alike([value for _, value in there], "J"), strict=True)))
+    at_the_end = html.table(["energy at the end", ""], rows, [1]) if rows else ""
+    return at_the_end + _parts(result)
+
+
+def _parts(result: Result) -> str:
+    """The energy of each part at the end of the history; nothing where there is one part alone."""
+    try:
+        told = by_part(result.history)
+    except UnfinishedError:
+        return ""
+    parts = next(iter(told.values()), {})
+    ended = [part for part, values in parts.items() if values]
+    columns = [alike([of[part][-1] for part in ended], "J") for of in told.values()]
+    rows = [list(row) for row in zip(ended, *columns, strict=True)]
+    return html.table(["part, at the end", *told], rows, [1, 2]) if rows else ""
+
+
+def fragments(result: Result) -> str:
+    """What the fragments are as a whole, and the laws of their masses and extents."""
+    said = summary(result)
+    if said is None:
+        return ""
+    rows = [
+        ["fragments of ten tets or more", count(said.fragments)],
+        ["dust", f"{count(said.dust)}, {percent(said.dust_share)} of the mass"],
+        ["largest fragment", f"{percent(said.largest_share)} of the mass"],
+    ]
+    laws = [*_laws("mass", said.masses, "kg"), *_laws("extent", said.sizes, "m")]
+    told = html.table(["of", "law", "parameter", "value", "ln L"], laws, [3, 4]) if laws else ""
+    return html.table(["", ""], rows) + told
+
+
+def _laws(what: str, fits: Sequence[Fit], unit: str) -> list[list[str]]:
+    """The likeliest law first; the exponent of a power law has no unit."""
+    return [
+        [what, fit.law, _PARAMETERS[fit.law], exact(fit.parameter, "" if fit.law == "power" else unit, 4),
+         exact(fit.log_likelihood, "", 5)]
+        for fit in sorted(fits, key=lambda fit: -fit.log_likelihood)
+    ]  # fmt: skip
+
+
+def balance(result: Result, ended: Outcome | None) -> str:
+    """The cuts of the mesh in the course of the run."""
+    cuts = [message for message in result.messages if isinstance(message, Balance)]
+    if not cuts:
+        return ""
+    some = cuts[:_CUTS]
+    times, costs, gains = (
+        alike(column, "s") for column in ([c.t for c in some], [c.cost for c in some], [c.saved for c in some])
+    )
+    rows = [
+        [t, count(cut.step), cut.cause, count(cut.tets), spent, saved]
+        for cut, t, spent, saved in zip(some, times, costs, gains, strict=True)
+    ]
+    told = f"<p>{counted(len(cuts), 'cut')}{f', the first {_CUTS} of them:' if len(cuts) > _CUTS else ''}</p>"
+    told += html.table(["time", "step", "cause", "tets moved", "cost", "saved by those before"], rows, [1, 3, 4, 5])
+    if ended is not None:
+        told += f"<p>They cost {si(ended.balancing_cost, 's')} and saved {si(ended.balancing_saved, 's')}.</p>"
+    return told
+
+
+def messages(result: Result) -> str:
+    """All lines of the log."""
+    lines = [f"{message.level}: {message.text}" for message in result.messages if isinstance(message, Log)]
+    return f"<pre class=log tabindex=0>{escape(chr(10).join(lines))}</pre>" if lines else ""
+
+
+def keys(told: dict[str, object]) -> str:
+    """The case with every default filled in, in SI."""
+    text = escape(json.dumps(told, indent=2, ensure_ascii=False))
+    shown = f"<pre class=log tabindex=0>{text}</pre>"
+    return f"<details><summary>with every default filled in, in SI</summary>{shown}</details>"

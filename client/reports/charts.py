@@ -1,0 +1,123 @@
+"""Charts from a run's journal. Nothing imports matplotlib early: this module and ``curves`` alone."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from conoid.cases.figures import counted, percent
+from conoid.cases.messages import AnyMessage, Balance, Load
+
+from ..errors import ClientError
+from .curves import save
+
+_COLOURS = {
+    "elements": "#4c78a8", "nodes": "#72b7b2", "contact": "#f58518", "fracture": "#e45756", "output": "#54a24b",
+    "exchange": "#b5bcc4",
+}  # fmt: skip
+"""By phase, from the foot of a bar upwards."""
+_RANKS = ["#4c78a8", "#f58518", "#54a24b", "#e45756", "#72b7b2", "#b279a2", "#eeca3b", "#9d755d"]
+_INK, _FAINT = "#1d2733", "#b5bcc4"
+_NAMED = len(_RANKS)
+"""Ranks that all have a colour of their own; of more, only those with the most and the fewest nodes in the end have."""
+PAPER = {
+    "glass_steel_bar": (
+        "Moon, Kim and Lee, fig. 17: 18 cuts on 16 processors, domain 4, by the impact, grows most; "
+        "fig. 18: contact and its communication take most of the time"
+    ),
+}
+"""What the paper says of the same, by case."""
+
+
+@dataclass
+class Course:
+    """What a run has told of its ranks."""
+
+    times: list[float] = field(default_factory=list)
+    """s."""
+    outside: list[list[int]] = field(default_factory=list)
+    """Of each rank at these times."""
+    cuts: list[float] = field(default_factory=list)
+    """Times, s."""
+    seconds: dict[str, list[float]] = field(default_factory=dict)
+    """CPU time by phase, one number a rank."""
+
+
+def course(messages: Sequence[AnyMessage]) -> Course:
+    """The course of the ranks. Raises ClientError where the journal knows none.
+
+    What a run that went on from a checkpoint had told of the times beyond is dropped; its CPU time is not.
+    """
+    told = Course()
+    for message in messages:
+        if isinstance(message, Load):
+            while told.times and told.times[-1] >= message.t:
+                told.times.pop()
+                told.outside.pop()
+            told.times.append(message.t)
+            told.outside.append(message.outside)
+            for name, seconds in message.phases.items():
+                before = told.seconds.get(name, [0.0] * len(seconds))
+                told.seconds[name] = [a + b for a, b in zip(before, seconds, strict=True)]
+        elif isinstance(message, Balance):
+            told.cuts = [t for t in told.cuts if t < message.t] + [message.t]
+    if not told.times:
+        raise ClientError("this run has not told the loads of its ranks")
+    return told
+
+
+def balance(told: Course, title: str, case: str, out: Path) -> None:
+    """Outside nodes of each rank over time with the cuts, and CPU time by phase and rank, as a PNG."""
+    figure = balance_figure(told)
+    figure.suptitle(title, fontsize=11, color=_INK)
+    figure.supxlabel(PAPER.get(case, ""), fontsize=8, color=_INK)
+    save(figure, out)
+
+
+def balance_figure(told: Course) -> Figure:
+    """Outside nodes of each rank over time with the cuts, and CPU time by phase and rank."""
+    figure = Figure(figsize=(11, 4.8), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    _outside(left, told)
+    _phases(right, told.seconds)
+    for axes in (left, right):
+        axes.set_title(axes.get_title(), fontsize=10, color=_INK)
+        axes.spines[["top", "right"]].set_visible(False)
+    return figure
+
+
+def _outside(axes: Axes, told: Course) -> None:
+    last = told.outside[-1]
+    ranks = len(last)
+    named = range(ranks) if ranks <= _NAMED else (last.index(max(last)), last.index(min(last)))
+    for t in told.cuts:
+        axes.axvline(1e6 * t, color=_FAINT, linewidth=0.8, linestyle=":", label="cut" if t == told.cuts[0] else None)
+    palette = iter(_RANKS)
+    for rank in sorted(range(ranks), key=lambda r: r in named):
+        points = [(1e6 * t, row[rank]) for t, row in zip(told.times, told.outside, strict=True) if len(row) == ranks]
+        style: dict[str, Any] = (
+            {"color": next(palette), "label": f"rank {rank}"} if rank in named else {"color": _FAINT}
+        )
+        axes.plot(*zip(*points, strict=True), linewidth=1.5 if rank in named else 0.7, **style)
+    axes.set(xlabel="time, µs", ylabel="outside nodes", ylim=(0, None), xlim=(0, None))
+    told_of = f"outside nodes: {counted(len(told.cuts), 'cut')} on {counted(ranks, 'rank')}"
+    axes.set_title(told_of if ranks else "nothing is in contact")
+    if axes.get_legend_handles_labels()[0]:
+        axes.legend(fontsize=8, frameon=False)
+
+
+def _phases(axes: Axes, seconds: dict[str, list[float]]) -> None:
+    ranks = len(next(iter(seconds.values())))
+    low = [0.0] * ranks
+    total = sum(map(sum, seconds.values())) or 1.0
+    for name in _COLOURS:
+        spent = seconds.get(name, [0.0] * ranks)
+        label = f"{name}{' and waiting' if name == 'exchange' else ''} {percent(sum(spent) / total, 0)}"
+        axes.bar(range(ranks), spent, bottom=low, color=_COLOURS[name], label=label)
+        low = [a + b for a, b in zip(low, spent, strict=True)]
+    axes.set(xlabel="rank", ylabel="CPU time, s", xticks=range(0, ranks, max(1, ranks // 16)))
+    axes.set_title("CPU time by phase")
+    axes.legend(fontsize=8, frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5), reverse=True)

@@ -1,0 +1,184 @@
+"""Two runs side by side: keys that differ, how each ended, what became of the fragments."""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import msgspec
+
+from conoid.cases import fragments, history
+from conoid.cases.fragments import Summary
+from conoid.cases.outcome import Outcome
+
+from ..columns import Columns
+from ..errors import UnfinishedError
+from ..result import Result
+
+_OUTCOME = (
+    "steps", "time", "ranks", "elapsed", "cpu", "elements", "nodes", "fragments", "broken", "eroded", "eroded_mass",
+    "inside", "deepest", "overlapping", "overlap", "rebalances", "worst_residual", "element_updates_per_second",
+)  # fmt: skip
+_DRAWN = (
+    "kinetic", "elastic", "plastic", "contact", "friction", "eroded", "fracture", "cohesive", "stepping", "averaging",
+)  # fmt: skip
+AT_THE_END = ", at the end"
+"""Behind the name of a column of the history: its last value."""
+_UNITS = {"time": "s", "elapsed": "s", "cpu": "s", "eroded_mass": "kg", "element_updates_per_second": "1/s"}
+
+
+class Key(msgspec.Struct, frozen=True):
+    """A key of the case that differs; None where a case has none."""
+
+    key: str
+    a: Any
+    b: Any
+
+
+class Value(msgspec.Struct, frozen=True):
+    """A number of both runs, NaN where it is not known; ``difference`` is b - a, ``relative`` that over |a|."""
+
+    name: str
+    unit: str
+    a: float
+    b: float
+
+    @property
+    def difference(self) -> float:
+        """b - a."""
+        return self.b - self.a
+
+    @property
+    def relative(self) -> float:
+        """Of the magnitude of a; 0 where both are the same, NaN where one is not known, or a is 0."""
+        if self.difference == 0.0:
+            return 0.0
+        return self.difference / abs(self.a) if self.a else math.nan
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """What two runs have in common, and what not."""
+
+    names: tuple[str, str]
+    same_answer: bool
+    """Their digests are equal."""
+    keys: list[Key]
+    ends: list[Value]
+    sizes: list[Value]
+    """Fragment statistics of the last tables."""
+
+
+def compare(a: Result, b: Result) -> Comparison:
+    """Compares two runs that have ended. Raises UnfinishedError."""
+    ends = [*_outcomes(a, b), *_energies(a, b), *_references(a, b), *_last(a, b)]
+    digests = a.outcome.digest, b.outcome.digest
+    return Comparison(
+        (a.folder.name, b.folder.name), digests[0] == digests[1] != "", differing(a.case, b.case), ends, _sizes(a, b)
+    )
+
+
+def differing(a: Any, b: Any) -> list[Key]:
+    """The keys whose values differ, such as ``parts.glass.mesh.element_size``."""
+    first, second = dict(_flat(a)), dict(_flat(b))
+    every = [*first, *(key for key in second if key not in first)]
+    return [Key(key, first.get(key), second.get(key)) for key in every if first.get(key) != second.get(key)]
+
+
+def _flat(data: Any, path: str = "") -> Iterator[tuple[str, Any]]:
+    """Keys and values of the leaves; entries of lists are called by their name where they have one."""
+    if isinstance(data, dict):
+        for key, value in data.items():
+            yield from _flat(value, f"{path}.{key}" if path else str(key))
+    elif isinstance(data, list) and any(isinstance(each, dict) for each in data):
+        for place, each in enumerate(data):
+            name = each.get("name", place) if isinstance(each, dict) else place
+            yield from _flat(each, f"{path}.{name}")
+    else:
+        yield path, data
+
+
+def _outcomes(a: Result, b: Result) -> list[Value]:
+    """NaN where one run does not know it; what neither knows is left out."""
+    pairs = ((name, _known(a.outcome, name), _known(b.outcome, name)) for name in _OUTCOME)
+    return [Value(n, _UNITS.get(n, ""), *both) for n, *both in pairs if not all(map(math.isnan, both))]
+
+
+def _known(ended: Outcome, name: str) -> float:
+    value = getattr(ended, name)
+    return math.nan if value is None else float(value)
+
+
+def _energies(a: Result, b: Result) -> list[Value]:
+    first, second = a.outcome.energy, b.outcome.energy
+    if first is None or second is None:
+        return []
+    pairs = [(name, getattr(first, name), getattr(second, name)) for name in first.__struct_fields__]
+    return [Value(f"energy.{n}", "" if n == "residual" else "J", one, two) for n, one, two in pairs if one or two]
+
+
+def _references(a: Result, b: Result) -> list[Value]:
+    second = {check.name: check.value for check in b.outcome.reference}
+    return [Value(c.name, c.unit, c.value, second[c.name]) for c in a.outcome.reference if c.name in second]
+
+
+def _last(a: Result, b: Result) -> list[Value]:
+    """The last line of the columns of both histories that no outcome has: momentum, probes."""
+    try:
+        first, second = a.history, b.history
+    except UnfinishedError:
+        return []
+    shared = [name for name in common(first, second) if name not in (*history.CLOCK, *history.LEDGER)]
+    if not (first.rows and second.rows):
+        return []
+    return [Value(f"{n}{AT_THE_END}", first.units[n], first.numbers(n)[-1], second.numbers(n)[-1]) for n in shared]
+
+
+def common(a: Columns, b: Columns) -> list[str]:
+    """Columns of numbers that both have."""
+    return [name for name, values in a.items() if name in b and not isinstance(values, list)]
+
+
+@dataclass(frozen=True)
+class Material:
+    """What a picture of two runs is drawn from, by their names."""
+
+    histories: dict[str, Columns]
+    fragments: dict[str, Columns]
+    columns: list[str]
+
+
+def material(a: Result, b: Result, names: Sequence[str] = ()) -> Material:
+    """The histories and last fragment tables; without ``names``, energies that are not all 0 and shared probes."""
+    runs = {a.folder.name: a, b.folder.name: b} if a.folder.name != b.folder.name else {"A": a, "B": b}
+    told = {name: run.history for name, run in runs.items()}
+    both = common(a.history, b.history)
+    chosen = [n for n in both if n in _DRAWN and any(any(each.numbers(n)) for each in told.values())]
+    chosen += [n for n in both if n not in history.COLUMNS and history.part_of(n) is None]
+    tables = {name: run.fragments_of() for name, run in runs.items() if run.fragment_tables}
+    return Material(told, tables, list(names or chosen))
+
+
+def _sizes(a: Result, b: Result) -> list[Value]:
+    first, second = summary(a), summary(b)
+    if first is None or second is None:
+        return []
+    whole = f"fragments of {fragments.DUST} tets or more"
+    values = [
+        Value(whole, "", first.fragments, second.fragments), Value("dust", "", first.dust, second.dust),
+        Value("dust, of the mass", "", first.dust_share, second.dust_share),
+        Value("largest fragment, of the mass", "", first.largest_share, second.largest_share),
+    ]  # fmt: skip
+    laws = {fit.law: fit.parameter for fit in second.masses}
+    for fit in first.masses:
+        unit = "" if fit.law == "power" else "kg"
+        values.append(Value(f"masses, {fit.law} law", unit, fit.parameter, laws.get(fit.law, math.nan)))
+    return values
+
+
+def summary(result: Result) -> Summary | None:
+    """What the last table of fragments says as a whole; None where there is none."""
+    if not result.fragment_tables:
+        return None
+    table = result.fragments_of()
+    return fragments.summary([int(n) for n in table.numbers("tets")], table.numbers("mass"), table.numbers("extent"))

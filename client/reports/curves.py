@@ -1,0 +1,201 @@
+"""Curves of a run: energy, fragments, time step, columns of its history; two runs in one picture. With matplotlib."""
+
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from conoid.cases import history
+from conoid.cases.figures import counted, exact
+from conoid.cases.fragments import DUST
+
+from ..columns import Columns, by_part
+from ..errors import ClientError, UsageError
+from ..local.saving import whole
+from .compare import Material
+
+_INK, _FAINT = "#1d2733", "#b5bcc4"
+_COLOURS = (
+    "#4c78a8", "#f58518", "#54a24b", "#e45756", "#72b7b2", "#b279a2", "#eeca3b", "#9d755d", "#ff9da6", "#8c96a3",
+)  # fmt: skip
+_LEDGER = (
+    "elastic", "cohesive", "plastic", "viscous", "contact", "friction", "eroded", "fracture", "stepping", "averaging",
+)  # fmt: skip
+_DASHES = ("-", "--", ":")
+_LIMITERS = 6
+"""Limiters of the step that have a colour of their own. Chosen."""
+_PROBES = 8
+"""Curves of a panel, at most. Chosen."""
+
+
+def save(figure: Figure, out: Path) -> Path:
+    """Writes a figure, as PNG or what the name ends in. Raises ClientError, UsageError for an ending nobody knows."""
+    try:
+        with whole(out) as part:
+            figure.savefig(part, dpi=100)
+    except ValueError as error:
+        raise UsageError(f"{out}: cannot be written: {error}") from None
+    return out
+
+
+def energy(told: Columns) -> Figure:
+    """The whole ledger; its terms without the kinetic one and what came in; the residual; and of several parts the
+    kinetic and the internal energy of each.
+    """
+    parts = {name: _largest(some) for name, some in by_part(told).items()}
+    figure, (left, middle, right, *others) = _panels(3 + len(parts))
+    t = _micro(told)
+    left.plot(t, told.numbers("kinetic"), color="#4c78a8", label="kinetic", linewidth=1.4)
+    came = [a + b for a, b in zip(told.numbers("initial"), told.numbers("external"), strict=True)]
+    left.plot(t, came, color=_INK, label="initial + external", linewidth=1.4)
+    there = ("kinetic", *(name for name in _LEDGER if name in told))
+    total = [math.fsum(values) for values in zip(*(told.numbers(name) for name in there), strict=True)]
+    left.plot(t, total, color="#e45756", label="sum of all terms", linewidth=1.0, linestyle="--")
+    for name, colour in zip(_LEDGER, _COLOURS, strict=False):
+        if name in told and any(told.numbers(name)):
+            middle.plot(t, told.numbers(name), color=colour, label=name, linewidth=1.4)
+    positive = [value if value > 0.0 else math.nan for value in told.numbers("residual")]
+    right.semilogy(t, positive, color=_INK, linewidth=1.2)
+    _name(left, "energy", "energy, J", ylim=(0, None))
+    _name(middle, "without the kinetic term", "energy, J")
+    _name(right, "residual of the ledger", "of the largest energy that came in")
+    for axes, (name, some) in zip(others, parts.items(), strict=True):
+        for (part, values), colour in zip(some.items(), _COLOURS * len(some), strict=False):
+            axes.plot(t, values, color=colour, label=part, linewidth=1.4)
+        _name(axes, f"{name} energy of each part", "energy, J")
+    return figure
+
+
+def _largest(curves: dict[str, Sequence[float]]) -> dict[str, Sequence[float]]:
+    """As many as a panel has room for, those that rise highest."""
+    chosen = sorted(curves, key=lambda name: -max(curves[name], default=0.0))[:_PROBES]
+    return {name: curves[name] for name in curves if name in chosen}
+
+
+def steps(told: Columns) -> Figure:
+    """The length of the time step, in the colour of what holds it down."""
+    figure, (axes,) = _panels(1)
+    held = [_limiter(text) for text in told["limiter"] if isinstance(text, str)] or [""] * told.rows
+    often = sorted(set(held), key=lambda name: -held.count(name))[:_LIMITERS]
+    points = list(zip(_micro(told), told.numbers("dt"), held, strict=True))
+    axes.plot([t for t, _, _ in points], [1e9 * dt for _, dt, _ in points], color=_FAINT, linewidth=0.7)
+    for name, colour in zip((*often, "others"), (*_COLOURS[:_LIMITERS], _FAINT), strict=False):
+        some = [(t, 1e9 * dt) for t, dt, by in points if by == name or (name == "others" and by not in often)]
+        if some:
+            axes.plot(*zip(*some, strict=True), ".", markersize=3, color=colour, label=name or "not known")
+    _name(axes, "time step, and what holds it down", "dt, ns", ylim=(0, None))
+    return figure
+
+
+def _limiter(text: str) -> str:
+    """``stability: glass`` of ``stability: tet 12 of glass``."""
+    what, _, where = text.partition(":")
+    return f"{what}: {where.rpartition(' of ')[2].strip()}" if where else what
+
+
+def fragments(tables: Sequence[Columns]) -> Figure:
+    """How many there are in each frame, the share of the largest one, and N(m) of the last frame with its laws."""
+    if not tables or not any(table.rows for table in tables):
+        raise ClientError("this run has no tables of fragments: nothing in it can break")
+    figure, (left, right) = _panels(2)
+    counted = [table for table in tables if table.rows]
+    t = [1e6 * table.numbers("t")[0] for table in counted]
+    whole = [sum(tets >= DUST for tets in table.numbers("tets")) for table in counted]
+    left.plot(t, [table.rows for table in counted], ".-", color=_COLOURS[0], label="all")
+    left.plot(t, whole, ".-", color=_COLOURS[1], label=f"of {DUST} tets or more")
+    left.set_yscale("symlog", linthresh=1.0)
+    distribution(right, {"": counted[-1]})
+    _name(left, "fragments", "number", ylim=(0, None))
+    return figure
+
+
+def distribution(axes: Axes, tables: Mapping[str, Columns]) -> None:
+    """N(m), the number of fragments of mass m or more, on two logarithmic axes."""
+    for (name, table), colour in zip(tables.items(), _COLOURS, strict=False):
+        masses = sorted((1e3 * mass for mass in table.numbers("mass") if mass > 0.0), reverse=True)
+        when = exact(table.numbers("t")[0], "s", 4) if table.rows else ""
+        label = ", ".join(filter(None, [name, when, counted(len(masses), "fragment")]))
+        axes.step(masses, range(1, len(masses) + 1), where="post", color=colour, label=label, linewidth=1.4)
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    _name(axes, "N(m): fragments of mass m or more", "N", xlabel="m, g")
+
+
+def columns(told: Columns, names: Sequence[str] = ()) -> Figure:
+    """Columns of a history, those of one unit in one panel; without names, those of the probes. Raises ClientError."""
+    return overlaid({"": told}, names or probes(told) or ["momentum_x", "momentum_y", "momentum_z"])
+
+
+def probes(told: Columns) -> list[str]:
+    """The columns that belong to the probes of the case."""
+    return [name for name in told if name not in history.COLUMNS and history.part_of(name) is None]
+
+
+def overlaid(runs: Mapping[str, Columns], names: Sequence[str], spare: int = 0) -> Figure:
+    """Columns of several runs: a panel a unit, a colour a column, a dash a run; the last ``spare`` panels stay empty.
+
+    Raises ClientError.
+    """
+    groups = _by_unit(runs, names)
+    figure, panels = _panels(len(groups) + spare)
+    for (unit, some), axes in zip(groups.items(), panels, strict=False):
+        for name, colour in zip(some, _COLOURS * len(some), strict=False):
+            for told, dash in zip(runs.values(), _DASHES, strict=False):
+                if name in told:
+                    label = name if told is next(iter(runs.values())) else None
+                    axes.plot(_micro(told), told.numbers(name), dash, color=colour, label=label, linewidth=1.3)
+        what = ", ".join(some) if len(some) < 4 else f"{some[0]}, {some[1]} and {len(some) - 2} more"
+        _name(axes, what if len(runs) == 1 else _dashed(runs), unit or "1")
+    return figure
+
+
+def _dashed(runs: Mapping[str, Columns]) -> str:
+    """Which run has which dash."""
+    return ", ".join(f"{run} {mark}" for run, mark in zip(runs, ("——", "– –", "· ·"), strict=False))
+
+
+def comparison(material: Material) -> Figure:
+    """Two runs: the columns of their histories over each other, and the masses of their fragments."""
+    figure = overlaid(material.histories, material.columns, 1 if material.fragments else 0)
+    if material.fragments:
+        distribution(figure.axes[-1], material.fragments)
+    return figure
+
+
+def _by_unit(runs: Mapping[str, Columns], names: Sequence[str]) -> dict[str, list[str]]:
+    """Names by their unit, in their order, so many a panel."""
+    groups: dict[str, list[str]] = {}
+    for name in names:
+        told = next((told for told in runs.values() if name in told), next(iter(runs.values())))
+        told.numbers(name)
+        unit = told.units[name]
+        groups.setdefault(unit, [])
+        if len(groups[unit]) < _PROBES:
+            groups[unit].append(name)
+    return groups
+
+
+def _panels(n: int) -> tuple[Figure, list[Axes]]:
+    across = min(n, 3)
+    down = -(-n // across)
+    figure = Figure(figsize=(5.2 * across if across > 1 else 7.5, 3.8 * down), layout="constrained")
+    axes: Any = figure.subplots(down, across, squeeze=False)
+    every = list(axes.flat)
+    for unused in every[n:]:
+        unused.remove()
+    return figure, every[:n]
+
+
+def _name(axes: Axes, title: str, ylabel: str, xlabel: str = "time, µs", **limits: Any) -> None:
+    axes.set(xlabel=xlabel, ylabel=ylabel, **limits)
+    axes.set_title(title, fontsize=10, color=_INK)
+    axes.spines[["top", "right"]].set_visible(False)
+    if axes.get_legend_handles_labels()[0]:
+        axes.legend(fontsize=8, frameon=False)
+
+
+def _micro(told: Columns) -> list[float]:
+    return [1e6 * t for t in told.numbers("t")]

@@ -1,0 +1,161 @@
+"""Pictures and charts of a report, each in the page itself."""
+
+import io
+import re
+import tempfile
+from collections.abc import Callable, Sequence
+from html import escape
+from pathlib import Path
+from typing import Any
+
+from conoid.cases.figures import exacts
+from conoid.cases.messages import Load
+
+from ..drawing.fields import FIELDS
+from ..drawing.picture import Drawn
+from ..errors import ClientError, UnfinishedError, ViewError
+from ..result import Result
+from . import html
+
+_SHOTS = 3
+"""Times of a picture, evenly over the frames. Chosen: they fit beside each other."""
+_SIZE = (1500, 860)
+_INK, _FAINT = "#1d2733", "#b5bcc4"
+"""Colours of charts that are those of the text in a report, so that they are read on a light and on a dark ground."""
+
+
+def pictures(result: Result, fields: Sequence[str], at: Callable[[str], None]) -> str:
+    """Each field at some times, and the last one on a cut; what cannot be drawn is said."""
+    frames = [frame.index for frame in result.frames]
+    if not frames or not fields:
+        return ""
+    some = sorted({frames[round((len(frames) - 1) * (k + 1) / _SHOTS)] for k in range(_SHOTS)})
+    drawn = []
+    for field in fields:
+        at(f"drawing {field} at {len(some)} times")
+        drawn.append(_picture(result, field, f"at {len(some)} times", frame=some, mirror="auto"))
+    inside = next((field for field in fields if FIELDS[field].kind not in ("classes", "fragments")), "")
+    if inside:
+        at(f"drawing {inside} on a cut")
+        drawn.append(_picture(result, inside, "on a cut", frame=[frames[-1]], **_cut(result)))
+    return "".join(drawn)
+
+
+def _cut(result: Result) -> dict[str, str]:
+    """A model with a plane of symmetry shows its inside there; others are cut through the middle."""
+    return {} if result.scene().mirrors else {"section": "y=middle", "camera": "0.35,-1,0.3"}
+
+
+def _picture(result: Result, field: str, how: str, **options: Any) -> str:
+    with tempfile.TemporaryDirectory() as folder:
+        out = Path(folder) / f"{field}.png"
+        try:
+            drawn = result.view(field, out, size=_SIZE, transparent=True, captions=False, **options)
+        except ViewError as error:
+            return f"<p class=hint>{escape(field)}: {escape(str(error))}</p>"
+        label = FIELDS[field].label
+        image = html.image(_webp(out), "webp", f"{label} {how}")
+        caption = f"<b>{escape(label)}</b> {escape(how)} {_key(drawn)}"
+        return f"<figure class=plate>{image}<figcaption>{caption}</figcaption></figure>"
+
+
+def _webp(path: Path) -> bytes:
+    """The picture in a tenth of the bytes."""
+    from PIL import Image  # comes with what has drawn it
+
+    packed = io.BytesIO()
+    with Image.open(path) as image:
+        image.save(packed, "WEBP", quality=88, method=5)
+    return packed.getvalue()
+
+
+def _key(drawn: Drawn) -> str:
+    """The colour bar of a picture as text and a stripe."""
+    field = FIELDS[drawn.field]
+    if field.kind == "fragments":
+        return "<span class=hint>a hue for each part, pieces vary it; what is whole is pale</span>"
+    if field.kind == "classes":
+        return ""
+    low, high = exacts((drawn.low, drawn.high), drawn.unit, 4)
+    if drawn.limits is None:
+        return f"<span class=hint>{escape(low)} everywhere</span>"
+    first, last = exacts(drawn.limits, drawn.unit, 4)
+    stripe = f'<i style="background:linear-gradient(90deg,{",".join(field.colours)})"></i>'
+    beyond = drawn.low < drawn.limits[0] or drawn.high > drawn.limits[1]
+    said = f" <span class=hint>values from {escape(low)} to {escape(high)}</span>" if beyond else ""
+    return f"<span class=scale>{escape(first)} {stripe} {escape(last)}</span>{said}"
+
+
+# Charts ---------------------------------------------------------------------------------------------------------------
+
+
+def curve(result: Result, name: str) -> list[str]:
+    """The charts of a history; a line where there is no package to draw with."""
+    return charts(lambda: _curves().__dict__[name](result.history))
+
+
+def fragments(result: Result) -> list[str]:
+    """Numbers of fragments over time, and their masses."""
+    tables = (result.fragments_of(index) for index in result.fragment_tables)
+    return charts(lambda: _curves().fragments(list(tables)))
+
+
+def balance(result: Result) -> list[str]:
+    """Outside nodes and CPU time by rank."""
+    messages = result.messages
+    if not any(isinstance(message, Load) for message in messages):
+        return []
+
+    def draw() -> Any:
+        from . import charts as drawing  # matplotlib is loaded when it is needed
+
+        return drawing.balance_figure(drawing.course(messages))
+
+    return charts(draw)
+
+
+def _curves() -> Any:
+    from . import curves  # matplotlib is loaded when it is needed
+
+    return curves
+
+
+def charts(draw: Callable[[], Any]) -> list[str]:
+    """Each panel of a figure as SVG of its own, in the colours of the text; nothing where the run lacks it."""
+    try:
+        figure = draw()
+    except UnfinishedError:
+        return []
+    except ModuleNotFoundError as error:
+        return [f"<p class=hint>charts need the extra 'view' of conoid: {escape(str(error))}</p>"]
+    except ClientError as error:
+        return [f"<p class=hint>{escape(str(error))}</p>"]
+    return [_svg(figure, panel) for panel in figure.axes]
+
+
+def _svg(figure: Any, panel: Any) -> str:
+    import matplotlib as mpl
+
+    figure.draw_without_rendering()
+    figure.set_layout_engine("none")
+    figure.patch.set_visible(False)
+    for each in figure.axes:
+        each.set_visible(each is panel)
+        each.patch.set_visible(False)
+    title = panel.get_title()
+    panel.set_title("")
+    if (legend := panel.get_legend()) is not None:
+        legend.get_frame().set_alpha(0.0)
+    text = io.StringIO()
+    with mpl.rc_context({"svg.fonttype": "none", "svg.hashsalt": f"conoid{title}"}):
+        figure.savefig(text, format="svg", bbox_inches="tight", transparent=True, metadata={"Date": None})
+    body = text.getvalue()
+    body = re.sub(r"<metadata>.*?</metadata>", "", body[body.index("<svg") :], flags=re.DOTALL)
+    for colour in (_INK, "#000000"):
+        body = body.replace(colour, "currentColor")
+    used = set(re.findall(r"#([\w-]+)", body))
+    body = re.sub(r' id="([\w.-]+)"', lambda found: found[0] if found[1] in used else "", body)
+    body = re.sub(
+        r'<svg[^>]*?viewBox="([^"]*)"[^>]*>', rf'<svg viewBox="\1" role=img aria-label="{escape(title)}">', body
+    )
+    return f"<h2>{escape(title)}</h2>{body}"

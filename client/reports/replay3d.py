@@ -1,0 +1,182 @@
+"""The replay in 3-D inside a report: the page's own modules, three.js and the snapshots of a run, all in one file.
+
+The modules import each other by relative addresses, which a page without an address cannot resolve: here they are
+entries of an import map, called ``conoid/NAME``. Those that ask the server have small ones in their place. Modules and
+snapshots are packed by gzip, which browsers unpack.
+"""
+
+import base64
+import gzip
+import hashlib
+import json
+import re
+from collections.abc import Sequence
+from html import escape
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+from conoid.cases import layout
+from conoid.cases.messages import Snapshot
+
+from ..errors import ClientError
+from ..result import Result
+
+FIRST = "body.js"
+"""The module that shows the body; what it imports comes along."""
+PACKAGE, VERSION = "nicegui", "3.18.0"
+THREE = (
+    "nicegui/elements/scene/dist/index.js",
+    "f55227d12dac0eb037cae13b1992091746fc017a275748e4a1bebd0f6244e7e5",
+)
+"""three.js as the live page has it: the file in the package, and its sha256 in the wheel of ``VERSION`` on PyPI."""
+MOST = 24
+"""Snapshots that are embedded, evenly over the run, unless they are too large. Chosen."""
+BUDGET = 2_200_000
+"""Packed bytes of all snapshots in a report, where they are a third more. Chosen: all of it stays below 5 MB."""
+_WEB = Path(__file__).parent.parent / "web"
+_IMPORT = re.compile(r"""(?:import|export)\s*(?:\{([^}]*)\}|\*)?[^;'"]*["']\./([\w-]+\.js)["']""")
+_RELATIVE = re.compile(r"""(from\s*|import\s*\(\s*|import\s+)(["'])\./""")
+_OF_SERVER = {
+    "api.js": {
+        "binary": """async (path) => {
+  const [, n, tets] = /snapshots\\/(\\d+)(\\/tets)?$/.exec(path);
+  return conoid[tets ? "bytes" : "unzip"](tets ? `tets-${n}` : `snapshot-${n}`);
+}""",
+        "call": """async (path) => {
+  if (path.endsWith("case.resolved.json")) return JSON.parse(document.getElementById("case").textContent);
+  throw new Error("a report does not have it");
+}""",
+    },
+    "libraries.js": {"three": '() => import("conoid/three")'},
+}
+"""What stands in for modules that ask the server."""
+_ABSENT = '() => { throw new Error("a report has no server"); }'
+_START = """
+import { Body } from "conoid/body.js";
+const body = new Body("report", () => {});
+document.getElementById("replay").replaceWith(body.element);
+body.element.id = "replay";
+body.update(JSON.parse(document.getElementById("snapshots").textContent));
+"""
+_BOOT = """
+(async () => {
+  const bytes = (id) => Uint8Array.from(atob(document.getElementById(id).textContent), (letter) => letter.charCodeAt(0)).buffer;
+  const unzip = (id) => new Response(new Blob([bytes(id)]).stream().pipeThrough(new DecompressionStream("gzip"))).arrayBuffer();
+  const script = (type, text) => document.body.append(Object.assign(document.createElement("script"), { type, textContent: text }));
+  globalThis.conoid = { bytes, unzip };
+  try {
+    const modules = Object.entries(JSON.parse(new TextDecoder().decode(await unzip("modules"))));
+    const imports = Object.fromEntries(modules.map(([name, code]) => [name, `data:text/javascript,${encodeURIComponent(code)}`]));
+    script("importmap", JSON.stringify({ imports }));
+    script("module", document.getElementById("start").textContent);
+  } catch (error) {
+    document.getElementById("replay").textContent = `No replay in 3-D: ${error.message}`;
+  }
+})();
+"""  # noqa: E501
+
+
+def html(result: Result) -> str:
+    """The replay of a run's snapshots; a line where three.js is not installed; nothing where there is no snapshot."""
+    names = [name for name in result.folder.names() if re.fullmatch(rf"{layout.SNAPSHOTS}/\d+\.snap", name)]
+    if not names or not (_WEB / FIRST).is_file():
+        return ""
+    try:
+        code = modules(three().decode())
+    except ClientError as error:
+        return f"<p class=hint>No replay in 3-D: {escape(str(error))}</p>"
+    entries, embedded = _snapshots(result, names)
+    packed = gzip.compress(json.dumps(code).encode(), mtime=0)
+    return "".join([
+        '<section id=replay class=card><p class=hint>The replay in 3-D is being unpacked …</p></section>', *embedded,
+        _script("application/json", _json(entries), "snapshots"),
+        _script("application/json", _json(result.case), "case"),
+        _script("application/octet-stream", _base64(packed), "modules"),
+        _script("text/plain", _START, "start"), f"<script>{_BOOT}</script>",
+    ])  # fmt: skip
+
+
+def _snapshots(result: Result, names: Sequence[str]) -> tuple[list[dict[str, Any]], list[str]]:
+    """What the body is told of the snapshots that fit, and their bytes; those of all tets while there is room."""
+    told = {message.n: message for message in _messages(result) if isinstance(message, Snapshot)}
+    packed = _packed(result, names)
+    room = BUDGET - sum(map(len, packed.values()))
+    entries, embedded = [], []
+    for name, data in packed.items():
+        n, tets, entry = int(Path(name).stem), name.replace(".snap", ".tets"), {"bytes": len(data), "tets": 0}
+        if tets in result.folder.names():
+            volume = result.folder.path(tets).read_bytes()
+            if len(volume) < room:
+                room -= len(volume)
+                entry["tets"] = len(volume)
+                embedded.append(_script("application/octet-stream", _base64(volume), f"tets-{n}"))
+        entries.append({"n": n, **entry, **({"t": told[n].t, "fields": told[n].fields} if n in told else {})})
+        embedded.append(_script("application/octet-stream", _base64(data), f"snapshot-{n}"))
+    return entries, embedded
+
+
+def _packed(result: Result, names: Sequence[str]) -> dict[str, bytes]:
+    """As many snapshots as there is room for, the first and the last one at least."""
+    packed = {name: gzip.compress(result.folder.path(name).read_bytes(), mtime=0) for name in spread(names, MOST)}
+    while len(packed) > 2 and sum(map(len, packed.values())) > BUDGET:
+        kept = spread(list(packed), max(2, len(packed) * 4 // 5))
+        packed = {name: packed[name] for name in kept}
+    return packed
+
+
+def _messages(result: Result) -> list[Any]:
+    try:
+        return list(result.messages)
+    except ClientError:
+        return []
+
+
+def spread(names: Sequence[str], most: int) -> list[str]:
+    """At most so many of the names, evenly, with the first and the last."""
+    return sorted({names[round(k * (len(names) - 1) / max(most - 1, 1))] for k in range(most)})
+
+
+def modules(library: str) -> dict[str, str]:
+    """All modules of the replay by their names in the import map; ``library``: three.js."""
+    found, asked, waiting = {"conoid/three": library}, {name: set(known) for name, known in _OF_SERVER.items()}, [FIRST]
+    while waiting:
+        name = waiting.pop()
+        code = (_WEB / name).read_text(encoding="utf-8")
+        found[f"conoid/{name}"] = _RELATIVE.sub(r"\1\2conoid/", code)
+        for names, other in _IMPORT.findall(code):
+            if other in asked:
+                asked[other] |= {each.split(" as ")[0].strip() for each in names.split(",") if each.strip()}
+            elif f"conoid/{other}" not in found:
+                waiting.append(other)
+    return found | {f"conoid/{name}": _stand_in(name, wanted) for name, wanted in asked.items()}
+
+
+def _stand_in(module: str, wanted: set[str]) -> str:
+    known = _OF_SERVER[module]
+    return "\n".join(f"export const {name} = {known.get(name, _ABSENT)};" for name in sorted(wanted))
+
+
+def three() -> bytes:
+    """three.js out of the installed package, which is not imported. Raises ClientError for any but the tested one."""
+    cure = f"pip install --no-deps {PACKAGE}=={VERSION}"
+    try:
+        installed = metadata.distribution(PACKAGE)
+        content = Path(str(installed.locate_file(THREE[0]))).read_bytes()
+    except (metadata.PackageNotFoundError, OSError):
+        raise ClientError(f"{PACKAGE} {VERSION} is not installed: {cure}") from None
+    if hashlib.sha256(content).hexdigest() != THREE[1]:
+        raise ClientError(f"{PACKAGE} {installed.version} is installed, tested is {VERSION}: {cure}")
+    return content
+
+
+def _script(kind: str, content: str, name: str) -> str:
+    return f'<script type="{kind}" id={name}>{content}</script>'
+
+
+def _json(data: object) -> str:
+    return json.dumps(data).replace("</", "<\\/")
+
+
+def _base64(data: bytes) -> str:
+    return base64.b64encode(data).decode()

@@ -1,0 +1,169 @@
+"""``conoid report``: a run as one HTML file that needs no server, no network and nothing beside it.
+
+It has the style sheets of the live page, so that it looks like one: the body at the left, what matters beside it, and
+charts below.
+"""
+
+from collections.abc import Callable, Sequence
+from html import escape
+from importlib import metadata
+from pathlib import Path
+
+from conoid.cases.outcome import Outcome
+
+from ..errors import ClientError, UnfinishedError
+from ..local.saving import save_text
+from ..result import Result
+from . import cards, plates, replay3d
+
+_WEB = Path(__file__).parent.parent / "web"
+_SHEETS = ("style.css", "body.css")
+_STYLE = """
+:root { color-scheme: light dark }
+main { max-width: 1880px; margin: 0 auto }
+.plain { position: static; height: auto } .plain > .card { height: auto }
+.charts > .card.wide { grid-column: 1 / -1 }
+.plates { display: grid; gap: 12px; grid-template-columns: repeat(auto-fit, minmax(min(100%, 560px), 1fr)) }
+.plate { margin: 0 } .plate img { display: block; width: 100%; height: auto }
+.plate figcaption { display: flex; flex-wrap: wrap; align-items: center; gap: 4px 10px; font-size: 13.5px }
+.scale { display: inline-flex; align-items: center; gap: 8px; color: var(--soft) }
+.scale > i { width: 120px; height: 10px; border-radius: 3px; border: 1px solid var(--line) }
+.card > svg { display: block; width: 100%; height: auto; color: var(--ink) }
+.card > svg text { font-family: inherit !important; fill: currentColor !important }
+table { border-collapse: collapse; margin: 2px 0 8px; font-size: 14px } .wide-table { overflow-x: auto }
+th { text-align: left; font-weight: 500; font-size: 13px; color: var(--soft) }
+th, td { padding: 5px 14px 5px 0; vertical-align: top } tbody tr { border-top: 1px solid var(--line) }
+td.n, th.n { text-align: right; white-space: nowrap } td { overflow-wrap: break-word }
+td:first-child { min-width: 6em } .sources td:last-child { min-width: 15em }
+.digest { overflow-wrap: anywhere; font: 12.5px var(--mono) }
+span.good, span.bad { font-weight: 600 } summary { cursor: pointer }
+.now p { margin: 0 0 8px } .log { max-height: 420px }
+@media print {
+  .bench { grid-template-columns: 1fr } .stage { position: static; height: 480px } .plain { height: auto }
+  .card { break-inside: avoid; box-shadow: none } .log { max-height: none }
+  .tools3d, .controls, .scrub { display: none !important } .top { position: static }
+}
+"""
+_MARK = (
+    '<svg viewBox="0 0 32 32" width="26" height="26" aria-hidden="true"><path class="cone" d="M13 6h6l9 20H4z"/>'
+    '<path class="crack" d="M16 6l-2 7 4 4-3 9"/><circle class="ball" cx="16" cy="3.2" r="2.4"/></svg>'
+)
+
+
+def write(
+    result: Result, out: Path, fields: Sequence[str] | None = None, at: Callable[[str], None] = lambda _: None
+) -> Path:
+    """Writes the report of a run; ``fields`` are drawn, none for no pictures, by default what tells most. ``at`` is
+    called with what it is at.
+
+    Raises ClientError, UnfinishedError where not even the case is there.
+    """
+    case, ended = result.case, _outcome(result)
+    title = str(case.get("title") or case.get("name"))
+    shown = telling(result) if fields is None else fields
+
+    def say(what: str) -> None:
+        at(f"writing {out}: {what}")
+
+    say("replay")
+    stage = replay3d.html(result)
+    say("pictures")
+    drawn = plates.pictures(result, shown, at)
+    pictured = _card("Pictures", f'<div class="plates">{drawn}</div>' if drawn else "", wide=True)
+    about = _card("Case", cards.case(case), wide=True)
+    kind = "stage" if stage else "stage plain"
+    first, *others = filter(None, [stage, pictured, about])
+    body = "".join([
+        _head(result.folder.name, title, str(case.get("name", "")), ended),
+        f'<div class="bench"><div class="{kind}">{first}</div><div class="now">{_now(ended)}</div></div>',
+        '<div class="cards charts">', _card("References", cards.references(ended), wide=True), *others,
+        _charts(result, ended, say),
+        _card("Messages", cards.messages(result) if _has_journal(result) else "", wide=True),
+        _card("All keys of the case", cards.keys(case), wide=True), "</div>",
+    ])  # fmt: skip
+    save_text(out, _page(f"{title}: {result.folder.name}", body))
+    return out
+
+
+def _page(title: str, body: str) -> str:
+    sheets = "".join((_WEB / name).read_text(encoding="utf-8") for name in _SHEETS if (_WEB / name).is_file())
+    release = escape(f"Conoid {metadata.version('conoid')}")
+    return (
+        '<!doctype html><html lang="en"><head><meta charset="utf-8">'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">'
+        f"<title>{escape(title)}</title><style>{sheets}{_STYLE}</style></head><body>"
+        f'<header class="top"><span class="brand">{_MARK}<span>Conoid</span></span><span class="grow"></span>'
+        f'<span class="who">written by {release}</span></header>'
+        f'<main><div class="work">{body}</div></main></body></html>'
+    )
+
+
+def _head(name: str, title: str, case: str, ended: Outcome | None) -> str:
+    state = ended.state if ended is not None else "not ended"
+    told = f'<p class="told">{escape(ended.message)}</p>' if ended is not None and ended.message else ""
+    kind = state if ended is not None else "running"
+    return (
+        f'<header class="head"><div class="run-head"><div class="titles"><h1>{escape(title)}</h1>'
+        f'<div class="sub">{escape(" · ".join(dict.fromkeys(filter(None, [case, name]))))}</div></div>'
+        f'<div class="side"><span class="pill {escape(kind)}">{escape(state.replace("_", " "))}</span></div></div>'
+        f"{told}</header>"
+    )
+
+
+def _now(ended: Outcome | None) -> str:
+    """What stands beside the body."""
+    return "".join([
+        _card("Run", cards.strip(ended)), _card("Warnings", cards.warnings(ended)),
+        _card("Results", cards.results(ended)),
+    ])  # fmt: skip
+
+
+def _charts(result: Result, ended: Outcome | None, say: Callable[[str], None]) -> str:
+    """Charts and the tables that belong to them."""
+    say("energy")
+    found = [_card("Cost and error", cards.cost(ended)), *_energy(result, ended)]
+    say("fragments")
+    if result.fragment_tables:
+        found += [*map(_chart, plates.fragments(result)), _card("Fragments", cards.fragments(result))]
+    say("time step and probes")
+    found += [*map(_chart, plates.curve(result, "steps")), *map(_chart, plates.curve(result, "columns"))]
+    say("balance")
+    if _has_journal(result):
+        found += [*map(_chart, plates.balance(result)), _card("Ranks and balance", cards.balance(result, ended))]
+    return "".join(found)
+
+
+def _energy(result: Result, ended: Outcome | None) -> list[str]:
+    return [*map(_chart, plates.curve(result, "energy")), _card("Energy", cards.energy(result, ended))]
+
+
+def _chart(body: str) -> str:
+    return f'<section class="card">{body}</section>'
+
+
+def _card(title: str, body: str, wide: bool = False) -> str:
+    head = f'<section class="card{" wide" if wide else ""}"><div class="card-head"><h2>{escape(title)}</h2></div>'
+    return f"{head}{body}</section>" if body else ""
+
+
+def _outcome(result: Result) -> Outcome | None:
+    try:
+        return result.outcome
+    except UnfinishedError:
+        return None
+
+
+def _has_journal(result: Result) -> bool:
+    try:
+        return bool(result.messages)
+    except ClientError:
+        return False
+
+
+def telling(result: Result) -> list[str]:
+    """The fields that say most of a run: its fragments, its plastic strain or its stress; and the speed."""
+    ended = _outcome(result)
+    if result.fragment_tables:
+        return ["fragment", "speed"]
+    energy = ended.energy if ended is not None else None
+    return ["plastic_strain" if energy is not None and energy.plastic > 0.0 else "mises", "speed"]

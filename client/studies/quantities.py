@@ -1,0 +1,103 @@
+"""The numbers of one finished run that a study compares: references, probes, energies, counts."""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+from conoid.cases import history
+from conoid.cases.messages import Energy
+from conoid.cases.outcome import Outcome
+from conoid.cases.schema import Case
+
+from ..columns import Columns
+
+_COUNTS = ("broken", "fragments", "eroded")
+_NO_STORE = ("initial", "external", "stepping", "averaging", "residual")
+"""Lines of the ledger that are no energy at the end."""
+_FLOOR, _SHARE = 1e-6, 0.01
+"""Differences that mean nothing: a millionth of the value, and a hundredth of the tolerance of a reference. Chosen."""
+
+
+@dataclass(frozen=True)
+class Number:
+    """One quantity of one run."""
+
+    name: str
+    value: float
+    unit: str = ""
+    expected: float | None = None
+    tolerance: float = 0.0
+    source: str = ""
+
+    @property
+    def floor(self) -> float:
+        """The difference from which on it counts."""
+        return max(_FLOOR * abs(self.value), _SHARE * self.tolerance)
+
+    @property
+    def of_nothing(self) -> bool:
+        """Whether nothing is expected, or next to it: then there is no relative error."""
+        return self.expected is not None and abs(self.expected) <= self.tolerance
+
+    @property
+    def scale(self) -> float:
+        """By which errors are divided: the expected value, or what was measured where zero is expected."""
+        return max(abs(self.expected if self.expected is not None else self.value), self.tolerance)
+
+
+def of_run(case: Case, outcome: Outcome, told: Columns) -> list[Number]:
+    """References in their order, then probes, then energies at the end over the initial one, then counts."""
+    found = [*_references(outcome), *_probes(case, told), *_energies(outcome), *_counts(case, outcome)]
+    return [number for number in found if "worst_residual" not in number.name]
+
+
+def names(case: Case) -> list[str]:
+    """Of all that ``of_run`` may find."""
+    of_probes = (f"{what} of {probe.name}" for probe in case.probes for what in ("mean", "peak", "end"))
+    energies = (f"{name} energy, share" for name in history.LEDGER if name not in _NO_STORE)
+    counts = (f"{name}, number" for name in _COUNTS if case.fractures or case.erodes)
+    found = [*_numbered(each.title for each in case.reference), *of_probes, *energies, *counts]
+    return [name for name in found if "worst_residual" not in name]
+
+
+def _numbered(titles: Iterable[str]) -> Iterator[str]:
+    """Those that stand there again with their number."""
+    seen: dict[str, int] = {}
+    for title in titles:
+        seen[title] = seen.get(title, 0) + 1
+        yield title if seen[title] == 1 else f"{title} ({seen[title]})"
+
+
+def _references(outcome: Outcome) -> Iterator[Number]:
+    titles = _numbered(check.name for check in outcome.reference)
+    for name, check in zip(titles, outcome.reference, strict=True):
+        yield Number(name, check.value, check.unit, check.expected, check.tolerance, check.source)
+
+
+def _probes(case: Case, told: Columns) -> Iterator[Number]:
+    """Mean over the time of the run, the value furthest from zero, and the last one."""
+    for name in (probe.name for probe in case.probes):
+        values, unit = told.numbers(name), told.units[name]
+        finite = [value for value in values if value == value]
+        if finite:
+            yield Number(f"mean of {name}", sum(finite) / len(finite), unit)
+            yield Number(f"peak of {name}", max(finite, key=abs), unit)
+            yield Number(f"end of {name}", finite[-1], unit)
+
+
+def _energies(outcome: Outcome) -> Iterator[Number]:
+    energy = outcome.energy
+    if energy is None:
+        return
+    came = max(energy.initial + max(energy.external, 0.0), 1e-300)
+    for name in Energy.__struct_fields__:
+        if name in history.LEDGER and name not in _NO_STORE:
+            value = float(getattr(energy, name))
+            if abs(value) > 1e-4 * came:
+                yield Number(f"{name} energy, share", value / came)
+
+
+def _counts(case: Case, outcome: Outcome) -> Iterator[Number]:
+    if case.fractures or case.erodes:
+        for name in _COUNTS:
+            if getattr(outcome, name):
+                yield Number(f"{name}, number", float(getattr(outcome, name)))

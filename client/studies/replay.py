@@ -1,0 +1,211 @@
+"""The loads of a run under another balance policy, without the solver: what cuts would have cost and saved.
+
+A run reports at intervals what each group of tets costs (worker/migration/groups.py). Cuts decide which rank has
+which group, as in the run: the first by numbers of tets, later ones by measured loads. See
+docs/performance/balance.md.
+"""
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+
+from conoid.cases.balancing import WORK, Guard, Trigger, lost
+from conoid.cases.figures import number
+from conoid.cases.messages import AnyMessage, Balance, Groups, Load
+from conoid.cases.schema import Balance as Spec
+
+from ..errors import ClientError, UsageError
+
+Point = tuple[float, float, float]
+Shares = list[tuple[int, float]]
+"""Groups of a rank, and how much of each it has."""
+
+
+@dataclass
+class Account:
+    """What a policy comes to. Times in s."""
+
+    policy: str
+    ranks: int
+    cuts: list[int] = field(default_factory=list)
+    """Steps before which was cut."""
+    lost: float = 0.0
+    """To imbalance: what the most loaded rank worked longer than the mean."""
+    cost: float = 0.0
+    """Of all cuts."""
+    work: float = 0.0
+    """Of a rank, in the mean."""
+    imbalance: float = 1.0
+    """Largest load over the mean, both over all steps."""
+    total: float = 0.0
+    """Lost and cost."""
+
+    def book(self, loads: Sequence[float], steps: int) -> None:
+        """Takes the ``loads`` of all ranks, s a step, over some steps."""
+        self.lost += lost(loads) * steps
+        self.work += sum(loads) / len(loads) * steps
+        self._close()
+
+    def cut(self, step: int, cost: float) -> None:
+        """Takes a cut."""
+        self.cuts.append(step)
+        self.cost += cost
+        self._close()
+
+    def _close(self) -> None:
+        self.total = self.lost + self.cost
+        self.imbalance = 1.0 + self.lost / self.work if self.work > 0.0 else 1.0
+
+
+@dataclass
+class Record:
+    """What a run has told of its groups."""
+
+    centres: list[Point]
+    """m, at the start."""
+    tets: list[int]
+    moments: list[Groups]
+    """The first knows no loads."""
+    cost: float
+    """Mean cost of a cut of the run, s, or what one was taken to cost when there was none."""
+    happened: Account
+    """The run itself."""
+
+    @property
+    def heaviest(self) -> float:
+        """Largest share of all work that one group has at any moment."""
+        return max((max(m.load) / sum(m.load) for m in self.moments if any(m.load)), default=0.0)
+
+
+def read(messages: Iterable[AnyMessage], policy: str = "") -> Record:
+    """What a journal holds of loads. Raises ClientError where it holds none.
+
+    Where a run has gone on from a checkpoint, what it had told of the steps beyond is dropped.
+    """
+    moments: list[Groups] = []
+    first, costs, expected = None, [], 0.0
+    happened = Account(policy, 1)
+    for message in messages:
+        if isinstance(message, Groups):
+            while moments and moments[-1].step > message.step:
+                moments.pop()
+            if not moments or moments[-1].step < message.step:
+                moments.append(message)
+            first, expected = (message, message.cost) if message.centres else (first, expected)
+        elif isinstance(message, Load):
+            shared = [seconds for name, seconds in message.phases.items() if name in WORK]
+            work = [sum(seconds) for seconds in zip(*shared, strict=True)]
+            if work:
+                happened.ranks = len(work)
+                happened.book(work, 1)
+        elif isinstance(message, Balance):
+            costs.append(message.cost)
+            happened.cut(message.step, message.cost)
+    if first is None or len(moments) < 2:
+        raise ClientError("this run has not told the loads of its groups")
+    cost = sum(costs) / len(costs) if costs else expected
+    return Record(first.centres, first.tets, moments, cost, happened)
+
+
+def replay(record: Record, spec: Spec, ranks: int, cost: float, scale: Point = (1.0, 1.0, 1.0)) -> Account:
+    """What the policy of ``spec`` comes to on so many ``ranks`` when a cut costs ``cost``, s.
+
+    ``scale`` multiplies positions before every cut. At most as many ranks as groups.
+    """
+    if not 1 <= ranks <= len(record.centres):
+        raise UsageError(f"ranks = {ranks}: 1 to {len(record.centres)}, the number of groups")
+    places = [(x * scale[0], y * scale[1], z * scale[2]) for x, y, z in record.centres]
+    account, trigger, first = Account(named(spec), ranks), Trigger(spec, cost), record.moments[0]
+    held = divide(places, record.tets, ranks)
+    guards = _guards(spec, first, held)
+    before, end = first.step, record.moments[-1].step
+    trigger.step = before
+    for moment in record.moments[1:]:
+        for step in _looks(spec, before, moment.step):
+            loads = [1e-9 * (moment.rank + load) for load in _sums(held, moment.load)]
+            account.book(loads, step - before)
+            trigger.look(loads, step - before)
+            grown = [g.grown(round(n)) for g, n in zip(guards, _sums(held, moment.outside), strict=True)]
+            if ranks > 1 and step < end and trigger.cause(step, any(grown)) is not None:
+                account.cut(step, cost)
+                trigger.settle(step, cost)
+                held = divide(places, _weights(spec, record, moment), ranks)
+                guards = _guards(spec, moment, held)
+            before = step
+    return account
+
+
+def compare(record: Record, spec: Spec, ranks: int, cost: float, scale: Point) -> list[Account]:
+    """The policy of ``spec``, then the others with its ``alpha`` and ``every``."""
+    policies = [spec.policy, *(p for p in ("measured", "outside", "every", "never") if p != spec.policy)]
+    specs = [spec.model_copy(update={"policy": policy}) for policy in policies]
+    return [replay(record, each, ranks, cost, scale) for each in specs]
+
+
+def chosen(spec: Spec, words: str, alpha: float | None = None) -> Spec:
+    """The ``spec`` of a case with another policy, as a user writes it: ``every:500``. Raises UsageError."""
+    policy, colon, every = words.partition(":")
+    told = {"policy": policy} | ({"every": every} if every else {}) | ({"alpha": alpha} if alpha is not None else {})
+    try:
+        if colon and (policy != "every" or not every):
+            raise ValueError
+        return Spec.model_validate(spec.model_dump() | told)
+    except ValueError:
+        raise UsageError(
+            f"policy = {words!r}, alpha = {number(spec.alpha if alpha is None else alpha)}: "
+            "allowed: measured, outside, every, every:N, never; alpha greater than 1"
+        ) from None
+
+
+def named(spec: Spec) -> str:
+    """The policy and what it goes by."""
+    return spec.policy + {"outside": f" {number(spec.alpha)}", "every": f":{spec.every}"}.get(spec.policy, "")
+
+
+def _looks(spec: Spec, before: int, now: int) -> Iterator[int]:
+    """Steps after ``before`` and up to ``now`` before which the policy is asked; ``now`` is the last."""
+    if spec.policy == "every":
+        yield from range((before // spec.every + 1) * spec.every, now, spec.every)
+    yield now
+
+
+def _weights(spec: Spec, record: Record, moment: Groups) -> Sequence[float]:
+    """What is divided evenly."""
+    weights = {"measured": moment.load, "outside": moment.outside, "tets": record.tets}[spec.weights]
+    return weights if any(weights) else record.tets
+
+
+def _guards(spec: Spec, moment: Groups, held: list[Shares]) -> list[Guard]:
+    return [Guard(spec.alpha, round(n)) for n in _sums(held, moment.outside)]
+
+
+def _sums(held: list[Shares], values: Sequence[float]) -> list[float]:
+    """(ranks,) what each rank has of the ``values`` (groups,)."""
+    return [sum(share * values[group] for group, share in shares) for shares in held]
+
+
+def divide(places: Sequence[Point], weights: Sequence[float], ranks: int) -> list[Shares]:
+    """The groups of each rank: boxes cut across their longest axis so that the ``weights`` (groups,) are equal.
+
+    A group through which a cut goes is divided, as its tets would be. A number of ranks that is no power of two is
+    split as floor : ceiling.
+    """
+    return _halved([(group, 1.0) for group in range(len(places))], places, weights, ranks)
+
+
+def _halved(members: Shares, places: Sequence[Point], weights: Sequence[float], ranks: int) -> list[Shares]:
+    if ranks == 1 or not members:
+        return [members, *([] for _ in range(ranks - 1))]
+    along = [[places[group][axis] for group, _ in members] for axis in range(3)]
+    axis = max(range(3), key=lambda a: max(along[a]) - min(along[a]))
+    ordered = sorted(members, key=lambda member: (places[member[0]][axis], member[0]))
+    left = ranks // 2
+    wanted = sum(weights[group] * share for group, share in ordered) * left / ranks
+    low: Shares = []
+    high: Shares = []
+    for group, share in ordered:
+        weight = weights[group] * share
+        part = min(wanted / weight, 1.0) if weight > 0.0 else float(wanted > 0.0)
+        wanted = max(wanted - weight, 0.0)
+        low += [(group, share * part)] if part > 0.0 else []
+        high += [(group, share * (1.0 - part))] if part < 1.0 else []
+    return [*_halved(low, places, weights, left), *_halved(high, places, weights, ranks - left)]

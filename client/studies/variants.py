@@ -1,0 +1,110 @@
+"""The runs of a study of convergence: which keys of the case each of them changes."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from conoid.cases.bodies import Loose, MeshFile
+from conoid.cases.figures import number
+from conoid.cases.load import material
+from conoid.cases.schema import Case
+
+from ..errors import UsageError
+from .scatter import perturbations
+
+FORMS = ("standard", "nodal", "split")
+STEPS, SEEDS = "steps", "seeds"
+"""What differs between the members of an ensemble."""
+
+
+@dataclass(frozen=True)
+class Variant:
+    """How the equations are solved."""
+
+    form: str
+    safety: float
+
+    def __str__(self) -> str:
+        """As tables name it."""
+        return f"{self.form}, dt_safety {number(self.safety)}"
+
+
+@dataclass(frozen=True)
+class Point:
+    """One run: a variant on one mesh, and its number in the ensemble."""
+
+    variant: Variant
+    factor: float
+    """Of the element sizes of the case."""
+    member: int
+    changes: Mapping[str, Any]
+    """By key."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What is varied."""
+
+    factors: Sequence[float]
+    forms: Sequence[str] = ()
+    """Pressure forms; that of the case when empty."""
+    safeties: Sequence[float] = ()
+    """Values of dt_safety; that of the case when empty."""
+    members: int = 1
+    vary: str = STEPS
+    ranks: int = 1
+    threads: int = 1
+
+    def variants(self, case: Case) -> list[Variant]:
+        """All combinations."""
+        forms, safeties = self.forms or (case.numerics.pressure,), self.safeties or (case.numerics.dt_safety,)
+        return [Variant(form, safety) for form in forms for safety in safeties]
+
+    def points(self, case: Case) -> list[Point]:
+        """Every run, the dearest first. Raises UsageError for a case that has no mesh to scale."""
+        shares = perturbations(self.members) if self.vary == STEPS else [0.0] * self.members
+        return [
+            Point(variant, factor, member, {
+                **sizes(case, factor), **(seeds(case, member) if self.vary == SEEDS else {}),
+                "numerics.pressure": variant.form, "numerics.dt_safety": variant.safety * (1.0 - shares[member]),
+                "run.ranks": self.ranks, "run.threads": self.threads, "run.frames": 0, "run.snapshots": 0,
+                "run.checkpoint_every": "none",
+            })
+            for factor in sorted(self.factors) for variant in self.variants(case) for member in range(self.members)
+        ]  # fmt: skip
+
+
+def sizes(case: Case, factor: float) -> dict[str, float]:
+    """Keys and values of all element sizes times ``factor``; those of mesh files and loose tets stay.
+
+    Raises UsageError where no part has a mesh that is generated.
+    """
+    found: dict[str, float] = {}
+    for index, part in enumerate(case.parts):
+        mesh = part.mesh
+        if isinstance(mesh, MeshFile | Loose):
+            continue
+        key = f"parts[{index}].mesh"
+        found[f"{key}.element_size"] = factor * mesh.element_size
+        if mesh.grading is not None:
+            found[f"{key}.grading.far_size"] = factor * mesh.grading.far_size
+    if not found:
+        raise UsageError(f"{case.name}: no part has a generated mesh, so there is no element size to change")
+    return found
+
+
+def seeds(case: Case, member: int) -> dict[str, int]:
+    """Keys and values of the seeds of scattered strengths for a member. Raises UsageError where nothing scatters."""
+    found = {}
+    for name in {part.material for part in case.parts if part.fracture is not None}:
+        scatter = getattr(material(case, name).brittle, "scatter", None)
+        if scatter is not None and name in case.materials:
+            found[f"materials.{name}.brittle.scatter.seed"] = scatter.seed + member
+    if not found:
+        raise UsageError(f"{case.name}: no material of its own has a scatter of its strength; vary steps instead")
+    return found
+
+
+def chaotic(case: Case) -> bool:
+    """Whether small causes can have large effects: something breaks or wears."""
+    return case.fractures or case.erodes

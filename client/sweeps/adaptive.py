@@ -1,0 +1,250 @@
+"""An adaptive sweep: runs of a case at points that close in on where a result passes a threshold."""
+
+import hashlib
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from importlib import metadata
+from pathlib import Path
+from typing import Any, Protocol
+
+from conoid.cases import history, points
+from conoid.cases.figures import counted, number
+from conoid.cases.load import apply_overrides, parse_case
+from conoid.cases.outcome import Outcome
+from conoid.cases.run import State
+
+from ..errors import ClientError, MissingError, UsageError
+from ..remote.http import Me
+from ..remote.outbox import Outbox
+from ..remote.told import RunInfo
+from ..run import Run
+from . import ballistic
+from .bracket import Bracket, Sample, between, bracket, widest
+from .found import Book, Found, Tried
+from .goal import Goal, Span, changes, goal_of, tolerance_of
+
+MOST = 40
+"""Runs, at most, where no other number is given. Chosen: a bisection takes 20 to a millionth."""
+_AT_ONCE = 8
+"""Points of a round, at most, where no other number is given. Chosen: more win little, a round divides by one more than
+it has points."""
+_ATTEMPTS = 100
+"""Times that a point is run again, at most."""
+Say = Callable[[str], None]
+
+
+class Server(Protocol):
+    """Who runs the points: a Session."""
+
+    outbox: Outbox
+
+    def submit(
+        self, case: Any, overrides: Any = (), key: str | None = None, labels: Mapping[str, str] | None = None,
+        profile: str = "", priority: int = 0, folder: Path | str | None = None,
+    ) -> Run:  # fmt: skip
+        """As of a Session."""
+
+    def me(self) -> Me:
+        """As of a Session."""
+
+    def runs(self, states: Sequence[str] = (), limit: int = 50) -> Sequence[RunInfo]:
+        """As of a Session."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Search:
+    """What is looked for, where, and how far it goes."""
+
+    case: Mapping[str, Any]
+    """Plain data, with the constants of the sweep and the hashes of its files."""
+    folder: Path
+    goal: Goal
+    spans: Sequence[Span]
+    """All vary together; the first is x."""
+    tolerance: float
+    """The bracket is no wider at the end, in the unit of the first span."""
+    at_once: int | None = None
+    most: int = MOST
+    since: str = ""
+    """The newest run of before: ids are in the order of time, and a later run is one of this search."""
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """The lower and the upper one."""
+        span = self.spans[0]
+        return min(span.low, span.high), max(span.low, span.high)
+
+
+def found_by(
+    session: Server, data: Mapping[str, Any], folder: Path, goal: str, spans: Sequence[Span], tolerance: Any,
+    at_once: int | None, most: int, out: Path | None, say: Say, at: Say = lambda text: None,
+) -> Found:  # fmt: skip
+    """As ``Session.adaptive_sweep``, of plain data whose files lie below ``folder``."""
+    if not spans:
+        raise UsageError("spans: name at least one key that varies, with both of its ends")
+    first = apply_overrides(data, changes(spans, spans[0].low))
+    wish = goal_of(goal, parse_case(first))
+    ready = session.outbox.ready(data, folder)
+    wanted = Search(
+        case=ready, folder=folder, goal=wish, spans=spans, tolerance=tolerance_of(tolerance, spans[0]),
+        at_once=at_once, most=most, since=max((run.id for run in session.runs(limit=1)), default=""),
+    )  # fmt: skip
+    book = Book(out, ready, wish, [span.key for span in spans])
+    return book.close(search(session, wanted, book, say, at))
+
+
+def search(session: Server, wanted: Search, book: Book, say: Say, at: Say) -> Found:
+    """Runs points until the bracket is as narrow as the tolerance, or no point is left that would help. ``say`` hears
+    of each run that has ended, ``at`` what goes on.
+
+    Points of the ``book`` that have succeeded are not run again; what is new is written into it at once. Raises
+    CaseError for ends that make no valid case, ClientError.
+    """
+    for x in wanted.ends:
+        parse_case(apply_overrides(wanted.case, changes(wanted.spans, x)))
+    fresh: list[Tried] = []
+    many = wanted.at_once or _free(session, wanted.case)
+    while True:
+        tried = [each for each in (*book.good(), *fresh) if wanted.ends[0] <= each.x <= wanted.ends[1]]
+        following, why = _next(wanted, tried, len(fresh), many)
+        if not following:
+            return _found(wanted, list({each.x: each for each in tried}.values()), why, len(fresh))
+        at(f"{counted(len(following), 'run')} at {', '.join(map(number, following))} {wanted.spans[0].unit}".strip())
+        for each in _round(session, wanted, following):
+            fresh.append(each)
+            book.add(each)
+            say(f"{_at(wanted, each.x)}: {_told(wanted, each)}; {_state(wanted, [*tried, *fresh])}")
+
+
+def _next(wanted: Search, tried: Sequence[Tried], spent: int, many: int) -> tuple[list[float], str]:
+    """The points of the following round; none, and why, at the end."""
+    low, high = wanted.ends
+    left = wanted.most - spent
+    taken = [each.x for each in tried]
+    missing = [x for x in (low, high) if x not in taken]
+    if missing:
+        inner = between(low, high, taken, min(many, left) - len(missing)) if not taken and many > len(missing) else []
+        return [*missing, *inner][: max(left, 0)], _USED_UP
+    failed = [each for each in tried if each.f is None]
+    if ends := [each for each in failed if each.x in (low, high)]:
+        return [], f"the run at {_at(wanted, ends[0].x)} has no result: {ends[0].problem}"
+    found = bracket(_samples(tried))
+    if found is None:
+        return [], ""
+    if found.width <= wanted.tolerance:
+        return [], ""
+    if failed and widest(found.low.x, found.high.x, taken) <= wanted.tolerance:
+        return [], f"{counted(len(failed), 'run')} within the bracket failed; {failed[0].run}: {failed[0].problem}"
+    wide = widest(found.low.x, found.high.x, taken)
+    enough = min(many, left, max(1, -int(-wide // wanted.tolerance) - 1) if not failed else many)
+    return between(found.low.x, found.high.x, taken, max(enough, 0)), _USED_UP
+
+
+_USED_UP = "as many runs as are allowed have been made"
+
+
+def _samples(tried: Sequence[Tried]) -> list[Sample]:
+    return [Sample(each.x, each.f) for each in tried]
+
+
+def _round(session: Server, wanted: Search, at: Sequence[float]) -> "list[Tried]":
+    """Runs points at the same time; in their order."""
+    runs = [(x, _submitted(session, wanted, x)) for x in at]
+    return [_ended(wanted, x, run) for x, run in runs]
+
+
+def _submitted(session: Server, wanted: Search, x: float) -> Run:
+    """The run of a point. One of an earlier search is taken where it has succeeded or goes on, else it is repeated."""
+    case = apply_overrides(wanted.case, changes(wanted.spans, x))
+    name = f"adaptive-{_hash(wanted.goal.result, [span.key for span in wanted.spans], case)[:12]}"
+    labels = {"sweep": f"adaptive {wanted.goal.result}"[:200], "point": _at(wanted, x)[:200]}
+    for attempt in range(_ATTEMPTS):
+        key = f"{name}-{_hash(metadata.version('conoid'), case)}-{attempt}"
+        try:
+            run = session.submit(case, key=key, labels=labels, folder=wanted.folder)
+            info = run.status()
+        except MissingError:  # its folder has been removed
+            continue
+        if run.id > wanted.since or info.state is State.SUCCEEDED or not info.state.final:
+            return run
+    raise ClientError(f"the run at {_at(wanted, x)} has failed {_ATTEMPTS} times")
+
+
+def _hash(*parts: Any) -> str:
+    return hashlib.sha256(json.dumps(parts, sort_keys=True, default=str).encode()).hexdigest()[:40]
+
+
+def _ended(wanted: Search, x: float, run: Run) -> Tried:
+    info = run.wait()
+    ended = info.outcome
+    values = changes(wanted.spans, x)
+    tried = Tried(x=x, values=values, run=run.id, state=info.state.value)
+    if info.state is not State.SUCCEEDED or ended is None:
+        return tried.but(problem=f"{info.state.value}: {info.message or info.cause}", cpu=_cpu(ended))
+    found = points.results(ended)
+    value = found.get((wanted.goal.result, wanted.goal.unit))
+    columns = {history.header({name: unit})[0]: cell for (name, unit), cell in found.items()}
+    if not isinstance(value, int | float):
+        return tried.but(results=columns, cpu=_cpu(ended), problem=f"{wanted.goal.result} is not a number there")
+    return tried.but(results=columns, cpu=_cpu(ended), value=float(value), f=float(value) - wanted.goal.threshold)
+
+
+def _cpu(ended: Outcome | None) -> float:
+    return ended.cpu if ended is not None and ended.cpu == ended.cpu else 0.0
+
+
+def _free(session: Server, case: Mapping[str, Any]) -> int:
+    """How many runs of the case may run now, at least one."""
+    slots = session.me().slots
+    cores = parse_case(case).run.cores
+    free = (slots.get("total", cores) - slots.get("used", 0)) // cores
+    return max(1, min(free, _AT_ONCE))
+
+
+def _found(wanted: Search, tried: Sequence[Tried], why: str, fresh: int) -> Found:
+    span = wanted.spans[0]
+    made = bracket(_samples(tried))
+    base = Found(
+        key=span.key, unit=span.unit, goal=wanted.goal, tolerance=wanted.tolerance, why=why, points=len(tried),
+        fresh=fresh, failed=sum(each.f is None for each in tried), cpu=sum(each.cpu for each in tried),
+    )  # fmt: skip
+    values = {each.x: each.value for each in tried}
+    if made is None:
+        ends = [(x, values[x]) for x in wanted.ends if x in values]
+        return base.but(ends=ends)
+    ends = [(sample.x, values[sample.x]) for sample in (made.low, made.high)]
+    fit = _fit(wanted, tried, made)
+    return base.but(ends=ends, limit=0.5 * (made.low.x + made.high.x), uncertainty=0.5 * made.width, fit=fit,
+                    changes=made.changes, mixed=made.mixed)  # fmt: skip
+
+
+def _fit(wanted: Search, tried: Sequence[Tried], made: Bracket) -> ballistic.Fit | None:
+    """Of residual velocity over velocity, or a line where the result goes through the threshold."""
+    samples = _samples(tried)
+    speeds = wanted.spans[0].unit.endswith("/s") and wanted.goal.unit == "m/s"
+    if speeds and ballistic.stops(samples, made, wanted.goal.threshold):
+        return ballistic.residual_velocity(samples, made, wanted.goal.threshold)
+    known = [sample.f for sample in samples if sample.f is not None]
+    return ballistic.line(samples, made) if min(known) < 0.0 < max(known) and made.changes == 1 else None
+
+
+# Words ----------------------------------------------------------------------------------------------------------------
+
+
+def _at(wanted: Search, x: float) -> str:
+    span = wanted.spans[0]
+    return f"{span.key} = {number(x)} {span.unit}".strip()
+
+
+def _told(wanted: Search, each: Tried) -> str:
+    if each.value is None:
+        return each.problem
+    return f"{wanted.goal.result} = {number(each.value)} {wanted.goal.unit}".strip()
+
+
+def _state(wanted: Search, tried: Sequence[Tried]) -> str:
+    made, unit = bracket(_samples(tried)), wanted.spans[0].unit
+    if made is None:
+        return "no bracket yet"
+    return f"between {number(made.low.x)} and {number(made.high.x)} {unit}".strip()

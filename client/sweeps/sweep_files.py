@@ -1,0 +1,55 @@
+"""The table of a sweep from its file: one in a folder of runs of a server, or an adaptive one. No server is asked."""
+
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from conoid.cases import layout, outcome, points, whole
+from conoid.cases.outcome import Outcome
+from conoid.cases.points import Column, Point
+
+from ..errors import UsageError
+from . import found
+
+
+class _Plan(msgspec.Struct):
+    """What server/intake/sweeps.py keeps."""
+
+    points: list[dict[str, Any]]
+    runs: list[str]
+
+
+def file_named(text: str) -> Path | None:
+    """The file that is meant, None for an id."""
+    path = Path(text)
+    return path if path.suffix == ".json" and path.is_file() else None
+
+
+def columns_of(path: Path) -> list[Column]:
+    """The table. Raises UsageError for a file of something else."""
+    try:
+        plan = msgspec.json.decode(whole.read(path), type=_Plan)
+    except OSError as error:
+        raise UsageError(f"{path}: {error.strerror}") from None
+    except msgspec.MsgspecError:
+        return found.table(found.read(path))
+    pairs = zip(plan.points, plan.runs, strict=False)
+    return points.table([_point(path.parent.parent / run, values) for values, run in pairs])
+
+
+def _point(folder: Path, values: dict[str, Any]) -> Point:
+    ended = _outcome(folder / layout.OUTCOME)
+    if ended is None:
+        return Point(values=values, run=folder.name)
+    return Point(
+        values=values, run=folder.name, state=ended.state, cause=ended.cause or "", results=points.results(ended)
+    )
+
+
+def _outcome(path: Path) -> Outcome | None:
+    """None before the end, and where it was removed or damaged."""
+    try:
+        return outcome.from_json(whole.read(path))
+    except (OSError, ValueError):
+        return None

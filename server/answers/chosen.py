@@ -1,0 +1,71 @@
+"""Which runs of a user a list has, as conditions of SQL: by state, label, case, words and time."""
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import sqlalchemy as sa
+
+from conoid.cases.run import State
+
+from ..database.tables import LABELS, RUNS
+
+OPEN = [state.value for state in State if not state.final]
+"""Of runs that have not ended."""
+_ESCAPE = "\\"
+_SPECIAL = re.compile(r"([\\%_])")
+_Column = sa.ColumnElement[str]
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """What the runs of a list have in common; what is left out excludes none. Times are Unix s."""
+
+    states: Sequence[State] = ()
+    labels: Mapping[str, str] = field(default_factory=dict)
+    case: str = ""
+    """The name of the case; ``*`` stands for any letters."""
+    words: Sequence[str] = ()
+    """Each stands in the case's name or title, the labels, the state, the cause or the message, or begins the id."""
+    since: float | None = None
+    """Submitted then, or later."""
+    until: float | None = None
+    """Submitted before."""
+    changed: float | None = None
+    """Open, or submitted or ended then, or later."""
+
+    def where(self, owner: str) -> Iterator[sa.ColumnElement[bool]]:
+        """The conditions, all of which hold."""
+        runs = RUNS.c
+        yield runs.owner == owner
+        if self.states:
+            yield runs.state.in_([state.value for state in self.states])
+        for name, value in self.labels.items():
+            same = (LABELS.c.owner == owner, LABELS.c.name == name, LABELS.c.value == value)
+            yield runs.id.in_(sa.select(LABELS.c.run).where(*same))
+        if self.case:
+            yield _like(runs.name, "%".join(map(_literal, self.case.split("*"))))
+        yield from (_has(word) for word in self.words)
+        if self.since is not None:
+            yield runs.submitted >= self.since
+        if self.until is not None:
+            yield runs.submitted < self.until
+        if self.changed is not None:
+            yield sa.or_(runs.state.in_(OPEN), runs.finished >= self.changed, runs.submitted >= self.changed)
+
+
+def _literal(text: str) -> str:
+    return _SPECIAL.sub(r"\\\1", text)
+
+
+def _like(column: _Column, pattern: str) -> sa.ColumnElement[bool]:
+    """Whatever the case of the letters; databases differ in it."""
+    return sa.func.lower(column).like(pattern.lower(), escape=_ESCAPE)
+
+
+def _has(word: str) -> sa.ColumnElement[bool]:
+    runs, anywhere = RUNS.c, f"%{_literal(word)}%"
+    label = LABELS.c.name + "=" + LABELS.c.value
+    labelled = sa.exists().where(LABELS.c.run == runs.id, _like(label, anywhere)).correlate(RUNS)
+    texts = (runs.name, runs.title, runs.state, runs.cause, runs.message)
+    return sa.or_(_like(runs.id, f"{_literal(word)}%"), *(_like(text, anywhere) for text in texts), labelled)

@@ -1,0 +1,182 @@
+"""history.csv as columns for charts: as many lines as are kept, thinned so that no peak is lost.
+
+Lines are gathered into groups, each of as many lines. Of each column a group keeps its least and its greatest value, in
+the order in which they came. When there are too many groups, two become one, so that memory and answers are bounded
+while a file of any length is read once.
+"""
+
+import csv
+import math
+import os
+from array import array
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from conoid.cases import history, whole
+
+from ..runs.journal import Tail
+
+_GROUPS = 4096
+"""Groups that are kept, at most: more than a screen has pixels. Chosen."""
+_NUMBERS = 400_000
+"""Groups times columns that are kept, at most. Chosen: 6 MB."""
+_SENT = 200_000
+"""Numbers of an answer, at most. Chosen: 4 MB of JSON."""
+_BLOCK = 1 << 20
+"""Bytes that are read at once. Chosen."""
+_AT_ONCE = 32
+"""Blocks that are read for one answer, at most: some 100,000 lines, half a second. Chosen."""
+_TEXT = frozenset({"limiter"})
+"""Columns that have no numbers."""
+csv.field_size_limit(1 << 30)  # What is longer than a number is none; it is no error.
+
+
+class Columns:
+    """What has been read of a history.csv; its holder takes a lock."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._begin()
+
+    def _begin(self) -> None:
+        self._tail = Tail(self._path)
+        self._file = self._size = 0
+        self.units: dict[str, str] = {}
+        """By name, of the columns of numbers."""
+        self.lines = 0
+        self.behind = False
+        """Whether the file has lines that have not been read."""
+        self._width, self._every = 0, 1
+        self._places: list[int] = []
+        """Of the columns of numbers in a line."""
+        self._kept: list[array[float]] = []
+        """By column, two values a group of ``_every`` lines."""
+        self._open: list[list[float]] = []
+        """By column, lines that make no whole group yet."""
+        self._extremes: list[tuple[float, float]] = []
+        self._last: list[float] = []
+
+    def catch_up(self) -> None:
+        """Reads what is new, at most ``_AT_ONCE`` blocks of it. A file that has been written anew is begun anew."""
+        if self._is_another():
+            self._begin()
+            self._is_another()
+        for _ in range(_AT_ONCE):
+            block = self._tail.block(_BLOCK)
+            if not block:
+                self.behind = False
+                return
+            self._take(block.decode("utf-8", "replace"))
+        self.behind = True
+
+    def _is_another(self) -> bool:
+        """Whether this is not the file of the last time: a run that goes on from a checkpoint writes a new one."""
+        try:
+            with whole.opened(self._path, links=False) as file:
+                now = os.fstat(file.fileno())
+        except FileNotFoundError:
+            return self.lines > 0
+        another = bool(self._file) and (now.st_ino != self._file or now.st_size < self._size)
+        self._file, self._size = now.st_ino, now.st_size
+        return another
+
+    def _take(self, text: str) -> None:
+        rows = list(csv.reader(text.splitlines()))
+        if not self.units and rows:
+            self._head(rows.pop(0))
+        rows = [row for row in rows if len(row) == self._width]
+        if not rows:
+            return
+        told = list(zip(*rows, strict=True))
+        for at, place in enumerate(self._places):
+            self._add(at, _numbers(told[place]))
+        self.lines += len(rows)
+        self._merge()
+
+    def _head(self, names: Sequence[str]) -> None:
+        pairs = [history.split(name) for name in names]
+        self._width = len(names)
+        places = {name: k for k, (name, _) in reversed([*enumerate(pairs)]) if name not in _TEXT}
+        self._places = sorted(places.values())  # Of columns with the same name the first.
+        self.units = dict(pairs[k] for k in self._places)
+        number = len(self._places)
+        self._kept = [array("d") for _ in range(number)]
+        self._open = [[] for _ in range(number)]
+        self._extremes = [(math.nan, math.nan)] * number
+        self._last = [math.nan] * number
+
+    def _add(self, at: int, values: list[float]) -> None:
+        self._last[at] = values[-1]
+        self._extremes[at] = _sorted(extremes([*self._extremes[at], *extremes(values)]))
+        values = [*self._open[at], *values]
+        ends = len(values) - len(values) % self._every
+        for k in range(0, ends, self._every):
+            self._kept[at].extend(extremes(values[k : k + self._every]))
+        self._open[at] = values[ends:]
+
+    def _merge(self) -> None:
+        """Until there are no more groups than may be kept."""
+        most = 2 * max(2, min(_GROUPS, _NUMBERS // max(1, len(self._kept))))
+        while self._kept and len(self._kept[0]) > most:
+            self._kept = [
+                array("d", (value for k in range(0, len(kept), 4) for value in extremes(kept[k : k + 4])))
+                for kept in self._kept
+            ]
+            self._every *= 2
+
+    def statistics(self) -> dict[str, dict[str, Any]]:
+        """Of each column its unit, its last, its least and its greatest value."""
+        return {
+            name: {"unit": unit, "last": last, "least": low, "most": high}
+            for (name, unit), last, (low, high) in zip(self.units.items(), self._last, self._extremes, strict=True)
+        }
+
+    def values(self, names: Sequence[str], points: int) -> dict[str, list[float]]:
+        """Columns by name, of about ``points`` lines at most: all there are, or of each group of lines the least and
+        the greatest value, in their order, and the last line.
+        """
+        chosen = frozenset(names)
+        places = {name: at for at, name in enumerate(self.units) if name in chosen}
+        points = max(4, min(points, _SENT // max(1, len(places))))
+        groups = len(self._kept[0]) // 2 if self._kept else 0
+        if self._every == 1 and groups <= points:
+            return {name: self._kept[at][::2].tolist() for name, at in places.items()}
+        size = 2 * max(1, math.ceil(groups / max(1, points // 2 - 1)))
+        return {name: self._thinned(at, size) for name, at in places.items()}
+
+    def _thinned(self, at: int, size: int) -> list[float]:
+        kept = self._kept[at]
+        found = [value for k in range(0, len(kept), size) for value in extremes(kept[k : k + size])]
+        return [*found, *(extremes(self._open[at]) if self._open[at] else ()), self._last[at]]
+
+
+def extremes(values: Sequence[float]) -> tuple[float, float]:
+    """The least and the greatest of some numbers, in the order in which they come first; those that are no numbers are
+    passed over.
+    """
+    total = sum(values)
+    if total != total:
+        values = [value for value in values if value == value]
+        if not values:
+            return math.nan, math.nan
+    low, high = min(values), max(values)
+    return (low, high) if values.index(low) <= values.index(high) else (high, low)
+
+
+def _sorted(pair: tuple[float, float]) -> tuple[float, float]:
+    return (pair[0], pair[1]) if not pair[0] > pair[1] else (pair[1], pair[0])
+
+
+def _numbers(texts: Sequence[str]) -> list[float]:
+    try:
+        return list(map(float, texts))
+    except ValueError:
+        return [_number(text) for text in texts]
+
+
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        return math.nan

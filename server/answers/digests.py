@@ -1,0 +1,58 @@
+"""SHA-256 of files, computed in slices and kept for each state of a file."""
+
+import asyncio
+import hashlib
+import os
+from collections import OrderedDict
+from typing import BinaryIO
+from weakref import WeakValueDictionary
+
+from ..requests.lanes import Lanes
+
+State = tuple[int, int, int, int, int]
+"""State of a file: device, inode, times of the last change of content and of the inode in ns, size in bytes."""
+_KEPT = 10_000
+"""Digests that are kept, 32 bytes each. Chosen."""
+_SLICE, _CHUNK = 1 << 25, 1 << 18
+"""Bytes of one task, and bytes of one read. Chosen: 0.1 s, between which other requests of the user are served."""
+
+
+def state_of(file: BinaryIO) -> State:
+    """State of an open file."""
+    status = os.fstat(file.fileno())
+    return status.st_dev, status.st_ino, status.st_mtime_ns, status.st_ctime_ns, status.st_size
+
+
+class Digests:
+    """Digests of files. Used in the thread of the event loop."""
+
+    def __init__(self, lanes: Lanes) -> None:
+        """None is known yet."""
+        self._lanes = lanes
+        self._known: OrderedDict[State, bytes] = OrderedDict()
+        self._locks: WeakValueDictionary[State, asyncio.Lock] = WeakValueDictionary()
+
+    async def of(self, file: BinaryIO, state: State) -> bytes:
+        """SHA-256 of the first ``size`` bytes. Raises OSError, ServiceError 503."""
+        lock = self._locks.setdefault(state, asyncio.Lock())
+        async with lock:
+            if state not in self._known:
+                self._known[state] = await self._computed(file, state[-1])
+                if len(self._known) > _KEPT:
+                    self._known.popitem(last=False)
+            return self._known[state]
+
+    async def _computed(self, file: BinaryIO, size: int) -> bytes:
+        total, offset = hashlib.sha256(), 0
+        while offset < size and (read := await self._lanes.run(_add, total, file, offset, min(_SLICE, size - offset))):
+            offset += read
+        return total.digest()
+
+
+def _add(total: "hashlib._Hash", file: BinaryIO, offset: int, size: int) -> int:
+    """Adds ``size`` bytes of a file to a digest; returns the number of bytes read."""
+    end = offset + size
+    while offset < end and (chunk := os.pread(file.fileno(), min(_CHUNK, end - offset), offset)):
+        total.update(chunk)
+        offset += len(chunk)
+    return size - (end - offset)

@@ -1,0 +1,196 @@
+"""Sends a file of a run's folder, whole or in part, and nothing outside of it."""
+
+import base64
+import hashlib
+import os
+import re
+import stat
+from collections.abc import AsyncIterator, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import BinaryIO
+
+from starlette.requests import Request
+from starlette.responses import Response, StreamingResponse
+from starlette.types import Receive, Scope, Send
+
+from ..errors import ServiceError, not_found
+from ..requests.crowd import place_of
+from ..requests.lanes import Lanes
+from .digests import Digests, State, state_of
+
+_CHUNK = 1 << 18
+"""Bytes that are read and sent at once. Chosen: larger ones are not faster."""
+_SMALL = 1 << 20
+"""Bytes of a file that is sent, and hashed, in a moment. Chosen: 1 ms of a processor."""
+_RANGE = re.compile(r"bytes=(\d{0,18})-(\d{0,18})")
+_TYPES = {
+    ".json": "application/json", ".jsonl": "application/x-ndjson", ".toml": "application/toml",
+    ".csv": "text/csv; charset=utf-8", ".log": "text/plain; charset=utf-8",
+    ".series": "application/json", ".png": "image/png", ".vtkhdf": "application/x-hdf5",
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A file of a run, with its path relative to the run's folder; ``modified`` in Unix s."""
+
+    path: str
+    size: int
+    modified: float
+
+
+def listing(folder: Path) -> list[Entry]:
+    """Every regular file below ``folder``, by path; links and hidden names are left out."""
+    entries = []
+    for here, folders, names in os.walk(folder):
+        folders[:] = [name for name in folders if not name.startswith(".")]
+        for name in names:
+            path = Path(here, name)
+            with suppress(FileNotFoundError):
+                status = path.lstat()
+                if stat.S_ISREG(status.st_mode) and not name.startswith("."):
+                    entries.append(Entry(str(path.relative_to(folder)), status.st_size, status.st_mtime))
+    return sorted(entries, key=lambda entry: entry.path)
+
+
+def open_inside(folder: Path, relative: str) -> BinaryIO:
+    """Opens a regular file below ``folder``. Raises ServiceError 404 for everything else.
+
+    Each step of the path is opened from the one before without following links, so that neither ``..`` nor a link,
+    not even one put there at this moment, leads outside.
+    """
+    parts = relative.split("/")
+    if any(part in {"", ".", ".."} or part.startswith(".") or "\0" in part for part in parts):
+        raise not_found(f"file {relative[:200]!r}")
+    try:
+        descriptor = _walk(folder, parts)
+    except OSError:
+        raise not_found(f"file {relative[:200]!r}") from None
+    if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+        os.close(descriptor)
+        raise not_found(f"file {relative[:200]!r}")
+    return os.fdopen(descriptor, "rb")
+
+
+def _walk(folder: Path, parts: list[str]) -> int:
+    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    for part in parts:
+        try:
+            inner = os.open(part, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK, dir_fd=descriptor)
+        finally:
+            os.close(descriptor)
+        descriptor = inner
+    return descriptor
+
+
+class Downloads:
+    """Belongs to the event loop."""
+
+    def __init__(self, lanes: Lanes) -> None:
+        """Files are read in the lane of who asks."""
+        self._lanes, self._digests = lanes, Digests(lanes)
+
+    async def respond(self, request: Request, folder: Path, relative: str, ended: bool) -> Response:
+        """The file as it is now, honouring Range, If-Range and If-None-Match; its sha256 stands in Repr-Digest.
+
+        A large file of a run that goes on has no Repr-Digest: it may grow faster than it is read. A file that is still
+        growing is sent up to its size at this moment. Raises ServiceError 404, 416, 429, 503.
+        """
+        file, state = await self._lanes.run(_opened, folder, relative)
+        try:
+            size = state[-1]
+            if size > _SMALL:
+                place_of(request).lengthen()
+            headers = {
+                "Accept-Ranges": "bytes",
+                "Cache-Control": "private, no-cache",
+                "X-Content-Type-Options": "nosniff",
+                "Content-Type": _TYPES.get(Path(relative).suffix, "application/octet-stream"),
+            }
+            tag = hashlib.sha256(repr(state).encode()).digest()
+            if ended or size <= _SMALL:
+                tag = await self._digests.of(file, state)
+                headers["Repr-Digest"] = f"sha-256=:{base64.b64encode(tag).decode()}:"
+            etag = headers["ETag"] = f'"{tag.hex()[:32]}"'
+            if is_known(etag, request.headers.get("if-none-match", "")):
+                file.close()
+                return Response(status_code=304, headers=headers)
+            begin, end, status = _part(request, size, etag)
+            if status == 206:
+                headers["Content-Range"] = f"bytes {begin}-{end - 1}/{size}"
+            return _FileResponse(self._lanes, file, begin, end, status, headers)
+        except BaseException:
+            file.close()
+            raise
+
+    async def whole(
+        self, request: Request, folder: Path, relative: str, headers: Mapping[str, str], media_type: str
+    ) -> Response:
+        """A file that does not change, with headers of the caller's. Raises ServiceError 404, 429, 503."""
+        file, state = await self._lanes.run(_opened, folder, relative)
+        try:
+            if state[-1] > _SMALL:
+                place_of(request).lengthen()
+            return _FileResponse(self._lanes, file, 0, state[-1], 200, {**headers, "Content-Type": media_type})
+        except BaseException:
+            file.close()
+            raise
+
+
+def _opened(folder: Path, relative: str) -> tuple[BinaryIO, State]:
+    file = open_inside(folder, relative)
+    return file, state_of(file)
+
+
+def is_known(etag: str, text: str) -> bool:
+    """Whether an If-None-Match has this ETag, or all there are; one that a proxy has made weak counts as well."""
+    known = {tag.strip().removeprefix("W/") for tag in text.split(",")}
+    return etag in known or known == {"*"}
+
+
+def tagged(body: bytes, known: str) -> Response:
+    """JSON with an ETag, or 304 where the caller knows it."""
+    etag = f'"{hashlib.sha256(body).hexdigest()[:32]}"'
+    headers = {"ETag": etag, "Cache-Control": "private, no-cache"}
+    if is_known(etag, known):
+        return Response(status_code=304, headers=headers)
+    return Response(body, headers=headers, media_type="application/json")
+
+
+def _part(request: Request, size: int, etag: str) -> tuple[int, int, int]:
+    """First byte, end and status of the answer; several ranges at once are answered with the whole file."""
+    match = _RANGE.fullmatch(request.headers.get("range", "").replace(" ", ""))
+    if match is None or match[0] == "bytes=-" or request.headers.get("if-range", etag) != etag:
+        return 0, size, 200
+    if not match[1]:
+        begin, end = max(0, size - int(match[2])), size
+    else:
+        begin, end = int(match[1]), min(size, int(match[2]) + 1) if match[2] else size
+    if begin >= end:
+        headers = {"Content-Range": f"bytes */{size}"}
+        raise ServiceError(416, "bad_range", f"Range {match[0]!r}: the file has {size} bytes", headers=headers)
+    return begin, end, 206
+
+
+class _FileResponse(StreamingResponse):
+    """A part of an open file; closes it, also when the client leaves in the middle."""
+
+    def __init__(
+        self, lanes: Lanes, file: BinaryIO, begin: int, end: int, status: int, headers: Mapping[str, str]
+    ) -> None:
+        super().__init__(_chunks(lanes, file, begin, end), status, {**headers, "Content-Length": str(end - begin)})
+        self._file = file
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        try:
+            await super().__call__(scope, receive, send)
+        finally:
+            self._file.close()
+
+
+async def _chunks(lanes: Lanes, file: BinaryIO, begin: int, end: int) -> AsyncIterator[bytes]:
+    while begin < end and (chunk := await lanes.run(os.pread, file.fileno(), min(_CHUNK, end - begin), begin)):
+        begin += len(chunk)
+        yield chunk

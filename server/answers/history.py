@@ -1,0 +1,154 @@
+"""What a run has said so far, thinned, so that a run of a million events opens at once.
+
+The journal is read once, and from then on what is new of it. Most lines are only looked at in their first letters; of
+the reports a few thousand are kept as they stand, every so many of them, and more and more of them are passed over as
+the run goes on. The rare events (cuts, snapshots, states) are all kept.
+"""
+
+import re
+import threading
+from collections import OrderedDict
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import msgspec
+
+from conoid.cases import layout
+from conoid.cases.messages import Snapshot, Status
+from conoid.cases.run import State
+
+from ..runs.journal import DAMAGED, Tail, seq_of
+from .columns import Columns
+from .notes import KINDS, Notes
+
+_SAMPLES = 4096
+"""Largest number of reports that are kept of a run. Chosen: some times the pixels of a chart."""
+_BYTES = 16 << 20
+"""Largest size of the kept reports of a run, bytes. Chosen: room for all of them up to some hundred ranks."""
+_CUTS = 10_000
+"""Number of newest balance events that are kept. Chosen."""
+_RUNS = 16
+"""Number of runs whose history is kept, the last ones asked for. Chosen."""
+_BLOCK = 4 << 20
+"""Bytes of one read of the journal. Chosen."""
+_TYPE = slice(9, 13)
+"""The first letters of a message's type in a line, after ``{"type":"``."""
+
+_SHA256 = re.compile("[0-9a-f]{64}")
+_snapshot = msgspec.json.Decoder(Snapshot)
+_status = msgspec.json.Decoder(Status)
+
+
+@dataclass(frozen=True)
+class Sample:
+    """A report: the newest line of each type at its time; b"" for types without a line yet."""
+
+    progress: bytes
+    load: bytes
+    counts: bytes
+    snapshot: bytes
+
+    @property
+    def size(self) -> int:
+        """Size in bytes, without lines that several samples share."""
+        return len(self.progress) + len(self.load)
+
+
+@dataclass
+class History:
+    """The history of a run, up to the part of its journal that has been read."""
+
+    path: Path
+    last: int = 0
+    """Number of the last event."""
+    wall: float = 0.0
+    """Unix time of the last status, s."""
+    began: float | None = None
+    """Unix time of the start of the worker, s."""
+    state: State = State.ACCEPTED
+    samples: list[Sample] = field(default_factory=list)
+    newest: Sample | None = None
+    cuts: list[bytes] = field(default_factory=list)
+    snapshots: dict[int, bytes] = field(default_factory=dict)
+    """Lines of snapshots by number."""
+    notes: Notes = field(default_factory=Notes)
+    answers: dict[int, tuple[int, bytes]] = field(default_factory=dict)
+    """Answers for a run that has ended, by their number of points: the last event, and the body."""
+
+    def __post_init__(self) -> None:
+        self.lock = threading.Lock()
+        self.columns = Columns(self.path.with_name(layout.HISTORY))
+        """Columns of history.csv; they are read separately, under the same lock."""
+        self._tail = Tail(self.path)
+        self._progress = self._counts = self._snapshot = b""
+        self._every, self._reports, self._size = 1, 0, 0
+
+    def catch_up(self) -> None:
+        """Reads new lines of the journal; the lock is held."""
+        while block := self._tail.block(_BLOCK):
+            lines = block.split(b"\n")
+            for line in lines:
+                kind = line[_TYPE]
+                if kind in KINDS:
+                    self.notes.take(line)
+                if kind == b"prog":
+                    self._progress = line
+                elif kind == b"load":
+                    self._load(line)
+                elif kind == b"coun":
+                    self._counts = line
+                elif kind in _RARE:
+                    self._rare(kind, line)
+            self.last = next((seq for line in reversed(lines) if (seq := seq_of(line))), self.last)
+
+    def _load(self, line: bytes) -> None:
+        self._reports += 1
+        self.newest = Sample(self._progress, line, self._counts, self._snapshot)
+        if self._reports % self._every:
+            return
+        self.samples.append(self.newest)
+        self._size += self.newest.size
+        if len(self.samples) > _SAMPLES or self._size > _BYTES:
+            self.samples = self.samples[1::2]
+            self._every *= 2
+            self._size = sum(sample.size for sample in self.samples)
+
+    def _rare(self, kind: bytes, line: bytes) -> None:
+        try:
+            if kind == b"stat":
+                self._state(_status.decode(line))
+            elif kind == b"snap":
+                told = _snapshot.decode(line.decode())
+                if Path(told.path).name and _SHA256.fullmatch(told.sha256):
+                    self.snapshots[told.n] = self._snapshot = line
+            elif msgspec.json.decode(line.decode(), type=msgspec.Raw):
+                self.cuts.append(line)
+                del self.cuts[:-_CUTS]
+        except DAMAGED:
+            return
+
+    def _state(self, status: Status) -> None:
+        self.state, self.wall = State(status.state), status.wall
+        if self.state is State.RUNNING and self.began is None:
+            self.began = status.wall
+
+
+_RARE = frozenset({b"stat", b"snap", b"bala"})
+
+
+class Histories:
+    """Histories of the runs that were asked for last, for any thread."""
+
+    def __init__(self) -> None:
+        """None yet."""
+        self._lock = threading.Lock()
+        self._known: OrderedDict[Path, History] = OrderedDict()
+
+    def of(self, path: Path) -> History:
+        """The history of the journal at ``path``; the caller takes its lock and calls ``catch_up``."""
+        with self._lock:
+            found = self._known.setdefault(path, History(path))
+            self._known.move_to_end(path)
+            if len(self._known) > _RUNS:
+                self._known.popitem(last=False)
+            return found

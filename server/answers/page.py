@@ -1,0 +1,155 @@
+"""The live page: its own files, and the two JavaScript libraries that it draws with, out of an installed wheel.
+
+three.js and ECharts come as ES modules inside the package ``nicegui``. Its metadata says where the files are; they are
+served, and the package is never imported: what it needs itself is not needed here. All files are read once, at the
+start: no address leads to a disk.
+"""
+
+import gzip
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from importlib import metadata
+from pathlib import Path
+
+from fastapi import FastAPI
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
+from starlette.responses import Response
+from starlette.types import Receive, Scope, Send
+
+from .. import errors
+from .download import is_known
+
+PACKAGE, VERSION = "nicegui", "3.18.0"
+TESTED = {
+    "echarts/index.js": (
+        "nicegui/elements/echart/dist/index.js",
+        "1d2ba6aca0b953103efb38e40ce29fc0fb71f3b04d94de0f0133c166197b789e",
+    ),
+    "echarts/index-DlVyZyb_.js": (
+        "nicegui/elements/echart/dist/index-DlVyZyb_.js",
+        "a67fedec464a22765df705cc09ee7fe16268e32535fbc74dcb5c74c52a02b01d",
+    ),
+    "three/index.js": (
+        "nicegui/elements/scene/dist/index.js",
+        "f55227d12dac0eb037cae13b1992091746fc017a275748e4a1bebd0f6244e7e5",
+    ),
+}
+"""Address below the version: file of the package, and its sha256 in the wheel of ``VERSION`` on PyPI."""
+_FOREVER = "public, max-age=31536000, immutable"
+"""Cached for a year, since the version is part of the address; RFC 9111 has no longer time."""
+_WORTH = 1 << 10
+"""Bytes from which a file is compressed. Chosen: the size of a packet."""
+_TYPES = {
+    ".js": "text/javascript", ".css": "text/css", ".html": "text/html", ".json": "application/json",
+    ".svg": "image/svg+xml", ".png": "image/png",
+}  # fmt: skip
+_LEVEL = 6
+"""Level of gzip: 1.1 MB become 0.37 MB in 50 ms, once."""
+
+
+class LibraryError(Exception):
+    """The libraries cannot be served; the text is one line."""
+
+
+@dataclass(frozen=True)
+class Library:
+    """One file with its headers."""
+
+    plain: bytes
+
+    @cached_property
+    def zipped(self) -> bytes:
+        """The compressed file, made at the first request."""
+        return gzip.compress(self.plain, _LEVEL, mtime=0)
+
+    @cached_property
+    def _digest(self) -> str:
+        return hashlib.sha256(self.plain).hexdigest()[:32]
+
+    def tag(self, zipped: bool) -> str:
+        """The ETag of the plain or the compressed form."""
+        return f'"{self._digest}{"-gzip" if zipped else ""}"'
+
+
+def libraries() -> dict[str, Library]:
+    """The files of the libraries, by address. Raises LibraryError when the package is missing or has another
+    version."""
+    cure = f"pip install --no-deps {PACKAGE}=={VERSION}"
+    try:
+        installed = metadata.distribution(PACKAGE)
+    except metadata.PackageNotFoundError:
+        raise LibraryError(f"{PACKAGE} {VERSION} is not installed: {cure}") from None
+    if installed.version != VERSION:
+        raise LibraryError(f"{PACKAGE} {installed.version} is installed, tested is {VERSION}: {cure}")
+    return {
+        address: _tested(Path(str(installed.locate_file(name))), digest) for address, (name, digest) in TESTED.items()
+    }
+
+
+def _tested(path: Path, digest: str) -> Library:
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise LibraryError(f"{path}: {error.strerror}") from None
+    if hashlib.sha256(content).hexdigest() != digest:
+        raise LibraryError(f"{path}: not the file of {PACKAGE} {VERSION} that was tested (sha256 differs)")
+    return Library(content)
+
+
+def install(app: FastAPI, web: Path, *, auth: bool) -> str:
+    """Mounts the page at ``/`` and the libraries at ``/lib``; returns what is wrong with the libraries, or an empty
+    text. Raises OSError where the page cannot be read.
+    """
+    found: Mapping[str, Library] = {}
+    problem = ""
+    try:
+        found = libraries()
+    except LibraryError as error:
+        problem = str(error)
+    known = {"auth": auth, "problem": problem}
+    names = {name: f"lib/{VERSION}/{name}/index.js" if found else None for name in ("echarts", "three")}
+    index = Library(json.dumps({**known, **names}).encode())
+    page = {str(path.relative_to(web)): Library(path.read_bytes()) for path in web.rglob("*") if _is_shown(path)}
+    app.mount("/lib", _Files({"index.json": index}, {f"{VERSION}/{name}": file for name, file in found.items()}))
+    app.mount("/", _Files({**page, "": page["index.html"]} if "index.html" in page else page, {}))
+    return problem
+
+
+def _is_shown(path: Path) -> bool:
+    """Whether a file belongs to the page, not to the Python package around it."""
+    return path.is_file() and not path.parent.name.startswith("_") and not path.name.startswith(("_", "."))
+
+
+class _Files:
+    """Serves files from memory, by address: ``fresh`` ones, which a browser revalidates each time, since a server
+    may be a newer one, and files that never change.
+    """
+
+    def __init__(self, fresh: Mapping[str, Library], lasting: Mapping[str, Library]) -> None:
+        self._fresh, self._lasting = fresh, lasting
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Raises HTTPException 405 for other methods and 404 for other addresses: the mount sees every address
+        without a route.
+        """
+        address = scope["path"].removeprefix(scope["root_path"]).removeprefix("/")
+        file, lasts = self._fresh.get(address) or self._lasting.get(address), address in self._lasting
+        if file is None or scope["method"] != "GET":
+            known = file is not None or errors.allowed(scope["app"], scope["path"])
+            raise HTTPException(405 if known else 404)
+        await _answer(Request(scope), address, file, lasts)(scope, receive, send)
+
+
+def _answer(request: Request, address: str, file: Library, lasts: bool) -> Response:
+    zipped = "gzip" in request.headers.get("accept-encoding", "") and len(file.plain) > _WORTH
+    headers = {"Cache-Control": _FOREVER if lasts else "no-cache", "Vary": "Accept-Encoding", "ETag": file.tag(zipped)}
+    if is_known(headers["ETag"], request.headers.get("if-none-match", "")):
+        return Response(status_code=304, headers=headers)
+    if zipped:
+        headers["Content-Encoding"] = "gzip"
+    kind = _TYPES.get(Path(address or "index.html").suffix, "application/octet-stream")
+    return Response(file.zipped if zipped else file.plain, media_type=kind, headers=headers)

@@ -1,0 +1,60 @@
+"""The course of one fragment over the snapshots of a run."""
+
+import os
+from collections.abc import Iterator, Sequence
+from functools import lru_cache
+from pathlib import Path
+
+from conoid.cases import snapshot
+from conoid.cases.messages import Snapshot
+
+from ..errors import ServiceError
+from . import download
+from .shapes import FragmentCourse
+
+MOST = 200
+"""Snapshots that are read for a course, evenly over those of a run. Chosen: 0.2 s where no one is known yet."""
+_KNOWN = 512
+"""Snapshots whose tables of fragments are kept, of all runs: 50 MB at most."""
+_HEADER = 16
+"""Bytes that say how long the header is."""
+_LONGEST = 1 << 24
+"""Bytes of a header that is read. Chosen: a hundred times the longest of a shipped case."""
+_DAMAGE = ValueError, IndexError, TypeError, OverflowError, RecursionError
+"""What a header with wrong numbers, and a file that ends before its columns do, come to."""
+_COLUMNS = "fragment_id", "fragment_mass", "fragment_velocity", "fragment_size", "fragment_tets"
+
+
+def course(folder: Path, told: Sequence[Snapshot], label: int) -> FragmentCourse:
+    """Of the fragment ``label`` of the run in ``folder``; a snapshot without it, or a damaged one, has no row."""
+    most = min(MOST, len(told))
+    chosen = sorted({round(k * (len(told) - 1) / max(most - 1, 1)) for k in range(most)})
+    rows = [row for k in chosen for row in _found(folder, told[k], label)]
+    columns = [list(column) for column in zip(*rows, strict=True)] or [[] for _ in range(6)]
+    return FragmentCourse(**dict(zip(("n", "t", "mass", "speed", "size", "tets"), columns, strict=True)))
+
+
+def _found(folder: Path, told: Snapshot, label: int) -> Iterator[tuple[float, ...]]:
+    try:
+        identity, mass, velocity, size, tets = _table(folder, told.path, told.sha256)
+        row = identity.tolist().index(label)
+        speed = sum(part * part for part in velocity[3 * row : 3 * row + 3]) ** 0.5
+        yield told.n, told.t, mass[row], speed, size[row], tets[row]
+    except (ServiceError, OSError, *_DAMAGE):
+        return
+
+
+@lru_cache(maxsize=_KNOWN)
+def _table(folder: Path, path: str, _sha256: str) -> tuple[memoryview, ...]:
+    """The columns of the table of fragments; no more of the file is read than they are. Raises ServiceError, OSError,
+    ValueError.
+    """
+    with download.open_inside(folder, path) as file:
+        start = file.read(_HEADER)
+        head = start + file.read(min(_LONGEST, int.from_bytes(start[12:16], "little")))
+        header = snapshot.header_of(head, size=os.fstat(file.fileno()).st_size)
+        return tuple(_column(file.fileno(), header.arrays[name]) for name in _COLUMNS if name in header.arrays)
+
+
+def _column(descriptor: int, array: snapshot.Array) -> memoryview:
+    return memoryview(os.pread(descriptor, snapshot.size_of(array), array.offset)).cast(snapshot.TYPES[array.dtype])  # type: ignore[call-overload, no-any-return]

@@ -1,0 +1,73 @@
+"""The SQLAlchemy engine of the server's database: how it is opened, which file it uses, and its error messages."""
+
+import os
+import shutil
+from pathlib import Path
+from typing import Any
+
+import sqlalchemy as sa
+
+from ..settings import StartError
+
+_BUSY = 2000
+"""ms that SQLite waits for a lock of another process. Chosen: longer than any transaction of this server, shorter
+than the time limit of a request."""
+_TABLES = 1 << 16
+"""Bytes of free disk below which SQLite cannot open a database: its log and its shared memory. By hand: 32 KiB."""
+
+
+class StoreError(StartError):
+    """The database cannot be used; the text is one line."""
+
+
+def failure(url: str | sa.URL, error: Exception, deed: str = "used") -> StoreError:
+    """The message for a database that failed: its file, or its address without the password, and why ``deed``
+    failed."""
+    try:
+        made = sa.make_url(url)
+        sqlite = made.get_backend_name() == "sqlite" and made.database
+        place = made.database if sqlite else made.render_as_string(hide_password=True)
+    except sa.exc.ArgumentError:
+        sqlite, place = None, repr(url)
+    full = " (its disk is full)" if sqlite and _full(Path(sqlite).parent) else ""
+    told = StoreError(f"the database cannot be {deed}: {place}: {str(error).splitlines()[0]}{full}")
+    told.exit_code = 2 if isinstance(error, sa.exc.ArgumentError) else 1
+    return told
+
+
+def _full(folder: Path) -> bool:
+    try:
+        return shutil.disk_usage(folder).free < _TABLES
+    except OSError:
+        return False
+
+
+def engine_of(url: str | sa.URL) -> sa.Engine:
+    """Opens the database. Raises SQLAlchemyError, ImportError where the driver is not installed."""
+    made = sa.make_url(url)
+    engine = sa.create_engine(made, pool_pre_ping=made.get_backend_name() != "sqlite")
+    if engine.dialect.name == "sqlite":
+        sa.event.listen(engine, "connect", _tune)
+    return engine
+
+
+def _tune(connection: Any, _record: object) -> None:
+    """Switches SQLite to WAL, so that readers do not wait for a writer, and gives it lower() for all letters."""
+    for pragma in ("journal_mode=wal", f"busy_timeout={_BUSY}"):
+        connection.execute(f"pragma {pragma}").close()
+    connection.create_function("lower", 1, _lower, deterministic=True)
+
+
+def _lower(text: str | None) -> str | None:
+    """SQLite's own knows the letters of ASCII alone."""
+    return text if text is None else str(text).lower()
+
+
+def identity_of(engine: sa.Engine) -> tuple[int, int] | None:
+    """Device and inode of the file of an SQLite database; None for other databases and where there is no file."""
+    place = engine.url.database if engine.dialect.name == "sqlite" else None
+    try:
+        status = os.stat(place) if place else None
+    except OSError:
+        return None
+    return (status.st_dev, status.st_ino) if status else None

@@ -1,0 +1,100 @@
+"""Identity of a server: one folder of runs and one database, each with the name of the other.
+
+A second server on the same database would mark the runs of the first one as lost, and a copy of a folder would stop
+the workers of the original: both are refused. ``adopt`` binds a folder and a database that were moved, or restored
+from a backup.
+"""
+
+import secrets
+from dataclasses import dataclass
+from pathlib import Path
+
+import msgspec
+
+from conoid.cases import whole
+
+from .. import durable
+from ..settings import SettingsError
+from .store import Bond, Store
+
+FILE = "server.identity"
+_MOST = 1 << 16
+"""Bytes of the file that are read. Chosen: it has some hundred."""
+
+
+class IdentityError(SettingsError):
+    """Folder and database do not belong together, or not here; the text is one line."""
+
+
+@dataclass(frozen=True)
+class Pair:
+    """The identities in folder and database; None where there is none yet."""
+
+    place: str
+    folder: Bond | None
+    database: Bond | None
+
+
+def require(runs: Path, store: Store) -> None:
+    """Binds a new folder and a new database. Raises IdentityError where they do not belong together, OSError,
+    SQLAlchemyError.
+    """
+    found = _look(runs, store)
+    if why := _wrong(found):
+        remedy = f"if it is no longer served there: python -m conoid.server --runs {runs} adopt"
+        raise IdentityError(f"--runs {runs}: {why}; {remedy}")
+    known = found.folder or found.database or Bond(secrets.token_hex(16), found.place)
+    _bind(runs, store, found, known)
+    if store.bond() != known:
+        raise IdentityError(f"--runs {runs}: another server begins to use this database")
+
+
+def adopt(runs: Path, store: Store) -> str:
+    """Binds folder and database to each other here; returns the previous identities in one line. Raises OSError,
+    SQLAlchemyError.
+    """
+    try:
+        found = _look(runs, store)
+    except IdentityError:
+        found = Pair(str(runs.resolve()), None, store.bond())
+    made = Bond((found.folder or found.database or Bond(secrets.token_hex(16), "")).server, found.place)
+    store.rebind(made)
+    durable.write(runs / FILE, _text(made))
+    before = {bond.place for bond in (found.folder, found.database) if bond is not None} - {found.place}
+    return f"belonged to {' and '.join(sorted(before))} before" if before else "belonged here before"
+
+
+def _look(runs: Path, store: Store) -> Pair:
+    """Reads the file of the folder. Raises IdentityError where it is damaged."""
+    place = str(runs.resolve())
+    try:
+        folder = msgspec.json.decode(whole.read(runs / FILE, _MOST), type=Bond)
+    except FileNotFoundError:
+        folder = None
+    except (OSError, msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
+        raise IdentityError(
+            f"--runs {runs}: {FILE} cannot be read ({error}); python -m conoid.server --runs {runs} adopt makes it anew"
+        ) from None
+    return Pair(place, folder, store.bond())
+
+
+def _wrong(found: Pair) -> str:
+    """Why the two do not belong together; empty when they do, or can be bound."""
+    if found.folder is not None and found.folder.place != found.place:
+        return f"this folder is a copy of {found.folder.place}, or was moved from there"
+    if found.database is None:
+        return ""
+    if found.folder is None or found.database.server != found.folder.server:
+        return f"its database belongs to the folder {found.database.place}"
+    return ""
+
+
+def _bind(runs: Path, store: Store, found: Pair, known: Bond) -> None:
+    if found.database is None:
+        store.bind(known)
+    if found.folder is None:
+        durable.write(runs / FILE, _text(known))
+
+
+def _text(bond: Bond) -> bytes:
+    return msgspec.json.format(msgspec.json.encode(bond), indent=2) + b"\n"

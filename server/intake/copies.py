@@ -1,0 +1,81 @@
+"""A run's own copies of the files that its case names: hard links to files that never change."""
+
+import re
+import secrets
+import shutil
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+from conoid.cases import layout
+from conoid.cases.files import copy_of
+from conoid.cases.load import CaseError, Problem
+from conoid.cases.problems import shown
+
+from .. import durable
+from ..errors import ServiceError
+from ..runs.folder import APART
+from .reading import FileName
+from .sent import SentFiles, give
+
+_LACKING = "you have sent no such file, or it has been removed since; send it first (PUT /v1/files/{sha256})"
+_NAMING = re.compile(rb"""path["']?[ \t]*[=:]|\\[uUx]""")
+Source = Callable[[FileName, Path], None]
+"""Puts a file that a case names at a path. Raises FileNotFoundError, OSError."""
+
+
+def of_owner(sent: SentFiles, owner: str) -> Source:
+    """Copies of files that a user has sent."""
+    return lambda file, target: sent.give(owner, file.sha256, target)
+
+
+def of_run(folder: Path) -> Source:
+    """Copies of files of another run of the same user; raises ServiceError 409 where that run has lost one."""
+
+    def put(file: FileName, target: Path) -> None:
+        try:
+            give(folder / layout.FILES / copy_of(file.path, file.sha256), target)
+        except FileNotFoundError:
+            detail = f"run {folder.name}: its copy of {shown(file.path)} is gone"
+            raise ServiceError(409, "no_file", detail) from None
+
+    return put
+
+
+def fill(files: Sequence[FileName], source: Source, folder: Path) -> None:
+    """Gives a folder a copy of each file; they are on disk on return. Raises CaseError for missing files, OSError."""
+    place = folder / layout.FILES
+    if files:
+        place.mkdir(0o700)
+    lacking = []
+    for file in files:
+        target = place / copy_of(file.path, file.sha256)
+        try:
+            if not target.exists():
+                source(file, target)
+        except FileNotFoundError:
+            lacking.append(Problem(f"{file.key}.sha256", shown(file.sha256), _LACKING))
+    if lacking:
+        raise CaseError(lacking)
+    if files:
+        durable.sync_folder(place)
+
+
+@contextmanager
+def apart(runs: Path, files: Sequence[FileName], source: Source) -> Iterator[Path]:
+    """A temporary folder with the files, laid out as in the folder of a run. A server that was killed leaves it
+    behind; the next one removes it. Raises the errors of ``fill``.
+    """
+    place = runs / f"{APART}{secrets.token_hex(8)}"
+    place.mkdir(0o700)
+    try:
+        (place / layout.SUBMISSION).touch()
+        fill(files, source, place)
+        yield place
+    finally:
+        shutil.rmtree(place, ignore_errors=True)
+
+
+def names_files(body: bytes) -> bool:
+    """Whether the text of a case may name files: it has a key ``path``, or escaped letters."""
+    return _NAMING.search(body) is not None

@@ -1,0 +1,164 @@
+"""Reads cases in separate processes with limits (``reading``), and decides whose turn it is."""
+
+import atexit
+import logging
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+from contextlib import suppress
+from functools import cache
+
+import msgspec
+
+from conoid.cases.cores import usable_cores
+
+from ..errors import ServiceError
+from ..requests.lanes import Lanes
+from .reading import CPU, PID, WALL, Answer, Question, Reading, WrongCaseError
+
+_log = logging.getLogger("conoid.server")
+_LOAD = 30.0
+"""s within which the program must have loaded its modules. Chosen: it takes half a second."""
+_FORK = 10.0
+"""s within which the program must have begun with a case; else it is replaced. Chosen: it takes 10 ms."""
+_REST = 5.0
+"""s beyond ``WALL`` after which the server kills the process of a case. Chosen."""
+_WAITING = 100
+"""Waiting bodies of one owner. Chosen: each may have 1 MiB."""
+CASE, SWEEP, FILES = 120.0, 900.0, 300.0
+"""s within which a case, all cases of a sweep, and a case with files must be read, with the waiting for their turn.
+Chosen."""
+
+
+def lanes(patience: float) -> Lanes:
+    """As many cases at a time as there are cores; one owner alone never takes the last place."""
+    places = max(2, usable_cores())
+    return Lanes(each=places - 1, waiting=_WAITING, patience=patience, most=places)
+
+
+def surveyors() -> Lanes:
+    """One case with files of an owner at a time, and of all owners as many as there are cores."""
+    return Lanes(each=1, waiting=_WAITING, patience=FILES, most=max(2, usable_cores()))
+
+
+class Reader:
+    """A program that reads cases; it is started when it is first needed, and again where it has ended or hangs. For
+    any thread.
+    """
+
+    def __init__(self) -> None:
+        """Starts nothing yet."""
+        self._lock = threading.Lock()
+        self._program: _Program | None = None
+
+    def read(self, question: Question) -> Reading:
+        """Reads a case. Raises CaseError with every problem, ServiceError 422 for a case that takes too much time or
+        memory, 503; RuntimeError."""
+        told = self._ask(msgspec.msgpack.encode(question))
+        if not told:
+            detail = f"the case takes too long to be read: more than {CPU} s, or too much memory"
+            raise ServiceError(422, "too_costly", detail)
+        answer = msgspec.msgpack.decode(told, type=Answer)
+        if answer.crash:
+            raise RuntimeError(answer.crash)
+        if answer.reading is None:
+            raise WrongCaseError(answer.problems, answer.files)
+        return answer.reading
+
+    def _ask(self, question: bytes) -> bytes:
+        """A connection to the program, or to the next one. Raises ServiceError 503."""
+        error: OSError | None = None
+        for _ in range(2):
+            try:
+                program = self._running()
+                connection, pid = program.begun()
+            except OSError as raised:
+                _log.error("the program that reads cases is started anew: %s", raised)
+                error = raised
+                self.close()
+            else:
+                return _answer(connection, pid, question)
+        raise ServiceError(503, "unavailable", "no case can be read now", retryable=True) from error
+
+    def _running(self) -> "_Program":
+        with self._lock:
+            if self._program is None:
+                self._program = _Program()
+            return self._program
+
+    def close(self) -> None:
+        """Ends the program; cases that it has begun with are read to their end."""
+        with self._lock:
+            if self._program is not None:
+                self._program.close()
+            self._program = None
+
+
+class _Program:
+    """A running program. It gets a connection for each case, and forks a process for it."""
+
+    def __init__(self) -> None:
+        """Raises OSError where it does not start."""
+        self._control, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        with theirs:
+            command = [sys.executable, "-m", "conoid.server.intake.reading"]
+            self._child = subprocess.Popen(command, stdin=theirs.fileno(), stdout=subprocess.DEVNULL)
+        self._control.settimeout(_LOAD)
+        try:
+            if not self._control.recv(1):
+                raise OSError("it ended at its start")
+        except OSError:
+            self.close()
+            raise
+        self._control.settimeout(_FORK)
+
+    def begun(self) -> tuple[socket.socket, int]:
+        """A connection to a process that waits for a case, and the number of the process. Raises OSError."""
+        ours, theirs = socket.socketpair()
+        try:
+            with theirs:
+                socket.send_fds(self._control, [b"c"], [theirs.fileno()])
+            ours.settimeout(_FORK)
+            number = ours.recv(PID, socket.MSG_WAITALL)
+            if len(number) < PID:
+                raise OSError("it has ended")
+            return ours, int.from_bytes(number)
+        except BaseException:
+            ours.close()
+            raise
+
+    def close(self) -> None:
+        """Ends the program."""
+        self._control.close()
+        self._child.kill()
+        self._child.wait()
+
+
+def _answer(connection: socket.socket, pid: int, question: bytes) -> bytes:
+    """The answer of a process; empty where it reached its limits. Raises ServiceError 503."""
+    with connection:
+        connection.settimeout(WALL + _REST)
+        chunks = []
+        try:
+            connection.sendall(question)
+            connection.shutdown(socket.SHUT_WR)
+            while chunk := connection.recv(1 << 16):
+                chunks.append(chunk)
+        except TimeoutError:
+            with suppress(ProcessLookupError):
+                os.kill(pid, signal.SIGKILL)
+            raise ServiceError(503, "unavailable", "the case cannot be read now", retryable=True) from None
+        except ConnectionError:
+            return b""
+        return b"".join(chunks)
+
+
+@cache
+def the_reader() -> Reader:
+    """One connection for each process, which keeps nothing between two cases."""
+    made = Reader()
+    atexit.register(made.close)
+    return made

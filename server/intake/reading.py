@@ -1,0 +1,246 @@
+"""``python -m conoid.server.intake.reading``: reads cases, each in a process of its own with limits.
+
+A body is somebody's text: what it costs to read is not known before. This program has everything loaded and forks for
+each case, so that one costs milliseconds, and a case that takes too long, or too much memory, ends its own process. Its
+standard input is a socket, which brings a connection for each case, and ends with the server. One thread, since a fork
+copies only that.
+"""
+
+import os
+import resource
+import signal
+import socket
+import sys
+import traceback
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from conoid.cases.estimate import Estimate, estimate
+from conoid.cases.files import files_of
+from conoid.cases.load import CaseError, Problem, json_data, parse_case, resolved_json, shipped_path, toml_data
+from conoid.cases.plausible import bare_numbers
+from conoid.cases.problems import dotted, problem
+from conoid.cases.schema import Case
+from conoid.cases.survey import Survey, from_json
+from conoid.cases.warned import warned
+
+from ..requests import limits
+from ..requests.limits import Limits
+
+CPU, WALL, MEMORY = 5, 20, 1 << 30
+"""s of CPU time, s on the clock, and bytes of memory that a case may take to be read. Chosen: the largest shipped case
+takes 0.1 s and 100 MB; a machine may be busy."""
+_NICE = 5
+"""Steps of priority below the server, which goes on answering. Chosen."""
+_SHIPPED = "demo"
+"""Read once before all others. Chosen: small, with a material of the library."""
+_MOST_FILES = 1000
+"""Files of a case with problems that are told of. Chosen."""
+_UNREAD = "was not read yet: its run reads it"
+PID = 4
+"""Bytes of the number of a process, which it sends first."""
+
+
+class Question(msgspec.Struct, frozen=True, kw_only=True):
+    """A body, its kind, and what is allowed."""
+
+    body: bytes
+    json: bool
+    limits: Limits
+    survey: bytes | None = None
+    """What a program of the worker has read of the files that the case names (conoid.cases.survey); empty: nothing.
+    None: it has not been asked yet. Then a case with files is read and checked, and not estimated."""
+    folder: str = ""
+    """Where these files are."""
+
+
+class FileName(msgspec.Struct, frozen=True, kw_only=True):
+    """A file that the case names, and the key of the table that does."""
+
+    key: str
+    path: str
+    sha256: str
+
+
+class WrongCaseError(CaseError):
+    """A case with problems, and the files that it names all the same."""
+
+    def __init__(self, problems: Iterable[Problem], files: Sequence[FileName]) -> None:
+        """Keeps both."""
+        super().__init__(problems)
+        self.files = files
+
+
+class Reading(msgspec.Struct, frozen=True, kw_only=True):
+    """A case that can be run here: what the server needs of it."""
+
+    name: str
+    title: str
+    ranks: int
+    threads: int
+    profile: str
+    """Of a batch system, by the case; empty for the site's own."""
+    wall_time: float | None
+    estimate: dict[str, int | float]
+    resolved: bytes
+    """case.resolved.json"""
+    case: bytes
+    """The case with every default, as JSON."""
+    doubts: list[Problem]
+    files: list[FileName] = []
+    survey: bytes = b""
+    """What these hold, as JSON; empty where nothing has read them."""
+
+
+class Answer(msgspec.Struct, frozen=True, kw_only=True):
+    """A reading, or every problem; ``crash`` is the traceback of a mistake of this program."""
+
+    reading: Reading | None = None
+    problems: list[Problem] = []
+    files: list[FileName] = []
+    """Of a case with problems: the files that it names, as far as it could be read; ``sha256`` may be empty."""
+    crash: str = ""
+
+
+def read(question: Question) -> Answer:
+    """Reads, checks and estimates a case."""
+    try:
+        return Answer(reading=_read(question))
+    except CaseError as error:
+        return Answer(problems=list(error.problems), files=_named(question))
+    except MemoryError:
+        raise
+    except Exception:
+        return Answer(crash=traceback.format_exc())
+
+
+def _read(question: Question) -> Reading:
+    text = _text(question.body)
+    data = json_data(text) if question.json else toml_data(text)
+    case = parse_case(data)
+    if problems := limits.check(case, question.limits):
+        raise CaseError(problems)
+    files = _files(case)
+    known = not files or question.survey is not None
+    told, odd = _weighed(case, data, question) if known else ({}, [])
+    return Reading(
+        name=case.name, title=case.title, ranks=case.run.ranks, threads=case.run.threads, profile=case.run.profile,
+        wall_time=limits.wall_time(case, question.limits), estimate=told,
+        resolved=resolved_json(case), case=case.model_dump_json().encode(), doubts=odd, files=files,
+        survey=question.survey or b"",
+    )  # fmt: skip
+
+
+def _files(case: Case) -> list[FileName]:
+    return _names(case.model_dump(include={"parts"}))
+
+
+def _named(question: Question) -> list[FileName]:
+    """The files of a case that cannot be run; none where its text cannot be read."""
+    try:
+        text = _text(question.body)
+        return _names(json_data(text) if question.json else toml_data(text))[:_MOST_FILES]
+    except CaseError:
+        return []
+
+
+def _names(data: Mapping[str, Any]) -> list[FileName]:
+    return [FileName(key=dotted(file.table), path=file.path, sha256=file.sha256 or "") for file in files_of(data)]
+
+
+def _weighed(case: Case, data: Mapping[str, Any], question: Question) -> tuple[dict[str, int | float], list[Problem]]:
+    """What the case needs, and what is odd about it. Raises CaseError where it cannot be run here."""
+    told = from_json(question.survey) if question.survey else Survey()
+    if told.refused:
+        raise CaseError(Problem("", "", line) for line in told.refused)
+    expected = _estimate(case, question, told)
+    # Parts that touch are told of files alone: the others take seconds to find.
+    unread = [problem((file.key, "path"), file.path, _UNREAD) for file in _files(case) if question.survey == b""]
+    odd = [*unread, *bare_numbers(data), *warned(case, expected, told, told.touching)]
+    return limits.figures(expected), odd
+
+
+def _estimate(case: Case, question: Question, told: Survey) -> Estimate:
+    try:
+        expected = estimate(case, Path(question.folder) if question.folder else None, told)
+    except (ArithmeticError, ValueError):
+        raise CaseError([Problem("parts", "", "the elements are too many or too small to be counted")]) from None
+    if problems := limits.check_size(expected, question.limits):
+        raise CaseError(problems)
+    return expected
+
+
+def _text(body: bytes) -> str:
+    try:
+        return body.decode()
+    except UnicodeDecodeError as error:
+        raise CaseError([Problem("", "", f"the body is not UTF-8 text (at byte {error.start})")]) from None
+
+
+# The process ----------------------------------------------------------------------------------------------------------
+
+
+def main() -> int:
+    """Answers until standard input ends. Says that it is ready by one byte."""
+    signal.signal(signal.SIGCHLD, signal.SIG_IGN)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    os.nice(_NICE)
+    _warm()
+    with socket.socket(fileno=sys.stdin.fileno()) as control:
+        control.send(b"r")
+        while _next(control):
+            pass
+    return 0
+
+
+def _next(control: socket.socket) -> bool:
+    """One case; False where there is none any more. A process that cannot be made is an empty answer."""
+    told, descriptors, _, _ = socket.recv_fds(control, 1, 1)
+    for descriptor in descriptors:
+        with socket.socket(fileno=descriptor) as connection, suppress(OSError):
+            if os.fork() == 0:
+                _child(connection)
+    return bool(told)
+
+
+def _warm() -> None:
+    """Reads a shipped case: what is made at the first case (validators, the materials) is there in each fork then."""
+    none = Limits(slots=1 << 20, elements=None, steps=None, memory=None, core_seconds=None, wall_time=None)
+    told = read(Question(body=shipped_path(_SHIPPED).read_bytes(), json=False, limits=none))
+    assert told.reading is not None, told
+
+
+def _child(connection: socket.socket) -> None:
+    """One case; leaves without the ceremonies of an interpreter, which belong to the parent."""
+    code = 1
+    try:
+        _limit()
+        connection.sendall(os.getpid().to_bytes(PID))
+        question = msgspec.msgpack.decode(_received(connection), type=Question)
+        connection.sendall(msgspec.msgpack.encode(read(question)))
+        code = 0
+    finally:
+        os._exit(code)
+
+
+def _limit() -> None:
+    resource.setrlimit(resource.RLIMIT_CPU, (CPU, CPU))
+    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))
+    signal.signal(signal.SIGALRM, signal.SIG_DFL)
+    signal.alarm(WALL)
+
+
+def _received(connection: socket.socket) -> bytes:
+    chunks: list[Any] = []
+    while chunk := connection.recv(1 << 16):
+        chunks.append(chunk)
+    return b"".join(chunks)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

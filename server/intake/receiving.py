@@ -1,0 +1,199 @@
+"""Takes files in that users send: streamed to disk, from the byte on that is missing, verified before they are there.
+
+A PUT with ``Content-Range: bytes FIRST-LAST/SIZE`` is a partial PUT of RFC 9110, 14.5: it goes on where the file ends
+here, as ``Upload-Offset`` (draft-ietf-httpbis-resumable-upload) says, which HEAD and every answer have. One without the
+header brings the file from its first byte on. What has arrived stays when a connection breaks, or the server is killed.
+"""
+
+import asyncio
+import hashlib
+import re
+import time
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import suppress
+from dataclasses import dataclass, field
+
+from starlette.requests import ClientDisconnect, Request
+
+from ..errors import ServiceError
+from ..requests.crowd import place_of
+from ..requests.lanes import Lanes
+from ..requests.limits import check_encoding
+from .sent import Part, Sent, SentFiles
+
+_RANGE = re.compile(r"bytes (?:(\d{1,18})-(\d{1,18})|\*)/(\d{1,18})")
+_GATHERED = 1 << 18
+"""Bytes that are collected before a write. Chosen: larger writes are not faster."""
+_SLICE = 1 << 25
+"""Bytes that are hashed in one task. Chosen: 0.1 s, between which other requests of the user are served."""
+_SILENCE = 30.0
+"""s within which a part of a body must arrive. Chosen, as for other bodies."""
+_STALLED = 5.0
+"""s without data after which another connection may continue with a file. Chosen: for a connection that broke."""
+
+
+@dataclass(frozen=True)
+class Span:
+    """The bytes ``first`` to ``end``, exclusive, of a file of ``total`` bytes; ``anew``: replaces what is there."""
+
+    first: int
+    end: int
+    total: int
+    anew: bool = False
+
+
+@dataclass
+class _Transfer:
+    """One connection that sends bytes of a file."""
+
+    heard: float = field(default_factory=time.monotonic)
+    given_up: bool = False
+    busy: bool = False
+    """All bytes have arrived; they are verified."""
+    over: asyncio.Event = field(default_factory=asyncio.Event)
+    patience: asyncio.Timeout | None = None
+
+    def give_up(self) -> None:
+        """Another connection continues with the file, at once."""
+        self.given_up = True
+        if self.patience is not None:
+            with suppress(RuntimeError):  # it does not wait for its body now
+                self.patience.reschedule(0.0)
+
+
+class Receiver:
+    """Used in the thread of the event loop; disks are used in the lane of the caller."""
+
+    def __init__(self, sent: SentFiles, lanes: Lanes) -> None:
+        """No connection sends yet."""
+        self._sent, self._lanes = sent, lanes
+        self._open: dict[tuple[str, str], _Transfer] = {}
+
+    async def receive(
+        self, request: Request, owner: str, sha256: str, check: Callable[[], Awaitable[None]]
+    ) -> tuple[Sent, bool]:
+        """Receives the body; returns what is there then, and whether the file has become complete. ``check`` raises
+        where the right to send has ended. Raises ServiceError: 400, 408, 409, 411, 413, 415, 422, 429, 503, 507.
+        """
+        span = span_of(request)
+        place_of(request).lengthen()
+        transfer = await self._begun(owner, sha256)
+        try:
+            part = await self._lanes.run(self._opened, owner, sha256, span)
+            if isinstance(part, Sent):
+                return part, False
+            await self._taken(request, transfer, part, check)
+            if part.offset < span.end:
+                raise ServiceError(400, "incomplete", f"the body broke off at byte {part.offset}", retryable=True)
+            if part.offset < span.total:
+                return Sent(sha256, span.total, part.offset, False, time.time()), False
+            transfer.busy = True
+            await self._verify(owner, sha256, part)
+            return Sent(sha256, span.total, span.total, True, time.time()), True
+        except OSError as error:
+            detail = f"the file cannot be kept: {error.strerror}"
+            raise ServiceError(507, "storage", detail, retryable=True) from error
+        finally:
+            del self._open[owner, sha256]
+            transfer.over.set()
+
+    async def _begun(self, owner: str, sha256: str) -> _Transfer:
+        """The connection that sends bytes of a file; a file has one at a time. Raises ServiceError 409."""
+        while (other := self._open.get((owner, sha256))) is not None:
+            if other.busy or time.monotonic() - other.heard < _STALLED:
+                raise _in_progress()
+            other.give_up()
+            await other.over.wait()
+        made = self._open[owner, sha256] = _Transfer()
+        return made
+
+    def _opened(self, owner: str, sha256: str, span: Span) -> Part | Sent:
+        """The incomplete file, open at the first byte of the body; the complete file where it exists. Raises
+        ServiceError 409, 413, 429, 507, OSError.
+        """
+        known = self._sent.find(owner, sha256)
+        if known is not None and known.whole:
+            return known
+        return self._sent.begin(owner, sha256, span.total, None if span.anew else span.first)
+
+    async def _taken(
+        self, request: Request, transfer: _Transfer, part: Part, check: Callable[[], Awaitable[None]]
+    ) -> None:
+        """Writes the body as it arrives; what has arrived stays, however it ends. Raises ServiceError 400, 401, 408,
+        409, OSError, and the errors of ``check``.
+        """
+        gathered, chunks = bytearray(), aiter(request.stream())
+        try:
+            while not transfer.given_up and (chunk := await _next(chunks, transfer)) is not None:
+                gathered += chunk
+                transfer.heard = time.monotonic()
+                if len(gathered) >= _GATHERED:
+                    await self._lanes.run(part.write, bytes(gathered))
+                    gathered.clear()
+                    await check()
+        finally:
+            if gathered:
+                await self._lanes.run(part.write, bytes(gathered))
+
+    async def _verify(self, owner: str, sha256: str, part: Part) -> None:
+        """Gives the verified file its name, on disk on return. Raises ServiceError 422 where the hash differs: then
+        the bytes are removed."""
+        total, offset = hashlib.sha256(), 0
+        while offset < part.size:
+            offset = await self._lanes.run(_hashed, total, part, offset)
+        if total.hexdigest() != sha256:
+            await self._lanes.run(self._sent.remove, owner, sha256)
+            detail = f"the bytes that have arrived have the sha256 {total.hexdigest()}: none of them is kept"
+            raise ServiceError(422, "wrong_hash", detail, pointer="sha256")
+        await self._lanes.run(self._sent.finish, owner, part)
+
+
+async def _next(chunks: AsyncIterator[bytes], transfer: _Transfer) -> bytes | None:
+    """The next piece of a body; None at its end. Raises ServiceError 400, 408, 409."""
+    try:
+        async with asyncio.timeout(_SILENCE) as transfer.patience:
+            return await anext(chunks, None)
+    except TimeoutError:
+        if transfer.given_up:
+            raise _in_progress() from None
+        detail = f"nothing of the body has arrived for {_SILENCE:g} s"
+        raise ServiceError(408, "timeout", detail, retryable=True) from None
+    except ClientDisconnect:
+        raise ServiceError(400, "incomplete", "the body broke off", retryable=True) from None
+
+
+def _in_progress() -> ServiceError:
+    detail = "another connection brings this file"
+    return ServiceError(409, "in_progress", detail, retryable=True, headers={"Retry-After": "1"})
+
+
+def _hashed(total: "hashlib._Hash", part: Part, offset: int) -> int:
+    """Adds a slice to the digest; returns its end. Raises OSError."""
+    end = min(part.size, offset + _SLICE)
+    while offset < end:
+        data = part.read(min(_GATHERED, end - offset), offset)
+        if not data:
+            raise OSError(5, "the file has become shorter")
+        total.update(data)
+        offset += len(data)
+    return offset
+
+
+def span_of(request: Request) -> Span:
+    """The range of bytes of a PUT, by its headers alone. Raises ServiceError 400, 411, 415."""
+    check_encoding(request)
+    length, told = request.headers.get("content-length", ""), request.headers.get("content-range")
+    if not length.isdecimal():
+        raise ServiceError(411, "length_required", "a file is sent with its Content-Length", pointer="Content-Length")
+    if told is None:
+        return Span(0, int(length), int(length), anew=True)
+    match = _RANGE.fullmatch(told)
+    if match is None:
+        detail = f"Content-Range {told[:80]!r}: write bytes FIRST-LAST/SIZE"
+        raise ServiceError(400, "bad_range", detail, pointer="Content-Range")
+    total = int(match[3])
+    first, end = (total, total) if match[1] is None else (int(match[1]), int(match[2]) + 1)
+    if not first <= end <= total or end - first != int(length):
+        detail = f"Content-Range {told[:80]!r} does not fit Content-Length {int(length)}"
+        raise ServiceError(400, "bad_range", detail, pointer="Content-Range")
+    return Span(first, end, total)

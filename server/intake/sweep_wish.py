@@ -1,0 +1,49 @@
+"""A sweep as it is handed in: the case, the points, the limit; the case of each point."""
+
+import json
+from typing import Any
+
+import msgspec
+
+from conoid.cases.load import CaseError, Problem, apply_overrides, json_data
+
+from ..answers.shapes import MOST_POINTS
+from ..errors import ServiceError, invalid_case
+
+
+class Wish(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
+    """What is handed in: a case as plain data, the changes of each point, the limit."""
+
+    case: dict[str, Any]
+    points: list[dict[str, Any]]
+    at_once: int | None = None
+
+
+def wish_of(body: bytes) -> Wish:
+    """Reads a request. Raises ServiceError."""
+    try:
+        wish = msgspec.convert(json_data(body), Wish)
+    except CaseError as error:
+        raise invalid_case(error.problems) from None
+    except msgspec.ValidationError as error:
+        raise ServiceError(422, "invalid_sweep", str(error), hint="case, points, at_once") from None
+    if not 1 <= len(wish.points) <= MOST_POINTS:
+        raise ServiceError(422, "invalid_sweep", f"{len(wish.points)} points; allowed: 1 to {MOST_POINTS}")
+    if wish.at_once is not None and wish.at_once < 1:
+        raise ServiceError(422, "invalid_sweep", f"at_once = {wish.at_once}: at least 1")
+    return wish
+
+
+def changed(case: dict[str, Any], point: dict[str, Any], n: int) -> bytes:
+    """The case at point ``n``, as JSON. Raises ServiceError."""
+    try:
+        return json.dumps(apply_overrides(case, point)).encode()
+    except CaseError as error:
+        raise at_point(n, error) from None
+    except RecursionError:
+        raise at_point(n, CaseError([Problem("", "", "its values are nested too deeply")])) from None
+
+
+def at_point(n: int, error: CaseError) -> ServiceError:
+    """What is wrong at point ``n``."""
+    return invalid_case([Problem(each.key, each.value, f"{each.message} (point {n})") for each in error.problems])

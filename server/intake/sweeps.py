@@ -1,0 +1,284 @@
+"""Sweeps: one case at many points, each a run of its own. A plain file a sweep, ``<runs>/sweeps/<id>.json``.
+
+The file is there before the first run is; each run has an idempotency key made of the sweep's id and its place. So a
+request that broke off is completed by sending it again, and makes no run twice. A server that was killed in the middle
+completes the sweep when it is started again, or takes it back where it has no key: until all runs are accepted none
+starts.
+"""
+
+import hashlib
+import logging
+import re
+import threading
+import time
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import msgspec
+
+from conoid.cases import whole
+from conoid.cases.figures import size
+from conoid.cases.load import CaseError
+
+from .. import durable
+from ..errors import ServiceError
+from ..queue.waiting import Need
+from ..runs import folder
+from ..settings import Settings
+from .reading import Reading
+from .submission import Desk, Wishes
+from .sweep_wish import Wish, at_point, changed, wish_of
+
+_log = logging.getLogger("conoid.server")
+FOLDER = "sweeps"
+_AGAIN = 2.0
+"""s after which a sweep that could not be completed is tried again. Chosen."""
+_MOST_BYTES = 16 << 20
+"""Of all cases of a sweep together. Chosen: what is expanded in a second."""
+_JSON = "application/json"
+_HASHES = re.compile(r"[0-9a-f]{64}")
+
+
+class Plan(msgspec.Struct, kw_only=True, frozen=True):
+    """A sweep as it is kept; ``runs`` is empty until all of them are accepted. ``submitted`` in Unix s."""
+
+    id: str
+    owner: str
+    name: str
+    submitted: float
+    key: str | None
+    digest: str
+    at_once: int | None
+    """Runs of the sweep that run at a time; None: as many as there are slots."""
+    points: list[dict[str, Any]]
+    runs: list[str] = []
+    case: dict[str, Any] | None = None
+    """What is changed at each point, until all runs are accepted."""
+    tries: list[int] = []
+    """How often each point was run again; empty: none was."""
+    repeated: list[int] = []
+    """Points that are run again, until all of these runs are accepted; ``earlier`` has the runs of before."""
+    earlier: list[str] = []
+
+    @property
+    def whole(self) -> bool:
+        """Whether all of its runs are accepted."""
+        return len(self.runs) == len(self.points) and not self.repeated
+
+    @property
+    def keys(self) -> list[str]:
+        """The idempotency keys of its runs."""
+        tries = self.tries or [0] * len(self.points)
+        return [f"sweep-{self.id}-{n}" + (f"-{again}" if again else "") for n, again in enumerate(tries)]
+
+    @property
+    def wanted(self) -> list[int]:
+        """The points that get a run when it is filled."""
+        return self.repeated or list(range(len(self.points)))
+
+
+class Sweeps:
+    """May be used from any thread."""
+
+    def __init__(self, settings: Settings, desk: Desk) -> None:
+        """Reads what is there; a file that cannot be read is left alone."""
+        self._folder, self._desk = settings.runs / FOLDER, desk
+        self._locks: dict[str, threading.Lock] = {}
+        """By owner: who hands in many points does not hold up others."""
+        self._plans: dict[str, Plan] = {}
+        self._filling: set[str] = set()
+        self._cancelled: set[str] = set()
+        for path in sorted(self._folder.glob("*.json")):
+            try:
+                self._keep(msgspec.json.decode(whole.read(path), type=Plan))
+            except (OSError, msgspec.MsgspecError):
+                continue
+        self._left = [plan for plan in self._plans.values() if not plan.whole]
+        self._filling |= {plan.id for plan in self._left}
+
+    def complete(self) -> None:
+        """Goes on with the sweeps that an earlier server was killed in, in a thread; their runs wait meanwhile."""
+        for plan in self._left:
+            runs = plan.earlier or self._desk.runs_of(plan.owner, plan.keys)
+            self._plans[plan.id] = msgspec.structs.replace(plan, runs=runs)
+        self._complete_later(self._left)
+
+    def _complete_later(self, plans: Sequence[Plan]) -> None:
+        if plans:
+            threading.Thread(target=self._complete_all, args=(plans,), name="sweeps", daemon=True).start()
+
+    def _complete_all(self, plans: Sequence[Plan]) -> None:
+        for plan in plans:
+            while not self._completed(plan):
+                time.sleep(_AGAIN)
+
+    def _completed(self, plan: Plan) -> bool:
+        """False where it has to be tried again. A sweep that cannot be completed is taken back; so is one without a
+        key: whoever has handed it in got no answer, and hands in another one.
+        """
+        with self._locks.setdefault(plan.owner, threading.Lock()):
+            if self._plans.get(plan.id, plan).whole or plan.id not in self._plans:
+                return True
+            try:
+                if plan.case is None or plan.key is None:
+                    raise ServiceError(409, "no_key", "its request broke off, and has no Idempotency-Key")
+                self._fill(plan, self._cases(plan))
+            except ServiceError as error:
+                if error.body["retryable"] and plan.id not in self._cancelled:
+                    return False
+                _log.error("sweep %s is taken back: %s", plan.id, error)
+                self._take_back(plan)
+                return True
+            except Exception:
+                _log.exception("sweep %s is completed later", plan.id)
+                return False
+            self._filling.discard(plan.id)
+            return True
+
+    def cancel(self, plan: Plan) -> list[str]:
+        """The runs that are there; of a sweep that is being handed in no other one follows."""
+        if not plan.whole:
+            self._cancelled.add(plan.id)
+        return self._plans.get(plan.id, plan).runs
+
+    def get(self, sweep_id: str, owner: str) -> Plan | None:
+        """The sweep, when it belongs to the owner."""
+        plan = self._plans.get(sweep_id)
+        return plan if plan is not None and plan.owner == owner else None
+
+    def of(self, owner: str) -> list[Plan]:
+        """The sweeps of an owner, newest first."""
+        return sorted((p for p in tuple(self._plans.values()) if p.owner == owner), key=lambda p: p.id, reverse=True)
+
+    def submit(self, owner: str, body: bytes, key: str | None) -> Plan:
+        """Accepts all runs of a sweep, or none. Raises ServiceError. The same key and body give the same sweep."""
+        digest = hashlib.sha256(body).hexdigest()
+        with self._locks.setdefault(owner, threading.Lock()):
+            plan = self._earlier(owner, key, digest)
+            if plan is not None and plan.whole:
+                return plan
+            fresh = plan or self._new(owner, wish_of(body), key, digest)
+            return self._accepted(fresh)
+
+    def again(self, plan: Plan, body: bytes, failed: Mapping[int, str]) -> Plan:
+        """Runs points again: those of ``failed``, by number, whose run is still the one that is given there. ``body``
+        is that of the sweep. Raises ServiceError; then the sweep is as it was.
+        """
+        with self._locks.setdefault(plan.owner, threading.Lock()):
+            plan = self._plans.get(plan.id, plan)
+            if hashlib.sha256(body).hexdigest() != plan.digest:
+                raise ServiceError(422, "key_reused", f"this is another case, or it has other points, than {plan.id}")
+            repeated = [n for n, run in failed.items() if plan.whole and plan.runs[n] == run]
+            if not repeated:
+                return plan
+            tries = plan.tries or [0] * len(plan.points)
+            fresh = msgspec.structs.replace(
+                plan, case=wish_of(body).case, repeated=repeated, earlier=plan.runs,
+                tries=[n + (k in repeated) for k, n in enumerate(tries)],
+            )  # fmt: skip
+            return self._accepted(fresh)
+
+    def _accepted(self, plan: Plan) -> Plan:
+        """The plan with the runs that it lacks, all of them or none. Raises ServiceError."""
+        cases = self._cases(plan)
+        self._desk.check_room(plan.owner, [plan.keys[n] for n in plan.wanted])
+        self._write(plan)
+        self._filling.add(plan.id)
+        try:
+            filled = self._fill(plan, cases)
+        except ServiceError:
+            self._take_back(plan)
+            raise
+        except Exception:
+            self._complete_later([plan])
+            raise
+        self._filling.discard(plan.id)
+        self._cancelled.discard(plan.id)  # Asked for when all runs were there: it has cancelled these.
+        return filled
+
+    def held(self, need: Need, active: Iterable[Need]) -> str:
+        """Why a run waits for its sweep: for all its runs to be there, or for those that are ``active``. The label of
+        a run says which sweep is meant.
+        """
+        plan = self.get(need.sweep, need.owner)
+        if plan is None:
+            return ""
+        if plan.id in self._filling:
+            return "its sweep is being handed in"
+        if plan.at_once is None:
+            return ""
+        own = sum(one.sweep == need.sweep and one.owner == need.owner for one in active)
+        return f"{own} runs of its sweep are running, as many as may at a time" if own >= plan.at_once else ""
+
+    def needed(self) -> set[str]:
+        """The hashes that stand in sweeps which are being handed in: what may be the files of runs to come."""
+        plans = [plan for plan in tuple(self._plans.values()) if not plan.whole]
+        return {
+            word for plan in plans for word in _HASHES.findall(msgspec.json.encode([plan.case, plan.points]).decode())
+        }
+
+    def _earlier(self, owner: str, key: str | None, digest: str) -> Plan | None:
+        found = [plan for plan in self.of(owner) if key is not None and plan.key == key]
+        if found and found[0].digest != digest:
+            detail = f"Idempotency-Key {key!r} was used for another sweep"
+            raise ServiceError(422, "key_reused", detail, pointer="Idempotency-Key", hint="use a new key")
+        return found[0] if found else None
+
+    def _cases(self, plan: Plan) -> dict[int, tuple[bytes, Reading]]:
+        """The case of each point that gets a run, and can be run. Raises ServiceError with what is wrong."""
+        made = {n: changed(plan.case or {}, plan.points[n], n) for n in plan.wanted}
+        if sum(map(len, made.values())) > _MOST_BYTES:
+            raise ServiceError(413, "too_large", f"the cases have more than {size(_MOST_BYTES)} together")
+        cases, source, surveys = {}, self._desk.source(plan.owner), dict[bytes, bytes]()
+        for n, text in made.items():
+            try:
+                cases[n] = text, self._desk.read(text, _JSON, source, surveys)
+            except CaseError as error:
+                raise at_point(n, error) from None
+        return cases
+
+    def _new(self, owner: str, wish: Wish, key: str | None, digest: str) -> Plan:
+        sweep_id, now = folder.new_id()
+        return Plan(
+            id=sweep_id, owner=owner, name=str(wish.case.get("name", "")), submitted=now, key=key, digest=digest,
+            at_once=wish.at_once, points=wish.points, case=wish.case,
+        )  # fmt: skip
+
+    def _fill(self, plan: Plan, cases: Mapping[int, tuple[bytes, Reading]]) -> Plan:
+        runs, keys = list(plan.earlier), plan.keys
+        for n, (body, reading) in cases.items():
+            if plan.id in self._cancelled:
+                raise ServiceError(409, "cancelled", f"sweep {plan.id} was cancelled while it was handed in")
+            wishes = Wishes({"sweep": plan.id, "point": str(n)})
+            receipt = self._desk.submit(plan.owner, body, _JSON, keys[n], wishes, reading)
+            runs[n : n + 1] = [receipt["id"]]
+            plan = msgspec.structs.replace(plan, runs=list(runs))
+            self._plans[plan.id] = plan
+        plan = msgspec.structs.replace(plan, case=None, repeated=[], earlier=[])
+        self._write(plan)
+        return plan
+
+    def _take_back(self, plan: Plan) -> None:
+        """Cancels the runs that were refused in the middle, before any of them has started. Of a sweep that was to be
+        run again all else stays as it was.
+        """
+        for run_id in self._desk.runs_of(plan.owner, [plan.keys[n] for n in plan.wanted]):
+            self._desk.take_back(run_id)
+        self._cancelled.discard(plan.id)
+        self._filling.discard(plan.id)
+        if plan.repeated:
+            self._write(msgspec.structs.replace(plan, case=None, runs=plan.earlier, repeated=[], earlier=[]))
+            return
+        del self._plans[plan.id]
+        (self._folder / f"{plan.id}.json").unlink(missing_ok=True)
+
+    def _keep(self, plan: Plan) -> None:
+        self._plans[plan.id] = plan
+
+    def _write(self, plan: Plan) -> None:
+        try:
+            self._folder.mkdir(0o700, exist_ok=True)
+            durable.write(self._folder / f"{plan.id}.json", msgspec.json.encode(plan))
+        except OSError as error:
+            raise ServiceError(507, "storage", f"the sweep cannot be kept: {error.strerror}", retryable=True) from error
+        self._keep(plan)

@@ -1,0 +1,142 @@
+"""The queue as the supervisor uses it: what each run needs, who has taken how much, and whose turn it is now."""
+
+import math
+import time
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+
+import msgspec
+
+from conoid.cases.figures import number
+from conoid.cases.run import State
+
+from ..runs import folder
+from ..runs.events import Run
+from ..runs.folder import Submission
+from ..settings import Settings
+from . import waiting
+from .usage import Took, Usage
+from .waiting import Busy, Need, Room
+
+_REST = 1.0
+"""s after which the queue is looked at again though nothing is known to have changed: what was taken is forgotten with
+time, and what failed is tried again. Chosen."""
+
+
+@dataclass(frozen=True)
+class Held:
+    """What others say of runs that wait."""
+
+    now: Callable[[str], bool]
+    """Whether a run is not to be tried again yet."""
+    sweep: Callable[[Need, Iterable[Need]], str]
+    """Why a run waits for others of its sweep, given those that have cores; empty when it does not."""
+
+
+class Waitlist:
+    """Belongs to the supervisor's thread; ``why`` and ``used`` may be asked from any."""
+
+    def __init__(self, settings: Settings, queues: bool) -> None:
+        """``queues``: a batch system has a queue of its own, and counts memory itself."""
+        self._settings, self._queues = settings, queues
+        self._rules, self._quota = settings.site.queue, settings.site.quota
+        self.usage = Usage(self._rules.forgets)
+        self._needs: dict[str, Need] = {}
+        self._why: dict[str, str] = {}
+        self._due = 0.0
+
+    def changed(self) -> None:
+        """Something has happened that may decide whose turn it is."""
+        self._due = 0.0
+
+    def settled(self, before: Run | None, after: Run) -> None:
+        """A run has made a step: what it has taken counts from the moment at which it has its cores no more."""
+        self._due = 0.0
+        if before is not None and before.started and (after.state.final or not after.started):
+            self.usage.add(Took(before.owner, before.cores, before.started, after.finished or time.time()))
+        if after.state.final:
+            self._needs.pop(after.id, None)
+            self._why.pop(after.id, None)
+
+    def why(self, run_id: str) -> str:
+        """What a run waits for by the last look; empty for one that does not wait."""
+        return self._why.get(run_id, "")
+
+    def used(self, owner: str, runs: Iterable[Run]) -> float:
+        """Core-seconds of an owner that count now, with those of what runs of ``runs``."""
+        now = time.time()
+        own = (run.cores * (now - run.started) for run in runs if run.owner == owner and run.started)
+        return self.usage.of(owner, now) + sum(own)
+
+    def turn(self, runs: Sequence[Run], active: Iterable[str], held: Held) -> list[str]:
+        """The runs that start now, in order; ``runs`` are open, ``active`` have cores or were handed over."""
+        if time.monotonic() < self._due:
+            return []
+        self._due = time.monotonic() + _REST
+        has, now = set(active), time.time()
+        queued = [run for run in runs if run.state is State.QUEUED and run.id not in has]
+        working = [(run, self._need(run)) for run in runs if run.id in has]
+        taken = self._taken(working, now)
+        queue = waiting.ordered([self._need(run) for run in queued], taken, self._rules.users)
+        blocked = self._blocks(working, held)
+        made = waiting.plan(queue, [_busy(*one) for one in working], self._room(), now, blocked)
+        self._why = made.why
+        return made.start
+
+    def _room(self) -> Room:
+        memory = self._rules.memory or (None if self._queues else self._settings.caps.memory)
+        return Room(self._settings.slots) if memory is None else Room(self._settings.slots, float(memory))
+
+    def _taken(self, working: Iterable[tuple[Run, Need]], now: float) -> dict[str, float]:
+        """Core-seconds by owner; a run that works counts for what it is expected to take, or for more if it has."""
+        taken = defaultdict(float, self.usage.all(now))
+        for run, need in working:
+            taken[run.owner] += run.cores * max(need.seconds, now - run.started if run.started else 0.0, 1.0)
+        return taken
+
+    def _blocks(self, working: Sequence[tuple[Run, Need]], held: Held) -> Callable[[Need, Sequence[Need]], str]:
+        quota, has = self._quota, [need for _, need in working]
+        running = Counter(need.owner for need in has)
+
+        def blocked(need: Need, starts: Sequence[Need]) -> str:
+            if held.now(need.run):
+                return "tried again soon"
+            own = running[need.owner] + sum(one.owner == need.owner for one in starts)
+            if quota.running is not None and own >= quota.running:
+                return f"{own} of your runs are running; this server allows {quota.running} at a time"
+            used = self.usage.of(need.owner, time.time()) if quota.core_seconds is not None else 0.0
+            if quota.core_seconds is not None and used >= quota.core_seconds:
+                most = number(quota.core_seconds)
+                return f"you have used {number(used)} core-seconds lately; this server allows {most}"
+            return held.sweep(need, [*has, *starts]) if need.sweep else ""
+
+        return blocked
+
+    def _need(self, run: Run) -> Need:
+        """By the run's folder, read once; where that is damaged nothing is known but its cores."""
+        if run.id not in self._needs:
+            try:
+                made = folder.submission(self._settings.runs / run.id)
+            except (OSError, msgspec.MsgspecError):
+                return Need(run.id, run.owner, run.cores)
+            self._needs[run.id] = need_of(made, self._settings.grace, self._room().memory)
+        return self._needs[run.id]
+
+
+def need_of(made: Submission, grace: float, room: float = math.inf) -> Need:
+    """What a submission asks for; ``grace``: s after its limit at which the run is ended by force at the latest. Bodies
+    that may break take memory as if they were dust, but for a run that would not fit into ``room``, bytes, for that.
+    """
+    seconds = made.estimate.get("seconds", made.estimate.get("core_seconds", 0.0) / made.cores)
+    limit = math.inf if made.wall_time is None else made.wall_time + 2.0 * grace
+    whole = float(made.estimate.get("memory_bytes", 0.0))
+    memory = max(whole, min(whole + made.estimate.get("dust_bytes", 0.0), room))
+    return Need(
+        made.id, made.owner, made.cores, memory, seconds, limit, made.priority, made.labels.get("sweep", "")
+    )  # fmt: skip
+
+
+def _busy(run: Run, need: Need) -> Busy:
+    """One that has its cores: it ends when its estimate says so."""
+    return Busy(run.cores, need.memory, run.started + need.seconds if run.started and need.seconds else 0.0)

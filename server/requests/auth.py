@@ -1,0 +1,112 @@
+"""Authentication: dependencies that give a route the identity of the caller and check its scopes."""
+
+import math
+import time
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass
+from typing import Annotated
+
+from fastapi import Depends, Request
+from sqlalchemy.exc import SQLAlchemyError
+
+from ..database.store import Token
+from ..errors import ServiceError
+from ..service import Service, ServiceOf
+from ..settings import loopback
+from .door import LOCAL_OWNER
+from .tokens import SCOPES
+
+RECHECK = 2.0
+"""s between two checks of the token of a long answer, so that a stream ends at most 5 s after its token is revoked.
+Chosen."""
+
+
+@dataclass(frozen=True)
+class Identity:
+    """The caller: owner and token."""
+
+    owner: str
+    token: Token | None
+    """None on a server without access control."""
+
+    def allows(self, scope: str) -> bool:
+        """True when the token carries ``scope``."""
+        return self.token is None or scope in self.token.scopes
+
+
+async def identify(request: Request, service: ServiceOf) -> Identity:
+    """The identity of a request; the middleware ``door`` has looked up its token. Raises ServiceError 401."""
+    if not service.settings.auth:
+        _same_machine_page(request)
+        return Identity(LOCAL_OWNER, None)
+    token: Token | None = request.scope["state"]["token"]
+    if token is None:
+        raise unauthorized()
+    return Identity(token.owner, token)
+
+
+def unauthorized() -> ServiceError:
+    """The error for a request without a valid token."""
+    return ServiceError(
+        401, "unauthorized", "this needs a valid token", headers={"WWW-Authenticate": "Bearer"},
+        hint="send the header 'Authorization: Bearer <token>'; the server's operator makes tokens",
+    )  # fmt: skip
+
+
+def _same_machine_page(request: Request) -> None:
+    """Refuses requests of other web pages on a server without tokens: a page of another site could reach it through
+    the user's browser."""
+    host = request.url.hostname or ""
+    if not loopback(host):
+        raise ServiceError(403, "forbidden", f"Host {host!r}: a server without tokens answers on loopback names only")
+    origin = request.headers.get("origin")
+    if origin is not None and origin != f"{request.url.scheme}://{request.url.netloc}":
+        raise ServiceError(403, "forbidden", f"Origin {origin!r}: pages of other sites may not use this server")
+
+
+def requires(scope: str) -> Callable[[Identity], Awaitable[Identity]]:
+    """A dependency that returns the identity. Raises ServiceError 401, or 403 when the token lacks ``scope``."""
+
+    async def check(identity: Annotated[Identity, Depends(identify)]) -> Identity:
+        if not identity.allows(scope):
+            detail = f"the token lacks the scope {scope!r} ({SCOPES[scope]})"
+            raise ServiceError(403, "forbidden", detail, hint="ask the server's operator for a token that has it")
+        return identity
+
+    return check
+
+
+Reader = Annotated[Identity, Depends(requires("read"))]
+Submitter = Annotated[Identity, Depends(requires("submit"))]
+
+
+class Pass:
+    """Limits a long answer: to the life of its token, and to ``seconds`` where they are given."""
+
+    def __init__(self, service: Service, identity: Identity, seconds: float | None = None) -> None:
+        self._service, self._identity = service, identity
+        self._looked = time.monotonic()
+        self._ends = math.inf if seconds is None else self._looked + seconds
+
+    @property
+    def left(self) -> float:
+        """s until the next check of the token."""
+        return max(0.0, min(RECHECK, self._ends - time.monotonic()))
+
+    async def holds(self) -> bool:
+        """False once the token has been revoked or the time is over."""
+        now = time.monotonic()
+        if now >= self._ends:
+            return False
+        if now - self._looked < RECHECK:
+            return True
+        self._looked = now
+        return await self._service.lanes.run(self._valid)
+
+    def _valid(self) -> bool:
+        """A database that does not answer does not end a stream."""
+        token = self._identity.token
+        try:
+            return token is None or self._service.store.token(token.id) is not None
+        except SQLAlchemyError:
+            return True

@@ -1,0 +1,217 @@
+"""Checks before a request costs anything: unknown parameters, large bodies, cases above the caps, full queues and
+disks.
+"""
+
+import asyncio
+import shutil
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, get_args, get_origin
+
+import msgspec
+from fastapi import Request
+from fastapi.dependencies.models import Dependant
+from fastapi.routing import APIRoute
+from starlette.requests import ClientDisconnect
+
+from conoid.cases.estimate import Estimate
+from conoid.cases.figures import count, crew, number, size
+from conoid.cases.files import files_of
+from conoid.cases.policy import Quota
+from conoid.cases.problems import Problem, problem, shown
+from conoid.cases.schema import Case
+from conoid.cases.similar import allowed
+
+from ..errors import ServiceError
+from ..settings import Caps, Settings
+from .connections import BODY
+
+_BODY_TIMEOUT = 30.0
+"""s for a whole body: 1 MiB at 35 kB/s. Chosen."""
+
+
+_COUNTABLE = 1 << 53
+"""Limit where there is no cap: the largest integer that every JSON reader has (IEEE 754)."""
+
+
+async def check_query(request: Request) -> None:
+    """Raises ServiceError 400 for an unknown parameter, since a misspelt one would count as absent, and 422 for a
+    parameter with one value that is given twice.
+    """
+    if not request.query_params:
+        return
+    route: APIRoute = request.scope["route"]
+    fields = {field.alias: field for field in _query(route.dependant)}
+    known = sorted(fields)
+    for name, values in Counter(name for name, _ in request.query_params.multi_items()).items():
+        if values > 1 and name in fields and not _many(fields[name].field_info.annotation):
+            detail = f"{name} = {shown(request.query_params[name])}: it has one value, and is given {values} times"
+            raise ServiceError(422, "bad_parameter", detail, pointer=name)
+        if name not in known:
+            detail = f"{name[:80]}: {request.url.path} knows no such parameter; {allowed(name, known)}"
+            raise ServiceError(400, "bad_parameter", detail, pointer=name[:80])
+
+
+def _many(annotation: Any) -> bool:
+    """Whether a parameter of this type may be given several times."""
+    return any(get_origin(each) is list for each in (annotation, *get_args(annotation)))
+
+
+def _query(dependant: Dependant) -> Iterator[Any]:
+    """The parameters of a route, from FastAPI."""
+    yield from dependant.query_params
+    for inner in dependant.dependencies:
+        yield from _query(inner)
+
+
+async def read_body(request: Request) -> bytes:
+    """The body, of which at most ``BODY`` is in memory. Raises ServiceError 415 for an encoded one, 413, 408, and
+    400 where it breaks off.
+    """
+    check_encoding(request)
+    length = request.headers.get("content-length", "0")
+    if length.isdigit() and int(length) > BODY:
+        raise _too_large(int(length))
+    try:
+        return await asyncio.wait_for(_collect(request), _BODY_TIMEOUT)
+    except TimeoutError:
+        raise ServiceError(408, "timeout", "the body did not arrive in time", retryable=True) from None
+    except ClientDisconnect:
+        raise ServiceError(400, "incomplete", "the body broke off", retryable=True) from None
+
+
+def check_encoding(request: Request) -> None:
+    """Raises ServiceError 415 for an encoded body: its size is not known before it is decoded."""
+    encoding = request.headers.get("content-encoding", "identity").strip().lower()
+    if encoding not in {"", "identity"}:
+        detail = f"Content-Encoding {encoding[:80]!r}: a body is sent as it is"
+        headers = {"Accept-Encoding": "identity"}
+        raise ServiceError(415, "unsupported_encoding", detail, pointer="Content-Encoding", headers=headers)
+
+
+async def _collect(request: Request) -> bytes:
+    body = bytearray()
+    async for chunk in request.stream():
+        body += chunk
+        if len(body) > BODY:
+            raise _too_large(len(body))
+    return bytes(body)
+
+
+def _too_large(length: int) -> ServiceError:
+    return ServiceError(413, "too_large", f"the body has {length} bytes or more; allowed: {BODY}")
+
+
+class Limits(msgspec.Struct, frozen=True):
+    """Needs of a case and their limits here; None: no cap."""
+
+    slots: int
+    elements: int | None
+    steps: int | None
+    memory: int | None
+    core_seconds: float | None
+    wall_time: float | None
+
+
+def of(settings: Settings) -> Limits:
+    """The limits of a site."""
+    caps = settings.caps
+    memory = min((most for most in (caps.memory, settings.site.queue.memory) if most is not None), default=None)
+    return Limits(settings.slots, caps.elements, caps.steps, memory, caps.core_seconds, caps.wall_time)
+
+
+def check(case: Case, limits: Limits) -> list[Problem]:
+    """All problems of a valid case with the limits of this server."""
+    return [*_cores(case, limits), *_files(case), *_time(case, limits)]
+
+
+def check_size(estimate: Estimate, caps: Limits) -> list[Problem]:
+    """All needs of the case that are above the limits; a need that is not known is no reason to refuse."""
+    needs = (
+        ("parts", "elements", count, estimate.elements, caps.elements),
+        ("run.end_time", "steps", count, estimate.steps, caps.steps),
+        ("parts", "of memory", size, estimate.memory_bytes, caps.memory),
+        ("run.end_time", "core-seconds", number, estimate.core_seconds, caps.core_seconds),
+    )
+    return [
+        Problem(key, "", f"the case needs about {shown(value)} {what}; this server allows {shown(cap or _COUNTABLE)}")
+        for key, what, shown, value, cap in needs
+        if value is not None and value > (_COUNTABLE if cap is None else cap)
+    ]
+
+
+def _cores(case: Case, settings: Limits) -> Iterator[Problem]:
+    run, slots = case.run, settings.slots
+    if run.ranks > slots:
+        yield Problem("run.ranks", str(run.ranks), f"this server has {slots} slots; allowed: 1 to {slots}")
+    elif run.cores > slots:
+        told = f"{crew(run.ranks, run.threads)} take {run.cores} slots, and this server has {slots}"
+        yield Problem("run.threads", str(run.threads), f"{told}; allowed: 1 to {slots // run.ranks}")
+
+
+def _files(case: Case) -> Iterator[Problem]:
+    """Problems of files without a hash: a path is one of the machine on which the case was written."""
+    for file in files_of(case.model_dump(include={"parts"})):
+        if file.sha256 is None:
+            message = "this key is missing: a server finds a file by its hash; conoid submit and its like fill it in"
+            yield problem((*file.table, "sha256"), ..., message)
+
+
+def _time(case: Case, caps: Limits) -> Iterator[Problem]:
+    asked, cap = case.run.max_wall_time, caps.wall_time
+    if asked is not None and cap is not None and asked > cap:
+        yield Problem("run.max_wall_time", f"{asked:g} s", f"this server allows {cap:g} s")
+
+
+def figures(estimate: Estimate) -> dict[str, int | float]:
+    """The numbers of an estimate that are known: elements, nodes, dt, steps, memory_bytes, core_seconds, seconds
+    by the clock; dust_bytes
+    where something may break.
+    """
+    values = {
+        "elements": estimate.elements,
+        "nodes": estimate.nodes,
+        "dt": estimate.dt,
+        "steps": estimate.steps,
+        "memory_bytes": estimate.memory_bytes,
+        "core_seconds": estimate.core_seconds,
+        "seconds": None if estimate.clock is None else estimate.clock.seconds,
+        "dust_bytes": estimate.dust_bytes or None,
+    }
+    return {name: value for name, value in values.items() if value is not None}
+
+
+def wall_time(case: Case, caps: Limits) -> float | None:
+    """Seconds after which the run is stopped; None: never."""
+    cost = None if caps.core_seconds is None else caps.core_seconds / case.run.cores
+    asked = [limit for limit in (case.run.max_wall_time, caps.wall_time, cost) if limit is not None]
+    return min(asked) if asked else None
+
+
+def later(code: str, detail: str, hint: str | None = None) -> ServiceError:
+    """429: the user has as much as he may have; less, later."""
+    return ServiceError(429, code, detail, hint=hint, retryable=True, headers={"Retry-After": "60"})
+
+
+def check_output(kept: int, quota: Quota) -> None:
+    """Raises ServiceError 429 when the folders of the owner's runs, ``kept`` bytes, are as large as they may be."""
+    if quota.output_bytes is not None and kept >= quota.output_bytes:
+        detail = f"your runs have {size(kept)} on disk; this server allows {size(quota.output_bytes)}: remove some"
+        raise later("output_quota", detail)
+
+
+def check_room(runs: Path, open_runs: int, caps: Caps, more: int = 1) -> None:
+    """Raises ServiceError 429 when the owner would have too many open runs with so many ``more``, 422 when these alone
+    are too many, 507 when the disk is nearly full.
+    """
+    if more > max(1, caps.queued):
+        raise ServiceError(422, "invalid_sweep", f"{more} points; this server allows {caps.queued} open runs of a user")
+    if open_runs + more > caps.queued:
+        new = f", and the sweep has {more}" if more > 1 else ""
+        detail = f"{open_runs} of your runs have not ended{new}; this server allows {caps.queued}"
+        raise later("queue_full", detail)
+    free = shutil.disk_usage(runs).free
+    if free < caps.free_disk:
+        detail = f"{size(free)} are free on the server's disk; it keeps {size(caps.free_disk)}"
+        raise ServiceError(507, "disk_full", detail, retryable=True)

@@ -1,0 +1,51 @@
+"""Bearer tokens: 256 random bits, shown once, kept as a hash, revocable, each with its scopes."""
+
+import hashlib
+import hmac
+import re
+import secrets
+import time
+
+from ..database.store import Store, Token
+from ..settings import StartError
+
+SCOPES = {
+    "read": "see own runs, their events and files, and subscribe over Zenoh",
+    "submit": "validate, submit and cancel",
+    "metrics": "read /metrics, which counts everybody's runs",
+}
+_PREFIX = "conoid"
+_OWNER = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,62}")
+_NOBODY = Token("", "", "0" * 64, frozenset(), 0.0)
+"""No digest is all zeros, so nobody has this token; comparing with it takes as long as with any other."""
+
+
+class TokenError(StartError):
+    """A token cannot be made, or ended; the text says why."""
+
+    exit_code = 2
+
+
+def create_token(store: Store, owner: str, scopes: frozenset[str]) -> str:
+    """Makes a token and returns it; it cannot be read again. Raises TokenError."""
+    if not _OWNER.fullmatch(owner):
+        raise TokenError(f"{owner!r}: a name starts with a letter or digit and has up to 63 letters, digits, _ or -")
+    if unknown := scopes - SCOPES.keys():
+        raise TokenError(f"unknown scope {', '.join(map(repr, sorted(unknown)))}; known: {', '.join(SCOPES)}")
+    token_id, secret = secrets.token_hex(5), secrets.token_urlsafe(32)
+    store.add_token(Token(token_id, owner, _hash(secret), scopes, time.time()))
+    return f"{_PREFIX}_{token_id}_{secret}"
+
+
+def check_token(store: Store, text: str) -> Token | None:
+    """The token that ``text`` is; None for anything else. Takes as long for a wrong id as for a wrong secret."""
+    prefix, _, rest = text.partition("_")
+    token_id, _, secret = rest.partition("_")
+    token = store.token(token_id) if prefix == _PREFIX else None
+    right = hmac.compare_digest((token or _NOBODY).sha256, _hash(secret))
+    return token if right else None
+
+
+def _hash(secret: str) -> str:
+    """The secret has 256 random bits, so that a plain hash cannot be searched."""
+    return hashlib.sha256(secret.encode()).hexdigest()

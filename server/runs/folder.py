@@ -1,0 +1,299 @@
+"""The folder of a run: submission, case, outcome and process record. All of it can be read without the server."""
+
+import hashlib
+import os
+import re
+import secrets
+import shutil
+import threading
+import time
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
+from functools import reduce
+from pathlib import Path
+
+import msgspec
+
+from conoid.cases import layout, whole
+from conoid.cases.messages import Status, to_json
+from conoid.cases.outcome import Outcome
+from conoid.cases.outcome import from_json as outcome_from_json
+from conoid.cases.outcome import to_json as outcome_to_json
+from conoid.cases.run import Cause, State
+
+from .. import durable
+from . import journal
+from .events import Run
+
+_ID = re.compile(r"[0-9a-z]{22}")
+_LETTERS = "0123456789abcdefghjkmnpqrstvwxyz"
+_NEW, _GONE = ".new-", ".gone-"
+APART = f"{_NEW}files-"
+"""Beginnings of the names of temporary folders; a server removes them when it starts."""
+_TELLING = (layout.SUBMISSION, layout.JOURNAL, layout.WORKER)
+"""Files of which at least one stays where a run was, however much is damaged."""
+_UNREADABLE = "outcome.unreadable.json"
+_TITLE = 200
+"""Characters of a title in lists. Chosen: a line or two."""
+DAMAGED = (FileNotFoundError, IsADirectoryError, NotADirectoryError, PermissionError)
+"""Errors of the system for a file that is missing, is not a regular file (``whole.opened``), or is not readable."""
+_NO_FILE = (FileNotFoundError, IsADirectoryError, NotADirectoryError)
+
+
+class Copy(msgspec.Struct, kw_only=True, frozen=True):
+    """A file that the case names; the run has a copy of its own: ``files/<sha256>`` with the ending of its name."""
+
+    path: str
+    """The name in the case."""
+    sha256: str
+
+
+class Submission(msgspec.Struct, kw_only=True, frozen=True):
+    """submission.json: what the server needs when its database is lost. Times are Unix s."""
+
+    id: str
+    owner: str
+    name: str
+    title: str
+    ranks: int
+    submitted: float
+    case_file: str
+    body_sha256: str
+    idempotency_key: str | None
+    wall_time: float | None
+    """Time limit of the run, s."""
+    estimate: dict[str, int | float]
+    labels: dict[str, str] = {}
+    """Labels of the submitter."""
+    profile: str = ""
+    """Profile of the batch system; empty where there is none."""
+    priority: int = 0
+    """Priority among the runs of its owner."""
+    wishes_sha256: str = ""
+    """Hash of labels, profile and priority as they were given; empty in files of earlier servers."""
+    threads: int = 1
+    """Threads of each rank."""
+    files: list[Copy] = []
+
+    @property
+    def cores(self) -> int:
+        """Cores that the run takes."""
+        return self.ranks * self.threads
+
+
+class Process(msgspec.Struct, kw_only=True, frozen=True):
+    """worker.json: the process of the run. ``started`` and ``boot`` distinguish it from a later process with the
+    same number."""
+
+    pid: int
+    started: int
+    """Start of the process in clock ticks after the boot."""
+    boot: str
+    launched: float
+
+
+_submission = msgspec.json.Decoder(Submission)
+_process = msgspec.json.Decoder(Process)
+_last_stamp, _stamping = 0, threading.Lock()
+
+
+def new_id() -> tuple[str, float]:
+    """An id of 22 letters and digits, and the Unix time in s. One half of each id is random. Ids sort in the order
+    of their creation, also when the clock is set back.
+    """
+    global _last_stamp
+    with _stamping:
+        _last_stamp = stamp = max(time.time_ns() // 1000, _last_stamp + 1)
+    return _letters(stamp, 11) + _letters(secrets.randbits(55), 11), time.time()
+
+
+def begin_after(run_id: str) -> None:
+    """Makes later ids sort after this one, whatever the clock shows."""
+    global _last_stamp
+    stamp = 0
+    for letter in run_id[:11]:
+        stamp = stamp << 5 | _LETTERS.index(letter)
+    _last_stamp = max(_last_stamp, stamp)
+
+
+def is_id(text: str) -> bool:
+    """True for a text that ``new_id`` could have returned."""
+    return _ID.fullmatch(text) is not None
+
+
+def _letters(number: int, length: int) -> str:
+    return "".join(_LETTERS[number >> 5 * place & 31] for place in reversed(range(length)))
+
+
+def create(
+    runs: Path, submission: Submission, case: bytes, resolved: bytes, fill: Callable[[Path], None] | None = None
+) -> Path:
+    """Creates the folder of an accepted run; ``fill`` adds further files. It appears whole, and is on disk on
+    return. Raises OSError, and the errors of ``fill``.
+    """
+    beside, folder = runs / f"{_NEW}{submission.id}", runs / submission.id
+    accepted = Status(run=submission.id, seq=1, wall=submission.submitted, state=State.ACCEPTED)
+    beside.mkdir(0o700)
+    (beside / layout.LOGS).mkdir(0o700)
+    durable.write_new(beside / submission.case_file, case)
+    durable.write_new(beside / layout.RESOLVED_CASE, resolved)
+    durable.write_new(beside / layout.SUBMISSION, msgspec.json.format(msgspec.json.encode(submission), indent=2))
+    durable.write_new(beside / layout.JOURNAL, to_json(accepted) + b"\n")
+    if fill is not None:
+        fill(beside)
+    durable.sync_folder(beside)
+    os.rename(beside, folder)
+    durable.sync_folder(runs)
+    return folder
+
+
+def discard(runs: Path, run_id: str) -> None:
+    """Removes the folder of a run that was not acknowledged."""
+    for path in (runs / f"{_NEW}{run_id}", runs / run_id):
+        shutil.rmtree(path, ignore_errors=True)
+
+
+def purge(runs: Path, run_id: str) -> None:
+    """Removes the folder of a run: first its name, then file by file. Raises OSError."""
+    beside = runs / f"{_GONE}{run_id}"
+    os.rename(runs / run_id, beside)
+    durable.sync_folder(runs)
+    shutil.rmtree(beside, ignore_errors=True)
+
+
+def runs_in(runs: Path) -> list[Path]:
+    """The folders of all runs, oldest first."""
+    return sorted(path for path in runs.iterdir() if is_id(path.name))
+
+
+def scan(runs: Path) -> Iterator[Path]:
+    """The folders of all runs, oldest first. Removes folders that a killed server left half made or half removed."""
+    for path in sorted(runs.iterdir()):
+        if path.name.startswith((_NEW, _GONE)):
+            shutil.rmtree(path, ignore_errors=True)
+        elif is_id(path.name) and any(there(path / name) for name in _TELLING):
+            yield path
+
+
+def there(path: Path) -> bool:
+    """Whether the file exists; True also where its folder may not be read."""
+    try:
+        path.lstat()
+    except (FileNotFoundError, NotADirectoryError):
+        return False
+    except PermissionError:
+        return True
+    return True
+
+
+def submission(folder: Path) -> Submission:
+    """Reads submission.json. Raises OSError, or msgspec.MsgspecError when it is damaged."""
+    try:
+        return _submission.decode(whole.read(folder / layout.SUBMISSION))
+    except (UnicodeDecodeError, RecursionError) as error:
+        raise msgspec.DecodeError(str(error)) from None
+
+
+def run(folder: Path) -> Run:
+    """The run by its folder: submission.json, and the Status lines of the journal."""
+    return replay(first(submission(folder)), journal.statuses(folder / layout.JOURNAL))
+
+
+def first(made: Submission) -> Run:
+    """The run as it was accepted."""
+    return Run(
+        made.id, made.owner, made.name, made.ranks, made.submitted, threads=made.threads, title=made.title[:_TITLE]
+    )  # fmt: skip
+
+
+def replay(accepted: Run, told: Iterable[Status]) -> Run:
+    """The run by the Status lines of its journal."""
+    return reduce(_after, told, accepted)
+
+
+def _after(told: Run, status: Status) -> Run:
+    state, cause = State(status.state), Cause(status.cause) if status.cause else None
+    after = replace(told, state=state, cause=cause, message=status.message)
+    if state in {State.QUEUED, State.STARTING} and state is not told.state:
+        return replace(after, started=status.wall if state is State.STARTING else 0.0)
+    return replace(after, finished=status.wall) if state.final else after
+
+
+def outcome(folder: Path) -> Outcome | None:
+    """The outcome of outcome.json; None when it is missing or damaged."""
+    try:
+        return outcome_from_json(whole.read(folder / layout.OUTCOME))
+    except (*_NO_FILE, msgspec.MsgspecError, UnicodeDecodeError, RecursionError):
+        return None
+
+
+def outcome_error(folder: Path) -> str:
+    """Why outcome.json cannot be read; empty when it can, or when it is missing."""
+    try:
+        outcome_from_json(whole.read(folder / layout.OUTCOME))
+    except FileNotFoundError:
+        return ""
+    except (*_NO_FILE, PermissionError, msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
+        return str(getattr(error, "strerror", error))
+    return ""
+
+
+def write_outcome(folder: Path, ended: Outcome) -> None:
+    """Writes outcome.json whole; a damaged one is kept beside it. Raises OSError."""
+    if outcome_error(folder):
+        put_away(folder / layout.OUTCOME, folder / _UNREADABLE)
+    durable.write(folder / layout.OUTCOME, outcome_to_json(ended))
+
+
+def put_away(path: Path, kept: Path | None = None) -> None:
+    """Frees the name of a file that is about to be written; a present one is renamed to ``kept``. Raises OSError."""
+    if kept is not None and not kept.exists():
+        os.replace(path, kept)
+    elif path.is_dir():
+        shutil.rmtree(path)
+    else:
+        path.unlink(missing_ok=True)
+
+
+def is_as_accepted(folder: Path, made: Submission) -> bool:
+    """Whether the case on disk is the one that was checked. Raises OSError."""
+    return made.body_sha256 in {"", digest_of(made.case_file, whole.read(folder / made.case_file))}
+
+
+def digest_of(case_file: str, body: bytes) -> str:
+    """Hash of a submitted case and of its type."""
+    return hashlib.sha256(case_file.encode() + b"\0" + body).hexdigest()
+
+
+def write_stop(folder: Path, why: Cause) -> None:
+    """Records that a stop was asked for. Raises OSError."""
+    durable.write(folder / layout.STOP_REQUEST, why.value.encode())
+
+
+def stop_asked(folder: Path) -> Cause | None:
+    """Why a stop was asked for; None without a request."""
+    try:
+        return Cause(whole.read(folder / layout.STOP_REQUEST, 80).decode())
+    except (OSError, ValueError):
+        return None
+
+
+def process(folder: Path) -> Process | None:
+    """The process that was started for the run; None before that."""
+    try:
+        return _process.decode(whole.read(folder / layout.WORKER))
+    except (*DAMAGED, msgspec.MsgspecError):
+        return None
+
+
+def write_process(folder: Path, started: Process) -> None:
+    """Records the process. Raises OSError."""
+    durable.write(folder / layout.WORKER, msgspec.json.encode(started))
+
+
+def runs_for(folder: Path) -> float:
+    """s since the start of the recorded process, by the clock since the boot; 0 without a record."""
+    made = process(folder)
+    if made is None or not made.started:
+        return 0.0
+    return max(0.0, time.clock_gettime(time.CLOCK_BOOTTIME) - made.started / os.sysconf("SC_CLK_TCK"))

@@ -1,0 +1,47 @@
+"""Runs that are kept for good: by the label ``keep``, or by the last request, a hidden file in the run's folder."""
+
+from pathlib import Path
+
+import msgspec
+
+from conoid.cases import whole
+
+from .. import durable
+from .folder import submission
+
+_PINNED, _YES, _NO = ".keep", "yes", "no"
+
+
+def pinned(folder: Path) -> bool:
+    """Whether the run is kept for good: by the last request, else by its label ``keep``."""
+    if said := told(folder):
+        return said == _YES
+    try:
+        return submission(folder).labels.get("keep", _NO) != _NO
+    except (OSError, msgspec.MsgspecError):
+        return False
+
+
+def told(folder: Path) -> str:
+    """The last request, ``yes`` or ``no``; empty without one."""
+    try:
+        return whole.read(folder / _PINNED, 80).decode()
+    except (OSError, UnicodeDecodeError):
+        return ""
+
+
+def labels(folder: Path) -> dict[str, str]:
+    """Labels of the submission, with ``keep`` by the last request; none where the folder has been removed or
+    damaged.
+    """
+    try:
+        made = submission(folder).labels
+    except (OSError, msgspec.MsgspecError):
+        return {}
+    said = told(folder)
+    return {**made, "keep": said} if said else made
+
+
+def pin(folder: Path, keep: bool) -> None:
+    """Keeps a run for good, or no longer. Raises OSError."""
+    durable.write(folder / _PINNED, (_YES if keep else _NO).encode())

@@ -1,0 +1,110 @@
+"""The state of a run after a restart of the server, by the run's folder and the processes of the machine."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal
+
+import msgspec
+
+from conoid.cases import layout
+from conoid.cases.messages import Status
+from conoid.cases.outcome import Outcome
+from conoid.cases.run import State
+
+from ..launch import Launcher, Trace, Worker
+from . import ends, farewell, folder, journal
+from .events import Found, Run
+from .folder import Submission
+
+_STOPPABLE = {State.QUEUED, State.STARTING, State.RUNNING, State.STOPPING}
+
+
+@dataclass(frozen=True)
+class Left:
+    """A run by its folder, its idempotency key, and the trace of its worker."""
+
+    run: Run
+    key: str | None
+    found: Found
+    worker: Worker | None
+
+
+def look(path: Path, known: Run | None, launcher: Launcher) -> Left:
+    """Reads a run. ``known``: its row in the database, for what a damaged folder lacks. Raises OSError, and
+    ValueError when neither has the owner of the run.
+    """
+    made = _submission(path)
+    if made is None and known is None:
+        raise ValueError(f"{layout.SUBMISSION} cannot be read, and the database does not know the run")
+    accepted = folder.first(made) if made is not None else _as_accepted(known)
+    told = _told(path)
+    trace = launcher.find(accepted.id, path)
+    run = _mended(folder.replay(accepted, told), bool(told), known, path, trace, launcher.queues)
+    code, full = farewell.exit_code(path), farewell.disk_failed(path)
+    found = Found(_fate(path, trace), _outcome(path), trace.rebooted, code, full, ends.when(path))
+    return Left(
+        _stopping(run, known, path, launcher.queues), made.idempotency_key if made else None, found, trace.worker
+    )
+
+
+def _submission(path: Path) -> Submission | None:
+    try:
+        return folder.submission(path)
+    except (*folder.DAMAGED, msgspec.MsgspecError):
+        return None
+
+
+def _outcome(path: Path) -> Outcome | None:
+    """The submission; None where it may not be read."""
+    try:
+        return folder.outcome(path)
+    except PermissionError:
+        return None
+
+
+def _told(path: Path) -> list[Status]:
+    """The Status messages of the journal; none where it cannot be read."""
+    try:
+        return journal.statuses(path / layout.JOURNAL)
+    except folder.DAMAGED:
+        return []
+
+
+def _as_accepted(known: Run | None) -> Run:
+    assert known is not None
+    return Run(
+        known.id, known.owner, known.name, known.ranks, known.submitted, threads=known.threads, title=known.title
+    )
+
+
+def _fate(path: Path, trace: Trace) -> Literal["none", "alive", "gone"]:
+    """The process record; one that cannot be read is still a trace of a launch."""
+    if trace.worker is not None:
+        return "alive"
+    return "gone" if trace.launched or folder.there(path / layout.WORKER) else "none"
+
+
+def _mended(run: Run, journal_there: bool, known: Run | None, path: Path, trace: Trace, queues: bool) -> Run:
+    """Status of a run whose journal is missing or behind the processes: a run that was started is never started
+    twice. One that a batch system ``queues`` may still wait for its cores.
+    """
+    if not journal_there and known is not None:
+        run = replace(known, message="") if known.state is not State.STOPPING else replace(run, state=State.STARTING)
+    launched = trace.worker is not None or (not journal_there and _launched(path, trace))
+    if launched and not queues and run.state in {State.ACCEPTED, State.QUEUED}:
+        return replace(run, state=State.STARTING)
+    return run
+
+
+def _launched(path: Path, trace: Trace) -> bool:
+    return trace.launched or folder.there(path / layout.WORKER) or folder.there(path / layout.OUTCOME)
+
+
+def _stopping(run: Run, known: Run | None, path: Path, queues: bool) -> Run:
+    """A waiting job that reported a stop by itself was preempted and continues, unless a stop was asked for."""
+    why = folder.stop_asked(path) or (known.stopping_for if known is not None else None)
+    if why is None and queues and run.state is State.STOPPING:
+        return replace(run, state=State.RUNNING)
+    if why is None or run.state not in _STOPPABLE:
+        return run
+    return replace(run, state=State.STOPPING, stopping_for=why)

@@ -1,0 +1,299 @@
+"""Performs what ``lifecycle`` decides. One thread owns every open run, so that no two events ever meet."""
+
+import logging
+import queue
+import threading
+import time
+from collections.abc import Callable, Iterable
+from concurrent.futures import Future
+from dataclasses import dataclass
+
+from sqlalchemy.exc import SQLAlchemyError
+
+from conoid.cases.messages import Progress
+from conoid.cases.run import State
+
+from ..database.store import Store
+from ..launch import Launcher, LaunchError
+from ..queue import waiting
+from ..queue.waiting import Need
+from ..queue.waitlist import Held, Waitlist
+from ..settings import Settings
+from ..telemetry import Telemetry, TelemetryError
+from .events import ONCE, Admitted, Broken, CancelAsked, Event, Granted, LaunchPutOff, Run
+from .holds import Holds, words
+from .index import Index
+from .leavings import Leavings
+from .lifecycle import advance
+from .perform import Performer, of_launch
+from .recovery import Left
+
+_log = logging.getLogger("conoid.server")
+_LOOK = 0.02
+"""s between two looks at the running workers: what a live event waits at most before it is passed on."""
+_TIDY = 5.0
+"""s between two looks at the tokens."""
+_AGAIN = 1.0
+"""s between two looks while something waits to be tried again."""
+_GONE = "the folder of the run has been removed"
+_DAMAGED = "the folder of the run cannot be used"
+_ANSWER = 10.0
+"""s that the thread of the supervisor may take to answer. Chosen: it looks fifty times a second."""
+
+
+@dataclass(frozen=True)
+class _Cancel:
+    run: str
+    done: Future[None]
+
+
+class Supervisor:
+    """Its public methods may be called from any thread."""
+
+    def __init__(
+        self,
+        settings: Settings,
+        store: Store,
+        launcher: Launcher,
+        telemetry: Telemetry | None,
+        ring: Callable[[str], None],
+    ) -> None:
+        """``ring`` is called with a run's id when there is news of it."""
+        self._settings, self._store, self._launcher = settings, store, launcher
+        self._telemetry, self._ring = telemetry, ring
+        self._inbox: queue.SimpleQueue[_Cancel | None] = queue.SimpleQueue()
+        self._open: dict[str, Run] = {}
+        self._hands = Performer(settings, launcher, telemetry)
+        self._watches = self._hands.watches
+        self._batch = launcher.queues
+        self._holds = Holds()
+        self._index = Index(store)
+        self._leavings = Leavings(settings.runs, store, self._index, launcher, self._found)
+        self._waitlist = Waitlist(settings, launcher.queues)
+        self.held_back: Callable[[Need, Iterable[Need]], str] = lambda need, active: ""
+        self._thread = threading.Thread(target=self._work, name="supervisor", daemon=True)
+        self._leaving = False
+        self._tidied = time.monotonic()
+
+    # From any thread --------------------------------------------------------------------------------------------------
+
+    def start(self) -> None:
+        """Takes up what an earlier server left, then begins to work. Raises OSError, SQLAlchemyError."""
+        self._launcher.tidy()
+        self._take_up()
+        self._waitlist.usage.begin(self._store.taken())
+        self._thread.start()
+
+    def close(self) -> None:
+        """Stops supervising. Workers go on; the next server adopts them."""
+        self._leaving = True
+        self._inbox.put(None)
+        self._thread.join(_ANSWER)
+
+    def end_all(self) -> None:
+        """Cancels every open run; returns when all have ended, or after twice the grace."""
+        deadline = time.monotonic() + 2 * self._settings.grace
+        for run_id in tuple(self._open):
+            self._inbox.put(_Cancel(run_id, Future()))
+        while self._open and self.alive and time.monotonic() < deadline:
+            time.sleep(_LOOK)
+
+    @property
+    def alive(self) -> bool:
+        """False when runs are not looked after any more."""
+        return self._thread.is_alive()
+
+    def admit(self, run: Run) -> None:
+        """A new run, which is on disk and in the store."""
+        self._open[run.id] = run
+        self._waitlist.changed()
+        self._inbox.put(None)
+
+    def cancel(self, run_id: str) -> None:
+        """Returns when the request is recorded. Raises TimeoutError, or what kept it from being recorded."""
+        asked = _Cancel(run_id, Future())
+        self._inbox.put(asked)
+        asked.done.result(_ANSWER)
+
+    def current(self, run_id: str) -> Run | None:
+        """The run as it is now; None when it has ended or is not known."""
+        return self._open.get(run_id)
+
+    def is_open(self, run_id: str) -> bool:
+        """False once the run has ended and its last line stands in the journal."""
+        run = self._open.get(run_id)
+        return run is not None and not run.state.final
+
+    def progress(self, run_id: str) -> Progress | None:
+        """The newest progress of a worker that lives."""
+        watch = self._watches.get(run_id)
+        return None if watch is None else watch.progress
+
+    def slots_used(self) -> int:
+        """Ranks that run now."""
+        return sum(run.cores for run_id in tuple(self._watches) if (run := self._open.get(run_id)))
+
+    def reason(self, run_id: str) -> str:
+        """What a queued run waits for, and what a batch system has to say of any; else empty."""
+        if why := self._holds.why(run_id):
+            return f"tried again soon: {why}"
+        watch = self._watches.get(run_id)
+        if watch is not None and (note := watch.worker.note()):
+            return note
+        return self._waitlist.why(run_id)
+
+    def taken(self, owner: str) -> tuple[int, float]:
+        """Runs of an owner that have cores, or were handed over; his core-seconds that count in the queue."""
+        own = [run for run in tuple(self._open.values()) if run.owner == owner]
+        return sum(run.id in self._watches for run in own), self._waitlist.used(owner, own)
+
+    def stranded(self) -> list[str]:
+        """Open runs that have neither a watch nor a place in the queue nor a timer: none, at any time."""
+        looked_after = {*self._watches, *self._index.unsaved, *self._holds.timed()}
+        return waiting.stranded(tuple(self._open.values()), looked_after)
+
+    # The supervisor's own thread --------------------------------------------------------------------------------------
+
+    def _work(self) -> None:
+        while not self._leaving:
+            try:
+                self._turn()
+            except Exception:
+                _log.exception("the supervisor goes on in %g s", _AGAIN)
+                time.sleep(_AGAIN)
+
+    def _turn(self) -> None:
+        self._answer()
+        for run_id in tuple(self._watches):
+            self._attend(run_id)
+        for run_id, event in self._holds.due():
+            self._apply(run_id, event)
+        for run in waiting.in_state(tuple(self._open.values()), State.ACCEPTED):
+            if not self._holds.held(run.id):
+                self._apply(run.id, Admitted())
+        self._grant()
+        if time.monotonic() - self._tidied > _TIDY:
+            self._tidy()
+
+    def _answer(self) -> None:
+        """Takes what was asked; waits for it no longer than until the next look."""
+        try:
+            asked = self._inbox.get(timeout=_LOOK if self._watches else _AGAIN if self._holds else _TIDY)
+        except queue.Empty:
+            return
+        if asked is not None:
+            failed = self._apply(asked.run, CancelAsked(handed=asked.run in self._watches))
+            asked.done.set_exception(failed) if failed else asked.done.set_result(None)
+
+    def _attend(self, run_id: str) -> None:
+        watch = self._watches[run_id]
+        if self._holds.held(run_id):
+            return
+        try:
+            for event in watch.look():
+                self._apply(run_id, event)
+        except OSError as error:
+            self._fail(self._open[run_id], None, error)
+        if watch.news:
+            self._ring(run_id)
+
+    def _grant(self) -> None:
+        """Starts those whose turn it is. One that cannot be started now holds nobody up; nothing is announced that
+        could not be written.
+        """
+        held = Held(self._holds.held, self.held_back)
+        for run_id in self._waitlist.turn(tuple(self._open.values()), tuple(self._watches), held):
+            try:
+                self._hands.probe(run_id)
+            except OSError as error:
+                self._fail(self._open[run_id], Granted(self._batch), error)
+            else:
+                self._apply(run_id, Granted(self._batch))
+
+    def _apply(self, run_id: str, event: Event) -> Exception | None:
+        """One step of a run; what kept it from being made, if anything.
+
+        A step that fails (a full disk) changes nothing and comes up again: a run in the queue gets its turn again, a
+        worker's end is seen again, and what nobody would say again waits among the holds. What the first try did
+        write is found, so that nothing is done twice.
+        """
+        before = self._open.get(run_id)
+        if before is None:
+            return None
+        now = time.time()
+        after, actions = advance(before, event, now)
+        try:
+            for action in actions:
+                self._hands.perform(after, action, now)
+        except LaunchError as error:
+            self._settle(after)
+            return self._apply(run_id, of_launch(error))
+        except Exception as error:
+            return self._fail(before, event, error)
+        if isinstance(event, LaunchPutOff):
+            self._holds.rest(run_id, event.message)
+        else:
+            self._holds.done(run_id, event)
+        if after != before:
+            self._settle(after)
+        return None
+
+    def _fail(self, run: Run, event: Event | None, error: Exception) -> Exception | None:
+        """A run whose folder is gone, or cannot be used while others can, has ended; any other is tried again."""
+        if not isinstance(event, Broken):
+            if self._hands.gone(run.id):
+                return self._apply(run.id, Broken(_GONE))
+            if self._holds.damaged(run.id, error) and not self._hands.lives(run.id) and self._hands.beyond_use(run.id):
+                return self._apply(run.id, Broken(f"{_DAMAGED}: {words(error)}"))
+        self._waitlist.changed()
+        return self._holds.put_off(run.id, error, event if isinstance(event, ONCE) else None)
+
+    def _settle(self, run: Run) -> None:
+        """The step is made: memory first, then the database, then those who wait for news."""
+        self._waitlist.settled(self._open.get(run.id), run)
+        self._open[run.id] = run
+        if run.state.final:
+            self._watches.pop(run.id, None)
+            self._holds.forget(run.id)
+        self._save(run)
+        self._ring(run.id)
+
+    def _save(self, run: Run) -> None:
+        if self._index.save(run) and run.state.final:
+            del self._open[run.id]
+
+    # Housekeeping -----------------------------------------------------------------------------------------------------
+
+    def _tidy(self) -> None:
+        """Does again what failed before, and lets the router know the tokens as they are."""
+        self._tidied = time.monotonic()
+        self._leavings.again()
+        for run_id in tuple(self._index.unsaved):
+            self._save(self._open[run_id])
+        for run_id, run in tuple(self._open.items()):
+            if not run.state.final and self._hands.gone(run_id):
+                self._apply(run_id, Broken(_GONE))
+        for run_id in self.stranded():
+            _log.error("run %s was not looked after; it is taken up again", run_id)
+            self._leavings.take_up(self._settings.runs / run_id)
+        if self._telemetry is not None:
+            try:
+                self._telemetry.follow(self._store.tokens())
+            except (SQLAlchemyError, TelemetryError) as error:
+                _log.error("the router does not know the newest tokens: %s", error)
+
+    def _take_up(self) -> None:
+        """Makes memory and database agree with the runs' folders, and goes on with what an earlier server left."""
+        self._leavings.all()
+        for run_id, run in self._store.open().items():
+            if run_id not in self._open and self._hands.gone(run_id):
+                self._open[run_id] = run
+                self._apply(run_id, Broken(_GONE))
+
+    def _found(self, left: Left) -> None:
+        """A run that an earlier server has left; one that has ended is known here until the database knows it too."""
+        if left.worker is not None:
+            self._hands.found[left.run.id] = left.worker
+        if not left.run.state.final or left.run.id in self._index.unsaved:
+            self._open[left.run.id] = left.run
+            self._apply(left.run.id, left.found)

@@ -1,0 +1,115 @@
+"""One worker as the supervisor sees it: its journal, its process, its deadlines."""
+
+import time
+from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
+
+import msgspec
+
+from conoid.cases import layout
+from conoid.cases.messages import Progress, Status
+from conoid.cases.run import State
+
+from ..keeping import weights
+from ..launch import Phase, Worker
+from . import ends, farewell, folder, journal
+from .events import Event, GraceOver, OutputOver, WallTimeOver, WorkerExited, WorkerRuns, WorkerStarts, WorkerWaits
+
+_FAREWELL = 10.0
+"""s that a worker may take to leave after it has said that it finished; its launcher may hang when a helper of it was
+killed from outside."""
+_PATIENCE = 1.0
+"""s between two looks at a worker that waits for its cores in a queue, of which there may be a thousand. Chosen."""
+_WEIGHED = 5.0
+"""s between two looks at the size of a run's folder. Chosen: some hundred files take milliseconds."""
+
+_progress = msgspec.json.Decoder(Progress)
+_status = msgspec.json.Decoder(Status)
+
+
+class Watch:
+    """Looks at a worker a few dozen times a second; says what happened to it as events."""
+
+    def __init__(self, run_folder: Path, worker: Worker, left: float | None, most: int | None = None) -> None:
+        """``left`` is the wall time, s, that the run may still take. It is measured by a clock that nobody sets.
+        ``most``: bytes that its folder may have.
+        """
+        self._most, self._weigh_at = most, time.monotonic() + _WEIGHED
+        self.worker, self._folder = worker, run_folder
+        self._tail = journal.Tail(run_folder / layout.JOURNAL)
+        self._deadline = None if left is None else time.monotonic() + left
+        self._kill_at, self._runs = float("inf"), False
+        self._phase: Phase = "unknown"
+        self._next, self._full = 0.0, False
+        self.progress: Progress | None = None
+        self.news = False
+        """True when the last look found new lines in the journal."""
+
+    def look(self) -> Iterator[Event]:
+        """What has happened since the last look. A disk that was full when the worker ended was full, also when the
+        end can be told only later. Raises OSError.
+        """
+        now = time.monotonic()
+        if self._phase == self.worker.phase() == "waits" and now < self._next:
+            return
+        self._next = now + _PATIENCE
+        exit_, unseen = self.worker.exited(), self._phase == "unknown"
+        yield from self._turn()
+        if self._read(now):
+            yield WorkerRuns()
+        if exit_ is not None:
+            told = folder.outcome(self._folder)
+            code = farewell.exit_code(self._folder) if exit_.code is None else exit_.code
+            self._full = told is None and (self._full or farewell.disk_failed(self._folder))
+            traces = self._traces(exit_.last_words)
+            at = ends.when(self._folder) if unseen or told is not None else 0.0
+            yield WorkerExited(code, told, exit_.out_of_memory, self._full, traces, exit_.reading, at)
+        elif now >= self._kill_at:
+            self._kill_at = now + 1.0
+            self.worker.kill()
+            yield GraceOver()
+        elif self._deadline is not None and now >= self._deadline:
+            self._deadline = None
+            yield WallTimeOver()
+        elif self._most is not None and now >= self._weigh_at:
+            self._weigh_at = now + _WEIGHED
+            if weights.size(self._folder) > self._most:
+                self._most = None
+                yield OutputOver()
+
+    def _turn(self) -> Iterator[Event]:
+        """Whether the worker has got its cores, or has to wait for them again."""
+        phase, before = self.worker.phase(), self._phase
+        self._phase = phase
+        if phase == "waits":
+            self._runs = False
+        if phase != before and phase != "unknown":
+            yield WorkerWaits() if phase == "waits" else WorkerStarts(self.worker.began())
+
+    def stop(self, grace: float) -> None:
+        """Asks the worker to stop, and sets the time at which it is killed."""
+        self.worker.stop()
+        self._kill_at = min(self._kill_at, time.monotonic() + grace)
+
+    def _traces(self, last_words: str) -> str:
+        wrong = folder.outcome_error(self._folder)
+        return f"{layout.OUTCOME}: {wrong}" if wrong else f"its last words: {last_words}" if last_words else ""
+
+    def _read(self, now: float) -> bool:
+        """Takes in the new lines; True when the worker has just said that it runs."""
+        runs, self.news = False, False
+        while lines := self._tail.read():
+            self.news = True
+            for line in lines:
+                if line.type == "progress":
+                    with suppress(msgspec.MsgspecError):
+                        self.progress = _progress.decode(line.raw)
+                    runs |= self._phase != "waits"
+                elif line.type == "status":
+                    with suppress(msgspec.MsgspecError):
+                        runs |= _status.decode(line.raw).state == State.RUNNING
+                elif line.type == "finished":
+                    self._kill_at = min(self._kill_at, now + _FAREWELL)
+        fresh, self._runs = runs and not self._runs, self._runs or runs
+        return fresh

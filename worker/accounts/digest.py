@@ -1,0 +1,39 @@
+"""The digest: sha256 over the state of nodes and tets in the order of their global ids, for any number of ranks."""
+
+import hashlib
+
+import numpy as np
+
+from ..model.state import VOLUME_FLUX, Floats, Model
+from ..parallel.comm import Comm
+
+
+def digest(model: Model, comm: Comm, nodal: list[Floats], more: bytes = b"") -> str | None:
+    """Hex digest on rank 0, None elsewhere.
+
+    Positions, velocities, what else the nodes carry (``nodal``), every row of the tets' state but VOLUME_FLUX, which is
+    scratch, or in a material without a strength the volume, which the positions say; and what all ranks have alike
+    (``more``).
+    """
+    nodes, h = model.nodes, hashlib.sha256()
+    owned = nodes.owned
+    for values in (nodes.x, nodes.v, *nodal):
+        _add(h, comm, nodes.id[owned], values[owned])
+    for part in range(len(model.parts)):
+        block = next((b for b in model.blocks if b.part == part), None)
+        ids = block.id if block else np.zeros(0, np.int64)
+        rows = comm.maximum(np.array([float(block.state.shape[1]) if block else 0.0]))
+        for row in range(int(rows[0])):
+            if row != VOLUME_FLUX:
+                _add(h, comm, ids, block.row(row) if block else np.zeros(0))
+    h.update(more)
+    return h.hexdigest() if comm.rank == 0 else None
+
+
+def _add(h: "hashlib._Hash", comm: Comm, ids: "np.ndarray", values: "np.ndarray") -> None:
+    pieces = comm.gather((ids, values))
+    if pieces is None:
+        return
+    all_ids = np.concatenate([ids for ids, _ in pieces])
+    all_values = np.concatenate([values for _, values in pieces])
+    h.update(np.ascontiguousarray(all_values[np.argsort(all_ids)]).tobytes())

@@ -1,0 +1,190 @@
+"""Boundaries that do work from outside: gravity, tractions, prescribed motion."""
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ..kernels.jit import Kernel
+from ..materials.turning import sine_and_cosine
+from ..migration.parcel import Parcel
+from ..model.state import Bits, Floats, Indices, Ints, Load, Nodes, extended
+from ..model.topology import Split
+from ..parallel.arguments import Arguments
+from . import impulses
+from .boundaries import FREE, KEPT, PRESCRIBED, Boundary, free
+
+
+class Driver(Boundary):
+    """A boundary whose impulses are work from outside."""
+
+    def note(self, state: Nodes) -> None:
+        self._note(state, self.external_work, 0.5)
+
+    def _act(self, kernel: Kernel, arguments: Arguments, state: Nodes, *values: Any) -> None:
+        """Applies a kernel (impulses.py) with what it takes besides the nodes."""
+        table = arguments.set(
+            state.v, state.mass, self.nodes, self._before, self._impulse, self.external_work, *values
+        )  # fmt: skip
+        self.over.run(kernel, table, len(self.nodes))
+
+
+class Course:
+    """A factor over time: linear between the given ``points`` (time, s, and factor), constant before and after; 1
+    without any.
+    """
+
+    def __init__(self, points: Sequence[tuple[float, float]] = ()) -> None:
+        self._times, self._factors = np.array(list(points) or [(0.0, 1.0)]).T
+        self._constant = float(self._factors[0]) if len(self._factors) == 1 else None
+
+    def mean(self, begin: float, end: float) -> float:
+        """Of the factor between two times, s, exactly; its value where they are one."""
+        if self._constant is not None:
+            return self._constant
+        within = self._times[(self._times > begin) & (self._times < end)]
+        times = np.array([begin, *within, end])
+        values = np.interp(times, self._times, self._factors)
+        if end <= begin or (values == values[0]).all():
+            return float(values[0])
+        return float((0.5 * np.diff(times) * (values[1:] + values[:-1])).sum() / (end - begin))
+
+
+class Gravity(Driver):
+    """An ``acceleration`` (3,), m/s^2, times the mean factor of the ``course`` over the mean step of the kick: in free
+    fall velocities are exact at n+1/2, and positions at n where it is constant.
+    """
+
+    def __init__(self, nodes: Indices, acceleration: Floats, course: Course) -> None:
+        super().__init__(nodes)
+        self._acceleration, self._course = acceleration, course
+        self._arguments = Arguments(*impulses.ACCELERATE)
+        self._last_dt = 0.0
+
+    def held_components(self) -> Bits:
+        return free(self.nodes)
+
+    def resume(self, parcel: Parcel, name: str, dt: float) -> None:
+        super().resume(parcel, name, dt)
+        self._last_dt = dt
+
+    def apply(self, state: Nodes, dt: float, t: float) -> None:
+        factor = self._course.mean(t - 0.5 * self._last_dt, t + 0.5 * dt)
+        gained = 0.5 * (self._last_dt + dt) * factor * self._acceleration
+        self._last_dt = dt
+        self._act(impulses.accelerate, self._arguments, state, gained)
+
+
+class Traction(Driver):
+    """Forces on corners of tets, times the mean factor of the ``course`` over the mean step of the kick. They go with
+    their tets.
+
+    ``load`` is on all ``corners`` (m,) that are local nodes.
+    """
+
+    on_faces = True
+
+    def __init__(self, corners: Indices, load: Load, course: Course) -> None:
+        super().__init__(np.unique(corners))
+        self._corners, self._load, self._course = corners, load, course
+        self._arguments = Arguments(*impulses.PUSH)
+        self.force = self._summed()
+        """(n, 3) N."""
+        self._last_dt = 0.0
+
+    def held_components(self) -> Bits:
+        return free(self.nodes)
+
+    def keep(self, parcel: Parcel, name: str) -> None:
+        super().keep(parcel, name)
+        load, ids = self._load, parcel.nodes["id"]
+        parcel.rows[f"{name}.load"] = {
+            "of": ids[self._corners], "key": load.place, "tets": load.tets, "force": load.force
+        }  # fmt: skip
+
+    def resume(self, parcel: Parcel, name: str, dt: float) -> None:
+        booked = [(parcel.nodes[f"{name}.{key}"] != 0.0).reshape(len(parcel.nodes["id"]), -1) for key in KEPT]
+        used = np.asarray(np.concatenate(booked, axis=1).any(axis=1))
+        used[self._corners] = True
+        self.nodes = np.flatnonzero(used).astype(np.int32)
+        super().resume(parcel, name, dt)
+        self.force = self._summed()
+        self._last_dt = dt
+
+    def grow(self, split: Split, ids: Ints) -> None:
+        super().grow(split, ids)
+        self._corners = split.followed(self._corners[:, None], ids, self._load.tets)[:, 0]
+        self.force = self._summed()
+
+    def drop(self, tets: Ints) -> None:
+        stay = ~np.isin(self._load.tets, tets)
+        if not stay.all():
+            self._load, self._corners = self._load.take(stay), self._corners[stay]
+            self.force = self._summed()
+
+    def _summed(self) -> Floats:
+        force = np.zeros((len(self.nodes), 3))
+        np.add.at(force, np.searchsorted(self.nodes, self._corners), self._load.force)
+        return force
+
+    def apply(self, state: Nodes, dt: float, t: float) -> None:
+        mean_dt = 0.5 * (self._last_dt + dt)
+        factor = mean_dt * self._course.mean(t - 0.5 * self._last_dt, t + 0.5 * dt)
+        self._last_dt = dt
+        self._act(impulses.push, self._arguments, state, self.force, factor)
+
+
+class PrescribedVelocity(Driver):
+    """Nodes whose velocity has given components, times the factor of the ``course``; NaN leaves a component free.
+
+    A step takes the mean factor over its length, so that positions at n are those of the course.
+    """
+
+    def __init__(self, nodes: Indices, velocity: Floats, course: Course) -> None:
+        super().__init__(nodes)
+        self._course, self._arguments = course, Arguments(*impulses.PRESCRIBE)
+        self._velocity: Floats = np.array(np.broadcast_to(velocity, (len(nodes), 3)), order="C")
+
+    def held_components(self) -> Bits:
+        return np.where(np.isnan(self._velocity), FREE, PRESCRIBED).astype(np.uint8)
+
+    def _inherit(self, at: Ints) -> None:
+        self._velocity = extended(self._velocity, self._velocity[at])
+
+    def start(self, state: Nodes) -> None:
+        free = np.isnan(self._velocity)
+        state.v[self.nodes] = np.where(free, state.v[self.nodes], self._course.mean(0.0, 0.0) * self._velocity)
+
+    def apply(self, state: Nodes, dt: float, t: float) -> None:
+        self._act(impulses.prescribe, self._arguments, state, self._velocity, self._course.mean(t, t + dt))
+
+
+class PrescribedRotation(Driver):
+    """Nodes that turn rigidly: each step is the chord of the exact rotation."""
+
+    def __init__(self, nodes: Indices, centre: Floats, rate: Floats) -> None:
+        super().__init__(nodes)
+        self._centre, self._rate = centre, rate
+        self._arguments = Arguments(*impulses.PRESCRIBE)
+
+    def held_components(self) -> Bits:
+        return np.full((len(self.nodes), 3), PRESCRIBED, np.uint8)
+
+    def start(self, state: Nodes) -> None:
+        state.v[self.nodes] = self._chord(state, 0.0)
+
+    def apply(self, state: Nodes, dt: float, t: float) -> None:
+        chord = np.ascontiguousarray(self._chord(state, dt))
+        self._act(impulses.prescribe, self._arguments, state, chord, 1.0)
+
+    def _chord(self, state: Nodes, dt: float) -> Floats:
+        """(n, 3) the velocities of a step ``dt``, s, m/s."""
+        r = state.x[self.nodes] - self._centre
+        speed = math.sqrt(sum(float(component) ** 2 for component in self._rate))
+        if dt == 0.0 or speed == 0.0:
+            return np.cross(self._rate, r)
+        axis, (sine, cosine) = self._rate / speed, sine_and_cosine(speed * dt)
+        across = np.cross(axis, r)
+        chord: Floats = (sine * across + (1.0 - cosine) * np.cross(axis, across)) / dt
+        return chord

@@ -1,0 +1,83 @@
+"""The impulses that boundaries give to nodes, and half of their work before and after: kernels of tasks over the nodes
+of a boundary (boundaries.py).
+"""
+
+import numpy as np
+
+from ..kernels.jit import njit, types
+from ..parallel.arguments import reader
+from ..parallel.team import TASK
+
+_F, _F1, _F2, _N1 = types.float64, types.float64[::1], types.float64[:, ::1], types.int32[::1]
+NOTE = _F2, _N1, _F2, _F2, _F1, _F
+"""v (nodes, 3), nodes (n,), and by place: v(n-1/2) and impulses (n, 3), N s, the account of their work (n,), J; a half
+with the sign of the work in the account."""
+_ACT = _F2, _F1, _N1, _F2, _F2, _F1
+"""v, mass (nodes,), nodes; v(n-1/2), impulses and account as above. The work is from outside."""
+PRESCRIBE = (*_ACT, _F2, _F)
+"""And the velocities (n, 3), m/s, NaN where it is free, and their factor."""
+ACCELERATE = (*_ACT, _F1)
+"""And the velocity gained (3,), m/s."""
+PUSH = (*_ACT, _F2, _F)
+"""And forces (n, 3), N, and for how long they act, s."""
+_note, _prescribe, _accelerate, _push = reader(*NOTE), reader(*PRESCRIBE), reader(*ACCELERATE), reader(*PUSH)
+
+
+@njit("void(float64[::1], float64[:, ::1], float64[:, ::1], int64, float64)", cache=True)
+def book(account, impulse, before, j, factor):  # type: ignore[no-untyped-def]
+    """Adds ``factor``, a half with a sign, times the work of the impulse at the place ``j`` at the velocity ``before``
+    there to the ``account``, J.
+    """
+    work = 0.0
+    for i in range(3):
+        work += impulse[j, i] * before[j, i]
+    account[j] += factor * work
+
+
+@njit(TASK, cache=True)
+def note(table, begin, end, thread):  # type: ignore[no-untyped-def]
+    """Keeps v(n-1/2), and books the second half of the work of the last impulses."""
+    v, nodes, before, impulse, account, factor = _note(table)
+    for j in range(begin, end):
+        a = nodes[j]
+        for i in range(3):
+            before[j, i] = v[a, i]
+        book(account, impulse, before, j, factor)
+
+
+@njit(TASK, cache=True)
+def prescribe(table, begin, end, thread):  # type: ignore[no-untyped-def]
+    """Sets the velocities that are not free."""
+    v, mass, nodes, before, impulse, account, velocity, factor = _prescribe(table)
+    for j in range(begin, end):
+        a = nodes[j]
+        for i in range(3):
+            old, given = v[a, i], velocity[j, i]
+            new = old if np.isnan(given) else factor * given
+            impulse[j, i] = mass[a] * (new - old)
+            v[a, i] = new
+        book(account, impulse, before, j, 0.5)
+
+
+@njit(TASK, cache=True)
+def accelerate(table, begin, end, thread):  # type: ignore[no-untyped-def]
+    """Adds the same to all velocities."""
+    v, mass, nodes, before, impulse, account, gained = _accelerate(table)
+    for j in range(begin, end):
+        a = nodes[j]
+        for i in range(3):
+            impulse[j, i] = mass[a] * gained[i]
+            v[a, i] += gained[i]
+        book(account, impulse, before, j, 0.5)
+
+
+@njit(TASK, cache=True, error_model="numpy")
+def push(table, begin, end, thread):  # type: ignore[no-untyped-def]
+    """Forces over a time."""
+    v, mass, nodes, before, impulse, account, force, time = _push(table)
+    for j in range(begin, end):
+        a = nodes[j]
+        for i in range(3):
+            impulse[j, i] = time * force[j, i]
+            v[a, i] += impulse[j, i] / mass[a]
+        book(account, impulse, before, j, 0.5)

@@ -1,0 +1,185 @@
+"""Symmetry planes for the nodes beside them: what flies at a plane meets its mirror image there.
+
+A node with tets and its image press on each other with equal forces, so that neither passes the plane: that is a wall
+for each side of it. Nodes without tets do not meet each other: such a node passes its image, and the image comes in
+where the node goes out, with the mirrored position and velocity. So debris turns round at a plane without a loss.
+"""
+
+from typing import Self
+
+import numpy as np
+
+from conoid.cases.schema import Case, Symmetry
+
+from ..kernels.jit import njit
+from ..migration.parcel import Parcel
+from ..model.state import Bits, Flags, Floats, Indices, Ints, Model, Nodes, extended
+from ..parallel.comm import Comm
+from ..rigid.bodies import of_nodes
+from ..scene.conditions import AXES, part_sides, sides
+from .boundaries import Boundary, driven, free
+
+_TOGETHER = 64
+"""Nodes that are looked at in one loop, which compilers make vectors of; only where one of them would be beyond are
+they looked at on their own."""
+_TURNS = 1000
+"""Planes that a node without tets may pass in a step; a velocity that is not finite would go on for ever."""
+
+
+class Mirrors(Boundary):
+    """No node ends the step beyond a symmetry plane that it started beside. An impulse stops a node with tets there,
+    and never pulls; one without tets is reflected.
+    """
+
+    after_contact = True
+
+    def __init__(
+        self, nodes: Indices, axes: Ints, at: Floats, sides: Floats, restitution: float = 0.0,
+        loose_sides: Floats | None = None,
+    ) -> None:  # fmt: skip
+        """Planes across the ``axes`` (planes,) at the heights ``at`` (planes,), m; ``sides`` (n, planes): 1 for a node
+        above, -1 for one below, 0 for one that the plane does not hold; ``restitution``: as of contact;
+        ``loose_sides``: the same for a node once it has no tets, as ``sides`` if not given.
+        """
+        super().__init__(nodes)
+        self._axes, self._at, self._sides, self._restitution = axes, at, sides, restitution
+        self._loose_sides = sides.copy() if loose_sides is None else loose_sides
+        self._stopped: Ints = np.zeros(0, np.int64)
+        """Places of the nodes that were stopped or reflected in the last step."""
+        self._loose: Ints = np.zeros(0, np.int64)
+        """Places of those without tets."""
+        self._reflected: Ints = np.zeros(0, np.int64)
+        self._aside = np.zeros((0, 3))
+        """Places of those that are reflected in this step, and how far their images are from where they go, m."""
+
+    @classmethod
+    def of(cls, case: Case, model: Model, bounds: list[Boundary], comm: Comm) -> Self:
+        """All symmetry planes of a case, and the nodes that start beside them or may come there without tets; those of
+        prescribed motion, and of rigid parts, are left alone. All ranks take part.
+        """
+        specs, of = [spec for _, spec in case.boundaries_of(Symmetry)], model.nodes.part
+        axes, at = np.array([AXES[spec.axis] for spec in specs]), np.array([spec.at for spec in specs])
+        held = np.column_stack([sides(spec, model) for spec in specs])
+        body = np.column_stack([part_sides(spec, model, comm)[of] for spec in specs])
+        wears = np.array([part.erosion is not None for part in case.parts])[of]
+        loose = np.where((held == 0.0) & wears[:, None], body, held)
+        some = loose.any(axis=1) & ~driven(model.nodes.n, bounds) & (of_nodes(case, model.nodes) < 0)
+        back = case.contact.restitution if case.contact is not None else 0.0
+        return cls(np.flatnonzero(some).astype(np.int32), axes, at, held[some], back, loose[some])
+
+    def held_components(self) -> Bits:
+        return free(self.nodes)
+
+    def release(self, loose: Flags, bounds: list[Boundary]) -> None:
+        self._loose = np.flatnonzero(loose[self.nodes])
+        self._sides[self._loose] = 0.0
+
+    def _inherit(self, at: Ints) -> None:
+        self._sides = extended(self._sides, self._sides[at])
+        self._loose_sides = extended(self._loose_sides, self._loose_sides[at])
+
+    def resume(self, parcel: Parcel, name: str, dt: float) -> None:
+        super().resume(parcel, name, dt)
+        self._stopped = np.flatnonzero(self._impulse.any(axis=1))
+
+    def note(self, state: Nodes) -> None:
+        np.take(state.v, self.nodes, axis=0, out=self._before, mode="clip")
+        _book(self.contact_loss, self._impulse, self._before, self._stopped)
+        self._impulse[self._stopped] = 0.0
+
+    def apply(self, state: Nodes, dt: float, t: float) -> None:
+        self._stopped = _stop(
+            state.x, state.v, self._before, self._impulse, state.mass, self.nodes, self._axes, self._at,
+            self._sides, self._restitution, dt,
+        )  # fmt: skip
+        if len(self._loose):
+            self._reflected, self._aside = _reflect(
+                state.x, state.v, self._impulse, state.mass, self.nodes, self._loose, self._axes, self._at,
+                self._loose_sides, dt,
+            )  # fmt: skip
+            self._stopped = np.concatenate([self._stopped, self._reflected])
+        _book(self.contact_loss, self._impulse, self._before, self._stopped)
+
+    def after_move(self, state: Nodes) -> None:
+        if len(self._reflected):
+            state.x[self.nodes[self._reflected]] += self._aside
+            self._reflected, self._aside = self._reflected[:0], self._aside[:0]
+
+
+@njit("void(float64[::1], float64[:, ::1], float64[:, ::1], int64[::1])", cache=True)
+def _book(loss, impulse, before, rows):  # type: ignore[no-untyped-def]
+    """Half of what the impulses of these ``rows`` take from the body, at the velocities ``before`` them."""
+    for j in rows:
+        for i in range(3):
+            loss[j] -= 0.5 * impulse[j, i] * before[j, i]
+
+
+@njit(
+    "int64[::1](float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[::1], int32[::1], "
+    "int64[::1], float64[::1], float64[:, ::1], float64, float64)",
+    cache=True,
+    error_model="numpy",
+)
+def _stop(x, v, before, impulse, mass, nodes, axes, at, sides, restitution, dt):  # type: ignore[no-untyped-def]
+    """The velocity of a node that would be beyond a plane ends it on the plane, or leads away from it with a share of
+    the speed at which it came, of ``before`` (n, 3): v(n-1/2). Adds to ``impulse``; returns the places of those that
+    were stopped, by some plane.
+    """
+    stopped, n = np.empty(len(nodes), np.int64), 0
+    for first in range(0, len(nodes), _TOGETHER):
+        last, met = min(first + _TOGETHER, len(nodes)), 0
+        for k in range(len(axes)):
+            i, plane = axes[k], at[k]
+            for j in range(first, last):
+                a = nodes[j]
+                met += sides[j, k] * (x[a, i] - plane + dt * v[a, i]) < 0.0
+        if not met:
+            continue
+        for j in range(first, last):
+            a = nodes[j]
+            for k in range(len(axes)):
+                i, side = axes[k], sides[j, k]
+                height, speed = side * (x[a, i] - at[k]), side * v[a, i]
+                if height + dt * speed < 0.0:
+                    back = -restitution * side * before[j, i]
+                    change = side * (max(-height / dt, back if back > 0.0 else -np.inf) - speed)
+                    v[a, i] += change
+                    impulse[j, i] += mass[a] * change
+            if impulse[j].any():
+                stopped[n] = j
+                n += 1
+    return stopped[:n].copy()
+
+
+@njit(
+    "Tuple((int64[::1], float64[:, ::1]))(float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[::1], "
+    "int32[::1], int64[::1], int64[::1], float64[::1], float64[:, ::1], float64)",
+    cache=True,
+)
+def _reflect(x, v, impulse, mass, nodes, rows, axes, at, sides, dt):  # type: ignore[no-untyped-def]
+    """Of the nodes at the places ``rows`` that would end the step beyond planes, the velocity becomes that of their
+    last image. Adds to ``impulse``; returns the places of these nodes, and (n, 3) from where their velocities take them
+    to where the images end the step, m.
+    """
+    turned, aside, n = np.empty(len(rows), np.int64), np.zeros((len(rows), 3)), 0
+    for j in rows:
+        a, any_turns = nodes[j], False
+        for i in range(3):
+            end, turns = x[a, i] + dt * v[a, i], 0
+            before = -1
+            while before < turns < _TURNS:
+                before = turns
+                for k in range(len(axes)):
+                    if axes[k] == i and sides[j, k] * (end - at[k]) < 0.0:
+                        end = 2.0 * at[k] - end
+                        turns += 1
+            if turns % 2 == 1:
+                impulse[j, i] -= 2.0 * mass[a] * v[a, i]
+                v[a, i] = -v[a, i]
+            if turns > 0:
+                aside[n, i] = end - (x[a, i] + dt * v[a, i])
+                any_turns = True
+        if any_turns:
+            turned[n] = j
+            n += 1
+    return turned[:n].copy(), aside[:n].copy()

@@ -1,0 +1,180 @@
+"""A pressure that follows the surface: on the present area of each face, against its present normal.
+
+The force of a face, -p (b - a) x (c - a) / 2, goes to its nodes a, b, c in thirds, in quanta of a power of two: sums
+over faces do not depend on their order, and shared nodes are completed in one exchange. The impulses of a step are
+those of a traction, and so is the account of their work: with x(n), v(n-1/2) and v(n+1/2) of the nodes it closes
+whatever way the surface goes.
+
+Faces of a closed surface have no force and no moment in sum, but for what rounding leaves: half a quantum a node and
+face, of which the largest force of a node of a face has 2^42 at the start.
+"""
+
+import math
+
+import numpy as np
+
+from conoid.cases.schema import Traction
+
+from ..kernels.jit import njit
+from ..migration.parcel import Parcel
+from ..model.state import WIDE, Bits, Block, Flags, Floats, Indices, Ints, LoadedFaces, Model, Nodes
+from ..model.topology import Split
+from ..parallel.arguments import Arguments
+from ..parallel.comm import Comm
+from ..parallel.ownership import Neighbour, SharedSum, complete
+from ..parallel.tags import Tag
+from . import impulses
+from .boundaries import KEPT, free
+from .drivers import Course, Driver
+
+_BITS = 42
+"""Quanta of the largest force of a node of a face at the start, as a power of two. Chosen: what a face loses by
+rounding is 1e-13 of it, and there is room for an area 2^(_MOST - _BITS) times as large."""
+_MOST = 56
+"""Quanta of a node of a face at most, as a power of two: 64 faces fit the sum of a node."""
+
+
+def scale(spec: Traction, outward: Floats) -> float:
+    """Quanta per newton for faces with areas along their normals, ``outward`` (m, 3), m^2."""
+    largest = abs(spec.pressure or 0.0) * float(np.abs(outward).max(initial=0.0)) / 3.0
+    return math.ldexp(1.0, _BITS - math.frexp(largest)[1]) if largest > 0.0 else 1.0
+
+
+class SurfacePressure(Driver):
+    """A ``pressure``, Pa, on faces, times the mean factor of the ``course`` over the mean step of the kick.
+
+    A rank has the faces of its tets, and of the nodes all that have a load on any rank.
+    """
+
+    on_faces = True
+
+    def __init__(
+        self, model: Model, faces: LoadedFaces, pressure: float, course: Course, neighbours: list[Neighbour], comm: Comm
+    ) -> None:  # fmt: skip
+        """All ranks take part."""
+        self._model, self._comm, self._neighbours = model, comm, neighbours
+        self._faces, self._corners = faces, model.nodes.places(faces.nodes.reshape(-1)).reshape(-1, 3)
+        self._quanta = -pressure * faces.scale / 6.0
+        super().__init__(self._agreed(np.zeros(model.nodes.n, bool)))
+        self._course, self._last_dt = course, 0.0
+        self._arguments = Arguments(*impulses.PUSH)
+        self._places = self._placed()
+        self._shared: SharedSum | None = None
+        self._sharing: list[Indices] = []
+        """The nodes that each neighbour shared when that was made."""
+        self._watched: list[tuple[Block, Ints, Ints]] | None = None
+        """Blocks of parts that fracture, the faces of each, and the places of their tets; None before it is asked."""
+
+    @property
+    def force(self) -> Floats:
+        """(n, 3) N, at the present positions; not a number where a face has outgrown the quanta, which ends the step
+        in an error on all ranks. All ranks take part.
+        """
+        sums = np.zeros((len(self.nodes), 3), np.int64)
+        largest = _press(sums, self._model.nodes.x, self._corners, self._places, self._quanta)
+        shared = self._sums()
+        shared.begin(sums)
+        shared.finish(sums)
+        return np.asarray(sums / (self._faces.scale if largest < 2.0**_MOST else math.nan))
+
+    def held_components(self) -> Bits:
+        return free(self.nodes)
+
+    def apply(self, state: Nodes, dt: float, t: float) -> None:
+        self._let_go()
+        factor = 0.5 * (self._last_dt + dt) * self._course.mean(t - 0.5 * self._last_dt, t + 0.5 * dt)
+        self._last_dt = dt
+        self._act(impulses.push, self._arguments, state, self.force, factor)
+
+    def keep(self, parcel: Parcel, name: str) -> None:
+        super().keep(parcel, name)
+        parcel.known[f"{name}.scale"] = self._faces.scale
+        parcel.rows[f"{name}.faces"] = {"tet": self._faces.tets, "corners": parcel.nodes["id"][self._corners]}
+
+    def resume(self, parcel: Parcel, name: str, dt: float) -> None:
+        booked = [(parcel.nodes[f"{name}.{key}"] != 0.0).reshape(len(parcel.nodes["id"]), -1) for key in KEPT]
+        self.nodes = self._agreed(np.asarray(np.concatenate(booked, axis=1).any(axis=1)))
+        super().resume(parcel, name, dt)
+        self._places, self._last_dt = self._placed(), dt
+
+    def grow(self, split: Split, ids: Ints) -> None:
+        super().grow(split, ids)
+        self._corners = split.followed(self._corners, ids, self._faces.tets)
+        self._places = self._placed()
+
+    def drop(self, tets: Ints) -> None:
+        self._take(~np.isin(self._faces.tets, tets))
+
+    def free(self) -> None:
+        if self._shared is not None:
+            self._shared.free()
+            self._shared = None
+
+    def _take(self, stay: Flags) -> None:
+        if not stay.all():
+            self._faces, self._corners = self._faces.take(stay), self._corners[stay]
+            self._places = self._placed()
+            self._watched = None
+
+    def _placed(self) -> Indices:
+        """(m, 3) where the corners stand among the nodes."""
+        return np.searchsorted(self.nodes, self._corners).astype(np.int32)
+
+    def _agreed(self, some: Flags) -> Indices:
+        """``some`` (nodes,), and those of the faces, as far as any rank has them; all ranks take part."""
+        some[self._corners] = True
+        sums = some[:, None].astype(np.int64)
+        complete(self._comm, self._neighbours, sums, Tag.LOAD)
+        return np.flatnonzero(sums).astype(np.int32)
+
+    def _sums(self) -> SharedSum:
+        """The exchange of the loaded nodes that are shared; anew when nodes have separated."""
+        if self._shared is None or any(
+            one.nodes is not nodes for one, nodes in zip(self._neighbours, self._sharing, strict=True)
+        ):
+            self.free()
+            self._sharing = [each.nodes for each in self._neighbours]
+            place = np.full(self._model.nodes.n, -1, np.int32)
+            place[self.nodes] = np.arange(len(self.nodes), dtype=np.int32)
+            held = [(each.rank, place[each.nodes]) for each in self._neighbours]
+            common = [Neighbour(rank, at[at >= 0]) for rank, at in held if (at >= 0).any()]
+            self._shared = SharedSum(self._comm, common, 3, Tag.LOAD)
+        return self._shared
+
+    def _within(self, block: Block) -> tuple[Block, Ints, Ints]:
+        """A block of a part that fractures, which does not erode, with its faces and the places of their tets."""
+        order = np.argsort(block.id)
+        at = np.minimum(np.searchsorted(block.id, self._faces.tets, sorter=order), max(block.n - 1, 0))
+        places = order[at]
+        rows = np.flatnonzero(block.id[places] == self._faces.tets)
+        return block, rows, places[rows]
+
+    def _let_go(self) -> None:
+        """Faces of tets that have come off alone have no load any more."""
+        if self._watched is None:
+            self._watched = [self._within(block) for block in self._model.blocks if len(block.bond)]
+        stay = np.ones(len(self._faces.tets), bool)
+        for block, rows, places in self._watched:
+            across, bond = block.across[places], block.bond[places]
+            stay[rows] = ((across >= 0) & (bond != WIDE)).any(axis=1) | (across < 0).all(axis=1)
+        self._take(stay)
+
+
+@njit("float64(int64[:, ::1], float64[:, ::1], int32[:, ::1], int32[:, ::1], float64)", cache=True)
+def _press(sums, x, corners, places, factor):  # type: ignore[no-untyped-def]
+    """Adds ``factor`` times twice the area of each face along its normal to the ``sums`` (n, 3) at the ``places`` of
+    its ``corners`` (m, 3), in quanta. Returns the largest component.
+    """
+    largest = 0.0
+    for k in range(len(corners)):
+        a, b, c = corners[k, 0], corners[k, 1], corners[k, 2]
+        for i in range(3):
+            j, h = (i + 1) % 3, (i + 2) % 3
+            area = (x[b, j] - x[a, j]) * (x[c, h] - x[a, h]) - (x[b, h] - x[a, h]) * (x[c, j] - x[a, j])
+            value = np.rint(factor * area)
+            if not abs(value) <= largest:
+                largest = abs(value)
+            if largest < 2.0**62:
+                for corner in range(3):
+                    sums[places[k, corner], i] += np.int64(value)
+    return largest

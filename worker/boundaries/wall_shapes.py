@@ -1,0 +1,131 @@
+"""The surfaces of rigid walls: planes, cylinders and spheres, and how they move."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from conoid.cases.boundaries import Wall
+
+from ..kernels.jit import njit, record, types
+from ..model.state import Floats, Ints
+from .drivers import Course
+
+PLANE, CYLINDER, SPHERE = range(3)
+KINDS = ("plane", "cylinder", "sphere")
+
+
+class Shapes(NamedTuple):
+    """One row a wall."""
+
+    kind: Ints
+    """(w,) PLANE, CYLINDER or SPHERE."""
+    point: Floats
+    """(w, 3) of the plane, of the axis, or the centre, m."""
+    axis: Floats
+    """(w, 3) unit normal of a plane, unit direction of the axis of a cylinder."""
+    radius: Floats
+    """(w,) m."""
+    side: Floats
+    """(w,) 1 where bodies are outside, -1 where they are inside."""
+
+
+_F, _F1, _F2 = types.float64, types.float64[::1], types.float64[:, ::1]
+SHAPES = record(Shapes, types.int64[::1], _F2, _F2, _F1, _F1)
+
+
+class Walls:
+    """The walls of a case with their state, the same on all ranks."""
+
+    def __init__(self, specs: list[Wall]) -> None:
+        n = len(specs)
+        axis = np.array([each.normal or each.axis or (0.0, 0.0, 1.0) for each in specs]).reshape(n, 3)
+        squares = axis * axis
+        axis = axis / np.sqrt((squares[:, 0] + squares[:, 1]) + squares[:, 2])[:, None]
+        self.shapes = Shapes(
+            np.array([KINDS.index(each.shape) for each in specs], np.int64),
+            np.array([each.point for each in specs]).reshape(n, 3), axis,
+            np.array([each.radius or 0.0 for each in specs]),
+            np.array([-1.0 if each.side == "inside" else 1.0 for each in specs]),
+        )  # fmt: skip
+        self.friction = np.array([each.friction for each in specs])
+        self._given = np.array([each.velocity for each in specs]).reshape(n, 3)
+        self._courses = [Course(each.course) for each in specs]
+        self.mass = np.array([each.mass or np.inf for each in specs])
+        """(w,) kg; infinite where a wall is fixed or driven."""
+        self.lightness = np.array([0.0 if each.mass is None else 1.0 / each.mass for each in specs])
+        self.plain = np.array([each.plain for each in specs], bool)
+        """(w,) fixed planes."""
+        self.speed = np.array([self._driven(k, 0.0, 0.0) for k in range(n)]).reshape(n, 3)
+        """(w, 3) m/s at mid-step."""
+        self.before = self.speed.copy()
+        """(w, 3) v(n-1/2), m/s."""
+
+    @property
+    def n(self) -> int:
+        """How many there are."""
+        return len(self.mass)
+
+    def keep(self) -> tuple[Floats, Floats]:
+        """Where they are and how they move."""
+        return self.shapes.point.copy(), self.speed.copy()
+
+    def resume(self, known: tuple[Floats, Floats]) -> None:
+        """Takes it back; of no wall a checkpoint has arrays without rows."""
+        point, speed = known
+        self.shapes.point[:], self.speed[:] = np.reshape(point, (-1, 3)), np.reshape(speed, self.speed.shape)
+
+    def words(self) -> bytes:
+        """Of the digest: of those that move."""
+        moving = ~self.plain
+        return bytes(self.shapes.point[moving].tobytes() + self.speed[moving].tobytes())
+
+    def kinetic(self) -> float:
+        """Of those with a mass at n, J: that of the leapfrog."""
+        free = self.lightness > 0.0
+        squares = self.before[free] * self.speed[free]
+        return float((0.5 * self.mass[free] * ((squares[:, 0] + squares[:, 1]) + squares[:, 2])).sum())
+
+    def momenta(self) -> Floats:
+        """(6,) momentum, kg m/s, and angular momentum about the origin, kg m^2/s, of those with a mass at n."""
+        free = self.lightness > 0.0
+        p = 0.5 * self.mass[free, None] * (self.before[free] + self.speed[free])
+        x = self.shapes.point[free]
+        about = [x[:, i] * p[:, j] - x[:, j] * p[:, i] for i, j in ((1, 2), (2, 0), (0, 1))]
+        return np.concatenate([p.sum(axis=0), np.stack(about, axis=1).sum(axis=0)])
+
+    def note(self) -> None:
+        """Before the kick: keeps v(n-1/2)."""
+        self.before[:] = self.speed
+
+    def kick(self, dt: float, t: float) -> None:
+        """Driven walls take the mean velocity of the step ahead."""
+        for k in range(self.n):
+            if self.lightness[k] == 0.0:
+                self.speed[k] = self._driven(k, t, t + dt)
+
+    def move(self, dt: float) -> None:
+        """To n+1."""
+        self.shapes.point[:] += dt * self.speed
+
+    def _driven(self, k: int, begin: float, end: float) -> Floats:
+        return np.asarray(self._given[k] * self._courses[k].mean(begin, end))
+
+
+@njit(types.float64(_F1, SHAPES, types.int64, _F, _F, _F), cache=True, error_model="numpy")
+def gap(normal, shapes, k, x, y, z):  # type: ignore[no-untyped-def]
+    """Distance of a point from wall ``k``, m, negative behind it; sets the unit ``normal`` (3,) out of the wall there.
+    On the axis of a cylinder, or in the centre of a sphere, it is zero.
+    """
+    p, a = shapes.point, shapes.axis
+    dx, dy, dz = x - p[k, 0], y - p[k, 1], z - p[k, 2]
+    along = dx * a[k, 0] + dy * a[k, 1] + dz * a[k, 2]
+    if shapes.kind[k] == PLANE:
+        for i in range(3):
+            normal[i] = a[k, i]
+        return along
+    if shapes.kind[k] == CYLINDER:
+        dx, dy, dz = dx - along * a[k, 0], dy - along * a[k, 1], dz - along * a[k, 2]
+    far = np.sqrt(dx * dx + dy * dy + dz * dz)
+    over = shapes.side[k] / far if far > 0.0 else 0.0
+    normal[0], normal[1], normal[2] = over * dx, over * dy, over * dz
+    return shapes.side[k] * (far - shapes.radius[k])

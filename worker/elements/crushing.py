@@ -1,0 +1,269 @@
+"""The compression that brittle matter without a law of compressive failure meets, in every step, beside Griffith's
+criterion (cases/compression.py).
+
+Such matter breaks in tension alone and bears any compression. Each stress is compared with the criterion of Griffith
+(1924): (s1 - s3)^2 / (8 T (s1 + s3)) for the largest and the smallest pressure, s1 and s3, and the tensile strength T.
+Matter of this strength cracks at 1, and the number grows in proportion to the stress. Tension, s3 < 0, counts as none:
+it is for the law that the matter has. The stress is that of the tets at the end of a step, without its viscous part.
+"""
+
+from dataclasses import astuple, dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from conoid.cases.compression import bears_all
+from conoid.cases.library import material
+from conoid.cases.outcome import Compressed
+from conoid.cases.schema import Case
+
+from ..clock import Clock
+from ..kernels.jit import njit, types
+from ..model.state import CHUNK, PRESSURE, S_XX, S_XY, S_YY, S_YZ, S_ZX, S_ZZ, Block, Floats, Model
+from ..parallel.arguments import reader
+from ..parallel.comm import Comm
+from ..parallel.passes import Pass
+from ..parallel.team import TASK, Team
+
+_SXX, _SYY, _SZZ = S_XX * CHUNK, S_YY * CHUNK, S_ZZ * CHUNK
+_SYZ, _SZX, _SXY = S_YZ * CHUNK, S_ZX * CHUNK, S_XY * CHUNK
+_P = PRESSURE * CHUNK
+_MOST = 100
+"""Steps of Newton at most. Chosen: 6 do, and where two principal stresses are nearly equal each halves the distance, so
+that 30 reach what rounding leaves."""
+_ROUNDING = 1e-15
+"""Of the cube of the root: a few last bits of a float64. What is below it is noise; a double root is known to the root
+of that."""
+CHUNKS_OF_A_TASK = 16
+"""Chosen: 10 us of work and more, against 2 us that a region of threads costs."""
+_I, _F, _I1, _F1, _F3 = types.int64, types.float64, types.int64[::1], types.float64[::1], types.float64[:, :, ::1]
+_LOOK = _I1, _F1, _F3, _I1, _I, _F, _F
+_COUNT = _I1, _F3, _I, _F
+_of_look, _of_count = reader(*_LOOK), reader(*_COUNT)
+
+
+@njit("float64(float64, float64)", cache=True, error_model="numpy")
+def _largest_root(j2, j3):  # type: ignore[no-untyped-def]
+    """The largest principal value of a deviator with these invariants: of x^3 - j2 x - j3 = 0, by Newton from above. It
+    is not below the root of j2 / 3, where the slope is zero: rounding must not take a step past it.
+    """
+    least = np.sqrt(j2 / 3.0)
+    x = 2.0 * least
+    for _ in range(_MOST):
+        left, slope = (x * x - j2) * x - j3, 3.0 * x * x - j2
+        if left <= _ROUNDING * x * x * x or slope <= 0.0:
+            break
+        x = max(x - left / slope, least)
+    return x
+
+
+@njit("UniTuple(float64, 2)(float64[::1], int64)", cache=True, error_model="numpy")
+def principal(s, i):  # type: ignore[no-untyped-def]
+    """The largest and the smallest pressure of tet ``i`` of a chunk, Pa."""
+    xx, yy, zz, yz, zx, xy = s[_SXX + i], s[_SYY + i], s[_SZZ + i], s[_SYZ + i], s[_SZX + i], s[_SXY + i]
+    j2 = 0.5 * (xx * xx + yy * yy + zz * zz) + yz * yz + zx * zx + xy * xy
+    j3 = xx * (yy * zz - yz * yz) - xy * (xy * zz - yz * zx) + zx * (xy * yz - yy * zx)
+    return s[_P + i] + _largest_root(j2, -j3), s[_P + i] - _largest_root(j2, j3)
+
+
+@njit("float64(float64, float64, float64)", cache=True, error_model="numpy")
+def _beyond(s1, s3, strength):  # type: ignore[no-untyped-def]
+    """How many times these pressures are those of the criterion."""
+    s3 = max(s3, 0.0)
+    return (s1 - s3) ** 2 / (8.0 * strength * (s1 + s3)) if s1 > 0.0 else 0.0
+
+
+@njit("boolean(float64[::1], int64, float64)", cache=True, error_model="numpy", forceinline=True)
+def _below(s, i, least):  # type: ignore[no-untyped-def]
+    """Whether 8 T times the number of tet ``i`` of a chunk is below ``least``, Pa, by two bounds of the invariants. The
+    number is at most s1 / 8 T, and s1 <= p + 2 r, r = sqrt(J2 / 3). And s1 - s3 <= 2 sqrt(J2), s1 + s3 >= 2 p - r.
+    """
+    xx, yy, zz, yz, zx, xy = s[_SXX + i], s[_SYY + i], s[_SZZ + i], s[_SYZ + i], s[_SZX + i], s[_SXY + i]
+    j2 = 0.5 * (xx * xx + yy * yy + zz * zz) + yz * yz + zx * zx + xy * xy
+    r, p = np.sqrt(j2 / 3.0), s[_P + i]
+    return (p + 2.0 * r < least) | (4.0 * j2 < least * (2.0 * p - r))
+
+
+@njit("boolean(float64[::1], int64, float64)", cache=True, error_model="numpy", forceinline=True)
+def _above(s, i, least):  # type: ignore[no-untyped-def]
+    """Whether it is above, by two bounds likewise: s1 - s3 >= sqrt(3 J2), s1 + s3 <= 2 p + r; and s1 >= p + r, where s3
+    may be tension, which is as none.
+    """
+    xx, yy, zz, yz, zx, xy = s[_SXX + i], s[_SYY + i], s[_SZZ + i], s[_SYZ + i], s[_SZX + i], s[_SXY + i]
+    j2 = 0.5 * (xx * xx + yy * yy + zz * zz) + yz * yz + zx * zx + xy * xy
+    r, p = np.sqrt(j2 / 3.0), s[_P + i]
+    return (3.0 * j2 > least * (2.0 * p + r)) & ((p >= 2.0 * r) | (p + r > least))
+
+
+@njit("int64(float64[::1], int64, float64)", cache=True, error_model="numpy")
+def _not_below(s, n, least):  # type: ignore[no-untyped-def]
+    """How many of the ``n`` tets of a chunk are not. The loop has no branch: it uses vector instructions."""
+    some = 0
+    for i in range(n):
+        some += 0 if _below(s, i, least) else 1
+    return some
+
+
+@njit("Tuple((int64, float64))(float64[:, :, ::1], int64[::1], int64, float64, float64, int64, int64)", cache=True,
+      error_model="numpy")  # fmt: skip
+def hardest(state, ids, n, strength, known, first, stop):  # type: ignore[no-untyped-def]
+    """The place of the tet that exceeds the criterion most, and by how many times, where that is more than ``known``;
+    -1 where none is. Of equal ones that with the smallest id. Of ``n`` tets those of the chunks from ``first`` to
+    ``stop``.
+
+    Most chunks, and most tets of the others, are passed over by a bound.
+    """
+    place, best = -1, known
+    for c in range(first, stop):
+        s, here = state[c].reshape(-1), min(CHUNK, n - c * CHUNK)
+        if _not_below(s, here, 8.0 * strength * best) == 0:
+            continue
+        for i in range(here):
+            if _below(s, i, 8.0 * strength * best):
+                continue
+            s1, s3 = principal(s, i)
+            share, at = _beyond(s1, s3, strength), c * CHUNK + i
+            if share > best or (share == best and place >= 0 and ids[at] < ids[place]):
+                place, best = at, share
+    return place, best
+
+
+@njit("UniTuple(int64, 2)(float64[::1], int64, float64)", cache=True, error_model="numpy")
+def _decided(s, n, least):  # type: ignore[no-untyped-def]
+    """How many of the ``n`` tets of a chunk are ``_above``, and how many neither that nor ``_below``."""
+    above, open_ = 0, 0
+    for i in range(n):
+        yes, no = _above(s, i, least), _below(s, i, least)
+        above += 1 if yes else 0
+        open_ += 0 if yes | no else 1
+    return above, open_
+
+
+@njit("int64(float64[:, :, ::1], int64, float64, int64, int64)", cache=True, error_model="numpy")
+def crushed(state, n, strength, first, stop):  # type: ignore[no-untyped-def]
+    """How many tets are beyond the criterion; which ones as for ``hardest``. The principal pressures are found where
+    bounds do not decide.
+    """
+    found, least = 0, 8.0 * strength
+    for c in range(first, stop):
+        s, here = state[c].reshape(-1), min(CHUNK, n - c * CHUNK)
+        above, open_ = _decided(s, here, least)
+        found += above
+        for i in range(here if open_ > 0 else 0):
+            if not (_above(s, i, least) | _below(s, i, least)):
+                s1, s3 = principal(s, i)
+                found += _beyond(s1, s3, strength) > 1.0
+    return found
+
+
+@njit(TASK, cache=True)
+def _look(table, first, stop, thread):  # type: ignore[no-untyped-def]
+    """``hardest`` of the chunks of a task."""
+    places, times, state, ids, n, strength, known = _of_look(table)
+    k = first // CHUNKS_OF_A_TASK
+    places[k], times[k] = hardest(state, ids, n, strength, known, first, stop)
+
+
+@njit(TASK, cache=True)
+def _count(table, first, stop, thread):  # type: ignore[no-untyped-def]
+    """``crushed`` of the chunks of a task."""
+    counts, state, n, strength = _of_count(table)
+    counts[first // CHUNKS_OF_A_TASK] = crushed(state, n, strength, first, stop)
+
+
+@dataclass(frozen=True)
+class Met:
+    """What a tet has met: how many times the criterion, pressures, Pa, its id, its centre, m, and the time, s."""
+
+    times: float = 0.0
+    most: float = 0.0
+    least: float = 0.0
+    tet: int = -1
+    centre: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    time: float = 0.0
+
+
+class Crushing:
+    """The hardest that each part of such matter has met; on this rank until ranks compare."""
+
+    def __init__(self, model: Model, strengths: Floats, comm: Comm, clock: Clock, team: Team) -> None:
+        """``strengths`` (parts,): of tension, Pa; 0 for other matter; ``team``: whose threads look."""
+        self._model, self._strengths, self._comm, self._clock = model, strengths, comm, clock
+        self._looking = Pass(team, _look, *_LOOK, size=CHUNKS_OF_A_TASK)
+        self._counting = Pass(team, _count, *_COUNT, size=CHUNKS_OF_A_TASK)
+        self._met = [Met() for _ in model.parts]
+        self._most = np.zeros(len(model.parts), np.int64)
+        """(parts,) tets beyond the criterion at once, the most so far."""
+
+    @classmethod
+    def of(cls, case: Case, model: Model, comm: Comm, clock: Clock, team: Team) -> "Crushing | None":
+        """None where no part is of such matter."""
+        made = [material(case, part.material) for part in case.parts]
+        strengths = [
+            each.brittle.strength if each.brittle and bears_all(each) and part.rigid is None else 0.0
+            for each, part in zip(made, case.parts, strict=True)
+        ]
+        return cls(model, np.array(strengths), comm, clock, team) if any(strengths) else None
+
+    def look(self) -> None:
+        """The stresses as they are now."""
+        for block in self._blocks():
+            place, times = self._hardest(block, self._met[block.part].times)
+            if place >= 0:
+                self._met[block.part] = self._of(block, place, times)
+
+    def _blocks(self) -> list[Block]:
+        """Those of such matter."""
+        return [block for block in self._model.blocks if self._strengths[block.part] > 0.0]
+
+    def _hardest(self, block: Block, known: float) -> tuple[int, float]:
+        """``hardest`` of all chunks of a block."""
+        chunks, strength = block.chunks, float(self._strengths[block.part])
+        places, times = np.empty(self._looking.many(chunks), np.int64), np.empty(self._looking.many(chunks))
+        self._looking.run(chunks, places, times, block.state, block.id, block.n, strength, known)
+        if (places < 0).all():
+            return -1, known
+        most = np.flatnonzero((places >= 0) & (times == times.max()))
+        best = most[block.id[places[most]].argmin()]
+        return int(places[best]), float(times[best])
+
+    def count(self) -> None:
+        """How many tets are beyond the criterion now; all ranks take part."""
+        found = np.zeros(len(self._most), np.int64)
+        for block in self._blocks():
+            counts = np.zeros(self._counting.many(block.chunks), np.int64)
+            self._counting.run(block.chunks, counts, block.state, block.n, float(self._strengths[block.part]))
+            found[block.part] = counts.sum()
+        self._most = np.maximum(self._most, self._comm.sum(found))
+
+    def _of(self, block: Block, place: int, times: float) -> Met:
+        chunk, i = divmod(place, CHUNK)
+        corners = self._model.nodes.x[block.tets[place]]
+        x, y, z = (0.25 * ((corners[0] + corners[1]) + (corners[2] + corners[3]))).tolist()
+        most, least = principal(block.state[chunk].reshape(-1), i)
+        return Met(times, most, least, int(block.id[place]), (x, y, z), self._clock.t)
+
+    def _of_all(self) -> list[Met]:
+        """Of each part the hardest of all ranks, the earliest of equal ones; all ranks take part."""
+        shared = self._comm.share(self._met)
+        return [min(found, key=lambda met: (-met.times, met.time, met.tet)) for found in zip(*shared, strict=True)]
+
+    def keep(self) -> tuple[list[tuple[Any, ...]], list[int]]:
+        """What has been met, equal on all ranks; all take part."""
+        return [astuple(met) for met in self._of_all()], self._most.tolist()
+
+    def resume(self, known: tuple[list[tuple[Any, ...]], list[int]]) -> None:
+        """Takes it back."""
+        self._met = [replace(Met(*met), centre=tuple(met[4])) for met in known[0]]
+        self._most = np.array(known[1], np.int64)
+
+    def found(self) -> list[Compressed]:
+        """Of each part of such matter, the hardest first; all ranks take part."""
+        met = [
+            Compressed(
+                part=name, times=each.times, most=each.most, least=each.least, tet=each.tet,
+                tets=int(most), x=each.centre[0], y=each.centre[1], z=each.centre[2], time=each.time,
+            )
+            for name, each, most in zip(self._model.parts, self._of_all(), self._most, strict=True) if each.tet >= 0
+        ]  # fmt: skip
+        return sorted(met, key=lambda each: (-each.times, each.part))

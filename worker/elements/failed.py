@@ -1,0 +1,25 @@
+"""Why a tet ends the run, by its state; the words are the same on all ranks."""
+
+import numpy as np
+
+from ..materials.equation_of_state import GRUNEISEN, pole
+from ..materials.models import EQUATIONS
+from ..model.state import VOLUME_RATIO, Block, Floats
+from ..simulation import Simulation
+
+
+def why(sim: Simulation) -> str:
+    """What the limiting tet has come to, whose limit is not a number; all ranks take part."""
+    tet = sim.limiting_id()
+    compression, bound = sim.comm.maximum(np.max([_compression(block, tet) for block in sim.model.blocks], axis=0))
+    if compression >= bound > 0.0:
+        return f"is compressed by 1 - V/V0 = {compression:.4g}; its equation of state ends at the pole, {bound:.4g}"
+    return "turned inside out, or its stress is not a number"
+
+
+def _compression(block: Block, tet: int) -> Floats:
+    """(2,) compression that the equation of state of a tet sees, and its pole; -inf where a block has none of it."""
+    places = np.flatnonzero(block.id == tet)
+    if EQUATIONS[block.eos] is not GRUNEISEN or not len(places):
+        return np.full(2, -np.inf)
+    return np.array([1.0 - float(block.at(VOLUME_RATIO, places)[0]), pole(block.params)])

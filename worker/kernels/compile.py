@@ -1,0 +1,290 @@
+"""All kernels compiled ahead, on several cores: ``python -m conoid.worker.kernels.compile``.
+
+Modules whose sources have not changed since an earlier folder are linked from there. One child process a core compiles
+the kernels of the others into the cache folder, module after module. A module comes after those that it imports, so
+that no kernel is compiled twice. numba keeps files of its own for each kernel: children never write the same one.
+"""
+
+import fcntl
+import os
+import queue
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO
+
+from ..errors import CompileError, StoppedError
+from ..run.signals import REQUESTS
+from . import store
+
+Tell = Callable[[int, int], None]
+"""Is told every few seconds how many kernels are compiled, and of how many."""
+
+COMPLETE = "complete"
+"""The file in the cache folder that says that every kernel is there."""
+WORD_EVERY = 3.0
+"""s between two words of progress."""
+_MOST = 4
+"""Children at most: the longest chain of modules holds 27 % of the machine code."""
+_MOST_WORDS = 500
+"""Characters of numba's report: what is wrong comes first."""
+_PATIENCE = 900.0
+"""s that a module may take: the largest takes ten on an idle core."""
+_HASH = "hash"
+"""The file in a module's folder that says that all its kernels are there, and what they are made of."""
+_LOCK, _LOOK = "lock", 0.3
+"""The file that whoever compiles holds, and s between two checks of it: a tenth of WORD_EVERY."""
+
+
+def compile_all(folder: Path, tell: Tell, root: Path = store.ROOT, package: str = "conoid.worker") -> bool:
+    """Compiles every kernel below ``root`` that ``folder`` lacks; False when it lacks none. Raises CompileError.
+
+    One program at a time: another one waits for it, and goes on where it was killed.
+    """
+    if (folder / COMPLETE).exists():
+        return False
+    counts = {path: path.read_text(encoding="utf-8").count(store.DECLARATION) for path in store.kernel_files(root)}
+    total = sum(counts.values())
+    said = _Saying(tell, folder, total)
+    with _alone(folder, said):
+        if not (folder / COMPLETE).exists():
+            modules = {path: _Module.of(path, root, package) for path in counts}
+            kept = {path for path, module in modules.items() if module.take_over(folder)}
+            _in_parallel(_order(set(counts) - kept), folder, said, modules)
+            (folder / COMPLETE).touch()
+    tell(total, total)
+    return True
+
+
+class _Saying:
+    """Reports how many kernels have come into the folder, at once and then every ``WORD_EVERY`` s."""
+
+    def __init__(self, tell: Tell, folder: Path, total: int) -> None:
+        self._tell, self._folder, self._total = tell, folder, total
+        self._last = -WORD_EVERY
+
+    def __call__(self) -> None:
+        if time.monotonic() - self._last >= WORD_EVERY:
+            self._last = time.monotonic()
+            self._tell(min(self._total, sum(1 for _ in self._folder.rglob("*.nbc"))), self._total)
+
+
+@contextmanager
+def _alone(folder: Path, said: _Saying) -> Iterator[None]:
+    """Inside, no other program compiles into the folder; the lock goes with its holder, however that ends."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        lock = (folder / _LOCK).open("w")
+    except OSError as error:
+        raise CompileError(f"kernels cannot be kept in {folder}: {error.strerror}; set CONOID_CACHE_DIR") from None
+    with lock:
+        while True:
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                break
+            except BlockingIOError:
+                said()
+                time.sleep(_LOOK)
+        yield
+
+
+@dataclass(frozen=True)
+class _Module:
+    """A file with kernels."""
+
+    name: str
+    """As Python imports it, and as its folder is called."""
+    hash: str
+    """Of all that its kernels are made of."""
+
+    @classmethod
+    def of(cls, path: Path, root: Path, package: str) -> "_Module":
+        name = ".".join((package, *path.relative_to(root).with_suffix("").parts))
+        return cls(name, store.module_hash(path, root))
+
+    def take_over(self, folder: Path) -> bool:
+        """Links its kernels from another folder beside ``folder`` that has them whole, unless they are there; whether
+        they are.
+        """
+        own = folder / self.name
+        if self._whole(own):
+            return True
+        for other in folder.parent.glob(f"*/{self.name}"):
+            if self._whole(other):
+                return self._link(other, own)
+        return False
+
+    def done(self, folder: Path) -> None:
+        """All its kernels are in the folder."""
+        own = folder / self.name
+        own.mkdir(exist_ok=True)
+        (own / _HASH).write_text(self.hash)
+
+    def _whole(self, own: Path) -> bool:
+        try:
+            return (own / _HASH).read_text() == self.hash
+        except OSError:
+            return False
+
+    def _link(self, other: Path, own: Path) -> bool:
+        """False where files cannot be linked: the kernels are compiled then."""
+        try:
+            own.mkdir(exist_ok=True)
+            for path in other.glob("*.nb[ci]"):
+                (own / path.name).unlink(missing_ok=True)
+                (own / path.name).hardlink_to(path)
+        except OSError:
+            return False
+        self.done(own.parent)
+        return True
+
+
+# The order --------------------------------------------------------------------------------------------------------
+
+
+def _order(files: set[Path]) -> dict[Path, set[Path]]:
+    """Of each file those that must come before it; the files that begin the longest chains of source come first."""
+    needs = {path: _needed(path, files) for path in files}
+    length = {path: len(path.read_text(encoding="utf-8")) for path in files}
+    chain: dict[Path, int] = {}
+    for path in sorted(files, key=lambda path: len(needs[path]), reverse=True):
+        chain[path] = length[path] + max((chain[user] for user in chain if path in needs[user]), default=0)
+    return {path: needs[path] for path in sorted(files, key=lambda path: (-chain[path], path))}
+
+
+def _needed(path: Path, files: set[Path]) -> set[Path]:
+    """The ``files`` that ``path`` imports, at any depth."""
+    return (store.reached([path]) & files) - {path}
+
+
+def _in_parallel(needs: dict[Path, set[Path]], folder: Path, said: _Saying, modules: dict[Path, _Module]) -> None:
+    """Compiles the files of ``needs``, each after those that it needs, by as many children as there are cores."""
+    children: queue.SimpleQueue[_Child] = queue.SimpleQueue()
+    number = min(_MOST, len(os.sched_getaffinity(0)), len(needs))
+    done: set[Path] = set()
+    running: dict[Future[None], Path] = {}
+    waiting, last = list(needs), time.monotonic()
+    with ThreadPoolExecutor(number) as threads, ExitStack() as ended:
+        for _ in range(number):
+            children.put(ended.enter_context(_child(folder)))
+        while waiting or running:
+            said()
+            ready = [path for path in waiting if needs[path] <= done][: number - len(running)]
+            for path in ready:
+                waiting.remove(path)
+                running[threads.submit(_by_one, children, modules[path].name)] = path
+            finished, _ = wait(running, timeout=_LOOK, return_when=FIRST_COMPLETED)
+            for future in finished:
+                future.result()
+                done.add(path := running.pop(future))
+                modules[path].done(folder)
+                last = time.monotonic()
+            if time.monotonic() - last > _PATIENCE:
+                name = modules[min(running.values())].name
+                raise CompileError(f"kernels of {name}: not compiled after {_PATIENCE:.0f} s")
+
+
+def _by_one(children: "queue.SimpleQueue[_Child]", module: str) -> None:
+    child = children.get()
+    child.compile(module)
+    children.put(child)
+
+
+# The children -----------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Child:
+    """A process that compiles modules; its standard error is the file ``errors``."""
+
+    process: "subprocess.Popen[bytes]"
+    errors: IO[bytes]
+
+    def compile(self, module: str) -> None:
+        """Returns when all kernels of the module are in the cache. Raises CompileError, and StoppedError where the run
+        was asked to stop: launchers tell all processes of a rank.
+        """
+        assert self.process.stdin is not None
+        assert self.process.stdout is not None
+        with suppress(BrokenPipeError):
+            self.process.stdin.write(module.encode() + b"\n")
+            if self.process.stdout.readline().decode().strip() == module:
+                return
+        if -self.process.wait() in REQUESTS:
+            raise StoppedError("stopped on request, before its kernels were compiled")
+        raise CompileError(f"kernels of {module} cannot be compiled: {self._reason()}")
+
+    def _reason(self) -> str:
+        """The last line that the child wrote, or how it ended."""
+        code = self.process.wait()
+        self.errors.seek(0)
+        lines = self.errors.read().decode(errors="replace").strip().splitlines()
+        return lines[-1].strip() if lines and code > 0 else f"the process ended with code {code}"
+
+
+@contextmanager
+def _child(folder: Path) -> Iterator[_Child]:
+    """Inside, a child lives that compiles into ``folder``; it ends too when this process dies."""
+    command = [sys.executable, "-m", "conoid.worker.kernels.compile", "--child"]
+    environment = os.environ | {store.VARIABLE: str(folder), "NUMBA_NUM_THREADS": "1"}
+    pipe = subprocess.PIPE
+    with (
+        tempfile.TemporaryFile() as errors,
+        subprocess.Popen(command, bufsize=0, stdin=pipe, stdout=pipe, stderr=errors, env=environment) as process,
+    ):
+        try:
+            yield _Child(process, errors)
+        finally:
+            process.kill()
+
+
+def _serve() -> int:
+    """The child: imports the modules named on stdin, compiles their kernels, and names each module when it is done.
+
+    The answers alone go to standard output; what anybody prints goes to standard error. Returns the exit code.
+    """
+    import importlib
+
+    from . import jit
+
+    answers = os.fdopen(os.dup(1), "w")
+    os.dup2(2, 1)
+    try:
+        for module in map(str.strip, sys.stdin):
+            importlib.import_module(module)
+            for kernel in jit.DECLARED:
+                if kernel.py_func.__module__ == module:
+                    kernel.load()
+            print(module, file=answers, flush=True)
+    except Exception as error:
+        text = " ".join(f"{type(error).__name__}: {error}".split())
+        print(text[:_MOST_WORDS], file=sys.stderr)
+        return CompileError.exit_code
+    return 0
+
+
+def words(done: int, total: int) -> str:
+    """The progress as users read it."""
+    return f"compiling kernels: {done} of {total}"
+
+
+def main() -> int:
+    """Compiles what is missing and reports the progress; the exit code."""
+    try:
+        fresh = compile_all(store.cache_folder(), lambda done, total: print(words(done, total), flush=True))
+    except (CompileError, StoppedError) as error:
+        print(error, file=sys.stderr)
+        return CompileError.exit_code
+    if not fresh:
+        print("all kernels are compiled")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(_serve() if "--child" in sys.argv else main())

@@ -1,0 +1,248 @@
+"""Kernels: functions that numba compiles for the signature that they are declared with, at their first call.
+
+``numba.njit`` compiles a function with a signature where it is declared, or loads it from the cache: every rank would
+load every kernel of the worker at its start, whatever its scene. ``njit`` of this module, the one that knows numba,
+does the same at the first call, from Python or from another kernel.
+
+numba counts who uses an array, atomically, for every array of every record that one kernel hands to another. A kernel
+that makes no array need not, and does not: that was three quarters of the narrow phase of a stack of plates.
+"""
+
+import inspect
+import os
+import sys
+import time
+from collections.abc import Callable
+from types import ModuleType
+from typing import Any
+
+from llvmlite import ir
+from numba import config, types
+from numba.core import cgutils
+from numba.core.bytecode import FunctionIdentity
+from numba.core.caching import CompileResultCacheImpl, FunctionCache, _CacheLocator
+from numba.core.compiler_lock import global_compiler_lock
+from numba.core.registry import CPUDispatcher, cpu_target
+from numba.core.sigutils import normalize_signature
+from numba.extending import intrinsic
+
+__all__ = ["DECLARED", "Kernel", "intrinsic", "njit", "packed", "prefetch", "record", "several", "types"]
+
+_BLAS = "scipy.linalg"
+_TO_READ, _TO_SECOND, _DATA = 0, 2, 1
+"""Of LLVM's prefetch: to read, into the second level of the cache, data."""
+FunctionIdentity._unique_ids = iter(lambda: int.from_bytes(os.urandom(8), "big"), None)  # type: ignore[assignment]
+"""Draws the numbers by which numba tells functions of one name apart, which it counts in each process. Of functions
+that are called the same in the objects of two kernels the first that is loaded serves both, so kernels that several
+processes have compiled could call each other's sorting, and crash (numba issue 10486)."""
+_MAKERS = {
+    "arange", "argsort", "array", "concatenate", "copy", "cumsum", "empty", "full", "ones", "sort", "unique", "zeros",
+}  # fmt: skip
+"""Functions and methods that make arrays, by their names. numba refuses to compile a kernel that makes some by others,
+or by assigning whole rows: it is declared with ``_nrt=True``."""
+DECLARED: list["Kernel"] = []
+"""Every kernel of the modules that are imported."""
+
+
+def _folder() -> str:
+    """The folder of all kernels, empty where it has no name."""
+    return str(config.CACHE_DIR)  # type: ignore[attr-defined]
+
+
+class _ModuleFolder(_CacheLocator):
+    """Where numba keeps the kernels of a module: below the folder that the sources name (kernels/store.py)."""
+
+    def __init__(self, function: Callable[..., Any], file: str) -> None:
+        self._py_file, self._line = file, function.__code__.co_firstlineno
+        self._path = os.path.join(_folder(), function.__module__)
+        os.makedirs(self._path, exist_ok=True)
+
+    def get_cache_path(self) -> str:
+        """The folder."""
+        return self._path
+
+    def get_source_stamp(self) -> str:
+        """The same at any time: other sources have another folder."""
+        return ""
+
+    def get_disambiguator(self) -> str:
+        """Tells kernels of one name apart."""
+        return str(self._line)
+
+    @classmethod
+    def from_function(cls, function: Callable[..., Any], file: str) -> "_ModuleFolder | None":
+        """None where the folder has no name, or cannot be made: numba then takes one of its own choice."""
+        try:
+            return cls(function, file) if _folder() else None
+        except OSError:
+            return None
+
+
+class _Kept(CompileResultCacheImpl):
+    _locator_classes = [_ModuleFolder, *CompileResultCacheImpl._locator_classes]  # noqa: RUF012
+
+
+class _Cache(FunctionCache):
+    _impl_class = _Kept
+
+
+class Kernel(CPUDispatcher):
+    """A compiled function with one signature."""
+
+    signature: Any = ""
+    """As it is declared: in numba's notation, or made of its ``types``."""
+    _address: int | None = None
+
+    @property
+    def result(self) -> Any:
+        """The type of what it returns."""
+        return normalize_signature(self.signature)[1]  # type: ignore[no-untyped-call]
+
+    def enable_caching(self) -> None:
+        """Keeps the kernel in the folder of its module."""
+        self._cache = _Cache(self.py_func)  # type: ignore[no-untyped-call]
+
+    def load(self) -> None:
+        """Compiles the kernel, or loads it from the cache, and what it calls; once, whatever thread asks."""
+        with global_compiler_lock:
+            if self.overloads:
+                return
+            with _loading:
+                self.targetoptions.setdefault("_nrt", _makes_arrays(self))
+                super().compile(self.signature)
+            self.disable_compile()
+
+    @property
+    def address(self) -> int:
+        """Where its machine code begins, for calls that pass arguments as C does."""
+        if self._address is None:
+            self.load()
+            compiled: Any = next(iter(self.overloads.values()))
+            self._address = compiled.library.get_pointer_to_function(compiled.fndesc.llvm_cfunc_wrapper_name)
+        return self._address
+
+    def compile(self, sig: Any) -> Any:
+        """As numba asks for it when another kernel calls this one: for the declared signature, whatever ``sig`` is."""
+        self.load()
+        (compiled,) = self.overloads.values()
+        return compiled.entry_point  # type: ignore[attr-defined]
+
+    def _compile_for_args(self, *args: Any, **kws: Any) -> "Kernel":
+        """As numba asks for it at the first call from Python. Loaded, it is called again, and checks its arguments."""
+        self.load()
+        return self
+
+
+def _makes_arrays(kernel: Kernel) -> bool:
+    """Whether a kernel makes arrays, or calls one that hands it some, and so has to count who uses them."""
+    names, used = kernel.py_func.__code__.co_names, inspect.getclosurevars(kernel.py_func)
+    known = [*used.nonlocals.values(), *used.globals.values()]
+    known += [getattr(module, name, None) for module in known if isinstance(module, ModuleType) for name in names]
+    handing = (kernel, *(each for each in known if isinstance(each, Kernel)))
+    return not _MAKERS.isdisjoint(names) or any(_holds_arrays(each.result) for each in handing)
+
+
+def _holds_arrays(kind: Any) -> bool:
+    if isinstance(kind, types.BaseTuple):
+        return any(_holds_arrays(each) for each in kind.types)  # type: ignore[attr-defined]
+    return isinstance(kind, types.Array)
+
+
+def njit(signature: Any, *, cache: bool = True, **options: Any) -> Callable[[Callable[..., Any]], Kernel]:
+    """Declares a kernel of that signature; ``options`` are numba's own."""
+
+    def declare(function: Callable[..., Any]) -> Kernel:
+        kernel = Kernel(function, targetoptions={"nopython": True, "boundscheck": None, **options})
+        kernel.signature = signature
+        if cache:
+            kernel.enable_caching()
+        DECLARED.append(kernel)
+        return kernel
+
+    return declare
+
+
+def several(*kinds: Any) -> Any:
+    """The type of a tuple."""
+    return types.Tuple(kinds)  # type: ignore[no-untyped-call]
+
+
+def record(name: type, *kinds: Any) -> Any:
+    """The type of a named tuple."""
+    if len(set(kinds)) == 1:
+        return types.NamedUniTuple(kinds[0], len(kinds), name)  # type: ignore[no-untyped-call]
+    return types.NamedTuple(kinds, name)  # type: ignore[no-untyped-call]
+
+
+packed: Any = cgutils.pack_array
+"""Makes LLVM's array of a list of values, for intrinsics."""
+
+
+def _prefetch(_: Any, array: Any, index: Any) -> Any:
+    word, byte = ir.IntType(32), ir.IntType(8).as_pointer()
+
+    def emit(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        data = context.make_array(signature.args[0])(context, builder, args[0]).data
+        kind = ir.FunctionType(ir.VoidType(), [byte, word, word, word])
+        call = builder.module.declare_intrinsic("llvm.prefetch", [byte], kind)
+        place = builder.bitcast(builder.gep(data, [args[1]]), byte)
+        builder.call(call, [place, word(_TO_READ), word(_TO_SECOND), word(_DATA)])
+        return context.get_dummy_value()
+
+    return types.void(array, index), emit
+
+
+prefetch: Any = intrinsic(_prefetch)
+"""In a kernel: has the cache line of a place of a one-dimensional array brought near; a place beyond its end does no
+harm. It changes no value."""
+
+
+class _Loading:
+    """CPU and wall seconds of this thread in loading kernels; a kernel that another one loads is within its time."""
+
+    def __init__(self) -> None:
+        self.spent = self.passed = 0.0
+        self._depth = 0
+
+    def __enter__(self) -> None:
+        if not self._depth:
+            self._began = time.thread_time(), time.monotonic()
+        self._depth += 1
+
+    def __exit__(self, *_: object) -> None:
+        self._depth -= 1
+        if not self._depth:
+            self.spent += time.thread_time() - self._began[0]
+            self.passed += time.monotonic() - self._began[1]
+
+
+_loading = _Loading()
+
+
+def _begin() -> None:
+    """Loads numba's own implementations, which the first kernel needs, without the BLAS of scipy, which none does.
+
+    Where scipy is installed numba would import all of its linear algebra for that.
+    """
+    absent = _BLAS not in sys.modules
+    if absent:
+        sys.modules[_BLAS] = None  # type: ignore[assignment]
+    try:
+        cpu_target.typing_context.refresh()
+        cpu_target.target_context.refresh()
+    finally:
+        if absent:
+            del sys.modules[_BLAS]
+
+
+_begin()
+
+
+def cpu_time() -> float:
+    """CPU time of this thread so far without the loading of kernels, s: what the work itself costs, in any step."""
+    return time.thread_time() - _loading.spent
+
+
+def wall_time() -> float:
+    """s on a clock of this process that stands still while kernels are loaded."""
+    return time.monotonic() - _loading.passed

@@ -1,0 +1,56 @@
+"""Kernels that a scene needs, loaded on all ranks at once before the first step.
+
+A kernel is loaded at its first call (worker/kernels/jit.py), which takes 3 to 20 ms. Without this module the ranks
+would load the forty kernels of fracture one rank after the other, as cracks reach them, while all others wait. The
+kernels are found by the names in the functions of the packages; there is no list of them.
+"""
+
+import sys
+from collections.abc import Iterator
+from importlib.abc import InspectLoader
+from inspect import ismodule
+from types import CodeType, ModuleType
+
+from conoid.cases.schema import Case
+
+from ..model.inheriting import inherit
+from .jit import DECLARED, Kernel
+
+_WORKER = (__package__ or "").rpartition(".")[0]
+
+
+def preload(case: Case) -> None:
+    """Loads what contact, fracture and boundaries call, where the ``case`` has them."""
+    needed = {
+        "contact.": case.contact is not None,
+        "fracture.": case.fractures,
+        "boundaries.": bool(case.boundaries),
+    }
+    prefixes = tuple(f"{_WORKER}.{name}" for name, there in needed.items() if there)
+    for name, module in sorted(sys.modules.items()):
+        if name.startswith(prefixes):
+            for kernel in called(module):
+                kernel.load()
+    if case.fractures:
+        inherit.load()
+
+
+def called(module: ModuleType) -> Iterator[Kernel]:
+    """The kernels that functions and methods of a module name, as its own or as those of another module."""
+    loader = module.__loader__
+    assert isinstance(loader, InspectLoader)
+    whole = loader.get_code(module.__name__)
+    assert whole is not None
+    for code in _functions(whole, {kernel.py_func.__code__ for kernel in DECLARED}):
+        known = [vars(module)[name] for name in code.co_names if name in vars(module)]
+        others = [vars(found) for found in known if ismodule(found) and found.__name__.startswith(_WORKER)]
+        known += [other[name] for other in others for name in code.co_names if name in other]
+        yield from (found for found in known if isinstance(found, Kernel))
+
+
+def _functions(code: CodeType, kernels: set[CodeType]) -> Iterator[CodeType]:
+    """What is defined within, at any depth, but for ``kernels``, which call others of their own."""
+    for constant in code.co_consts:
+        if isinstance(constant, CodeType) and constant not in kernels:
+            yield constant
+            yield from _functions(constant, kernels)

@@ -1,0 +1,112 @@
+"""Where compiled kernels are kept.
+
+numba's disk cache does not see an edited callee in another file. The name of the cache folder is therefore a hash of
+every source that a kernel is made of (files with kernels, and what they import from the worker), the versions and the
+processor. Path and time of a source are not in it: equal sources share a folder. Below it each module has a folder of
+its own (worker/kernels/jit.py), named by a hash of the sources of its kernels: a new folder takes over unchanged
+modules of an earlier one. Rank 0 hashes the sources once a run and compiles what is missing
+(worker/kernels/compile.py); it sends the hash to the other ranks.
+"""
+
+import ast
+import hashlib
+import os
+import platform
+import sys
+from functools import cache
+from importlib.metadata import version
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+VARIABLE = "NUMBA_CACHE_DIR"
+DECLARATION = "\n@njit("
+"""How a kernel begins in its source."""
+
+
+@cache
+def source_hash(root: Path = ROOT) -> str:
+    """A hash of the sources of all kernels below ``root``, and of the versions. 0.08 CPU seconds on an idle core."""
+    return _hashed(kernel_sources(root), root)
+
+
+def module_hash(path: Path, root: Path) -> str:
+    """A hash of what the kernels of a file are made of: it, what it imports, the versions and the processor."""
+    return _named(f"{path.relative_to(root)} {_hashed(reached([path]), root)}")
+
+
+def _hashed(sources: set[Path], root: Path) -> str:
+    h = hashlib.sha256()
+    for source in sorted(sources):
+        h.update(f"{os.path.relpath(source, root)} ".encode() + source.read_bytes())
+    for part in (version("numba"), version("llvmlite"), version("numpy"), platform.python_version()):
+        h.update(part.encode())
+    return h.hexdigest()
+
+
+def _named(sources: str) -> str:
+    return hashlib.sha256(f"{sources} {_processor()}".encode()).hexdigest()[:16]
+
+
+def cache_folder(sources: str | None = None) -> Path:
+    """The folder of this source tree's kernels on this machine; ``sources`` is ``source_hash()`` where it is known."""
+    base = os.environ.get("CONOID_CACHE_DIR") or Path.home() / ".cache" / "conoid"
+    return Path(base) / "kernels" / _named(sources or source_hash())
+
+
+def kernel_sources(root: Path) -> set[Path]:
+    """The files below ``root`` that hold kernels, and those whose names they import from there, to any depth."""
+    return reached(kernel_files(root))
+
+
+def reached(paths: list[Path]) -> set[Path]:
+    """The files ``paths``, and those that they import relatively, to any depth."""
+    found: set[Path] = set()
+    waiting = list(paths)
+    while waiting:
+        path = waiting.pop()
+        if path not in found:
+            found.add(path)
+            waiting += imported(path)
+    return found
+
+
+def kernel_files(root: Path) -> list[Path]:
+    """The files below ``root`` that hold kernels."""
+    return [path for path in root.rglob("*.py") if DECLARATION in path.read_text(encoding="utf-8")]
+
+
+def imported(path: Path) -> list[Path]:
+    """Files that ``path`` imports relatively at its top level: what a kernel can see."""
+    files = []
+    for level, module, names in _imports(path.read_text(encoding="utf-8")):
+        base = path.parents[level - 1].joinpath(*module.split("."))
+        files += [base.with_suffix(".py"), *((base / name).with_suffix(".py") for name in names)]
+    return [file for file in files if file.is_file()]
+
+
+@cache
+def _imports(text: str) -> list[tuple[int, str, list[str]]]:
+    """Level, module and names of each relative import at the top level of a source; each source is parsed once."""
+    found = [node for node in ast.parse(text).body if isinstance(node, ast.ImportFrom) and node.level > 0]
+    return [(node.level, node.module or "", [alias.name for alias in node.names]) for node in found]
+
+
+@cache
+def _processor() -> str:
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+    except OSError:
+        return platform.processor()
+    return next((line for line in lines if line.startswith("flags")), platform.processor())
+
+
+def use_cache(sources: str | None = None) -> Path:
+    """Points numba to the folder, and returns it. Raises RuntimeError when numba has been imported before: it would
+    keep kernels beside their sources, and not see an edited callee.
+    """
+    folder = cache_folder(sources)
+    if "numba" in sys.modules and os.environ.get(VARIABLE) != str(folder):
+        raise RuntimeError("numba was imported before its cache had a name")
+    os.environ[VARIABLE] = str(folder)
+    os.environ.setdefault("NUMBA_NUM_THREADS", "1")
+    return folder

@@ -1,0 +1,246 @@
+"""What each rank holds: its piece of the whole mesh, shared nodes, masses, blocks of tets.
+
+Rank 0 builds the whole mesh (assembly.py), numbers it and cuts it; every rank receives its own piece.
+Global ids follow the order of the parts and, within a part, the order of the mesh, on any number of ranks.
+"""
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from conoid.cases import schema
+from conoid.cases.estimate import estimate
+from conoid.cases.library import material as find_material
+from conoid.cases.survey import Survey
+from conoid.cases.touching import touching
+from conoid.cases.warned import warned
+
+from ..bonds.pieces import Pieces
+from ..elements import wear
+from ..errors import InputError
+from ..materials import models
+from ..model.shares import Shares
+from ..model.state import (
+    CHUNK,
+    MASS,
+    Block,
+    Flags,
+    Floats,
+    Indices,
+    Ints,
+    Load,
+    LoadedFaces,
+    Model,
+    Nodes,
+    Tets,
+    chunked,
+)
+from ..parallel.comm import Comm, SerialComm
+from ..parallel.decompose import bisect
+from ..parallel.ownership import Neighbour
+from . import assembly
+from .assembly import Say, Whole
+
+GROUPS = 256
+"""Parts of the mesh whose loads are told (worker/migration/groups.py)."""
+
+
+@dataclass
+class Piece:
+    """What one rank receives."""
+
+    node_ids: Ints
+    node_part: Indices
+    node_owner: Indices
+    owned: Flags
+    points: Floats
+    velocity: Floats
+    mass: Floats
+    node_volume: Floats
+    shares: Shares
+    """Of the nodes of several parts."""
+    loads: list[Load | LoadedFaces]
+    """Of the tractions of the case, on all nodes that this rank holds; of those that follow the surface the faces of
+    its tets."""
+    tied: Pieces
+    """Of the bonds of meshes that do not match, of all ranks."""
+    tet_ids: Ints
+    tet_part: Indices
+    tets: Indices
+    tet_volume: Floats
+    across: Indices
+    """(tets, 4) see state.Block."""
+    border: Flags
+    node_group: Indices
+    tet_group: Indices
+    groups: Floats
+    """(groups, 4) see state.Model."""
+    neighbours: list[Neighbour]
+    totals: tuple[int, int, int]
+    """Tets, nodes and shared nodes of the whole."""
+    part_starts: Ints
+    """Global id of the first tet of each part."""
+    mean_volumes: Floats
+    """(parts,) m^3."""
+    size: float
+    """Largest coordinate of the whole, m."""
+    slack: Floats
+    rounding: Floats
+    """(parts,) see state.Model."""
+    marks: Ints
+    """(nodes,) see state.Nodes."""
+    warnings: list[str]
+    """See Whole."""
+
+
+def cut(whole: Whole, ranks: int, scale: tuple[float, float, float] = (1.0, 1.0, 1.0)) -> list[Piece]:
+    """The pieces of ``ranks`` ranks: tets by recursive bisection of their centres, nodes with every tet's rank.
+
+    ``scale`` multiplies the centres first: a direction that is small is cut last.
+    Raises InputError when there are more ranks than tets.
+    """
+    if ranks > len(whole.tets):
+        raise InputError(f"run.ranks = {ranks}: at most {len(whole.tets)}, the number of tets")
+    centres = whole.points[whole.tets].mean(axis=1) * np.array(scale)
+    owner, _ = bisect(centres, np.arange(len(centres)), np.ones(len(centres)), ranks, SerialComm())
+    nodes_of = [np.unique(whole.tets[owner == rank]) for rank in range(ranks)]
+    holders = np.zeros(len(whole.points), np.int32)
+    for nodes in nodes_of:
+        holders[nodes] += 1
+    home, grouped = _home(whole, owner), _grouped(whole, centres)
+    starts = np.searchsorted(whole.tet_part, np.arange(whole.tet_part[-1] + 1))
+    means = np.array([math.fsum(part) / max(len(part), 1) for part in np.split(whole.volumes, starts[1:])])
+    shared = holders > 1
+    totals = (len(whole.tets), len(whole.points), int(shared.sum()))
+    return [
+        _piece(whole, owner, rank, nodes_of, shared, home, grouped, totals, (starts, means)) for rank in range(ranks)
+    ]
+
+
+def _grouped(whole: Whole, centres: Floats) -> tuple[Indices, Indices, Floats]:
+    """The groups of the nodes and of the tets, and the groups; the tets are bisected by their ``centres`` (tets, 3)."""
+    n = min(GROUPS, len(centres))
+    tets, _ = bisect(centres, np.arange(len(centres)), np.ones(len(centres)), n, SerialComm())
+    middle, sizes = whole.points[whole.tets].mean(axis=1), np.bincount(tets, minlength=n)
+    sums = [np.bincount(tets, middle[:, axis], n) / sizes for axis in range(3)]
+    return _home(whole, tets), tets, np.column_stack([*sums, sizes])
+
+
+def _home(whole: Whole, owner: Indices) -> Indices:
+    """Which part of a cut has each node: the one that has its tet of smallest id; that rank owns the node."""
+    home = np.zeros(len(whole.points), np.int32)
+    home[whole.tets[::-1].reshape(-1)] = np.repeat(owner[::-1], 4)
+    return home
+
+
+def _piece(
+    whole: Whole, owner: Indices, rank: int, nodes_of: list[Ints], shared: Flags, home: Indices,
+    grouped: tuple[Indices, Indices, Floats], totals: tuple[int, int, int], parts: tuple[Ints, Floats],
+) -> Piece:  # fmt: skip
+    nodes, ids = nodes_of[rank], np.flatnonzero(owner == rank)
+    local = np.full(len(whole.points), -1, np.int32)
+    local[nodes] = np.arange(len(nodes), dtype=np.int32)
+    mine = nodes[shared[nodes]]
+    neighbours = []
+    for other, theirs in enumerate(nodes_of):
+        common = np.intersect1d(mine, theirs, assume_unique=True) if other != rank else mine[:0]
+        if len(common):
+            neighbours.append(Neighbour(other, local[common]))
+    tets = whole.tets[ids]
+    return Piece(
+        nodes.astype(np.int64), whole.node_part[nodes], home[nodes], home[nodes] == rank, whole.points[nodes],
+        whole.velocity[nodes], whole.mass[nodes], whole.node_volume[nodes], whole.shares.of_nodes(local),
+        [load.here(nodes, ids) for load in whole.loads], whole.tied,
+        ids.astype(np.int64),
+        whole.tet_part[ids], local[tets], whole.volumes[ids],
+        whole.across[ids] if len(whole.across) else whole.across, np.any(shared[tets], axis=1),
+        grouped[0][nodes], grouped[1][ids], grouped[2], neighbours, totals, *parts, float(np.abs(whole.points).max()),
+        whole.near.slack, whole.near.rounding, whole.marks[nodes] if len(whole.marks) else whole.marks, whole.warnings,
+    )  # fmt: skip
+
+
+def build(case: schema.Case, folder: Path, comm: Comm, say: Say = assembly.quiet) -> tuple[Model, Piece]:
+    """This rank's model; rank 0 calls ``say`` with what it is at.
+
+    Raises MeshError on every rank when rank 0 cannot build a mesh.
+    """
+    pieces: list[Piece] | None = None
+    failure: Exception | None = None
+    if comm.rank == 0:
+        try:
+            whole = assembly.assemble(case, folder, say)
+            whole.warnings[:0] = _warned(case, folder, whole.survey)
+            say(f"cutting {len(whole.tets)} tets for {comm.size} rank{'s' if comm.size > 1 else ''}")
+            pieces = cut(whole, comm.size, case.run.cut_scale)
+        except Exception as error:
+            failure = error
+    failure = comm.broadcast(failure)
+    if failure is not None:
+        raise failure
+    piece: Piece = comm.scatter(pieces)
+    return _model(case, piece), piece
+
+
+def _warned(case: schema.Case, folder: Path, survey: Survey) -> list[str]:
+    """What is odd about the case, as who checks it before is told."""
+    try:
+        expected = estimate(case, folder, survey)
+    except (ArithmeticError, ValueError):  # too many elements to be counted: it is refused where it is checked
+        return []
+    return [str(each) for each in warned(case, expected, survey, [*touching(case), *survey.touching])]
+
+
+def alone(case: schema.Case, whole: Whole) -> tuple[Model, Piece]:
+    """The model of a single rank."""
+    (piece,) = cut(whole, 1)
+    return _model(case, piece), piece
+
+
+def _model(case: schema.Case, piece: Piece) -> Model:
+    nodes = Nodes(
+        id=piece.node_ids, part=piece.node_part, owner=piece.node_owner, owned=piece.owned, x0=piece.points.copy(),
+        x=piece.points, v=piece.velocity, mass=piece.mass, force=np.zeros(piece.points.shape, np.int64),
+        stepping=np.zeros(len(piece.mass)),
+        group=piece.node_group, marks=piece.marks, shares=piece.shares,
+    )  # fmt: skip
+    blocks = [_block(case, piece, index) for index in range(len(case.parts)) if (piece.tet_part == index).any()]
+    return Model(
+        nodes, blocks, [p.name for p in case.parts], piece.totals[0], piece.totals[1], piece.part_starts,
+        piece.mean_volumes, piece.size, piece.slack, piece.rounding, piece.groups,
+    )  # fmt: skip
+
+
+def _block(case: schema.Case, piece: Piece, index: int) -> Block:
+    part, chosen = case.parts[index], np.flatnonzero(piece.tet_part == index)
+    material = find_material(case, part.material)
+    chosen = chosen[np.argsort(~piece.border[chosen], kind="stable")]
+    rows = models.rows_of(material, case.numerics.pressure)
+    state = np.zeros((-(-len(chosen) // CHUNK), rows, CHUNK))
+    state[:, MASS, :] = chunked(piece.tet_volume[chosen] * material.density)
+    for row, value in models.beginning(material, part.temperature).items():
+        if row < rows:
+            state[:, row, :] = value
+    across = piece.across[chosen] if len(piece.across) else piece.across
+    tets = np.ascontiguousarray(piece.tets[chosen], np.uint32)
+    made = block(case, index, piece.tet_ids[chosen], tets, state, across, int(piece.border[chosen].sum()))
+    made.group = piece.tet_group[chosen]
+    return made
+
+
+def block(
+    case: schema.Case, index: int, ids: Ints, tets: Tets, state: Floats, across: Indices, border: int
+) -> Block:  # fmt: skip
+    """The block of part ``index``: what is known of its tets, the ``border`` ones first, and what the case says."""
+    part = case.parts[index]
+    material = find_material(case, part.material)
+    return Block(
+        part=index, n=len(ids), id=ids, state=state, tets=tets,
+        kind=models.strength_of(material), eos=models.eos_of(material),
+        params=models.parameters(material, case.numerics.viscosity, breaks=part.fracture is not None),
+        border_chunks=-(-border // CHUNK), temperature=part.temperature, across=across,
+        worn=np.zeros(len(ids) if part.erosion is not None else 0, bool), life=wear.life(part.erosion),
+        rigid=part.rigid is not None,
+        quiet=np.zeros((-(-len(ids) // CHUNK), 3), np.int64),
+    )  # fmt: skip

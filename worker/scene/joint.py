@@ -1,0 +1,35 @@
+"""Parts of one body that gmsh meshes together."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+from conoid.cases.bodies import Mesh, Primitive, Symmetric
+from conoid.cases.joined import bodies
+from conoid.cases.schema import Case, Part
+from conoid.cases.solids import Meshed
+
+from ..mesh.build import build_together
+from ..mesh.model import TetMesh
+
+
+def asked(part: Part) -> Mesh:
+    """The mesh of a part, with the default that its erosion decides."""
+    mesh = part.mesh
+    if isinstance(mesh, Symmetric) and mesh.aligned is None:
+        return mesh.model_copy(update={"aligned": part.erosion is not None})
+    return mesh
+
+
+def grouped(case: Case, index: int) -> list[int]:
+    """The parts that gmsh meshes together with one: those of its body that it makes."""
+    body = bodies(case)
+    made = [isinstance(part.mesh, Primitive | Meshed) and part.mesh.generator == "gmsh" for part in case.parts]
+    return [i for i, of in enumerate(body) if of == body[index] and made[i]] if made[index] else []
+
+
+def built_together(
+    case: Case, group: list[int], folder: Path, said: Callable[[], None] = lambda: None
+) -> dict[int, TetMesh]:
+    """The meshes of the parts of a ``group``, by their numbers; ``said`` is called before they are made."""
+    meshes = {f"parts[{i}].mesh": asked(case.parts[i]) for i in group}
+    return dict(zip(group, build_together(meshes, folder, made=said), strict=True))

@@ -1,0 +1,108 @@
+"""Which nodes and faces are in the sets of mesh files that a case is on."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from conoid.cases import on
+from conoid.cases.problems import dotted
+from conoid.cases.schema import Case
+
+from ..errors import MeshError
+from ..mesh.lookup import known, meant
+from ..mesh.model import NodeSet, TetMesh
+from ..model.state import Flags, Indices, Ints
+
+Meshes = Mapping[int, tuple[TetMesh, Ints]]
+"""Of parts by their numbers, with the places (n,) of their nodes among all."""
+
+
+@dataclass
+class Marks:
+    """Of all nodes of some parts."""
+
+    nodes: Ints
+    """(n,) bit b of a node: whether it is in set b of ``cases.on.bits``; (0,) where the case is on none."""
+    faces: dict[int, Ints] = field(default_factory=dict)
+    """(k, 3) ascending nodes of the faces of surfaces, by bit."""
+    surfaces: dict[int, set[int]] = field(default_factory=dict)
+    """The parts in which a set is a surface, by bit."""
+    told: list[str] = field(default_factory=list)
+    """What the user should know."""
+
+    def holds(self, bit: int) -> Flags:
+        """(n,) the nodes that are in a set."""
+        return held(self.nodes, bit)
+
+    def chosen(self, bit: int, faces: Indices, part: Indices) -> Flags:
+        """(m,) which of the exposed faces (m, 3) a set has: those of a surface, and those all of whose nodes are in a
+        set of nodes. ``part``: (m,) whose they are.
+        """
+        of_surface = np.isin(part, sorted(self.surfaces.get(bit, ())))
+        by_nodes = self.holds(bit)[faces].all(axis=1)
+        if bit not in self.faces:
+            return np.asarray(by_nodes)
+        rows = np.concatenate([self.faces[bit], np.sort(faces, axis=1).astype(np.int64)])
+        _, of = np.unique(rows, axis=0, return_inverse=True)
+        of, first = of.reshape(-1), len(self.faces[bit])
+        listed = np.isin(of[first:], of[:first])
+        return np.asarray(np.where(of_surface, listed, by_nodes))
+
+
+def held(marks: Ints, bit: int) -> Flags:
+    """(n,) which nodes have a bit."""
+    return np.asarray((marks >> bit & 1).astype(bool))
+
+
+def marks(case: Case, meshes: Meshes, n: int, boundary: int | None = None) -> Marks:
+    """Of ``n`` nodes; ``boundary``: of what this one is on alone. Raises MeshError where a set is not there, has no
+    node, or a name means two things.
+    """
+    bits = on.bits(case)
+    made = Marks(np.zeros(n if bits else 0, np.int64))
+    numbers = {part.name: index for index, part in enumerate(case.parts)}
+    for location, spec in on.ons(case):
+        if boundary is not None and location != ("boundaries", boundary):
+            continue
+        candidates = [numbers[part.name] for part in on.parts(case, spec)]
+        where = f"{dotted((*location, 'on'))} = {spec.on!r}"
+        try:
+            found = _found(case, spec.on or "", [i for i in candidates if i in meshes], meshes, bool(on.named(spec)))
+        except MeshError as error:
+            raise MeshError(f"{where}: {error}") from None
+        for index, one in found:
+            _mark(made, bits[spec.on or ""], index, one, meshes[index][1])
+            if one.inner and hasattr(spec, "pressure"):
+                name = case.parts[index].name
+                made.told.append(f"{where}: {one.inner} of its faces lie inside of {name!r} and bear nothing")
+    return made
+
+
+def _found(case: Case, name: str, candidates: Sequence[int], meshes: Meshes, each: bool) -> list[tuple[int, NodeSet]]:
+    """The set in each part; ``each``: whether all of these must have it."""
+    if not candidates:
+        return []
+    found = [(index, meant(meshes[index][0].sets, name)) for index in candidates]
+    there = [(index, one) for index, one in found if one is not None]
+    lacking = [index for index, one in found if one is None]
+    if lacking and (each or not there):
+        sets = [one for index in lacking for one in meshes[index][0].sets]
+        raise MeshError(f"the mesh of {case.parts[lacking[0]].name!r} has no set of this name; known: {known(sets)}")
+    filled = [(index, one) for index, one in there if len(one.nodes)]
+    if not filled or (each and len(filled) < len(there)):
+        empty = next(index for index, one in there if not len(one.nodes))
+        raise MeshError(f"no node of {case.parts[empty].name!r} is in it")
+    files = {origin.file for index, _ in filled if (origin := meshes[index][0].origin) is not None}
+    if len(files) > 1:
+        names = ", ".join(repr(case.parts[index].name) for index, _ in filled)
+        raise MeshError(f"sets of several files have this name, in {names}; say in parts which are meant")
+    return filled
+
+
+def _mark(made: Marks, bit: int, index: int, one: NodeSet, places: Ints) -> None:
+    made.nodes[places[one.nodes]] |= np.int64(1) << np.int64(bit)
+    if one.faces is not None:
+        faces = np.sort(places[one.faces], axis=1)
+        made.faces[bit] = np.concatenate([made.faces.get(bit, np.zeros((0, 3), np.int64)), faces])
+        made.surfaces.setdefault(bit, set()).add(index)

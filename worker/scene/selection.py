@@ -1,0 +1,201 @@
+"""Nodes and faces that the regions of a case select, and whether they are those that ``validate`` expects."""
+
+import logging
+from collections.abc import Container, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from conoid.cases import loaded, region, schema
+from conoid.cases.bodies import MeshFile
+from conoid.cases.on import bits
+from conoid.cases.region import Region
+
+from ..mesh.faces import normals
+from ..model.state import Flags, Floats, Indices, Ints
+from .marks import Marks
+
+log = logging.getLogger("conoid.worker")
+
+_CLOSE = 0.5
+"""Of the shortest edge: how far outside of a border nodes are counted, to see whether they lie in layers. Chosen: the
+next layer of a regular mesh is twice as far."""
+_LAYER, _FEWEST = 0.5, 4
+"""Of these nodes, how many nearer than region.MOST are a layer, and their least number. Chosen: a fifth of them is that
+near where they lie at random."""
+Members = tuple[Ints, Indices]
+"""(m,) nodes and (m,) their parts: a row for each part of each node (state.Nodes.of_parts)."""
+_EDGES = ((0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3))
+"""Of a tet."""
+
+
+@dataclass(frozen=True)
+class Nearness:
+    """How near to a border a node of each part counts as on it, m; see ``cases/region.py``."""
+
+    edge: Floats
+    """(parts,) the shortest edge."""
+    slack: Floats
+    """(parts,) for regions."""
+    rounding: Floats
+    """(parts,) for planes of symmetry."""
+
+
+def nearness(case: schema.Case, x: Floats, members: Members, tets: Indices, tet_part: Indices) -> Nearness:
+    """Of the parts of a case, from all their nodes (n, 3), tets (m, 4), and the parts of both."""
+    nodes, part = members
+    n = len(case.parts)
+    squared, reach = np.full(n, np.inf), np.zeros(n)
+    for i, j in _EDGES:
+        along = x[tets[:, i]] - x[tets[:, j]]
+        np.minimum.at(squared, tet_part, (along * along).sum(axis=1))
+    np.maximum.at(reach, part, np.abs(x).max(axis=1)[nodes])
+    edge = np.sqrt(squared)
+    found = [(each.mesh, float(a), float(b)) for each, a, b in zip(case.parts, edge, reach, strict=True)]
+    return Nearness(
+        edge, np.array([region.slack(*each) for each in found]), np.array([region.rounding(*each) for each in found])
+    )
+
+
+def named(spec: schema.Boundary, parts: Sequence[str]) -> Flags:
+    """(parts,) the parts that a boundary names; all where it names none."""
+    return np.array([not spec.parts or name in spec.parts for name in parts])
+
+
+def settled(case: schema.Case, there: Container[int]) -> list[bool]:
+    """Of each boundary, whether all parts that it is for are among those that are ``there``, by number."""
+    return [all(index in there for index in np.flatnonzero(meant(case, spec)).tolist()) for spec in case.boundaries]
+
+
+def meant(case: schema.Case, spec: schema.Boundary) -> Flags:
+    """(parts,) the parts that a boundary is for: where it is on a set and names none, those with a mesh from a file."""
+    found = named(spec, [part.name for part in case.parts])
+    if getattr(spec, "on", None) is not None and not spec.parts:
+        found &= np.array([isinstance(part.mesh, MeshFile) for part in case.parts])
+    return found
+
+
+def inside(spec: schema.Prescribed | schema.Traction, x: Floats, part: Indices, near: Floats) -> Flags:
+    """(n,) the nodes (n, 3) of any part that lie in the region of a boundary; ``near``: (parts,) slack, m."""
+    return np.asarray(np.full(len(x), True) & Region.of(spec).holds(x.T, near[part]))
+
+
+def held(
+    spec: schema.Prescribed | schema.Traction, names: Sequence[str], x: Floats, members: Members, near: Floats
+) -> Flags:  # fmt: skip
+    """(n,) the nodes (n, 3) of the parts of a boundary that lie in its region; ``names`` of the parts, and ``near``
+    (parts,): slack, m.
+    """
+    nodes, part = members
+    some = named(spec, names)[part] & inside(spec, x[nodes], part, near)
+    found = np.zeros(len(x), bool)
+    found[nodes[some]] = True
+    return found
+
+
+@dataclass(frozen=True)
+class Selected:
+    """What the region of a boundary selects: area, m^2, and faces of a traction, nodes of a velocity."""
+
+    boundary: int
+    nodes: int
+    faces: int = 0
+    area: float = 0.0
+
+
+def compared(case: schema.Case, found: Sequence[Selected]) -> Iterator[str]:
+    """What is selected beside what ``validate`` expects: all of it into the log, a warning where they disagree."""
+    expected = {load.boundary: load for load in loaded.loads(case)}
+    for each in found:
+        load = expected[each.boundary]
+        took, meant = _words(each), load.words()
+        log.info("boundaries[%d] %s; expected: %s", each.boundary, took, meant)
+        if not load.agrees(each.nodes, each.faces, each.area):
+            yield (
+                f"boundaries[{each.boundary}]: {took}, where validate expects {meant}; check its box, its cylinder and "
+                "its parts against the mesh"
+            )
+
+
+def _words(found: Selected) -> str:
+    if found.faces:
+        return f"acts on {found.faces} faces, {1e6 * found.area:.6g} mm^2"
+    return f"drives {found.nodes} nodes"
+
+
+def missed(
+    case: schema.Case, number: int, x: Floats, members: Members, near: Nearness, took: Flags
+) -> Iterator[str]:  # fmt: skip
+    """Warnings for the region of a boundary that took something of the parts ``took`` (parts,): parts that it names and
+    took nothing of, and layers of nodes that lie so little outside of it that they were hardly meant to.
+    """
+    spec = case.boundaries[number]
+    assert isinstance(spec, schema.Prescribed | schema.Traction)
+    for name, some in zip([each.name for each in case.parts], took, strict=True):
+        if name in spec.parts and not some:
+            yield f"boundaries[{number}]: acts on nothing of part {name!r}, which it names"
+    if spec.on is not None:
+        return
+    nodes, part = members
+    chosen = np.flatnonzero(named(spec, [each.name for each in case.parts])[part])
+    at, of = x[nodes[chosen]], part[chosen]
+    took_up, close, wide = (
+        inside(spec, at, of, within) for within in (near.slack, region.MOST * near.edge, _CLOSE * near.edge)
+    )
+    fringe, around = int((close & ~took_up).sum()), int((wide & ~took_up).sum())
+    if fringe >= _FEWEST and fringe > _LAYER * around:
+        yield (
+            f"boundaries[{number}]: {fringe} nodes lie outside of its region by less than a tenth of an edge and are "
+            "not in it; move its border away from them"
+        )
+
+
+def counted(
+    case: schema.Case,
+    number: int,
+    x: Floats,
+    members: Members,
+    faces: tuple[Indices, Indices],
+    near: Nearness,
+    marked: Marks,
+) -> tuple[Selected, Flags]:
+    """What boundary ``number`` selects of nodes (n, 3), and of exposed ``faces``, (m, 3) and their parts (m,); which
+    nodes of a velocity, or faces of a traction, that are. ``marked``: of the nodes.
+    """
+    spec, names = case.boundaries[number], [each.name for each in case.parts]
+    assert isinstance(spec, schema.Prescribed | schema.Traction)
+    found = held(spec, names, x, members, near.slack)
+    bit = None if spec.on is None else bits(case)[spec.on]
+    if bit is not None and isinstance(spec, schema.Prescribed):
+        found &= marked.holds(bit)
+    nodes, (corners, of) = int(found.sum()), faces
+    if isinstance(spec, schema.Prescribed):
+        return Selected(number, nodes), found
+    chosen: Flags = np.asarray(found[corners].all(axis=1) & meant(case, spec)[of])
+    if bit is not None:
+        chosen &= marked.chosen(bit, corners, of)
+    area = float(0.5 * np.linalg.norm(normals(x, corners[chosen]), axis=1).sum())
+    return Selected(number, nodes, int(chosen.sum()), area), chosen
+
+
+NO_FACES = np.zeros((0, 3), np.int32), np.zeros(0, np.int32)
+"""For ``counted``."""
+
+
+def off_planes(
+    case: schema.Case, x: Floats, members: Members, near: Nearness, known: Sequence[bool]
+) -> Iterator[str]:  # fmt: skip
+    """A warning for each plane of symmetry that is ``known`` off which nodes lie so little that they were hardly meant
+    to.
+    """
+    names, (nodes, part) = [each.name for each in case.parts], members
+    for number, plane in case.boundaries_of(schema.Symmetry):
+        if not known[number]:
+            continue
+        away = np.abs(x[nodes, "xyz".index(plane.axis)] - plane.at)
+        off = named(plane, names)[part] & (away > near.rounding[part]) & (away <= near.slack[part])
+        if off.sum() >= _FEWEST:
+            yield (
+                f"boundaries[{number}]: {int(off.sum())} nodes start up to {away[off].max():.2g} m off this plane of "
+                "symmetry, less than a hundredth of an edge, and are not on it: they are free until they reach it"
+            )

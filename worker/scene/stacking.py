@@ -1,0 +1,103 @@
+"""The meshes of all parts as one mesh: nodes and tets in the order of the parts, joined where bonds have it so."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from conoid.cases.on import ons
+from conoid.cases.schema import Case
+
+from ..errors import MeshError
+from ..fracture.connectivity import components
+from ..mesh.faces import across
+from ..mesh.joining import Placed, joined, require_faces
+from ..mesh.model import TetMesh
+from ..mesh.sharing import shared_nodes
+from ..model.state import Flags, Floats, Indices, Ints
+from .pieces import pieces
+from .setting import turned
+
+
+@dataclass
+class Stacked:
+    """All nodes and tets."""
+
+    points: Floats
+    """(n, 3) m, as their parts turn them."""
+    tets: Indices
+    """(m, 4)."""
+    tet_part: Indices
+    node_part: Indices
+    """(n,) of nodes of several parts the first."""
+    body: Indices
+    """(n,) which body each node is of: a part, a piece of one, or what bonds hold together."""
+    part_of_body: Ints
+    """(bodies,) the first part of each; also of those that are part of another."""
+    stands: Ints
+    """(bodies,) the body that each is part of."""
+    across: Indices
+    """(m, 4) see state.Block; (0, 4) where nobody asks."""
+    warnings: list[str]
+    read: dict[int, tuple[TetMesh, Ints]]
+    """Meshes from files by parts, and where their nodes are among all; where the case is on sets."""
+
+    def any_of_body(self, allowed: Flags) -> Flags:
+        """(bodies, bodies) who meets whom: whatever meets a part of a body meets the body; ``allowed``: by parts of
+        bodies alone.
+        """
+        met, (one, other) = np.zeros_like(allowed), np.nonzero(allowed)
+        met[self.stands[one], self.stands[other]] = True
+        return met
+
+
+def stacked(case: Case, meshes: Iterable[tuple[int, TetMesh]], overlaps: bool) -> Stacked:
+    """The ``meshes`` of parts by their numbers, in their order; ``overlaps``: whether pieces of a part that overlap are
+    looked for. Raises MeshError, InputError.
+    """
+    points, tets, tet_part, node_part, told = [], [], [], [], list[str]()
+    bodies, part_of_body, placed, n = [], list[int](), dict[int, Placed](), 0
+    read, on_sets = dict[int, tuple[TetMesh, Ints]](), bool(ons(case))
+    for index, mesh in meshes:
+        piece, said = pieces(case, index, mesh, overlaps)
+        told += said
+        bodies.append(piece + len(part_of_body))
+        part_of_body += [index] * (int(piece.max(initial=0)) + 1)
+        points.append(turned(mesh.points, case.parts[index].turn))
+        placed[index] = n, mesh.origin, points[-1]
+        if on_sets and mesh.origin is not None:
+            read[index] = mesh, n + np.arange(len(mesh.points))
+        tets.append(mesh.tets.astype(np.int64) + n)
+        node_part.append(np.full(len(mesh.points), index, np.int32))
+        tet_part.append(np.full(len(mesh.tets), index, np.int32))
+        n += len(mesh.points)
+    for refusal in shared_nodes(case, [(i, o, x) for i, (_, o, x) in placed.items() if o is not None]):
+        raise MeshError(refusal)
+    made = Stacked(
+        np.concatenate(points), np.concatenate(tets).astype(np.int32), np.concatenate(tet_part),
+        np.concatenate(node_part), np.concatenate(bodies), np.array(part_of_body), np.arange(len(part_of_body)),
+        np.zeros((0, 4), np.int32), told, read,
+    )  # fmt: skip
+    several = _join(made, joined(case, placed, n))
+    if several or case.in_contact or case.fractures:
+        made.across = across(made.tets)
+    if several:
+        require_faces(case, placed, made.across, made.tet_part)
+    return made
+
+
+def _join(made: Stacked, stands: Ints) -> bool:
+    """Leaves of the nodes those that stand for themselves; ``stands`` (n,): who stands for each. Whether any node does
+    not.
+    """
+    kept = np.flatnonzero(stands == np.arange(len(stands)))
+    if len(kept) == len(stands):
+        return False
+    edges = np.column_stack([made.body, made.body[stands]])
+    made.stands = components(len(made.part_of_body), np.unique(edges, axis=0))
+    made.body = made.stands[made.body].astype(np.int32)
+    places = np.searchsorted(kept, stands)
+    made.tets = places[made.tets].astype(np.int32)
+    made.read = {part: (mesh, places[nodes]) for part, (mesh, nodes) in made.read.items()}
+    made.points, made.node_part, made.body = made.points[kept], made.node_part[kept], made.body[kept]
+    return True

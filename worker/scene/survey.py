@@ -1,0 +1,89 @@
+"""What the mesh files of a case hold: ``python -m conoid.worker.scene.survey``.
+
+One question on standard input, one answer on standard output (conoid.cases.survey). Files are read by child processes
+with limits, as for a run, and kept as for a run: one that follows does not read them again.
+"""
+
+import sys
+from pathlib import Path
+
+from conoid.cases import survey
+from conoid.cases.load import parse_case
+from conoid.cases.schema import Case
+from conoid.cases.solids import Measured
+from conoid.cases.survey import Survey
+
+from ..errors import ConoidError
+from ..kernels import compile as ahead
+from ..kernels import store
+from ..mesh.build import build
+from ..mesh.child import Limits, limit
+from ..mesh.model import TetMesh
+from ..mesh.sharing import Placed, shared_nodes
+from . import counting
+from .facts import Facts
+from .joint import built_together, grouped
+from .setting import turned
+
+
+def surveyed(case: Case, folder: Path, compiled: bool = True) -> Survey:
+    """Reads the files of all parts; what is wrong with one of them hides nothing that is wrong with another. Where all
+    can be used, a run begins with them as far as its first step; without ``compiled`` kernels nothing finds out whether
+    bodies overlap.
+    """
+    facts, refused, placed, meshes = Facts(case), list[str](), list[Placed](), dict[int, TetMesh]()
+    for index, part in enumerate(case.parts):
+        if not isinstance(part.mesh, Measured):
+            continue
+        try:
+            meshes |= _made(case, index, folder, meshes)
+        except ConoidError as error:
+            refused += [] if str(error) in refused else [str(error)]
+            continue
+        mesh = meshes[index]
+        facts.take(index, mesh)
+        if mesh.origin is not None:
+            placed.append((index, mesh.origin, turned(mesh.points, part.turn)))
+    try:
+        loads = list(counting.loads(case, meshes))
+    except ConoidError as error:
+        return Survey(parts=facts.parts, refused=[*refused, str(error)])
+    refused += [*shared_nodes(case, placed), *counting.empty(case, loads)]
+    if refused:
+        return Survey(parts=facts.parts, loads=loads, refused=refused)
+    try:
+        told = _begun(case, meshes, compiled)
+    except ConoidError as error:
+        return Survey(parts=facts.parts, loads=loads, refused=[str(error)])
+    return Survey(parts=facts.parts, loads=loads, touching=facts.survey().touching, told=told)
+
+
+def _made(case: Case, index: int, folder: Path, there: dict[int, TetMesh]) -> dict[int, TetMesh]:
+    """The mesh of a part, and of those that are meshed together with it, where they are not ``there`` yet."""
+    if index in there:
+        return {}
+    group = grouped(case, index)
+    if len(group) > 1:
+        return built_together(case, group, folder)
+    return {index: build(case.parts[index].mesh, folder, key=f"parts[{index}].mesh")}
+
+
+def _begun(case: Case, meshes: dict[int, TetMesh], compiled: bool) -> list[str]:
+    """Imported where it is needed: numba must know where its kernels are before."""
+    from .beginning import begun
+
+    return begun(case, meshes, compiled) if meshes else []
+
+
+def main() -> int:
+    """Answers the question on standard input; the exit code."""
+    asked = survey.read_question(sys.stdin.buffer.read())
+    limit(Limits().allowed())
+    compiled = (store.use_cache() / ahead.COMPLETE).exists()
+    found = surveyed(parse_case(asked.case), Path(asked.folder), compiled)
+    sys.stdout.buffer.write(survey.to_json(found) + b"\n")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
