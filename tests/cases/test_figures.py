@@ -35,7 +35,7 @@ def test_no_module_of_the_client_writes_numbers_on_its_own() -> None:
     form = re.compile(r"[.,\d%+]*[eEfgG%]|,")
     found = [
         f"{path.name}:{node.lineno}"
-        for path in (Path(__file__).parents[2] / "client").glob("*.py")
+        for path in (Path(__file__).parents[2] / "client").rglob("*.py")
         if path.name not in OWN
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
         if isinstance(node, ast.FormattedValue)

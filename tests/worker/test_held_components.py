@@ -76,7 +76,9 @@ def test_boundaries_hold_together() -> None:
     assert planes[3].tolist() == [True]
 
 
-@pytest.mark.parametrize("name", ["simulation.py", "domain.py", "erosion.py", "mirrors.py", "step.py", "contact"])
+@pytest.mark.parametrize(
+    "name", ["simulation.py", "scene/domain.py", "erosion.py", "boundaries/mirrors.py", "step.py", "contact"]
+)
 def test_nobody_asks_for_the_type_of_a_boundary(name: str) -> None:
     place = HOUSE / name
     for path in sorted(place.rglob("*.py")) if place.is_dir() else [place]:

@@ -17,6 +17,8 @@ from conoid.cases.bodies import Mesh, MeshFile
 from conoid.cases.files import files_of
 
 from ..errors import MeshError
+from ..materials import turning
+from ..model import hashing
 from .child import Limits, beside, run_child
 from .model import TetMesh, check
 from .order import morton_ordered
@@ -157,8 +159,7 @@ def _forget(asked: Any, place: tuple[int | str, ...]) -> None:
 def _maker() -> str:
     """The sources of this package, and of what it computes with, and the versions of what it calls."""
     text, here = hashlib.sha256(), Path(__file__).parent
-    formulas = [Path(str(module.__file__)) for module in (geometry, profile, ring)]
-    used = [*formulas, *(here.parent / f"{name}.py" for name in ("hashing", "turning"))]
+    used = [Path(str(module.__file__)) for module in (geometry, profile, ring, hashing, turning)]
     for path in [*sorted(here.rglob("*.py")), *used]:
         text.update(path.name.encode() + path.read_bytes())
     return " ".join([text.hexdigest(), *_versions("gmsh", "numpy")])
