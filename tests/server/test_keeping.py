@@ -21,7 +21,7 @@ from conoid.server.keeping.keeper import Keeper
 from conoid.server.runs import pins, present
 from conoid.server.runs.present import Present
 
-from .running import TOML, Running, User, case_text
+from .running import PATIENCE, TOML, Running, User, case_text
 
 
 def keeper_of(server: Running, **rules: Any) -> Keeper:
@@ -32,17 +32,21 @@ def keeper_of(server: Running, **rules: Any) -> Keeper:
                   service.sent)  # fmt: skip
 
 
-def ended(user: User, label: str = "") -> str:
-    """A run that is over, and forgotten by the supervisor."""
+def ended(server: Running, label: str = "") -> str:
+    """A run of ann that has ended and that the supervisor has closed, which it does after the state is known."""
     words = f"?label={label}" if label else ""
-    run = str(user.http.post(f"/v1/runs{words}", content=case_text(), headers=TOML).json()["id"])
-    assert user.wait_for(run)["state"] == "succeeded"
+    run = str(server.ann.http.post(f"/v1/runs{words}", content=case_text(), headers=TOML).json()["id"])
+    assert server.ann.wait_for(run)["state"] == "succeeded"
+    deadline = time.monotonic() + PATIENCE
+    while server.service.supervisor.current(run) is not None:
+        assert time.monotonic() < deadline, f"run {run} is still open"
+        time.sleep(0.01)
     return run
 
 
 def test_old_runs_go_and_leave_a_line(server: Running, tmp_path: Path) -> None:
-    old, pinned = ended(server.ann), ended(server.ann, "keep=yes")
-    later = ended(server.ann)
+    old, pinned = ended(server), ended(server, "keep=yes")
+    later = ended(server)
     assert server.ann.http.post(f"/v1/runs/{later}:keep").json()["labels"]["keep"] == "yes"
     running = server.ann.submit(wait=str(tmp_path / "go"))
     server.ann.wait_for(running, State.RUNNING)
@@ -66,7 +70,7 @@ def test_old_runs_go_and_leave_a_line(server: Running, tmp_path: Path) -> None:
 
 
 def test_the_oldest_go_until_the_rest_is_small_enough(server: Running) -> None:
-    runs = [ended(server.ann) for _ in range(3)]
+    runs = [ended(server) for _ in range(3)]
     for run in runs:
         (server.ann.runs / run / "large").write_bytes(b"x" * 1_000_000)
     looks = keeper_of(server, bytes=2_500_000)
@@ -77,7 +81,7 @@ def test_the_oldest_go_until_the_rest_is_small_enough(server: Running) -> None:
 
 
 def test_who_removes_a_run_is_told_too(server: Running) -> None:
-    run = ended(server.ann)
+    run = ended(server)
     assert server.ann.http.delete(f"/v1/runs/{run}").status_code == 204
     answer = server.ann.http.delete(f"/v1/runs/{run}")
     assert (answer.status_code, answer.json()["outcome"]["why"]) == (410, "by ann")
@@ -85,7 +89,7 @@ def test_who_removes_a_run_is_told_too(server: Running) -> None:
 
 def test_what_has_been_removed_is_in_no_list(server: Running) -> None:
     """It ended as ``succeeded`` and was listed so, the newest of all: nothing could be done with it."""
-    runs = [ended(server.ann) for _ in range(4)]
+    runs = [ended(server) for _ in range(4)]
     for gone in (runs[3], runs[1]):
         server.ann.http.delete(f"/v1/runs/{gone}")
     first = server.ann.http.get("/v1/runs", params={"limit": 1}).json()
@@ -109,7 +113,7 @@ def test_a_run_whose_folder_was_removed_by_hand_is_told_of_nowhere(
     server: Running, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(present, "_FRESH", 0.0)
-    run, _ = ended(server.ann), ended(server.ann)
+    run, _ = ended(server), ended(server)
     everywhere, nowhere = dict.fromkeys(told(server.ann, run), True), dict.fromkeys(told(server.ann, run), False)
     assert told(server.ann, run) == everywhere
     folder = server.ann.runs / run
@@ -120,7 +124,7 @@ def test_a_run_whose_folder_was_removed_by_hand_is_told_of_nowhere(
 
 
 def test_a_list_reads_names_once_a_second_and_no_folder(server: Running, monkeypatch: pytest.MonkeyPatch) -> None:
-    runs = [ended(server.ann) for _ in range(3)]
+    runs = [ended(server) for _ in range(3)]
     shutil.rmtree(server.ann.runs / runs[0])
     looked: list[str] = []
     there, names = Present.there, os.listdir
@@ -143,7 +147,7 @@ def test_a_list_reads_names_once_a_second_and_no_folder(server: Running, monkeyp
 
 
 def test_no_run_is_gone_because_the_folder_of_all_is_not_there(server: Running) -> None:
-    run, runs = ended(server.ann), server.ann.runs
+    run, runs = ended(server), server.ann.runs
     runs.rename(runs.with_name("away"))
     runs.mkdir()
     try:
@@ -156,7 +160,7 @@ def test_no_run_is_gone_because_the_folder_of_all_is_not_there(server: Running) 
 
 
 def test_lines_survive_a_lost_database_and_a_torn_end(server: Running, tmp_path: Path) -> None:
-    run, other = ended(server.ann), ended(server.ann)
+    run, other = ended(server), ended(server)
     server.ann.http.delete(f"/v1/runs/{run}")
     path = server.ann.runs / FILE
     path.write_bytes(path.read_bytes() + b'{"id": "to')
@@ -183,7 +187,7 @@ def farewell(lines: Farewells, run: str, other: str) -> Any:
 
 @pytest.mark.parametrize("verb", ["keep", "release"])
 def test_others_pin_nothing(server: Running, verb: str) -> None:
-    assert server.bob.http.post(f"/v1/runs/{ended(server.ann)}:{verb}").status_code == 404
+    assert server.bob.http.post(f"/v1/runs/{ended(server)}:{verb}").status_code == 404
 
 
 def test_what_a_run_writes_after_the_last_look_at_it_counts(server: Running, tmp_path: Path) -> None:
@@ -209,13 +213,13 @@ def test_who_asks_is_told_what_his_runs_have_on_disk_where_no_rule_has_them_look
 
     monkeypatch.setattr(keeper, "_PATIENCE", 0.0)
     assert told(server.ann) == 0
-    (server.ann.runs / ended(server.ann) / "large").write_bytes(bytes(1_000_000))
+    (server.ann.runs / ended(server) / "large").write_bytes(bytes(1_000_000))
     assert 1_000_000 < told(server.ann) < 1_100_000
     assert told(server.bob) == 0
 
 
 def test_a_run_that_is_removed_during_a_look_ends_no_look(server: Running) -> None:
-    first, second = ended(server.ann), ended(server.ann)
+    first, second = ended(server), ended(server)
     looks = keeper_of(server, bytes=1)
     store = server.service.store
 
