@@ -1,16 +1,17 @@
-# make demo   steel breaks glass: submitted over HTTP, run on 2 MPI ranks, watched live, checked, drawn (demo.png)
-# make test   linters, types and every test that takes seconds, in two halves at a time (the dots are of both)
-# make bench  speed, and speed against error, in 15 minutes: tables in build/bench (BENCH=quick: 2, BENCH=long: 60)
-# make accuracy  docs/verification/accuracy.md: every row of the verification catalogue as measured here (ACCURACY=quick: no studies)
-# make reference  docs/reference/case.md and the JSON schema, from the texts of the models in cases/; http.md, from the routes
-# make docs   the documentation as a site: build/site/index.html; a link that leads nowhere is an error
-# make drill  the long tests: faults by the hundred (table in build/drill; goes on where it was; DRILL="--shard 1/4"),
-#             then studies and failures that take minutes; root on Debian gets Slurm, libfaketime, systemd
+# make demo       a steel bar breaks a glass bar: submitted over HTTP, run on 2 MPI ranks, checked, drawn (demo.png)
+# make test       linters, types and every fast test; two groups of tests run at the same time
+# make lint       ruff, the checker of words (tests/plain_words.py) and mypy
+# make bench      speed, and speed against error: tables in build/bench, 15 minutes (BENCH=quick: 2, BENCH=long: 60)
+# make accuracy   docs/verification/accuracy.md: the verification catalogue, measured here (ACCURACY=quick: no studies)
+# make reference  docs/reference/case.md, docs/reference/http.md and the JSON schema of cases, from the sources
+# make docs       the documentation site: build/site/index.html; a broken link is an error
+# make drill      the long tests: 800 faults (table in build/drill; continues an earlier drill; DRILL="--shard 1/4"),
+#                 then studies of minutes; as root on Debian it installs Slurm, libfaketime and systemd
 #
-# Each target first brings .venv to the versions of requirements.lock, when that file or pyproject.toml has changed.
-# Kernels are compiled while pip installs what they do not need. Nothing takes 10 s without a word. What a worker, a server and
-# the command line import is kept as bytecode, also where the environment (that of many containers) lets nothing be kept; before the
-# tests so are sources that have changed: else each of some hundred processes compiles them.
+# Each target first brings .venv to the versions of requirements.lock when that file or pyproject.toml has changed.
+# Commands over 10 s print progress. Kernels are compiled while pip installs packages that they do not need.
+# `kept` writes the bytecode of changed sources before the tests, so that their some hundred processes do not compile
+# it each; also where the environment sets PYTHONDONTWRITEBYTECODE, as many containers do.
 
 PYTHON ?= $(firstword $(foreach name,python3.11 python3.12 python3.13 python3,$(shell command -v $(name))))
 BIN := .venv/bin
@@ -21,8 +22,8 @@ HOUSES := cases client server worker
 CHECK := $(BIN)/pytest -q -m "not slow" -p no:cacheprovider
 SERVICES := tests/parallel tests/server tests/client
 
-# $(call told,words,command) runs a command and says every 5 s how long it has taken so far.
-told = @echo "$(1)"; began=$$(date +%s); \
+# $(call progress,words,command) runs a command and prints every 5 s how long it has taken so far.
+progress = @echo "$(1)"; began=$$(date +%s); \
 	while sleep 5 >/dev/null 2>&1; do echo "$(1): $$(($$(date +%s) - began)) s"; done & clock=$$!; \
 	trap "kill $$clock" EXIT; $(2)
 
@@ -41,6 +42,7 @@ lint: style types
 style: $(READY)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+	$(BIN)/python -m tests.plain_words
 
 types: $(READY)
 	$(BIN)/mypy
@@ -81,10 +83,10 @@ drill: $(READY)
 
 $(READY): requirements.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Conoid needs Python 3.11 or newer; make PYTHON=/path/to/python")'
-	$(call told,making .venv,$(PYTHON) -m venv .venv)
-	$(call told,installing what the worker needs,$(PIP) -c requirements.lock setuptools \
+	$(call progress,making .venv,$(PYTHON) -m venv .venv)
+	$(call progress,installing what the worker needs,$(PIP) -c requirements.lock setuptools \
 		&& $(PIP) -c requirements.lock --no-build-isolation -e ".[worker]")
-	$(call told,installing the rest,$(KEPT) -m conoid.worker.kernels.compile & kernels=$$!; \
+	$(call progress,installing the rest,$(KEPT) -m conoid.worker.kernels.compile & kernels=$$!; \
 		$(PIP) --no-deps -r requirements.lock || { kill $$kernels; exit 1; }; wait $$kernels)
 	@$(KEPT) -c "import conoid.client.cli, conoid.client.drawing.render, conoid.server.serve, matplotlib.pyplot, pandas"
 	@mkdir -p build/types/conoid
