@@ -11,13 +11,13 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from . import whole
-from .checks import check, check_parts
-from .library import library, material
-from .problems import CaseError, Problem, from_pydantic, problem, shown
-from .quantities import read_references
-from .schema import Case
-from .similar import nearest
+from .checks.checks import check, check_parts
+from .model.schema import Case
+from .reading import whole
+from .reading.library import library, material
+from .reading.problems import CaseError, Problem, from_pydantic, problem, shown
+from .reading.quantities import read_references
+from .reading.similar import nearest
 
 __all__ = [
     "CaseError", "Problem", "apply_overrides", "material", "parse_case", "parse_json", "parse_toml",

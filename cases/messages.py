@@ -16,7 +16,7 @@ class Message(msgspec.Struct, tag_field="type", tag=str.lower, kw_only=True, fro
     """The envelope. ``wall`` is Unix time in s, ``t`` simulated time in s."""
 
     channel: ClassVar[str] = "event"
-    """Which class of Zenoh key the message is published under (cases/keys.py)."""
+    """Which class of Zenoh key the message is published under (cases/output/keys.py)."""
 
     run: str
     seq: int = 0
@@ -219,7 +219,7 @@ class Frame(Message, frozen=True):
 
 
 class Snapshot(Message, frozen=True):
-    """A snapshot of the fragments (cases/snapshot.py) is in the run's folder. ``step`` and ``t`` are its own."""
+    """A snapshot of the fragments (cases/output/snapshot.py) is in the run's folder. ``step`` and ``t`` are its own."""
 
     channel: ClassVar[str] = "fragments"
     n: int

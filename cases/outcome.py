@@ -145,7 +145,7 @@ class Outcome(msgspec.Struct, kw_only=True, frozen=True):
     helped: list[float] = []
     """s that all threads of a rank but its first have done tasks, together; at most threads - 1 times ``parallel``."""
     without: list[str] = []
-    """Stages that the case does not have (cases/stages.py): none of its phases has computed them."""
+    """Stages that the case does not have (cases/estimates/stages.py): none of its phases has computed them."""
     peak_memory: list[int] = []
     """Largest resident memory, bytes, one number a rank."""
     element_updates_per_second: float = math.nan

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from .estimate import estimate
+from .estimates.estimate import estimate
 from .load import shipped
+from .model.schema import Case
 from .outcome import Outcome
-from .schema import Case
 
 _TABLE = Path(__file__).with_name("hard.toml")
 RESIDUAL, DRIFT = 0.01, 1e-9

@@ -18,7 +18,7 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, GetJsonSchemaHandler
 from pydantic_core import CoreSchema
 
-from .similar import meant
+from .reading.similar import meant
 
 Dimension = tuple[int, int, int, int]
 """Exponents of metre, kilogram, second, kelvin."""

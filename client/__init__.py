@@ -4,7 +4,7 @@ The same words as on the command line: a session validates, submits and lists; a
 and gives its result; a result is viewed.
 """
 
-from conoid.cases.problems import CaseError, ConoidError
+from conoid.cases.reading.problems import CaseError, ConoidError
 
 from .errors import ClientError, NotFoundError, ServiceError, UnfinishedError, UnreachableError, ViewError
 from .remote.session import Session, connect

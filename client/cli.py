@@ -10,8 +10,8 @@ import typer
 
 from conoid.cases.figures import counted
 from conoid.cases.load import CaseError
-from conoid.cases.loaded import loads
 from conoid.cases.run import ExitCode
+from conoid.cases.shapes.loaded import loads
 
 from .commands import benches, commands, converging, hard, listing, reports, shelf, sweeping, validated, viewing
 from .commands.batch import batch_run

@@ -7,8 +7,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from html import escape
 from typing import Any, TypeAlias
 
-from conoid.cases import fragments, history
 from conoid.cases.figures import number
+from conoid.cases.output import fragments, history
 
 from .errors import ClientError, UsageError
 

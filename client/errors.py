@@ -3,7 +3,7 @@
 ::
 
     ConoidError
-    ├── CaseError            the case is wrong, whoever has found it: every error at once (cases/problems.py)
+    ├── CaseError            the case is wrong, whoever has found it: every error at once (cases/reading/problems.py)
     ├── …                    what a worker raises that is called from Python (worker/errors.py)
     └── ClientError
         ├── ServiceError     the server refused: the fields of an RFC 9457 problem
@@ -21,7 +21,7 @@ The command line ends with 2 where what was asked for is wrong, be it a case or 
 from collections.abc import Mapping
 from typing import Any
 
-from conoid.cases.problems import CaseError, ConoidError, Problem
+from conoid.cases.reading.problems import CaseError, ConoidError, Problem
 
 _LONGEST = 1000
 """Characters of a server's words that are shown. Chosen: half a screen."""

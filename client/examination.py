@@ -12,18 +12,18 @@ from typing import Any
 
 import msgspec
 
-from conoid.cases import survey
-from conoid.cases.estimate import Estimate, estimate
+from conoid.cases.checks.mesh_checks import missing_files
+from conoid.cases.estimates.estimate import Estimate, estimate
 from conoid.cases.load import CaseError, parse_case
-from conoid.cases.mesh_checks import missing_files
-from conoid.cases.plausible import bare_numbers
-from conoid.cases.problems import Problem, problem
-from conoid.cases.schema import Case
-from conoid.cases.solids import Measured
-from conoid.cases.survey import Survey
-from conoid.cases.touching import Touch
-from conoid.cases.touching import touching as touches
-from conoid.cases.warned import warned
+from conoid.cases.model.schema import Case
+from conoid.cases.model.solids import Measured
+from conoid.cases.reading import survey
+from conoid.cases.reading.problems import Problem, problem
+from conoid.cases.reading.survey import Survey
+from conoid.cases.warnings.plausible import bare_numbers
+from conoid.cases.warnings.touching import Touch
+from conoid.cases.warnings.touching import touching as touches
+from conoid.cases.warnings.warned import warned
 
 from .errors import ClientError
 

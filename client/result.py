@@ -11,10 +11,11 @@ from typing import Any, Literal
 
 import msgspec
 
-from conoid.cases import fragments, layout, outcome
+from conoid.cases import outcome
 from conoid.cases.figures import si
 from conoid.cases.messages import AnyMessage
 from conoid.cases.outcome import Outcome
+from conoid.cases.output import fragments, layout
 from conoid.cases.run import State
 from conoid.cases.units import parse_quantity
 
@@ -146,7 +147,7 @@ class Result:
         return sorted(int(found[1]) for name in self.folder.names() if (found := _TABLE.fullmatch(name)))
 
     def fragments_of(self, index: int = -1) -> Columns:
-        """The fragments of a frame by its number, -1 is the last one; columns are those of ``cases/fragments.py``.
+        """The fragments of frame ``index`` (-1: the last one), with the columns of ``cases/output/fragments.py``.
 
         Raises UnfinishedError where there is no table of them.
         """

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from conoid.cases import keys
 from conoid.cases.figures import duration
 from conoid.cases.messages import AnyMessage
 from conoid.cases.messages import Snapshot as Told
+from conoid.cases.output import keys
 
 from .errors import ClientError, NotFoundError, ServiceError, UnfinishedError, UnreachableError, passes
 from .live import Live

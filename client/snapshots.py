@@ -5,8 +5,8 @@ import zlib
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from conoid.cases import layout, snapshot
 from conoid.cases.figures import counted, exact
+from conoid.cases.output import layout, snapshot
 
 from .errors import ClientError
 

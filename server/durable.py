@@ -4,7 +4,7 @@ import os
 import shutil
 from pathlib import Path
 
-from conoid.cases import whole
+from conoid.cases.reading import whole
 
 _PROBE = 1 << 16
 """Bytes that are written to find out whether a folder takes any: more than a launch writes. Chosen."""

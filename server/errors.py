@@ -21,7 +21,7 @@ from fastapi.routing import APIRoute
 from sqlalchemy.exc import SQLAlchemyError
 from starlette.exceptions import HTTPException
 
-from conoid.cases.problems import Problem
+from conoid.cases.reading.problems import Problem
 
 from .runs.holds import DAMAGE
 

@@ -9,8 +9,8 @@ from pathlib import Path
 
 from sqlalchemy import URL
 
-from conoid.cases.batch import Site, SiteError, read_site
-from conoid.cases.cores import usable_cores
+from conoid.cases.estimates.cores import usable_cores
+from conoid.cases.site.batch import Site, SiteError, read_site
 
 WORKER = (sys.executable, "-m", "mpi4py", "-m", "conoid.worker")
 """The worker's command after ``mpiexec -n N``; ``-m mpi4py`` makes one rank's exception end all ranks."""

@@ -20,9 +20,10 @@ from typing import Any
 
 import zenoh
 
-from conoid.cases import keys, whole
-from conoid.cases.batch import Slurm
 from conoid.cases.messages import Status, to_msgpack
+from conoid.cases.output import keys
+from conoid.cases.reading import whole
+from conoid.cases.site.batch import Slurm
 
 from . import durable
 from .database.store import Token

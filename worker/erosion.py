@@ -9,7 +9,7 @@ tets that contact has pushed, where their part wants them to leave then.
 
 import numpy as np
 
-from conoid.cases.schema import Case
+from conoid.cases.model.schema import Case
 
 from .boundaries.boundaries import Boundary
 from .clock import Clock
@@ -100,8 +100,8 @@ class Erosion:
     def grow(self, split: Split, ids: Ints) -> None:
         """Takes up the copies of nodes.
 
-        A part that fractures does not erode (cases/checks.py): the tets of its nodes stay, and one is as good a count
-        as any that is not zero.
+        A part that fractures does not erode (cases/checks/checks.py): the tets of its nodes stay, and one is as good a
+        count as any that is not zero.
         """
         parents = split.copies.parents
         self.removed = extended(self.removed, self.removed[parents])

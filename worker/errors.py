@@ -15,7 +15,7 @@ The text of every one of them is a single line for the person who wrote the case
 
 from typing import ClassVar
 
-from conoid.cases import problems
+from conoid.cases.reading import problems
 from conoid.cases.run import Cause, ExitCode, State
 
 

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from conoid.cases.library import material as find_material
-from conoid.cases.schema import Case, Symmetry
+from conoid.cases.model.schema import Case, Symmetry
+from conoid.cases.reading.library import material as find_material
 
 from .accounts.energy import Ledger
 from .accounts.timers import Timers, worked

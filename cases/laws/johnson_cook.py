@@ -6,7 +6,7 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
-from ..tables import Model, Positive
+from ..model.tables import Model, Positive
 from ..units import Rate, Ratio, SpecificHeat, Stress, Temperature
 from .law import Law, Likely, Wrong
 

@@ -5,7 +5,7 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
-from ..tables import Positive
+from ..model.tables import Positive
 from ..units import Rate, Ratio, Stress
 from .law import Law, Wrong
 

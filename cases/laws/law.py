@@ -1,15 +1,15 @@
 """What every law of strength states besides its constants: cost, strength, and what is odd or wrong about it.
 
 A law is a file here, with its constants in SI and what is known of it before anything runs, and a file of the same name
-in worker/materials, with its kernel; ``Strength`` in cases/materials.py and ``LAWS`` in worker/materials/models.py list
-them.
+in worker/materials, with its kernel; ``Strength`` in cases/model/materials.py and ``LAWS`` in
+worker/materials/models.py list them.
 """
 
 import math
 from collections.abc import Iterator
 from typing import ClassVar
 
-from ..tables import Model
+from ..model.tables import Model
 
 Likely = tuple[str, str, float]
 """A key of a law, what it is (``cases.plausible.LIKELY``), and its value there."""

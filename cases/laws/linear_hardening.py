@@ -5,7 +5,7 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
-from ..tables import Positive
+from ..model.tables import Positive
 from ..units import Stress
 from .law import Law, Likely
 

@@ -6,7 +6,7 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import AfterValidator, Field
 
-from ..tables import Positive
+from ..model.tables import Positive
 from ..units import Angle, Ratio, Stress
 from .law import Law, Wrong
 

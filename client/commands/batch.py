@@ -13,11 +13,14 @@ from typing import Annotated, Any
 import msgspec
 import typer
 
-from conoid.cases import batch, layout, messages, slurm, slurm_call, whole
-from conoid.cases.batch import Job, Slurm
+from conoid.cases import messages
 from conoid.cases.load import parse_case, resolved_json
+from conoid.cases.model.schema import Run
+from conoid.cases.output import layout
+from conoid.cases.reading import whole
 from conoid.cases.run import State
-from conoid.cases.schema import Run
+from conoid.cases.site import batch, slurm, slurm_call
+from conoid.cases.site.batch import Job, Slurm
 
 from ..errors import ClientError
 from ..examination import examine

@@ -8,9 +8,9 @@ from typing import Annotated
 import typer
 
 from conoid.cases.figures import counted, duration
-from conoid.cases.problems import shown
+from conoid.cases.model.schema import MOST_RANKS, MOST_THREADS
+from conoid.cases.reading.problems import shown
 from conoid.cases.run import ExitCode
-from conoid.cases.schema import MOST_RANKS, MOST_THREADS
 from conoid.cases.units import parse_quantity
 
 from ..errors import UsageError

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from conoid.cases import layout
+from conoid.cases.output import layout
 from conoid.cases.run import ExitCode
 
 from ..errors import ClientError, UnfinishedError, UsageError

@@ -10,10 +10,10 @@ import typer
 
 from conoid.cases.figures import counted, duration, number
 from conoid.cases.load import parse_case
-from conoid.cases.problems import shown
+from conoid.cases.model.schema import Case
+from conoid.cases.reading.problems import shown
+from conoid.cases.reading.similar import allowed
 from conoid.cases.run import ExitCode
-from conoid.cases.schema import Case
-from conoid.cases.similar import allowed
 
 from ..errors import UsageError
 from ..local.local import LocalServer

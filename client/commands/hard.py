@@ -13,10 +13,10 @@ import typer
 
 from conoid.cases.figures import count, duration, fixed, rough
 from conoid.cases.load import apply_overrides, parse_case, read_data
+from conoid.cases.model.schema import Case
 from conoid.cases.outcome import Outcome
+from conoid.cases.reading.similar import allowed
 from conoid.cases.run import ExitCode
-from conoid.cases.schema import Case
-from conoid.cases.similar import allowed
 from conoid.cases.suite import Hard, drift, faults, is_free, suite
 
 from ..columns import Columns

@@ -3,7 +3,7 @@
 import re
 from datetime import datetime, timedelta
 
-from conoid.cases.problems import shown
+from conoid.cases.reading.problems import shown
 
 from ..errors import UsageError
 

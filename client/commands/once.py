@@ -7,14 +7,14 @@ from typing import Any
 
 from rich.console import Console
 
-from conoid.cases import fields
-from conoid.cases.cores import usable_cores
+from conoid.cases.estimates.cores import usable_cores
 from conoid.cases.figures import counted, crew
 from conoid.cases.load import material, parse_case
+from conoid.cases.model.schema import Case
 from conoid.cases.outcome import Outcome
+from conoid.cases.output import fields
+from conoid.cases.reading.similar import allowed
 from conoid.cases.run import ExitCode
-from conoid.cases.schema import Case
-from conoid.cases.similar import allowed
 
 from ..drawing.fields import FIELDS
 from ..drawing.picture import Drawn

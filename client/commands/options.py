@@ -9,14 +9,14 @@ from typing import Annotated
 import typer
 from rich.console import RenderableType
 
-from conoid.cases.estimate import estimate
+from conoid.cases.estimates.estimate import estimate
 from conoid.cases.figures import duration
 from conoid.cases.load import CaseError, materials, parse_case, shipped
-from conoid.cases.plausible import bare_numbers
-from conoid.cases.problems import Problem, shown
-from conoid.cases.survey import Survey
-from conoid.cases.touching import touching
-from conoid.cases.warned import warned
+from conoid.cases.reading.problems import Problem, shown
+from conoid.cases.reading.survey import Survey
+from conoid.cases.warnings.plausible import bare_numbers
+from conoid.cases.warnings.touching import touching
+from conoid.cases.warnings.warned import warned
 
 from ..errors import NotFoundError, UsageError
 from ..remote.session import Session, connect

@@ -8,7 +8,7 @@ from rich.console import Group
 from rich.table import Table
 
 from conoid.cases.figures import exact
-from conoid.cases.history import header, split
+from conoid.cases.output.history import header, split
 
 from ..errors import UsageError
 from .tables import short_names, table

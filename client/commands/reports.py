@@ -7,7 +7,7 @@ from typing import Annotated, Any
 import typer
 
 from conoid.cases.figures import counted, percent, si
-from conoid.cases.schema import Balance
+from conoid.cases.model.schema import Balance
 
 from ..drawing.fields import require_field
 from ..errors import ViewError

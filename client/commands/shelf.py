@@ -5,8 +5,10 @@ from typing import Annotated
 
 import typer
 
-from conoid.cases import files, library, load, reference
-from conoid.cases.page import page
+from conoid.cases import load
+from conoid.cases.reading import files, library
+from conoid.cases.reference import json_schema
+from conoid.cases.reference.page import page
 
 from ..errors import ClientError, UsageError
 from ..local.saving import save_text
@@ -25,7 +27,7 @@ def schema(
     out: OutOption = None,
 ) -> None:
     """Print the keys of a case: as JSON schema, for editors, or as a page with unit, range, default and meaning."""
-    text = page() if as_page else reference.schema_text()
+    text = page() if as_page else json_schema.schema_text()
     if out is None:
         echo(text, nl=False)
     else:
@@ -87,10 +89,12 @@ def copy_case(
     for each in (target, *named.values()):
         if each.exists():
             raise ClientError(f"{each} is there already; name another file with --out")
-    save_text(target, text.replace(f"{reference.LINE} ../{reference.FILE}", f"{reference.LINE} ./{reference.FILE}", 1))
+    save_text(
+        target, text.replace(f"{json_schema.LINE} ../{json_schema.FILE}", f"{json_schema.LINE} ./{json_schema.FILE}", 1)
+    )
     echo(str(target))
     for path, copy in named.items():
         save_text(copy, shipped.with_name(path).read_bytes())
         echo(str(copy))
-    save_text(target.with_name(reference.FILE), reference.schema_text())
-    echo(str(target.with_name(reference.FILE)))
+    save_text(target.with_name(json_schema.FILE), json_schema.schema_text())
+    echo(str(target.with_name(json_schema.FILE)))

@@ -12,10 +12,10 @@ from typing import Annotated, Any
 
 import typer
 
-from conoid.cases.cores import usable_cores
+from conoid.cases.estimates.cores import usable_cores
 from conoid.cases.figures import counted
 from conoid.cases.load import CaseError, parse_case
-from conoid.cases.points import KEY, to_csv
+from conoid.cases.output.points import KEY, to_csv
 from conoid.cases.run import State
 
 from ..errors import ServiceError, UsageError

@@ -9,7 +9,7 @@ from rich import box
 from rich.table import Table
 from rich.text import Text
 
-from conoid.cases.estimate import estimate
+from conoid.cases.estimates.estimate import estimate
 from conoid.cases.figures import (
     alike,
     count,
@@ -27,12 +27,12 @@ from conoid.cases.figures import (
     si,
     size,
 )
-from conoid.cases.flat import Scalar
-from conoid.cases.library import Constant
-from conoid.cases.materials import Material
+from conoid.cases.model.materials import Material
+from conoid.cases.model.schema import Case
 from conoid.cases.outcome import Check, Compressed, Measured, Outcome
+from conoid.cases.reading.library import Constant
+from conoid.cases.reference.flat import Scalar
 from conoid.cases.run import State
-from conoid.cases.schema import Case
 
 from ..remote.rows import RunRow
 from ..remote.told import RunInfo

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import TypeAlias
 
-from conoid.cases.history import split
+from conoid.cases.output.history import split
 
 from ..errors import UsageError
 

@@ -5,17 +5,17 @@ from collections.abc import Callable, Sequence
 
 from rich.table import Table
 
-from conoid.cases.bodies import Mesh, MeshFile
-from conoid.cases.estimate import Estimate
+from conoid.cases.estimates.estimate import Estimate
+from conoid.cases.estimates.stages import without
 from conoid.cases.figures import UNKNOWN, alike, count, crew, duration, exact, percent, si, size, vectors
-from conoid.cases.library import material
-from conoid.cases.loaded import Load
-from conoid.cases.placed import Bulk
-from conoid.cases.schema import Boundary, Case, Traction
-from conoid.cases.solids import Cad
-from conoid.cases.stages import without
-from conoid.cases.survey import Survey
-from conoid.cases.touching import Touch
+from conoid.cases.model.bodies import Mesh, MeshFile
+from conoid.cases.model.schema import Boundary, Case, Traction
+from conoid.cases.model.solids import Cad
+from conoid.cases.reading.library import material
+from conoid.cases.reading.survey import Survey
+from conoid.cases.shapes.loaded import Load
+from conoid.cases.shapes.placed import Bulk
+from conoid.cases.warnings.touching import Touch
 
 from .tables import pairs, table
 

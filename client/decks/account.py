@@ -4,7 +4,7 @@ from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import Any, Literal, TypeVar
 
-from conoid.cases.included import Line
+from conoid.cases.reading.included import Line
 
 T = TypeVar("T")
 Fate = Literal["taken", "left", "refused"]

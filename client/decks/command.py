@@ -7,8 +7,8 @@ from typing import Annotated, Any
 
 import typer
 
-from conoid.cases import reference
 from conoid.cases.figures import counted
+from conoid.cases.reference import json_schema
 from conoid.cases.run import ExitCode
 
 from ..commands.console import echo
@@ -58,7 +58,7 @@ def import_deck(
     save_text(listed, text)
     if written:
         save_text(target, _noted(found).toml)
-        save_text(target.with_name(reference.FILE), reference.schema_text())
+        save_text(target.with_name(json_schema.FILE), json_schema.schema_text())
     if not as_data:
         echo("")
         echo(f"{'written: ' + str(target) + ', ' if written else ''}{listed}")

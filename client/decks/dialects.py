@@ -5,9 +5,9 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Protocol
 
-from conoid.cases.included import lines
-from conoid.cases.problems import shown
-from conoid.cases.similar import choices
+from conoid.cases.reading.included import lines
+from conoid.cases.reading.problems import shown
+from conoid.cases.reading.similar import choices
 
 from ..errors import UsageError
 from .abaqus.reading import Abaqus

@@ -12,7 +12,7 @@ from .toml import NOTE
 from .units import LENGTH, Dimension, System
 
 _MOST_FRAMES = 100_000
-"""That a case may have (cases/schema.py)."""
+"""That a case may have (cases/model/schema.py)."""
 
 
 @dataclass

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import Generic, TypeVar
 
-from conoid.cases.cards import CardError
+from conoid.cases.reading.cards import CardError
 
 from .account import Entry, Remark
 

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from conoid.cases import whole
-from conoid.cases.cards import CardError
 from conoid.cases.figures import counted
-from conoid.cases.inp import InpError
 from conoid.cases.load import CaseError, parse_case
-from conoid.cases.problems import shown
+from conoid.cases.reading import whole
+from conoid.cases.reading.cards import CardError
+from conoid.cases.reading.inp import InpError
+from conoid.cases.reading.problems import shown
 
 from ..errors import ClientError, UsageError
 from . import units

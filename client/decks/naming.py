@@ -4,7 +4,7 @@ import re
 import unicodedata
 
 _MOST = 64
-"""Characters of a name of a case (cases/tables.py)."""
+"""Characters of a name of a case (cases/model/tables.py)."""
 
 
 class Names:

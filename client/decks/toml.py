@@ -4,7 +4,7 @@ import json
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from conoid.cases import reference
+from conoid.cases.reference import json_schema
 
 NOTE = "#"
 """A key of a table that is no key of a case: comments above the table, a line each."""
@@ -14,7 +14,7 @@ _LAST = ("run",)
 
 def toml(data: Mapping[str, Any]) -> str:
     """The text of a case file; ends in a line feed."""
-    lines = [f"{reference.LINE} ./{reference.FILE}", *_comment(data.get(NOTE, ()))]
+    lines = [f"{json_schema.LINE} ./{json_schema.FILE}", *_comment(data.get(NOTE, ()))]
     rest = [key for key in data if key not in (*_FIRST, *_LAST, NOTE)]
     rest.sort(key=lambda key: isinstance(data[key], Mapping | list))
     for key in (*(key for key in _FIRST if key in data), *rest, *(key for key in _LAST if key in data)):

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from conoid.cases.similar import allowed
+from conoid.cases.reading.similar import allowed
 
 from ..errors import LookError
 

@@ -7,7 +7,7 @@ from typing import Any
 import msgspec
 
 from conoid.cases.figures import number, vector
-from conoid.cases.similar import allowed
+from conoid.cases.reading.similar import allowed
 
 from ..errors import LookError
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from conoid.cases.similar import allowed
+from conoid.cases.reading.similar import allowed
 
 from ..errors import LookError
 from . import renderer

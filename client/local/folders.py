@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
-from conoid.cases import layout
+from conoid.cases.output import layout
 
 from ..errors import ClientError, UnfinishedError
 

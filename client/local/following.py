@@ -8,10 +8,12 @@ from typing import Any
 
 import msgspec
 
-from conoid.cases import batch, layout, slurm, slurm_call, whole
 from conoid.cases.messages import AnyMessage, Status
 from conoid.cases.outcome import from_json
+from conoid.cases.output import layout
+from conoid.cases.reading import whole
 from conoid.cases.run import Cause, State
+from conoid.cases.site import batch, slurm, slurm_call
 
 from ..journal import from_line
 from ..remote.link import Link

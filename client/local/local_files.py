@@ -11,10 +11,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from conoid.cases import layout, whole
-from conoid.cases.files import Named, files_of, located
 from conoid.cases.load import CaseError, Problem
-from conoid.cases.problems import problem
+from conoid.cases.output import layout
+from conoid.cases.reading import whole
+from conoid.cases.reading.files import Named, files_of, located
+from conoid.cases.reading.problems import problem
 
 from ..errors import ClientError
 from . import one_deck

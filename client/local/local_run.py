@@ -7,8 +7,10 @@ from typing import Any
 
 import msgspec
 
-from conoid.cases import layout, slurm, whole
+from conoid.cases.output import layout
+from conoid.cases.reading import whole
 from conoid.cases.run import Cause, State
+from conoid.cases.site import slurm
 
 from ..errors import ClientError, UnfinishedError
 from ..live import Live

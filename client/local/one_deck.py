@@ -5,8 +5,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from conoid.cases import inp, whole
-from conoid.cases.included import LONGEST_LINE, Included, flattened, included_by, lines
+from conoid.cases.reading import inp, whole
+from conoid.cases.reading.included import LONGEST_LINE, Included, flattened, included_by, lines
 
 ENDINGS = (".k", ".key", ".dyn")
 """Of the names of keyword decks."""

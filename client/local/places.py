@@ -4,7 +4,7 @@ import os
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from urllib.parse import quote
 
-from conoid.cases.problems import shown
+from conoid.cases.reading.problems import shown
 
 from ..errors import ClientError
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from datetime import datetime
 from typing import Any
 
-from conoid.cases.problems import shown
+from conoid.cases.reading.problems import shown
 
 from ..errors import UsageError
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import urlsplit
 
-from conoid.cases import whole
-from conoid.cases.problems import shown
+from conoid.cases.reading import whole
+from conoid.cases.reading.problems import shown
 
 from ..errors import ClientError, UsageError
 

@@ -4,9 +4,9 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from conoid.cases.files import files_of
 from conoid.cases.load import CaseError, Overrides, apply_overrides
-from conoid.cases.problems import dotted
+from conoid.cases.reading.files import files_of
+from conoid.cases.reading.problems import dotted
 
 from ..local.local_files import Hashes, with_hashes
 from ..sweeps.sweep import Point

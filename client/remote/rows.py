@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import msgspec
 
-from conoid.cases.flat import Scalar
+from conoid.cases.reference.flat import Scalar
 
 from .told import RunInfo
 

@@ -6,8 +6,8 @@ from io import FileIO
 
 import msgspec
 
-from conoid.cases import whole
 from conoid.cases.figures import size
+from conoid.cases.reading import whole
 
 from ..errors import ClientError, MissingError, ServiceError, UnreachableError
 from ..local.local_files import LocalFile

@@ -13,7 +13,7 @@ import httpx2
 import msgspec
 
 from conoid.cases.load import CaseError, Overrides, Problem
-from conoid.cases.problems import shown
+from conoid.cases.reading.problems import shown
 
 from ..errors import MissingError, NotFoundError, ServiceError, UsageError
 from ..local.places import quoted

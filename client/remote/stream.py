@@ -16,9 +16,9 @@ from typing import TypeVar, cast
 import msgspec
 import zenoh
 
-from conoid.cases import keys
 from conoid.cases.figures import duration
 from conoid.cases.messages import AnyMessage, Log, Snapshot, Status, fragments_from_msgpack, from_msgpack
+from conoid.cases.output import keys
 from conoid.cases.run import State
 
 from ..errors import AnswerError, ClientError, passes

@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Any
 
 from conoid.cases.load import CaseError, Overrides, apply_overrides, parse_case, read_data, shipped, shipped_path
-from conoid.cases.problems import Problem, shown
-from conoid.cases.schema import Case
-from conoid.cases.similar import nearest
+from conoid.cases.model.schema import Case
+from conoid.cases.reading.problems import Problem, shown
+from conoid.cases.reading.similar import nearest
 
 CaseSource = str | Path | Mapping[str, Any] | Case
 _SUFFIXES = {".toml": "application/toml", ".json": "application/json"}

@@ -5,9 +5,9 @@ from collections.abc import Sequence
 from html import escape
 
 from conoid.cases.figures import alike, count, counted, crew, duration, exact, percent, rough, si, vector
-from conoid.cases.fragments import Fit
 from conoid.cases.messages import Balance, Log
 from conoid.cases.outcome import Outcome
+from conoid.cases.output.fragments import Fit
 
 from ..columns import by_part
 from ..errors import UnfinishedError

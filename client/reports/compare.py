@@ -7,9 +7,9 @@ from typing import Any
 
 import msgspec
 
-from conoid.cases import fragments, history
-from conoid.cases.fragments import Summary
 from conoid.cases.outcome import Outcome
+from conoid.cases.output import fragments, history
+from conoid.cases.output.fragments import Summary
 
 from ..columns import Columns
 from ..errors import UnfinishedError

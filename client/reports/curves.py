@@ -8,9 +8,9 @@ from typing import Any
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from conoid.cases import history
 from conoid.cases.figures import counted, exact
-from conoid.cases.fragments import DUST
+from conoid.cases.output import history
+from conoid.cases.output.fragments import DUST
 
 from ..columns import Columns, by_part
 from ..errors import ClientError, UsageError

@@ -16,8 +16,8 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from conoid.cases import layout
 from conoid.cases.messages import Snapshot
+from conoid.cases.output import layout
 
 from ..errors import ClientError
 from ..result import Result

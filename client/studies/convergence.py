@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from conoid.cases.load import apply_overrides, parse_case
+from conoid.cases.model.schema import Case
 from conoid.cases.run import State
-from conoid.cases.schema import Case
 
 from ..errors import ClientError
 from ..remote.session import Session

@@ -18,9 +18,9 @@ from pathlib import Path
 
 import msgspec
 
-from conoid.cases import layout
 from conoid.cases.messages import AnyMessage, Counts, Load
 from conoid.cases.outcome import Outcome, Sharing, from_json
+from conoid.cases.output import layout
 
 from ..journal import from_line
 

@@ -3,10 +3,10 @@
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
-from conoid.cases import history
 from conoid.cases.messages import Energy
+from conoid.cases.model.schema import Case
 from conoid.cases.outcome import Outcome
-from conoid.cases.schema import Case
+from conoid.cases.output import history
 
 from ..columns import Columns
 

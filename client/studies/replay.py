@@ -8,10 +8,10 @@ docs/performance/balance.md.
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 
-from conoid.cases.balancing import WORK, Guard, Trigger, lost
+from conoid.cases.estimates.balancing import WORK, Guard, Trigger, lost
 from conoid.cases.figures import number
 from conoid.cases.messages import AnyMessage, Balance, Groups, Load
-from conoid.cases.schema import Balance as Spec
+from conoid.cases.model.schema import Balance as Spec
 
 from ..errors import ClientError, UsageError
 

@@ -9,10 +9,10 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from conoid.cases import layout
-from conoid.cases.cores import usable_cores
+from conoid.cases.estimates.cores import usable_cores
 from conoid.cases.load import resolved_json
 from conoid.cases.outcome import from_json
+from conoid.cases.output import layout
 from conoid.cases.run import State
 
 from ..errors import ClientError

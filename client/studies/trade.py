@@ -4,8 +4,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from conoid.cases.damping import WORDS
 from conoid.cases.figures import duration, exact, si
+from conoid.cases.warnings.damping import WORDS
 
 from .convergence import Mesh, Series
 from .quantities import Number

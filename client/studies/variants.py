@@ -4,10 +4,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from conoid.cases.bodies import Loose, MeshFile
 from conoid.cases.figures import number
 from conoid.cases.load import material
-from conoid.cases.schema import Case
+from conoid.cases.model.bodies import Loose, MeshFile
+from conoid.cases.model.schema import Case
 
 from ..errors import UsageError
 from .scatter import perturbations

@@ -8,10 +8,10 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any, Protocol
 
-from conoid.cases import history, points
 from conoid.cases.figures import counted, number
 from conoid.cases.load import apply_overrides, parse_case
 from conoid.cases.outcome import Outcome
+from conoid.cases.output import history, points
 from conoid.cases.run import State
 
 from ..errors import ClientError, MissingError, UsageError

@@ -7,9 +7,10 @@ from typing import Any
 
 import msgspec
 
-from conoid.cases import history, points, whole
 from conoid.cases.figures import counted, duration, number
-from conoid.cases.problems import shown
+from conoid.cases.output import history, points
+from conoid.cases.reading import whole
+from conoid.cases.reading.problems import shown
 
 from ..errors import ClientError, UsageError
 from ..local.saving import save_text

@@ -6,11 +6,11 @@ from typing import Any
 
 import msgspec
 
-from conoid.cases import points
 from conoid.cases.load import CaseError, Problem
-from conoid.cases.problems import shown
-from conoid.cases.schema import Case
-from conoid.cases.similar import nearest
+from conoid.cases.model.schema import Case
+from conoid.cases.output import points
+from conoid.cases.reading.problems import shown
+from conoid.cases.reading.similar import nearest
 from conoid.cases.units import parse_quantity, written
 
 _ADAPTIVE, _SET, _TOLERANCE = "--adaptive", "--set", "--tolerance"

@@ -14,9 +14,9 @@ from typing import Annotated, Any
 
 import msgspec
 
-from conoid.cases import whole
 from conoid.cases.load import CaseError, Problem, apply_overrides
-from conoid.cases.problems import shown
+from conoid.cases.reading import whole
+from conoid.cases.reading.problems import shown
 from conoid.cases.run import State
 
 from ..errors import AnswerError, ClientError

@@ -5,9 +5,11 @@ from typing import Any
 
 import msgspec
 
-from conoid.cases import layout, outcome, points, whole
+from conoid.cases import outcome
 from conoid.cases.outcome import Outcome
-from conoid.cases.points import Column, Point
+from conoid.cases.output import layout, points
+from conoid.cases.output.points import Column, Point
+from conoid.cases.reading import whole
 
 from ..errors import UsageError
 from . import found

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from conoid.cases.history import split
+from conoid.cases.output.history import split
 
 from ..commands.telling import Row, known, number_of, telling
 from ..errors import ClientError, UsageError

@@ -6,7 +6,7 @@ const START = 16;
 const TYPES = {
   uint8: Uint8Array, uint16: Uint16Array, uint32: Uint32Array, int64: BigInt64Array, float32: Float32Array, float64: Float64Array,
 };
-const DUST = 10; // Tets, as in conoid.cases.fragments.
+const DUST = 10; // Tets, as in conoid.cases.output.fragments.
 const MOST_ROWS = 65536; // A vertex names its row in 16 bits.
 
 // { header, arrays: { name: typed array, flat } }, without a copy. Throws Error for what is no snapshot.
@@ -71,7 +71,7 @@ export function sizes({ arrays }) {
   return { points: sorted.map((size, i) => [size, sorted.length - i]), dust: arrays.fragment_id.length - sorted.length, best };
 }
 
-// Rayleigh, exponential and power law by maximum likelihood of sizes from the shortest on (conoid.cases.fragments.fits):
+// Rayleigh, exponential and power law by maximum likelihood of sizes from the shortest on (conoid.cases.output.fragments.fits):
 // each with its parameter, the sum of ln(density), and the share of fragments that are longer than a size.
 export function laws(values) {
   const [n, low, high] = [values.length, values[0], values.at(-1)];

@@ -9,10 +9,11 @@ from typing import Any
 
 import msgspec
 
-from conoid.cases import layout, whole
-from conoid.cases.flat import Scalar, flat
 from conoid.cases.outcome import Outcome
-from conoid.cases.points import results
+from conoid.cases.output import layout
+from conoid.cases.output.points import results
+from conoid.cases.reading import whole
+from conoid.cases.reference.flat import Scalar, flat
 
 from ..runs import folder
 from ..runs.journal import DAMAGED

@@ -13,7 +13,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from conoid.cases import history, whole
+from conoid.cases.output import history
+from conoid.cases.reading import whole
 
 from ..runs.journal import Tail
 

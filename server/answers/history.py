@@ -13,8 +13,8 @@ from pathlib import Path
 
 import msgspec
 
-from conoid.cases import layout
 from conoid.cases.messages import Snapshot, Status
+from conoid.cases.output import layout
 from conoid.cases.run import State
 
 from ..runs.journal import DAMAGED, Tail, seq_of

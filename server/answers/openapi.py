@@ -7,7 +7,7 @@ from typing import Any
 import msgspec
 from fastapi import FastAPI
 
-from conoid.cases import reference
+from conoid.cases.reference import json_schema
 
 from . import shapes
 
@@ -130,7 +130,7 @@ def install(app: FastAPI) -> None:
     @cache
     def openapi() -> dict[str, Any]:
         made = own()
-        case = reference.json_schema("#/components/schemas/{model}")
+        case = json_schema.json_schema("#/components/schemas/{model}")
         _, shapes_ = msgspec.json.schema_components(shapes.ALL, ref_template="#/components/schemas/{name}")
         for shape in shapes_.values():
             _tell_of_null(shape.get("properties", {}))

@@ -5,8 +5,8 @@ from collections.abc import Iterator, Sequence
 from functools import lru_cache
 from pathlib import Path
 
-from conoid.cases import snapshot
 from conoid.cases.messages import Snapshot
+from conoid.cases.output import snapshot
 
 from ..errors import ServiceError
 from . import download

@@ -9,8 +9,8 @@ from typing import Any
 
 import msgspec
 
-from conoid.cases.flat import Scalar
-from conoid.cases.key_units import unit_of_key
+from conoid.cases.reference.flat import Scalar
+from conoid.cases.reference.key_units import unit_of_key
 
 from .card import Card
 

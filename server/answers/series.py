@@ -6,8 +6,8 @@ from typing import Any, TypeVar
 
 import msgspec
 
-from conoid.cases.history import OF_PARTS
 from conoid.cases.messages import Counts, Energy, Load, Progress, Snapshot
+from conoid.cases.output.history import OF_PARTS
 
 from ..runs.journal import DAMAGED
 from .history import History, Sample

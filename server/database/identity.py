@@ -11,7 +11,7 @@ from pathlib import Path
 
 import msgspec
 
-from conoid.cases import whole
+from conoid.cases.reading import whole
 
 from .. import durable
 from ..settings import SettingsError

@@ -7,10 +7,10 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from conoid.cases import layout
-from conoid.cases.files import copy_of
 from conoid.cases.load import CaseError, Problem
-from conoid.cases.problems import shown
+from conoid.cases.output import layout
+from conoid.cases.reading.files import copy_of
+from conoid.cases.reading.problems import shown
 
 from .. import durable
 from ..errors import ServiceError

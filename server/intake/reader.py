@@ -13,7 +13,7 @@ from functools import cache
 
 import msgspec
 
-from conoid.cases.cores import usable_cores
+from conoid.cases.estimates.cores import usable_cores
 
 from ..errors import ServiceError
 from ..requests.lanes import Lanes

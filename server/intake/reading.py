@@ -19,14 +19,14 @@ from typing import Any
 
 import msgspec
 
-from conoid.cases.estimate import Estimate, estimate
-from conoid.cases.files import files_of
+from conoid.cases.estimates.estimate import Estimate, estimate
 from conoid.cases.load import CaseError, Problem, json_data, parse_case, resolved_json, shipped_path, toml_data
-from conoid.cases.plausible import bare_numbers
-from conoid.cases.problems import dotted, problem
-from conoid.cases.schema import Case
-from conoid.cases.survey import Survey, from_json
-from conoid.cases.warned import warned
+from conoid.cases.model.schema import Case
+from conoid.cases.reading.files import files_of
+from conoid.cases.reading.problems import dotted, problem
+from conoid.cases.reading.survey import Survey, from_json
+from conoid.cases.warnings.plausible import bare_numbers
+from conoid.cases.warnings.warned import warned
 
 from ..requests import limits
 from ..requests.limits import Limits
@@ -52,8 +52,8 @@ class Question(msgspec.Struct, frozen=True, kw_only=True):
     json: bool
     limits: Limits
     survey: bytes | None = None
-    """What a program of the worker has read of the files that the case names (conoid.cases.survey); empty: nothing.
-    None: it has not been asked yet. Then a case with files is read and checked, and not estimated."""
+    """The survey of the mesh files that the case names (conoid.cases.reading.survey); empty: it could not be made.
+    None: not made yet. Then a case with files is read and checked, and not estimated."""
     folder: str = ""
     """Where these files are."""
 

@@ -20,8 +20,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from conoid.cases.figures import size
-from conoid.cases.files import HASH
-from conoid.cases.policy import Files
+from conoid.cases.reading.files import HASH
+from conoid.cases.site.policy import Files
 
 from .. import durable
 from ..errors import ServiceError

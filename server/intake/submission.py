@@ -13,8 +13,8 @@ import msgspec
 from msgspec import structs
 from sqlalchemy.exc import SQLAlchemyError
 
-from conoid.cases.batch import profile_of
 from conoid.cases.load import CaseError
+from conoid.cases.site.batch import profile_of
 
 from ..database.store import Store
 from ..errors import ServiceError, database_away, invalid_case

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import msgspec
 
-from conoid.cases import survey
+from conoid.cases.reading import survey
 
 _log = logging.getLogger("conoid.server")
 CPU, WALL, MEMORY, FILE = 200, 240, 8 << 30, 4 << 30
@@ -30,8 +30,10 @@ _SECRET = ("CONOID_DATABASE", "CONOID_TOKEN")
 
 
 def surveyed(case: Mapping[str, object], folder: Path) -> bytes:
-    """What the files of a case in ``folder`` hold, as JSON (conoid.cases.survey); empty where they cannot be read here,
-    or not within the limits: that is no reason to refuse a run, which has limits of its own. Waits for it.
+    """The survey of a case's mesh files in ``folder``, as JSON (conoid.cases.reading.survey). Blocks until it is made.
+
+    Empty where the files cannot be read here, or not within the limits: that is no reason to refuse a run, which has
+    limits of its own.
     """
     if not survey.installed():
         return b""

@@ -16,9 +16,9 @@ from typing import Any
 
 import msgspec
 
-from conoid.cases import whole
 from conoid.cases.figures import size
 from conoid.cases.load import CaseError
+from conoid.cases.reading import whole
 
 from .. import durable
 from ..errors import ServiceError

@@ -11,8 +11,8 @@ from typing import Any
 
 import msgspec
 
-from conoid.cases import whole
 from conoid.cases.outcome import known
+from conoid.cases.reading import whole
 from conoid.cases.run import Cause, State
 
 from .. import durable

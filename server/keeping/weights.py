@@ -9,7 +9,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from conoid.cases import layout
+from conoid.cases.output import layout
 
 Copies = dict[tuple[int, int], int]
 """Bytes of files, by device and inode."""

@@ -13,7 +13,9 @@ from pathlib import Path
 
 import msgspec
 
-from conoid.cases import batch, layout, slurm, slurm_call, whole
+from conoid.cases.output import layout
+from conoid.cases.reading import whole
+from conoid.cases.site import batch, slurm, slurm_call
 
 from .handed import SlurmWorker
 

@@ -5,7 +5,7 @@ import queue
 import threading
 from typing import Protocol
 
-from conoid.cases import slurm
+from conoid.cases.site import slurm
 
 _log = logging.getLogger("conoid.server")
 

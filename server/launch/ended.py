@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
-from conoid.cases.batch import Job
 from conoid.cases.run import Cause, State
-from conoid.cases.slurm import Entry
+from conoid.cases.site.batch import Job
+from conoid.cases.site.slurm import Entry
 
 from ..runs import farewell
 from . import Exit, Reading

@@ -6,10 +6,12 @@ from pathlib import Path
 
 import msgspec
 
-from conoid.cases import batch, layout, slurm, slurm_call, whole
-from conoid.cases.batch import Job
+from conoid.cases.output import layout
+from conoid.cases.reading import whole
 from conoid.cases.run import Cause, State
-from conoid.cases.slurm import Entry
+from conoid.cases.site import batch, slurm, slurm_call
+from conoid.cases.site.batch import Job
+from conoid.cases.site.slurm import Entry
 
 from . import Exit, Phase
 from .clerk import Clerk

@@ -11,8 +11,9 @@ from contextlib import suppress
 from pathlib import Path
 from typing import BinaryIO
 
-from conoid.cases import checkpoints, layout, whole
-from conoid.cases.cores import core_numbers, usable_cores
+from conoid.cases.estimates.cores import core_numbers, usable_cores
+from conoid.cases.output import checkpoints, layout
+from conoid.cases.reading import whole
 
 from ..runs import farewell
 from ..runs import folder as run_folder

@@ -11,8 +11,10 @@ from pathlib import Path
 
 import msgspec
 
-from conoid.cases import batch, layout, slurm, slurm_call, whole
-from conoid.cases.slurm import Entry
+from conoid.cases.output import layout
+from conoid.cases.reading import whole
+from conoid.cases.site import batch, slurm, slurm_call
+from conoid.cases.site.slurm import Entry
 
 from ..settings import Settings
 from . import DamagedError, Job, LaunchError, Trace

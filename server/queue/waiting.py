@@ -13,8 +13,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, field
 
 from conoid.cases.figures import counted, size
-from conoid.cases.policy import Share
 from conoid.cases.run import State
+from conoid.cases.site.policy import Share
 
 from ..runs.events import Run
 

@@ -10,7 +10,7 @@ from contextlib import asynccontextmanager
 
 from starlette.requests import Request
 
-from conoid.cases.policy import Http
+from conoid.cases.site.policy import Http
 
 from .lanes import busy
 

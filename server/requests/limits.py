@@ -15,13 +15,13 @@ from fastapi.dependencies.models import Dependant
 from fastapi.routing import APIRoute
 from starlette.requests import ClientDisconnect
 
-from conoid.cases.estimate import Estimate
+from conoid.cases.estimates.estimate import Estimate
 from conoid.cases.figures import count, crew, number, size
-from conoid.cases.files import files_of
-from conoid.cases.policy import Quota
-from conoid.cases.problems import Problem, problem, shown
-from conoid.cases.schema import Case
-from conoid.cases.similar import allowed
+from conoid.cases.model.schema import Case
+from conoid.cases.reading.files import files_of
+from conoid.cases.reading.problems import Problem, problem, shown
+from conoid.cases.reading.similar import allowed
+from conoid.cases.site.policy import Quota
 
 from ..errors import ServiceError
 from ..settings import Caps, Settings

@@ -7,9 +7,9 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Header, Response
 from msgspec import to_builtins
 
-from conoid.cases import reference
-from conoid.cases.files import files_of
 from conoid.cases.load import CaseError, read_case, read_data, shipped
+from conoid.cases.reading.files import files_of
+from conoid.cases.reference import json_schema
 
 from ..answers import openapi
 from ..errors import entry, not_found
@@ -86,7 +86,7 @@ def shipped_file(service: ServiceOf, identity: Reader, name: str, file: str) -> 
 
 @cache
 def _schema() -> str:
-    return reference.schema_text()
+    return json_schema.schema_text()
 
 
 @cache

@@ -5,7 +5,7 @@ from typing import Annotated
 from fastapi import APIRouter, Header, Query, Request, Response
 from fastapi.responses import StreamingResponse
 
-from conoid.cases import layout
+from conoid.cases.output import layout
 
 from ..answers import stream
 from ..errors import ServiceError

@@ -5,7 +5,7 @@ from typing import Annotated
 import msgspec
 from fastapi import APIRouter, Header, Query, Response
 
-from conoid.cases import layout
+from conoid.cases.output import layout
 
 from ..answers import download, series
 from ..answers.columns import Columns

@@ -9,7 +9,7 @@ from fastapi import APIRouter, Request, Response
 from fastapi import Path as PathParameter
 from fastapi.responses import StreamingResponse
 
-from conoid.cases import layout
+from conoid.cases.output import layout
 
 from ..answers import download, stream
 from ..errors import ServiceError

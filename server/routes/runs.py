@@ -10,10 +10,10 @@ import msgspec
 from fastapi import APIRouter, Depends, Header, Query, Request, Response
 from fastapi.responses import JSONResponse
 
-from conoid.cases import layout
 from conoid.cases.load import CaseError
-from conoid.cases.policy import PRIORITY
+from conoid.cases.output import layout
 from conoid.cases.run import State
+from conoid.cases.site.policy import PRIORITY
 
 from ..answers import download, openapi, view
 from ..answers.chosen import Chosen

@@ -7,8 +7,8 @@ import msgspec
 from fastapi import APIRouter, Request, Response
 from fastapi import Path as PathParameter
 
-from conoid.cases import layout
 from conoid.cases.messages import Snapshot
+from conoid.cases.output import layout
 
 from ..answers import download, pieces, series
 from ..errors import not_found

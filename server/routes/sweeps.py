@@ -7,8 +7,8 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Depends, Header, Query, Response
 from fastapi.responses import JSONResponse
 
-from conoid.cases.points import Point, results, to_csv
-from conoid.cases.points import table as points_table
+from conoid.cases.output.points import Point, results, to_csv
+from conoid.cases.output.points import table as points_table
 from conoid.cases.run import State
 
 from ..answers import openapi, view

@@ -6,9 +6,9 @@ from typing import Any, TypeVar
 
 import msgspec
 
-from conoid.cases import layout
 from conoid.cases.messages import Counts, Message, Progress, Started
 from conoid.cases.outcome import Outcome
+from conoid.cases.output import layout
 
 from . import folder, journal
 from .events import Run

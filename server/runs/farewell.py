@@ -5,7 +5,8 @@ import os
 import re
 from pathlib import Path
 
-from conoid.cases import layout, whole
+from conoid.cases.output import layout
+from conoid.cases.reading import whole
 
 _TAIL = 1 << 14
 """Bytes at the end of the log that are searched for the launcher's banner. Chosen: a banner has 700."""

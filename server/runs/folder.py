@@ -14,11 +14,12 @@ from pathlib import Path
 
 import msgspec
 
-from conoid.cases import layout, whole
 from conoid.cases.messages import Status, to_json
 from conoid.cases.outcome import Outcome
 from conoid.cases.outcome import from_json as outcome_from_json
 from conoid.cases.outcome import to_json as outcome_to_json
+from conoid.cases.output import layout
+from conoid.cases.reading import whole
 from conoid.cases.run import Cause, State
 
 from .. import durable

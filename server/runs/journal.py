@@ -8,8 +8,8 @@ from pathlib import Path
 
 import msgspec
 
-from conoid.cases import whole
 from conoid.cases.messages import Status, to_json
+from conoid.cases.reading import whole
 from conoid.cases.run import Cause, State
 
 _CHUNK = 1 << 18

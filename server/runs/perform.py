@@ -7,8 +7,8 @@ from pathlib import Path
 
 import msgspec
 
-from conoid.cases import layout
 from conoid.cases.messages import Status
+from conoid.cases.output import layout
 from conoid.cases.run import Cause, State
 
 from .. import durable

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import msgspec
 
-from conoid.cases import whole
+from conoid.cases.reading import whole
 
 from .. import durable
 from .folder import submission

@@ -6,9 +6,9 @@ from typing import Literal
 
 import msgspec
 
-from conoid.cases import layout
 from conoid.cases.messages import Status
 from conoid.cases.outcome import Outcome
+from conoid.cases.output import layout
 from conoid.cases.run import State
 
 from ..launch import Launcher, Trace, Worker

@@ -6,8 +6,9 @@ import shutil
 from contextlib import suppress
 from pathlib import Path
 
-from conoid.cases import checkpoints, fragments, layout, whole
 from conoid.cases.load import apply_overrides, read_data
+from conoid.cases.output import checkpoints, fragments, layout
+from conoid.cases.reading import whole
 from conoid.cases.run import Cause, State
 
 from ..errors import ServiceError

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import msgspec
 
-from conoid.cases import layout
 from conoid.cases.messages import Progress, Status
+from conoid.cases.output import layout
 from conoid.cases.run import State
 
 from ..keeping import weights

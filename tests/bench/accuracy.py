@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
 
-from conoid.cases import layout
 from conoid.cases.outcome import Check, from_json
+from conoid.cases.output import layout
 
 from .scene import FORMS, Form, Generator
 from .table import Cell, table

@@ -19,9 +19,9 @@ from typing import Any
 
 import msgspec
 
-from conoid.cases.estimate import estimate
+from conoid.cases.estimates.estimate import estimate
 from conoid.cases.load import CaseError, apply_overrides, parse_case, read_data, shipped
-from conoid.cases.schema import Case
+from conoid.cases.model.schema import Case
 from conoid.cases.suite import suite
 from conoid.client.commands import hard
 from conoid.client.errors import ClientError

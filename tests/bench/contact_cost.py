@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from conoid.cases import layout
 from conoid.cases.outcome import Outcome, from_json
+from conoid.cases.output import layout
 
 from .table import Cell, table
 

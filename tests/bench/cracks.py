@@ -14,11 +14,11 @@ import numpy as np
 from matplotlib.tri import Triangulation
 
 from conoid.cases import load
-from conoid.cases.bodies import Box, Plate
-from conoid.cases.geometry import bounds
-from conoid.cases.materials import Material
 from conoid.cases.messages import Energy
-from conoid.cases.schema import Case
+from conoid.cases.model.bodies import Box, Plate
+from conoid.cases.model.materials import Material
+from conoid.cases.model.schema import Case
+from conoid.cases.shapes.geometry import bounds
 from conoid.worker import simulation, step
 from conoid.worker.fracture import connectivity
 from conoid.worker.materials.law import DENSITY

@@ -12,10 +12,10 @@ from pathlib import Path
 
 import numpy as np
 
-from conoid.cases.impact import wave_speed
-from conoid.cases.library import library
+from conoid.cases.estimates.impact import wave_speed
 from conoid.cases.load import parse_case
-from conoid.cases.schema import Case
+from conoid.cases.model.schema import Case
+from conoid.cases.reading.library import library
 from conoid.worker import simulation, step
 from conoid.worker.fracture import connectivity
 from conoid.worker.parallel.comm import SerialComm

@@ -14,7 +14,7 @@ from dataclasses import asdict, dataclass
 from functools import cached_property
 from pathlib import Path
 
-from conoid.cases.estimate import Estimate, estimate
+from conoid.cases.estimates.estimate import Estimate, estimate
 from conoid.cases.load import apply_overrides, parse_case, read_data, shipped
 from conoid.cases.outcome import Outcome, from_json
 from conoid.cases.suite import suite

@@ -1,4 +1,4 @@
-"""How much the mean time step falls where bars flatten on a wall, beside what is expected (cases/shrinkage.py).
+"""The mean time step of bars that flatten on a wall, beside its estimate (cases/estimates/shrinkage.py).
 
 ``python -m tests.bench.flattening``: square bars of two metals, one to four times as long as wide, on one rank.
 """
@@ -12,11 +12,11 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
-from conoid.cases.estimate import estimate
-from conoid.cases.impact import impact_speeds
+from conoid.cases.estimates.estimate import estimate
+from conoid.cases.estimates.impact import impact_speeds
+from conoid.cases.estimates.shrinkage import shrinkage
 from conoid.cases.load import parse_case
 from conoid.cases.outcome import from_json
-from conoid.cases.shrinkage import shrinkage
 
 from .table import Cell, table
 

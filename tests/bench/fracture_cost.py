@@ -12,8 +12,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from conoid.cases import fragments, layout, load
+from conoid.cases import load
 from conoid.cases.outcome import Outcome, from_json
+from conoid.cases.output import fragments, layout
 from conoid.worker import simulation, step
 from conoid.worker.parallel.comm import SerialComm
 

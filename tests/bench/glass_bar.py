@@ -18,8 +18,9 @@ import numpy as np
 import numpy.typing as npt
 from PIL import Image
 
-from conoid.cases import fragments, history, layout, messages
+from conoid.cases import messages
 from conoid.cases.outcome import Outcome, from_json
+from conoid.cases.output import fragments, history, layout
 
 from .table import Cell, table
 

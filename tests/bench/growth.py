@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from conoid.cases import schema
+from conoid.cases.model import schema
 from conoid.worker.mesh.build import build as build_mesh
 
 from .gather_scatter import GatherScatter

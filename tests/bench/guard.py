@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from conoid.cases import layout
+from conoid.cases.output import layout
 
 from .table import Cell, table
 

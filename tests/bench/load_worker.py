@@ -13,7 +13,8 @@ import sys
 import time
 from pathlib import Path
 
-from conoid.cases import layout, messages, outcome
+from conoid.cases import messages, outcome
+from conoid.cases.output import layout
 from conoid.worker.output.journal import Journal
 from conoid.worker.output.telemetry import Telemetry
 

@@ -17,9 +17,10 @@ import h5py
 import numpy as np
 import numpy.typing as npt
 
-from conoid.cases import layout, load
-from conoid.cases.library import library
+from conoid.cases import load
 from conoid.cases.outcome import Outcome, from_json
+from conoid.cases.output import layout
+from conoid.cases.reading.library import library
 from conoid.worker.gauges import penetration
 from conoid.worker.mesh.faces import boundary_faces
 

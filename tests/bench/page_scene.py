@@ -10,9 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from conoid.cases import layout, messages
+from conoid.cases import messages
+from conoid.cases.output import layout
+from conoid.cases.output.snapshot import Column, Field, Header, pack
 from conoid.cases.run import State
-from conoid.cases.snapshot import Column, Field, Header, pack
 from tests.server.visitor import OWNER
 
 _AROUND = 20

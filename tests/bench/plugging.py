@@ -14,9 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from conoid.cases import layout, load
-from conoid.cases.library import library
+from conoid.cases import load
 from conoid.cases.outcome import Outcome, from_json
+from conoid.cases.output import layout
+from conoid.cases.reading.library import library
 
 from .table import Cell, table
 

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from conoid.cases.load import parse_case
-from conoid.cases.schema import Case
+from conoid.cases.model.schema import Case
 from conoid.worker import simulation, step
 from conoid.worker.contact import common_volume
 from conoid.worker.parallel.comm import SerialComm

@@ -12,7 +12,7 @@ from unittest.mock import patch
 
 import numpy as np
 
-from conoid.cases import bodies, schema
+from conoid.cases.model import bodies, schema
 from conoid.worker import simulation, step
 from conoid.worker.mesh.model import TetMesh
 from conoid.worker.model import state

@@ -20,8 +20,8 @@ from unittest.mock import patch
 
 import numpy as np
 
-from conoid.cases import schema
 from conoid.cases.load import parse_case
+from conoid.cases.model import schema
 from conoid.worker import simulation, step
 from conoid.worker.gauges import penetration, reference
 from conoid.worker.mesh.build import build

@@ -18,8 +18,8 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
-from conoid.cases import layout
 from conoid.cases.outcome import from_json
+from conoid.cases.output import layout
 
 from . import router, switch
 from .switch import Block, Pairs

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from conoid.cases.bodies import Box
+from conoid.cases.model.bodies import Box
 from conoid.worker.mesh.build import build as build_mesh
 
 from . import akantu_peer

@@ -14,7 +14,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from conoid.cases import layout, messages
+from conoid.cases import messages
+from conoid.cases.output import layout
 from conoid.client.local.local import LocalServer
 
 from .startup_phases import PHASES

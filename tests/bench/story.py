@@ -10,10 +10,11 @@ from typing import Any
 
 import msgspec
 
-from conoid.cases import history, layout, messages, outcome
-from conoid.cases.quantities import FIELD_UNITS
+from conoid.cases import messages, outcome
+from conoid.cases.model.schema import Case
+from conoid.cases.output import history, layout
+from conoid.cases.reading.quantities import FIELD_UNITS
 from conoid.cases.run import State
-from conoid.cases.schema import Case
 
 from .page_scene import blob
 

@@ -8,7 +8,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from conoid.cases import load, schema
+from conoid.cases import load
+from conoid.cases.model import schema
 from conoid.worker import step
 from conoid.worker.mesh.build import build as build_mesh
 from conoid.worker.mesh.model import TetMesh

@@ -16,8 +16,9 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
-from conoid.cases import layout, messages
+from conoid.cases import messages
 from conoid.cases.outcome import from_json
+from conoid.cases.output import layout
 from conoid.worker.output.telemetry import Telemetry
 
 from . import router, switch

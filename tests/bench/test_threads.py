@@ -4,9 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from conoid.cases import layout, outcome
+from conoid.cases import outcome
 from conoid.cases.messages import to_json
 from conoid.cases.outcome import Outcome
+from conoid.cases.output import layout
 from conoid.client.remote.submission import case_of
 from conoid.client.studies.scaling import Trial
 from tests.client import studies

@@ -16,9 +16,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from conoid.cases import layout
 from conoid.cases.figures import duration
 from conoid.cases.outcome import from_json
+from conoid.cases.output import layout
 from conoid.cases.run import State
 from conoid.client.commands.benches import layouts_of
 from conoid.client.errors import ClientError

@@ -4,8 +4,8 @@ from typing import Any
 
 from pydantic import TypeAdapter
 
-from conoid.cases.bodies import Cone, Hemisphere, Mesh, Ogive, RingSector, SphericalCap
-from conoid.cases.profile import Revolved
+from conoid.cases.model.bodies import Cone, Hemisphere, Mesh, Ogive, RingSector, SphericalCap
+from conoid.cases.shapes.profile import Revolved
 
 SHAPES: dict[str, dict[str, Any]] = {
     "frustum": {"shape": "cone", "radius": 0.5, "top_radius": 0.2, "length": 2.0, "axis": "y"},

@@ -2,8 +2,8 @@
 
 import pytest
 
-from conoid.cases.balancing import Guard, Stretch, Trigger, imbalance, lost
-from conoid.cases.schema import Balance
+from conoid.cases.estimates.balancing import Guard, Stretch, Trigger, imbalance, lost
+from conoid.cases.model.schema import Balance
 
 EVEN, ODD = [2.0, 2.0], [3.0, 1.0]
 """Loads of two ranks, s a step."""

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from conoid.cases.cards import Block, CardError, Deck
+from conoid.cases.reading.cards import Block, CardError, Deck
 
 NODE = (8, 16, 16, 16, 8, 8)
 

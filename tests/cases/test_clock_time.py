@@ -5,11 +5,11 @@ import io
 import pytest
 from rich.console import Console
 
-from conoid.cases.clock_time import clock_time
-from conoid.cases.estimate import estimate
+from conoid.cases.estimates.clock_time import clock_time
+from conoid.cases.estimates.estimate import estimate
+from conoid.cases.estimates.stages import CONTACT, STEPS, TETS
 from conoid.cases.load import apply_overrides, parse_case, read_data, shipped_path
-from conoid.cases.schema import Case
-from conoid.cases.stages import CONTACT, STEPS, TETS
+from conoid.cases.model.schema import Case
 from conoid.client.commands.validated import estimate_table
 
 COSTS = {TETS: 60.0, CONTACT: 30.0, STEPS: 10.0}

@@ -5,11 +5,11 @@ from typing import Any
 
 import pytest
 
-from conoid.cases.compression import griffith, impact_stresses
-from conoid.cases.estimate import estimate
-from conoid.cases.library import library
+from conoid.cases.estimates.estimate import estimate
 from conoid.cases.load import parse_case
-from conoid.cases.plausible import doubts
+from conoid.cases.reading.library import library
+from conoid.cases.warnings.compression import griffith, impact_stresses
+from conoid.cases.warnings.plausible import doubts
 
 MM = 1e-3
 

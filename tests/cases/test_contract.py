@@ -6,7 +6,8 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from conoid.cases import keys, layout, messages, outcome
+from conoid.cases import messages, outcome
+from conoid.cases.output import keys, layout
 from conoid.cases.run import FINAL, FOLLOWERS, State
 
 ENERGY = messages.Energy(

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from conoid.cases import cores
+from conoid.cases.estimates import cores
 from conoid.cases.figures import crew
 
 

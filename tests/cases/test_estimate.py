@@ -9,8 +9,7 @@ from typing import Any
 import pytest
 from pydantic import TypeAdapter
 
-from conoid.cases.bodies import Mesh
-from conoid.cases.estimate import (
+from conoid.cases.estimates.estimate import (
     BROKEN_NANOSECONDS,
     PRESSED_NANOSECONDS,
     RANK_BYTES,
@@ -18,12 +17,13 @@ from conoid.cases.estimate import (
     broken_share,
     estimate,
 )
-from conoid.cases.geometry import Generated, surface, volume
-from conoid.cases.impact import impact_speeds
-from conoid.cases.library import material
+from conoid.cases.estimates.impact import impact_speeds
+from conoid.cases.estimates.mesh_size import mesh_size, size_at
+from conoid.cases.estimates.shrinkage import DEEPEST, SLENDER, shrinkage, slenderness
 from conoid.cases.load import apply_overrides, parse_case, read_case, read_data, shipped, shipped_path, toml_data
-from conoid.cases.mesh_size import mesh_size, size_at
-from conoid.cases.shrinkage import DEEPEST, SLENDER, shrinkage, slenderness
+from conoid.cases.model.bodies import Mesh
+from conoid.cases.reading.library import material
+from conoid.cases.shapes.geometry import Generated, surface, volume
 from conoid.cases.suite import Hard, suite
 from conoid.worker.mesh.build import build
 from conoid.worker.mesh.structured import structured

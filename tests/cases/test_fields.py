@@ -2,8 +2,8 @@
 
 import pytest
 
-from conoid.cases.fields import lacking
 from conoid.cases.load import read_case, shipped_path
+from conoid.cases.output.fields import lacking
 
 ASKED_FOR = {"density", "effective_strain", "strain_rate", "contact_pressure"}
 

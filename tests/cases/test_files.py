@@ -5,9 +5,9 @@ from typing import Any
 
 import pytest
 
-from conoid.cases import layout
-from conoid.cases.files import copy_of, files_of, located
 from conoid.cases.load import CaseError, parse_case, read_data, shipped_path
+from conoid.cases.output import layout
+from conoid.cases.reading.files import copy_of, files_of, located
 
 HASH = "0123456789abcdef" * 4
 

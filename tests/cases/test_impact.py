@@ -4,9 +4,9 @@ from typing import Any
 
 import pytest
 
-from conoid.cases.impact import impact_speeds, pressed, sweeps
+from conoid.cases.estimates.impact import impact_speeds, pressed, sweeps
 from conoid.cases.load import parse_case
-from conoid.cases.schema import Case
+from conoid.cases.model.schema import Case
 
 BRITTLE = {"density": 2500, "elastic": {"young": 72e9, "poisson": 0.22}, "brittle": {"strength": 60e6, "energy": 5}}
 TOUGH = {**BRITTLE, "strength": {"model": "linear_hardening", "yield_stress": 200e6, "hardening": 0}}

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 import pytest
 from pydantic import BaseModel
 
-from conoid.cases.library import CONFIDENCES, library, provenance, sources
-from conoid.cases.materials import Elastic, JohnsonCook, Material, MohrCoulomb
+from conoid.cases.model.materials import Elastic, JohnsonCook, Material, MohrCoulomb
+from conoid.cases.reading.library import CONFIDENCES, library, provenance, sources
 
 NAMES = sorted(library())
 

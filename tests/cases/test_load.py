@@ -7,7 +7,6 @@ from pathlib import Path
 
 import pytest
 
-from conoid.cases.bodies import Cylinder
 from conoid.cases.load import (
     CaseError,
     Problem,
@@ -23,6 +22,7 @@ from conoid.cases.load import (
     shipped_path,
     toml_data,
 )
+from conoid.cases.model.bodies import Cylinder
 
 from .scenes import ROD, problems, rod, said
 

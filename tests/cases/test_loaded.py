@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from conoid.cases.idle import unloaded
 from conoid.cases.load import CaseError, parse_case
-from conoid.cases.loaded import loads
-from conoid.cases.region import Region
-from conoid.cases.schema import Case
+from conoid.cases.model.schema import Case
+from conoid.cases.shapes.loaded import loads
+from conoid.cases.shapes.region import Region
+from conoid.cases.warnings.idle import unloaded
 from conoid.worker.mesh.faces import boundary_faces, normals
 from conoid.worker.mesh.structured import structured
 

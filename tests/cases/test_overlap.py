@@ -5,8 +5,8 @@ from typing import Any
 
 import pytest
 
+from conoid.cases.checks.overlap import grazes
 from conoid.cases.load import CaseError, parse_case
-from conoid.cases.overlap import grazes
 from conoid.worker.errors import InputError
 from conoid.worker.scene import assembly
 

@@ -6,13 +6,13 @@ from typing import Any
 
 import pytest
 
-from conoid.cases.driven import passing
-from conoid.cases.estimate import estimate
-from conoid.cases.library import library
+from conoid.cases.estimates.estimate import estimate
 from conoid.cases.load import parse_case, read_case, read_data, resolved_json, shipped, toml_data
-from conoid.cases.placed import velocity
-from conoid.cases.plausible import STIFFENING, bare_numbers, doubts, linear_error
-from conoid.cases.schema import Case
+from conoid.cases.model.schema import Case
+from conoid.cases.reading.library import library
+from conoid.cases.shapes.placed import velocity
+from conoid.cases.warnings.driven import passing
+from conoid.cases.warnings.plausible import STIFFENING, bare_numbers, doubts, linear_error
 
 from .scenes import rod
 

@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
-from conoid.cases.key_units import unit_of_key
 from conoid.cases.outcome import Check, Measured, Outcome, from_json, to_json
-from conoid.cases.points import KEY, RESULT, Point, in_one_unit, results, safe, table, to_csv
+from conoid.cases.output.points import KEY, RESULT, Point, in_one_unit, results, safe, table, to_csv
+from conoid.cases.reference.key_units import unit_of_key
 
 
 @pytest.mark.parametrize(

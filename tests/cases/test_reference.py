@@ -8,14 +8,14 @@ from typing import Any
 import jsonschema
 import pytest
 
-from conoid.cases import page, reference
 from conoid.cases.load import read_data, shipped
-from conoid.cases.reference import FILE, LINE, definition, json_schema
+from conoid.cases.reference import json_schema, page
+from conoid.cases.reference.json_schema import FILE, LINE, definition
 
 from .scenes import problems, rod
 
 ROOT = Path(__file__).parents[2]
-SCHEMA = json_schema()
+SCHEMA = json_schema.json_schema()
 CHECK = jsonschema.Draft202012Validator(SCHEMA)
 
 
@@ -27,7 +27,7 @@ def keys(schema: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
 
 
 @pytest.mark.parametrize(
-    ("path", "text"), [("docs/reference/case.md", page.page()), (f"cases/{FILE}", reference.schema_text())]
+    ("path", "text"), [("docs/reference/case.md", page.page()), (f"cases/{FILE}", json_schema.schema_text())]
 )
 def test_what_is_committed_is_what_make_reference_makes(path: str, text: str) -> None:
     assert (ROOT / path).read_text(encoding="utf-8") == text, "run: make reference"

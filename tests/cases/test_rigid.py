@@ -6,12 +6,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from conoid.cases.bonds import TiedBond
-from conoid.cases.estimate import estimate
+from conoid.cases.estimates.estimate import estimate
 from conoid.cases.load import CaseError, apply_overrides, parse_case
-from conoid.cases.placed import bulk
-from conoid.cases.plausible import oddities
-from conoid.cases.unstrained import Strained, could_be_rigid
+from conoid.cases.model.bonds import TiedBond
+from conoid.cases.shapes.placed import bulk
+from conoid.cases.warnings.plausible import oddities
+from conoid.cases.warnings.unstrained import Strained, could_be_rigid
 
 BALL = {"shape": "sphere", "centre": [0, 0, "5.1 mm"], "radius": "5 mm", "element_size": "1 mm"}
 PAD = {"shape": "box", "low": ["-9 mm", "-9 mm", "-9 mm"], "high": ["9 mm", "9 mm", 0], "element_size": "2 mm"}

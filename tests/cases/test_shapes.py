@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from scipy import integrate
 
-from conoid.cases.bodies import RingSector
-from conoid.cases.geometry import AXES, bounds, height, holds, index, lowest_along, surface, volume
 from conoid.cases.load import CaseError, parse_case
-from conoid.cases.profile import profile
-from conoid.cases.sheets import sheets
+from conoid.cases.model.bodies import RingSector
+from conoid.cases.shapes.geometry import AXES, bounds, height, holds, index, lowest_along, surface, volume
+from conoid.cases.shapes.profile import profile
+from conoid.cases.shapes.sheets import sheets
 
 from .forms import SHAPES, revolved, shape
 

@@ -6,14 +6,14 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from conoid.cases.bodies import TwoTets
-from conoid.cases.estimate import estimate
-from conoid.cases.geometry import altitude, volume
-from conoid.cases.impact import wave_speed
-from conoid.cases.library import library
+from conoid.cases.estimates.estimate import estimate
+from conoid.cases.estimates.impact import wave_speed
 from conoid.cases.load import parse_json, read_case, resolved_json, shipped
-from conoid.cases.materials import JohnsonCook, MohrCoulomb
-from conoid.cases.schema import Case, Prescribed, Reference
+from conoid.cases.model.bodies import TwoTets
+from conoid.cases.model.materials import JohnsonCook, MohrCoulomb
+from conoid.cases.model.schema import Case, Prescribed, Reference
+from conoid.cases.reading.library import library
+from conoid.cases.shapes.geometry import altitude, volume
 
 from .one_dimension import broken_rod
 

@@ -4,9 +4,9 @@ from typing import Any
 
 import pytest
 
-from conoid.cases.batch import Slurm, profile_of
 from conoid.cases.load import CaseError, parse_case, shipped_path
-from conoid.cases.similar import allowed, close, nearest
+from conoid.cases.reading.similar import allowed, close, nearest
+from conoid.cases.site.batch import Slurm, profile_of
 from conoid.cases.units import parse_unit
 
 from .scenes import rod

@@ -2,9 +2,9 @@
 
 import pytest
 
-from conoid.cases.estimate import estimate
+from conoid.cases.estimates.estimate import estimate
+from conoid.cases.estimates.stages import stages, without
 from conoid.cases.load import parse_case, read_case, shipped
-from conoid.cases.stages import stages, without
 
 
 def test_a_case_without_anything_besides_tets() -> None:

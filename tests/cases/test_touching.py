@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from conoid.cases.load import parse_case, read_case, shipped
-from conoid.cases.touching import apart, touching
+from conoid.cases.warnings.touching import apart, touching
 
 PLATE = {"shape": "plate", "width": "20 mm", "height": "20 mm", "thickness": "5 mm", "element_size": "1 mm"}
 ROD = {"shape": "cylinder", "radius": "3 mm", "length": "8 mm", "element_size": "1 mm"}

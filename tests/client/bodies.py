@@ -8,7 +8,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-from conoid.cases import fragments, history
+from conoid.cases.output import fragments, history
 
 RADIUS, LENGTH = 3.2e-3, 32.4e-3
 

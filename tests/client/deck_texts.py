@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Any
 
-from conoid.cases.materials import Material
+from conoid.cases.model.materials import Material
 from conoid.client.decks.importing import Imported, read_deck
 from conoid.client.decks.toml import bare
 

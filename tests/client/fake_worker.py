@@ -19,8 +19,9 @@ from typing import Any
 
 import zenoh
 
-from conoid.cases import keys, layout, messages, outcome, snapshot
+from conoid.cases import messages, outcome
 from conoid.cases.load import read_data
+from conoid.cases.output import keys, layout, snapshot
 
 stop = False
 

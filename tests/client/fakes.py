@@ -9,8 +9,8 @@ from typing import Any
 
 import zenoh
 
-from conoid.cases import keys
 from conoid.cases.messages import AnyMessage, to_msgpack
+from conoid.cases.output import keys
 from conoid.client.remote.http import Router
 
 OWNER = "ann"

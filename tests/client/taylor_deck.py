@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from conoid.cases.bodies import Cylinder
+from conoid.cases.model.bodies import Cylinder
 from conoid.worker.mesh.model import TetMesh
 from conoid.worker.mesh.structured import structured
 

@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner, Result
 
-from conoid.cases.cores import usable_cores
+from conoid.cases.estimates.cores import usable_cores
 from conoid.cases.load import read_case, resolved_json, shipped_path
 from conoid.client.cli import app
 from conoid.client.local.local import LocalServer

@@ -12,7 +12,8 @@ from rich.table import Table
 from rich.text import Text
 from typer.testing import CliRunner, Result
 
-from conoid.cases import layout, messages
+from conoid.cases import messages
+from conoid.cases.output import layout
 from conoid.client.cli import app
 from conoid.client.commands.console import PlainConsole, one_line, plain
 

@@ -9,8 +9,8 @@ from typer.testing import CliRunner
 
 from conoid.cases.load import parse_case, read_data, shipped_path
 from conoid.cases.messages import Energy
+from conoid.cases.model.schema import Case
 from conoid.cases.outcome import Check, Outcome
-from conoid.cases.schema import Case
 from conoid.client import cli
 from conoid.client.columns import read_columns
 from conoid.client.errors import ClientError

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from conoid.cases.materials import JohnsonCook, JohnsonHolmquist, LinearHardening, Material
+from conoid.cases.model.materials import JohnsonCook, JohnsonHolmquist, LinearHardening, Material
 from conoid.worker.materials.equation_of_state import cold
 from conoid.worker.materials.law import DENSITY, EQUATION
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from conoid.cases.bodies import MeshFile
+from conoid.cases.model.bodies import MeshFile
 from conoid.client.decks.toml import bare
 from conoid.worker.mesh.read import read as read_mesh
 

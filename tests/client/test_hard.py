@@ -4,8 +4,8 @@ import pytest
 from typer.testing import CliRunner
 
 from conoid.cases.load import apply_overrides, parse_case, read_data
+from conoid.cases.model.schema import Case
 from conoid.cases.outcome import Check, Outcome
-from conoid.cases.schema import Case
 from conoid.cases.suite import Hard, drift, faults, is_free, suite
 from conoid.client import cli
 from conoid.client.commands.hard import Verdict, chosen, to_markdown

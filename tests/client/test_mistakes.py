@@ -7,7 +7,8 @@ import msgspec
 import pytest
 from typer.testing import CliRunner, Result
 
-from conoid.cases import layout, messages
+from conoid.cases import messages
+from conoid.cases.output import layout
 from conoid.client import cli
 from conoid.client.cli import app
 from conoid.client.commands import sweeping

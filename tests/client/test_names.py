@@ -9,7 +9,8 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-from conoid.cases import layout, messages
+from conoid.cases import messages
+from conoid.cases.output import layout
 from conoid.client.cli import app
 from conoid.client.errors import AnswerError, NotFoundError, UsageError
 from conoid.client.remote.session import Session

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from pydantic import TypeAdapter
 
-from conoid.cases.bodies import MeshFile
-from conoid.cases.cards import Deck
 from conoid.cases.load import CaseError
+from conoid.cases.model.bodies import MeshFile
+from conoid.cases.reading.cards import Deck
 from conoid.client.decks.importing import read_deck
 from conoid.client.decks.toml import bare
 from conoid.client.errors import UsageError

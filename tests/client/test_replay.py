@@ -10,7 +10,7 @@ from msgspec.structs import replace
 from typer.testing import CliRunner
 
 from conoid.cases.messages import AnyMessage, Balance, Groups, Load, to_json
-from conoid.cases.schema import Balance as Spec
+from conoid.cases.model.schema import Balance as Spec
 from conoid.client.cli import app
 from conoid.client.errors import ClientError
 from conoid.client.studies import replay

@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from conoid.cases import layout
-from conoid.cases.files import Named
 from conoid.cases.load import CaseError
+from conoid.cases.output import layout
+from conoid.cases.reading.files import Named
 from conoid.client.cli import app
 from conoid.client.errors import ClientError, ServiceError
 from conoid.client.local.local import LocalServer

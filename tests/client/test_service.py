@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from conoid.cases.problems import CaseError
+from conoid.cases.reading.problems import CaseError
 from conoid.cases.run import State
 from conoid.client.errors import NotFoundError, ServiceError, UnfinishedError
 from conoid.client.local.local import LocalServer

@@ -12,7 +12,7 @@ import httpx2
 import pytest
 
 from conoid.cases.load import CaseError
-from conoid.cases.problems import ConoidError
+from conoid.cases.reading.problems import ConoidError
 from conoid.client.errors import AnswerError, ClientError, NotFoundError, ServiceError, UnreachableError, UsageError
 from conoid.client.local.places import inside
 from conoid.client.remote.config import DEFAULT_URL, target

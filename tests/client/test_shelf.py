@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner, Result
 
-from conoid.cases import page, reference
 from conoid.cases.load import materials, read_case, shipped
+from conoid.cases.reference import json_schema, page
 from conoid.client.cli import app
 
 
@@ -21,7 +21,7 @@ def test_the_version_is_that_of_the_package() -> None:
 
 
 def test_the_schema_and_the_page_are_printed_or_written(quiet_home: Path) -> None:
-    assert conoid("schema").stdout == reference.schema_text()
+    assert conoid("schema").stdout == json_schema.schema_text()
     assert conoid("schema", "--page", "--out", "keys.md").stdout == ""
     assert (quiet_home / "keys.md").read_text() == page.page()
     refused = conoid("schema", "--out", "no/keys.json")
@@ -43,7 +43,7 @@ def test_a_copy_is_the_case_and_names_the_schema_beside_it(quiet_home: Path) -> 
     copy = quiet_home / "demo.toml"
     assert read_case(copy) == read_case(shipped()["demo"])
     assert copy.read_text().startswith("#:schema ./case.schema.json\n")
-    assert (quiet_home / "case.schema.json").read_text() == reference.schema_text()
+    assert (quiet_home / "case.schema.json").read_text() == json_schema.schema_text()
     copy.write_text("mine")
     again = conoid("cases", "copy", "demo")
     assert (again.exit_code, again.stderr) == (1, "conoid: demo.toml is there already; name another file with --out\n")

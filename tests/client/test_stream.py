@@ -7,8 +7,8 @@ from collections.abc import Callable, Iterator
 import msgspec
 import pytest
 
-from conoid.cases import keys
 from conoid.cases.messages import AnyMessage, Log
+from conoid.cases.output import keys
 from conoid.client.errors import AnswerError, UnreachableError
 from conoid.client.remote import stream
 from conoid.client.remote.http import Router

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from typer.testing import CliRunner
 
-from conoid.cases import layout
+from conoid.cases.output import layout
 from conoid.client.cli import app
 
 CASE = """

@@ -9,12 +9,12 @@ import jsonschema
 import pytest
 from typer.testing import CliRunner
 
-from conoid.cases.estimate import estimate
+from conoid.cases.estimates.estimate import estimate
 from conoid.cases.figures import rough
 from conoid.cases.load import parse_case, toml_data
-from conoid.cases.plausible import doubts
-from conoid.cases.reference import json_schema
-from conoid.cases.solids import Cad
+from conoid.cases.model.solids import Cad
+from conoid.cases.reference.json_schema import json_schema
+from conoid.cases.warnings.plausible import doubts
 from conoid.client.cli import app
 from conoid.client.result import Result
 

@@ -9,7 +9,7 @@ from unittest.mock import patch
 import numpy as np
 import numpy.typing as npt
 
-from conoid.cases import schema
+from conoid.cases.model import schema
 from conoid.worker.contact import surface
 from conoid.worker.contact.records import CrackSides, Crowd
 from conoid.worker.contact.surface import Surface

@@ -9,8 +9,8 @@ from unittest.mock import patch
 import numpy as np
 import pytest
 
-from conoid.cases import schema
 from conoid.cases.messages import Energy
+from conoid.cases.model import schema
 from conoid.worker import simulation, step
 from conoid.worker.accounts.digest import digest
 from conoid.worker.errors import InputError

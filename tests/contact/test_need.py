@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from conoid.cases.impact import Sweeps
+from conoid.cases.estimates.impact import Sweeps
 from conoid.worker.contact.need import Need
 
 from ..worker.meshes import Floats

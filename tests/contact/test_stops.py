@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from conoid.cases import schema
+from conoid.cases.model import schema
 from conoid.worker.contact.stops import Stops
 from conoid.worker.mesh.model import TetMesh
 

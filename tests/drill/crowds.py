@@ -19,8 +19,8 @@ from pathlib import Path
 
 import httpx2
 
-from conoid.cases import layout
 from conoid.cases.messages import Log, Status, to_json
+from conoid.cases.output import layout
 from conoid.cases.run import State
 from conoid.server.database.store import Store
 from conoid.server.requests.tokens import create_token

@@ -10,7 +10,7 @@ from functools import partial
 from itertools import product
 from pathlib import Path
 
-from conoid.cases import layout
+from conoid.cases.output import layout
 
 from . import judge
 from .judge import TRUE, Row

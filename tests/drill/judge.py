@@ -4,7 +4,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from conoid.cases import layout
+from conoid.cases.output import layout
 from conoid.server.launch import processes
 from conoid.server.runs import folder, journal
 

@@ -12,7 +12,7 @@ from functools import partial
 from itertools import product
 from pathlib import Path
 
-from conoid.cases import layout
+from conoid.cases.output import layout
 
 from ..server.running import case_text
 from . import damage

@@ -9,7 +9,7 @@ from pathlib import Path
 import httpx2
 import pytest
 
-from conoid.cases import layout
+from conoid.cases.output import layout
 
 from . import damage, strike, strikes, table
 from .damage import CASE, Damage

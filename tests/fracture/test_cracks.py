@@ -6,7 +6,7 @@ from unittest.mock import patch
 import numpy as np
 import pytest
 
-from conoid.cases import materials, schema
+from conoid.cases.model import materials, schema
 from conoid.worker import step
 from conoid.worker.fracture.strength import Toughness
 from conoid.worker.mesh.model import TetMesh

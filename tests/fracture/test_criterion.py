@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from conoid.cases import materials, schema
+from conoid.cases.model import materials, schema
 from conoid.worker import step
 from conoid.worker.elements import hot, tet4
 from conoid.worker.fracture import criterion

@@ -13,7 +13,7 @@ from scipy import stats
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from conoid.cases import fragments as tables
+from conoid.cases.output import fragments as tables
 from conoid.worker.fracture import connectivity, fragments, numbers
 from conoid.worker.mesh.faces import FACES, across
 from conoid.worker.model.state import MASS, Block, Model, Nodes, chunked

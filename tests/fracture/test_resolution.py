@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from conoid.cases import materials, schema
+from conoid.cases.model import materials, schema
 from conoid.worker.fracture.resolution import told_once, warnings
 from conoid.worker.fracture.strength import toughness
 

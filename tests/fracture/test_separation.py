@@ -9,7 +9,7 @@ import pytest
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from conoid.cases import materials, schema
+from conoid.cases.model import materials, schema
 from conoid.worker import simulation, step
 from conoid.worker.fracture import stars
 from conoid.worker.fracture.facets import mesh_of

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from conoid.cases import load
-from conoid.cases.bodies import Plate
+from conoid.cases.model.bodies import Plate
 from conoid.worker.mesh.structured import structured
 
 from ..bench import cracks

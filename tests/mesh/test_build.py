@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from conoid.cases.bodies import Box, Cylinder, MeshFile
+from conoid.cases.model.bodies import Box, Cylinder, MeshFile
 from conoid.worker.errors import MeshError, StoppedError
 from conoid.worker.mesh import build as building
 from conoid.worker.mesh.build import build, cache_folder

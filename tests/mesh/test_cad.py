@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from pydantic import TypeAdapter
 
-from conoid.cases.bodies import Mesh
+from conoid.cases.model.bodies import Mesh
 from conoid.worker.errors import MeshError
 from conoid.worker.mesh.build import build
 from conoid.worker.mesh.model import TetMesh, check

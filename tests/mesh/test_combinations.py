@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from pydantic import TypeAdapter
 
-from conoid.cases.bodies import Mesh
-from conoid.cases.combined import box_of, combined_size, inside
 from conoid.cases.load import CaseError, parse_case
-from conoid.cases.solids import Combination, Difference, Intersection, Union
+from conoid.cases.model.bodies import Mesh
+from conoid.cases.model.solids import Combination, Difference, Intersection, Union
+from conoid.cases.shapes.combined import box_of, combined_size, inside
 from conoid.worker.errors import MeshError
 from conoid.worker.mesh.build import build
 from conoid.worker.mesh.model import TetMesh, check

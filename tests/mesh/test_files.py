@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from conoid.cases.bodies import MeshFile
+from conoid.cases.model.bodies import MeshFile
 from conoid.worker.errors import MeshError
 from conoid.worker.mesh.build import build
 from conoid.worker.mesh.child import Limits

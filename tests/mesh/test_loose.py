@@ -6,9 +6,9 @@ import math
 import numpy as np
 import pytest
 
-from conoid.cases.bodies import Shards, TwoTets
-from conoid.cases.geometry import bounds, pitch, surface, volume
-from conoid.cases.mesh_size import mesh_size
+from conoid.cases.estimates.mesh_size import mesh_size
+from conoid.cases.model.bodies import Shards, TwoTets
+from conoid.cases.shapes.geometry import bounds, pitch, surface, volume
 from conoid.worker.mesh.faces import areas, boundary_faces, normals
 from conoid.worker.mesh.loose import rotations
 from conoid.worker.mesh.model import REGULAR_STEP, Floats, TetMesh, check

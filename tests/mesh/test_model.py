@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from conoid.cases.bodies import Box
+from conoid.cases.model.bodies import Box
 from conoid.worker.errors import MeshError
 from conoid.worker.mesh.faces import FACES, areas, boundary_faces
 from conoid.worker.mesh.model import REGULAR_STEP, Ints, Names, TetMesh, check

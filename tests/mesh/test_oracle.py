@@ -16,7 +16,7 @@ import meshio
 import numpy as np
 import pytest
 
-from conoid.cases.bodies import MeshFile
+from conoid.cases.model.bodies import MeshFile
 from conoid.worker.errors import MeshError
 from conoid.worker.mesh.cells import HEX8, PYRAMID5, WEDGE6
 from conoid.worker.mesh.read import read

@@ -7,7 +7,7 @@ from random import Random
 import numpy as np
 import pytest
 
-from conoid.cases.bodies import MeshFile
+from conoid.cases.model.bodies import MeshFile
 from conoid.worker.errors import MeshError
 from conoid.worker.mesh.lookup import meant
 from conoid.worker.mesh.model import TetMesh

@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from conoid.cases.bodies import RingSector
-from conoid.cases.geometry import centre, cut_directions, surface, volume
-from conoid.cases.mesh_size import mesh_size
+from conoid.cases.estimates.mesh_size import mesh_size
+from conoid.cases.model.bodies import RingSector
+from conoid.cases.shapes.geometry import centre, cut_directions, surface, volume
 from conoid.worker.mesh.build import build
 from conoid.worker.mesh.faces import areas, boundary_faces
 from conoid.worker.mesh.model import REGULAR_STEP, TetMesh, check

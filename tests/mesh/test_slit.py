@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from pydantic import TypeAdapter
 
-from conoid.cases.bodies import Box, Mesh, Plate
-from conoid.cases.geometry import across, index, slit_extents, surface, volume
+from conoid.cases.model.bodies import Box, Mesh, Plate
+from conoid.cases.shapes.geometry import across, index, slit_extents, surface, volume
 from conoid.worker.mesh.faces import across as behind
 from conoid.worker.mesh.faces import areas, boundary_faces, normals
 from conoid.worker.mesh.model import Floats, TetMesh, check

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from pydantic import TypeAdapter
 
-from conoid.cases.bodies import Box, Cylinder, Mesh, Sphere
-from conoid.cases.geometry import Generated, bounds, centre, cut_directions, volume
-from conoid.cases.grading import Grading
-from conoid.cases.solids import Measured
+from conoid.cases.model.bodies import Box, Cylinder, Mesh, Sphere
+from conoid.cases.model.grading import Grading
+from conoid.cases.model.solids import Measured
+from conoid.cases.shapes.geometry import Generated, bounds, centre, cut_directions, volume
 from conoid.worker.errors import MeshError
 from conoid.worker.mesh.faces import areas, boundary_faces
 from conoid.worker.mesh.model import REGULAR_STEP, TetMesh, check

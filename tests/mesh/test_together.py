@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from conoid.cases.bodies import Ogive
-from conoid.cases.geometry import volume
 from conoid.cases.load import parse_case
-from conoid.cases.problems import CaseError
-from conoid.cases.schema import Case
+from conoid.cases.model.bodies import Ogive
+from conoid.cases.model.schema import Case
+from conoid.cases.reading.problems import CaseError
+from conoid.cases.shapes.geometry import volume
 from conoid.worker.errors import InputError, MeshError
 from conoid.worker.mesh.faces import FACES, across, areas
 from conoid.worker.scene.assembly import Whole, assemble

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from pydantic import TypeAdapter
 
-from conoid.cases.bodies import Box, Cylinder, Mesh, Plate, Sphere, Tube
-from conoid.cases.geometry import Generated, bounds, centre, cut_directions, index, volume
+from conoid.cases.model.bodies import Box, Cylinder, Mesh, Plate, Sphere, Tube
+from conoid.cases.shapes.geometry import Generated, bounds, centre, cut_directions, index, volume
 from conoid.worker.mesh.build import build
 from conoid.worker.mesh.faces import areas, boundary_faces
 from conoid.worker.mesh.model import REGULAR_STEP, TetMesh, check

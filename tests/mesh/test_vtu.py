@@ -14,7 +14,7 @@ from vtkmodules.vtkCommonCore import vtkPoints
 from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkUnstructuredGrid
 from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
 
-from conoid.cases.bodies import MeshFile
+from conoid.cases.model.bodies import MeshFile
 from conoid.worker.errors import MeshError
 from conoid.worker.mesh.cells import HEX8, PYRAMID5, WEDGE6, Kind
 from conoid.worker.mesh.lookup import meant

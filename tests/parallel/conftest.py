@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from conoid.cases import layout
+from conoid.cases.output import layout
 
 from .launching import together
 from .scenes import FAST, SCENES, arguments

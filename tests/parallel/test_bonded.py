@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from conoid.cases import layout
 from conoid.cases.outcome import Outcome, from_json
+from conoid.cases.output import layout
 
 from .launching import command, ended, together
 

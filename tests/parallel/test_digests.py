@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from conoid.cases import layout
 from conoid.cases.outcome import from_json
+from conoid.cases.output import layout
 
 from .launching import together
 from .scenes import CASE

@@ -6,10 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from conoid.cases import layout, messages
-from conoid.cases.estimate import RANK_BYTES, estimate
+from conoid.cases import messages
+from conoid.cases.estimates.estimate import RANK_BYTES, estimate
 from conoid.cases.load import read_case, shipped_path
 from conoid.cases.outcome import Outcome, from_json
+from conoid.cases.output import layout
 
 from .launching import command, ended, processes, started, wait_for, wait_until_gone
 from .scenes import CASE as BREAKING

@@ -9,9 +9,9 @@ from typing import Any
 import h5py
 import pytest
 
-from conoid.cases import layout
 from conoid.cases.load import parse_case, read_data
 from conoid.cases.outcome import Outcome, from_json
+from conoid.cases.output import layout
 from conoid.worker import simulation, step
 from conoid.worker.model.topology import Split
 from conoid.worker.parallel.comm import Comm

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from conoid.cases import layout
 from conoid.cases.outcome import from_json
+from conoid.cases.output import layout
 
 from ..client.taylor_deck import abaqus_text, lsdyna_text
 from .launching import command, ended

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from conoid.cases.load import apply_overrides, parse_case, read_data, shipped
-from conoid.cases.schema import Case
+from conoid.cases.model.schema import Case
 from conoid.worker import simulation, step
 from conoid.worker.contact import domain, search
 from conoid.worker.contact.flight import Flight

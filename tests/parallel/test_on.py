@@ -3,8 +3,8 @@
 from pathlib import Path
 from random import Random
 
-from conoid.cases import layout
 from conoid.cases.outcome import Outcome, from_json
+from conoid.cases.output import layout
 
 from ..mesh.bars import bar
 from ..mesh.decks import prepost

@@ -8,8 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from conoid.cases import layout, load
+from conoid.cases import load
 from conoid.cases.outcome import Outcome, from_json
+from conoid.cases.output import layout
 
 from .launching import command, ended, together
 

@@ -14,9 +14,9 @@ import h5py
 import numpy as np
 import pytest
 
-from conoid.cases import fragments, history, layout, snapshot
 from conoid.cases.messages import Counts, Snapshot, from_json
 from conoid.cases.outcome import from_json as outcome_from_json
+from conoid.cases.output import fragments, history, layout, snapshot
 
 from .launching import command, ended, processes, started, together, wait_for, wait_until_gone
 from .scenes import FAST, arguments

@@ -11,10 +11,10 @@ from pathlib import Path
 
 import pytest
 
-from conoid.cases import fragments, layout
 from conoid.cases.messages import Balance, Checkpoint, Frame, from_json
 from conoid.cases.outcome import Outcome
 from conoid.cases.outcome import from_json as outcome_from_json
+from conoid.cases.output import fragments, layout
 
 from .launching import command, ended, processes, started, together, wait_until_gone
 from .scenes import FAST, SCENES, arguments

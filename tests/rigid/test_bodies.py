@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from conoid.cases import schema
 from conoid.cases.messages import Energy
+from conoid.cases.model import schema
 from conoid.worker import step
 from conoid.worker.accounts import digest
 from conoid.worker.errors import PhysicsError

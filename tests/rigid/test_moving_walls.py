@@ -6,9 +6,9 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from conoid.cases import schema
-from conoid.cases.materials import Elastic, Material
 from conoid.cases.messages import Energy
+from conoid.cases.model import schema
+from conoid.cases.model.materials import Elastic, Material
 from conoid.worker.boundaries.moving_walls import MovingWalls
 from conoid.worker.simulation import Simulation
 

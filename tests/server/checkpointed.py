@@ -3,8 +3,8 @@
 import hashlib
 from pathlib import Path
 
-from conoid.cases import layout
-from conoid.cases.checkpoints import FORMAT, MANIFEST, SEAL, File, Manifest, sealed
+from conoid.cases.output import layout
+from conoid.cases.output.checkpoints import FORMAT, MANIFEST, SEAL, File, Manifest, sealed
 
 from .running import Running
 

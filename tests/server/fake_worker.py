@@ -14,7 +14,8 @@ import time
 import tomllib
 from pathlib import Path
 
-from conoid.cases import layout, messages, outcome
+from conoid.cases import messages, outcome
+from conoid.cases.output import layout
 from conoid.cases.run import ExitCode
 
 stop = False

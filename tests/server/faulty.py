@@ -13,8 +13,9 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from conoid.cases import layout, outcome
+from conoid.cases import outcome
 from conoid.cases.messages import Status
+from conoid.cases.output import layout
 from conoid.server.database.store import Store
 from conoid.server.launch import Exit, Job, LaunchError, Phase, Trace, Worker
 from conoid.server.runs import folder, journal

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from conoid.cases import layout
-from conoid.cases.batch import Job, read_job
+from conoid.cases.output import layout
 from conoid.cases.run import State
+from conoid.cases.site.batch import Job, read_job
 
 from .real_slurm import Cluster
 from .running import TOML, Process, User, case_text

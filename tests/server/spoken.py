@@ -5,7 +5,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from conoid.cases import layout, messages
+from conoid.cases import messages
+from conoid.cases.output import layout
 from conoid.cases.run import State
 
 ENERGY = {

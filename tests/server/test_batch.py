@@ -13,9 +13,11 @@ import msgspec
 import pytest
 from typer.testing import CliRunner, Result
 
-from conoid.cases import batch, layout, whole
-from conoid.cases.files import located
+from conoid.cases.output import layout
+from conoid.cases.reading import whole
+from conoid.cases.reading.files import located
 from conoid.cases.run import Cause, State
+from conoid.cases.site import batch
 from conoid.client.cli import app
 from conoid.client.commands.batch import slurm_of
 from conoid.client.local import following

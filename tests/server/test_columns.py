@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from conoid.cases import history, layout
+from conoid.cases.output import history, layout
 from conoid.server.answers import columns
 from conoid.server.answers.columns import Columns, extremes
 

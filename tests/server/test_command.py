@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from conoid.cases.cores import usable_cores
+from conoid.cases.estimates.cores import usable_cores
 from conoid.server.__main__ import main
 from conoid.server.database.engine import StoreError
 from conoid.server.database.store import Store

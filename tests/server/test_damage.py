@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from sqlalchemy.exc import OperationalError
 
-from conoid.cases import layout
+from conoid.cases.output import layout
 from conoid.cases.run import State
 from conoid.server.runs import farewell, folder, holds, index
 from conoid.server.runs.events import Run

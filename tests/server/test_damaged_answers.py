@@ -5,8 +5,8 @@ from typing import Any
 
 import pytest
 
-from conoid.cases import layout
 from conoid.cases.messages import Snapshot, Status, to_json
+from conoid.cases.output import layout
 
 from .running import Running, case_text
 

@@ -8,10 +8,10 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from conoid.cases import layout
 from conoid.cases.messages import AnyMessage, Counts, Progress, Started, Status, to_json
 from conoid.cases.outcome import Outcome, from_json
 from conoid.cases.outcome import to_json as outcome_to_json
+from conoid.cases.output import layout
 from conoid.cases.run import State
 from conoid.server.launch import Exit, Phase
 from conoid.server.runs import ends

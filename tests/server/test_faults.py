@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from conoid.cases import layout
+from conoid.cases.output import layout
 from conoid.cases.run import State
 from conoid.server import durable
 from conoid.server.alone import AloneError, only_one

@@ -3,8 +3,9 @@
 import math
 from pathlib import Path
 
-from conoid.cases import layout, messages
+from conoid.cases import messages
 from conoid.cases.outcome import Check, Outcome, to_json
+from conoid.cases.output import layout
 from conoid.cases.run import State
 from conoid.server.runs import folder
 from conoid.server.runs.folder import Submission

@@ -12,8 +12,8 @@ from typing import Any
 
 import pytest
 
-from conoid.cases import layout
 from conoid.cases.messages import Status
+from conoid.cases.output import layout
 from conoid.cases.run import State
 
 from .running import Process, User, case_text, processes

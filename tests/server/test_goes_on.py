@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from conoid.cases import layout
-from conoid.cases.checkpoints import MANIFEST, SEAL
 from conoid.cases.outcome import Outcome
+from conoid.cases.output import layout
+from conoid.cases.output.checkpoints import MANIFEST, SEAL
 from conoid.cases.run import Cause, State
 from conoid.server.errors import ServiceError
 from conoid.server.runs import restarts

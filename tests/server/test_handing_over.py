@@ -9,11 +9,12 @@ from pathlib import Path
 
 import pytest
 
-from conoid.cases import batch, layout, slurm, slurm_call
-from conoid.cases.batch import Job, Profile, Slurm
 from conoid.cases.messages import Status
+from conoid.cases.output import layout
 from conoid.cases.run import Cause, State
-from conoid.cases.slurm import Entry
+from conoid.cases.site import batch, slurm, slurm_call
+from conoid.cases.site.batch import Job, Profile, Slurm
+from conoid.cases.site.slurm import Entry
 from conoid.server.launch.arrays import Arrays
 from conoid.server.launch.handed import SlurmWorker
 from conoid.server.launch.slurm import SlurmLauncher

@@ -10,9 +10,10 @@ from typing import Any
 import msgspec
 import pytest
 
-from conoid.cases import layout, messages
+from conoid.cases import messages
+from conoid.cases.output import layout
+from conoid.cases.output.snapshot import Column, Header, pack
 from conoid.cases.run import State
-from conoid.cases.snapshot import Column, Header, pack
 from conoid.server.answers import history
 from conoid.server.answers.history import History
 

@@ -12,7 +12,7 @@ from itertools import product
 
 import pytest
 
-from conoid.cases import layout
+from conoid.cases.output import layout
 from conoid.cases.run import State
 from conoid.server.runs import folder, holds
 from conoid.server.runs.events import CancelAsked, Run

@@ -10,8 +10,9 @@ from typing import Any
 
 import pytest
 
-from conoid.cases import layout, whole
 from conoid.cases.messages import Status
+from conoid.cases.output import layout
+from conoid.cases.reading import whole
 from conoid.cases.run import State
 from conoid.server.keeping.farewells import Farewells
 from conoid.server.runs import ends, farewell, folder, journal, pins, restarts

@@ -11,9 +11,9 @@ from typing import Any
 import msgspec
 import pytest
 
-from conoid.cases.batch import Site
-from conoid.cases.policy import Retention
 from conoid.cases.run import State
+from conoid.cases.site.batch import Site
+from conoid.cases.site.policy import Retention
 from conoid.server.database.store import Store
 from conoid.server.keeping import keeper
 from conoid.server.keeping.farewells import FILE, Farewells

@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
-from conoid.cases.batch import Site
-from conoid.cases.policy import Http
+from conoid.cases.site.batch import Site
+from conoid.cases.site.policy import Http
 from conoid.server import durable, readiness
 from conoid.server.answers import view
 from conoid.server.app import build_app, opened

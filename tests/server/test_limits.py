@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 import sqlalchemy as sa
 
-from conoid.cases import layout
 from conoid.cases.messages import Log, to_json
+from conoid.cases.output import layout
 from conoid.cases.run import State
 from conoid.server.answers import digests, series, view
 from conoid.server.answers.chosen import Chosen

@@ -8,8 +8,9 @@ from typing import Any
 
 import pytest
 
-from conoid.cases import layout, survey
-from conoid.cases.survey import Survey, Surveyed
+from conoid.cases.output import layout
+from conoid.cases.reading import survey
+from conoid.cases.reading.survey import Survey, Surveyed
 from conoid.server.intake import sent, submission
 from conoid.server.keeping import weights
 from conoid.server.requests import limits

@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 import zenoh
 
-from conoid.cases.batch import Slurm
 from conoid.cases.messages import Log
+from conoid.cases.site.batch import Slurm
 from conoid.server.database.store import Token
 from conoid.server.telemetry import Telemetry
 from conoid.worker.output import telemetry as worker

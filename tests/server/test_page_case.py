@@ -13,8 +13,8 @@ from typing import Any
 
 import pytest
 
-from conoid.cases.files import files_of
 from conoid.cases.load import shipped
+from conoid.cases.reading.files import files_of
 
 WEB = Path(__file__).parents[2] / "client" / "web"
 NODE = shutil.which("node")

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from conoid.cases import layout
+from conoid.cases.output import layout
 from tests.bench.many import lay
 from tests.bench.page_compare import alike
 

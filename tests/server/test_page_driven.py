@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from conoid.cases import history, layout
+from conoid.cases.output import history, layout
 from conoid.client.reports import report
 from conoid.client.result import Result
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from conoid.cases import layout
+from conoid.cases.output import layout
 from conoid.client import snapshots
 from conoid.client.drawing import hues
 from conoid.client.snapshots import Snapshot

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
-from conoid.cases import fragments
+from conoid.cases.output import fragments
 from conoid.client.drawing import hues, scales
 from conoid.client.drawing.fields import FIELDS
 from conoid.client.snapshots import Snapshot

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from conoid.cases.flat import Scalar
+from conoid.cases.reference.flat import Scalar
 from conoid.server.answers import card, rows
 
 from .node import NODE, Ask

@@ -11,9 +11,9 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
-from conoid.cases.batch import Site, SiteError, read_site
-from conoid.cases.policy import Queue, Quota, RunCaps, Share
 from conoid.cases.run import State
+from conoid.cases.site.batch import Site, SiteError, read_site
+from conoid.cases.site.policy import Queue, Quota, RunCaps, Share
 from conoid.server.app import build_app, opened
 from conoid.server.queue.usage import Took
 from conoid.server.requests.tokens import create_token

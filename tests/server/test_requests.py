@@ -16,7 +16,7 @@ from starlette.requests import Request
 from starlette.testclient import TestClient
 
 from conoid.cases.load import shipped_path
-from conoid.cases.reference import json_schema
+from conoid.cases.reference.json_schema import json_schema
 from conoid.server.answers import reference, shapes
 from conoid.server.app import ROUTERS, build_app, opened
 from conoid.server.errors import ServiceError

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from conoid.cases import layout
+from conoid.cases.output import layout
 from conoid.cases.run import State
 from conoid.server.launch.local import LocalLauncher
 

@@ -13,8 +13,8 @@ from typing import Any
 
 import pytest
 
-from conoid.cases.batch import Site
-from conoid.cases.policy import Files
+from conoid.cases.site.batch import Site
+from conoid.cases.site.policy import Files
 from conoid.server.intake import receiving, sent
 from conoid.server.intake.sent import Part, SentFiles
 from conoid.server.settings import Settings

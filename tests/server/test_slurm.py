@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from conoid.cases import layout
 from conoid.cases.messages import AnyMessage, Finished, Progress
+from conoid.cases.output import layout
 from conoid.cases.run import State
 from conoid.client import connect
 from conoid.client.remote.link import Link

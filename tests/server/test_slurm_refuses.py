@@ -6,10 +6,11 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from conoid.cases import batch, layout, slurm, slurm_call
-from conoid.cases.batch import Profile, Slurm
+from conoid.cases.output import layout
 from conoid.cases.run import Cause, State
-from conoid.cases.slurm import Entry
+from conoid.cases.site import batch, slurm, slurm_call
+from conoid.cases.site.batch import Profile, Slurm
+from conoid.cases.site.slurm import Entry
 from conoid.server.launch import clerk as clerks
 from conoid.server.launch.handed import SlurmWorker
 

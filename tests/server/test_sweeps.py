@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
-from conoid.cases.problems import CaseError
+from conoid.cases.reading.problems import CaseError
 from conoid.cases.run import State
 from conoid.client.sweeps.sweep import SweepInfo
 from conoid.server.answers import view

@@ -10,7 +10,8 @@ from typing import Any
 import msgspec
 import pytest
 
-from conoid.cases import layout, outcome
+from conoid.cases import outcome
+from conoid.cases.output import layout
 from conoid.cases.run import State
 from conoid.server.answers import card, cards, rows
 from conoid.server.answers.chosen import Chosen

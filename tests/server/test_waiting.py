@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import pytest
 
-from conoid.cases.policy import Share
+from conoid.cases.site.policy import Share
 from conoid.server.queue.usage import Took, Usage
 from conoid.server.queue.waiting import Busy, Need, Room, ordered, plan
 from conoid.server.queue.waitlist import need_of

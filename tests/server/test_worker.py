@@ -12,8 +12,8 @@ from typing import Any
 import pytest
 import zenoh
 
-from conoid.cases import snapshot
 from conoid.cases.messages import fragments_from_msgpack, from_msgpack
+from conoid.cases.output import snapshot
 from conoid.cases.run import State
 
 from .running import PATIENCE, Process, User

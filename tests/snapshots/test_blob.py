@@ -1,4 +1,4 @@
-"""Snapshots say what the model is: read back here with numpy alone, from the layout in cases/snapshot.py."""
+"""Snapshots say what the model is: read back here with numpy alone, from the layout in cases/output/snapshot.py."""
 
 from dataclasses import replace
 
@@ -7,7 +7,7 @@ import pytest
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from conoid.cases import snapshot
+from conoid.cases.output import snapshot
 from conoid.worker.snapshots import blob, table
 from conoid.worker.snapshots.blob import Budget
 from conoid.worker.snapshots.share import joined

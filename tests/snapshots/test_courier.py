@@ -16,7 +16,8 @@ from typing import Any
 
 import pytest
 
-from conoid.cases import layout, messages, snapshot
+from conoid.cases import messages
+from conoid.cases.output import layout, snapshot
 from conoid.worker.output.telemetry import Telemetry
 from conoid.worker.snapshots import packer, share
 from conoid.worker.snapshots.courier import Courier

@@ -5,7 +5,7 @@ import gzip
 import numpy as np
 import pytest
 
-from conoid.cases import snapshot
+from conoid.cases.output import snapshot
 from conoid.worker.snapshots import blob, invariants, volume
 from conoid.worker.snapshots.blob import Made
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from conoid.cases import snapshot
+from conoid.cases.output import snapshot
 from conoid.worker.snapshots import blob
 from conoid.worker.snapshots.blob import Budget, Made
 

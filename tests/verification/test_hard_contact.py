@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
-from conoid.cases import materials
-from conoid.cases.library import library
 from conoid.cases.load import apply_overrides, parse_case, read_data, shipped
-from conoid.cases.schema import Case
+from conoid.cases.model import materials
+from conoid.cases.model.schema import Case
+from conoid.cases.reading.library import library
 from conoid.worker import simulation, step
 from conoid.worker.contact import common_volume
 from conoid.worker.mesh.model import TetMesh

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from conoid.cases.materials import JohnsonCook
+from conoid.cases.model.materials import JohnsonCook
 from conoid.worker.model.state import PLASTIC_STRAIN, TEMPERATURE
 
 from ..worker import formulas

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from conoid.cases import materials
+from conoid.cases.model import materials
 from conoid.worker.boundaries.drivers import Course, PrescribedVelocity
 from conoid.worker.mesh.model import TetMesh
 from conoid.worker.model.state import Indices, Nodes

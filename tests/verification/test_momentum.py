@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from conoid.cases import materials
+from conoid.cases.model import materials
 from conoid.worker.simulation import Simulation
 
 from ..worker.kernels import COPPER, COPPER_GAS, FORMS, STEEL, STEEL_42CRMO4, Form, build, run, scene

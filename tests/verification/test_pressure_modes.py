@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from conoid.cases import bodies, materials
+from conoid.cases.model import bodies, materials
 from conoid.worker.mesh.build import build as build_mesh
 from conoid.worker.mesh.structured import structured
 from conoid.worker.model.state import PLASTIC_STRAIN, PRESSURE, S_XX, S_XY
@@ -168,7 +168,7 @@ def breathing(form: Form) -> float:
 
 
 def test_the_split_form_damps_elastic_motion_and_nodal_does_not() -> None:
-    """What validate, converge and the reference say of it (cases/damping.py); that of 6,400 tets is in
+    """What validate, converge and the reference say of it (cases/warnings/damping.py); that of 6,400 tets is in
     docs/theory/elements.md."""
     assert breathing("split") > 0.08
     assert 0.0 <= breathing("nodal") < 0.03, "differences within a tet are stored, and come back"

@@ -7,7 +7,7 @@ import pytest
 
 from conoid.cases.load import parse_case
 from conoid.cases.messages import Energy
-from conoid.cases.schema import Case
+from conoid.cases.model.schema import Case
 from conoid.worker import simulation, step
 from conoid.worker.parallel.comm import SerialComm
 

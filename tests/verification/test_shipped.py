@@ -8,9 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from conoid.cases import layout, load
-from conoid.cases.library import material
+from conoid.cases import load
 from conoid.cases.outcome import Outcome, from_json
+from conoid.cases.output import layout
+from conoid.cases.reading.library import material
 
 HEAVY = {
     "branching_plate", "breathing_facet", "demo", "free_tets", "glass_steel_bar", "glass_steel_demo", "hertz_spheres",

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from conoid.cases import bodies, materials
+from conoid.cases.model import bodies, materials
 from conoid.worker.mesh.structured import structured
 from conoid.worker.simulation import Simulation
 

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from conoid.cases import materials
+from conoid.cases.model import materials
 from conoid.worker.mesh.model import TetMesh
 from conoid.worker.model.state import PRESSURE
 

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from conoid.cases.load import parse_case
-from conoid.cases.schema import Case
+from conoid.cases.model.schema import Case
 from conoid.worker.mesh.model import Origin, TetMesh
 
 from .meshes import block

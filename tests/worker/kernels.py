@@ -12,7 +12,7 @@ from unittest.mock import patch
 import numpy as np
 import numpy.typing as npt
 
-from conoid.cases import bodies, materials, schema
+from conoid.cases.model import bodies, materials, schema
 from conoid.worker import simulation, step
 from conoid.worker.boundaries.boundaries import Boundary
 from conoid.worker.materials import law

@@ -7,7 +7,7 @@ from unittest.mock import patch
 
 import numpy as np
 
-from conoid.cases import schema
+from conoid.cases.model import schema
 from conoid.worker import simulation, step
 from conoid.worker.accounts.timers import Timers
 from conoid.worker.mesh.model import TetMesh

@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from conoid.cases import schema
-from conoid.cases.bodies import Box
+from conoid.cases.model import schema
+from conoid.cases.model.bodies import Box
 from conoid.worker import simulation
 from conoid.worker.elements.barrier import SQUEEZED, STIFF
 from conoid.worker.model.state import PRESSURE, VISCOUS, WORK

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from conoid.cases import materials, schema
 from conoid.cases.load import parse_case
+from conoid.cases.model import materials, schema
 from conoid.worker import simulation, step
 from conoid.worker.boundaries.drivers import Traction
 from conoid.worker.boundaries.walls import RigidWalls

@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from conoid.cases import materials, schema
-from conoid.cases.compression import borne, griffith
+from conoid.cases.model import materials, schema
 from conoid.cases.outcome import Compressed
+from conoid.cases.warnings.compression import borne, griffith
 from conoid.worker import step
 from conoid.worker.elements.crushing import crushed, hardest, principal
 from conoid.worker.model.state import CHUNK, PRESSURE, S_XX, S_XY, S_YY, S_YZ, S_ZX, S_ZZ

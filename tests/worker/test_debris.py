@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from conoid.cases import schema
+from conoid.cases.model import schema
 from conoid.worker import step
 from conoid.worker.contact.inside import look
 from conoid.worker.parallel.comm import SerialComm

@@ -6,8 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from conoid.cases import load, materials
-from conoid.cases.library import library
+from conoid.cases import load
+from conoid.cases.model import materials
+from conoid.cases.reading.library import library
 from conoid.worker import simulation
 from conoid.worker.mesh.model import TetMesh
 from conoid.worker.model.state import DILATION, PLASTIC_STRAIN, PRESSURE, S_ZZ, WORK, WORK_AVERAGED, WORK_PLASTIC

@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from conoid.cases.materials import MieGruneisen
+from conoid.cases.model.materials import MieGruneisen
 from conoid.worker import step
 from conoid.worker.errors import PhysicsError
 from conoid.worker.model.state import MASS, PRESSURE, VOLUME_RATIO, WORK, WORK_VISCOUS

@@ -7,8 +7,8 @@ from typing import Any, TypeVar
 import numpy as np
 import pytest
 
-from conoid.cases import materials, schema
-from conoid.cases.materials import Material
+from conoid.cases.model import materials, schema
+from conoid.cases.model.materials import Material
 from conoid.worker import step
 from conoid.worker.accounts import digest
 from conoid.worker.boundaries.mirrors import Mirrors

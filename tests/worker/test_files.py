@@ -10,8 +10,8 @@ import numpy as np
 import pyarrow.parquet
 import pytest
 
-from conoid.cases import history, layout
 from conoid.cases.messages import Energy
+from conoid.cases.output import history, layout
 from conoid.worker.fracture.columns import FacetConstants, Facets, PairState, Softening
 from conoid.worker.model.state import Model, Nodes
 from conoid.worker.output import frames, storage

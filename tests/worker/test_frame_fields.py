@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.linalg import logm
 
-from conoid.cases import schema
 from conoid.cases.load import CaseError, parse_case
+from conoid.cases.model import schema
 from conoid.worker import step
 from conoid.worker.output import frames
 from conoid.worker.output.wanted import wanted

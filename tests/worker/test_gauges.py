@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from conoid.cases import schema
 from conoid.cases.load import CaseError, parse_case
+from conoid.cases.model import schema
 from conoid.worker import step
 from conoid.worker.gauges import rays
 from conoid.worker.mesh.model import TetMesh

@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from conoid.cases import materials, schema
-from conoid.cases.balancing import WORK
+from conoid.cases.estimates.balancing import WORK
+from conoid.cases.model import materials, schema
 from conoid.worker import step
 from conoid.worker.migration.balance import Balance, Window
 from conoid.worker.migration.groups import Groups

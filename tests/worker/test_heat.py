@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from conoid.cases.library import library
+from conoid.cases.reading.library import library
 from conoid.worker.model.state import MASS, PRESSURE, WORK, WORK_PLASTIC
 
 from .kernels import COPPER_GAS, Form, Patch, build, run, scene

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from conoid.cases.materials import Material
+from conoid.cases.model.materials import Material
 from conoid.worker.materials.hyperelastic import inverse_sixth_root
 from conoid.worker.mesh.model import TetMesh
 from conoid.worker.model.state import DISTORTION, PRESSURE, TET_VOLUME, WORK

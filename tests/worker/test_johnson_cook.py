@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from conoid.cases.materials import JohnsonCook
+from conoid.cases.model.materials import JohnsonCook
 from conoid.worker.elements.tet4 import TRIAL, VOLUME_MID
 from conoid.worker.materials.johnson_cook import gather, increments, initial_yield
 from conoid.worker.mesh.model import TetMesh

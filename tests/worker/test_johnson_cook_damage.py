@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from conoid.cases.library import library
-from conoid.cases.materials import Elastic, JohnsonCook, JohnsonCookDamage, Material
-from conoid.cases.schema import Erosion
+from conoid.cases.model.materials import Elastic, JohnsonCook, JohnsonCookDamage, Material
+from conoid.cases.model.schema import Erosion
+from conoid.cases.reading.library import library
 from conoid.worker.elements import wear
 from conoid.worker.mesh.model import TetMesh
 from conoid.worker.model.state import DAMAGE, FLOW, PLASTIC_STRAIN, PRESSURE

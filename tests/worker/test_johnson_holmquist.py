@@ -8,8 +8,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from conoid.cases.laws.johnson_holmquist import JohnsonHolmquist
-from conoid.cases.library import library
-from conoid.cases.materials import Material
+from conoid.cases.model.materials import Material
+from conoid.cases.reading.library import library
 from conoid.worker.model.state import BULKING, DAMAGE, MASS, PLASTIC_STRAIN, PRESSURE, S_ZZ, WORK, WORK_PLASTIC
 from conoid.worker.simulation import Simulation
 

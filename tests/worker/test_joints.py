@@ -8,8 +8,8 @@ from unittest.mock import patch
 import numpy as np
 import pytest
 
-from conoid.cases.library import library
-from conoid.cases.schema import Case
+from conoid.cases.model.schema import Case
+from conoid.cases.reading.library import library
 from conoid.worker import step
 from conoid.worker.accounts import digest
 from conoid.worker.errors import InputError, MeshError

@@ -10,10 +10,10 @@ from typing import NamedTuple
 
 import pytest
 
-from conoid.cases import schema
-from conoid.cases.checkpoints import FORMAT, Manifest
 from conoid.cases.load import apply_overrides, parse_case, read_data, resolved_json
 from conoid.cases.messages import Energy
+from conoid.cases.model import schema
+from conoid.cases.output.checkpoints import FORMAT, Manifest
 from conoid.worker import simulation, step
 from conoid.worker.accounts.digest import digest
 from conoid.worker.errors import InputError

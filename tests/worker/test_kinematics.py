@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from conoid.cases.materials import Material
+from conoid.cases.model.materials import Material
 from conoid.worker.mesh.model import TetMesh
 from conoid.worker.model.state import PRESSURE, WORK
 

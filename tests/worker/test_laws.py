@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from conoid.cases.laws.law import Law as Constants
-from conoid.cases.library import library
-from conoid.cases.materials import Material, MieGruneisen, Strength
+from conoid.cases.model.materials import Material, MieGruneisen, Strength
+from conoid.cases.reading.library import library
 from conoid.worker.elements import tet4
 from conoid.worker.materials import law, models
 from conoid.worker.model import state

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from conoid.cases import materials
 from conoid.cases.messages import Energy
+from conoid.cases.model import materials
 from conoid.worker.errors import EnergyError
 from conoid.worker.model.state import WORK, WORK_PLASTIC, WORK_VISCOUS
 from conoid.worker.simulation import Simulation

@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from conoid.cases.load import parse_case
-from conoid.cases.problems import CaseError
-from conoid.cases.survey import Survey
+from conoid.cases.reading.problems import CaseError
+from conoid.cases.reading.survey import Survey
 from conoid.worker.scene.survey import surveyed
 
 from ..mesh.bars import bar

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from conoid.cases import materials
+from conoid.cases.model import materials
 from conoid.worker.elements.averaging import AveragedElements
 from conoid.worker.elements.matter import PORES_AT, PRESSURE_AT
 from conoid.worker.model.state import PORES, PRESSURE

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from conoid.cases import materials
+from conoid.cases.model import materials
 from conoid.worker.mesh.model import TetMesh
 from conoid.worker.model.state import CHUNK, PLASTIC_STRAIN, PRESSURE, WORK, WORK_PLASTIC
 

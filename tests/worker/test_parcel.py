@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from conoid.cases import checkpoints
-from conoid.cases.checkpoints import FORMAT, MANIFEST, SEAL
 from conoid.cases.load import parse_case, read_data, shipped_path
+from conoid.cases.output import checkpoints
+from conoid.cases.output.checkpoints import FORMAT, MANIFEST, SEAL
 from conoid.worker.errors import InputError
 from conoid.worker.migration import checkpoint
 from conoid.worker.migration.parcel import Parcel, joined, length, once, take

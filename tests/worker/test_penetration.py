@@ -6,7 +6,7 @@ from unittest.mock import patch
 import numpy as np
 import pytest
 
-from conoid.cases import schema
+from conoid.cases.model import schema
 from conoid.worker import simulation
 from conoid.worker.gauges import reference
 from conoid.worker.gauges.penetration import LINES, MEASURED, bottoms, depth, spans, thickness

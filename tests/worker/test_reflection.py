@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from conoid.cases import schema
+from conoid.cases.model import schema
 from conoid.worker import step
 from conoid.worker.accounts import digest
 from conoid.worker.boundaries.mirrors import Mirrors

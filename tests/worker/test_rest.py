@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from conoid.cases.materials import Material
+from conoid.cases.model.materials import Material
 from conoid.worker import step
 from conoid.worker.accounts import digest
 from conoid.worker.elements import rest

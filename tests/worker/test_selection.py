@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from conoid.cases.load import CaseError, parse_case
-from conoid.cases.loaded import loads
-from conoid.cases.schema import Case, Prescribed
+from conoid.cases.model.schema import Case, Prescribed
+from conoid.cases.shapes.loaded import loads
 from conoid.worker.errors import InputError
 from conoid.worker.mesh.model import TetMesh
 from conoid.worker.mesh.scale import scaled

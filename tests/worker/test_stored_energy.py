@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from conoid.cases.laws.johnson_holmquist import JohnsonHolmquist
-from conoid.cases.library import library
-from conoid.cases.materials import Elastic, Material
 from conoid.cases.messages import Energy
-from conoid.cases.schema import Erosion
+from conoid.cases.model.materials import Elastic, Material
+from conoid.cases.model.schema import Erosion
+from conoid.cases.reading.library import library
 from conoid.worker.elements.averaging import AveragedElements
 from conoid.worker.elements.matter import PRESSURE_AT, RATIO
 from conoid.worker.materials import law

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from conoid.cases import materials, schema
 from conoid.cases.load import CaseError, parse_case
+from conoid.cases.model import materials, schema
 from conoid.worker import step
 from conoid.worker.boundaries.surface_pressure import SurfacePressure
 from conoid.worker.mesh.faces import boundary_faces

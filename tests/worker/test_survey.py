@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from conoid.cases import survey
-from conoid.cases.bodies import Mesh
 from conoid.cases.load import parse_case
+from conoid.cases.model.bodies import Mesh
+from conoid.cases.reading import survey
 from conoid.worker.errors import MeshError
 from conoid.worker.mesh.child import Limits, perform
 from conoid.worker.mesh.sources import Sources

@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from conoid.cases import schema
-from conoid.cases.bodies import Sphere
-from conoid.cases.library import library
-from conoid.cases.materials import Material
-from conoid.cases.motion import Stretch
-from conoid.cases.schema import Erosion
+from conoid.cases.model import schema
+from conoid.cases.model.bodies import Sphere
+from conoid.cases.model.materials import Material
+from conoid.cases.model.motion import Stretch
+from conoid.cases.model.schema import Erosion
+from conoid.cases.reading.library import library
 from conoid.worker import simulation
 from conoid.worker.model.state import MASS, PORES, PRESSURE, VOLUME_RATIO, WORK, WORK_PLASTIC
 from conoid.worker.parallel.comm import SerialComm

@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from conoid.cases import schema
+from conoid.cases.estimates.stages import stages
 from conoid.cases.messages import Energy
-from conoid.cases.stages import stages
+from conoid.cases.model import schema
 from conoid.worker import step
 from conoid.worker.simulation import Simulation
 

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from conoid.cases.bodies import Mesh
 from conoid.cases.load import parse_case
+from conoid.cases.model.bodies import Mesh
 from conoid.cases.outcome import from_json
 from conoid.client.examination import examine
 from conoid.worker import simulation

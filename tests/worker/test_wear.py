@@ -6,7 +6,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from conoid.cases import schema
+from conoid.cases.model import schema
 from conoid.worker import step
 from conoid.worker.elements import tet4, wear
 from conoid.worker.model import state

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from conoid.cases.messages import Energy, PartEnergy
-from conoid.cases.schema import Run
+from conoid.cases.model.schema import Run
 
 from ..bonds.stage import Bonds
 from ..boundaries.boundaries import Boundary

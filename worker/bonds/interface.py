@@ -13,8 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from conoid.cases.bonds import GAP, TiedBond
-from conoid.cases.schema import Case
+from conoid.cases.model.bonds import GAP, TiedBond
+from conoid.cases.model.schema import Case
 
 from ..contact import search
 from ..contact.search import Things

@@ -8,8 +8,8 @@ change. Contact sees no pair whose nodes are tied by one bond (``bits``).
 
 import numpy as np
 
-from conoid.cases.bonds import TiedBond
-from conoid.cases.schema import Case
+from conoid.cases.model.bonds import TiedBond
+from conoid.cases.model.schema import Case
 
 from ..boundaries.boundaries import Boundary, mirrored
 from ..clock import Clock

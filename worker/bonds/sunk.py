@@ -4,8 +4,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from conoid.cases.bonds import GAP, TiedBond
-from conoid.cases.schema import Case
+from conoid.cases.model.bonds import GAP, TiedBond
+from conoid.cases.model.schema import Case
 
 from ..contact import overlap
 from ..errors import InputError

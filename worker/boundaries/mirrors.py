@@ -9,7 +9,7 @@ from typing import Self
 
 import numpy as np
 
-from conoid.cases.schema import Case, Symmetry
+from conoid.cases.model.schema import Case, Symmetry
 
 from ..kernels.jit import njit
 from ..migration.parcel import Parcel

@@ -13,7 +13,7 @@ import math
 
 import numpy as np
 
-from conoid.cases.schema import Traction
+from conoid.cases.model.schema import Traction
 
 from ..kernels.jit import njit
 from ..migration.parcel import Parcel

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from conoid.cases.boundaries import Wall
+from conoid.cases.model.boundaries import Wall
 
 from ..kernels.jit import njit, record, types
 from ..model.state import Floats, Ints

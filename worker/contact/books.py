@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from conoid.cases.schema import Case
+from conoid.cases.model.schema import Case
 
 from ..migration.parcel import Parcel
 from ..model.state import Floats, Indices, Ints, Nodes, extended

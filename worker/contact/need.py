@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from conoid.cases.impact import Sweeps
+from conoid.cases.estimates.impact import Sweeps
 
 from ..model.state import Ints
 

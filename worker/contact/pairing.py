@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from conoid.cases.joined import bodies, meeting
-from conoid.cases.schema import Case
+from conoid.cases.model.joined import bodies, meeting
+from conoid.cases.model.schema import Case
 
 from ..model.state import Flags, Floats, Nodes
 from ..parallel.comm import Comm

@@ -5,7 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
-from conoid.cases.schema import Case
+from conoid.cases.model.schema import Case
 
 from ..clock import Clock
 from ..migration.parcel import Parcel

@@ -23,9 +23,9 @@ from .records import Edges, Faces
 SHARP = sine_and_cosine(math.radians(25.0))[1]
 """Edges between faces whose normals differ by more than this can meet other edges."""
 BENT, PRESSED = sine_and_cosine(math.radians(5.0))[1], 4
-"""The same of parts that are pressed together beyond their strength (cases/impact.py), and after how many steps edges
-are looked at there: ridges of surfaces that were flat cross without a node inside, and what overlaps has no pressure.
-Chosen by flyer plates of copper at 1 to 2.4 km/s (docs/theory/contact.md, "Ridges under pressure")."""
+"""The same of parts that are pressed together beyond their strength (cases/estimates/impact.py), and after how many
+steps edges are looked at there: ridges of surfaces that were flat cross without a node inside, and what overlaps has no
+pressure. Chosen by flyer plates of copper at 1 to 2.4 km/s (docs/theory/contact.md, "Ridges under pressure")."""
 
 _A, _B, _C, _D, _OWNER, _TOP, _FACE, _OPEN, _LENGTH, _LOW, _NORMAL = range(11)
 """Columns of a half edge that travels: its nodes, the third node of its face and the one opposite, the owners of these

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from conoid.cases.impact import pressed, sweeps
-from conoid.cases.schema import Case
+from conoid.cases.estimates.impact import pressed, sweeps
+from conoid.cases.model.schema import Case
 
 from ..accounts.timers import Timers
 from ..boundaries.boundaries import Boundary

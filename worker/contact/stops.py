@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from conoid.cases import schema
-from conoid.cases.schema import Case
+from conoid.cases.model import schema
+from conoid.cases.model.schema import Case
 
 from ..boundaries.walls import ACROSS
 from ..kernels.jit import njit, record, types

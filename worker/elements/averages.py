@@ -10,8 +10,8 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from conoid.cases.joined import shared_bonds
-from conoid.cases.schema import MOST_PARTS, Case
+from conoid.cases.model.joined import shared_bonds
+from conoid.cases.model.schema import MOST_PARTS, Case
 
 from ..migration.parcel import Table
 from ..model.state import Block, Floats, Indices, Ints, Model, Nodes, Tets, extended

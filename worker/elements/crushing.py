@@ -1,5 +1,5 @@
 """The compression that brittle matter without a law of compressive failure meets, in every step, beside Griffith's
-criterion (cases/compression.py).
+criterion (cases/warnings/compression.py).
 
 Such matter breaks in tension alone and bears any compression. Each stress is compared with the criterion of Griffith
 (1924): (s1 - s3)^2 / (8 T (s1 + s3)) for the largest and the smallest pressure, s1 and s3, and the tensile strength T.
@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from conoid.cases.compression import bears_all
-from conoid.cases.library import material
+from conoid.cases.model.schema import Case
 from conoid.cases.outcome import Compressed
-from conoid.cases.schema import Case
+from conoid.cases.reading.library import material
+from conoid.cases.warnings.compression import bears_all
 
 from ..clock import Clock
 from ..kernels.jit import njit, types

@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from conoid.cases.schema import Erosion
+from conoid.cases.model.schema import Erosion
 
 from ..kernels.jit import njit
 from ..materials.law import DENSITY

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from conoid.cases.schema import Fracture as Spec
+from conoid.cases.model.schema import Fracture as Spec
 
 from ..migration.parcel import Table
 from ..model.ids import among, located, places

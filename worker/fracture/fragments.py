@@ -19,7 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
-from conoid.cases import fragments as tables
+from conoid.cases.output import fragments as tables
 
 from ..mesh.faces import FACES, areas
 from ..model.ids import places
@@ -39,7 +39,7 @@ FRAGMENT = np.dtype([
     ("translation", float), ("rotation", float), ("deformation", float), ("low", float, 3), ("high", float, 3),
     ("extent", float), ("new_surface", float),
 ])  # fmt: skip
-"""A row of the table; the columns are those of cases/fragments.py."""
+"""A row of the table; the columns are those of cases/output/fragments.py."""
 
 
 class Groups:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from conoid.cases.schema import Fracture
+from conoid.cases.model.schema import Fracture
 
 from ..clock import Clock
 from ..migration.parcel import Parcel

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from conoid.cases import fragments as tables
+from conoid.cases.output import fragments as tables
 
 from ..migration.parcel import Parcel, length
 from ..model.ids import places

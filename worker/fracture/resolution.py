@@ -3,7 +3,7 @@
 import logging
 import math
 
-from conoid.cases.schema import Part
+from conoid.cases.model.schema import Part
 
 from ..materials.elementary import power
 from .strength import Toughness

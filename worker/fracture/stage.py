@@ -12,8 +12,8 @@ neither a node of what breaks nor a copy of the surface of a rank that has some 
 
 import numpy as np
 
-from conoid.cases.joined import breakable, cohesive
-from conoid.cases.schema import Case
+from conoid.cases.model.joined import breakable, cohesive
+from conoid.cases.model.schema import Case
 
 from ..clock import Clock
 from ..contact.stage import Contact

@@ -12,9 +12,9 @@ from typing import Literal
 
 import numpy as np
 
-from conoid.cases.bonds import SharedBond
-from conoid.cases.materials import Brittle, Material, Scatter
-from conoid.cases.schema import Fracture
+from conoid.cases.model.bonds import SharedBond
+from conoid.cases.model.materials import Brittle, Material, Scatter
+from conoid.cases.model.schema import Fracture
 
 from ..kernels.jit import njit
 from ..materials.elementary import exp_less_one, log, power

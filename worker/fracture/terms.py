@@ -1,8 +1,8 @@
 """How the facets of a case break: those within each part, and those between parts that a bond holds together."""
 
-from conoid.cases.joined import shared_bonds
-from conoid.cases.library import material as find_material
-from conoid.cases.schema import Case, Fracture
+from conoid.cases.model.joined import shared_bonds
+from conoid.cases.model.schema import Case, Fracture
+from conoid.cases.reading.library import material as find_material
 
 from ..materials.elementary import power
 from ..model.state import Model

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from conoid.cases.schema import Case
+from conoid.cases.model.schema import Case
 
 from ..fracture import connectivity, fragments
 from ..model.state import Floats, Ints

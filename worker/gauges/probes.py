@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from conoid.cases.measures import BEYOND, PUSHES, SHAPES, SUMS, kind
-from conoid.cases.on import bits
-from conoid.cases.region import Region
-from conoid.cases.schema import Case, Probe
+from conoid.cases.checks.on import bits
+from conoid.cases.model.measures import BEYOND, PUSHES, SHAPES, SUMS, kind
+from conoid.cases.model.schema import Case, Probe
+from conoid.cases.shapes.region import Region
 
 from ..errors import InputError
 from ..model.state import (

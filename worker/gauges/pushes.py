@@ -4,8 +4,8 @@ from typing import Any
 
 import numpy as np
 
-from conoid.cases.measures import PUSHES, Probe, kind
-from conoid.cases.schema import Case, Wall
+from conoid.cases.model.measures import PUSHES, Probe, kind
+from conoid.cases.model.schema import Case, Wall
 
 from ..boundaries.boundaries import Boundary
 from ..model.state import Floats

@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from conoid.cases import history, layout
+from conoid.cases.model.schema import Reference
 from conoid.cases.outcome import Check
-from conoid.cases.quantities import unit_of
-from conoid.cases.schema import Reference
+from conoid.cases.output import history, layout
+from conoid.cases.reading.quantities import unit_of
 
 from ..model.state import Block, Floats
 from ..parallel.comm import Comm

@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from conoid.cases.measures import SHAPES, Probe
-from conoid.cases.schema import Case
+from conoid.cases.model.measures import SHAPES, Probe
+from conoid.cases.model.schema import Case
 
 from ..fracture import connectivity, fragments
 from ..mesh.faces import FACES, areas

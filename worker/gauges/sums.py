@@ -5,10 +5,10 @@ from typing import Any
 
 import numpy as np
 
-from conoid.cases.measures import SUMS, Beyond, Probe, kind
-from conoid.cases.on import bits
-from conoid.cases.region import Region
-from conoid.cases.schema import Case
+from conoid.cases.checks.on import bits
+from conoid.cases.model.measures import SUMS, Beyond, Probe, kind
+from conoid.cases.model.schema import Case
+from conoid.cases.shapes.region import Region
 
 from ..model.state import Flags, Floats
 from ..parallel.fixed_point import exact_sums

@@ -1,12 +1,12 @@
-"""How little the parts of a run that has ended were strained (cases/unstrained.py)."""
+"""How little the parts of a run that has ended were strained (cases/warnings/unstrained.py)."""
 
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
-from conoid.cases.library import material
-from conoid.cases.unstrained import Strained, could_be_rigid
+from conoid.cases.reading.library import material
+from conoid.cases.warnings.unstrained import Strained, could_be_rigid
 
 from ..model.state import PLASTIC_STRAIN
 from ..output.history import extremes

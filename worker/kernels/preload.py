@@ -11,7 +11,7 @@ from importlib.abc import InspectLoader
 from inspect import ismodule
 from types import CodeType, ModuleType
 
-from conoid.cases.schema import Case
+from conoid.cases.model.schema import Case
 
 from ..model.inheriting import inherit
 from .jit import DECLARED, Kernel

@@ -6,7 +6,7 @@ SEEN of the scratch, and the tet's own change of volume from CHANGE, so that the
 
 import numpy as np
 
-from conoid.cases.materials import MieGruneisen
+from conoid.cases.model.materials import MieGruneisen
 
 from ..elements.tet4 import CHANGE, MODULUS, NODAL, SEEN, VOLUME_SEEN
 from ..kernels.jit import njit

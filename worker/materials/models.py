@@ -8,8 +8,8 @@ import math
 
 import numpy as np
 
-from conoid.cases.materials import Material
-from conoid.cases.schema import Viscosity
+from conoid.cases.model.materials import Material
+from conoid.cases.model.schema import Viscosity
 
 from ..kernels.jit import njit
 from ..model import state

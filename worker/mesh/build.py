@@ -12,9 +12,10 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from conoid.cases import geometry, profile, ring, whole
-from conoid.cases.bodies import Mesh, MeshFile
-from conoid.cases.files import files_of
+from conoid.cases.model.bodies import Mesh, MeshFile
+from conoid.cases.reading import whole
+from conoid.cases.reading.files import files_of
+from conoid.cases.shapes import geometry, profile, ring
 
 from ..errors import MeshError
 from ..materials import turning

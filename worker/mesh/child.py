@@ -20,9 +20,9 @@ from pathlib import Path
 
 from pydantic import TypeAdapter
 
-from conoid.cases.bodies import Mesh, MeshFile
+from conoid.cases.model.bodies import Mesh, MeshFile
+from conoid.cases.model.solids import Cad, Combination, Measured
 from conoid.cases.run import ExitCode
-from conoid.cases.solids import Cad, Combination, Measured
 
 from ..errors import InputError, MeshError, StoppedError
 from ..run.signals import REQUESTS

@@ -6,7 +6,7 @@ that each body is made once, not once an axis; the turn only permutes coordinate
 
 import numpy as np
 
-from conoid.cases.geometry import Generated, across, bounds, centre, index, volume
+from conoid.cases.shapes.geometry import Generated, across, bounds, centre, index, volume
 
 from ..errors import MeshError
 from .model import MAX_TETS, Floats

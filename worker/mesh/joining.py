@@ -5,8 +5,8 @@ from itertools import combinations
 
 import numpy as np
 
-from conoid.cases.joined import bodies, shared_bonds
-from conoid.cases.schema import Case
+from conoid.cases.model.joined import bodies, shared_bonds
+from conoid.cases.model.schema import Case
 
 from ..errors import InputError
 from .model import Floats, Ids, Ints, Origin

@@ -6,8 +6,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from conoid.cases.bodies import Shards, TwoTets
-from conoid.cases.geometry import altitude, pitch
+from conoid.cases.model.bodies import Shards, TwoTets
+from conoid.cases.shapes.geometry import altitude, pitch
 
 from ..materials.turning import sine_and_cosine, sines_and_cosines
 from ..model.hashing import uniform

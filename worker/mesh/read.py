@@ -10,7 +10,7 @@ import hashlib
 from collections.abc import Callable
 from pathlib import Path
 
-from conoid.cases.bodies import MeshFile
+from conoid.cases.model.bodies import MeshFile
 
 from ..errors import MeshError
 from .abaqus.reading import read_inp

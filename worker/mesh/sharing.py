@@ -5,8 +5,8 @@ from itertools import combinations
 
 import numpy as np
 
-from conoid.cases.joined import bodies
-from conoid.cases.schema import Case
+from conoid.cases.model.joined import bodies
+from conoid.cases.model.schema import Case
 
 from .model import Floats, Ids, Origin
 

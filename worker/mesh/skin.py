@@ -6,8 +6,8 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from conoid.cases.bodies import Box, Cylinder, Plate, Sphere, Tube
-from conoid.cases.geometry import Generated, cut_directions
+from conoid.cases.model.bodies import Box, Cylinder, Plate, Sphere, Tube
+from conoid.cases.shapes.geometry import Generated, cut_directions
 
 from .faces import boundary_faces
 from .frame import block

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from conoid.cases.bodies import Box, Plate
-from conoid.cases.geometry import across, bounds, index
+from conoid.cases.model.bodies import Box, Plate
+from conoid.cases.shapes.geometry import across, bounds, index
 
 from .model import TetMesh
 

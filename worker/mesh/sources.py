@@ -4,12 +4,12 @@ import hashlib
 from collections.abc import Mapping
 from pathlib import Path
 
-from conoid.cases import whole
-from conoid.cases.bodies import Mesh
-from conoid.cases.files import located
-from conoid.cases.measured_checks import File, files_in
-from conoid.cases.operands import Place
-from conoid.cases.problems import dotted
+from conoid.cases.checks.measured_checks import File, files_in
+from conoid.cases.model.bodies import Mesh
+from conoid.cases.model.operands import Place
+from conoid.cases.reading import whole
+from conoid.cases.reading.files import located
+from conoid.cases.reading.problems import dotted
 
 from ..errors import MeshError
 

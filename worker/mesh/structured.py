@@ -9,8 +9,8 @@ import itertools
 import numpy as np
 from numpy.typing import NDArray
 
-from conoid.cases.bodies import Box, Cylinder, Plate, Shards, Tube, TwoTets
-from conoid.cases.geometry import Generated
+from conoid.cases.model.bodies import Box, Cylinder, Plate, Shards, Tube, TwoTets
+from conoid.cases.shapes.geometry import Generated
 
 from ..errors import MeshError
 from ..materials.turning import sines_and_cosines

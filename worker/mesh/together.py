@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from conoid.cases.bodies import RingSector, Symmetric
-from conoid.cases.combined import cut_by
-from conoid.cases.geometry import Generated, bounds, centre, cut_directions
-from conoid.cases.profile import Revolved
-from conoid.cases.solids import Cad, Combination
+from conoid.cases.model.bodies import RingSector, Symmetric
+from conoid.cases.model.solids import Cad, Combination
+from conoid.cases.shapes.combined import cut_by
+from conoid.cases.shapes.geometry import Generated, bounds, centre, cut_directions
+from conoid.cases.shapes.profile import Revolved
 
 from ..errors import MeshError
 from .frame import refuse_impossible

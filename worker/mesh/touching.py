@@ -5,11 +5,11 @@ from itertools import combinations
 
 import numpy as np
 
-from conoid.cases.bodies import Loose
-from conoid.cases.placed import Placed
-from conoid.cases.schema import Case
-from conoid.cases.solids import Measured
-from conoid.cases.touching import NEAR, Touch, bonded, size
+from conoid.cases.model.bodies import Loose
+from conoid.cases.model.schema import Case
+from conoid.cases.model.solids import Measured
+from conoid.cases.shapes.placed import Placed
+from conoid.cases.warnings.touching import NEAR, Touch, bonded, size
 
 from .faces import normals
 from .model import Floats, Ids, Ints

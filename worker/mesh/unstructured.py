@@ -8,9 +8,9 @@ request gives the same bits.
 import math
 from typing import Any
 
-from conoid.cases.bodies import Box, Cylinder, Plate, RingSector, Sphere, Tube
-from conoid.cases.geometry import Generated, centre
-from conoid.cases.profile import Revolved
+from conoid.cases.model.bodies import Box, Cylinder, Plate, RingSector, Sphere, Tube
+from conoid.cases.shapes.geometry import Generated, centre
+from conoid.cases.shapes.profile import Revolved
 
 from ..errors import MeshError
 from .frame import block, refuse_impossible, to_space

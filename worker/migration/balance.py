@@ -11,9 +11,9 @@ from typing import Any, Self
 
 import numpy as np
 
-from conoid.cases import balancing
-from conoid.cases.balancing import MOVED, WORK, Guard, Trigger
-from conoid.cases.schema import Case
+from conoid.cases.estimates import balancing
+from conoid.cases.estimates.balancing import MOVED, WORK, Guard, Trigger
+from conoid.cases.model.schema import Case
 
 from .. import simulation
 from ..accounts.timers import worked

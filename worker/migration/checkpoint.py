@@ -6,7 +6,7 @@
                           manifest.json   step, time, the case, what all ranks know, bytes and sha256 of each file
 
 The folder is written under another name, flushed to disk and renamed. Any number of ranks can read it. What makes it
-whole is in conoid.cases.checkpoints.
+whole is in conoid.cases.output.checkpoints.
 """
 
 import json
@@ -18,8 +18,10 @@ from typing import Any
 import h5py
 import numpy as np
 
-from conoid.cases import layout
-from conoid.cases.checkpoints import (
+from conoid.cases.load import resolved_json
+from conoid.cases.model.schema import Case
+from conoid.cases.output import layout
+from conoid.cases.output.checkpoints import (
     FORMAT,
     MANIFEST,
     SEAL,
@@ -32,8 +34,6 @@ from conoid.cases.checkpoints import (
     sealed,
     sha256,
 )
-from conoid.cases.load import resolved_json
-from conoid.cases.schema import Case
 
 from ..errors import InputError
 from ..output import hdf5

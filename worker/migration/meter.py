@@ -5,7 +5,7 @@ from typing import Self
 
 import numpy as np
 
-from conoid.cases.balancing import WORK
+from conoid.cases.estimates.balancing import WORK
 
 from ..model.state import Floats
 from ..simulation import Simulation

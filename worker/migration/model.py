@@ -4,8 +4,8 @@ from typing import Any
 
 import numpy as np
 
-from conoid.cases.on import ons
-from conoid.cases.schema import MOST_PARTS, Case
+from conoid.cases.checks.on import ons
+from conoid.cases.model.schema import MOST_PARTS, Case
 
 from ..model.ids import located
 from ..model.shares import Shares, ranks

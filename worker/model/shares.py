@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from conoid.cases.joined import shared_bonds
-from conoid.cases.schema import MOST_PARTS, Case
+from conoid.cases.model.joined import shared_bonds
+from conoid.cases.model.schema import MOST_PARTS, Case
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]

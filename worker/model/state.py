@@ -376,7 +376,7 @@ class Model:
     size: float = 0.0
     """Largest coordinate of the whole mesh at the start, m: what round-off in positions is measured by."""
     slack: Floats = field(default_factory=lambda: np.zeros(0))
-    """(parts,) how far outside of a region a node of each part is still in it, m (cases/region.py)."""
+    """(parts,) how far outside of a region a node of each part is still in it, m (cases/shapes/region.py)."""
     rounding: Floats = field(default_factory=lambda: np.zeros(0))
     """(parts,) how far off a plane of symmetry a node of each part is still on it, m."""
     groups: Floats = field(default_factory=lambda: np.zeros((0, 4)))

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from conoid.cases.joined import bodies
+from conoid.cases.model.joined import bodies
 
 from ..kernels.jit import njit
 from ..model.ids import located, unique

@@ -7,9 +7,9 @@ has.
 
 import numpy as np
 
-from conoid.cases.fields import counting, damageable
-from conoid.cases.joined import cohesive
-from conoid.cases.schema import Case
+from conoid.cases.model.joined import cohesive
+from conoid.cases.model.schema import Case
+from conoid.cases.output.fields import counting, damageable
 
 from ..fracture.cohesive import Cohesion
 from ..fracture.columns import Facets

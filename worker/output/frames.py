@@ -11,7 +11,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-from conoid.cases import layout
+from conoid.cases.output import layout
 
 from ..model.state import CHUNK, PLASTIC_STRAIN, PRESSURE, S_XX, S_XY, TEMPERATURE, Block, Floats, Ints, Model
 from ..parallel.comm import Comm

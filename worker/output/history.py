@@ -9,8 +9,8 @@ from pathlib import Path
 
 import msgspec
 
-from conoid.cases import history, layout
 from conoid.cases.messages import Energy
+from conoid.cases.output import history, layout
 
 from . import storage
 

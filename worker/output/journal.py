@@ -8,7 +8,9 @@ from typing import Any, Protocol, TypeVar
 
 import msgspec
 
-from conoid.cases import layout, messages, whole
+from conoid.cases import messages
+from conoid.cases.output import layout
+from conoid.cases.reading import whole
 from conoid.cases.run import State
 
 from . import storage

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from conoid.cases import fragments, layout
+from conoid.cases.output import fragments, layout
 
 _KINDS = {layout.FRAMES: ".vtkhdf", fragments.FOLDER: ".csv", layout.SNAPSHOTS: ".snap"}
 """Folders of a run, and how finished files in them end."""

@@ -4,7 +4,7 @@ import csv
 import os
 from pathlib import Path
 
-from conoid.cases import fragments, layout
+from conoid.cases.output import fragments, layout
 
 
 def rewind(folder: Path, step: int, frame: int) -> None:

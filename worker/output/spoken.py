@@ -4,9 +4,10 @@ import contextlib
 import sys
 from pathlib import Path
 
-from conoid.cases import layout, messages
+from conoid.cases import messages
 from conoid.cases.figures import alike, clock, count, counted, crew, duration, percent, rough, si
 from conoid.cases.outcome import Outcome
+from conoid.cases.output import layout
 from conoid.cases.run import State
 
 

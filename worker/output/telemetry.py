@@ -16,7 +16,8 @@ from collections import deque
 
 import zenoh
 
-from conoid.cases import keys, messages
+from conoid.cases import messages
+from conoid.cases.output import keys
 
 _RING = 1024
 """Messages that wait for the network. Chosen: more than a minute of a run, which sends some ten a

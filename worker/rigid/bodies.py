@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from conoid.cases.schema import Case, Part
+from conoid.cases.model.schema import Case, Part
 
 from ..model.state import Flags, Floats, Indices, Ints, Nodes
 from ..parallel.comm import Comm

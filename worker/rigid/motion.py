@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from conoid.cases.geometry import AXES
-from conoid.cases.schema import Boundary, Case, Gravity, Part, Prescribed, Rotation, Symmetry
+from conoid.cases.model.schema import Boundary, Case, Gravity, Part, Prescribed, Rotation, Symmetry
+from conoid.cases.shapes.geometry import AXES
 
 from ..boundaries.drivers import Course
 from ..materials.turning import sine_and_cosine

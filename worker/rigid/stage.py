@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from conoid.cases.estimate import RIGID_STEPS
-from conoid.cases.region import GENERATED
-from conoid.cases.schema import Case, Wall
+from conoid.cases.estimates.estimate import RIGID_STEPS
+from conoid.cases.model.schema import Case, Wall
+from conoid.cases.shapes.region import GENERATED
 
 from ..boundaries.wall_shapes import Walls
 from ..contact.active import IMPULSE, ActiveNodes

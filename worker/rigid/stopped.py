@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from conoid.cases.schema import Case, Symmetry, Wall
+from conoid.cases.model.schema import Case, Symmetry, Wall
 
 from ..model.state import Flags, Floats, Indices, Ints, Nodes
 from ..parallel.comm import Comm

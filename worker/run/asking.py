@@ -3,8 +3,8 @@
 import math
 from pathlib import Path
 
-from conoid.cases import layout
-from conoid.cases.schema import Case
+from conoid.cases.model.schema import Case
+from conoid.cases.output import layout
 
 from ..clock import Clock
 from ..migration.balance import Balance

@@ -11,15 +11,15 @@ from pathlib import Path
 import numpy as np
 
 from conoid.cases import messages
-from conoid.cases.checkpoints import Manifest
-from conoid.cases.compression import borne
-from conoid.cases.history import of_parts
-from conoid.cases.joined import bodies
+from conoid.cases.estimates.stages import without
+from conoid.cases.model.joined import bodies
+from conoid.cases.model.schema import Case
 from conoid.cases.outcome import Made, Measured, Outcome, Sharing
-from conoid.cases.quantities import FIELD_UNITS
+from conoid.cases.output.checkpoints import Manifest
+from conoid.cases.output.history import of_parts
+from conoid.cases.reading.quantities import FIELD_UNITS
 from conoid.cases.run import State
-from conoid.cases.schema import Case
-from conoid.cases.stages import without
+from conoid.cases.warnings.compression import borne
 
 from .. import simulation
 from ..accounts import digest

@@ -18,10 +18,13 @@ from pathlib import Path
 
 import msgspec
 
-from conoid.cases import batch, checkpoints, figures, layout, messages, outcome, slurm, slurm_call, whole
-from conoid.cases.batch import Job
+from conoid.cases import figures, messages, outcome
 from conoid.cases.outcome import Outcome
+from conoid.cases.output import checkpoints, layout
+from conoid.cases.reading import whole
 from conoid.cases.run import Cause, ExitCode, State
+from conoid.cases.site import batch, slurm, slurm_call
+from conoid.cases.site.batch import Job
 
 from ..output.journal import Journal
 from .lock import hold

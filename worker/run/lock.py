@@ -5,7 +5,7 @@ import time
 from pathlib import Path
 from typing import IO
 
-from conoid.cases import layout
+from conoid.cases.output import layout
 
 _PATIENCE = 20.0
 """s that the one before gets to leave. Chosen: a killed run is gone within seconds, a lock on a network within ten."""

@@ -10,8 +10,9 @@ from typing import Any
 
 import msgspec
 
-from conoid.cases import layout, messages
+from conoid.cases import messages
 from conoid.cases.messages import Energy, PartEnergy
+from conoid.cases.output import layout
 from conoid.cases.run import Cause, State
 
 from .. import simulation, step

@@ -12,13 +12,15 @@ from typing import TYPE_CHECKING, Any
 
 import msgspec
 
-from conoid.cases import layout, load, messages, whole
+from conoid.cases import load, messages
 from conoid.cases import outcome as outcomes
+from conoid.cases.model.schema import Case
 from conoid.cases.outcome import Outcome
-from conoid.cases.plausible import bare_numbers
-from conoid.cases.problems import CaseError
+from conoid.cases.output import layout
+from conoid.cases.reading import whole
+from conoid.cases.reading.problems import CaseError
 from conoid.cases.run import Cause, ExitCode, State
-from conoid.cases.schema import Case
+from conoid.cases.warnings.plausible import bare_numbers
 
 from ..errors import CompileError, ConoidError, StoppedError
 from ..kernels import compile as ahead

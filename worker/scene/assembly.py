@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
-from conoid.cases import schema
-from conoid.cases.library import material as find_material
-from conoid.cases.solids import Measured
-from conoid.cases.survey import Survey
+from conoid.cases.model import schema
+from conoid.cases.model.solids import Measured
+from conoid.cases.reading.library import material as find_material
+from conoid.cases.reading.survey import Survey
 
 from ..bonds import interface
 from ..bonds.pieces import Pieces

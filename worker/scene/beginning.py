@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from conoid.cases.schema import Case
+from conoid.cases.model.schema import Case
 
 from ..mesh.model import TetMesh
 from ..parallel.comm import SerialComm

@@ -4,10 +4,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from conoid.cases import schema
-from conoid.cases.drives import REST, clash, motions
-from conoid.cases.on import bits
-from conoid.cases.region import GENERATED
+from conoid.cases.checks.drives import REST, clash, motions
+from conoid.cases.checks.on import bits
+from conoid.cases.model import schema
+from conoid.cases.shapes.region import GENERATED
 
 from ..boundaries.boundaries import Boundary, SymmetryPlane, driven, mirrored
 from ..boundaries.drivers import Course, Gravity, PrescribedRotation, PrescribedVelocity, Traction

@@ -4,9 +4,9 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from conoid.cases.joined import bodies
-from conoid.cases.loaded import Load
-from conoid.cases.schema import Case, Prescribed, Traction
+from conoid.cases.model.joined import bodies
+from conoid.cases.model.schema import Case, Prescribed, Traction
+from conoid.cases.shapes.loaded import Load
 
 from ..mesh.faces import FACES, across
 from ..mesh.joining import Placed, joined

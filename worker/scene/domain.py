@@ -10,12 +10,12 @@ from pathlib import Path
 
 import numpy as np
 
-from conoid.cases import schema
-from conoid.cases.estimate import estimate
-from conoid.cases.library import material as find_material
-from conoid.cases.survey import Survey
-from conoid.cases.touching import touching
-from conoid.cases.warned import warned
+from conoid.cases.estimates.estimate import estimate
+from conoid.cases.model import schema
+from conoid.cases.reading.library import material as find_material
+from conoid.cases.reading.survey import Survey
+from conoid.cases.warnings.touching import touching
+from conoid.cases.warnings.warned import warned
 
 from ..bonds.pieces import Pieces
 from ..elements import wear

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from conoid.cases.library import material
-from conoid.cases.placed import driven, with_inertia
-from conoid.cases.schema import Case
-from conoid.cases.survey import Survey, Surveyed
+from conoid.cases.model.schema import Case
+from conoid.cases.reading.library import material
+from conoid.cases.reading.survey import Survey, Surveyed
+from conoid.cases.shapes.placed import driven, with_inertia
 
 from ..mesh.faces import FACES, areas, boundary_faces
 from ..mesh.model import Floats, TetMesh

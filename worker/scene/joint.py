@@ -3,10 +3,10 @@
 from collections.abc import Callable
 from pathlib import Path
 
-from conoid.cases.bodies import Mesh, Primitive, Symmetric
-from conoid.cases.joined import bodies
-from conoid.cases.schema import Case, Part
-from conoid.cases.solids import Meshed
+from conoid.cases.model.bodies import Mesh, Primitive, Symmetric
+from conoid.cases.model.joined import bodies
+from conoid.cases.model.schema import Case, Part
+from conoid.cases.model.solids import Meshed
 
 from ..mesh.build import build_together
 from ..mesh.model import TetMesh

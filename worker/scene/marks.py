@@ -5,9 +5,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from conoid.cases import on
-from conoid.cases.problems import dotted
-from conoid.cases.schema import Case
+from conoid.cases.checks import on
+from conoid.cases.model.schema import Case
+from conoid.cases.reading.problems import dotted
 
 from ..errors import MeshError
 from ..mesh.lookup import known, meant

@@ -5,8 +5,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from conoid.cases.figures import counted
-from conoid.cases.schema import Case
-from conoid.cases.solids import Measured
+from conoid.cases.model.schema import Case
+from conoid.cases.model.solids import Measured
 
 from ..contact import overlap, pairing
 from ..errors import InputError

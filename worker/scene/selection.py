@@ -6,10 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from conoid.cases import loaded, region, schema
-from conoid.cases.bodies import MeshFile
-from conoid.cases.on import bits
-from conoid.cases.region import Region
+from conoid.cases.checks.on import bits
+from conoid.cases.model import schema
+from conoid.cases.model.bodies import MeshFile
+from conoid.cases.shapes import loaded, region
+from conoid.cases.shapes.region import Region
 
 from ..mesh.faces import normals
 from ..model.state import Flags, Floats, Indices, Ints
@@ -31,7 +32,7 @@ _EDGES = ((0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3))
 
 @dataclass(frozen=True)
 class Nearness:
-    """How near to a border a node of each part counts as on it, m; see ``cases/region.py``."""
+    """How near to a border a node of each part counts as on it, m; see ``cases/shapes/region.py``."""
 
     edge: Floats
     """(parts,) the shortest edge."""

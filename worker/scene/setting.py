@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from conoid.cases.schema import Part, Turn
+from conoid.cases.model.schema import Part, Turn
 
 from ..materials.turning import sine_and_cosine
 from ..mesh.model import Floats

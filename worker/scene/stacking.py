@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from conoid.cases.on import ons
-from conoid.cases.schema import Case
+from conoid.cases.checks.on import ons
+from conoid.cases.model.schema import Case
 
 from ..errors import MeshError
 from ..fracture.connectivity import components

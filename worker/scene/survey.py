@@ -1,17 +1,17 @@
 """What the mesh files of a case hold: ``python -m conoid.worker.scene.survey``.
 
-One question on standard input, one answer on standard output (conoid.cases.survey). Files are read by child processes
-with limits, as for a run, and kept as for a run: one that follows does not read them again.
+One question on standard input, one answer on standard output (conoid.cases.reading.survey). Files are read by child
+processes with limits, as for a run, and kept as for a run: one that follows does not read them again.
 """
 
 import sys
 from pathlib import Path
 
-from conoid.cases import survey
 from conoid.cases.load import parse_case
-from conoid.cases.schema import Case
-from conoid.cases.solids import Measured
-from conoid.cases.survey import Survey
+from conoid.cases.model.schema import Case
+from conoid.cases.model.solids import Measured
+from conoid.cases.reading import survey
+from conoid.cases.reading.survey import Survey
 
 from ..errors import ConoidError
 from ..kernels import compile as ahead

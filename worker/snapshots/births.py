@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from conoid.cases import fragments
+from conoid.cases.output import fragments
 
 from ..model.state import Floats, Ints
 

@@ -1,4 +1,4 @@
-"""From a whole model to the bytes of a snapshot (cases/snapshot.py), and to those of all its tets."""
+"""From a whole model to the bytes of a snapshot (cases/output/snapshot.py), and to those of all its tets."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from msgspec.structs import replace
 
-from conoid.cases.snapshot import FIELD, Array, Column, Field, Header, pack, size_of
+from conoid.cases.output.snapshot import FIELD, Array, Column, Field, Header, pack, size_of
 
 from ..fracture import connectivity
 from ..fracture.numbers import numbered

@@ -13,7 +13,7 @@ from collections import deque
 from pathlib import Path
 from typing import Any
 
-from conoid.cases import layout
+from conoid.cases.output import layout
 
 from ..run.signals import REQUESTS
 from . import share

@@ -15,8 +15,8 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
-from conoid.cases import layout
-from conoid.cases import whole as whole_file
+from conoid.cases.output import layout
+from conoid.cases.reading import whole as whole_file
 
 from . import blob, share
 from .births import Births

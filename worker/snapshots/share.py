@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from conoid.cases.whole import named
+from conoid.cases.reading.whole import named
 
 from ..fracture.numbers import UNKNOWN
 from ..model.ids import located

@@ -12,7 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from conoid.cases import fields, layout, messages
+from conoid.cases import messages
+from conoid.cases.output import fields, layout
 
 from ..clock import Clock
 from ..output.journal import Journal

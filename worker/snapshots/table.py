@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from conoid.cases.snapshot import REST
+from conoid.cases.output.snapshot import REST
 
 from ..fracture import fragments
 from ..model.state import Floats, Ints

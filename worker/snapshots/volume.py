@@ -1,4 +1,4 @@
-"""All tets of a model in few bytes, for sections through it; in the layout of a snapshot (cases/snapshot.py).
+"""All tets of a model in few bytes, for sections through it; in the layout of a snapshot (cases/output/snapshot.py).
 
 Nodes are in the order of a Z-curve through the box (Morton 1966), tets have their nodes ascending and are sorted by
 them: differences from one to the next are small, and their high bytes are zeros that gzip takes away.

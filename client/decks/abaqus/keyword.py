@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from conoid.cases.inp import InpError, fields, numbers
+from conoid.cases.reading.inp import InpError, fields, numbers
 
 from ..account import Entry
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 
-from conoid.cases.inp import InpError, numbers
+from conoid.cases.reading.inp import InpError, numbers
 
 from ..account import Entry
 from ..draft import Body, Draft

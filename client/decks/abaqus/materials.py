@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from conoid.cases.inp import InpError
+from conoid.cases.reading.inp import InpError
 
 from ..draft import Made
 from ..laws import line_of, young_of

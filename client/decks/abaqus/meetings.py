@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 
-from conoid.cases.inp import InpError
+from conoid.cases.reading.inp import InpError
 
 from ..account import Entry
 from ..contacts import Meeting

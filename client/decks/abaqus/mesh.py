@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from conoid.cases.inp import Block, InpError, Source, fields, is_whole, numbers
+from conoid.cases.reading.inp import Block, InpError, Source, fields, is_whole, numbers
 
 from ..topology import Point
 from .keyword import joined

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from functools import cached_property
 from pathlib import Path
 
-from conoid.cases.inp import Block, InpError, Source, numbers
+from conoid.cases.reading.inp import Block, InpError, Source, numbers
 
 from ..account import Account, Entry
 from ..bonds import join

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from conoid.cases.cards import Block, Card
+from conoid.cases.reading.cards import Block, Card
 
 from ..account import Entry
 from ..contacts import Meeting

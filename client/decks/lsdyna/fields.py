@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from conoid.cases.cards import Block, Card
+from conoid.cases.reading.cards import Block, Card
 
 from .. import fields
 from ..account import Entry

@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from conoid.cases.cards import Block
+from conoid.cases.reading.cards import Block
 
 from ..account import Entry
 from ..holds import Hold, displacement_speed, velocity_course

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from conoid.cases.cards import Block, Card, Deck
+from conoid.cases.reading.cards import Block, Card, Deck
 
 from ..topology import Point
 

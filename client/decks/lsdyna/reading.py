@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 
-from conoid.cases.cards import Block, CardError, Deck
+from conoid.cases.reading.cards import Block, CardError, Deck
 
 from ..account import Account, Entry, once
 from ..bonds import Tie, join

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 from itertools import pairwise
 
-from conoid.cases.cards import Block, Card
+from conoid.cases.reading.cards import Block, Card
 
 from ..account import Entry
 from .fields import Fields, numbers

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from conoid.cases.included import Included
+from conoid.cases.reading.included import Included
 
 from ..topology import Point
 from .text import Option, Row, cut, numbers, options, real, whole

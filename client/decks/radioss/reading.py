@@ -4,8 +4,8 @@ from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 
-from conoid.cases.cards import CardError
-from conoid.cases.included import Included
+from conoid.cases.reading.cards import CardError
+from conoid.cases.reading.included import Included
 
 from ..account import Account, Entry, once
 from ..bonds import Tie, join

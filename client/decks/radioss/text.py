@@ -8,9 +8,9 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from conoid.cases.cards import CardError
-from conoid.cases.included import Included, flattened, included_by
-from conoid.cases.problems import shown
+from conoid.cases.reading.cards import CardError
+from conoid.cases.reading.included import Included, flattened, included_by
+from conoid.cases.reading.problems import shown
 
 from .. import fields
 from ..account import Entry

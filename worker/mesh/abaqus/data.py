@@ -4,7 +4,7 @@ import math
 from array import array
 from collections.abc import Iterator
 
-from conoid.cases.inp import fields, is_whole, numbers, whole, wholes
+from conoid.cases.reading.inp import fields, is_whole, numbers, whole, wholes
 
 from ...errors import MeshError
 from ...materials.turning import sine_and_cosine

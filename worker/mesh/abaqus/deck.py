@@ -5,8 +5,8 @@ from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 
-from conoid.cases.included import own
-from conoid.cases.inp import Block, Source, fields, is_whole, numbers, shortened, whole, wholes
+from conoid.cases.reading.included import own
+from conoid.cases.reading.inp import Block, Source, fields, is_whole, numbers, shortened, whole, wholes
 
 from ...errors import MeshError
 from .data import axis, cylindrical, element_rows, numbers_of, translation

@@ -4,7 +4,7 @@ A word may be shortened as long as no other one begins like it (Analysis User's 
 that is not listed is an error: it could make or move nodes.
 """
 
-from conoid.cases.inp import Block
+from conoid.cases.reading.inp import Block
 
 from ...errors import MeshError
 

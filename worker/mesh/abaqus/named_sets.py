@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from conoid.cases.inp import is_whole
+from conoid.cases.reading.inp import is_whole
 
 from ...errors import MeshError
 from ..model import Ids

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from conoid.cases.inp import InpError
+from conoid.cases.reading.inp import InpError
 
 from ...errors import MeshError
 from ...materials.turning import sine_and_cosine

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from conoid.cases import cards
-from conoid.cases.cards import Block, Card
+from conoid.cases.reading import cards
+from conoid.cases.reading.cards import Block, Card
 
 from .families import FURTHER, JOINING, SOLIDS, VOLUMES, refuse
 from .sets import Sets

@@ -2,7 +2,7 @@
 
 from collections.abc import Container
 
-from conoid.cases.cards import Block
+from conoid.cases.reading.cards import Block
 
 from ...errors import MeshError
 

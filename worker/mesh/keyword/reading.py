@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from conoid.cases.cards import CardError
+from conoid.cases.reading.cards import CardError
 
 from ...errors import MeshError
 from .. import omitted, solid

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from conoid.cases.cards import Block, Card
+from conoid.cases.reading.cards import Block, Card
 
 _WIDTHS = (10,) * 8
 _KINDS = ("NODE", "SEGMENT", "PART", "SOLID")

@@ -3,10 +3,10 @@
 import math
 from typing import Any
 
-from conoid.cases import ring
-from conoid.cases.bodies import RingSector
-from conoid.cases.geometry import bounds, cut_directions
-from conoid.cases.profile import Revolved
+from conoid.cases.model.bodies import RingSector
+from conoid.cases.shapes import ring
+from conoid.cases.shapes.geometry import bounds, cut_directions
+from conoid.cases.shapes.profile import Revolved
 
 from ..frame import refuse_impossible
 from ..gmsh_session import OPTIONS, session

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from conoid.cases.figures import si
-from conoid.cases.operands import CadForm
-from conoid.cases.similar import choices
+from conoid.cases.model.operands import CadForm
+from conoid.cases.reading.similar import choices
 
 from ...errors import MeshError
 from .draw import Solids

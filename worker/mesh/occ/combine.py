@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 from typing import Any
 
-from conoid.cases.combined import box_of
-from conoid.cases.operands import CadForm, CombinedForm, DifferenceForm, Operand, UnionForm
+from conoid.cases.model.operands import CadForm, CombinedForm, DifferenceForm, Operand, UnionForm
+from conoid.cases.shapes.combined import box_of
 
 from ...errors import MeshError
 from ..sources import Sources

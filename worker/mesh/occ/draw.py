@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from conoid.cases.forms import (
+from conoid.cases.model.forms import (
     BallPiece,
     BoxForm,
     ConeForm,
@@ -15,10 +15,10 @@ from conoid.cases.forms import (
     SphereForm,
     TubeForm,
 )
-from conoid.cases.geometry import index
-from conoid.cases.motion import Turn
-from conoid.cases.profile import Arc, Profile, Segment, profile
-from conoid.cases.tables import Axis
+from conoid.cases.model.motion import Turn
+from conoid.cases.model.tables import Axis
+from conoid.cases.shapes.geometry import index
+from conoid.cases.shapes.profile import Arc, Profile, Segment, profile
 
 from .frame import Frame, Vector
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from conoid.cases.geometry import AXES, across, index
-from conoid.cases.tables import Axis
+from conoid.cases.model.tables import Axis
+from conoid.cases.shapes.geometry import AXES, across, index
 
 from ..model import Floats
 

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from conoid.cases.grading import Grading
+from conoid.cases.model.grading import Grading
 
 from .frame import Frame
 

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from conoid.cases.combined import cut_by
-from conoid.cases.grading import Grading
-from conoid.cases.solids import Cad, Combination, Measured, Meshed, Solid, Stl
+from conoid.cases.model.grading import Grading
+from conoid.cases.model.solids import Cad, Combination, Measured, Meshed, Solid, Stl
+from conoid.cases.shapes.combined import cut_by
 
 from ...errors import MeshError
 from ..gmsh_session import OPTIONS, session

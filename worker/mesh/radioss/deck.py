@@ -5,7 +5,7 @@ from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from conoid.cases.included import Included, own
+from conoid.cases.reading.included import Included, own
 
 from ...errors import MeshError
 from .lines import Block, blocks, number, point, wholes

@@ -8,8 +8,8 @@ for others.
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-from conoid.cases.included import Included, flattened, included_by
-from conoid.cases.problems import shown
+from conoid.cases.reading.included import Included, flattened, included_by
+from conoid.cases.reading.problems import shown
 
 from ...errors import MeshError
 

@@ -1,0 +1,116 @@
+"""What the models cannot check one by one in bonds: parts that must be there, keys that go together, meshes."""
+
+from collections.abc import Iterator
+
+from ..model.bodies import Box, Loose, MeshFile, Plate
+from ..model.bonds import Bonded, SharedBond
+from ..model.boundaries import Gravity
+from ..model.joined import bodies, breakable, shared_bonds
+from ..model.schema import Case, Part
+from ..model.solids import Stl
+from ..reading.problems import Location, Problem, problem
+from ..reading.similar import choices, nearest
+
+
+def check_bonds(case: Case) -> Iterator[Problem]:
+    """Every problem of the bonds of a case."""
+    found = list(_each(case))
+    yield from found or (*_wearing(case), *_pulled(case))
+
+
+def _each(case: Case) -> Iterator[Problem]:
+    """Those of one bond, or of two of the same parts."""
+    parts = {part.name: part for part in case.parts}
+    for i, bond in enumerate(case.bond):
+        location: Location = ("bond", i)
+        yield from _keys(bond, location)
+        unknown = [k for k, name in enumerate(bond.parts) if name not in parts]
+        for k in unknown:
+            message = f"no part of this name; {nearest(bond.parts[k], parts)}"
+            yield problem((*location, "parts", k), bond.parts[k], message)
+        if bond.parts[0] == bond.parts[1]:
+            message = "a part cannot be bonded to itself; name two parts"
+            yield problem((*location, "parts"), _both(bond), message)
+        elif not unknown:
+            yield from _twice(case, i)
+            if isinstance(bond, SharedBond):
+                yield from _meshes(parts[bond.parts[0]], parts[bond.parts[1]], bond.breaks, (*location, "parts"))
+
+
+def _wearing(case: Case) -> Iterator[Problem]:
+    """Parts that erode in a body of which another part breaks."""
+    breaks = breakable(case)
+    for k, _, one, other in shared_bonds(case):
+        worn = [case.parts[i].name for i in (one, other) if case.parts[i].erosion is not None and breaks[i]]
+        if worn:
+            message = (
+                f"{choices(worn)}: a part that erodes cannot be of one body with parts or bonds that break; remove "
+                "erosion or fracture, or set kind = 'tied'"
+            )
+            yield problem(("bond", k, "parts"), _both(case.bond[k]), message)
+
+
+def _pulled(case: Case) -> Iterator[Problem]:
+    """Gravity on some parts of a body alone: a node of the interface has one acceleration for all of its mass."""
+    body = bodies(case)
+    for k, spec in enumerate(case.boundaries):
+        if isinstance(spec, Gravity) and spec.parts:
+            some = {of for part, of in zip(case.parts, body, strict=True) if part.name in spec.parts}
+            left = [part.name for part, of in zip(case.parts, body, strict=True)
+                    if of in some and part.name not in spec.parts]  # fmt: skip
+            if left:
+                message = f"bonds make one body of these and {choices(left)}, with nodes in common; name all"
+                yield problem(("boundaries", k, "parts"), ", ".join(spec.parts), message)
+
+
+def _both(bond: Bonded) -> str:
+    return ", ".join(bond.parts)
+
+
+def _keys(bond: Bonded, location: Location) -> Iterator[Problem]:
+    if not bond.breaks:
+        given = (("shear_strength", bond.shear_strength), ("energy", bond.energy), ("shear_energy", bond.shear_energy))
+        for key, value in given:
+            if value:
+                yield problem((*location, key), value, "a bond without strength never breaks; give strength too")
+        return
+    normal, shear = bond.energies
+    if (normal > 0.0) != (shear > 0.0):
+        key, value = ("shear_energy", shear) if shear == 0.0 else ("energy", normal)
+        message = "energy and shear_energy are both 0, and the bond lets go at once, or both above 0"
+        yield problem((*location, key), value, message)
+
+
+def _twice(case: Case, number: int) -> Iterator[Problem]:
+    bond = case.bond[number]
+    for k, earlier in enumerate(case.bond[:number]):
+        if sorted(earlier.parts) == sorted(bond.parts):
+            message = f"bond[{k}] is of these parts; keep one of the two"
+            yield problem(("bond", number, "parts"), _both(bond), message)
+
+
+def _meshes(one: Part, other: Part, breaks: bool, location: Location) -> Iterator[Problem]:
+    """Parts whose meshes cannot have nodes in common, or that cannot come apart."""
+    names, pair = f"{one.name}, {other.name}", (one.mesh, other.mesh)
+    way = "set kind = 'tied'"
+    loose = [part.name for part in (one, other) if isinstance(part.mesh, Loose)]
+    if loose:
+        yield problem(location, names, f"{choices(loose)}: loose tets share no node with other parts; {way}")
+    elif isinstance(one.mesh, MeshFile) or isinstance(other.mesh, MeshFile):
+        if not all(isinstance(mesh, MeshFile) for mesh in pair):
+            message = f"a mesh of a file and one that is generated have no nodes in common; {way}"
+            yield problem(location, names, message)
+    elif one.mesh.generator != other.mesh.generator:
+        yield problem(location, names, f"their meshes have two generators; give both the same, or {way}")
+    elif one.mesh.generator == "structured" and not all(isinstance(mesh, Box | Plate) for mesh in pair):
+        message = f"structured meshes have nodes in common where both are boxes or plates; use gmsh, or {way}"
+        yield problem(location, names, message)
+    elif any(isinstance(mesh, Stl) for mesh in pair):
+        message = f"the surface of an STL file is meshed alone; take both from one STEP or mesh file, or {way}"
+        yield problem(location, names, message)
+    worn = [part.name for part in (one, other) if part.erosion is not None]
+    if breaks and worn:
+        message = f"{choices(worn)}: a part that erodes cannot have a bond that breaks; remove erosion or strength"
+        yield problem(location, names, message)
+    if one.turn != other.turn:
+        yield problem(location, names, f"their turns differ, and their nodes do not stay together; {way}")

@@ -1,0 +1,216 @@
+"""What the models cannot check of boundaries: parts that must exist, boxes that hold something, walls in front."""
+
+import itertools
+import math
+from collections.abc import Iterator
+
+from ..model.bodies import Box, Loose, Plate, Tube
+from ..model.schema import Case, Gravity, Part, Prescribed, Rotation, Symmetry, Traction, Wall
+from ..model.solids import Measured
+from ..reading.problems import Location, Problem, problem
+from ..reading.similar import choices, nearest
+from ..shapes.geometry import Vector, index, lowest_along
+from ..shapes.loaded import near
+from ..shapes.placed import Placed
+from ..shapes.region import GENERATED
+from ..warnings.idle import idle
+from .drives import clash
+
+ROUNDING = 1e-9
+"""Of a length or a time: two numbers that agree to this were meant to be equal. Chosen far above the rounding of
+units (1e-16) and far below any tolerance of a drawing."""
+
+
+def check_boundaries(case: Case) -> Iterator[Problem]:
+    """Problems of the boundaries of a case, in the order of their keys."""
+    names = [part.name for part in case.parts]
+    for i, boundary in enumerate(case.boundaries):
+        for j, name in enumerate(boundary.parts):
+            if name not in names:
+                yield problem(("boundaries", i, "parts", j), name, f"no part of this name; {nearest(name, names)}")
+        if isinstance(boundary, Prescribed):
+            yield from _prescribed(boundary, ("boundaries", i))
+        elif isinstance(boundary, Gravity):
+            yield from _gravity(boundary, ("boundaries", i))
+        elif isinstance(boundary, Traction):
+            yield from _traction(boundary, ("boundaries", i))
+        yield from _out_of_reach(case, i)
+    yield from _two_drives(case)
+
+
+def _out_of_reach(case: Case, number: int) -> Iterator[Problem]:
+    """A plane or a box off all bodies that it is for, and a traction inside of them; what lies between nodes of a body
+    the worker finds.
+    """
+    boundary = case.boundaries[number]
+    parts = [part for part in case.parts if not boundary.parts or part.name in boundary.parts]
+    known = {part.name: Placed(part.mesh, part.turn) for part in parts if not isinstance(part.mesh, Measured | Loose)}
+    if not known or len(known) < len(parts):
+        return
+    bodies = [body.bounds() for body in known.values()]
+    if isinstance(boundary, Symmetry):
+        d = index(boundary.axis)
+        margin = GENERATED * max(abs(x) for body in bodies for corner in body for x in corner)
+        apart = not any(low[d] - margin <= boundary.at <= high[d] + margin for low, high in bodies)
+        if apart and not any(
+            _comes(case, part, d, boundary.at - low[d]) for part, (low, _) in zip(parts, bodies, strict=True)
+        ):
+            reach = f"{min(low[d] for low, _ in bodies):g} and {max(high[d] for _, high in bodies):g} m"
+            message = f"nothing lies on this plane or flies at it: the bodies are between {reach} along {boundary.axis}"
+            yield problem(("boundaries", number, "at"), f"{boundary.at:g} m", message)
+    elif isinstance(boundary, Prescribed | Traction) and boundary.low is not None and boundary.high is not None:
+        box = list(zip(boundary.low, boundary.high, strict=True))
+        if any(a > b for a, b in box):
+            return
+        margin = max(near(body) for body in known.values())
+        wider = [(a - margin, b + margin) for a, b in box]
+        reached = {name: body for name, body in known.items() if _meet(wider, body.bounds())}
+        if not reached:
+            low, high = (
+                [pick(x) for x in zip(*corners, strict=True)]
+                for pick, corners in zip((min, max), zip(*bodies, strict=True), strict=True)
+            )
+            reach = " to ".join(f"({', '.join(f'{x:g}' for x in corner)})" for corner in (low, high))
+            yield problem(
+                ("boundaries", number), ..., f"the box misses all bodies that it is for; they are in {reach} m"
+            )
+        elif isinstance(boundary, Traction) and all(_surrounds(body, wider) for body in reached.values()):
+            message = f"the box lies inside of {choices(reached)}; tractions act on surfaces"
+            yield problem(("boundaries", number), ..., message)
+        else:
+            yield from idle(case, number)
+
+
+def _meet(box: list[tuple[float, float]], body: tuple[Vector, Vector]) -> bool:
+    return all(a <= top and b >= bottom for (a, b), bottom, top in zip(box, *body, strict=True))
+
+
+def _surrounds(body: Placed, box: list[tuple[float, float]]) -> bool:
+    """Whether a box lies in a body, as far as its corners tell: they do where it has neither hole nor slit."""
+    if isinstance(body.mesh, Tube) or (isinstance(body.mesh, Box | Plate) and body.mesh.slit is not None):
+        return False
+    first, second, third = box
+    return all(body.holds((x, y, z)) for x, y, z in itertools.product(first, second, third))
+
+
+def _comes(case: Case, part: Part, axis: int, way: float) -> bool:
+    """Whether a part moves along ``axis`` to where it comes by going the ``way``, m, as far as that can be said."""
+    pulls = [boundary.acceleration[axis] for boundary in case.boundaries if isinstance(boundary, Gravity)]
+    unknown = part.spin is not None or part.stretch is not None or part.jitter > 0.0
+    driven = any(isinstance(boundary, Prescribed | Rotation | Traction) for boundary in case.boundaries)
+    return unknown or driven or any(speed * way > 0.0 for speed in (part.velocity[axis], *pulls))
+
+
+def _two_drives(case: Case) -> Iterator[Problem]:
+    """Two boundaries that drive the whole of a part, each in its own way; the worker looks at the nodes of boxes."""
+    drives = [(i, each) for i, each in enumerate(case.boundaries) if isinstance(each, Rotation) or _whole(each)]
+    drives = [(i, each) for i, each in drives if getattr(each, "on", None) is None]
+    names = [part.name for part in case.parts]
+    for (i, first), (j, second) in itertools.combinations(drives, 2):
+        shared = [name for name in names if all(not each.parts or name in each.parts for each in (first, second))]
+        axes = clash(first, second)
+        if shared and axes:
+            what = f"the velocity of part {shared[0]!r} along {choices(axes)}"
+            message = f"prescribes {what}, and so does boundaries[{i}] in another way; keep one of the two"
+            yield problem(("boundaries", j), ..., message)
+
+
+def _whole(boundary: object) -> bool:
+    return isinstance(boundary, Prescribed) and boundary.low is None and boundary.high is None and boundary.on is None
+
+
+def _prescribed(boundary: Prescribed, location: Location) -> Iterator[Problem]:
+    if boundary.x is None and boundary.y is None and boundary.z is None:
+        yield problem(location, ..., "prescribes nothing; give one or more of x, y, z")
+    yield from _box(boundary, location)
+    yield from _course(boundary, location)
+
+
+def _gravity(boundary: Gravity, location: Location) -> Iterator[Problem]:
+    if not any(boundary.acceleration):
+        yield problem((*location, "acceleration"), "0, 0, 0", "must not be zero")
+    yield from _course(boundary, location)
+
+
+def _traction(boundary: Traction, location: Location) -> Iterator[Problem]:
+    if (boundary.stress is None) == (boundary.pressure is None):
+        yield problem(location, ..., "give either stress or pressure")
+    elif boundary.stress is not None and not any(boundary.stress):
+        yield problem((*location, "stress"), "0, 0, 0", "must not be zero")
+    elif boundary.pressure == 0.0:
+        yield problem((*location, "pressure"), 0, "must not be zero")
+    if boundary.follows and boundary.pressure is None:
+        yield problem((*location, "follows"), True, "a pressure follows the surface, a stress does not; give pressure")
+    if (round_ := boundary.cylinder) is not None and round_.inner_radius > round_.radius:
+        message = f"must not be above radius, {round_.radius:g} m"
+        yield problem((*location, "cylinder", "inner_radius"), f"{round_.inner_radius:g} m", message)
+    yield from _box(boundary, location)
+    yield from _course(boundary, location)
+
+
+def _course(boundary: Prescribed | Gravity | Traction | Wall, location: Location) -> Iterator[Problem]:
+    for k, ((before, _), (after, _)) in enumerate(itertools.pairwise(boundary.course)):
+        if not after > before:
+            yield problem(
+                (*location, "course", k + 1, 0), after, f"must be later than the time before it, {before:g} s"
+            )
+
+
+def _box(boundary: Prescribed | Traction, location: Location) -> Iterator[Problem]:
+    if (boundary.low is None) != (boundary.high is None):
+        yield problem(location, ..., "give both low and high, or neither for all of the parts")
+    elif boundary.low is not None and boundary.high is not None:
+        yield from ordered(boundary.low, boundary.high, location)
+
+
+def ordered(low: tuple[float, ...], high: tuple[float, ...], location: Location) -> Iterator[Problem]:
+    """Corners of a box of which ``high`` is below ``low``."""
+    for d, (a, b) in enumerate(zip(low, high, strict=True)):
+        if a > b:
+            yield problem((*location, "high", d), b, f"must not be below low[{d}], {a}")
+
+
+def check_walls(case: Case) -> Iterator[Problem]:
+    """Walls of one name, without a normal, or in front of which a part does not start."""
+    walls = [(i, boundary) for i, boundary in enumerate(case.boundaries) if isinstance(boundary, Wall)]
+    seen: set[str] = set()
+    for i, wall in walls:
+        if wall.name in seen:
+            yield problem(("boundaries", i, "name"), wall.name, "an earlier wall has this name; give each its own")
+        seen.add(wall.name)
+        yield from _shape(wall, ("boundaries", i))
+        yield from _course(wall, ("boundaries", i))
+        if wall.normal is not None and any(wall.normal) and wall.shape == "plane":
+            yield from _behind(case, i, wall.point, wall.normal, wall.parts)
+
+
+def _shape(wall: Wall, location: Location) -> Iterator[Problem]:
+    """Keys of a wall that its shape needs, or does not have."""
+    needed = {"plane": ("normal",), "cylinder": ("axis", "radius"), "sphere": ("radius",)}[wall.shape]
+    for key in ("normal", "axis", "radius"):
+        value = getattr(wall, key)
+        if key in needed and value is None:
+            yield problem((*location, key), ..., f"this key is missing; a {wall.shape} needs {choices(needed)}")
+        elif key not in needed and value is not None:
+            yield problem((*location, key), ..., f"a {wall.shape} has no {key}; it needs {choices(needed)}")
+        elif isinstance(value, tuple) and not any(value):
+            yield problem((*location, key), "0, 0, 0", "must not be zero")
+    if wall.shape == "plane" and wall.side == "inside":
+        yield problem((*location, "side"), wall.side, "a plane has no inside; turn its normal round")
+    if wall.course and wall.mass is not None:
+        yield problem((*location, "course"), ..., "a wall with a mass is free; remove course or mass")
+    elif wall.course and not any(wall.velocity):
+        yield problem((*location, "course"), ..., "is a factor of velocity, which is zero")
+
+
+def _behind(case: Case, number: int, point: Vector, way: Vector, parts: tuple[str, ...]) -> Iterator[Problem]:
+    length = math.hypot(*way)
+    normal = (way[0] / length, way[1] / length, way[2] / length)
+    level = sum(n * x for n, x in zip(normal, point, strict=True))
+    for part in case.parts:
+        if isinstance(part.mesh, Measured) or part.turn is not None or (parts and part.name not in parts):
+            continue
+        depth = level - lowest_along(part.mesh, normal)
+        if depth > GENERATED * max(abs(x) for corner in Placed(part.mesh).bounds() for x in corner):
+            message = f"part {part.name!r} starts {depth:g} m behind this wall; move it, or turn the normal round"
+            yield problem(("boundaries", number), ..., message)

@@ -1,0 +1,37 @@
+"""What drives nodes: which components a boundary prescribes, and where two boundaries prescribe different ones."""
+
+from ..model.boundaries import Boundary, Course, Prescribed, Rotation
+from ..model.tables import Axis
+from ..shapes.geometry import AXES, across
+
+Motion = tuple[object, ...]
+"""What a component of the velocity is over time: motions that are equal as tuples are one."""
+REST: Motion = (0.0,)
+"""The motion of a component that stays zero."""
+
+
+def motions(boundary: Boundary) -> dict[Axis, Motion]:
+    """The motion of each component that a boundary prescribes; none where it drives nothing."""
+    if isinstance(boundary, Prescribed):
+        given = {axis: getattr(boundary, axis) for axis in AXES}
+        return {axis: _straight(speed, boundary.course) for axis, speed in given.items() if speed is not None}
+    if isinstance(boundary, Rotation):
+        return {axis: _round(boundary, axis) for axis in AXES}
+    return {}
+
+
+def clash(one: Boundary, other: Boundary) -> tuple[Axis, ...]:
+    """The components that both prescribe, and not alike: a node cannot follow both."""
+    first, second = motions(one), motions(other)
+    return tuple(axis for axis in AXES if axis in first and axis in second and first[axis] != second[axis])
+
+
+def _straight(speed: float, course: Course) -> Motion:
+    return (speed, course) if speed and any(factor for _, factor in course or ((0.0, 1.0),)) else REST
+
+
+def _round(boundary: Rotation, axis: Axis) -> Motion:
+    """Along the line that a body turns about nothing moves."""
+    i, j = across(axis)
+    rate = boundary.spin.rate
+    return (boundary.spin.centre, rate) if rate[i] or rate[j] else REST

@@ -1,0 +1,71 @@
+"""What the models cannot check one by one in a form: sizes that must fit."""
+
+from collections.abc import Iterator
+
+from ..model.forms import BoxForm, ConeForm, OgiveForm, RingSectorForm, SphericalCapForm, TubeForm
+from ..model.tables import Model
+from ..reading.problems import Location, Problem, problem
+from ..shapes.profile import tangent
+
+_LEAST = 1e-6
+"""Of the radius of a body: what is smaller, and not 0, is a slip. Chosen: no element is so small."""
+_ROUNDED = "shank", "tip_radius", "meplat", "top_radius", "inner_radius", "radius"
+
+
+def check_form(form: Model, location: Location) -> Iterator[Problem]:
+    """Every problem of the sizes of a form that stands at ``location``."""
+    yield from _slips(form, location)
+    if isinstance(form, BoxForm):
+        for d in (d for d in range(3) if form.low[d] >= form.high[d]):
+            yield problem((*location, "high", d), form.high[d], f"must be above low[{d}], {form.low[d]} m")
+    elif isinstance(form, TubeForm | RingSectorForm):
+        if form.inner_radius >= form.radius:
+            yield problem((*location, "inner_radius"), form.inner_radius, f"must be below the radius, {form.radius} m")
+    elif isinstance(form, ConeForm):
+        if not form.radius + form.top_radius > 0.0:
+            yield problem((*location, "top_radius"), form.top_radius, "must be above 0 where radius is 0")
+    elif isinstance(form, OgiveForm):
+        yield from _ogive(form, location)
+    elif isinstance(form, SphericalCapForm) and form.height >= 2.0 * form.radius:
+        yield problem((*location, "height"), form.height, f"must be below the diameter, {2.0 * form.radius:g} m")
+
+
+def _slips(form: Model, location: Location) -> Iterator[Problem]:
+    """Lengths that may be 0 and are nearly that."""
+    if not isinstance(form, ConeForm | OgiveForm | RingSectorForm):
+        return
+    most = max(form.radius, form.top_radius) if isinstance(form, ConeForm) else form.radius
+    for key in _ROUNDED:
+        if 0.0 < getattr(form, key, 0.0) < _LEAST * most:
+            message = f"less than a millionth of the radius, {most:g} m; set 0, or a length that elements can have"
+            yield problem((*location, key), getattr(form, key), message)
+
+
+def _ogive(form: OgiveForm, location: Location) -> Iterator[Problem]:
+    """The first thing that is wrong with an ogive."""
+    for key, value, message in (*_nose(form), *_tip(form)):
+        yield problem((*location, key), value, message)
+        return
+
+
+def _nose(form: OgiveForm) -> Iterator[tuple[str, object, str]]:
+    if form.crh is None and form.nose is None:
+        yield "crh", ..., "this key is missing, or nose: at least one of them is needed"
+    elif form.nose is not None and form.nose < form.radius:
+        yield "nose", form.nose, f"must not be below the radius, {form.radius:g} m, which makes a hemisphere"
+    elif form.nose is not None and form.crh is not None:
+        least = tangent(form.nose, form.radius)
+        if form.crh < least * (1.0 - 1e-12):
+            message = (
+                f"must not be below {least:.12g}, the tangent ogive of this nose: it would bulge beyond the calibre"
+            )
+            yield "crh", form.crh, message
+
+
+def _tip(form: OgiveForm) -> Iterator[tuple[str, object, str]]:
+    if form.tip_radius and form.meplat:
+        yield "meplat", form.meplat, "the tip is round (tip_radius) or flat; remove one of them"
+    elif form.meplat >= 2.0 * form.radius:
+        yield "meplat", form.meplat, f"must be below the diameter, {2.0 * form.radius:g} m"
+    elif form.tip_radius >= form.radius:
+        yield "tip_radius", form.tip_radius, f"must be below the radius, {form.radius:g} m"

@@ -1,0 +1,54 @@
+"""Sets of mesh files that boundaries and probes are on: by which they are told apart, and which parts they are of."""
+
+from collections.abc import Iterator
+
+from ..model.bodies import MeshFile
+from ..model.boundaries import Prescribed, Rotation, Traction
+from ..model.measures import FRAGMENTS, PUSHES, SHAPES, Probe, kind
+from ..model.schema import Case, Part
+from ..reading.problems import Location, Problem, problem
+
+MOST = 62
+"""Sets that a case may be on: a node has a bit for each in a whole number of 64."""
+
+
+def ons(case: Case) -> list[tuple[Location, Prescribed | Rotation | Traction | Probe]]:
+    """The boundaries and probes that are on a set, and where they stand in the case."""
+    boundaries: list[tuple[Location, Prescribed | Rotation | Traction | Probe]] = [
+        (("boundaries", i), each)
+        for i, each in enumerate(case.boundaries)
+        if isinstance(each, Prescribed | Rotation | Traction) and each.on is not None
+    ]
+    return [*boundaries, *((("probes", i), each) for i, each in enumerate(case.probes) if each.on is not None)]
+
+
+def bits(case: Case) -> dict[str, int]:
+    """A number for each set that the case is on, from 0."""
+    return {name: bit for bit, name in enumerate(dict.fromkeys(each.on or "" for _, each in ons(case)))}
+
+
+def named(spec: Prescribed | Rotation | Traction | Probe) -> tuple[str, ...]:
+    """The parts that a boundary or a probe names."""
+    return (spec.part,) if isinstance(spec, Probe) else spec.parts
+
+
+def parts(case: Case, spec: Prescribed | Rotation | Traction | Probe) -> list[Part]:
+    """Those whose sets may be meant: the ones that are named, else all that have a mesh from a file."""
+    names = named(spec)
+    return [part for part in case.parts if (part.name in names if names else isinstance(part.mesh, MeshFile))]
+
+
+def check_ons(case: Case) -> Iterator[Problem]:
+    """A problem for each that is on a set and for a part without one; sets are of mesh files alone."""
+    for location, spec in ons(case):
+        generated = [part.name for part in parts(case, spec) if not isinstance(part.mesh, MeshFile)]
+        if generated:
+            yield problem((*location, "on"), spec.on, f"a mesh from a file has sets; that of {generated[0]!r} is not")
+        elif not parts(case, spec):
+            yield problem((*location, "on"), spec.on, "a mesh from a file has sets; no part of the case has one")
+        if isinstance(spec, Probe) and kind(spec.field) in (*PUSHES, *FRAGMENTS, *SHAPES):
+            yield problem(
+                (*location, "on"), spec.on, f"is of means and sums alone; {spec.field!r} is neither; remove on"
+            )
+    if len(bits(case)) > MOST:
+        yield problem(("boundaries",), ..., f"they and the probes are on {len(bits(case))} sets; allowed are {MOST}")

@@ -1,0 +1,87 @@
+"""What the models cannot check of probes: parts and walls that must exist, keys that a field needs or does not use."""
+
+from collections.abc import Iterator
+
+from ..model.measures import BEYOND, PUSHES, SHAPES, SUMS, Probe, kind
+from ..model.schema import Case, Part, Wall
+from ..output.fields import damageable
+from ..output.history import COLUMNS
+from ..reading.problems import Location, Problem, problem
+from ..reading.similar import choices, nearest
+from ..shapes.geometry import AXES, bounds
+from .boundary_checks import ordered
+
+_HOLES = ("hole_diameter", "hole_width")
+_USED: dict[str, tuple[str, ...]] = {
+    "wall": ("wall_force", "wall_impulse"),
+    "by": ("contact_force", "contact_impulse"),
+    "beyond": (*SUMS, *BEYOND),
+    "axis": SHAPES,
+    "at": _HOLES,
+    "centre": (*_HOLES, "cone_angle"),
+}
+"""Which fields a key is of."""
+_NEEDED: dict[str, tuple[str, ...]] = {"beyond": BEYOND, "axis": SHAPES, "at": _HOLES}
+"""Which fields need a key."""
+
+
+def check_probes(case: Case) -> Iterator[Problem]:
+    """Problems of the probes of a case, in the order of their keys."""
+    parts, names = {part.name: part for part in case.parts}, [probe.name for probe in case.probes]
+    for i, probe in enumerate(case.probes):
+        location = ("probes", i)
+        if (first := names.index(probe.name)) < i:
+            yield problem((*location, "name"), probe.name, f"probes[{first}] has this name; give each its own")
+        if probe.name in COLUMNS:
+            message = f"is a column of every history.csv; allowed: any name but {choices(COLUMNS)}"
+            yield problem((*location, "name"), probe.name, message)
+        yield from _keys(probe, location)
+        if (probe.low is None) != (probe.high is None):
+            yield problem(location, ..., "low and high go together; give both, or none for the whole part")
+        elif probe.low is not None and probe.high is not None:
+            yield from ordered(probe.low, probe.high, location)
+        if probe.part not in parts:
+            yield problem((*location, "part"), probe.part, f"no part of this name; {nearest(probe.part, parts)}")
+            continue
+        yield from _pushes(case, i, probe)
+        if probe.field == "cone_angle" and not (damageable(case) or case.erodes):
+            yield problem((*location, "field"), probe.field, "nothing of the case is damaged, fractures or erodes")
+        yield from _box(parts[probe.part], probe, location)
+
+
+def _keys(probe: Probe, location: Location) -> Iterator[Problem]:
+    """Keys that the field of a probe needs, and those that it does not use."""
+    field = kind(probe.field)
+    for key, fields in _USED.items():
+        if field not in fields and getattr(probe, key) is not None:
+            yield problem((*location, key), ..., f"{field} does not use this key; remove it")
+    for key, fields in _NEEDED.items():
+        if field in fields and getattr(probe, key) is None:
+            yield problem((*location, key), ..., f"this key is missing; {field} needs it")
+    whole = (*PUSHES, *SHAPES, "fragment_velocity", "fragment_mass")
+    if field in whole and (probe.low is not None or probe.high is not None):
+        yield problem(location, ..., f"{field} is that of the whole part; remove low and high")
+
+
+def _pushes(case: Case, number: int, probe: Probe) -> Iterator[Problem]:
+    """A push of a wall or of a part that is not there, or of what cannot push."""
+    location, names = ("probes", number), [wall.name for _, wall in case.boundaries_of(Wall)]
+    if probe.field.startswith("wall_"):
+        if not names:
+            yield problem((*location, "field"), probe.field, "the case has no wall")
+        elif probe.wall is not None and probe.wall not in names:
+            yield problem((*location, "wall"), probe.wall, f"no wall of this name; {nearest(probe.wall, names)}")
+    others = [part.name for part in case.parts if part.name != probe.part]
+    if probe.by is not None and probe.by not in others:
+        message = "is the part itself" if probe.by == probe.part else "no part of this name"
+        yield problem((*location, "by"), probe.by, f"{message}; {nearest(probe.by, others)}")
+
+
+def _box(part: Part, probe: Probe, location: Location) -> Iterator[Problem]:
+    body = bounds(part.mesh)
+    if body is None or part.turn is not None or probe.low is None or probe.high is None:
+        return
+    for d, (a, b) in enumerate(zip(*body, strict=True)):
+        if probe.high[d] < a or probe.low[d] > b:
+            message = f"the box misses part {probe.part!r}, which lies between {a:g} and {b:g} m along {AXES[d]}"
+            yield problem(location, ..., message)

@@ -1,0 +1,58 @@
+"""What the models cannot check one by one of rigid parts: what they cannot do, and what acts on some of them only."""
+
+from collections.abc import Iterator
+
+from ..model.rigid import tensor_problems
+from ..model.schema import Case, Part, Prescribed, Rotation, Traction
+from ..reading.problems import Location, Problem, problem
+from .on import parts
+
+
+def check_rigid(case: Case) -> Iterator[Problem]:
+    """Problems of the rigid parts of a case, and of what acts on them."""
+    for i in case.rigid:
+        part = case.parts[i]
+        yield from _part(part, ("parts", i))
+        if case.contact is not None and part.name in (case.contact.self_contact or ()):
+            message = f"{part.name!r} is rigid and cannot meet itself; remove it"
+            yield problem(("contact", "self_contact"), part.name, message)
+    yield from _boundaries(case)
+    rigid = [case.parts[i].name for i in case.rigid]
+    for k, bond in enumerate(case.bond):
+        for name in (name for name in bond.parts if name in rigid):
+            yield problem(("bond", k, "parts"), name, "is rigid; bonds hold deformable parts")
+
+
+def _part(part: Part, location: Location) -> Iterator[Problem]:
+    for key in ("erosion", "fracture", "stretch"):
+        if getattr(part, key) is not None:
+            yield problem((*location, key), ..., "a rigid part has no stress and no strain; remove this key or rigid")
+    if part.jitter > 0.0:
+        yield problem((*location, "jitter"), part.jitter, "a rigid part moves as one; remove this key or rigid")
+    spec = part.rigid
+    if spec is None:
+        return
+    if spec.centre is not None and spec.inertia is None:
+        yield problem((*location, "rigid", "centre"), ..., "needs rigid.inertia, about this centre")
+    if spec.inertia is not None:
+        for message in tensor_problems(spec.inertia):
+            yield problem((*location, "rigid", "inertia"), ", ".join(f"{c:g}" for c in spec.inertia), message)
+
+
+def _boundaries(case: Case) -> Iterator[Problem]:
+    rigid = [case.parts[i] for i in case.rigid]
+    for k, boundary in enumerate(case.boundaries):
+        on_set = isinstance(boundary, Prescribed | Rotation | Traction) and boundary.on is not None
+        meant = parts(case, boundary) if isinstance(boundary, Prescribed | Rotation | Traction) and on_set else rigid
+        held = [part.name for part in rigid if (not boundary.parts or part.name in boundary.parts) and part in meant]
+        if not held:
+            continue
+        if isinstance(boundary, Traction):
+            message = f"acts on the rigid part {held[0]!r}, which takes no traction; name the other parts in parts"
+            yield problem(("boundaries", k), ..., message)
+        elif on_set:
+            message = f"drives a set of the rigid part {held[0]!r}; drive all of it, without on"
+            yield problem(("boundaries", k), ..., message)
+        elif isinstance(boundary, Prescribed) and boundary.low is not None:
+            message = f"drives a box of the rigid part {held[0]!r}; drive all of it, without low and high"
+            yield problem(("boundaries", k), ..., message)

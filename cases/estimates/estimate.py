@@ -1,0 +1,276 @@
+"""What a case will cost, before anything runs: tets, time step, steps, memory, core time.
+
+An estimate, not a promise: counts are exact for the structured generator and within about 10 % for gmsh; steps within a
+factor of two; core time as good as the constants below, which were measured on one machine.
+"""
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..model.bodies import MeshFile
+from ..model.schema import Case, Part, Rotation
+from ..model.solids import Combination, Measured
+from ..reading.files import located
+from ..reading.library import material
+from ..reading.survey import Survey, Surveyed
+from ..shapes.combined import combined_size
+from ..shapes.geometry import bounds
+from ..shapes.placed import Bulk, bulk, driven
+from .clock_time import ClockTime, clock_time
+from .impact import driven_together, impact_speeds, wave_speed
+from .mesh_size import MeshSize, mesh_size, surface_faces
+from .shrinkage import shrinkage
+from .stages import AVERAGED, CONTACT, STATE, STEPS, STRENGTH, TETS
+
+NANOSECONDS = {"tet": 80.0, "nodal": 45.0, "split": 90.0, "eos": 15.0}
+"""Core time per tet and step: what every tet takes, and what each feature adds; laws say theirs (cases/laws). Measured
+at 10,000 to 750,000 tets."""
+FACE_NANOSECONDS = {"contact": 50.0, "erosion": 1400.0}
+"""Core time per face of the surface and step; the second where parts erode, stay in touch and are searched often."""
+STEP_OVERHEAD = 0.3e-3
+"""Core seconds that a rank takes for a step besides its tets."""
+START = 2.0
+"""Core seconds of a rank before its first step, with a warm kernel cache."""
+
+BROKEN_NANOSECONDS = 15_000.0
+"""Core time per tet and step of a body that has turned to dust whose pieces touch each other: 3 to 14 us in the ten
+hard cases that break without being driven (docs/verification/accuracy.md: CPU s less what an estimate has without dust,
+by steps and tets that may break), 10 to 20 us in a plate of glass under an eroding cylinder, on aluminium, with
+friction. It is 7 us a broken facet, of which dust has two a tet."""
+PRESSED_NANOSECONDS = 26_000.0
+"""The same of dust that is held together and pressed, where every tet meets all round it and sweeps are many: a plug of
+glass under a ram (tests/bench/press.py) took 17,000 to 20,000 on one rank, a block of 3,600 tets between walls, into
+which a ram goes by a fifth and by a third of its height, 18,000 and 26,000 (by hand); less where it gives way."""
+BREAKING_OVERHEAD = 2e-3
+"""Core seconds that a rank takes for a step in which something breaks, however little: 1 to 4 ms in twelve scenes of
+150 to 24,000 tets."""
+
+RIGID_STEPS = 1000.0
+"""Steps of a run of rigid parts alone, where spin does not ask for more (worker/rigid/stage.py)."""
+
+RANK_BYTES = 280_000_000
+"""Memory of a rank without a mesh: the interpreter, the libraries and the kernels of a body alone. Rank 0, which has
+all files, takes 260 MB, and 300 where pyarrow writes a history as Parquet as well; the others take 240."""
+STAGE_BYTES = {"contact": 20_000_000, "fracture": 30_000_000}
+"""What the kernels and tables of a stage take of a rank besides: bar_on_bar had 276 MB in all, the tile of
+docs/tutorial/first_case.md before it breaks 301 MB."""
+TET_BYTES = {"tet": 330, "nodal": 110, "split": 140, "strength": 50, "facets": 130}
+"""Memory a tet, its share of the nodes included, at its peak while the model is set up (docs/performance/bench.md)."""
+DUST_BYTES = 20_000
+"""Memory a tet besides, of a body that has turned to dust: copies of nodes, surface, candidate pairs and tables that
+they are made of. Measured are peaks of a rank where half of the facets were broken, less what it takes before: 12 to 16
+kB in glass_steel_demo and glass_ball_cohesive, 15 and 20 kB in tiles of 16,800 and 4,200 tets
+(docs/tutorial/first_case.md), 18 kB in cases/hard/wedge_glass.toml; bars of glass of which a quarter of the facets was
+broken, glass_steel_bar with 9,000 and 39,000 tets, had 7 and 5 kB."""
+FILE_BYTES = {".msh": 42, ".inp": 48}
+"""Bytes of a text mesh file a tet, its share of the node lines included."""
+
+
+@dataclass(frozen=True)
+class PartEstimate:
+    """One part; None where a mesh file does not tell."""
+
+    name: str
+    elements: int | None
+    nodes: int | None
+    dt: float | None
+    """The time step its smallest tet allows at the start, s; infinite of a rigid part."""
+    bulk: Bulk | None = None
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """The whole case; None where a part's mesh file does not tell."""
+
+    elements: int | None
+    nodes: int | None
+    dt: float | None
+    """The first time step, s."""
+    steps: int | None
+    memory_bytes: int | None
+    """Of all ranks together, while nothing breaks."""
+    core_seconds: float | None
+    """CPU time of all ranks together, s."""
+    clock: ClockTime | None
+    """What its ranks and threads take by the clock."""
+    costs: dict[str, float]
+    """Its share of each stage of the case (cases/estimates/stages.py), s; empty where unknown. Breakage costs more, by
+    an amount that cannot be estimated."""
+    breaking: float
+    """CPU time, s, that comes on top where the parts that fracture break as far as they may; 0 where none does."""
+    dust_bytes: int
+    """Memory of all ranks that comes on top there."""
+    parts: tuple[PartEstimate, ...]
+
+
+def estimate(case: Case, folder: Path | None = None, survey: Survey = Survey()) -> Estimate:  # noqa: B008
+    """What ``case`` costs; relative paths of mesh files start in ``folder`` (without one no file is looked
+    at), ``survey`` has what was read of them.
+
+    Raises CaseError, unknown material.
+    """
+    known = [survey.of(index) for index in range(len(case.parts))]
+    sizes = [_size(part, folder, found) for part, found in zip(case.parts, known, strict=True)]
+    parts = tuple(_part(case, *each) for each in zip(case.parts, sizes, known, strict=True))
+    dt = _at_most(case, _least([part.dt for part in parts]))
+    shrunk = [
+        None if p.dt is None else p.dt / shrinkage(case, q, speed)
+        for p, q, speed in zip(parts, case.parts, impact_speeds(case), strict=True)
+    ]
+    mean = _at_most(case, _least(shrunk))
+    steps = None if mean is None else min(math.ceil(case.run.end_time / mean), case.run.max_steps)
+    costs = _costs(case, parts, steps, sum(found.faces for found in survey.parts))
+    breaking = _breaking(case, parts, steps) if costs else 0.0
+    return Estimate(
+        elements=_total([part.elements for part in parts]),
+        nodes=_total([part.nodes for part in parts]),
+        dt=dt,
+        steps=steps,
+        memory_bytes=_memory(case, parts),
+        core_seconds=sum(costs.values()) if costs else None,
+        clock=clock_time(case, costs, breaking) if costs else None,
+        costs=costs,
+        breaking=breaking,
+        dust_bytes=DUST_BYTES * _tets_that_break(case, parts),
+        parts=parts,
+    )
+
+
+def _at_most(case: Case, dt: float | None) -> float | None:
+    """A step where only rigid parts are, s: a run has so many at least."""
+    return case.run.end_time / RIGID_STEPS if dt == math.inf else dt
+
+
+def _size(part: Part, folder: Path | None, found: Surveyed | None) -> MeshSize | int | None:
+    """What is known of a part's mesh: sizes, the number of tets only, or nothing."""
+    if found is not None:
+        return MeshSize(found.elements, found.nodes, found.step_length)
+    if not isinstance(part.mesh, Measured):
+        return mesh_size(part.mesh)
+    if isinstance(part.mesh, Combination):
+        return combined_size(part.mesh)
+    if folder is None or not isinstance(part.mesh, MeshFile):
+        return None
+    path = located(part.mesh.path, part.mesh.sha256, folder)
+    try:
+        return path.stat().st_size // FILE_BYTES.get(path.suffix, FILE_BYTES[".msh"])
+    except (OSError, ValueError):  # a name with a null byte
+        return None
+
+
+def _part(case: Case, part: Part, size: MeshSize | int | None, found: Surveyed | None) -> PartEstimate:
+    if not isinstance(size, MeshSize):
+        return PartEstimate(part.name, size, None, None)
+    made = material(case, part.material)
+    slowest = wave_speed(made) * _viscous_factor(case)
+    step = math.inf if part.rigid is not None else case.numerics.dt_safety * size.step_length / slowest
+    if isinstance(part.mesh, Measured):
+        brings = None if found is None else found.bulk
+    else:
+        brings = bulk(driven(case, part), part.mesh, made.density)
+    return PartEstimate(part.name, size.elements, size.nodes, step, brings)
+
+
+def _viscous_factor(case: Case) -> float:
+    """The linear bulk viscosity takes its share of the time step."""
+    viscosity = case.numerics.viscosity
+    linear = viscosity.linear if viscosity is not None else 0.0
+    return linear + math.hypot(1.0, linear)
+
+
+def _memory(case: Case, parts: tuple[PartEstimate, ...]) -> int | None:
+    needed = [
+        None if size.elements is None else size.elements * _tet_bytes(case, part)
+        for size, part in zip(parts, case.parts, strict=True)
+    ]
+    tets = _total(needed)
+    there = {"contact": case.in_contact, "fracture": case.fractures}
+    rank = RANK_BYTES + sum(STAGE_BYTES[stage] for stage, is_there in there.items() if is_there)
+    return None if tets is None else tets + case.run.ranks * rank
+
+
+def _tet_bytes(case: Case, part: Part) -> int:
+    there = {"strength": material(case, part.material).strength is not None, "facets": part.fracture is not None}
+    features = sum(TET_BYTES[feature] for feature, is_there in there.items() if is_there)
+    return TET_BYTES["tet"] + TET_BYTES.get(case.numerics.pressure, 0) + features
+
+
+def _costs(case: Case, parts: tuple[PartEstimate, ...], steps: int | None, faces: int) -> dict[str, float]:
+    """Core seconds by stage, of mesh files with so many ``faces``; none where a mesh file does not tell the tets."""
+    if steps is None or any(size.elements is None for size in parts):
+        return {}
+    found = {STEPS: steps * case.run.ranks * STEP_OVERHEAD + case.run.ranks * START}
+    for size, part in zip(parts, case.parts, strict=True):
+        for name, nanoseconds in _nanoseconds(case, part).items():
+            found[name] = found.get(name, 0.0) + 1e-9 * steps * (size.elements or 0) * nanoseconds
+    found[CONTACT] = 1e-9 * steps * _contact(case, faces)
+    return {name: seconds for name, seconds in found.items() if seconds > 0.0}
+
+
+def _breaking(case: Case, parts: tuple[PartEstimate, ...], steps: int | None) -> float:
+    """Core seconds of fracture, and of the contact of what has come apart, at most; what flies is taken to break as far
+    as its motion can break it, what is driven to become dust and to be pressed.
+    """
+    pressed = case.in_contact and driven_together(case)
+    dust = 0.0
+    for size, part, speed in zip(parts, case.parts, impact_speeds(case), strict=True):
+        if part.fracture is not None:
+            share = 1.0 if pressed else broken_share(case, part, speed)
+            dust += share * (size.elements or 0) * (PRESSED_NANOSECONDS if pressed else BROKEN_NANOSECONDS)
+    rate = case.run.ranks * BREAKING_OVERHEAD + 1e-9 * dust
+    return (steps or 0) * rate if case.fractures else 0.0
+
+
+def broken_share(case: Case, part: Part, speed: float) -> float:
+    """Of the facets of a part, those that may break where it meets others at a ``speed``, m/s, at most: fragments are
+    as large as the kinetic energy of their stretching can pay for in cracks, s^3 = 24 G / (density rate^2), Grady 1982
+    (J. Appl. Phys. 53, 322), and facets lie one element from each other. The rate is that of its stretch or of its
+    spin, the speed by the length of the part, or what strains the part to its strength while a wave goes through it.
+    1 of mesh files.
+    """
+    made, body = material(case, part.material), bounds(part.mesh)
+    if made.brittle is None or body is None or isinstance(part.mesh, Measured):
+        return 1.0
+    length = max(high - low for low, high in zip(*body, strict=True))
+    own = [abs(rate) for motion in (part.stretch, part.spin) if motion is not None for rate in motion.rate]
+    rate = max(speed / length, made.brittle.strength / made.elastic.young * wave_speed(made) / length, *own)
+    fragment = (24.0 * made.brittle.energy / (made.density * rate**2)) ** (1.0 / 3.0)
+    return float(min(1.0, part.mesh.element_size / fragment))
+
+
+def _tets_that_break(case: Case, parts: tuple[PartEstimate, ...]) -> int:
+    """As far as mesh files tell."""
+    pairs = zip(parts, case.parts, strict=True)
+    return sum(size.elements or 0 for size, part in pairs if part.fracture is not None)
+
+
+def _contact(case: Case, faces: int) -> float:
+    """Nanoseconds of contact in a step; ``faces``: of the parts from mesh files, as far as they are known."""
+    if not case.in_contact:
+        return 0.0
+    faces += sum(surface_faces(part.mesh) for part in case.parts if not isinstance(part.mesh, Measured))
+    return faces * FACE_NANOSECONDS["erosion" if case.erodes else "contact"]
+
+
+def _nanoseconds(case: Case, part: Part) -> dict[str, float]:
+    """Of a tet and a step, by stage."""
+    if part.rigid is not None:
+        return {}
+    made = material(case, part.material)
+    turned = any(b.on is None and (not b.parts or part.name in b.parts) for _, b in case.boundaries_of(Rotation))
+    return {
+        TETS: NANOSECONDS["tet"], AVERAGED: NANOSECONDS.get(case.numerics.pressure, 0.0),
+        STRENGTH: made.strength.nanoseconds if made.strength is not None and not turned else 0.0,
+        STATE: NANOSECONDS["eos"] if made.eos is not None else 0.0,
+    }  # fmt: skip
+
+
+def _least(values: list[float | None]) -> float | None:
+    known = [value for value in values if value is not None]
+    return min(known) if len(known) == len(values) else None
+
+
+def _total(values: list[int | None]) -> int | None:
+    known = [value for value in values if value is not None]
+    return sum(known) if len(known) == len(values) else None

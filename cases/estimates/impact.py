@@ -1,0 +1,139 @@
+"""How fast bodies meet, and what that asks of contact."""
+
+import itertools
+import math
+from collections import Counter
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from ..model.boundaries import Course, Prescribed, Rotation, Traction, Wall
+from ..model.materials import Material
+from ..model.schema import Case, Part
+from ..model.solids import Measured
+from ..reading.library import material
+from ..shapes.geometry import Vector
+from ..shapes.placed import Placed, driven, velocity
+
+FEW, MANY, FULL, MOST = 5, 10, 40, 80
+"""Sweeps of contact in a step: the fewest, also where bodies meet fast, also for rubble that is driven and with
+restitution, and the most; what more are good for: docs/theory/contact.md, "Contact", "Driven rubble", "Sweeps by need"
+and "Restitution"."""
+FAST = 0.2
+"""Of the wave speed of what is met: above it there are MANY sweeps. Chosen: below half of where few were too few for
+columns of metal (docs/theory/contact.md, "Plates under 100 GPa")."""
+PRESSING = 0.1
+"""Of the same: above it flat surfaces buckle. Chosen: half of where irregular plates of copper lost their pressure
+(docs/theory/contact.md, "Ridges under pressure")."""
+
+
+def wave_speed(made: Material) -> float:
+    """Speed of plane waves at rest, m/s: sqrt((K + 4 G / 3) / density), K from the equation of state where given."""
+    return math.sqrt((made.bulk + 4.0 / 3.0 * made.elastic.shear) / made.density)
+
+
+def impact_speeds(case: Case, walls: bool = True) -> list[float]:
+    """The largest speed, m/s, at which each part may meet another part, or a wall where ``walls`` count: by the bounds
+    of their velocities, so up to sqrt(3) times what it is where a body turns.
+    """
+    bounds = [velocities(case, part) for part in case.parts]
+    there = Counter(bounds)
+    for _, wall in case.boundaries_of(Wall) if walls else ():
+        there[wall.velocity, wall.velocity] += 1
+    return [
+        max((apart(*own, *other) for other, many in there.items() if other != own or many > 1), default=0.0)
+        for own in bounds
+    ]
+
+
+def apart(low: Vector, high: Vector, low2: Vector, high2: Vector) -> float:
+    """The largest distance of a point of one box from a point of another."""
+    return math.hypot(*(max(b - c, d - a) for a, b, c, d in zip(low, high, low2, high2, strict=True)))
+
+
+def velocities(case: Case, part: Part) -> tuple[Vector, Vector]:
+    """Bounds of the velocities, m/s, that nodes of a part start with or are driven with; a mesh file neither turns nor
+    stretches here.
+    """
+    if isinstance(part.mesh, Measured):
+        found = [part.velocity]
+    else:
+        moving, (low, high) = driven(case, part), Placed(part.mesh, part.turn).bounds()
+        sides = (low[0], high[0]), (low[1], high[1]), (low[2], high[2])
+        found = [velocity(moving, (x, y, z)) for x, y, z in itertools.product(*sides)]
+    for _, drive in case.boundaries_of(Prescribed):
+        if not drive.parts or part.name in drive.parts:
+            given = [_given(drive, factor, speeds) for factor in _extremes(drive.course) for speeds in found]
+            found = given if drive.low is None and drive.high is None and drive.on is None else [*found, *given]
+    least, most = ([pick(each) for each in zip(*found, strict=True)] for pick in (min, max))
+    return _shifted(least, -part.jitter), _shifted(most, part.jitter)
+
+
+def _extremes(course: Course) -> tuple[float, float]:
+    factors = [factor for _, factor in course] or [1.0]
+    return min(factors), max(factors)
+
+
+def _given(drive: Prescribed, factor: float, speeds: Vector) -> Vector:
+    x, y, z = (
+        old if new is None else factor * new for new, old in zip((drive.x, drive.y, drive.z), speeds, strict=True)
+    )
+    return x, y, z
+
+
+def _shifted(vector: Sequence[float], by: float) -> Vector:
+    x, y, z = vector
+    return x + by, y + by, z + by
+
+
+def _fast(case: Case, share: float) -> bool:
+    """Whether two parts meet at more than a ``share`` of the wave speed of one of them."""
+    speeds = impact_speeds(case, walls=False)
+    return any(
+        speed > share * wave_speed(material(case, part.material))
+        for part, speed in zip(case.parts, speeds, strict=True)
+    )
+
+
+def pressed(case: Case) -> list[bool]:
+    """Which parts are pressed together with others beyond their strength: flat surfaces buckle there. All are where two
+    parts meet at more than PRESSING of the wave speed of one of them; else those that flow, and do not break, where an
+    impact on their like has more than their flow stress: density c v / 2.
+    """
+    if _fast(case, PRESSING):
+        return [True] * len(case.parts)
+    return [
+        part.fracture is None and flows(material(case, part.material), speed)
+        for part, speed in zip(case.parts, impact_speeds(case, walls=False), strict=True)
+    ]
+
+
+def flows(made: Material, speed: float) -> bool:
+    """Whether an impact on its like at ``speed``, m/s, has more than its flow stress."""
+    return made.strength is not None and 0.5 * made.density * wave_speed(made) * speed > made.strength.flow_stress()
+
+
+def driven_together(case: Case) -> bool:
+    """Whether parts may meet, or walls, while a motion or a traction drives something: it presses for as long as it
+    lasts, where what flies presses until it has stopped.
+    """
+    if case.boundaries_of(Traction):
+        return len(case.parts) > 1 or bool(case.boundaries_of(Wall))
+    moved = any(value for _, drive in case.boundaries_of(Prescribed) for value in (drive.x, drive.y, drive.z))
+    return (moved or bool(case.boundaries_of(Rotation))) and any(impact_speeds(case))
+
+
+class Sweeps(NamedTuple):
+    """Bounds of the sweeps over the active contacts of a step; the first step has the least."""
+
+    least: int
+    most: int
+
+
+def sweeps(case: Case) -> Sweeps:
+    """What ``contact.sweeps`` says; or, from what the scene asks for on, as many as the step before needed."""
+    assert case.contact is not None
+    if case.contact.sweeps is not None:
+        return Sweeps(case.contact.sweeps, case.contact.sweeps)
+    if case.contact.restitution > 0.0 or (case.fractures and driven_together(case)):
+        return Sweeps(FULL, MOST)
+    return Sweeps(MANY if _fast(case, FAST) else FEW, MOST)

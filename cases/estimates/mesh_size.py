@@ -1,0 +1,202 @@
+"""How many tets and nodes the generators will make of a primitive, and the step length of its worst tet."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+
+from ..model.bodies import Box, Cylinder, Plate, RingSector, Shards, Sphere, Tube, TwoTets
+from ..model.grading import Grading
+from ..shapes.geometry import (
+    Generated,
+    Vector,
+    across,
+    bounds,
+    centre,
+    cut_directions,
+    round_part,
+    side_areas,
+    surface,
+    tets,
+    volume,
+)
+from ..shapes.profile import Revolved, tips
+
+TETS_PER_VOLUME, TETS_PER_SURFACE = 5.55, 1.42
+NODES_PER_VOLUME, NODES_PER_SURFACE = 0.87, 1.23
+"""gmsh makes a V / h^3 + b S / h^2 tets and nodes of a body with volume V and surface S: fitted to seven bodies."""
+
+FACES_PER_SURFACE = 1.8
+"""Faces of a surface S over S / h^2; a structured mesh has 2."""
+
+REGULAR = 6**-0.5
+"""Step length 1 / sqrt(sum |grad N|^2) of the regular tet, and of the tets of a cut cube, over the edge h."""
+WORST_UNSTRUCTURED = 0.68
+"""Step length of the worst tet of gmsh over that of a regular tet: 0.64 to 0.74 for the bodies of the fit."""
+SHARP, BLUNT = 1.3, 0.9
+"""The same at the tip of a cone or an ogive, at most: the first times the tangent of half its angle; where the tip is
+cut off, or round, the second times its radius over h. Cones of half an angle of 9 and 27 degrees had 0.16 to 0.25 and
+0.40 to 0.68, tips of a radius of h/4 and h/2 0.20 to 0.24 and 0.20 to 0.64, wholes and sectors."""
+WORST_CYLINDER, WORST_TUBE = 0.81, 0.78
+"""The same for structured cylinders cut into 6, and tubes."""
+WORST_FIVE = 0.54
+"""The same for structured cylinders cut into 5, times the cells along the radius: they flatten on the diagonal."""
+WORST_SHARD = 1.7
+"""What the worst shard loses of its step length over how far nodes are moved: 1.5 to 1.9 among 1,000 and 10,000."""
+
+_LATTICE = 20
+"""Points a direction at which a graded size is averaged over a body. Chosen: 8,000 points in all."""
+
+
+@dataclass(frozen=True)
+class MeshSize:
+    """Counts, and the step length, m, of the worst tet: the stable time step is this over the wave speed."""
+
+    elements: int
+    nodes: int
+    step_length: float
+
+
+def mesh_size(mesh: Generated) -> MeshSize:
+    """The size of the mesh of a primitive: exact counts for the structured generator, estimates for gmsh."""
+    if not isinstance(mesh, Sphere | Revolved | RingSector) and mesh.generator == "structured":
+        return _structured(mesh)
+    per_volume, per_surface = _mean_powers(mesh)
+    filling, covering = volume(mesh) * per_volume, surface(mesh) * per_surface
+    elements = TETS_PER_VOLUME * filling + TETS_PER_SURFACE * covering
+    nodes = NODES_PER_VOLUME * filling + NODES_PER_SURFACE * covering
+    return MeshSize(max(6, round(elements)), max(8, round(nodes)), _worst(mesh) * REGULAR * mesh.element_size)
+
+
+def _worst(mesh: Generated) -> float:
+    """Step length of the worst tet of gmsh over that of a regular tet."""
+    if not isinstance(mesh, Revolved):
+        return WORST_UNSTRUCTURED
+    at_tips = [SHARP * slope if radius == 0.0 else BLUNT * radius / mesh.element_size for radius, slope in tips(mesh)]
+    return min(WORST_UNSTRUCTURED, *at_tips)
+
+
+def surface_faces(mesh: Generated) -> int:
+    """How many faces the surface of a primitive has, cuts of its sector included: an estimate."""
+    return round(FACES_PER_SURFACE * surface(mesh) * _mean_powers(mesh)[1])
+
+
+@lru_cache(maxsize=4096)
+def _mean_powers(mesh: Generated) -> tuple[float, float]:
+    """Means over the volume of 1 / h^3 and 1 / h^2 for the element size h, which grading makes vary."""
+    if mesh.grading is None:
+        return mesh.element_size**-3, mesh.element_size**-2
+    graded = size_at(mesh, mesh.grading)
+    sizes = [graded(point) for point in _lattice(mesh)]
+    return math.fsum(h**-3 for h in sizes) / len(sizes), math.fsum(h**-2 for h in sizes) / len(sizes)
+
+
+def _lattice(mesh: Generated) -> list[tuple[float, float, float]]:
+    low, high = bounds(mesh) or ((0.0,) * 3, (0.0,) * 3)
+    lines = [[a + (b - a) * (i + 0.5) / _LATTICE for i in range(_LATTICE)] for a, b in zip(low, high, strict=True)]
+    inside = round_part(mesh)
+    return [point for x in lines[0] for y in lines[1] for z in lines[2] if inside(point := (x, y, z))] or [centre(mesh)]
+
+
+def size_at(mesh: Generated, grading: Grading) -> Callable[[Vector], float]:
+    """The element size, m, at a point of a primitive that is graded: to be asked of many points."""
+    size, near, more = mesh.element_size, grading.near, grading.far_size - mesh.element_size
+    width, origin, radius = grading.far - grading.near, grading.origin, grading.radius
+
+    def at(distance: float) -> float:
+        return size + more * min(max((abs(distance - radius) - near) / width, 0.0), 1.0)
+
+    if grading.axis is None:
+        return lambda point: at(math.dist(point, origin))
+    i, j = across(grading.axis)
+    x, y = origin[i], origin[j]
+    return lambda point: at(math.hypot(point[i] - x, point[j] - y))
+
+
+def _structured(mesh: Box | Plate | Cylinder | Tube | TwoTets | Shards) -> MeshSize:
+    if isinstance(mesh, TwoTets | Shards):
+        return _loose(mesh)
+    if isinstance(mesh, Cylinder):
+        return _structured_cylinder(mesh)
+    if isinstance(mesh, Tube):
+        return _structured_tube(mesh)
+    rows = grid(mesh)
+    cells, nodes = math.prod(row.cells for row in rows), math.prod(row.cells + 1 for row in rows)
+    return MeshSize(mesh.split * cells, nodes + math.prod(slit_lines(mesh)), _cell_step([row.spacing for row in rows]))
+
+
+@dataclass(frozen=True)
+class Row:
+    """The planes of nodes of the structured generator across one direction: ``start`` and ``spacing`` in m."""
+
+    start: float
+    spacing: float
+    cells: int
+
+    def place(self, x: float) -> float:
+        """Number of the plane at ``x``, m; a whole number within round-off counts as one."""
+        place = (x - self.start) / self.spacing
+        return round(place) if abs(place - round(place)) < 1e-6 else place
+
+
+def grid(mesh: Box | Plate) -> list[Row]:
+    """The planes of nodes across x, y and z."""
+    low, high = bounds(mesh) or ((0.0,) * 3, (0.0,) * 3)
+    counts = [_divisions(b - a, mesh.element_size) for a, b in zip(low, high, strict=True)]
+    return [Row(a, (b - a) / n, n) for a, b, n in zip(low, high, counts, strict=True)]
+
+
+def slit_lines(mesh: Box | Plate) -> tuple[int, int]:
+    """How many lines of nodes of a slit are doubled, in the two directions across its axis; 0, 0 without a slit."""
+    if mesh.slit is None:
+        return 0, 0
+    rows = [grid(mesh)[d] for d in across(mesh.slit.axis)]
+    first, second = (
+        max(0, _doubled(row, row.place(low), row.place(high)))
+        for row, low, high in zip(rows, mesh.slit.low, mesh.slit.high, strict=True)
+    )
+    return first, second
+
+
+def _doubled(row: Row, low: float, high: float) -> int:
+    """How many planes lie between two places: a border on the surface of the body counts, one inside does not."""
+    first = 0 if low <= 0 else math.floor(low) + 1
+    last = row.cells if high >= row.cells else math.ceil(high) - 1
+    return last - first + 1
+
+
+def _loose(mesh: TwoTets | Shards) -> MeshSize:
+    if isinstance(mesh, TwoTets):
+        areas = math.hypot(math.sqrt(3.0) / 4.0 * mesh.element_size**2, *side_areas(mesh)[:3])
+        return MeshSize(2, 5, 1.5 * volume(mesh) / areas)
+    shrunk = 1.0 - WORST_SHARD * mesh.perturbation
+    return MeshSize(tets(mesh), 4 * tets(mesh), shrunk * REGULAR * mesh.element_size)
+
+
+def _structured_cylinder(mesh: Cylinder) -> MeshSize:
+    n, layers = _divisions(mesh.radius, mesh.element_size), _divisions(mesh.length, mesh.element_size)
+    cut = len(cut_directions(mesh, mesh.axis))
+    a, b = (n if cut > 0 else 2 * n), (n if cut > 1 else 2 * n)
+    worst = WORST_CYLINDER if mesh.split == 6 else WORST_FIVE / n
+    cell = [mesh.radius / n, mesh.radius / n, mesh.length / layers]
+    return MeshSize(mesh.split * a * b * layers, (a + 1) * (b + 1) * (layers + 1), worst * _cell_step(cell))
+
+
+def _structured_tube(mesh: Tube) -> MeshSize:
+    rings, layers = (_divisions(extent, mesh.element_size) for extent in (mesh.radius - mesh.inner_radius, mesh.length))
+    n = _divisions(math.pi / 4.0 * (mesh.radius + mesh.inner_radius), mesh.element_size)
+    quarters = {"full": 4, "half": 2, "quarter": 1}[mesh.sector]
+    lines = quarters * n + (mesh.sector != "full")
+    arc = math.pi / 2.0 / n
+    cell = [(mesh.radius - mesh.inner_radius) / rings, arc * mesh.inner_radius, mesh.length / layers]
+    step = min(WORST_TUBE * REGULAR * mesh.element_size, _cell_step(cell))
+    return MeshSize(mesh.split * rings * quarters * n * layers, (rings + 1) * lines * (layers + 1), step)
+
+
+def _cell_step(cell: list[float]) -> float:
+    """Step length of a tet that a box-shaped cell is cut into: 1 / sqrt(2 sum 1 / a^2), for every cut."""
+    return 1.0 / math.sqrt(2.0 * sum(1.0 / length**2 for length in cell))
+
+
+def _divisions(length: float, size: float) -> int:
+    return max(1, round(length / size))

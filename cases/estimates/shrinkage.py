@@ -1,0 +1,140 @@
+"""How much shorter than the first time step the mean one is: impact and pressure flatten tets and make waves faster."""
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+
+from ..model.bodies import Tube
+from ..model.boundaries import Around, Course, Traction
+from ..model.materials import Material
+from ..model.schema import Case, Part, Symmetry
+from ..model.solids import Measured
+from ..reading.library import material
+from ..shapes.geometry import AXES, bounds
+from .impact import wave_speed
+
+DEEPEST, DEEPEST_ERODING = 12.0, 4.0
+"""The mean time step of a crushed body is never taken to be smaller than the initial one over this: the flattest tets
+of a part that erodes leave."""
+FOOT, SLENDER = 0.9, 4.5
+"""See shrinkage."""
+CROSSINGS = 2.0
+"""For so many times as long as a part takes to cross its own extent at the speed of an impact it is shocked. Measured:
+the step of two balls of copper of 1 mm that meet at 10 km/s (cases/hard/head_on_10km.toml) is short for 0.2 us."""
+
+
+def shrinkage(case: Case, part: Part, speed: float) -> float:
+    """Initial over mean time step of a part that is met at a ``speed``, m/s: impact flattens the tets, and compression
+    makes waves faster.
+
+    Free to flow, a metal that stops from the speed v takes the strain density v^2 / (2 yield stress) in the mean, and
+    its foot, which is about as long as wide, what the whole length takes: the mean step falls as exp(k strain) with
+    k = 0.9 length / width, at most 4 (``slenderness``). Measured: square bars that are 1, 2 and 4 times as long as wide
+    have k up to 0.9, 1.8 and 2.8, less where they harden much (``python -m tests.bench.flattening``), Taylor bars of
+    copper and steel 4. Held on all sides, it is compressed by a shock.
+    """
+    made = material(case, part.material)
+    deepest = DEEPEST if part.erosion is None else DEEPEST_ERODING
+    if _confined(case, part):
+        shock = made.eos.c0 + made.eos.S * speed if made.eos is not None else wave_speed(made)
+        faster = 1.0 + 2.0 * made.eos.S * speed / made.eos.c0 if made.eos is not None else 1.0
+        return min(deepest, faster / (1.0 - min(speed / shock, 0.9)))
+    if made.strength is None:
+        return 1.0
+    strain = made.density * speed**2 / (2.0 * made.strength.flow_stress())
+    flattened = math.exp(min(FOOT * slenderness(case) * strain, 10.0))
+    imploded = max((_imploded(case, part, made, load) for load in _on_part(case, part)), default=1.0)
+    return max(_shocked(case, part, made, speed, flattened), min(deepest, imploded))
+
+
+def _shocked(case: Case, part: Part, made: Material, speed: float, flattened: float) -> float:
+    """With what flattens it, and for as long as a part crosses itself with what makes its waves faster: matter behind a
+    shock moves at u = speed / 2, and waves there go about 2 S u faster than c0. Meanwhile a tet that erodes flattens
+    up to the strain at which it leaves; later those are gone.
+    """
+    body = None if isinstance(part.mesh, Measured) else bounds(part.mesh)
+    if part.erosion is None:
+        return min(DEEPEST, flattened)
+    later = min(DEEPEST_ERODING, flattened)
+    if made.eos is None or part.erosion.plastic_strain is None or body is None or not speed:
+        return later
+    leaves = min(math.exp(min(part.erosion.plastic_strain, 10.0)), 1.0 / part.erosion.time_step)
+    extent = max(high - low for low, high in zip(*body, strict=True))
+    share = min(1.0, CROSSINGS * extent / (speed * case.run.end_time))
+    faster = 1.0 + made.eos.S * speed / made.eos.c0
+    return share * faster * min(leaves, flattened) + (1.0 - share) * later
+
+
+def _on_part(case: Case, part: Part) -> list[Traction]:
+    loads = [load for _, load in case.boundaries_of(Traction)]
+    return [load for load in loads if load.on is None and (not load.parts or part.name in load.parts)]
+
+
+def _imploded(case: Case, part: Part, made: Material, load: Traction) -> float:
+    """Of a tube under a ``load`` on its outside, where that is above what a tube of its strength holds,
+    Y ln(outer / inner radius): the wall moves inwards as one that is free, its area stays, and what is at the bore
+    takes the strain ln(first / present radius) round it. A bore that closes flattens its tets without end.
+    """
+    tube, flow = part.mesh, made.strength.flow_stress() if made.strength is not None else math.inf
+    if not isinstance(tube, Tube) or load.pressure is None or not _outside(tube, load.cylinder):
+        return 1.0
+    area = tube.radius**2 - tube.inner_radius**2
+    more = load.pressure - flow * math.log(tube.radius / tube.inner_radius)
+    pace = more * tube.radius / (made.density * area / 2.0)
+    outer = tube.radius - pace * _moved(load.course, case.run.end_time)
+    bore = outer**2 - area if outer > 0.0 else 0.0
+    return 1.0 if more <= 0.0 else math.inf if bore <= 0.0 else tube.inner_radius / math.sqrt(bore)
+
+
+def _outside(tube: Tube, region: Around | None) -> bool:
+    """Whether a region has the outside of a tube, and not its bore."""
+    return region is not None and tube.inner_radius < region.inner_radius <= tube.radius <= region.radius
+
+
+def _moved(course: Course, until: float) -> float:
+    """The way, s^2, on which the factor of a course brings what it moves by 1 m/s^2."""
+    times = [until * n / 100 for n in range(101)]
+    factors = [_factor(course, time) for time in times]
+    return sum((until - time) * factor for time, factor in zip(times, factors, strict=True)) * until / 100
+
+
+def _factor(course: Course, time: float) -> float:
+    """Of a force at a time: linear between the pairs, constant before and after them."""
+    if not course or time <= course[0][0]:
+        return course[0][1] if course else 1.0
+    for (start, low), (end, high) in pairwise(course):
+        if time <= end:
+            return low + (high - low) * (time - start) / (end - start)
+    return course[-1][1]
+
+
+def slenderness(case: Case) -> float:
+    """The largest length over width of the parts, 1 to SLENDER: the longest extent over the mean of the other two. What
+    is slender strains what it meets, too. SLENDER where a part is a mesh file.
+    """
+    most = 1.0
+    for part in case.parts:
+        body = None if isinstance(part.mesh, Measured) else bounds(part.mesh)
+        if body is None:
+            return SLENDER
+        wide, broad, length = sorted(high - low for low, high in zip(*body, strict=True))
+        most = max(most, length / math.sqrt(wide * broad))
+    return min(most, SLENDER)
+
+
+def _confined(case: Case, part: Part) -> bool:
+    """Whether planes of symmetry hold a part on both sides in two directions."""
+    body = None if isinstance(part.mesh, Measured) else bounds(part.mesh)
+    if body is None:
+        return False
+    planes = [
+        (boundary.axis, boundary.at)
+        for boundary in case.boundaries
+        if isinstance(boundary, Symmetry) and (not boundary.parts or part.name in boundary.parts)
+    ]
+    held = [all(_on(planes, d, side[d]) for side in body) for d in range(3)]
+    return sum(held) >= 2
+
+
+def _on(planes: Sequence[tuple[str, float]], direction: int, at: float) -> bool:
+    return any(axis == AXES[direction] and math.isclose(where, at, abs_tol=1e-9) for axis, where in planes)

@@ -1,0 +1,57 @@
+"""What the tables of a case are made of: the base of every model, names, places, counts."""
+
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, GetJsonSchemaHandler
+from pydantic_core import CoreSchema
+
+from ..reading.files import HASH
+from ..units import Length, Speed, usable
+
+Axis = Literal["x", "y", "z"]
+Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]{0,63}$")]
+SetName = Annotated[str, Field(min_length=1, max_length=200)]
+"""Of a set in a mesh file, which may have blanks and any letters."""
+Point = tuple[Length, Length, Length]
+Velocity = tuple[Speed, Speed, Speed]
+Positive = Field(gt=0)
+
+
+def _floats(value: Any) -> Any:
+    return tuple(value) if isinstance(value, list) else value
+
+
+def _no_truth(value: Any) -> Any:
+    if isinstance(value, bool):
+        raise ValueError("expected a whole number")
+    return value
+
+
+Count = Annotated[int, BeforeValidator(_no_truth)]
+_Component = Annotated[float, AfterValidator(usable)]
+Direction = Annotated[tuple[_Component, _Component, _Component], BeforeValidator(_floats)]
+
+
+def _hash(value: str) -> str:
+    if not HASH.fullmatch(value.lower()):
+        raise ValueError("expected 64 hexadecimal digits, as sha256sum prints them")
+    return value.lower()
+
+
+Sha256 = Annotated[str, AfterValidator(_hash), Field(json_schema_extra={"pattern": "^[0-9a-fA-F]{64}$"})]
+"""Of a file that a case names, in lower case."""
+
+
+class Switch:
+    """In the JSON schema of a key: ``"none"`` is allowed as well."""
+
+    def __get_pydantic_json_schema__(self, core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        """What pydantic asks an annotation for."""
+        schema = handler(core)
+        return {**schema, "anyOf": [*schema["anyOf"], {"const": "none"}]}
+
+
+class Model(BaseModel):
+    """Base of everything in a case."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, use_attribute_docstrings=True)

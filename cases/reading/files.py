@@ -1,0 +1,73 @@
+"""The files that a case names: where it names them, by which path and hash, and where a run finds them.
+
+Every table below ``parts[].mesh`` that has a ``path`` names a file; ``sha256`` beside it says which bytes are meant.
+The path leads to the file on the machine of who has written the case. A run of a server, or of ``conoid batch``, has
+copies of its own in its folder, under their hashes: there the path is a name and nothing more.
+"""
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path, PurePath
+from typing import Any
+
+from ..output import layout
+
+HASH = re.compile(r"[0-9a-f]{64}")
+"""A sha256 as it is written in names and addresses."""
+_ENDING = re.compile(r"\.[a-z0-9]{1,8}")
+"""Of a file's name, by which its format is known."""
+
+
+@dataclass(frozen=True)
+class Named:
+    """A file that a case names, and the table that names it, as ``("parts", 0, "mesh")``."""
+
+    table: tuple[int | str, ...]
+    path: str
+    sha256: str | None
+
+    @property
+    def copy(self) -> str:
+        """The name of the copy in a run's folder; empty where the case has no hash of the file."""
+        return copy_of(self.path, self.sha256)
+
+
+def files_of(case: Mapping[str, Any]) -> list[Named]:
+    """All files that a case in plain data names, in its order. What is no table, list or text is passed over."""
+    parts = case.get("parts")
+    meshes = ((n, part.get("mesh")) for n, part in enumerate(_listed(parts)) if isinstance(part, Mapping))
+    return [file for n, mesh in meshes for file in _below(mesh, ("parts", n, "mesh"))]
+
+
+def _below(value: Any, place: tuple[int | str, ...]) -> Iterator[Named]:
+    if isinstance(value, Mapping):
+        if isinstance(path := value.get("path"), str):
+            told = value.get("sha256")
+            yield Named(place, path, told.strip().lower() if isinstance(told, str) else None)
+        for key, inner in value.items():
+            yield from _below(inner, (*place, str(key)))
+    for n, inner in enumerate(_listed(value)):
+        yield from _below(inner, (*place, n))
+
+
+def _listed(value: Any) -> list[Any]:
+    return list(value) if isinstance(value, list | tuple) else []
+
+
+def copy_of(path: str, sha256: str | None) -> str:
+    """The name of the copy of a file: its hash, and how the name in the case ends. Empty without a hash."""
+    if sha256 is None or not HASH.fullmatch(sha256.lower()):
+        return ""
+    ending = PurePath(path).suffix.lower()
+    return sha256.lower() + (ending if _ENDING.fullmatch(ending) else "")
+
+
+def located(path: str, sha256: str | None, folder: Path) -> Path:
+    """Where a run whose case is in ``folder`` finds a file that the case names.
+
+    In the folder of a run of a server that is the run's own copy and nothing else, so that no case reads a path of the
+    server; elsewhere the copy where there is one, else ``path``, from the folder on.
+    """
+    copy = folder / layout.FILES / (copy_of(path, sha256) or "none")
+    return copy if (folder / layout.SUBMISSION).exists() or copy.exists() else folder / path

@@ -1,0 +1,92 @@
+"""The material library: ``materials.toml``, every constant with its confidence and source."""
+
+import tomllib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any, Literal, get_args
+
+from ..model.materials import Material
+from ..model.schema import Case
+from .problems import CaseError, problem
+from .similar import nearest
+
+PATH = Path(__file__).parents[1] / "materials.toml"
+Confidence = Literal["paper", "read", "derived", "memory", "assumed"]
+"""How sure a constant is: in the paper this work starts from; read in the source named; computed from other constants;
+remembered from the literature and not read again; chosen without evidence for this alloy."""
+CONFIDENCES: tuple[str, ...] = get_args(Confidence)
+
+
+@cache
+def library() -> dict[str, Material]:
+    """Every material of the library by its name."""
+    return {name: Material.model_validate(_values(table)) for name, table in _tables().items()}
+
+
+@cache
+def sources() -> dict[str, str]:
+    """What the source keys of the library stand for."""
+    return dict(tomllib.loads(PATH.read_text(encoding="utf-8"))["sources"])
+
+
+def provenance(name: str) -> dict[str, tuple[str, str]]:
+    """``{"elastic.young": ("read", "uintah"), ...}``: confidence and source key of each constant of a material."""
+    return {key: (confidence, source) for key, (_, confidence, source) in _entries(_tables()[name], "")}
+
+
+@dataclass(frozen=True)
+class Constant:
+    """One number of the library as it is written there, such as ``7850 kg/m^3``."""
+
+    key: str
+    value: str
+    confidence: Confidence
+    source: str
+    """A key of the sources."""
+    cited: str
+    """What it stands for."""
+
+
+def constants(name: str) -> list[Constant]:
+    """Every constant of a material of the library. Raises CaseError with the nearest names."""
+    if name not in library():
+        raise CaseError([problem(("material",), name, f"unknown material; {nearest(name, sorted(library()))}")])
+    return [
+        Constant(key, str(value), confidence, source, sources()[source])
+        for key, (value, confidence, source) in _entries(_tables()[name], "")
+    ]
+
+
+def material(case: Case, name: str) -> Material:
+    """The material ``name``: the case's own first, then the library's. Raises CaseError with the nearest names."""
+    known = {**library(), **case.materials}
+    if name not in known:
+        raise CaseError([problem(("material",), name, f"unknown material; {nearest(name, sorted(known))}")])
+    return known[name]
+
+
+def _tables() -> dict[str, dict[str, Any]]:
+    tables = tomllib.loads(PATH.read_text(encoding="utf-8"))
+    return {name: table for name, table in tables.items() if name != "sources"}
+
+
+def _values(table: dict[str, Any]) -> dict[str, Any]:
+    """The table with each ``[value, confidence, source]`` replaced by its value."""
+    return {key: _value(entry) for key, entry in table.items()}
+
+
+def _value(entry: Any) -> Any:
+    if isinstance(entry, dict):
+        return _values(entry)
+    return entry[0] if isinstance(entry, list) else entry
+
+
+def _entries(table: dict[str, Any], prefix: str) -> Iterator[tuple[str, list[Any]]]:
+    """Dotted keys, and value, confidence and source key of each constant in a table."""
+    for key, entry in table.items():
+        if isinstance(entry, dict):
+            yield from _entries(entry, f"{prefix}{key}.")
+        elif isinstance(entry, list):
+            yield f"{prefix}{key}", entry

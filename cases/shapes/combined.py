@@ -1,0 +1,145 @@
+"""Combinations of shapes before they are meshed: which points they hold, in which box they lie, their size, about.
+
+Exact for points; volumes by points of a lattice. What has solids of a CAD file is known when that is read.
+"""
+
+import math
+from collections.abc import Callable
+from functools import lru_cache
+from typing import Any
+
+from ..estimates.mesh_size import (
+    NODES_PER_SURFACE,
+    NODES_PER_VOLUME,
+    REGULAR,
+    TETS_PER_SURFACE,
+    TETS_PER_VOLUME,
+    MeshSize,
+)
+from ..model.bodies import Box, Cone, Cylinder, Hemisphere, Ogive, Plate, RingSector, Sphere, SphericalCap, Tube
+from ..model.grading import Grading
+from ..model.operands import CadForm, CombinedForm, DifferenceForm, Operand, UnionForm
+from ..model.solids import Combination
+from ..model.tables import Axis, Model
+from .geometry import Vector, across, index
+from .placed import Placed, lattice
+
+Bounds = tuple[Vector, Vector]
+Inside = Callable[[Vector], bool]
+
+WORST = 0.45
+"""Step length of the worst tet of gmsh over that of a regular tet, where a combination has no edges shorter than an
+element: 0.3 to 0.7 in 40 of the combinations of tests/mesh/test_combinations.py."""
+_LATTICE = 12
+"""Points a direction at which a combination is looked at. Chosen: 1,728 points, volumes within some per cent."""
+_BULKY = 1.5
+"""Surface of a combination over that of a cube of its volume. Chosen."""
+_BODIES: dict[str, type[Model]] = {
+    "box": Box, "plate": Plate, "cylinder": Cylinder, "tube": Tube, "sphere": Sphere, "cone": Cone, "ogive": Ogive,
+    "hemisphere": Hemisphere, "spherical_cap": SphericalCap, "ring_sector": RingSector,
+}  # fmt: skip
+
+
+def box_of(form: CombinedForm | Operand) -> Bounds | None:
+    """Corners of a box that holds a form, m: of an operand before it is turned; None where a CAD file decides. The low
+    corner of an intersection that is empty may be above the high one."""
+    if isinstance(form, CadForm):
+        return None
+    if not isinstance(form, CombinedForm):
+        return _placed(form).bounds()
+    found = [box_of(each) for each in form.of]
+    boxes = [box for box, each in zip(found, form.of, strict=True) if box is not None and _unturned(each)]
+    if isinstance(form, DifferenceForm):
+        return found[0] if _unturned(form.of[0]) else None
+    if isinstance(form, UnionForm) and len(boxes) < len(form.of):
+        return None
+    if not boxes:
+        return None
+    low, high = (min, max) if isinstance(form, UnionForm) else (max, min)
+    (a, b, c), (d, e, f) = (
+        [pick(each) for each in zip(*corners, strict=True)]
+        for pick, corners in zip((low, high), zip(*boxes, strict=True), strict=True)
+    )
+    return (a, b, c), (d, e, f)
+
+
+def _unturned(form: Operand) -> bool:
+    """Whether the box of an operand is where the operand is: a combination within is turned as a whole."""
+    return not isinstance(form, CombinedForm) or form.turn is None
+
+
+def _placed(form: Operand) -> Placed:
+    body: Any = _BODIES[form.shape].model_validate({**form.model_dump(exclude={"turn"}), "element_size": 1.0})
+    return Placed(body, form.turn)
+
+
+def inside(form: CombinedForm | Operand) -> Inside | None:
+    """Whether a point, m, lies in a form: to be asked of many points; None where a CAD file decides."""
+    if isinstance(form, CadForm):
+        return None
+    if not isinstance(form, CombinedForm):
+        return _placed(form).holds
+    asked = [inside(each) for each in form.of]
+    known = [each for each in asked if each is not None]
+    if len(known) < len(asked):
+        return None
+    turn = getattr(form, "turn", None)
+    here = _joined(form, known)
+    if turn is None:
+        return here
+    back = turn.model_copy(update={"angle": -turn.angle})
+    carrier = Placed(Sphere(shape="sphere", radius=1.0, element_size=1.0), back)
+    return lambda point: here(carrier.turned(point))
+
+
+def _joined(form: CombinedForm, known: list[Inside]) -> Inside:
+    if isinstance(form, UnionForm):
+        return lambda point: any(each(point) for each in known)
+    if isinstance(form, DifferenceForm):
+        return lambda point: known[0](point) and not any(each(point) for each in known[1:])
+    return lambda point: all(each(point) for each in known)
+
+
+def modelled(mesh: Combination) -> Bounds | None:
+    """The box round what is modelled of a combination, m, as far as ``box_of`` knows it."""
+    box = box_of(mesh)
+    if box is None:
+        return None
+    low, high = list(box[0]), box[1]
+    for d in cut_by(mesh.sector, mesh.axis):
+        low[d] = max(low[d], mesh.centre[d])
+    return (low[0], low[1], low[2]), high
+
+
+def cut_by(sector: str, axis: Axis) -> tuple[int, ...]:
+    """The directions across ``axis`` in which a sector keeps the positive side alone."""
+    return across(axis)[: {"full": 0, "half": 1, "quarter": 2}[sector]]
+
+
+@lru_cache(maxsize=256)
+def combined_size(mesh: Combination) -> MeshSize | None:
+    """About how large the mesh of a combination will be; None where a CAD file decides, or nothing seems to be left."""
+    box, holds = modelled(mesh), inside(mesh)
+    if box is None or holds is None or any(a >= b for a, b in zip(*box, strict=True)):
+        return None
+    points = list(lattice(*box, _LATTICE))
+    held = [point for point in points if holds(point)]
+    cell = math.prod(b - a for a, b in zip(*box, strict=True)) / len(points)
+    sizes = [_size_at(mesh.element_size, mesh.grading, point) for point in held]
+    filling, volume = cell * math.fsum(h**-3 for h in sizes), cell * len(held)
+    if not held:
+        return None
+    covering = _BULKY * 6.0 * volume ** (2.0 / 3.0) * math.fsum(h**-2 for h in sizes) / len(held)
+    elements = TETS_PER_VOLUME * filling + TETS_PER_SURFACE * covering
+    nodes = NODES_PER_VOLUME * filling + NODES_PER_SURFACE * covering
+    return MeshSize(max(6, round(elements)), max(8, round(nodes)), WORST * REGULAR * mesh.element_size)
+
+
+def _size_at(size: float, grading: Grading | None, point: Vector) -> float:
+    if grading is None:
+        return size
+    away = [p - o for p, o in zip(point, grading.origin, strict=True)]
+    if grading.axis is not None:
+        away[index(grading.axis)] = 0.0
+    share = (abs(math.hypot(*away) - grading.radius) - grading.near) / (grading.far - grading.near)
+    return size + (grading.far_size - size) * min(max(share, 0.0), 1.0)

@@ -1,0 +1,41 @@
+"""Boundaries that act on nothing, before there is a mesh."""
+
+from collections.abc import Iterator
+
+from ..model.boundaries import Prescribed, Traction
+from ..model.schema import Case, Part
+from ..model.solids import Measured
+from ..reading.problems import Problem, problem
+from ..shapes.loaded import block_faces, loads, parts_of, planes_of
+from ..shapes.placed import Placed
+from ..shapes.region import Region
+
+
+def idle(case: Case, number: int) -> Iterator[Problem]:
+    """An error for a boundary in whose box no node, or no face, of structured blocks lies that are not turned."""
+    spec = case.boundaries[number]
+    assert isinstance(spec, Prescribed | Traction)
+    if all(_empty(part, spec) for part in parts_of(case, spec)):
+        what = "node" if isinstance(spec, Prescribed) else "face"
+        message = f"no {what} of the bodies that it is for lies in its box; let it reach over the nodes that are meant"
+        yield problem(("boundaries", number), ..., message)
+
+
+def _empty(part: Part, spec: Traction | Prescribed) -> bool:
+    """Whether a boundary is sure to find nothing of a part in its box."""
+    if isinstance(part.mesh, Measured):
+        return False
+    body, region = Placed(part.mesh, part.turn), Region.of(spec)
+    planes = planes_of(body, region)
+    if planes is None:
+        return False
+    return 0 in planes if isinstance(spec, Prescribed) else block_faces(body, region) is None
+
+
+def unloaded(case: Case) -> Iterator[Problem]:
+    """A warning for each boundary in whose region no face or node seems to lie."""
+    for load in loads(case):
+        if load.faces == 0 or load.nodes == 0:
+            what = "face" if load.faces == 0 else "node"
+            message = f"no {what} of the bodies that it is for seems to lie in it; where there is none no run starts"
+            yield problem(("boundaries", load.boundary), ..., message)

@@ -1,0 +1,234 @@
+"""What a valid case makes a reader doubt: bare numbers where a unit was expected, and what a slip of units makes.
+
+Warnings, never errors: each says what a value was taken for, or what is odd about it.
+"""
+
+import math
+from collections.abc import Iterator, Mapping
+from functools import cache
+from itertools import chain
+from typing import Any
+
+from ..checks.overlap import grazes
+from ..estimates.estimate import Estimate
+from ..estimates.impact import impact_speeds, wave_speed
+from ..model.materials import Material
+from ..model.schema import Case
+from ..reading.library import material
+from ..reading.problems import Location, Problem, problem
+from ..reading.quantities import unit_of_reference
+from ..reference.json_schema import Schema, definition, json_schema, variants
+from ..units import QUANTITY
+from .approach import strangers
+from .compression import crushed
+from .damping import damped
+from .driven import passing
+from .idle import unloaded
+from .reach import cut_bodies, scant_probes
+from .stiff import stiff
+
+DAY = 86_400.0
+"""Core seconds. Chosen: who wants more than a day knows it."""
+FEW_STEPS = 10
+"""Chosen: a wave takes two steps or so through a tet; what ends before it has crossed five shows nothing. A slip of the
+unit of a mesh file is the commonest cause."""
+LIKELY: dict[str, tuple[float, float, str]] = {
+    "density": (10.0, 23_000.0, "kg/m^3: foams have 10, osmium has 22,590"),
+    "wave speed": (20.0, 20_000.0, "m/s: soft rubber has 30, diamond has 18,000"),
+    "yield stress over Young's modulus": (1e-6, 0.1, "crystals shear off at a tenth"),
+    "tensile strength over Young's modulus": (1e-7, 0.1, "atoms let go at a tenth"),
+    "specific heat": (50.0, 15_000.0, "J/kg/K: tungsten has 134, hydrogen 14,300"),
+    "fracture energy": (1e-2, 1e6, "J/m^2: glass has 8, tough steel 100,000"),
+    "temperature": (100.0, 6_000.0, "K: 20 degrees Celsius are 293 K"),
+    "extent": (1e-6, 100.0, "m"),
+    "bulk modulus, density c0^2, over that of elastic,": (0.5, 2.0, "both are of one solid at rest"),
+}
+"""Between what a quantity of any solid lies, and the ends as people know them (handbooks)."""
+SHOCKING = 0.1
+"""Of the wave speed, for what is met and has the linear pressure: where one body hits another of its kind at this
+speed, u = v / 2, the pressure is some 7 % too low, and 13 % where the other body does not yield. A shock has
+p = density (c0 + s u) u, with s near 1.5 for metals (1.2 to 1.9 in materials.toml), the linear pressure -K ln J makes
+it density (c0 + u / 4) u."""
+STIFFENING, LINEAR_STIFFENING = 1.5, 0.25
+"""Of the speed of a shock by the speed u of the matter behind it: s of metals, and what the linear pressure has."""
+_UNLIKE = 1000.0
+"""Between the largest and the smallest part. Chosen: millimetres taken for metres."""
+
+
+def doubts(data: Mapping[str, Any], case: Case, expected: Estimate) -> list[Problem]:
+    """Every warning: ``data`` is the case as it was written, ``expected`` its estimate."""
+    return [*bare_numbers(data), *oddities(case, expected)]
+
+
+def oddities(case: Case, expected: Estimate) -> list[Problem]:
+    """Those that do not depend on how the case is written."""
+    return [
+        *_effort(case, expected),
+        *_materials(case),
+        *_bodies(case, expected),
+        *_shocks(case),
+        *crushed(case),
+        *damped(case),
+        *grazes(case),
+        *strangers(case),
+        *passing(case),
+        *unloaded(case),
+        *cut_bodies(case),
+        *stiff(case, expected),
+        *scant_probes(case, expected),
+    ]
+
+
+# Bare numbers ---------------------------------------------------------------------------------------------------------
+
+
+def bare_numbers(data: Mapping[str, Any]) -> list[Problem]:
+    """Numbers other than 0 where a unit was expected: one line a key, which says what they were taken for."""
+    whole = _schema()
+    return list(_bare((), data, whole, whole, data))
+
+
+@cache
+def _schema() -> Schema:
+    return json_schema()
+
+
+def _bare(location: Location, value: Any, schema: Schema, whole: Schema, data: Mapping[str, Any]) -> Iterator[Problem]:
+    for meant in (definition(variant, whole) for variant in variants(schema)):
+        if "properties" in meant and isinstance(value, Mapping) and _is(meant, value):
+            inner = ((key, value[key], each) for key, each in meant["properties"].items() if key in value)
+        elif "patternProperties" in meant and isinstance(value, Mapping):
+            inner = ((key, each, next(iter(meant["patternProperties"].values()))) for key, each in value.items())
+        elif "items" in meant and isinstance(value, list | tuple):
+            inner = ((i, each, meant["items"]) for i, each in enumerate(value))
+        else:
+            yield from _taken(location, value, meant, data)
+            continue
+        yield from chain.from_iterable(_bare((*location, key), each, to, whole, data) for key, each, to in inner)
+
+
+def _is(schema: Schema, value: Mapping[str, Any]) -> bool:
+    """Whether a table is of the kind that a schema describes."""
+    consts = {key: each["const"] for key, each in schema["properties"].items() if "const" in each}
+    return all(value.get(key) == const for key, const in consts.items())
+
+
+def _taken(location: Location, value: Any, schema: Schema, data: Mapping[str, Any]) -> Iterator[Problem]:
+    listed = isinstance(value, list | tuple)
+    values, schemas = (value, schema.get("prefixItems", ())) if listed else ([value], [schema])
+    bare = [to["unit"] for each, to in zip(values, schemas, strict=False) if to.get("unit") and _bare_number(each)]
+    unit = next(iter(bare), "")
+    if unit == QUANTITY:
+        unit = unit_of_reference(data, location)
+    if unit:
+        shown = f"[{', '.join(map(str, values))}]" if listed else f"{float(value):g}"
+        yield Problem(
+            problem(location, ..., "").key, shown, f"no unit, taken for {unit if listed else f'{shown} {unit}'}"
+        )
+
+
+def _bare_number(value: Any) -> bool:
+    """Whether a value is a number without a unit, other than 0, also one that is written as text."""
+    try:
+        return not isinstance(value, bool) and float(value) != 0.0
+    except (TypeError, ValueError):
+        return False
+
+
+# What is odd ----------------------------------------------------------------------------------------------------------
+
+
+def _effort(case: Case, expected: Estimate) -> Iterator[Problem]:
+    end, where = case.run.end_time, ("run", "end_time")
+    if expected.dt is not None and end < expected.dt:
+        yield problem(where, f"{end:g} s", f"is shorter than the first time step, {expected.dt:.3g} s")
+    elif expected.dt is not None and end < FEW_STEPS * expected.dt:
+        few = f"is {end / expected.dt:.2g} time steps of {expected.dt:.3g} s: no wave crosses more than a few tets"
+        yield problem(where, f"{end:g} s", few)
+    if expected.steps is None or expected.core_seconds is None:
+        return
+    if expected.steps >= case.run.max_steps:
+        yield problem(("run", "max_steps"), case.run.max_steps, f"will be used up before run.end_time, {end:g} s")
+    if expected.core_seconds > DAY:
+        hours = expected.core_seconds / 3600.0
+        yield problem(where, f"{end:g} s", f"takes about {expected.steps:.2g} steps and {hours:.3g} hours of core time")
+
+
+def _materials(case: Case) -> Iterator[Problem]:
+    for name, made in case.materials.items():
+        for key, what, value in _constants(made):
+            yield from _unlikely(("materials", name, *key), what, value)
+        if made.spall is not None and made.brittle is not None and made.spall < made.brittle.strength:
+            strength = f"brittle.strength, {made.brittle.strength:.3g} Pa: under tension from all sides no facet breaks"
+            yield problem(("materials", name, "spall"), f"{made.spall:.3g} Pa", f"pores open below {strength}")
+
+
+def _constants(made: Material) -> Iterator[tuple[Location, str, float]]:
+    yield ("density",), "density", made.density
+    yield ("elastic", "young"), "wave speed", wave_speed(made)
+    if made.strength is not None:
+        for key, what, value in made.strength.likely(made.elastic.young):
+            yield ("strength", key), what, value
+    if made.brittle is not None:
+        yield (
+            ("brittle", "strength"),
+            "tensile strength over Young's modulus",
+            made.brittle.strength / made.elastic.young,
+        )
+        yield ("brittle", "energy"), "fracture energy", made.brittle.energy
+    if made.eos is not None:
+        yield ("eos", "c0"), "bulk modulus, density c0^2, over that of elastic,", made.bulk / made.elastic.bulk
+
+
+def _unlikely(location: Location, what: str, value: float) -> Iterator[Problem]:
+    low, high, known = LIKELY[what]
+    if not low <= value <= high:
+        end = f"below {low:g}" if value < low else f"above {high:g}"
+        yield problem(location, ..., f"a {what} of {value:.3g} is {end} ({known})".replace("a extent", "an extent"))
+
+
+def _bodies(case: Case, expected: Estimate) -> Iterator[Problem]:
+    sizes: dict[int, float] = {}
+    for i, (part, size) in enumerate(zip(case.parts, expected.parts, strict=True)):
+        yield from _unlikely(("parts", i, "temperature"), "temperature", part.temperature)
+        if size.bulk is None:
+            continue
+        sizes[i] = max(size.bulk.extent)
+        yield from _unlikely(("parts", i, "mesh"), "extent", sizes[i])
+        wave = wave_speed(material(case, part.material))
+        if size.bulk.speed > wave:
+            than = f"faster than waves in {part.material}, {wave:.3g} m/s"
+            message = f"{part.name!r} moves at {size.bulk.speed:.3g} m/s, {than}"
+            yield problem(("parts", i, "velocity"), ..., message)
+    if sizes and max(sizes.values()) > _UNLIKE * min(sizes.values()):
+        large, small = (pick(sizes, key=lambda i: sizes[i]) for pick in (max, min))
+        names = f"{case.parts[large].name!r} is {sizes[large] / sizes[small]:.0f} times as large as"
+        yield problem(
+            ("parts", small, "mesh"), ..., f"{names} {case.parts[small].name!r}, which has {sizes[small]:.3g} m"
+        )
+
+
+def _shocks(case: Case) -> Iterator[Problem]:
+    """A warning for each material that is met too fast for its linear pressure, at the part that is met fastest."""
+    met: dict[str, tuple[float, int]] = {}
+    for i, (part, speed) in enumerate(zip(case.parts, impact_speeds(case), strict=True)):
+        fastest, _ = met.get(part.material, (0.0, i))
+        if speed > fastest:
+            met[part.material] = speed, i
+    for name, (speed, i) in met.items():
+        made = material(case, name)
+        own = made.eos is not None or (made.strength is not None and made.strength.own_pressure)
+        share = speed / wave_speed(made)
+        if share > SHOCKING and not own:
+            low = 100.0 * linear_error(math.sqrt(made.bulk / made.density), 0.5 * speed)
+            shock = f"{low:.0f} % below that of a shock, density (c0 + s u) u, s = {STIFFENING:g}, u half that speed"
+            fast = f"may be met at {speed:.3g} m/s, {share:.2g} of its wave speed"
+            message = f"{fast}, without eos: linear pressure is some {shock}"
+            yield problem(("parts", i, "material"), name, message)
+
+
+def linear_error(c0: float, u: float) -> float:
+    """By what share the linear pressure is below that of a shock with the speed ``u``, m/s, of the matter behind it;
+    ``c0`` is the bulk speed of sound, m/s.
+    """
+    return (STIFFENING - LINEAR_STIFFENING) * u / (c0 + STIFFENING * u)

@@ -1,0 +1,51 @@
+"""What a plane of symmetry or the box of a probe reaches of a body, where that is valid and hardly meant."""
+
+import math
+from collections.abc import Iterator
+
+from ..estimates.estimate import Estimate
+from ..model.bodies import Loose
+from ..model.schema import Case, Symmetry
+from ..model.solids import Measured
+from ..reading.problems import Problem, problem
+from ..shapes.geometry import index, volume
+from ..shapes.placed import Placed
+
+_TOUCH = 1e-9
+"""Of the size of a body: a plane that is no deeper in it lies on its surface. Far above rounding, far below any tet."""
+_FEWEST = 1.0
+"""Tets that the box of a probe should hold, by its volume. Chosen: below it a mesh may have none there."""
+
+
+def cut_bodies(case: Case) -> Iterator[Problem]:
+    """A warning for each plane of symmetry that goes through a body, of which both sides are there; none for bodies
+    that are turned, of which only a box round them is known.
+    """
+    for number, plane in case.boundaries_of(Symmetry):
+        d = index(plane.axis)
+        for part in case.parts:
+            if isinstance(part.mesh, Measured | Loose) or part.turn is not None:
+                continue
+            if plane.parts and part.name not in plane.parts:
+                continue
+            low, high = (corner[d] for corner in Placed(part.mesh).bounds())
+            if min(plane.at - low, high - plane.at) > _TOUCH * (high - low):
+                message = f"goes through part {part.name!r}, which lies between {low:g} and {high:g} m"
+                message = f"{message}: each side meets its own mirror image; model one of them"
+                yield problem(("boundaries", number, "at"), f"{plane.at:g} m", message)
+                break
+
+
+def scant_probes(case: Case, expected: Estimate) -> Iterator[Problem]:
+    """A warning for each probe whose box is smaller than a tet; none for mesh files and where sizes differ."""
+    sizes = {part.name: (part, size) for part, size in zip(case.parts, expected.parts, strict=True)}
+    for i, probe in enumerate(case.probes):
+        part, size = sizes[probe.part]
+        if probe.low is None or probe.high is None or isinstance(part.mesh, Measured) or part.mesh.grading is not None:
+            continue
+        box = zip(probe.low, probe.high, *Placed(part.mesh, part.turn).bounds(), strict=True)
+        inside = math.prod(max(0.0, min(b, high) - max(a, low)) for a, b, low, high in box)
+        holds = (size.elements or 0) * inside / volume(part.mesh)
+        if holds < _FEWEST:
+            message = f"the box has room for {holds:.2g} tets of part {part.name!r}; where it holds no centre of one"
+            yield problem(("probes", i), ..., f"{message} the run does not start")

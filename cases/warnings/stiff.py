@@ -1,0 +1,42 @@
+"""Which parts could be rigid: what strains them is a small share of the energy beside all that they meet."""
+
+import math
+from collections.abc import Iterator
+
+from ..estimates.estimate import Estimate
+from ..estimates.impact import wave_speed
+from ..model.schema import Case
+from ..reading.library import material
+from ..reading.problems import Problem, problem
+from .compression import impact_stresses
+
+STIFF = 20.0
+"""Times the impedance of all others. Chosen: of the energy that an impact sends into two bodies the stiffer one has the
+share of the softer one's impedance in the sum of both, 5 % then."""
+
+
+def stiff(case: Case, expected: Estimate) -> Iterator[Problem]:
+    """A warning for each part that could be rigid, with what that would save; none that yields, breaks or erodes."""
+    if case.contact is None or len(case.parts) < 2:
+        return
+    made = [material(case, part.material) for part in case.parts]
+    impedances = [each.density * wave_speed(each) for each in made]
+    for i, (part, stress) in enumerate(zip(case.parts, impact_stresses(case), strict=True)):
+        others = max(z for j, z in enumerate(impedances) if j != i)
+        law = made[i].strength
+        yields = law is not None and stress > 0.5 * law.flow_stress()
+        whole = part.rigid is None and part.fracture is None and part.erosion is None and part.stretch is None
+        if whole and not yields and impedances[i] > STIFF * others:
+            message = f"is {impedances[i] / others:.0f} times as stiff against waves as all that {part.name!r} meets"
+            yield problem(("parts", i, "rigid"), ..., f"{message}; rigid = true {_saves(i, expected)}")
+
+
+def _saves(i: int, expected: Estimate) -> str:
+    """What a rigid part would save."""
+    mine, others = expected.parts[i], [part.dt for j, part in enumerate(expected.parts) if j != i]
+    tets = f"{100.0 * mine.elements / expected.elements:.0f} %" if mine.elements and expected.elements else "a share"
+    told = f"would save {tets} of the tets"
+    if mine.dt is not None and None not in others:
+        longer = min((dt for dt in others if dt is not None), default=math.inf) / mine.dt
+        told += f" and make steps {longer:.2g} times as long" if 1.05 < longer < math.inf else ""
+    return told

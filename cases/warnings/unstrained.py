@@ -1,0 +1,51 @@
+"""Which parts of a run that has ended could have been rigid: they stayed elastic, with little strain and energy."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from ..checks.checks import check
+from ..model.rigid import Rigid
+from ..model.schema import Case
+
+STRAIN = 1e-3
+"""Of a part, at most. Chosen: half of the yield strain of a hard steel; what it strains moves its surface by so much of
+its size."""
+SHARE = 0.05
+"""Of the largest energies in the tets of all parts. Chosen: what stiff.STIFF leaves to the stiffer of two bodies."""
+
+
+@dataclass(frozen=True)
+class Strained:
+    """What a part has gone through."""
+
+    elements: int
+    strain: float
+    """sqrt(2 U / (E V)) of the largest energy U in its tets: the root of the mean square of the strain, at most."""
+    share: float
+    """Of that energy in the sum of those of all parts."""
+    plastic: bool
+    """Whether one of its tets has yielded or left."""
+
+
+def could_be_rigid(case: Case, found: Sequence[Strained], limiter: str) -> Iterator[str]:
+    """A line for each part that could be rigid, with what that would save; ``limiter``: what holds the step down."""
+    if case.contact is None or len(case.parts) < 2:
+        return
+    every = sum(part.elements for part in found)
+    for i, (part, each) in enumerate(zip(case.parts, found, strict=True)):
+        little = not each.plastic and each.strain < STRAIN and each.share < SHARE
+        if part.rigid is None and each.elements and little and _allowed(case, i):
+            way = "rigid = true" if part.erosion is None else "rigid = true in place of erosion"
+            held = limiter.endswith(f" of {part.name}")
+            yield (
+                f"parts[{i}].rigid: {part.name!r} stayed elastic, with strains of {each.strain:.1g} or less (root of "
+                f"the mean square) and {100.0 * each.share:.1g} % of the energy of deformation; {way} would save "
+                f"{100.0 * each.elements / every:.0f} % of the tets{', which hold the time step down' if held else ''}"
+            )
+
+
+def _allowed(case: Case, i: int) -> bool:
+    """Whether the case would be valid with part ``i`` rigid."""
+    stiff = case.parts[i].model_copy(update={"rigid": Rigid(), "erosion": None})
+    parts = (*case.parts[:i], stiff, *case.parts[i + 1 :])
+    return not check(case.model_copy(update={"parts": parts}))
