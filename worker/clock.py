@@ -1,34 +1,34 @@
-"""Time: the stable step, its growth, and steps that land on output times."""
+"""Simulated time and the choice of the time step: stability limit, growth limit, landing on output times."""
 
 import math
 
 COLLAPSE = 1e-6
-"""A stable step below this share of the first one means that a tet is being crushed, not that it needs patience.
-Chosen: a run of a million times the steps never ends."""
+"""Share of the first stable step below which the run ends with an error: a tet is crushed. Chosen: a run with a
+million times as many steps would never end."""
 
 STARVED = 1e-3
-"""A stable step below this share of the first one is worth a warning: what is left takes a thousand times the steps.
-Chosen: dust and penetration take it down to a hundredth."""
+"""Share of the first stable step below which a warning is given: the rest of the run takes a thousand times as many
+steps. Chosen: dust and penetration reduce it to a hundredth."""
 
 SLOWED = 0.1
-"""A stable step below this share of the first one is named where a run has used up its time or its steps: it is why.
-Chosen: flow and dust take it down to a third without anybody's fault."""
+"""Share of the first stable step below which a message that the limit of time or of steps was reached also names the
+stable step as the reason. Chosen: plastic flow and dust reduce it to a third in any run."""
 
 
 class Clock:
-    """Simulated time, compensated (Kahan), and the step that leads on."""
+    """Simulated time, by compensated summation (Kahan), and the time step."""
 
     def __init__(self, end: float, safety: float, growth: float, frames: int) -> None:
         self.t = 0.0
         self.step = 0
         self.dt = 0.0
-        """The step ahead, s."""
+        """Time step from n to n+1, s."""
         self.last_dt = 0.0
-        """The step behind, s."""
+        """Time step from n-1 to n, s."""
         self.mean_dt = 0.0
-        """Mean of the two: it carries v(n-1/2) to v(n+1/2)."""
+        """Mean of the two, s: the kick from v(n-1/2) to v(n+1/2) takes this time."""
         self.shorter = 0.0
-        """A quarter of what the step ahead is shorter than the one behind, s."""
+        """A quarter of ``last_dt - dt``, s."""
         self._first = 0.0
         self._lost = 0.0
         self._stable = math.inf
@@ -37,18 +37,18 @@ class Clock:
         self._growth = growth
         self._frames = frames
         self.frame = 0
-        """Index of the next frame time to land on."""
+        """Index of the next frame on whose time a step ends."""
         self._of = -1
-        """Of which frame the two times are."""
+        """Index of the frame whose times ``_landing`` and ``_after`` are."""
         self._landing = self._after = 0.0
         """Times of the next frame and of the one after it, s."""
 
     def keep(self) -> dict[str, float]:
-        """Its whole state."""
+        """Returns the whole state, for a checkpoint."""
         return dict(vars(self))
 
     def resume(self, known: dict[str, float]) -> None:
-        """Takes it back."""
+        """Restores the state that ``keep`` returned."""
         vars(self).update(known)
 
     @property
@@ -57,24 +57,24 @@ class Clock:
         return self.t >= self._end
 
     def frame_time(self, index: int) -> float:
-        """Time of frame ``index``, s; the last is the end of the run."""
+        """Returns the time of frame ``index``, s; that of the last one is the end of the run."""
         return self._end * (index / self._frames) if self._frames and index < self._frames else self._end
 
     @property
     def frame_due(self) -> bool:
-        """Whether a frame belongs to the present time."""
+        """Whether a frame is to be written at the present time."""
         if self._of != self.frame:
             self._of, self._landing, self._after = self.frame, *map(self.frame_time, (self.frame, self.frame + 1))
         return self.t >= self._landing and self._frames > 0 and self.frame <= self._frames
 
     def choose(self, limit: float) -> float:
-        """The next step, s: ``limit`` is the largest one-over-stable-step of all tets, 1/s, zero when none is left.
+        """Chooses the next time step ``dt`` and returns ``mean_dt``, s. ``limit``: the largest one-over-stable-step of
+        all tets, 1/s; zero when no tet is left.
 
-        Returns the mean step.
-
-        The way to the next frame is divided into equal steps, as few as are stable: steps that change little cost
-        little energy, and none is a sliver. ``growth`` bounds the stable step. At the end of the run it is the step
-        that would follow, as long as the last one where that is stable.
+        The interval to the next frame is divided into as few equal steps as are stable: a step that changes little
+        costs little energy, and no step is much shorter than the others. ``growth`` bounds the ratio of two
+        successive stable steps. At the end time, ``dt`` is the step that would follow: the last one, if that is
+        stable.
         """
         self.last_dt = self.dt
         self._stable = min(self._safety / limit if limit > 0.0 else math.inf, self._growth * self._stable)
@@ -87,41 +87,41 @@ class Clock:
 
     @property
     def longest(self) -> float:
-        """The longest step that may follow the one ahead, s."""
+        """The largest time step that may follow ``dt``, s."""
         return self._growth * self.dt
 
     def choose_again(self, limit: float) -> float:
-        """The step anew, for another ``limit``, before it is used; see ``choose``."""
+        """Chooses the time step again, for another ``limit``, before it is used; see ``choose``."""
         self.dt = self.last_dt
         return self.choose(limit)
 
     @property
     def collapsed(self) -> bool:
-        """Whether the stable step has fallen so far below the first that the run would not end."""
+        """Whether the stable step is so far below the first one that the run would not end."""
         return self._stable < COLLAPSE * self._first
 
     @property
     def starved(self) -> bool:
-        """Whether the stable step has fallen so far that people should know."""
+        """Whether the stable step is so far below the first one that the user is warned."""
         return self._stable < STARVED * self._first
 
     @property
     def share(self) -> float:
-        """Of the first stable step, what is left of it."""
+        """The stable step over the first one."""
         return self._stable / self._first
 
     @property
     def steps_left(self) -> float:
-        """To the end of the run, at the stable step as it is."""
+        """Number of steps to the end of the run, at the present stable step."""
         return (self._end - self.t) / self._stable
 
     @property
     def stable(self) -> float:
-        """The step that stability and growth allow, s, before landing on an output time."""
+        """The time step that stability and growth allow, s, before it is shortened to land on an output time."""
         return self._stable
 
     def advance(self) -> None:
-        """Moves on by the chosen step; lands on a frame time exactly."""
+        """Adds the chosen step to the time; a frame time is set exactly."""
         increment = self.dt - self._lost
         new = self.t + increment
         self._lost = (new - self.t) - increment

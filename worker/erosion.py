@@ -1,10 +1,11 @@
-"""Erosion: worn-out tets leave the body, what they covered is laid bare, and what left is booked.
+"""Erosion: worn tets are removed, the faces behind them become surface, and the energy and momentum removed are booked.
 
-A tet is marked in the pass over the elements (elements/wear.py), with its force at n+1 already in the nodal sums. It
-leaves before the contact of the next step, so that what it covered meets other bodies in that very step. Its last force
-acts through one more kick: the second half of that work is booked a step later, as for a boundary. Tets that have only
-strained enough are gathered for a few steps, because every removal calls for new mean normals. So are nodes without
-tets that contact has pushed, where their part wants them to leave then.
+A tet is marked in the pass over the elements (elements/wear.py), when its force of n+1 is already in the nodal sums.
+It is removed before the contact of the next step, so that the faces behind it are in contact in that step. Its last
+force acts in one more kick: the second half of the work of that force is booked one step later, as for a boundary.
+Tets that exceed only a strain or damage limit are collected for some steps, because each removal requires new mean
+normals. So are nodes without tets that contact has pushed, if their part removes them then (``erosion.nodes =
+"strike"``).
 """
 
 import numpy as np
@@ -50,10 +51,11 @@ from .parallel.ownership import Neighbour, complete
 from .parallel.tags import Tag
 
 GATHERED = 10
-"""Steps in which worn tets are gathered. Chosen: every removal calls for mean normals and tests of all pairs."""
+"""Number of steps in which worn tets are collected. Chosen: each removal requires new mean normals and tests of all
+candidate pairs."""
 UNDECIDED = 0.25
-"""Share of ``erosion.damage`` from which on a warning says that nothing has left. Chosen: a punch of
-docs/theory/erosion.md, Erosion, leaves damage of 0.42 in a plate, and plugs it where the tets are smaller."""
+"""Share of ``erosion.damage`` from which a warning says that no tet was removed. Chosen: a punch
+(docs/theory/erosion.md, Erosion) leaves damage of 0.42 in a plate, and with smaller tets cuts a plug out of it."""
 
 
 class Erosion:
@@ -73,24 +75,25 @@ class Erosion:
             for kind in ("remove", "strike")
         )
         self.removed = np.zeros(model.nodes.n, bool)
-        """(nodes,) which have left; they stand still where they were."""
+        """(nodes,) which are removed; they stand still where they were."""
         self._tets_at = self._completed([block.tets.astype(np.int64) for block in model.blocks])
         self._last: list[tuple[Ints, Floats]] = []
         self._leaving, self._before = np.zeros(0, np.int64), np.zeros((0, 3))
-        """Nodes that leave in this step, and their v(n-1/2), m/s."""
+        """Nodes that are removed in this step, and their v(n-1/2), m/s."""
         mass, speed, arm = extremes
         energy, momentum, spin = mass * speed * speed, mass * speed, mass * speed * arm
         self.work = Tally(np.full(len(WORKS) + 1, energy))
-        """WORKS of the tets that have left, J, and of those whose pressure sees heat the heat."""
+        """Sums of WORKS over the removed tets, J, and the heat of those whose equation of state depends on it."""
         self.nodal = Tally(np.array([energy, mass, *[momentum] * 3, *[spin] * 3]))
-        """Energy, J, mass, kg, momentum, kg m/s, and angular momentum, kg m^2/s, of the nodes that have left."""
+        """Energy, J, mass, kg, momentum, kg m/s, and angular momentum, kg m^2/s, of the removed nodes."""
         self._half = self.nodal.quanta(np.zeros((0, len(self.nodal.scale))))
         self._limit = 0.0
         self.due = False
-        """Whether the next step begins with a removal."""
+        """Whether the next step starts with a removal."""
 
     def begin(self, limit: float) -> None:
-        """Takes the largest one-over-stable-step at the start, 1/s, as the measure of later ones."""
+        """Sets the limits of the stable step, as shares of the first one; ``limit``: the largest
+        one-over-stable-step at the start, 1/s."""
         self._limit = limit
         for block in self._model.blocks:
             spec = self._specs[block.part]
@@ -98,10 +101,10 @@ class Erosion:
                 block.life[FREQUENCY] = limit / spec.time_step
 
     def grow(self, split: Split, ids: Ints) -> None:
-        """Takes up the copies of nodes.
+        """Extends the arrays by the copies of separated nodes.
 
-        A part that fractures does not erode (cases/checks/checks.py): the tets of its nodes stay, and one is as good a
-        count as any that is not zero.
+        Parts that fracture do not erode (cases/checks/checks.py): no tet of these nodes is removed, so that any count
+        of tets but zero will do for a copy.
         """
         parents = split.copies.parents
         self.removed = extended(self.removed, self.removed[parents])
@@ -110,7 +113,7 @@ class Erosion:
         self._tets_at = extended(self._tets_at, np.ones(len(parents), np.int64))
 
     def keep(self, parcel: Parcel) -> None:
-        """Adds what it must remember to a parcel."""
+        """Adds the state to a parcel."""
         nodes, ids = self._model.nodes, parcel.nodes["id"]
         parcel.known["erosion"] = self._limit, self.due, self.work.scale, self.nodal.scale
         for key, words in (("work", self.work.words), ("nodal", self.nodal.words), ("half", self._half)):
@@ -124,7 +127,7 @@ class Erosion:
         parcel.rows["erosion.last"] = {"at": nodes.x[tets].mean(axis=1), "with": ids[tets], "force": forces}
 
     def resume(self, parcel: Parcel) -> None:
-        """Takes it back."""
+        """Restores the state from a parcel."""
         limit, self.due, self.work.scale, self.nodal.scale = parcel.known["erosion"]
         self.begin(limit)
         self.work.words, self.nodal.words, self._half = (
@@ -137,8 +140,9 @@ class Erosion:
         self._release()
 
     def strikes(self) -> int:
-        """After contact: nodes without tets that it has pushed in this step will leave, where their part wants that.
-        TIRED (elements/wear.py) if this rank has nodes that will leave, else SOUND.
+        """After contact: marks the nodes without tets that contact pushed in this step, in parts with
+        ``erosion.nodes = "strike"``. Returns TIRED (elements/wear.py) if nodes of this rank are to be removed, else
+        SOUND.
         """
         if self._contact is not None:
             flying = np.flatnonzero(self._strikes & self._loose)
@@ -146,11 +150,12 @@ class Erosion:
         return TIRED if (self._leaves & self._loose).any() else SOUND
 
     def decide(self, found: int) -> None:
-        """``found`` of all ranks (elements/wear.py): whether there is something to remove now."""
+        """Decides whether the next step removes tets or nodes; ``found``: the maximum over all ranks of what was
+        found (elements/wear.py)."""
         self.due = found == BROKEN or (found > SOUND and self._clock.step % GATHERED == 0)
 
     def warnings(self, eroded: int) -> list[str]:
-        """What the user should know at the end, when so many tets of all ranks have left; all ranks take part."""
+        """Returns warnings for the end of the run; ``eroded``: number of removed tets of all ranks. Collective."""
         parts = self._model.parts
         left, damage = np.zeros(len(parts), np.int64), np.zeros(len(parts))
         for block in self._model.blocks:
@@ -158,38 +163,39 @@ class Erosion:
             if block.has(DAMAGE) and block.n:
                 damage[block.part] = max(damage[block.part], block.at(DAMAGE, np.arange(block.n)).max())
         left, damage = self._comm.sum(left), self._comm.maximum(damage)
-        told = [f"part {parts[k]!r} has no tet left: erosion has taken them all" for k in np.flatnonzero(left == 0)]
+        found = [f"part {parts[k]!r} has no tet left: erosion removed all of them" for k in np.flatnonzero(left == 0)]
         limits = [float(life(spec)[DAMAGED]) for spec in self._specs]
         undecided = [k for k, limit in enumerate(limits) if not eroded and UNDECIDED * limit < damage[k] < limit]
-        return told + [
-            f"part {parts[k]!r} is damaged to {damage[k]:.2g} of erosion.damage {limits[k]:g} and no tet has left: "
-            "shear bands are no narrower than tets, and smaller ones reach it sooner (conoid converge says whether it "
-            "matters)"
+        return found + [
+            f"part {parts[k]!r} is damaged to {damage[k]:.2g} of erosion.damage {limits[k]:g} and no tet was removed: "
+            "shear bands are at least as wide as a tet, and smaller tets reach the limit sooner (conoid converge shows "
+            "whether this matters)"
             for k in undecided
         ]
 
     @property
     def particles(self) -> int:
-        """Nodes without tets that fly on; all ranks take part."""
+        """Number of free nodes without tets (particles). Collective."""
         nodes = self._model.nodes
         return int(self._comm.sum(np.array([(nodes.owned & self._loose).sum()]))[0])
 
     def note(self, state: Nodes) -> None:
-        """Before the kick: books the second half of what the last removal has begun."""
+        """Before the kick: books the second half of the work of the last removal."""
         self._book_last_work(state)
         self.nodal.words += self._half
         self.nodal.carry()
         self._half[:] = 0
 
     def remove(self, state: Nodes) -> None:
-        """Takes the marked tets out, when that is due; all ranks take part."""
+        """Removes the marked tets, if a removal is scheduled. Collective."""
         self._leaving = np.zeros(0, np.int64)
         if self.due:
             self._remove(state)
             self.due = False
 
     def stop_removed(self, state: Nodes) -> None:
-        """After the kick: books the nodes that leave in this step; all that have left stand still."""
+        """After the kick: books the nodes that are removed in this step; sets the velocities of all removed nodes to
+        zero."""
         leaving = self._leaving
         if len(leaving):
             owned = leaving[state.owned[leaving]]
@@ -205,7 +211,7 @@ class Erosion:
         state.v[self.removed] = 0.0
 
     def _remove(self, state: Nodes) -> None:
-        """Takes the marked tets out; all ranks take part."""
+        """Removes the marked tets and the nodes that leave with them. Collective."""
         gone, left, ids = [np.zeros((0, bare.WORDS), np.int64)], [], [np.zeros(0, np.int64)]
         for block in self._model.blocks:
             worn = np.flatnonzero(block.worn)
@@ -230,17 +236,17 @@ class Erosion:
 
     @property
     def _loose(self) -> Flags:
-        """(nodes,) those without tets that fly on."""
+        """(nodes,) nodes without tets that are not removed: particles."""
         return np.asarray((self._tets_at == 0) & ~self.removed)
 
     def _release(self) -> None:
-        """Boundaries take nodes without tets for particles."""
+        """Declares nodes without tets particles, in all boundaries."""
         for bound in self._bounds:
             bound.release(self._loose, self._bounds)
 
     def _unload(self, gone: Ints) -> None:
-        """Tets ``gone`` from this rank, global ids, carry no boundary any more, which acts on every rank that holds a
-        node of theirs; all ranks take part.
+        """Removes the boundary loads of the removed tets ``gone`` (global ids, of this rank), on every rank that has
+        a node of them. Collective.
         """
         if any(bound.on_faces for bound in self._bounds):
             gone = self._comm.join(gone)
@@ -248,14 +254,14 @@ class Erosion:
                 bound.drop(gone)
 
     def _completed(self, tets: list[Ints]) -> Ints:
-        """(nodes,) how many of these tets of all ranks have each node; all ranks take part."""
+        """(nodes,) number of tets at each node, counted over these ``tets`` of all ranks. Collective."""
         corners = np.concatenate([np.zeros(0, np.int64), *(rows.reshape(-1) for rows in tets)])
         counts = np.bincount(corners, minlength=self._model.nodes.n)[:, None].astype(np.int64)
         complete(self._comm, self._neighbours, counts, Tag.TETS_AT_NODE)
         return counts[:, 0]
 
     def _book_last_work(self, state: Nodes) -> None:
-        """The second half of what the last forces of removed tets have done, with the velocities after the kick."""
+        """Books the second half of the work of the last forces of removed tets, with the velocities after the kick."""
         for tets, forces in self._last:
             work = np.zeros(len(tets))
             for corner in range(4):
@@ -266,12 +272,12 @@ class Erosion:
 
 
 def _rows(block: Block, chosen: Ints, rows: "np.ndarray") -> Floats:
-    """(len(chosen), len(rows)) of the block's state."""
+    """(len(chosen), len(rows)) values of some state rows of some tets."""
     return np.asarray(block.state[(chosen // CHUNK)[:, None], rows, (chosen % CHUNK)[:, None]])
 
 
 def _energies(block: Block, chosen: Ints) -> Floats:
-    """(k, 5) WORKS of some tets, and the heat that their pressure has seen, J."""
+    """(k, 5) WORKS of some tets, J, and the heat in their equation of state, J."""
     none = np.zeros(len(chosen))
     found = {row: block.at(row, chosen) if block.has(row) else none for row in WORKS}
     heat = found[WORK_VISCOUS] + found[WORK_PLASTIC] if EQUATIONS[block.eos] is GRUNEISEN else none
@@ -279,7 +285,7 @@ def _energies(block: Block, chosen: Ints) -> Floats:
 
 
 def _forces(block: Block, chosen: Ints, x: Floats) -> Floats:
-    """(k, 4, 3) -V stress grad N of some tets, N."""
+    """(k, 4, 3) nodal forces -V stress grad N of some tets, N."""
     values = _rows(block, chosen, np.arange(VISCOUS + 1))
     stress = np.empty((len(chosen), 3, 3))
     pressure = values[:, PRESSURE] + values[:, VISCOUS]

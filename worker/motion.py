@@ -1,4 +1,4 @@
-"""Nodes: forces to velocities, velocities to positions. Increments are added, positions never recomputed."""
+"""Kick and move of the nodes. Velocities and positions are incremented in place, never computed anew."""
 
 from .kernels.jit import njit, types
 from .model.state import Nodes
@@ -38,19 +38,20 @@ def _move(table, begin, end, thread):  # type: ignore[no-untyped-def]
 
 
 class Leapfrog:
-    """Moves the nodes of a rank, by the threads of its ``team``."""
+    """Kick and move of the nodes of a rank, on the threads of its ``team``."""
 
     def __init__(self, team: Team) -> None:
         self._kick, self._move = Pass(team, _kick, *_KICK), Pass(team, _move, *_MOVE)
 
     def kick(self, nodes: Nodes, impulse_quantum: float, shorter: float) -> None:
-        """v(n-1/2) to v*(n+1/2); ``impulse_quantum`` is the mean step over the force scale, N s; ``shorter``: a quarter
-        of what the step ahead is shorter than the one behind, over the force scale, for the account ``stepping``, J.
+        """Computes v*(n+1/2) from v(n-1/2) and f(n). ``impulse_quantum``: mean of the two time steps over the force
+        scale, N s. ``shorter``: (dt(n-1/2) - dt(n+1/2)) / 4 over the force scale; the account ``stepping``, J, takes
+        the work of f(n) by unequal steps, here its first part.
         """
         self._kick.run(nodes.n, nodes.v, nodes.force, nodes.mass, nodes.stepping, impulse_quantum, shorter)
 
     def move(self, nodes: Nodes, dt: float, shorter: float) -> None:
-        """x(n) to x(n+1), in a step ``dt``, s; ends the account that ``kick`` has begun, with the same f(n), and leaves
-        no force.
+        """Computes x(n+1) from x(n) with the time step ``dt``, s; adds the second part to ``stepping``, with the
+        same f(n), then sets the forces to zero.
         """
         self._move.run(nodes.n, nodes.x, nodes.v, nodes.force, nodes.stepping, dt, shorter)

@@ -1,9 +1,9 @@
-"""The reduction of the step: what all ranks agree on, by which they decide alike what the next step does.
+"""The reduction of the step (Allreduce): after it all ranks have the same limits and flags, and decide alike.
 
-A maximum of int64 words over all ranks, one word a field: an integer, a flag (0 or 1), or the bits of a float64 that is
-not negative. Such bits have the order of the floats, and a NaN is larger than any number, so that the maximum of words
-is right for every field. Where parts fracture a word for every rank follows. Where there is contact a sum of six words
-is added up at the same time. One rank sends nothing and encodes nothing.
+A maximum of int64 words over all ranks, one word a field: an integer, a flag (0 or 1), or the bits of a float64 that
+is not negative. Such bits have the order of the floats, and a NaN is larger than any number, so that the maximum of
+words is right for every field. If parts fracture, one word for each rank follows. If there is contact, a sum of six
+words is reduced at the same time. A single rank sends and encodes nothing.
 """
 
 import struct
@@ -16,107 +16,108 @@ from .model.state import Ints
 from .parallel.comm import Comm, Pending
 
 _COSTS, _UNSETTLED = 4, 2
-"""Words of the sum: what contact has taken, and what its sweeps leave undone."""
+"""Words of the sum: energies that contact took (4), and residuals of its sweeps (2)."""
 
 
 class Fields:
     """The fields of the reduction."""
 
     def __init__(self) -> None:
-        """Nothing is asked for, nothing limits."""
+        """All fields at zero: no limit, no request."""
         self.limit = 0.0
         """Largest one-over-stable-step of all tets, 1/s; NaN when some tet is inverted or not a number."""
         self.force = 0.0
         """Largest contribution to a nodal force, N."""
         self.stop = 0
-        """Reason to stop, 0 for none (worker/run/loop.py): the largest wins."""
+        """Reason to stop, 0 for none (worker/run/loop.py): the largest of the ranks holds."""
         self.report = False
-        """Rank 0 wants the loads of all ranks."""
+        """Rank 0 requests the loads of all ranks."""
         self.groups = False
-        """Rank 0 wants the loads of groups besides."""
+        """Rank 0 requests the loads of groups as well."""
         self.approach = 0.0
-        """Largest one-over-step in which a node passes half of a tet that it meets, 1/s."""
+        """One over the time in which a node passes half of a tet that it hits, 1/s; the largest."""
         self.opening = False
-        """A crack has become so wide that its sides are surface from now on."""
+        """A crack has opened so wide that its two sides become surface."""
         self.stray = False
-        """In the next step a slot will have strayed so far that it is registered anew."""
+        """A slot of contact will have moved beyond its skin in the next step, and must be registered again."""
         self.search = False
-        """The surface of a rank has used up the last search for contact."""
+        """The surface of a rank has moved further than the last broad phase allows."""
         self.worn = 0
-        """What a rank has found of worn-out tets (elements/wear.py)."""
+        """State of the worn tets of a rank: SOUND, TIRED or BROKEN (elements/wear.py)."""
         self.breaking = 0
-        """What a rank has found of facets that break (fracture/stage.py)."""
+        """State of the facets of a rank: NOTHING, OVERSTRESSED or BREAKS (fracture/stage.py)."""
         self.grown = False
-        """A rank has more surface nodes than the balance allows it."""
+        """A rank has more surface nodes than the load balance allows."""
         self.checkpoint = False
-        """A checkpoint is asked for."""
+        """A checkpoint is requested."""
         self.snapshot = False
-        """A snapshot of the fragments is due."""
+        """A snapshot of the fragments is scheduled."""
         self.apart = False
-        """A tied node has come apart from the faces that it was tied to (bonds/stage.py)."""
+        """A bond of a tied node has failed (bonds/stage.py)."""
         self.nodes = 0
-        """All nodes; a rank knows of those that have separated elsewhere since the last reduction when this is done."""
+        """Number of nodes of all ranks. A rank without a node of what separated in the last step receives the new
+        number here."""
 
     def pack(self, words: Ints) -> None:
         """Encodes the fields in the first ``words``."""
         _LAYOUT.pack_into(words.data, 0, *_values(self))
 
     def unpack(self, words: Ints) -> None:
-        """Takes the fields that are encoded in the first ``words``."""
+        """Decodes the fields from the first ``words``."""
         vars(self).update(zip(NAMES, _LAYOUT.unpack_from(words.data), strict=True))
 
 
 NAMES = tuple(vars(Fields()))
-"""Of the fields, in the order of their words."""
+"""Names of the fields, in the order of their words."""
 _values = attrgetter(*NAMES)
 _LAYOUT = struct.Struct("=" + "".join("d" if isinstance(value, float) else "q" for value in vars(Fields()).values()))
 
 
 class Offer(Fields):
-    """What a rank gives to a reduction."""
+    """Contribution of a rank to a reduction."""
 
     def __init__(self, ranks: int) -> None:
-        """Of so many."""
+        """For this number of ``ranks``."""
         super().__init__()
         self.touched: Ints = np.zeros(ranks, np.int64)
-        """(ranks,) whom the facets that break concern (fracture/separation.py)."""
+        """(ranks,) non-zero for the ranks that have a node of the facets that break (fracture/separation.py)."""
         self.sums: Ints = np.zeros(_COSTS + _UNSETTLED, np.int64)
         self.costs: Ints = self.sums[:_COSTS]
-        """(4,) what contact has taken from the bodies on this rank (contact/account.py)."""
+        """(4,) energies that contact took from the bodies on this rank (contact/account.py)."""
         self.unsettled: Ints = self.sums[_COSTS:]
-        """(2,) what the sweeps of contact leave undone on this rank (contact/need.py)."""
+        """(2,) residuals of the contact sweeps on this rank (contact/need.py)."""
 
 
 class StepReduction(Fields):
-    """What all ranks have agreed on in the last reduction; ``own`` is what this rank gives to the next one."""
+    """Result of the last reduction, equal on all ranks; ``own``: the contribution of this rank to the next one."""
 
     def __init__(self, ranks: int = 1, *, fractures: bool = True, contact: bool = True) -> None:
-        """On so many ranks; whether parts of the case fracture, and whether there is contact."""
+        """For this number of ``ranks``; ``fractures``, ``contact``: whether the case has them."""
         super().__init__()
         self.own = Offer(ranks)
         self._alone, self._contact = ranks == 1, contact
         self._given, self._agreed = (np.zeros(len(NAMES) + ranks * fractures, np.int64) for _ in range(2))
         self.touched: Ints = self.own.touched if self._alone else self._agreed[len(NAMES) :]
-        """(ranks,) the maximum of what the ranks have given."""
+        """(ranks,) the maximum over the contributions."""
         self._sums: Ints = np.zeros(_COSTS + _UNSETTLED, np.int64)
         self.costs: Ints = self._sums[:_COSTS]
-        """(4,) of all ranks."""
+        """(4,) sum over all ranks."""
         self.unsettled: Ints = self._sums[_COSTS:]
-        """(2,) of all ranks."""
+        """(2,) sum over all ranks."""
         self._pending: list[Pending] = []
 
     def keep(self) -> Ints:
-        """(fields,) what a run that goes on must know, on any number of ranks."""
+        """Returns (fields,) words of the result, for a checkpoint; independent of the number of ranks."""
         words = np.zeros(len(NAMES), np.int64)
         self.pack(words)
         return words
 
     def resume(self, words: Ints) -> None:
-        """Takes it back."""
+        """Restores the result from the words of ``keep``."""
         self.unpack(words)
 
     def begin(self, comm: Comm) -> Self:
-        """Starts the reduction. All ranks take part."""
+        """Starts the reduction. Collective."""
         own = self.own
         if self._alone:
             vars(self).update(zip(NAMES, _values(own), strict=True))
@@ -130,7 +131,7 @@ class StepReduction(Fields):
         return self
 
     def finish(self) -> None:
-        """Returns when the fields are those of all ranks."""
+        """Waits until the fields are those of all ranks."""
         if self._alone:
             return
         for pending in self._pending:
@@ -138,8 +139,8 @@ class StepReduction(Fields):
         self.unpack(self._agreed)
 
     def begin_again(self) -> None:
-        """Clears what was asked for once: a run that goes on from a checkpoint does not stop or report again, and
-        begins with a search.
+        """Clears the requests that are executed once: a run that resumes from a checkpoint does not stop or report
+        again, and starts with a broad phase.
         """
         self.stop = 0
         self.report = self.groups = self.stray = self.grown = self.checkpoint = self.snapshot = self.apart = False

@@ -1,4 +1,5 @@
-"""What a case needs, built once: the model, its pressure form, its boundaries, its accounts. The step uses it."""
+"""The simulation of one rank: model, pressure form, boundaries, contact, fracture and accounts, built once; the time
+step (step.py) uses it."""
 
 import math
 from dataclasses import dataclass
@@ -53,12 +54,12 @@ from .scene import conditions, domain
 from .scene.assembly import Say, quiet
 
 _SMALLEST_STRAIN = 1e-12
-"""Forces of a smaller strain than this need no finer quantum. Chosen: its stress in steel is 0.2 Pa."""
+"""Strain whose forces the force quantum must still resolve. Chosen: its stress in steel is 0.2 Pa."""
 
 
 @dataclass
 class Simulation:
-    """Everything one rank needs to take steps."""
+    """Model and stages of one rank; a stage that the case does not need is None."""
 
     case: Case
     comm: Comm
@@ -66,10 +67,10 @@ class Simulation:
     elements: Elements
     leapfrog: Leapfrog
     boundaries: list[Boundary]
-    """In the order in which they act."""
+    """In the order in which they act in a step."""
     contact: Contact | None
     bonds: Bonds | None
-    """Of meshes that do not match."""
+    """Tied bonds between non-matching meshes."""
     erosion: Erosion | None
     fracture: Fracture | None
     rigid: Rigid | None
@@ -79,28 +80,28 @@ class Simulation:
     probes: Probes
     timers: Timers
     record: Record | None
-    """Of the fragments."""
+    """Record of the fragments."""
     crushing: Crushing | None
     neighbours: list[Neighbour]
     assembled: float
-    """CPU time that it took to make the stages on the slowest rank, s."""
+    """CPU time for building the stages on the slowest rank, s."""
     floor: float
-    """Forces below this, N, do not refine the force quantum."""
+    """Force, N, down to which the force quantum is refined; smaller forces do not refine it."""
     reduction: StepReduction
     warnings: tuple[str, ...] = ()
-    """What the user should know of the meshes, of a run that begins."""
+    """Warnings about the meshes, of a run that starts."""
     _acts: Acts | None = None
 
     @property
     def acts(self) -> Acts:
-        """What the boundaries do in a step."""
+        """The boundaries by their place in the step."""
         if self._acts is None or self._acts.boundaries != len(self.boundaries):
             self._acts = Acts.of(self.boundaries)
         return self._acts
 
     @property
     def scale(self) -> float:
-        """Quanta per newton of the nodal forces as they stand."""
+        """Quanta per newton of the present nodal forces."""
         return self.model.nodes.scale
 
     @scale.setter
@@ -114,16 +115,16 @@ class Simulation:
 
     @property
     def pushing(self) -> "list[Boundary | Contact | Rigid]":
-        """All that has a ``last_push``."""
+        """All objects that have a ``last_push``."""
         return [*self.boundaries, *(each for each in (self.contact, self.rigid) if each is not None)]
 
     def limiting_id(self) -> int:
-        """The tet that holds the time step down, the smallest id when several do; all ranks take part."""
+        """Returns the id of the tet that limits the time step; of several the smallest. Collective."""
         mine = self.elements.limit_bits == fixed_point.bits_of(self.reduction.limit)
         return -int(self.comm.maximum(np.array([-float(self.elements.limiting) if mine else -np.inf]))[0])
 
     def limiting_tet(self) -> str:
-        """The name of that tet, or of the rigid parts; all ranks take part."""
+        """Returns the name of that tet, or "a rigid part". Collective."""
         if self.rigid is not None and self.reduction.limit == self.rigid.limit:
             return "a rigid part"
         first = self.limiting_id()
@@ -131,7 +132,7 @@ class Simulation:
         return f"tet {first} of {self.model.parts[part]}"
 
     def limiter(self) -> str:
-        """Which tet holds the time step down, and why; all ranks take part."""
+        """Returns the reason for the present time step and the tet that limits it. Collective."""
         stable = self.clock.stable
         if self.limit > self.reduction.limit:
             return "contact: speed of approach"
@@ -143,19 +144,19 @@ class Simulation:
         return f"{why}: {self.limiting_tet()}"
 
     def shared_nodes(self) -> int:
-        """Nodes that several ranks hold; all ranks take part."""
+        """Returns the number of nodes that several ranks share. Collective."""
         shared = np.zeros(self.model.nodes.n, bool)
         for other in self.neighbours:
             shared[other.nodes] = True
         return int(self.comm.sum(np.array([(shared & self.model.nodes.owned).sum()]))[0])
 
     def count_nodes(self) -> None:
-        """Has all ranks know how many nodes there are, as the reduction of the next step would; all take part."""
+        """Makes ``nodes_global`` equal on all ranks, as the reduction of the next step would. Collective."""
         most = self.comm.maximum(np.array([float(self.model.nodes_global)]))
         self.model.nodes_global = int(most[0])
 
     def free(self) -> None:
-        """Gives all standing messages back to MPI."""
+        """Frees all persistent messages."""
         self.elements.free()
         if self.fracture is not None:
             self.fracture.free()
@@ -167,12 +168,13 @@ class Simulation:
             self.bonds.free()
 
     def next_scale(self) -> float:
-        """The scale for the next sum of forces."""
+        """Returns the quanta per newton for the next sum of forces."""
         return fixed_point.scale_for(max(self.reduction.force, self.floor))
 
 
 def build(case: Case, folder: Path, comm: Comm, say: Say = quiet) -> Simulation:
-    """Meshes, cuts and distributes the case; rank 0 calls ``say`` with what it is at.
+    """Meshes the case, partitions and distributes the mesh, and builds the stages; rank 0 calls ``say`` with its
+    progress.
 
     Raises InputError on every rank alike.
     """
@@ -180,11 +182,11 @@ def build(case: Case, folder: Path, comm: Comm, say: Say = quiet) -> Simulation:
     say("setting up the first step")
     walls = conditions.walls_of(case)
     scene = conditions.build(case, model, piece.loads, piece.neighbours, comm, walls)
-    told = conditions.start(case, model, scene, comm)
+    more = conditions.start(case, model, scene, comm)
     rigid = _rigid(case, model, walls, comm)
     timers = Timers(comm, team(case.run.threads))
     sim = _assemble(case, model, piece.neighbours, scene, (rigid, walls), piece.node_volume, comm, timers, piece.tied)
-    sim.warnings = *piece.warnings, *told
+    sim.warnings = *piece.warnings, *more
     sim.probes.require_tets(case)
     if sim.contact is not None:
         sim.contact.require_faces()
@@ -194,8 +196,8 @@ def build(case: Case, folder: Path, comm: Comm, say: Say = quiet) -> Simulation:
 def _rigid(
     case: Case, model: Model, walls: Walls, comm: Comm, known: dict[str, Any] | None = None
 ) -> Rigid | None:  # fmt: skip
-    """The rigid bodies of a case that has some: at the start, or as they are ``known``. All ranks take part. Raises
-    InputError, on every rank alike, where one starts behind a wall.
+    """Returns the rigid bodies of a case, or None: at the start, or with the state ``known`` of a parcel.
+    Collective. Raises InputError, on every rank alike, where a body starts behind a wall.
     """
     if not case.rigid:
         return None
@@ -218,8 +220,8 @@ def _assemble(
     undeformed: tuple[Rigid | None, Walls], node_volume: Floats, comm: Comm, timers: Timers,
     tied: Pieces,
 ) -> Simulation:  # fmt: skip
-    """The stages that the case needs, round a model and its boundaries; ``node_volume`` (nodes,): at the start, m^3;
-    ``tied``: of the bonds, of a run that begins.
+    """Builds the stages that the case needs, for a model and its boundaries. ``node_volume`` (nodes,): at the start,
+    m^3; ``tied``: pieces of the bonds, of a run that starts.
     """
     began, run, numerics, (rigid, moving) = worked(comm), case.run, case.numerics, undeformed
     threads = team(run.threads)
@@ -261,7 +263,7 @@ def _assemble(
 
 
 def keep(sim: Simulation) -> Parcel:
-    """All that this rank must remember between two steps; all ranks take part."""
+    """Returns the whole state of this rank between two steps. Collective."""
     sim.count_nodes()
     parcel = model_of.keep(sim.model, sim.case)
     pushes = sim.comm.maximum(np.array([each.last_push for each in sim.pushing]))
@@ -290,7 +292,7 @@ def keep(sim: Simulation) -> Parcel:
 
 
 def resume(case: Case, arrived: Arrived, comm: Comm, timers: Timers) -> Simulation:
-    """Goes on with what has arrived; all ranks take part."""
+    """Builds the simulation from the parcel that arrived from a checkpoint or from other ranks. Collective."""
     parcel, known = arrived.parcel, arrived.parcel.known
     model = model_of.resume(case, arrived, comm)
     walls = conditions.walls_of(case)
@@ -325,7 +327,8 @@ def resume(case: Case, arrived: Arrived, comm: Comm, timers: Timers) -> Simulati
 
 
 def _extremes(model: Model, comm: Comm) -> tuple[float, float, float]:
-    """The largest nodal mass, kg, the largest of wave speed and velocity, m/s, and distance from the origin, m."""
+    """Largest nodal mass, kg, largest of wave speed and velocity, m/s, and largest distance from the origin, m, of
+    all ranks."""
     speeds = [float(np.linalg.norm(model.nodes.v, axis=1).max(initial=0.0))]
     for block in model.blocks:
         p = block.params

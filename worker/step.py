@@ -1,34 +1,36 @@
 """The time step, in order. A new developer reads this file first.
 
-Leapfrog: positions, stresses and forces live at n, velocities at n-1/2. One pass over the elements makes stress(n+1)
-and at once f(n+1) from it, so a step begins with forces that are already at hand:
+Leapfrog: positions, stresses and forces are known at n, velocities at n-1/2. One pass over the elements computes
+stress(n+1) and from it f(n+1); so f(n) is already known when a step begins:
 
 ==  =====================================================  ==========================
- 1  choose dt (the first once more, after 4)               from the limits at n
+ 1  choose dt (in the first step again, after 4)           from the limits at n
  2  second half of the work of the last impulses           v(n-1/2)
- 3  erosion: worn tets leave the body                      topology(n)
- 4  contact: search, when it is due                        candidate pairs
- 5  cohesive facets let go; velocities                     f(n); v(n-1/2) -> v*(n+1/2)
+ 3  erosion: remove worn tets                              topology(n)
+ 4  contact: broad phase, if scheduled                     candidate pairs
+ 5  unload cohesive facets; kick                           f(n); v(n-1/2) -> v*(n+1/2)
  6  gravity, tractions, symmetry, prescribed motion        v*(n+1/2)
- 7  erosion: removed nodes stop                            v*(n+1/2)
+ 7  erosion: stop removed nodes                            v*(n+1/2)
  8  contact: impulses of active contacts; tied bonds       v*(n+1/2)
  9  walls, mirror images behind symmetry planes            v*(n+1/2) -> v(n+1/2)
 10  output at time n: ledger, probes, frames               x(n), stress(n)
-11  positions; debris past a plane becomes its image       x(n) -> x(n+1)
+11  move; reflect debris at symmetry planes                x(n) -> x(n+1)
 12  velocity gradient at x(n+1/2), stress, pressure        stress(n) -> stress(n+1)
 13  internal forces, limits of the next step               f(n+1)
 14  complete shared nodes, step reduction                  the exchange of the step
-15  facets that pass break, nodes separate                 topology(n+1), f(n+1)
+15  break facets, separate nodes                           topology(n+1), f(n+1)
 ==  =====================================================  ==========================
 
-After the last step 1 to 10 are done once more, and ``end`` takes the velocities at n.
+``first_half`` is 1 to 9, ``second_half`` is 11 to 15; the loop (run/loop.py) writes the output of 10 between them.
+After the last step, 1 to 10 are done once more, and ``end`` sets the velocities to those at n.
 
-Rigid bodies (rigid/stage.py) and walls that move take part in 2, 6, 8, 9 and 11, and in no other.
-
-What erosion uncovers meets in the same step. 12 and 13 are one pass over each chunk of tets (two with an averaged
-pressure, with the exchange of the nodal volumes between them); 14 is started after the border tets and finished after
-the interior ones, before the criterion. Which facets pass it is found before the reduction, which says whether any rank
-has some and whom they concern; which cracks open is found in 8, and they open after the reduction.
+- Rigid bodies (rigid/stage.py) and moving walls act in 2, 6, 8, 9 and 11 only.
+- Surface that erosion exposes in 3 is in contact from 4 of the same step on.
+- 12 and 13 are one pass over each chunk of tets; the averaged pressure forms need two, with the exchange of the nodal
+  volume sums between them.
+- 14 starts after the border tets and ends after the interior ones, before the fracture criterion. The criterion runs
+  before the reduction, which then holds whether any facet breaks, and which ranks have a node of one.
+- Broken facets that have opened wide enough to be surface are found in 8 and become surface after the reduction.
 """
 
 import math
@@ -45,7 +47,7 @@ from .simulation import Simulation
 
 
 def prepare(sim: Simulation) -> None:
-    """Forces and limits of the initial state: a pass over the elements in no time at all."""
+    """Computes forces and limits of the initial state: a pass over the elements with dt = 0."""
     sim.model.nodes.force[:] = 0
     _elements(sim, 0.0, None)
     if sim.erosion is not None:
@@ -54,29 +56,31 @@ def prepare(sim: Simulation) -> None:
 
 
 def first_half(sim: Simulation) -> None:
-    """1 to 9: from f(n) to v(n+1/2)."""
+    """1 to 9: from f(n) to v(n+1/2). Raises PhysicsError where the stable step has collapsed."""
     nodes, clock = sim.model.nodes, sim.clock
     sim.timers.switch("nodes")
     mean_dt = clock.choose(sim.limit)  # 1: dt between n and n+1
     if clock.collapsed:
         raise PhysicsError(
             f"{_when(sim)}: {sim.limiting_tet()} is crushed; the stable step is {clock.stable:.3g} s. Where its "
-            "part erodes (parts[].erosion) such a tet leaves"
+            "part erodes (parts[].erosion) such a tet is removed"
         )
     acts = sim.acts
     _before_kick(sim, acts)  # 2 to 4
     if sim.contact is not None and clock.step == 0 and sim.contact.look_ahead(nodes):
-        mean_dt = clock.choose_again(sim.limit)
+        mean_dt = clock.choose_again(sim.limit)  # 1 again: now with the limit of contact
     if sim.fracture is not None:
-        sim.fracture.let_go()  # 5: f(n), less where cohesive facets would give what nobody has paid
-    # v*(n+1/2) = v(n-1/2) + dt f(n) / m
+        sim.fracture.unload()  # 5: f(n) without the cohesive tractions that would release more than they absorbed
+    # 5: v*(n+1/2) = v(n-1/2) + (dt(n-1/2) + dt(n+1/2)) / 2 f(n) / m
     sim.leapfrog.kick(nodes, mean_dt / nodes.scale, clock.shorter / nodes.scale)
     _after_kick(sim, acts)  # 6 to 9: v(n+1/2)
 
 
 def end(sim: Simulation, before: Floats) -> None:
-    """After the first half of the step that would follow the last one: v(n), between v(n-1/2), ``before`` (nodes, 3),
-    and v(n+1/2), in which walls and contact have had their part as in any step.
+    """Sets the velocities to v(n), after the first half of a step beyond the last one.
+
+    v(n) is interpolated between v(n-1/2), ``before`` (nodes, 3), and v(n+1/2), which walls and contact have corrected
+    as in any step.
     """
     nodes = sim.model.nodes
     nodes.v[:] = between(sim, before)
@@ -87,7 +91,7 @@ def end(sim: Simulation, before: Floats) -> None:
 
 
 def between(sim: Simulation, before: Floats) -> Floats:
-    """(nodes, 3) v(n), m/s, between v(n-1/2), ``before`` (nodes, 3), and v(n+1/2) of the model."""
+    """(nodes, 3) v(n), m/s, interpolated between v(n-1/2), ``before`` (nodes, 3), and v(n+1/2) of the model."""
     v = sim.model.nodes.v
     return np.asarray(before + 0.5 * sim.clock.last_dt / sim.clock.mean_dt * (v - before))
 
@@ -96,7 +100,7 @@ def _before_kick(sim: Simulation, acts: Acts) -> None:
     """2 to 4, with v(n-1/2)."""
     nodes, erosion, contact, bonds = sim.model.nodes, sim.erosion, sim.contact, sim.bonds
     for boundary in acts.noting:
-        boundary.note(nodes)  # 2: half of the impulse times v(n-1/2)
+        boundary.note(nodes)  # 2: half of the last impulse times v(n-1/2)
     if erosion is not None:
         erosion.note(nodes)
     if contact is not None:
@@ -106,13 +110,13 @@ def _before_kick(sim: Simulation, acts: Acts) -> None:
     sim.walls.note()
     if erosion is not None:
         removes = erosion.due
-        erosion.remove(nodes)  # 3: what the tets covered is surface now
+        erosion.remove(nodes)  # 3: faces behind the removed tets become surface
         if bonds is not None and removes:
             bonds.follow()
     if bonds is not None:
-        bonds.note(nodes)  # 2, of the nodes that are tied now
+        bonds.note(nodes)  # 2: after 3, for the nodes that are still tied
     if contact is not None:
-        contact.search_if_due(nodes)  # 4: candidate pairs of the surface as it is now
+        contact.search_if_due(nodes)  # 4: candidate pairs of the present surface
 
 
 def _after_kick(sim: Simulation, acts: Acts) -> None:
@@ -126,7 +130,7 @@ def _after_kick(sim: Simulation, acts: Acts) -> None:
     if sim.erosion is not None:
         sim.erosion.stop_removed(nodes)  # 7
     if sim.bonds is not None:
-        sim.bonds.predict(nodes)  # 8: contact sees bodies that hold together
+        sim.bonds.predict(nodes)  # 8: bonds first, with the impulses of the last step: warm start for contact
     if sim.contact is not None:
         sim.contact.solve(nodes, dt, t)  # 8
     if sim.bonds is not None:
@@ -138,25 +142,21 @@ def _after_kick(sim: Simulation, acts: Acts) -> None:
 
 
 def second_half(sim: Simulation) -> None:
-    """11 to 15: from v(n+1/2) to f(n+1)."""
+    """11 to 15: from v(n+1/2) to f(n+1). Raises PhysicsError where a tet has failed."""
     nodes, clock = sim.model.nodes, sim.clock
     # 11: x(n+1) = x(n) + dt v(n+1/2)
     sim.leapfrog.move(nodes, clock.dt, clock.shorter / nodes.scale)
     for boundary in sim.acts.moving:
-        boundary.after_move(nodes)  # images of debris that passes a symmetry plane
+        boundary.after_move(nodes)  # 11: debris that passed a symmetry plane is reflected
     sim.walls.move(clock.dt)
     if sim.rigid is not None:
         sim.rigid.move(nodes, clock.dt)
     clock.advance()
-    if sim.contact is not None:
-        own = sim.reduction.own
-        own.search, own.approach, own.opening = sim.contact.spent(nodes), sim.contact.approach, sim.contact.opening
-        own.stray = sim.contact.stray
-        own.costs[:], own.unsettled[:] = sim.contact.costs, sim.contact.need.unsettled
+    _offer_contact(sim)
     _elements(sim, clock.dt, sim.fracture)  # 12 to 14
     if sim.fracture is not None and sim.reduction.breaking != NOTHING:
         sim.timers.switch("fracture")
-        # 15: facets break, nodes separate, f(n+1) goes with them
+        # 15: facets break, nodes separate; forces f(n+1) of their tets are moved to the new nodes
         sim.fracture.advance(sim.reduction.breaking, sim.reduction.touched)
         if sim.bonds is not None and sim.reduction.breaking == BREAKS:
             sim.bonds.follow()
@@ -164,17 +164,40 @@ def second_half(sim: Simulation) -> None:
 
 
 def _elements(sim: Simulation, dt: float, fracture: Fracture | None) -> None:
-    """12 to 14, and which facets break; repeats the sum of forces in a coarser quantum when they have outgrown the
-    present one.
-    """
-    elements, reduction, own = sim.elements, sim.reduction, sim.reduction.own
-    scale = sim.scale = sim.next_scale()
+    """12 to 14. ``fracture``: None in the pass over the initial state, where no facet breaks."""
+    elements, reduction = sim.elements, sim.reduction
+    sim.scale = sim.next_scale()
     sim.timers.switch("elements")
-    elements.advance(dt, scale)
+    elements.advance(dt, sim.scale)  # 12, 13
     if sim.crushing is not None:
-        sim.crushing.look()
-    own.breaking = OVERSTRESSED if elements.hot else NOTHING
+        sim.crushing.update()
     sim.timers.switch("exchange")
+    _offer(sim, fracture)
+    reduction.begin(sim.comm)  # 14
+    if fracture is None:
+        elements.finish()
+    reduction.finish()
+    _follow_reduction(sim)
+    if fixed_point.outgrown(reduction.force, sim.scale):
+        _sum_again(sim)
+
+
+def _offer_contact(sim: Simulation) -> None:
+    """14: what contact contributes on this rank to the reduction, at the positions of n+1."""
+    contact, own = sim.contact, sim.reduction.own
+    if contact is None:
+        return
+    own.search, own.approach, own.opening = contact.spent(sim.model.nodes), contact.approach, contact.opening
+    own.stray = contact.stray
+    own.costs[:], own.unsettled[:] = contact.costs, contact.need.unsettled
+
+
+def _offer(sim: Simulation, fracture: Fracture | None) -> None:
+    """14: what the other stages contribute on this rank to the reduction; with fracture, shared nodes are completed
+    first, and the facets that break are found.
+    """
+    elements, own = sim.elements, sim.reduction.own
+    own.breaking = OVERSTRESSED if elements.hot else NOTHING
     if fracture is not None:
         elements.finish()
         sim.timers.switch("fracture")
@@ -187,10 +210,13 @@ def _elements(sim: Simulation, dt: float, fracture: Fracture | None) -> None:
         own.worn = max(own.worn, sim.erosion.strikes())
     own.apart = sim.bonds is not None and sim.bonds.apart
     own.nodes = sim.model.nodes_global
-    reduction.begin(sim.comm)
-    if fracture is None:
-        elements.finish()
-    reduction.finish()
+
+
+def _follow_reduction(sim: Simulation) -> None:
+    """14: acts on the result of the reduction, alike on all ranks. Raises PhysicsError where a limit or a force is not
+    a finite number.
+    """
+    reduction = sim.reduction
     sim.model.nodes_global = reduction.nodes
     if not (math.isfinite(reduction.limit) and math.isfinite(reduction.force)):
         raise PhysicsError(f"{_when(sim)}: {sim.limiting_tet()} {failed.why(sim)}")
@@ -200,12 +226,17 @@ def _elements(sim: Simulation, dt: float, fracture: Fracture | None) -> None:
         sim.erosion.decide(reduction.worn)
     if sim.bonds is not None and reduction.apart:
         sim.bonds.follow()
-    if fixed_point.outgrown(reduction.force, scale):
-        sim.scale = fixed_point.scale_for(reduction.force)
-        sim.timers.switch("elements")
-        elements.again(sim.scale)
-        sim.timers.switch("exchange")
-        elements.finish()
+
+
+def _sum_again(sim: Simulation) -> None:
+    """13 and 14: repeats the sum of the forces in a coarser quantum, when the largest force has outgrown the present
+    one.
+    """
+    sim.scale = fixed_point.scale_for(sim.reduction.force)
+    sim.timers.switch("elements")
+    sim.elements.again(sim.scale)
+    sim.timers.switch("exchange")
+    sim.elements.finish()
 
 
 def _when(sim: Simulation) -> str:

@@ -482,6 +482,6 @@ def test_damage_that_takes_no_tet_is_told(ranks: int) -> None:
 
     for before, after in on(ranks, case, meshes, work):
         assert [text.partition(":")[0] for text in before] == [
-            "part 'body1' is damaged to 0.4 of erosion.damage 1 and no tet has left"
+            "part 'body1' is damaged to 0.4 of erosion.damage 1 and no tet was removed"
         ]
         assert after == []

@@ -205,7 +205,7 @@ class Crushing:
         ]
         return cls(model, np.array(strengths), comm, clock, team) if any(strengths) else None
 
-    def look(self) -> None:
+    def update(self) -> None:
         """The stresses as they are now."""
         for block in self._blocks():
             place, times = self._hardest(block, self._met[block.part].times)

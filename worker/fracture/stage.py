@@ -70,7 +70,7 @@ class Fracture:
         """Facets of all ranks that have broken."""
         return self.separation.broken
 
-    def let_go(self) -> None:
+    def unload(self) -> None:
         """Before the forces of the present act: cohesive facets give up what they would not be paid for; all ranks
         take part.
         """
