@@ -29,7 +29,7 @@ class Fields:
         self.force = 0.0
         """Largest contribution to a nodal force, N."""
         self.stop = 0
-        """Reason to stop, 0 for none (worker/run/loop.py): the largest of the ranks holds."""
+        """Reason to stop, 0 for none (worker/run/stops.py): the largest decides."""
         self.report = False
         """Rank 0 requests the loads of all ranks."""
         self.groups = False

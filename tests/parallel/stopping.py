@@ -13,7 +13,7 @@ if __name__ == "__main__":
     last, attend = int(sys.argv[1]), Loop._attend
 
     def stop_there(loop: Loop) -> None:
-        loop._asking._signals.raised |= loop.sim.clock.step + 1 >= last
+        loop._requests._signals.raised |= loop.sim.clock.step + 1 >= last
         attend(loop)
 
     Loop._attend = stop_there  # type: ignore[method-assign,assignment]

@@ -81,4 +81,4 @@ def test_what_is_used_up_says_how_short_the_steps_were(tmp_path: Path, ranks: in
     assert end.message.startswith("run.max_steps is used up before run.end_time, at 0.0008")
     assert "; the stable step has fallen to " in end.message
     assert " of the first (stability: tet " in end.message
-    assert end.message.endswith(" steps are left; erosion.time_step lets go of such tets")
+    assert end.message.endswith(" steps are left; erosion.time_step removes such tets")

@@ -1,0 +1,64 @@
+"""Samples of a run: the lines of history.csv, and the time at which the next one is scheduled."""
+
+import math
+
+import msgspec
+
+from conoid.cases.messages import Energy, PartEnergy
+
+from .. import step
+from ..clock import Clock
+from ..model.state import Floats
+from ..output.history import History
+from ..simulation import Simulation
+
+
+class Samples:
+    """Takes samples and keeps the latest one."""
+
+    def __init__(self, sim: Simulation, history: History | None, number: int) -> None:
+        """``history``: the file, None on all ranks except 0; ``number``: samples scheduled so far."""
+        run = sim.case.run
+        self._history = history
+        self._names = [probe.name for probe in sim.case.probes]
+        self._every = run.end_time, run.samples
+        self.number = number
+        """Samples scheduled so far."""
+        self._next = number * run.end_time / run.samples
+        """Time of the next sample, s."""
+        self.time: float | None = None
+        """Time of the latest sample, s."""
+        self.energy: Energy | None = None
+        self.parts: dict[str, PartEnergy] = {}
+        self.measured: list[float] = []
+        """Values of the probes."""
+
+    def due(self, clock: Clock) -> bool:
+        """Return whether the time of the next sample is reached."""
+        return clock.t >= self._next
+
+    def probes(self) -> dict[str, float | None]:
+        """Return the latest value of each probe by name; None for NaN, which JSON has not."""
+        named = zip(self._names, self.measured, strict=True)
+        return {name: None if math.isnan(value) else value for name, value in named}
+
+    def take(self, sim: Simulation, before: Floats, *, ending: bool) -> None:
+        """Write energies, momenta and probes at time n to the history. Raises PhysicsError if the energy is out of
+        balance. Collective. ``before``: (nodes, 3) v(n-1/2); ``ending``: the step after the last one.
+        """
+        clock, (end, samples) = sim.clock, self._every
+        self.energy, self.parts, self.time = sim.ledger.close(before), sim.ledger.parts, clock.t
+        if ending:
+            step.end(sim, before)
+        if sim.crushing is not None:
+            sim.crushing.count()
+        probes = sim.probes.measure(step.between(sim, before) if sim.probes.sums and not ending else None)
+        self.measured = probes.tolist()
+        self.number = int(clock.t * samples / end) + 1
+        self._next = self.number * end / samples
+        limiter = sim.limiter()
+        if self._history is not None:
+            parts = [value for part in self.parts.values() for value in msgspec.structs.astuple(part)]
+            extra = [*sim.ledger.momentum, *sim.ledger.angular_momentum, *parts, *probes]
+            self._history.write(clock.step, clock.t, clock.dt, limiter, self.energy, extra)
+        sim.ledger.require(sim.case.run, sim.case.numerics.dt_safety, f"at step {clock.step}, t = {clock.t:.6g} s")

@@ -1,0 +1,43 @@
+"""Reasons for which a run stops before its end time, and their messages."""
+
+from conoid.cases.run import Cause, State
+
+from ..clock import SLOWED
+from ..simulation import Simulation
+
+CANCELLED, WALL_TIME, MAX_STEPS = 1, 2, 3
+"""Reasons to stop early, in the reduction of the step: the largest decides."""
+
+STOPS = {
+    CANCELLED: (State.CANCELLED, Cause.CANCELLED, "stopped on request"),
+    WALL_TIME: (State.TIMED_OUT, Cause.WALLTIME, "run.max_wall_time is used up"),
+    MAX_STEPS: (State.TIMED_OUT, Cause.STEPS, "run.max_steps is used up before run.end_time"),
+}
+"""State, cause and message for each reason to stop early."""
+
+
+def reason(sim: Simulation, stop: int) -> str:
+    """Return the message for an early stop: the reason, the time reached and, if it fell far, the stable step.
+    Collective.
+    """
+    clock, text = sim.clock, STOPS[stop][2]
+    if stop == CANCELLED:
+        return text
+    text += f", at {clock.t:.3g} s of {sim.case.run.end_time:.3g} s"
+    slow = clock.share < SLOWED
+    return f"{text}; {_fallen(sim, f'1/{1.0 / clock.share:.0f} of the first')}" if slow else text
+
+
+def starved(sim: Simulation) -> str:
+    """Return the warning for a stable step so small that run.max_steps may end the run. Collective."""
+    text = _fallen(sim, f"below 1/1000 of the first, at {sim.clock.t:.3g} s")
+    return text + ", run.max_steps ends the run"
+
+
+def _fallen(sim: Simulation, extent: str) -> str:
+    """Return how far the stable step has fallen, which tet limits it, and the key that helps. Collective."""
+    clock = sim.clock
+    return (
+        f"the stable step has fallen to {clock.stable:.2g} s, {extent} ({sim.limiter()}): about "
+        f"{clock.steps_left:.2g} steps are left; erosion.time_step removes such tets"
+    )
