@@ -194,7 +194,7 @@ def test_a_job_that_waits_though_its_run_has_ended_is_taken_out(place: Path, mon
     worker = SlurmWorker(run, JOB, Slurm(profiles={"a": Profile()}, bin=commands(place, "exit 1")))
     worker.write_down(job="7", command=["false"])
     (run / layout.OUTCOME).write_text("{}")
-    monkeypatch.setattr(attempt.Told, "listen", lambda self: None)
+    monkeypatch.setattr(attempt.Relay, "listen", lambda self: None)
     monkeypatch.setenv("SLURM_JOB_ID", "7")
     assert attempt.main([str(run), JOB.name]) == 0, "nothing is run again"
     worker.turn([Entry("7", "PENDING", 0.0, JOB.name, "launch failed requeued held")])
@@ -244,7 +244,7 @@ RUNNING = {"JobState": "RUNNING", "Restarts": "0", "StartTime": "1000", "TimeLim
 @pytest.mark.parametrize(
     ("changes", "now", "verdict"),
     [
-        ({}, 1100.0, "nobody"),
+        ({}, 1100.0, "outside"),
         ({"JobState": "CANCELLED"}, 1100.0, "cancelled"),
         ({}, 4450.0, "time limit"),
         ({"JobState": "COMPLETING"}, 1100.0, "cancelled"),
@@ -252,8 +252,8 @@ RUNNING = {"JobState": "RUNNING", "Restarts": "0", "StartTime": "1000", "TimeLim
         ({"PreemptTime": "1090"}, 1100.0, "preempted"),
         ({"PreemptTime": "1090", "JobState": "COMPLETING"}, 1100.0, "unknown"),
         ({"JobState": "COMPLETING", "Restarts": "1"}, 1100.0, "requeued"),
-        ({"TimeLimit": "UNLIMITED"}, 9e9, "nobody"),
-        ({"TimeLimit": "1-00:00:00"}, 4450.0, "nobody"),
+        ({"TimeLimit": "UNLIMITED"}, 9e9, "outside"),
+        ({"TimeLimit": "1-00:00:00"}, 4450.0, "outside"),
         ({"TimeLimit": "1-00:00:00", "JobState": "COMPLETING"}, 4450.0, "cancelled"),
     ],
 )
@@ -273,7 +273,7 @@ def test_a_job_that_starts_after_the_stop_runs_nothing(tmp_path: Path, monkeypat
     record = Job(**{**{name: getattr(JOB, name) for name in JOB.__struct_fields__}, "command": ["false"]})
     (tmp_path / layout.JOB).write_bytes(batch.to_json(record))
     (tmp_path / layout.STOP_REQUEST).touch()
-    monkeypatch.setattr(attempt.Told, "listen", lambda self: None)
+    monkeypatch.setattr(attempt.Relay, "listen", lambda self: None)
     assert attempt.main([str(tmp_path), JOB.name]) == 0
     assert '"state": "cancelled"' in (tmp_path / layout.OUTCOME).read_text()
 

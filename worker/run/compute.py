@@ -1,4 +1,4 @@
-"""From a case to an outcome, with the kernels loaded: build, advance, run the outputs, sum up."""
+"""A run from its case to its outcome: builds or resumes the simulation, runs the time loop, sums up."""
 
 import logging
 import time
@@ -39,7 +39,7 @@ from .signals import Signals
 from .summary import Times, sum_up
 
 CHOSEN, ALL, PROJECT = "chosen", "all", "project"
-"""What is done with the threads of a rank."""
+"""Use of the threads of a rank; see ``compute``."""
 
 log = logging.getLogger("conoid.worker")
 
@@ -48,13 +48,14 @@ def compute(
     case: Case, meshes: Path, folder: Path, comm: Comm, journal: Journal | None, signals: Signals, began: float,
     restart: bool, use: str = CHOSEN,
 ) -> Outcome:  # fmt: skip
-    """Runs the case in ``folder`` on all ranks; relative mesh paths start at ``meshes``.
+    """Runs the case in ``folder`` and returns its outcome. Collective.
 
-    With ``restart`` from the latest checkpoint that is there. ``use`` of the threads: CHOSEN, as many
-    as make it faster; ALL; PROJECT, one, and what more would take is in the outcome. Raises ConoidError.
+    ``meshes``: folder at which relative paths of mesh files start; ``restart``: resume from the latest checkpoint;
+    ``use`` of the threads: CHOSEN, as many as make the run faster; ALL; PROJECT, one thread, and the outcome has the
+    estimated time with more. Raises ConoidError.
     """
     say = journal.starting if journal is not None else quiet
-    threads = team(case.run.threads)  # of a process that may have had other runs
+    threads = team(case.run.threads)  # the team may have the settings of an earlier run of this process
     threads.most = threads.threads
     threads.projecting = Projecting(threads.threads) if use == PROJECT else None
     if comm.size > 1:
@@ -95,8 +96,8 @@ def compute(
 
 
 def _resumed(case: Case, folder: Path, comm: Comm, journal: Journal | None) -> tuple[Simulation, Start]:
-    """The run in ``folder`` as its latest checkpoint that is whole has it; all ranks take part. The journal gets a
-    warning of each later one, which is damaged. Raises InputError on all alike.
+    """Returns the simulation of the latest complete checkpoint in ``folder``. Collective. The journal gets a warning
+    of each later checkpoint, which is damaged. Raises InputError on all ranks.
     """
     found: tuple[Path, Manifest] | None = None
     failure: InputError | None = None
@@ -129,7 +130,7 @@ def _warn(journal: Journal | None, texts: Sequence[str]) -> None:
 
 
 def _announce(sim: Simulation, journal: Journal | None, setup: float) -> None:
-    """Reports how large the model is and how it is spread; all ranks take part."""
+    """Reports the size of the model and its distribution over the ranks. Collective."""
     model, nodes = sim.model, sim.model.nodes
     sizes = np.zeros(len(model.parts), np.int64)
     for block in model.blocks:

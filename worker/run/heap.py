@@ -1,4 +1,4 @@
-"""What the C library of a rank does with the memory of arrays that are let go."""
+"""Settings of the C library's allocator: large arrays that are freed go back to the system at once."""
 
 import ctypes
 import sys
@@ -6,17 +6,16 @@ import sys
 _TRIM_THRESHOLD, _MMAP_THRESHOLD = -1, -3
 """Parameters of mallopt(3), of glibc."""
 LARGE = 1 << 20
-"""Bytes of an array that goes back to the system at once. glibc would raise its own bound up to 32 MB, to the largest
-array that it has seen let go: what grows and is made anew while a body breaks then leaves holes, and the case of
-docs/tutorial/first_case.md took 540 MB where it takes 380 MB now. Its CPU time is the same, and that of a bar with
-62,000 tets."""
+"""Bytes of an array that goes back to the system at once. By default glibc raises this bound, up to 32 MB, to the
+largest array that was freed: arrays that grow while a body breaks then leave holes, and the case of
+docs/tutorial/first_case.md took 540 MB instead of 380 MB. CPU time is unchanged, also for a bar with 62,000 tets."""
 _SPARE = 32 << 20
-"""Bytes at the end of the heap that stay: without them a step of large arrays gives back and asks again, 2 s of 28 for
-that bar."""
+"""Free bytes at the end of the heap that stay allocated: without them each step of that bar returns large arrays and
+requests them again, 2 s of 28."""
 
 
 def tidy() -> bool:
-    """Gives large arrays back as soon as they are let go; False where the C library cannot be told."""
+    """Applies the settings; returns False if the C library has no ``mallopt``."""
     if not sys.platform.startswith("linux"):
         return False
     mallopt = getattr(ctypes.CDLL(None), "mallopt", None)

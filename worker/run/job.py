@@ -1,9 +1,9 @@
 """``python -m conoid.worker.run.job FOLDER NAME``: one attempt of a run inside a job of a batch system.
 
-The script of the job becomes this process. It starts the ranks, tells them when the batch system wants the cores back,
-and says what that was: a cancel, which ends the run, or a preemption or a time limit, after which the same job waits
-for its turn again and the run goes on from its checkpoint. What it cannot find out it leaves to who has handed the job
-over: the folder then holds a checkpoint and no outcome.
+The script of the job becomes this process. It starts the ranks, passes on the signal of the batch system, and finds
+its cause: a cancel, which ends the run, or a preemption or a time limit, after which the same job is queued again
+and the run resumes from its checkpoint. If the cause is unknown the folder has a checkpoint and no outcome, and the
+server or command that submitted the job decides.
 """
 
 import os
@@ -31,60 +31,61 @@ from .lock import hold
 
 _ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 _ASK_FOR = 20.0
-"""s for which the controller is asked what has happened. Chosen: KillWait, 30 s by default, ends this process."""
+"""s for which the controller is asked for the cause of a signal. Chosen: KillWait, 30 s by default, ends this
+process."""
 _EARLY = 90.0
-"""s by which Slurm may send the signal before it is due (60, sbatch(1)), and some for the checkpoint."""
+"""s by which Slurm may send the signal early (60, sbatch(1)), and a margin for the checkpoint."""
 
 
 @dataclass
-class Told:
-    """Passes the batch system's TERM on to the ranks: as USR1, because srun takes a TERM for its own end."""
+class Relay:
+    """Passes the TERM of the batch system on to the ranks, as USR1: srun takes a TERM as its own end."""
 
     child: "subprocess.Popen[bytes] | None" = None
     raised: bool = False
 
     def listen(self) -> None:
-        """From now on."""
+        """Installs the handlers of the signals."""
         for number in (signal.SIGTERM, signal.SIGUSR1, signal.SIGINT):
             signal.signal(number, self._on_signal)
 
     def _on_signal(self, number: int, frame: object) -> None:
         self.raised = True
-        self.tell()
+        self.send()
 
-    def tell(self) -> None:
-        """Tells the ranks."""
+    def send(self) -> None:
+        """Sends USR1 to the ranks if they run."""
         if self.child is not None and self.child.poll() is None:
             self.child.send_signal(signal.SIGUSR1)
 
 
 def main(arguments: list[str]) -> int:
-    """The exit code of the job: that of the ranks; 0 when another job has the run, or when it waits again."""
-    told = Told()
-    told.listen()
+    """Runs the ranks and returns their exit code; 0 if another job runs this case or this job is queued again."""
+    relay = Relay()
+    relay.listen()
     folder, number, name = *_place(Path(arguments[0]), os.environ), arguments[1]
     if os.path.samestat(os.fstat(1), os.stat(os.devnull)):
         _write_into(folder)
     job = batch.read_job(folder)
     if job is None or job.name != name or not claim(folder, job, number):
-        print(f"job {number}: another job has this run", flush=True)
+        print(f"job {number}: another job runs this case", flush=True)
         return 0
     if (folder / layout.OUTCOME).exists():
-        print(f"job {number}: this run has ended; the controller has forgotten that it was started", flush=True)
+        print(f"job {number}: this run has already ended", flush=True)
         return 0
     if (folder / layout.STOP_REQUEST).exists():
         end(folder, job, Outcome(state=State.CANCELLED, cause=Cause.CANCELLED, message="cancelled before it started"))
         return 0
     before = latest(folder)
-    code = _run(folder, job, number, told)
-    if (folder / layout.OUTCOME).exists() or not (told.raised or code == ExitCode.INTERRUPTED):
+    code = _run(folder, job, number, relay)
+    if (folder / layout.OUTCOME).exists() or not (relay.raised or code == ExitCode.INTERRUPTED):
         return code
     return _interrupted(folder, job, number, latest(folder) > before) or code
 
 
 def _place(given: Path, env: Mapping[str, str]) -> tuple[Path, str]:
-    """The run's folder, and the number of the job as the queue has it. A task of an array finds its folder by its
-    place, and from then on writes into that folder's log. Raises OSError.
+    """Returns the run's folder, and the number of the job as the queue shows it. A task of an array finds its folder
+    by its index, and writes into that folder's log from then on. Raises OSError.
     """
     task = env.get("SLURM_ARRAY_TASK_ID", "")
     if not task or not (given / layout.ARRAY).exists():
@@ -95,7 +96,7 @@ def _place(given: Path, env: Mapping[str, str]) -> tuple[Path, str]:
 
 
 def _write_into(folder: Path) -> None:
-    """What this process and the ranks print goes to the launcher's log of the run. Raises OSError."""
+    """Directs the output of this process and of the ranks into the launcher's log of the run. Raises OSError."""
     log = os.open(folder / layout.LOGS / layout.LAUNCHER_LOG, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o600)
     for stream in (1, 2):
         os.dup2(log, stream)
@@ -103,7 +104,7 @@ def _write_into(folder: Path) -> None:
 
 
 def claim(folder: Path, job: Job, number: str) -> bool:
-    """True for the first job of this name that starts, and for the same one when it is started again."""
+    """Returns True for the first job of this name that starts, and for the same job when it is started again."""
     path = layout.claim(folder, job.name)
     beside = path.with_name(f"{path.name}.{number}.{os.getpid()}")
     beside.write_text(number)
@@ -114,29 +115,30 @@ def claim(folder: Path, job: Job, number: str) -> bool:
 
 
 def latest(folder: Path) -> int:
-    """The step of the newest checkpoint; -1 when there is none."""
+    """Returns the step of the newest checkpoint; -1 if there is none."""
     return next((int(place.name) for place in checkpoints.found(folder)), -1)
 
 
-def _run(folder: Path, job: Job, number: str, told: Told) -> int:
-    """Starts the ranks and waits for their end, however long it takes after a signal."""
+def _run(folder: Path, job: Job, number: str, relay: Relay) -> int:
+    """Starts the ranks and waits for their end, without a limit after a signal. Returns their exit code."""
     (folder / layout.INTERRUPTED).unlink(missing_ok=True)
     again = int(os.environ.get("SLURM_RESTART_COUNT", "0"))
     attempt = f"attempt {job.attempt + again}" if job.attempt + again > 1 else figures.crew(job.ranks, job.threads)
-    _say(folder, job, State.STARTING, f"Slurm job {number} on {os.environ.get('SLURM_JOB_NODELIST', '?')}, {attempt}")
+    where = os.environ.get("SLURM_JOB_NODELIST", "?")
+    _report(folder, job, State.STARTING, f"Slurm job {number} on {where}, {attempt}")
     access = batch.read_access(folder)
     words = [*job.command, *(["--restart"] if latest(folder) >= 0 else [])]
     if access is not None:
         words += ["--telemetry", access.endpoint, "--prefix", access.prefix]
-    told.child = subprocess.Popen(words, stdin=subprocess.DEVNULL, env=environment(os.environ, job, access))
-    if told.raised:
-        told.tell()
-    code = told.child.wait()
+    relay.child = subprocess.Popen(words, stdin=subprocess.DEVNULL, env=environment(os.environ, job, access))
+    if relay.raised:
+        relay.send()
+    code = relay.child.wait()
     return code if code >= 0 else 128 - code
 
 
 def environment(base: Mapping[str, str], job: Job, access: batch.Access | None) -> dict[str, str]:
-    """Of the ranks: libraries with one thread, the run's mark, its credentials."""
+    """Returns the environment of the ranks: libraries with one thread, the run's id, its Zenoh credentials."""
     env = {**base, **dict.fromkeys(_ONE_THREAD, "1"), "CONOID_RUN": job.run}
     if access is not None and access.user:
         env |= {"CONOID_ZENOH_USER": access.user, "CONOID_ZENOH_PASSWORD": access.password}
@@ -146,32 +148,36 @@ def environment(base: Mapping[str, str], job: Job, access: batch.Access | None) 
 
 
 def _interrupted(folder: Path, job: Job, number: str, further: bool) -> int | None:
-    """Settles what the signal was; None when that is left to others. ``further``: there is a new checkpoint."""
+    """Acts on the cause of the signal; None if the exit code of the ranks stands. ``further``: there is a newer
+    checkpoint.
+    """
     if (folder / layout.STOP_REQUEST).exists():
         return _cancelled(folder, job, "stopped on request")
     verdict = judge(_details(job.bin, number), int(os.environ.get("SLURM_RESTART_COUNT", "0")), job.notice, time.time())
     if verdict == "cancelled":
         return _cancelled(folder, job, f"Slurm job {number} was cancelled")
-    if verdict == "nobody":
-        message = f"Slurm job {number} was told to stop from outside, neither by its owner nor by Slurm"
+    if verdict == "outside":
+        message = f"Slurm job {number} got a signal that neither its owner nor Slurm has sent"
         end(folder, job, _so_far(folder, State.FAILED, Cause.PREEMPTED, message))
         return ExitCode.INTERRUPTED
     if verdict == "time limit" and not further:
-        message = "the job's time limit came before a checkpoint that is newer than the last"
+        message = "the job's time limit came before a new checkpoint"
         end(folder, job, _so_far(folder, State.TIMED_OUT, Cause.WALLTIME, message))
         return ExitCode.INTERRUPTED
     if verdict == "unknown":
-        _say(folder, job, State.QUEUED, f"job {number} was interrupted; a next one goes on from its checkpoint")
+        _report(folder, job, State.QUEUED, f"job {number} was interrupted; the next job goes on from its checkpoint")
         return None
     why = "the time limit is near" if verdict == "time limit" else "preempted"
-    _say(folder, job, State.QUEUED, f"{why}; job {number} waits again and goes on from its checkpoint")
-    return _again(job.bin, number) if verdict != "requeued" else 0
+    _report(folder, job, State.QUEUED, f"{why}; job {number} is queued again and goes on from its checkpoint")
+    return _requeue(job.bin, number) if verdict != "requeued" else 0
 
 
 def judge(found: Mapping[str, str], restarts: int, notice: float, now: float) -> str:
-    """What the batch system has meant by its signal: ``cancelled``, ``time limit``, ``preempted``, ``requeued`` (it
-    has put the job back by itself), ``nobody`` (the signal came from elsewhere) or ``unknown``; from what scontrol
-    says of the job that was started ``restarts`` times before.
+    """Returns the cause of the batch system's signal: ``cancelled``, ``time limit``, ``preempted``, ``requeued`` (Slurm
+    has queued the job again by itself), ``outside`` (another sender) or ``unknown``.
+
+    ``found``: the fields of scontrol for the job, which was started ``restarts`` times before; ``notice``: s between
+    the signal and the time limit; ``now``: s since 1970.
     """
     if not found:
         return "unknown"
@@ -183,11 +189,11 @@ def judge(found: Mapping[str, str], restarts: int, notice: float, now: float) ->
     start = found.get("StartTime", "")
     if limit is not None and start.isdigit() and now >= int(start) + limit - notice - _EARLY:
         return "time limit" if found.get("JobState") == "RUNNING" else "unknown"
-    return "cancelled" if found.get("JobState") in {"CANCELLED", "COMPLETING"} else "nobody"
+    return "cancelled" if found.get("JobState") in {"CANCELLED", "COMPLETING"} else "outside"
 
 
 def _seconds(text: str) -> float | None:
-    """``1-02:03:04`` in s; None for no limit."""
+    """Returns ``1-02:03:04`` in s; None for no limit."""
     days, _, clock = text.rpartition("-")
     parts = clock.split(":")
     if not all(part.isdigit() for part in (*parts, days or "0")):
@@ -205,11 +211,11 @@ def _details(place: str, number: str) -> dict[str, str]:
     return {}
 
 
-def _again(place: str, number: str) -> int | None:
+def _requeue(place: str, number: str) -> int | None:
     try:
         slurm.requeue(place, number)
     except slurm_call.SlurmError as error:
-        print(f"job {number}: it cannot be put back: {error}", flush=True)
+        print(f"job {number}: it cannot be queued again: {error}", flush=True)
         return None
     return 0
 
@@ -220,7 +226,7 @@ def _cancelled(folder: Path, job: Job, message: str) -> int:
 
 
 def _so_far(folder: Path, state: State, cause: Cause, message: str) -> Outcome:
-    """The outcome that the interrupted ranks have left, with its true reason."""
+    """Returns the outcome of the interrupted ranks, with its true cause."""
     try:
         found = outcome.from_json(whole.read(folder / layout.INTERRUPTED))
     except (OSError, msgspec.MsgspecError):
@@ -229,7 +235,7 @@ def _so_far(folder: Path, state: State, cause: Cause, message: str) -> Outcome:
 
 
 def end(folder: Path, job: Job, ended: Outcome) -> None:
-    """The outcome, and the last message. Raises OSError."""
+    """Writes the outcome and the last message. Raises OSError."""
     lock = hold(folder)
     last = msgspec.structs.replace(ended, ranks=job.ranks, threads=job.threads)
     whole.write(folder / layout.OUTCOME, outcome.to_json(last))
@@ -241,7 +247,7 @@ def end(folder: Path, job: Job, ended: Outcome) -> None:
         lock.close()
 
 
-def _say(folder: Path, job: Job, state: State, message: str) -> None:
+def _report(folder: Path, job: Job, state: State, message: str) -> None:
     journal = Journal(folder, job.run)
     journal.write(messages.Status, state=state, message=message)
     journal.close()

@@ -1,4 +1,5 @@
-"""One writer a folder: rank 0 holds a lock of the run's folder while it lives, on whatever node."""
+"""Lock of a run's folder: rank 0 holds it while the process lives, so that one worker at a time writes into the
+folder, on any node."""
 
 import fcntl
 import time
@@ -8,13 +9,14 @@ from typing import IO
 from conoid.cases.output import layout
 
 _PATIENCE = 20.0
-"""s that the one before gets to leave. Chosen: a killed run is gone within seconds, a lock on a network within ten."""
+"""s to wait for the former holder. Chosen: a killed run is gone within seconds, a lock on a network within ten."""
 _PAUSE = 0.2
 """s between two tries. Chosen."""
 
 
 def hold(folder: Path, patience: float = _PATIENCE) -> IO[str] | None:
-    """The open file, which holds the lock until it is closed or the process dies; None when another process has it."""
+    """Returns the open file, which holds the lock until it is closed or the process ends; None if another process
+    holds it."""
     file = (folder / layout.LOCK).open("a")
     deadline = time.monotonic() + patience
     while True:

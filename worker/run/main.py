@@ -1,4 +1,4 @@
-"""Start-up of the worker: arguments, the case, the run folder, the outcome. Exit codes: cases/run.py."""
+"""Start-up of the worker: arguments, case, run folder, outcome. Exit codes: cases/run.py."""
 
 import argparse
 import logging
@@ -52,7 +52,7 @@ _CODES = {
 
 
 def main(arguments: list[str]) -> int:
-    """Runs one case on all ranks of MPI's world; returns the exit code of the process."""
+    """Runs one case on all ranks of MPI's world and returns the exit code of the process."""
     began = time.monotonic()
     heap.tidy()
     options = _parse(arguments)
@@ -61,11 +61,11 @@ def main(arguments: list[str]) -> int:
     try:
         return _run(options, comm, signals, began)
     except BaseException as error:
-        if log.hasHandlers():  # the folder of the run is there
+        if log.hasHandlers():  # it writes into the run's folder, which exists
             log.error("rank %d stops the job\n%s", comm.rank, traceback.format_exc())
         if storage.failed(error) or storage.gone(error, options.out):
             named = "" if isinstance(error, OSError) and error.filename else f" (in {options.out})"
-            print(f"a file of the run is gone or cannot be written: {error}{named}", file=sys.stderr, flush=True)
+            print(f"a file of the run was removed or cannot be written: {error}{named}", file=sys.stderr, flush=True)
             abort(ExitCode.STORAGE)
         raise
 
@@ -86,7 +86,7 @@ def _run(options: argparse.Namespace, comm: Comm, signals: Signals, began: float
 
 
 def _succeeded(folder: Path) -> bool:
-    """Whether the run in a folder has come to its end: another word about it would be a lie."""
+    """Returns whether the run in a folder has succeeded: its outcome must not be replaced."""
     try:
         return State(outcomes.from_json((folder / layout.OUTCOME).read_bytes()).state) is State.SUCCEEDED
     except (OSError, ValueError):
@@ -109,7 +109,7 @@ def _worked(options: argparse.Namespace, comm: Comm, signals: Signals, began: fl
 
 
 def _telemetry(options: argparse.Namespace) -> "Telemetry | None":
-    """Zenoh is for the one rank that publishes."""
+    """Opens the Zenoh session; only rank 0 imports Zenoh."""
     if not options.telemetry:
         return None
     from ..output.telemetry import Telemetry
@@ -120,16 +120,17 @@ def _telemetry(options: argparse.Namespace) -> "Telemetry | None":
 def _outcome(
     options: argparse.Namespace, comm: Comm, journal: Journal | None, signals: Signals, began: float
 ) -> tuple[Outcome, int]:
-    """Runs the case; whatever is wrong with it or happens in it on purpose becomes a failed outcome."""
+    """Runs the case and returns its outcome and exit code; an error of the case or of the run becomes a failed
+    outcome."""
     try:
-        case, told = _case(options, comm)
+        case, warnings = _case(options, comm)
         if comm.rank == 0:
             (options.out / layout.RESOLVED_CASE).write_bytes(load.resolved_json(case))
         if journal is not None:
-            for text in told:
+            for text in warnings:
                 journal.write(messages.Log, level="warning", text=text)
         outcome = _compute(case, options, comm, journal, signals, began)
-        outcome = msgspec.structs.replace(outcome, warnings=[*told, *outcome.warnings])
+        outcome = msgspec.structs.replace(outcome, warnings=[*warnings, *outcome.warnings])
         return outcome, _CODES[State(outcome.state)]
     except CaseError as error:
         return _unbegun(State.FAILED, Cause.INPUT, str(error), comm, began), ExitCode.BAD_INPUT
@@ -151,11 +152,11 @@ def _parse(arguments: list[str]) -> argparse.Namespace:
     parser.add_argument("--run", help="the run's id; the folder's name when absent")
     parser.add_argument("--telemetry", metavar="ENDPOINT", help="a Zenoh router, such as tcp/127.0.0.1:7447")
     parser.add_argument("--ranks", type=int, help="end at once when MPI has started another number of ranks")
-    parser.add_argument("--threads", type=int, help="of each rank; run.threads of the case when absent")
+    parser.add_argument("--threads", type=int, help="threads of each rank; run.threads of the case when absent")
     parser.add_argument(
         "--use", choices=("chosen", "all", "project"), default="chosen",
-        help="of the threads: as many as make the run faster; all; one, which times each task and says what more would "
-        "take (default: chosen)",
+        help="use of the threads: as many as make the run faster; all; one, which measures each task and estimates "
+        "the time with more threads (default: chosen)",
     )  # fmt: skip
     parser.add_argument(
         "--interruptible", action="store_true",
@@ -169,8 +170,8 @@ def _parse(arguments: list[str]) -> argparse.Namespace:
 
 
 def _case(options: argparse.Namespace, comm: Comm) -> tuple[Case, list[str]]:
-    """The case with its overrides, read by rank 0, and what is odd about how it is written; it runs on as many ranks as
-    MPI has started.
+    """Returns the case with its overrides, for as many ranks as MPI has started, and warnings of how it is written.
+    Rank 0 reads it; all ranks get it, or raise its error.
     """
     found: tuple[Case, list[str]] | None = None
     failure: Exception | None = None
@@ -187,7 +188,7 @@ def _case(options: argparse.Namespace, comm: Comm) -> tuple[Case, list[str]]:
 
 
 def _file(name: str) -> Path:
-    """The file of a case, which may be a shipped one. Raises CaseError."""
+    """Returns the file of a case, which may be a shipped one. Raises CaseError."""
     path = Path(name)
     return load.shipped_path(name) if not path.exists() and not path.suffix else path
 
@@ -199,12 +200,13 @@ def _read(options: argparse.Namespace, ranks: int) -> tuple[Case, list[str]]:
 
 
 def _prepare_folder(folder: Path, comm: Comm) -> AbstractContextManager[Any] | None:
-    """What holds the folder's lock until it is closed, on rank 0; None, on every rank, when another worker has it."""
+    """Returns the holder of the folder's lock on rank 0, an empty holder on the others; None on every rank if
+    another worker has the lock."""
     held: AbstractContextManager[Any] | None = nullcontext()
     if comm.rank == 0:
         (folder / layout.LOGS).mkdir(parents=True, exist_ok=True)
         held = hold(folder)
-        if held is not None and (folder / layout.OUTCOME).exists():  # what asked for that end asks for no other
+        if held is not None and (folder / layout.OUTCOME).exists():  # the request belonged to the earlier attempt
             (folder / layout.STOP_REQUEST).unlink(missing_ok=True)
     if not comm.broadcast(held is not None):
         return None
@@ -222,19 +224,19 @@ def _compute(
     ready_kernels(comm, journal)
     from . import compute
 
-    meshes = _file(options.case).resolve().parent  # where the files begin that it names
+    meshes = _file(options.case).resolve().parent  # relative paths of mesh files start here
     return compute.compute(case, meshes, options.out, comm, journal, signals, began, options.restart, options.use)
 
 
 def ready_kernels(comm: Comm, journal: Journal | None) -> None:
-    """Every rank uses the same kernels: rank 0 hashes the sources and compiles what is missing, the others sleep.
+    """Makes all ranks use the same kernels: rank 0 hashes the sources and compiles missing kernels, the others wait.
 
-    Must come before numba is imported. Raises CompileError, StoppedError on all ranks alike.
+    Must come before numba is imported. Raises CompileError, StoppedError on all ranks.
     """
     failure: ConoidError | None = None
     if comm.rank == 0:
         try:
-            ahead.compile_all(store.cache_folder(), lambda done, total: _say(journal, ahead.words(done, total)))
+            ahead.compile_all(store.cache_folder(), lambda done, total: _report(journal, ahead.words(done, total)))
         except (CompileError, StoppedError) as error:
             failure = error
     comm.await_all()
@@ -244,17 +246,17 @@ def ready_kernels(comm: Comm, journal: Journal | None) -> None:
     store.use_cache(sources)
 
 
-def _say(journal: Journal | None, what: str) -> None:
-    """Reports what the start is doing."""
+def _report(journal: Journal | None, what: str) -> None:
+    """Reports a phase of the start-up."""
     log.info(what)
     if journal is not None:
         journal.starting(what)
 
 
 def _close(outcome: Outcome, options: argparse.Namespace, journal: Journal, telemetry: "Telemetry | None") -> None:
-    """The outcome first, then the last message: whoever receives the last message finds it on disk.
+    """Writes the outcome, then the last message: a reader of the last message finds the outcome on disk.
 
-    An interrupted run has not ended: worker/run/job.py finds out what has interrupted it.
+    An interrupted run has not ended: worker/run/job.py finds the cause of the interruption.
     """
     interrupted = options.interruptible and outcome.state == State.CANCELLED
     if interrupted and not (options.out / layout.STOP_REQUEST).exists():

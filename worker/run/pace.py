@@ -1,19 +1,19 @@
-"""How fast simulated time passes."""
+"""Rate of simulated time against wall time."""
 
 
 class Pace:
-    """Simulated seconds per second of wall time, as a mean that forgets over some ten reports."""
+    """Simulated seconds per second of wall time, as an exponential mean over about ten reports."""
 
     def __init__(self, t: float, began: float) -> None:
         self._last = (t, began)
         self._rate: float | None = None
 
     def add(self, t: float, now: float) -> None:
-        """Notes that time ``t`` was reached at wall time ``now``."""
+        """Adds the report of time ``t``, s, at wall time ``now``, s."""
         rate = (t - self._last[0]) / (now - self._last[1])
         self._rate = rate if self._rate is None else 0.9 * self._rate + 0.1 * rate
         self._last = (t, now)
 
     def left(self, t: float) -> float:
-        """Wall time for another ``t``, s."""
+        """Returns the wall time for another ``t`` of simulated time, s."""
         return t / self._rate if self._rate else 0.0

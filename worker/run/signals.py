@@ -1,4 +1,4 @@
-"""A request to stop from outside: SIGTERM, SIGUSR1 or SIGINT raise a flag; the next step's reduction carries it."""
+"""Requests to stop by SIGTERM, SIGUSR1 or SIGINT: a flag, which the reduction of the next step carries to all ranks."""
 
 import signal
 
@@ -6,7 +6,7 @@ REQUESTS = (signal.SIGTERM, signal.SIGUSR1, signal.SIGINT)
 
 
 class Signals:
-    """Listens from its making on; the set-up of a run is finished before the flag is looked at."""
+    """Handlers of the signals, installed at construction; the flag is first read after the set-up of a run."""
 
     def __init__(self) -> None:
         self.raised = False
