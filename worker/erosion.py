@@ -22,28 +22,8 @@ from .materials.models import EQUATIONS
 from .mesh.faces import FACES
 from .mesh.faces import normals as face_normals
 from .migration.parcel import Parcel
-from .model.state import (
-    CHUNK,
-    DAMAGE,
-    PRESSURE,
-    S_XX,
-    S_XY,
-    S_YY,
-    S_YZ,
-    S_ZX,
-    S_ZZ,
-    VISCOUS,
-    WORK_PLASTIC,
-    WORK_VISCOUS,
-    WORKS,
-    Block,
-    Flags,
-    Floats,
-    Ints,
-    Model,
-    Nodes,
-    extended,
-)
+from .model.rows import DAMAGE, PRESSURE, S_XX, S_XY, S_YY, S_YZ, S_ZX, S_ZZ, VISCOUS, WORK_PLASTIC, WORK_VISCOUS, WORKS
+from .model.state import CHUNK, Block, Flags, Floats, Ints, Model, Nodes, extended
 from .model.topology import Split
 from .parallel.comm import Comm
 from .parallel.fixed_point import Tally

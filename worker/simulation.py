@@ -38,7 +38,8 @@ from .materials.models import eos_of, equation_of, parameters
 from .migration import model as model_of
 from .migration.parcel import Parcel
 from .migration.route import Arrived
-from .model.state import MASS, Floats, Model
+from .model.rows import MASS
+from .model.state import Floats, Model
 from .model.topology import KeptByNode
 from .motion import Leapfrog
 from .parallel import fixed_point

@@ -27,7 +27,8 @@ from conoid.worker.mesh.faces import FACES, areas
 from conoid.worker.mesh.model import TetMesh, check, step_lengths
 from conoid.worker.mesh.order import morton_ordered
 from conoid.worker.mesh.structured import divisions
-from conoid.worker.model.state import INTACT, MASS, Floats, Ints
+from conoid.worker.model.rows import MASS
+from conoid.worker.model.state import INTACT, Floats, Ints
 from conoid.worker.parallel.comm import SerialComm
 from conoid.worker.scene import assembly
 from conoid.worker.simulation import Simulation

@@ -15,7 +15,7 @@ import numpy as np
 from conoid.cases.model import bodies, schema
 from conoid.worker import simulation, step
 from conoid.worker.mesh.model import TetMesh
-from conoid.worker.model import state
+from conoid.worker.model import rows, state
 from conoid.worker.parallel.comm import SerialComm
 from conoid.worker.scene import assembly
 
@@ -95,5 +95,5 @@ class Ride:
         return float((self._plastic_strain() > before).mean()) if len(before) else 0.0
 
     def _plastic_strain(self) -> state.Floats:
-        blocks = [block for block in self.sim.model.blocks if block.has(state.PLASTIC_STRAIN)]
-        return np.concatenate([np.zeros(0), *(block.row(state.PLASTIC_STRAIN) for block in blocks)])
+        blocks = [block for block in self.sim.model.blocks if block.has(rows.PLASTIC_STRAIN)]
+        return np.concatenate([np.zeros(0), *(block.row(rows.PLASTIC_STRAIN) for block in blocks)])

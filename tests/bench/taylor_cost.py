@@ -13,7 +13,7 @@ from conoid.cases.model import schema
 from conoid.worker import step
 from conoid.worker.mesh.build import build as build_mesh
 from conoid.worker.mesh.model import TetMesh
-from conoid.worker.model import state
+from conoid.worker.model import rows, state
 
 from .gather_scatter import GatherScatter
 from .refine import Refined, refined
@@ -23,8 +23,8 @@ from .table import Cell, table
 
 _BAR = "taylor_42crmo4"
 _SIZE = "0.97 mm"
-_EXTENSIVE = (state.WORK, state.WORK_VISCOUS, state.WORK_PLASTIC, state.VOLUME_FLUX)
-_KEPT = (state.MASS,)
+_EXTENSIVE = (rows.WORK, rows.WORK_VISCOUS, rows.WORK_PLASTIC, rows.VOLUME_FLUX)
+_KEPT = (rows.MASS,)
 _KEEP_EVERY = 100
 
 

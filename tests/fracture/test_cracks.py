@@ -10,7 +10,7 @@ from conoid.cases.model import materials, schema
 from conoid.worker import step
 from conoid.worker.fracture.strength import Toughness
 from conoid.worker.mesh.model import TetMesh
-from conoid.worker.model import state
+from conoid.worker.model import rows
 from conoid.worker.model.state import Flags, Floats, Ints
 from conoid.worker.parallel.fixed_point import exact_sums
 from conoid.worker.simulation import Simulation
@@ -76,7 +76,7 @@ def at_rest(sim: Simulation) -> Simulation:
     step.prepare(sim)  # the volumes that tets keep
     nodes.force[:] = 0
     for b in sim.model.blocks:
-        b.state[:, : state.VISCOUS + 1, :] = 0.0
+        b.state[:, : rows.VISCOUS + 1, :] = 0.0
     return sim
 
 

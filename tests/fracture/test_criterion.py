@@ -16,7 +16,8 @@ from conoid.worker.fracture.strength import Toughness, toughness
 from conoid.worker.fracture.strength import required as required_traction
 from conoid.worker.mesh.faces import FACES
 from conoid.worker.model import state
-from conoid.worker.model.state import CHUNK, MASS, PRESSURE, S_XX, S_XY, VISCOUS, Floats, Ints
+from conoid.worker.model.rows import MASS, PRESSURE, S_XX, S_XY, VISCOUS
+from conoid.worker.model.state import CHUNK, Floats, Ints
 from conoid.worker.simulation import Simulation
 
 from ..contact.bodies import meeting_of

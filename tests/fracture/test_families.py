@@ -13,7 +13,7 @@ from conoid.cases.model import materials, schema
 from conoid.worker import step
 from conoid.worker.fracture.strength import Toughness
 from conoid.worker.mesh.model import TetMesh
-from conoid.worker.model import state
+from conoid.worker.model import rows
 from conoid.worker.model.state import Floats, Ints
 from conoid.worker.parallel.fixed_point import exact_sums
 from conoid.worker.simulation import Simulation
@@ -91,7 +91,7 @@ def at_rest(sim: Simulation, axes: Sequence[int] = (0, 2)) -> Simulation:
     assert sim.model.nodes_global == (2**planes).sum()
     nodes.x[:], nodes.v[:], nodes.force[:] = nodes.x0, 0.0, 0
     for b in sim.model.blocks:
-        b.state[:, : state.VISCOUS + 1, :] = 0.0
+        b.state[:, : rows.VISCOUS + 1, :] = 0.0
     return sim
 
 

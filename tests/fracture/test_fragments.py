@@ -16,7 +16,8 @@ from scipy.sparse.csgraph import connected_components
 from conoid.cases.output import fragments as tables
 from conoid.worker.fracture import connectivity, fragments, numbers
 from conoid.worker.mesh.faces import FACES, across
-from conoid.worker.model.state import MASS, Block, Model, Nodes, chunked
+from conoid.worker.model.rows import MASS
+from conoid.worker.model.state import Block, Model, Nodes, chunked
 from conoid.worker.parallel.comm import Comm, SerialComm
 
 from ..contact.ranks import on_ranks

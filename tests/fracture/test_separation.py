@@ -16,7 +16,8 @@ from conoid.worker.fracture.facets import mesh_of
 from conoid.worker.fracture.separation import Separation
 from conoid.worker.mesh.faces import FACES, across
 from conoid.worker.mesh.model import TetMesh
-from conoid.worker.model.state import BROKEN, INTACT, MASS, Floats, Ints, Model
+from conoid.worker.model.rows import MASS
+from conoid.worker.model.state import BROKEN, INTACT, Floats, Ints, Model
 from conoid.worker.parallel.comm import Comm
 from conoid.worker.parallel.fixed_point import exact_sums
 from conoid.worker.simulation import Simulation

@@ -10,7 +10,8 @@ from scipy.integrate import cumulative_simpson
 from conoid.cases import load
 from conoid.worker import simulation, step
 from conoid.worker.mesh.faces import FACES
-from conoid.worker.model.state import CHUNK, PRESSURE, Ints
+from conoid.worker.model.rows import PRESSURE
+from conoid.worker.model.state import CHUNK, Ints
 from conoid.worker.parallel.comm import SerialComm
 from conoid.worker.simulation import Simulation
 

@@ -9,7 +9,8 @@ import pytest
 from conoid.cases import load
 from conoid.worker import simulation
 from conoid.worker.mesh.faces import FACES, across
-from conoid.worker.model.state import INTACT, MASS, Ints
+from conoid.worker.model.rows import MASS
+from conoid.worker.model.state import INTACT, Ints
 from conoid.worker.parallel.comm import SerialComm
 from conoid.worker.simulation import Simulation
 

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from conoid.worker.model.state import CHUNK, DAMAGE, Block, Model, Nodes
+from conoid.worker.model.rows import DAMAGE
+from conoid.worker.model.state import CHUNK, Block, Model, Nodes
 from conoid.worker.snapshots.share import copied
 
 

@@ -14,7 +14,7 @@ from conoid.cases.reading.library import library
 from conoid.worker import simulation, step
 from conoid.worker.contact import common_volume
 from conoid.worker.mesh.model import TetMesh
-from conoid.worker.model import state
+from conoid.worker.model import rows
 from conoid.worker.parallel.comm import SerialComm
 from conoid.worker.simulation import Simulation
 
@@ -420,7 +420,7 @@ def test_irregular_plates_keep_the_pressure_of_their_impact() -> None:
     )  # fmt: skip
     sim = run(simulation.build(case, Path(), SerialComm()))
     height = np.concatenate([sim.model.nodes.x0[part.tets].mean(axis=1)[:, 2] for part in sim.model.blocks])
-    found, mass = (np.concatenate([part.row(k) for part in sim.model.blocks]) for k in (state.PRESSURE, state.MASS))
+    found, mass = (np.concatenate([part.row(k) for part in sim.model.blocks]) for k in (rows.PRESSURE, rows.MASS))
     for low, high in ((-0.6e-3, -0.1e-3), (-0.1e-3, 0.1e-3), (0.1e-3, 0.6e-3)):
         inside = (height > low) & (height < high)
         assert np.average(found[inside], weights=mass[inside]) == pytest.approx(pressure, rel=0.015)
@@ -465,9 +465,9 @@ def shocked(name: str, viscosity: dict[str, float]) -> Floats:
     sim = run(build(case, [block((1, 1, cells), size, 0.0)]))
     (row,) = sim.model.blocks
     layer = (sim.model.nodes.x0[row.tets].mean(axis=1)[:, 2] / size).astype(int)
-    total = row.row(state.MASS) * (row.row(state.PRESSURE) + row.row(state.VISCOUS))
+    total = row.row(rows.MASS) * (row.row(rows.PRESSURE) + row.row(rows.VISCOUS))
     return np.asarray(
-        np.bincount(layer, total) / np.bincount(layer, row.row(state.MASS)) / (metal.density * front * speed)
+        np.bincount(layer, total) / np.bincount(layer, row.row(rows.MASS)) / (metal.density * front * speed)
     )
 
 

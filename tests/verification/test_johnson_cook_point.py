@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from conoid.cases.model.materials import JohnsonCook
-from conoid.worker.model.state import PLASTIC_STRAIN, TEMPERATURE
+from conoid.worker.model.rows import PLASTIC_STRAIN, TEMPERATURE
 
 from ..worker import formulas
 from ..worker.kernels import STEEL_42CRMO4, drive

@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from conoid.worker.model.state import PRESSURE, S_XX, S_XY, S_YY
+from conoid.worker.model.rows import PRESSURE, S_XX, S_XY, S_YY
 
 from ..worker import formulas
 from ..worker.kernels import FORMS, HARD, STEEL, Form, Patch

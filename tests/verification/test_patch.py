@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 
 from conoid.cases import load
 from conoid.worker import simulation
-from conoid.worker.model.state import PRESSURE, S_ZZ
+from conoid.worker.model.rows import PRESSURE, S_ZZ
 from conoid.worker.parallel.comm import SerialComm
 from conoid.worker.simulation import Simulation
 

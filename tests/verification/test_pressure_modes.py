@@ -9,7 +9,7 @@ import pytest
 from conoid.cases.model import bodies, materials
 from conoid.worker.mesh.build import build as build_mesh
 from conoid.worker.mesh.structured import structured
-from conoid.worker.model.state import PLASTIC_STRAIN, PRESSURE, S_XX, S_XY
+from conoid.worker.model.rows import PLASTIC_STRAIN, PRESSURE, S_XX, S_XY
 from conoid.worker.simulation import Simulation
 
 from ..worker import formulas

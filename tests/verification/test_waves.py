@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from conoid.worker.model.state import WORK
+from conoid.worker.model.rows import WORK
 from conoid.worker.simulation import Simulation
 
 from ..worker.kernels import FORMS, STEEL, Form, build, run, scene

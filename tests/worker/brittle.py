@@ -7,7 +7,7 @@ import numpy as np
 
 from conoid.cases.model import materials
 from conoid.worker.mesh.model import TetMesh
-from conoid.worker.model.state import PRESSURE
+from conoid.worker.model.rows import PRESSURE
 
 from . import formulas
 from .kernels import GLASS, Patch

@@ -17,7 +17,7 @@ from conoid.worker import simulation, step
 from conoid.worker.boundaries.boundaries import Boundary
 from conoid.worker.materials import law
 from conoid.worker.mesh.model import TetMesh
-from conoid.worker.model import state
+from conoid.worker.model import rows, state
 from conoid.worker.parallel import fixed_point
 from conoid.worker.parallel.comm import SerialComm
 from conoid.worker.scene import assembly, domain
@@ -117,7 +117,7 @@ class Patch:
     def advance(self, dt: float) -> None:
         """One pass: x(n+1) and v(n+1/2) stand in ``nodes``; stress and forces become those of n+1."""
         if self.block.params[law.ORDER] == law.FROM_SHAPE:
-            self.put(state.TET_VOLUME, formulas.volumes(self.corners(self.nodes.x - dt * self.nodes.v)))
+            self.put(rows.TET_VOLUME, formulas.volumes(self.corners(self.nodes.x - dt * self.nodes.v)))
         self._used = self.scale or self.sim.next_scale()
         self.nodes.force[:] = 0
         self.elements.advance(dt, self._used)
@@ -154,19 +154,19 @@ class Patch:
     @property
     def deviator(self) -> Floats:
         """(n, 3, 3) deviatoric stress, Pa."""
-        xx, yy, zz, yz, zx, xy = (self.get(row) for row in range(state.S_XX, state.S_XY + 1))
+        xx, yy, zz, yz, zx, xy = (self.get(row) for row in range(rows.S_XX, rows.S_XY + 1))
         return np.stack([xx, xy, zx, xy, yy, yz, zx, yz, zz], axis=1).reshape(-1, 3, 3)
 
     @deviator.setter
     def deviator(self, s: Floats) -> None:
         places = [(0, 0), (1, 1), (2, 2), (1, 2), (2, 0), (0, 1)]
-        for row, (i, j) in zip(range(state.S_XX, state.S_XY + 1), places, strict=True):
+        for row, (i, j) in zip(range(rows.S_XX, rows.S_XY + 1), places, strict=True):
             self.put(row, s[:, i, j])
 
     @property
     def stress(self) -> Floats:
         """(n, 3, 3) Cauchy stress, the viscous part included, Pa."""
-        pressure = self.get(state.PRESSURE) + self.get(state.VISCOUS)
+        pressure = self.get(rows.PRESSURE) + self.get(rows.VISCOUS)
         return np.asarray(self.deviator - pressure[:, None, None] * np.eye(3))
 
     @property

@@ -10,7 +10,7 @@ from conoid.cases.model import schema
 from conoid.cases.model.bodies import Box
 from conoid.worker import simulation
 from conoid.worker.elements.barrier import SQUEEZED, STIFF
-from conoid.worker.model.state import PRESSURE, VISCOUS, WORK
+from conoid.worker.model.rows import PRESSURE, VISCOUS, WORK
 from conoid.worker.parallel.comm import SerialComm
 
 from . import formulas

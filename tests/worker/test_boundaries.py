@@ -14,7 +14,9 @@ from conoid.worker.boundaries.drivers import Traction
 from conoid.worker.boundaries.walls import RigidWalls
 from conoid.worker.errors import InputError
 from conoid.worker.mesh.faces import boundary_faces
-from conoid.worker.model.state import PRESSURE, S_ZZ, WORK, Flags, Load
+from conoid.worker.model.loads import Load
+from conoid.worker.model.rows import PRESSURE, S_ZZ, WORK
+from conoid.worker.model.state import Flags
 from conoid.worker.parallel.comm import SerialComm
 from conoid.worker.scene import domain
 from conoid.worker.simulation import Simulation

@@ -10,7 +10,8 @@ from conoid.cases.outcome import Compressed
 from conoid.cases.warnings.compression import borne, griffith
 from conoid.worker import step
 from conoid.worker.elements.crushing import crushed, hardest, principal
-from conoid.worker.model.state import CHUNK, PRESSURE, S_XX, S_XY, S_YY, S_YZ, S_ZX, S_ZZ
+from conoid.worker.model.rows import PRESSURE, S_XX, S_XY, S_YY, S_YZ, S_ZX, S_ZZ
+from conoid.worker.model.state import CHUNK
 from conoid.worker.simulation import Simulation
 
 from . import formulas

@@ -4,7 +4,7 @@ import numpy as np
 import numpy.typing as npt
 
 from conoid.worker.accounts.digest import digest
-from conoid.worker.model.state import WORK
+from conoid.worker.model.rows import WORK
 from conoid.worker.parallel.comm import SerialComm
 from conoid.worker.simulation import Simulation
 

@@ -11,7 +11,7 @@ from conoid.cases.model import materials
 from conoid.cases.reading.library import library
 from conoid.worker import simulation
 from conoid.worker.mesh.model import TetMesh
-from conoid.worker.model.state import DILATION, PLASTIC_STRAIN, PRESSURE, S_ZZ, WORK, WORK_AVERAGED, WORK_PLASTIC
+from conoid.worker.model.rows import DILATION, PLASTIC_STRAIN, PRESSURE, S_ZZ, WORK, WORK_AVERAGED, WORK_PLASTIC
 from conoid.worker.parallel.comm import SerialComm
 
 from . import formulas

@@ -9,7 +9,7 @@ import pytest
 from conoid.cases.model.materials import MieGruneisen
 from conoid.worker import step
 from conoid.worker.errors import PhysicsError
-from conoid.worker.model.state import MASS, PRESSURE, VOLUME_RATIO, WORK, WORK_VISCOUS
+from conoid.worker.model.rows import MASS, PRESSURE, VOLUME_RATIO, WORK, WORK_VISCOUS
 from conoid.worker.simulation import Simulation
 
 from . import formulas

@@ -16,7 +16,7 @@ from conoid.worker.gauges import reference
 from conoid.worker.gauges.probes import tet_volumes
 from conoid.worker.mesh.faces import across, boundary_faces
 from conoid.worker.mesh.model import TetMesh
-from conoid.worker.model import state
+from conoid.worker.model import rows, state
 from conoid.worker.simulation import Simulation
 
 from ..contact.bodies import meeting_of, moved
@@ -123,7 +123,7 @@ def test_the_heat_of_what_leaves_is_counted_where_its_pressure_sees_heat(materia
     """What the line ``eroded`` may be below zero by: 2 J of viscosity in each tet, nothing for another pressure."""
     sim = alone(block((2, 2, 2), MM), material=material)
     part = sim.model.blocks[0]
-    part.state[:, state.WORK_VISCOUS] = 2.0
+    part.state[:, rows.WORK_VISCOUS] = 2.0
     step.prepare(sim)
     tick(sim, part.id[:5].copy())
     assert sim.erosion is not None
@@ -301,20 +301,20 @@ def test_what_a_tiring_tet_covers_comes_to_the_surface_without_a_search() -> Non
     tick(sim, part.id[:1])
     inner = np.flatnonzero((behind[part.id] >= 0).all(axis=1))[0]
     tired, covers = int(part.id[inner]), behind[part.id[inner]]
-    part.state[inner // state.CHUNK, state.PLASTIC_STRAIN, inner % state.CHUNK] = 0.6
+    part.state[inner // state.CHUNK, rows.PLASTIC_STRAIN, inner % state.CHUNK] = 0.6
     searches.due = True
     tick(sim)
     many, scene = searches.many, searches.scene
     assert scene is not None
-    rows = scene.rows_of(covers)
-    assert len(rows) == 4
-    assert not scene.faces.exposed[rows].any()
+    at = scene.rows_of(covers)
+    assert len(at) == 4
+    assert not scene.faces.exposed[at].any()
     tick(sim, np.array([tired]))
     assert searches.many == many
     assert searches.scene is scene
-    assert scene.faces.exposed[rows].all()
+    assert scene.faces.exposed[at].all()
     assert not scene.faces.exposed[scene.rows_of(4 * tired + np.arange(4))].any()
-    corners = scene.faces.corners[rows, :3]
+    corners = scene.faces.corners[at, :3]
     assert scene.slots.on_surface[corners].all()
     assert scene.slots.live[corners].all()
     assert (part.across[np.isin(part.id, covers // 4)] == state.LAID_BARE).sum() >= 4
@@ -476,7 +476,7 @@ def test_damage_that_takes_no_tet_is_told(ranks: int) -> None:
         assert sim.erosion is not None
         step.prepare(sim)
         for part in sim.model.blocks:
-            part.state[0, state.DAMAGE, 0] = (0.2, 0.4, 0.4)[part.part]
+            part.state[0, rows.DAMAGE, 0] = (0.2, 0.4, 0.4)[part.part]
         sim.free()
         return [sim.erosion.warnings(eroded) for eroded in (0, 1)]
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from conoid.worker.elements.tet4 import quanta
-from conoid.worker.model.state import WORK
+from conoid.worker.model.rows import WORK
 from conoid.worker.parallel import fixed_point
 from conoid.worker.parallel.comm import SerialComm
 from conoid.worker.parallel.fixed_point import (

@@ -11,7 +11,7 @@ from conoid.worker.elements import rest
 from conoid.worker.elements.flat import THINNEST, flat_tets
 from conoid.worker.gauges.probes import tet_volumes
 from conoid.worker.mesh.model import TetMesh
-from conoid.worker.model import state
+from conoid.worker.model import rows
 from conoid.worker.simulation import Simulation
 
 from .brittle import brittle, stretched
@@ -78,12 +78,12 @@ def test_a_flat_tet_dilates_as_in_the_standard_form(form: Form) -> None:
     found = []
     for each in (form, "standard"):
         tet = Patch(mesh, brittle(1e7, 0.7, dilation_angle=0.5), each)
-        tet.put(state.PRESSURE, 1e8)
+        tet.put(rows.PRESSURE, 1e8)
         pressures = []
         for _ in range(6):
             stretched(tet, np.array([[0.0, 3e4, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, -1e3]]))
-            pressures.append(float(tet.get(state.PRESSURE)[0]))
-        found.append([*pressures, float(tet.get(state.WORK)[0])])
+            pressures.append(float(tet.get(rows.PRESSURE)[0]))
+        found.append([*pressures, float(tet.get(rows.WORK)[0])])
     assert found[1][5] > found[1][4] > found[1][0]
     assert np.allclose(found[0], found[1], rtol=1e-6)
 
@@ -108,7 +108,7 @@ def test_an_even_compression_has_one_pressure(material: "object", form: Form) ->
         patch.nodes.v[:] = -1e4 * patch.nodes.x
         patch.nodes.x += 1e-8 * patch.nodes.v
         patch.advance(1e-8)
-    pressure = patch.get(state.PRESSURE)
+    pressure = patch.get(rows.PRESSURE)
     assert pressure.min() > 1e7
     assert np.ptp(pressure) < 1e-8 * pressure.max()
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from conoid.cases.reading.library import library
-from conoid.worker.model.state import MASS, PRESSURE, WORK, WORK_PLASTIC
+from conoid.worker.model.rows import MASS, PRESSURE, WORK, WORK_PLASTIC
 
 from .kernels import COPPER_GAS, Form, Patch, build, run, scene
 from .meshes import block, free_tets

@@ -9,7 +9,7 @@ import pytest
 from conoid.cases.model.materials import Material
 from conoid.worker.materials.hyperelastic import inverse_sixth_root
 from conoid.worker.mesh.model import TetMesh
-from conoid.worker.model.state import DISTORTION, PRESSURE, TET_VOLUME, WORK
+from conoid.worker.model.rows import DISTORTION, PRESSURE, TET_VOLUME, WORK
 from conoid.worker.simulation import Simulation
 
 from . import formulas

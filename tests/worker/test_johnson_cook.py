@@ -10,7 +10,8 @@ from conoid.cases.model.materials import JohnsonCook
 from conoid.worker.elements.tet4 import TRIAL, VOLUME_MID
 from conoid.worker.materials.johnson_cook import gather, increments, initial_yield
 from conoid.worker.mesh.model import TetMesh
-from conoid.worker.model.state import CHUNK, FLOW, MASS, PLASTIC_STRAIN, TEMPERATURE, WORK_PLASTIC, YIELD
+from conoid.worker.model.rows import FLOW, MASS, PLASTIC_STRAIN, TEMPERATURE, WORK_PLASTIC, YIELD
+from conoid.worker.model.state import CHUNK
 
 from . import formulas
 from .kernels import STEEL_42CRMO4, Patch, drive

@@ -10,8 +10,8 @@ from conoid.cases.model.schema import Erosion
 from conoid.cases.reading.library import library
 from conoid.worker.elements import wear
 from conoid.worker.mesh.model import TetMesh
-from conoid.worker.model.state import DAMAGE, FLOW, PLASTIC_STRAIN, PRESSURE
-from conoid.worker.model.state import TEMPERATURE as HEAT
+from conoid.worker.model.rows import DAMAGE, FLOW, PLASTIC_STRAIN, PRESSURE
+from conoid.worker.model.rows import TEMPERATURE as HEAT
 
 from . import formulas
 from .kernels import Patch

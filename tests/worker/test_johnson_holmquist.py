@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 from conoid.cases.laws.johnson_holmquist import JohnsonHolmquist
 from conoid.cases.model.materials import Material
 from conoid.cases.reading.library import library
-from conoid.worker.model.state import BULKING, DAMAGE, MASS, PLASTIC_STRAIN, PRESSURE, S_ZZ, WORK, WORK_PLASTIC
+from conoid.worker.model.rows import BULKING, DAMAGE, MASS, PLASTIC_STRAIN, PRESSURE, S_ZZ, WORK, WORK_PLASTIC
 from conoid.worker.simulation import Simulation
 
 from .kernels import Form, Patch, build, run, scene

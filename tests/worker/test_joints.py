@@ -14,7 +14,8 @@ from conoid.worker import step
 from conoid.worker.accounts import digest
 from conoid.worker.errors import InputError, MeshError
 from conoid.worker.mesh.model import TetMesh
-from conoid.worker.model.state import PRESSURE, S_ZZ, VISCOUS, Load
+from conoid.worker.model.loads import Load
+from conoid.worker.model.rows import PRESSURE, S_ZZ, VISCOUS
 from conoid.worker.scene import assembly
 from conoid.worker.simulation import Simulation
 

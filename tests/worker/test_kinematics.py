@@ -5,7 +5,7 @@ import pytest
 
 from conoid.cases.model.materials import Material
 from conoid.worker.mesh.model import TetMesh
-from conoid.worker.model.state import PRESSURE, WORK
+from conoid.worker.model.rows import PRESSURE, WORK
 
 from . import formulas
 from .kernels import HARD, STEEL, Patch

@@ -10,7 +10,7 @@ from conoid.cases.model.materials import Material, MieGruneisen, Strength
 from conoid.cases.reading.library import library
 from conoid.worker.elements import tet4
 from conoid.worker.materials import law, models
-from conoid.worker.model import state
+from conoid.worker.model import rows, state
 
 from .kernels import COPPER, COPPER_GAS, GLASS, STEEL, STEEL_42CRMO4
 
@@ -31,8 +31,8 @@ def chunk(made: Material, seed: int) -> tuple["np.ndarray", "np.ndarray", "np.nd
     s = np.zeros((models.rows_of(made, "nodal"), state.CHUNK))
     for row, value in models.beginning(made, 300.0).items():
         s[row : row + 1] = value
-    s[: state.S_XY + 1] = random.uniform(-0.1, 0.1, (6, state.CHUNK)) * made.elastic.young
-    s[state.MASS], s[state.PRESSURE] = made.density, 0.01 * made.elastic.young
+    s[: rows.S_XY + 1] = random.uniform(-0.1, 0.1, (6, state.CHUNK)) * made.elastic.young
+    s[rows.MASS], s[rows.PRESSURE] = made.density, 0.01 * made.elastic.young
     return w, s.reshape(-1), models.parameters(made, None)
 
 
@@ -87,5 +87,5 @@ def test_a_vector_of_constants_has_room_for_every_law() -> None:
 
 def test_a_law_of_the_case_counts_damage_where_its_tets_have_a_row_for_it() -> None:
     counting = [made.strength is not None and made.strength.counts_damage for made in MATERIALS]
-    assert counting == [models.law_of(made).rows(made.strength) > state.DAMAGE for made in MATERIALS]
+    assert counting == [models.law_of(made).rows(made.strength) > rows.DAMAGE for made in MATERIALS]
     assert 0 < sum(counting) < len(MATERIALS)

@@ -10,7 +10,7 @@ import pytest
 from conoid.cases.messages import Energy
 from conoid.cases.model import materials
 from conoid.worker.errors import EnergyError
-from conoid.worker.model.state import WORK, WORK_PLASTIC, WORK_VISCOUS
+from conoid.worker.model.rows import WORK, WORK_PLASTIC, WORK_VISCOUS
 from conoid.worker.simulation import Simulation
 
 from .kernels import COPPER, COPPER_GAS, FORMS, GLASS, HARD, STEEL, STEEL_42CRMO4, Form, build, run, scene

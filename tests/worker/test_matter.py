@@ -8,7 +8,7 @@ import pytest
 from conoid.cases.model import materials
 from conoid.worker.elements.averaging import AveragedElements
 from conoid.worker.elements.matter import PORES_AT, PRESSURE_AT
-from conoid.worker.model.state import PORES, PRESSURE
+from conoid.worker.model.rows import PORES, PRESSURE
 from conoid.worker.simulation import Simulation
 
 from .kernels import COPPER, Form, build, run, scene

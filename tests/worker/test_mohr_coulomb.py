@@ -7,7 +7,8 @@ import pytest
 
 from conoid.cases.model import materials
 from conoid.worker.mesh.model import TetMesh
-from conoid.worker.model.state import CHUNK, PLASTIC_STRAIN, PRESSURE, WORK, WORK_PLASTIC
+from conoid.worker.model.rows import PLASTIC_STRAIN, PRESSURE, WORK, WORK_PLASTIC
+from conoid.worker.model.state import CHUNK
 
 from . import formulas
 from .brittle import BULK, DT, PHI, SHEAR, C, brittle, free, random_deviators, rotations, stretched

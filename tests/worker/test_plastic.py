@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from conoid.worker.model.state import PLASTIC_STRAIN, WORK, WORK_PLASTIC, YIELD
+from conoid.worker.model.rows import PLASTIC_STRAIN, WORK, WORK_PLASTIC, YIELD
 
 from . import formulas
 from .kernels import COPPER, HARD, Patch, drive

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from conoid.worker.model.state import PRESSURE, WORK
+from conoid.worker.model.rows import PRESSURE, WORK
 
 from . import formulas
 from .kernels import FORMS, STEEL, Form, Patch

@@ -17,7 +17,7 @@ from conoid.worker.errors import InputError
 from conoid.worker.mesh.model import TetMesh
 from conoid.worker.mesh.scale import scaled
 from conoid.worker.mesh.structured import structured
-from conoid.worker.model.state import Load
+from conoid.worker.model.loads import Load
 from conoid.worker.scene import assembly, conditions, selection
 from conoid.worker.scene.assembly import Whole
 

@@ -9,7 +9,7 @@ import pytest
 from conoid.worker.elements.tet4 import LENGTH_FACTOR
 from conoid.worker.materials.law import BREAKS
 from conoid.worker.mesh.model import TetMesh
-from conoid.worker.model.state import PRESSURE, VISCOUS, WORK, WORK_VISCOUS
+from conoid.worker.model.rows import PRESSURE, VISCOUS, WORK, WORK_VISCOUS
 from conoid.worker.simulation import Simulation
 
 from . import formulas

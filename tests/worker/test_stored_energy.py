@@ -18,7 +18,7 @@ from conoid.cases.reading.library import library
 from conoid.worker.elements.averaging import AveragedElements
 from conoid.worker.elements.matter import PRESSURE_AT, RATIO
 from conoid.worker.materials import law
-from conoid.worker.model.state import (
+from conoid.worker.model.rows import (
     BULKING,
     CORNERS,
     DAMAGE,

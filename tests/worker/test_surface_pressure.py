@@ -12,7 +12,8 @@ from conoid.cases.model import materials, schema
 from conoid.worker import step
 from conoid.worker.boundaries.surface_pressure import SurfacePressure
 from conoid.worker.mesh.faces import boundary_faces
-from conoid.worker.model.state import MASS, PRESSURE, S_XX, S_XY, S_YY, WIDE, Ints
+from conoid.worker.model.rows import MASS, PRESSURE, S_XX, S_XY, S_YY
+from conoid.worker.model.state import WIDE, Ints
 from conoid.worker.simulation import Simulation
 
 from .kernels import COPPER, STEEL, Floats, build, run, scene

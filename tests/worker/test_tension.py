@@ -14,7 +14,7 @@ from conoid.cases.model.motion import Stretch
 from conoid.cases.model.schema import Erosion
 from conoid.cases.reading.library import library
 from conoid.worker import simulation
-from conoid.worker.model.state import MASS, PORES, PRESSURE, VOLUME_RATIO, WORK, WORK_PLASTIC
+from conoid.worker.model.rows import MASS, PORES, PRESSURE, VOLUME_RATIO, WORK, WORK_PLASTIC
 from conoid.worker.parallel.comm import SerialComm
 
 from .kernels import COPPER_GAS, STEEL, Patch, run

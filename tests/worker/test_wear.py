@@ -9,7 +9,7 @@ import pytest
 from conoid.cases.model import schema
 from conoid.worker import step
 from conoid.worker.elements import tet4, wear
-from conoid.worker.model import state
+from conoid.worker.model import rows
 from conoid.worker.model.state import CHUNK, Block
 from conoid.worker.parallel.comm import Comm, SerialComm
 from conoid.worker.parallel.fixed_point import Tally
@@ -35,16 +35,16 @@ def differ(one: Floats, two: Floats) -> "np.ndarray":
 class Chunk:
     """Seven sound tets as the pass over the elements has them; the one in the middle is spoiled."""
 
-    def __init__(self, rows: int = state.TEMPERATURE + 1) -> None:
-        self.n, self.rows = 7, rows
+    def __init__(self, count: int = rows.TEMPERATURE + 1) -> None:
+        self.n, self.rows = 7, count
         random = np.random.default_rng(7)
-        self.w, self.s = random.normal(size=tet4.SCRATCH), random.normal(size=(rows, CHUNK))
+        self.w, self.s = random.normal(size=tet4.SCRATCH), random.normal(size=(count, CHUNK))
         self.w[tet4.VOLUME : tet4.VOLUME + CHUNK] = VOLUME
         self.w[tet4.LIMIT : tet4.LIMIT + CHUNK] = FREQUENCY
         self.params = np.array([8000.0])
-        self.s[state.MASS] = 8000.0 * VOLUME
-        if rows > state.PLASTIC_STRAIN:
-            self.s[state.PLASTIC_STRAIN] = 0.1
+        self.s[rows.MASS] = 8000.0 * VOLUME
+        if count > rows.PLASTIC_STRAIN:
+            self.s[rows.PLASTIC_STRAIN] = 0.1
         self.worn = np.zeros(self.n, bool)
 
     def mark(self) -> int:
@@ -55,13 +55,13 @@ class Chunk:
     def changed(self) -> tuple[list[int], list[tuple[int, int]]]:
         """Places of the scratch, and (row, tet) of the state, that the call has changed."""
         w = np.flatnonzero(differ(self.w, self.w_then))
-        rows, tets = np.nonzero(differ(self.s, self.s_then))
-        return w.tolist(), list(zip(rows.tolist(), tets.tolist(), strict=True))
+        places, tets = np.nonzero(differ(self.s, self.s_then))
+        return w.tolist(), list(zip(places.tolist(), tets.tolist(), strict=True))
 
 
 def test_a_sound_chunk_is_left_alone() -> None:
     chunk = Chunk()
-    chunk.s[state.PLASTIC_STRAIN] = LIFE[wear.STRAIN]
+    chunk.s[rows.PLASTIC_STRAIN] = LIFE[wear.STRAIN]
     chunk.w[tet4.LIMIT : tet4.LIMIT + CHUNK] = LIFE[wear.FREQUENCY]
     assert chunk.mark() == wear.SOUND
     assert not chunk.worn.any()
@@ -70,7 +70,7 @@ def test_a_sound_chunk_is_left_alone() -> None:
 
 def test_a_tet_that_has_strained_enough_is_tired_and_keeps_what_it_has() -> None:
     chunk = Chunk()
-    chunk.s[state.PLASTIC_STRAIN, 3] = 0.5001
+    chunk.s[rows.PLASTIC_STRAIN, 3] = 0.5001
     assert chunk.mark() == wear.TIRED
     assert np.flatnonzero(chunk.worn).tolist() == [3]
     assert chunk.changed() == ([], [])
@@ -82,32 +82,32 @@ def test_a_tet_that_has_strained_enough_is_tired_and_keeps_what_it_has() -> None
 def test_a_flat_or_swollen_or_stiff_tet_is_broken_and_limits_the_step_no_more(row: int, value: float) -> None:
     chunk = Chunk()
     chunk.w[row + 3] = value
-    chunk.s[state.PLASTIC_STRAIN, 5] = 0.6
+    chunk.s[rows.PLASTIC_STRAIN, 5] = 0.6
     assert chunk.mark() == wear.BROKEN
     assert np.flatnonzero(chunk.worn).tolist() == [3, 5]
     assert chunk.changed() == ([tet4.LIMIT + 3], [])
     assert chunk.w[tet4.LIMIT + 3] == 0.0
 
 
-@pytest.mark.parametrize("rows", [state.VOLUME_FLUX, state.TEMPERATURE + 1])
+@pytest.mark.parametrize("count", [rows.VOLUME_FLUX, rows.TEMPERATURE + 1])
 @pytest.mark.parametrize("value", [-0.5, 0.0])
-def test_a_tet_inside_out_acts_on_nobody(value: float, rows: int) -> None:
-    chunk = Chunk(rows)
+def test_a_tet_inside_out_acts_on_nobody(value: float, count: int) -> None:
+    chunk = Chunk(count)
     chunk.w[tet4.VOLUME + 3] = value * VOLUME
     chunk.w[tet4.LIMIT + 3] = np.nan
     assert chunk.mark() == wear.BROKEN
     assert np.flatnonzero(chunk.worn).tolist() == [3]
-    assert (chunk.s[: state.VISCOUS + 1, 3] == 0.0).all()
+    assert (chunk.s[: rows.VISCOUS + 1, 3] == 0.0).all()
     w, s = chunk.changed()
     assert w == [tet4.LIMIT + 3]
     assert chunk.w[tet4.LIMIT + 3] == 0.0
     assert {tet for _, tet in s} == {3}
-    assert {row for row, _ in s} <= {*range(state.VISCOUS + 1)}
+    assert {row for row, _ in s} <= {*range(rows.VISCOUS + 1)}
 
 
 @pytest.mark.parametrize("volume", [1.0, -0.5])
 @pytest.mark.parametrize(
-    ("row", "value"), [*((row, np.nan) for row in range(8)), (6, -np.inf), (state.WORK, np.nan), (-1, np.nan)]
+    ("row", "value"), [*((row, np.nan) for row in range(8)), (6, -np.inf), (rows.WORK, np.nan), (-1, np.nan)]
 )
 def test_what_is_not_a_number_stays_so_and_ends_the_run(row: int, value: float, volume: float) -> None:
     """The limit of the step becomes NaN: step.py stops there and names the tet. No NaN is turned into a zero."""
@@ -123,7 +123,7 @@ def test_what_is_not_a_number_stays_so_and_ends_the_run(row: int, value: float, 
 
 
 def test_a_block_without_plastic_strain_wears_by_its_shape_only() -> None:
-    chunk = Chunk(state.VOLUME_FLUX)
+    chunk = Chunk(rows.VOLUME_FLUX)
     assert chunk.mark() == wear.SOUND
     chunk.w[tet4.VOLUME + 6] = 4.0 * VOLUME
     assert chunk.mark() == wear.BROKEN

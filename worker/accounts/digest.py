@@ -4,7 +4,8 @@ import hashlib
 
 import numpy as np
 
-from ..model.state import VOLUME_FLUX, Floats, Model
+from ..model.rows import VOLUME_FLUX
+from ..model.state import Floats, Model
 from ..parallel.comm import Comm
 
 

@@ -29,7 +29,8 @@ from ..errors import EnergyError
 from ..fracture.stage import Fracture
 from ..kernels.jit import njit, types
 from ..materials.law import BULK, DENSITY
-from ..model.state import WORKS, Flags, Floats, Indices, Model, Nodes
+from ..model.rows import WORKS
+from ..model.state import Flags, Floats, Indices, Model, Nodes
 from ..parallel.arguments import reader
 from ..parallel.comm import Comm
 from ..parallel.fixed_point import Columns, Grouped, Table, Tally, exact_sums, totals_and_words

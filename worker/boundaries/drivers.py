@@ -9,7 +9,8 @@ import numpy as np
 from ..kernels.jit import Kernel
 from ..materials.turning import sine_and_cosine
 from ..migration.parcel import Parcel
-from ..model.state import Bits, Floats, Indices, Ints, Load, Nodes, extended
+from ..model.loads import Load
+from ..model.state import Bits, Floats, Indices, Ints, Nodes, extended
 from ..model.topology import Split
 from ..parallel.arguments import Arguments
 from . import impulses

@@ -17,7 +17,8 @@ from conoid.cases.model.schema import Traction
 
 from ..kernels.jit import njit
 from ..migration.parcel import Parcel
-from ..model.state import WIDE, Bits, Block, Flags, Floats, Indices, Ints, LoadedFaces, Model, Nodes
+from ..model.loads import LoadedFaces
+from ..model.state import WIDE, Bits, Block, Flags, Floats, Indices, Ints, Model, Nodes
 from ..model.topology import Split
 from ..parallel.arguments import Arguments
 from ..parallel.comm import Comm

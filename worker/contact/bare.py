@@ -13,7 +13,8 @@ import numpy as np
 from ..elements.wear import DAMAGED, STRAIN
 from ..mesh.faces import FACES
 from ..model.ids import among
-from ..model.state import DAMAGE, LAID_BARE, PLASTIC_STRAIN, Block, Flags, Indices, Ints
+from ..model.rows import DAMAGE, PLASTIC_STRAIN
+from ..model.state import LAID_BARE, Block, Flags, Indices, Ints
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour
 

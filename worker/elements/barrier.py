@@ -13,7 +13,8 @@ import numpy as np
 
 from ..kernels.jit import njit
 from ..materials.law import BULK, DENSITY, Q_LINEAR, Q_QUADRATIC, Q_SHOCK
-from ..model.state import CHUNK, MASS, VISCOUS, WORK, WORK_VISCOUS
+from ..model.rows import MASS, VISCOUS, WORK, WORK_VISCOUS
+from ..model.state import CHUNK
 from .tet4 import CHANGE, LIMIT, MODULUS, VOLUME
 
 SQUEEZED = 0.2

@@ -19,7 +19,8 @@ from conoid.cases.warnings.compression import bears_all
 
 from ..clock import Clock
 from ..kernels.jit import njit, types
-from ..model.state import CHUNK, PRESSURE, S_XX, S_XY, S_YY, S_YZ, S_ZX, S_ZZ, Block, Floats, Model
+from ..model.rows import PRESSURE, S_XX, S_XY, S_YY, S_YZ, S_ZX, S_ZZ
+from ..model.state import CHUNK, Block, Floats, Model
 from ..parallel.arguments import reader
 from ..parallel.comm import Comm
 from ..parallel.passes import Pass

@@ -4,7 +4,8 @@ import numpy as np
 
 from ..materials.equation_of_state import GRUNEISEN, pole
 from ..materials.models import EQUATIONS
-from ..model.state import VOLUME_RATIO, Block, Floats
+from ..model.rows import VOLUME_RATIO
+from ..model.state import Block, Floats
 from ..simulation import Simulation
 
 

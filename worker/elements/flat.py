@@ -11,7 +11,8 @@ from ..kernels.jit import njit
 from ..materials.law import BULK, DENSITY, DILATES
 from ..materials.models import press
 from ..mesh.faces import FACES, normals
-from ..model.state import CHUNK, DILATION, HEAT, MASS, TOLD, Block, Flags, Floats
+from ..model.rows import DILATION, HEAT, MASS, NODAL_WORK
+from ..model.state import CHUNK, Block, Flags, Floats
 from .heat_and_bulking import stretch_corner
 from .mean import book_averaged
 from .pressure import STABILISE
@@ -21,7 +22,7 @@ THINNEST = 0.1
 """Smallest altitude over longest edge of a tet whose volume strain is averaged; 0.82 for a regular tet. Chosen: what
 strains its neighbours by a tenth closes it (docs/theory/elements.md)."""
 
-_HEAT, _TOLD, _MASS, _GROWN = HEAT * CHUNK, TOLD * CHUNK, MASS * CHUNK, DILATION * CHUNK
+_HEAT, _NODAL_WORK, _MASS, _GROWN = HEAT * CHUNK, NODAL_WORK * CHUNK, MASS * CHUNK, DILATION * CHUNK
 
 
 def flat_tets(block: Block, x0: Floats) -> Flags:
@@ -59,11 +60,11 @@ def see_own(w, s, params, flat, rows, n):  # type: ignore[no-untyped-def]
             w[SEEN + i] = w[CHANGE + i] / (w[VOLUME + i] - 0.5 * w[CHANGE + i])
             if params[DILATES] > 0.0:
                 w[SEEN + i] += s[_GROWN + i]  # what ``tell_dilation`` has taken back
-            if rows > TOLD + 1:
+            if rows > NODAL_WORK + 1:
                 for k in range(4):
                     stretch_corner(w, s, i, k, w[SEEN + i])
-            elif rows > TOLD:
-                s[_HEAT + i] = unit * s[_TOLD + i] / s[_MASS + i]
+            elif rows > NODAL_WORK:
+                s[_HEAT + i] = unit * s[_NODAL_WORK + i] / s[_MASS + i]
 
 
 @njit(

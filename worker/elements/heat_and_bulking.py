@@ -8,14 +8,15 @@ import numpy as np
 
 from ..kernels.jit import njit
 from ..materials.law import BULK, DENSITY
-from ..model.state import BULKING, CHUNK, CORNERS, HEAT, MASS, TOLD, UNTOLD, WORK, WORK_AVERAGED, WORK_VISCOUS
+from ..model.rows import BULKING, BULKING_STEP, CORNERS, HEAT, MASS, NODAL_WORK, WORK, WORK_AVERAGED, WORK_VISCOUS
+from ..model.state import CHUNK
 from .pressure import QUANTA
 from .tet4 import CORNER_CHANGE, VOLUME_MID
 
 _WORK, _WORK_VISCOUS, _TAKEN = WORK * CHUNK, WORK_VISCOUS * CHUNK, WORK_AVERAGED * CHUNK
-_MASS, _HEAT, _TOLD = MASS * CHUNK, HEAT * CHUNK, TOLD * CHUNK
-_BULKING, _UNTOLD, _CORNERS = BULKING * CHUNK, UNTOLD * CHUNK, CORNERS * CHUNK
-HEATED = TOLD + 1
+_MASS, _HEAT, _NODAL_WORK = MASS * CHUNK, HEAT * CHUNK, NODAL_WORK * CHUNK
+_BULKING, _BULKING_STEP, _CORNERS = BULKING * CHUNK, BULKING_STEP * CHUNK, CORNERS * CHUNK
+HEATED = NODAL_WORK + 1
 """Rows of a tet with heat; one with bulking has more."""
 
 
@@ -44,8 +45,8 @@ def scatter_heat(sums, w, s, params, weight, tets, n):  # type: ignore[no-untype
     unit = params[DENSITY] / params[BULK]
     for i in range(n):
         work = s[_WORK + i] + s[_WORK_VISCOUS + i]
-        heat = 0.25 * w[VOLUME_MID + i] * unit * (work - s[_TOLD + i]) / s[_MASS + i]
-        s[_TOLD + i] = work
+        heat = 0.25 * w[VOLUME_MID + i] * unit * (work - s[_NODAL_WORK + i]) / s[_MASS + i]
+        s[_NODAL_WORK + i] = work
         for k in range(4):
             a = tets[i, k]
             sums[a, 2] += np.int64(np.rint(heat * weight[a] * QUANTA))
@@ -60,9 +61,9 @@ def scatter_bulking(sums, w, s, params, weight, tets, n):  # type: ignore[no-unt
     per_bulk = 1.0 / params[BULK]
     for i in range(n):
         if w[VOLUME_MID + i] == 0.0:
-            take_bulking(s, params, i, s[_UNTOLD + i])
-        share = 0.25 * w[VOLUME_MID + i] * per_bulk * s[_UNTOLD + i]
-        s[_UNTOLD + i] = 0.0
+            take_bulking(s, params, i, s[_BULKING_STEP + i])
+        share = 0.25 * w[VOLUME_MID + i] * per_bulk * s[_BULKING_STEP + i]
+        s[_BULKING_STEP + i] = 0.0
         for k in range(4):
             a = tets[i, k]
             sums[a, 2] += np.int64(np.rint(share * weight[a] * QUANTA))

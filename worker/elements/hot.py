@@ -1,7 +1,8 @@
 """Which faces a tet would break by its own stress: the cheap test before the criterion (fracture/criterion.py)."""
 
 from ..kernels.jit import njit
-from ..model.state import CHUNK, PRESSURE, S_XX, S_XY, S_YY, S_YZ, S_ZX, S_ZZ
+from ..model.rows import PRESSURE, S_XX, S_XY, S_YY, S_YZ, S_ZX, S_ZZ
+from ..model.state import CHUNK
 from .tet4 import EDGE
 
 _SXX, _SYY, _SZZ = S_XX * CHUNK, S_YY * CHUNK, S_ZZ * CHUNK

@@ -16,7 +16,8 @@ import numpy as np
 from ..kernels.jit import njit
 from ..materials.elastic import sheared
 from ..materials.law import BULK, DENSITY, DILATES, FROM_SHAPE, ORDER, SHEAR, SPALL
-from ..model.state import CHUNK, MASS, PORES, PRESSURE, WORK, WORK_AVERAGED, WORK_PLASTIC, Floats
+from ..model.rows import MASS, PORES, PRESSURE, WORK, WORK_AVERAGED, WORK_PLASTIC
+from ..model.state import CHUNK, Floats
 from .tet4 import CHANGE, MODULUS
 
 RATIO, PORES_AT, PRESSURE_AT, WORKED, TORN, OPENED, STIFF = range(7)

@@ -10,7 +10,8 @@ dissipate (docs/theory/elements.md, What averaging takes).
 from ..kernels.jit import njit
 from ..materials.elastic import sheared, squeezed
 from ..materials.law import BULK, DILATES
-from ..model.state import CHUNK, DILATION, PRESSURE, WORK_AVERAGED
+from ..model.rows import DILATION, PRESSURE, WORK_AVERAGED
+from ..model.state import CHUNK
 from .tet4 import BEFORE, CHANGE, CHANGE_SEEN, SEEN, VOLUME_MID, VOLUME_SEEN
 
 _P, _GROWN, _TAKEN = PRESSURE * CHUNK, DILATION * CHUNK, WORK_AVERAGED * CHUNK

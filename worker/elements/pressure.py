@@ -16,7 +16,8 @@ import numpy as np
 
 from ..kernels.jit import njit
 from ..materials.law import BULK
-from ..model.state import CHUNK, DILATION, MASS, PRESSURE, TET_VOLUME, VOLUME_FLUX, WORK
+from ..model.rows import DILATION, MASS, PRESSURE, TET_VOLUME, VOLUME_FLUX, WORK
+from ..model.state import CHUNK
 from .tet4 import (
     CHANGE,
     DILATATION,

@@ -13,7 +13,8 @@ Chunks at rest, which no wave has reached, are passed over (rest.py).
 from ..kernels.jit import njit, types
 from ..materials.law import AFTER_PRESSURE, DILATES, FROM_SHAPE, ORDER
 from ..materials.models import press, strengthen, swell
-from ..model.state import CHUNK, UNTOLD
+from ..model.rows import BULKING_STEP
+from ..model.state import CHUNK
 from . import chunks, rest, tet4
 from . import matter as matter_of
 from . import pressure as averaged
@@ -85,7 +86,7 @@ def strain_pass(motion, body, marks, scratch, means, begin, end, dt):  # type: i
     tets, state, params, rows, strength = body.tets, body.state, body.params, body.rows, body.strength
     sums, weight, split, pressure, projected = means.sums, means.weight, means.split, means.pressure, means.projected
     apart, noted, averages = body.flat, body.quiet, body.averages
-    shape, more, erodes = params[ORDER] == FROM_SHAPE, rows > UNTOLD, len(marks.worn) > 0
+    shape, more, erodes = params[ORDER] == FROM_SHAPE, rows > BULKING_STEP, len(marks.worn) > 0
     for c in range(begin, end):
         t, s = tets[c * CHUNK : (c + 1) * CHUNK], state[c * rows * CHUNK : (c + 1) * rows * CHUNK]
         n, means_of = len(t), averages[c * CHUNK : (c + 1) * CHUNK]
@@ -151,7 +152,7 @@ def force_pass(motion, body, marks, scratch, means, begin, end, dt, scale):  # t
     w, wi, bits, peaks, id, noted = scratch.w, scratch.wi, scratch.bits, scratch.peaks, body.id, body.quiet
     strain, told, gradient, pressure = means.strain, means.more, means.gradient, means.pressure
     split, apart, matter, averages = means.split, body.flat, means.matter, body.averages
-    shape, more, erodes = params[ORDER] == FROM_SHAPE, rows > UNTOLD, len(worn) > 0
+    shape, more, erodes = params[ORDER] == FROM_SHAPE, rows > BULKING_STEP, len(worn) > 0
     by_tets = matter_of.whose(eos, params) == matter_of.TETS
     for c in range(begin, end):
         t, s = tets[c * CHUNK : (c + 1) * CHUNK], state[c * rows * CHUNK : (c + 1) * rows * CHUNK]

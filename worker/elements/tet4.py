@@ -18,7 +18,8 @@ import numpy as np
 
 from ..kernels.jit import njit, prefetch
 from ..materials.elementary import NEAREST
-from ..model.state import CHUNK, MASS, PRESSURE, S_XX, S_XY, S_YY, S_YZ, S_ZX, S_ZZ, TET_VOLUME, VISCOUS
+from ..model.rows import MASS, PRESSURE, S_XX, S_XY, S_YY, S_YZ, S_ZX, S_ZZ, TET_VOLUME, VISCOUS
+from ..model.state import CHUNK
 
 # Rows of the scratch, in numbers of float64. EDGE holds e1, e2, e3 and later b1, b2, b3 at the end of the step;
 # RATE holds the velocity differences, then the rate of deformation and the spin; MOVED the differences of displacement.

@@ -13,8 +13,7 @@ from conoid.cases.model.schema import Erosion
 
 from ..kernels.jit import njit
 from ..materials.law import DENSITY
-from ..model.state import (
-    CHUNK,
+from ..model.rows import (
     DAMAGE,
     MASS,
     PLASTIC_STRAIN,
@@ -28,8 +27,8 @@ from ..model.state import (
     VISCOUS,
     WORK,
     WORK_VISCOUS,
-    Floats,
 )
+from ..model.state import CHUNK, Floats
 from .tet4 import EDGE, LIMIT, VOLUME, VOLUME_MID
 
 STRAIN, LOW, HIGH, FREQUENCY, DAMAGED = range(5)

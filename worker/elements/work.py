@@ -3,7 +3,8 @@
 import numpy as np
 
 from ..kernels.jit import njit
-from ..model.state import CHUNK, WORKS, Block, Floats, Ints
+from ..model.rows import WORKS
+from ..model.state import CHUNK, Block, Floats, Ints
 from ..parallel.fixed_point import limbs, magnitude, most
 
 

@@ -6,7 +6,8 @@ import numpy as np
 
 from ..kernels.jit import njit, types
 from ..mesh.faces import FACES
-from ..model.state import CHUNK, MASS, Flags, Floats, Ints
+from ..model.rows import MASS
+from ..model.state import CHUNK, Flags, Floats, Ints
 from .facets import Body
 from .records import BREAKING, CANDIDATES, INTERFACE, MESH, BreakingFacets, Candidates, InterfaceFacets
 

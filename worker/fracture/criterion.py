@@ -10,7 +10,8 @@ import numpy as np
 
 from ..kernels.jit import njit, types
 from ..mesh.faces import FACES
-from ..model.state import CHUNK, INTACT, PRESSURE, S_XX, S_XY, S_YY, S_YZ, S_ZX, S_ZZ
+from ..model.rows import PRESSURE, S_XX, S_XY, S_YY, S_YZ, S_ZX, S_ZZ
+from ..model.state import CHUNK, INTACT
 from .records import CANDIDATES, INTERFACE, LAW, MESH, POINTS, TABLE
 from .strength import required
 

@@ -23,7 +23,8 @@ from conoid.cases.output import fragments as tables
 
 from ..mesh.faces import FACES, areas
 from ..model.ids import places
-from ..model.state import MASS, Block, Floats, Ints, Model
+from ..model.rows import MASS
+from ..model.state import Block, Floats, Ints, Model
 from ..parallel.comm import Comm
 
 _NODE_BITS = 40

@@ -6,7 +6,8 @@ import numpy as np
 
 from ..elements.tet4 import EDGE, SCRATCH, end_gradients, gather, internal_forces
 from ..kernels.jit import njit, record, types
-from ..model.state import CHUNK, VISCOUS, Floats, Ints, Model, Tets
+from ..model.rows import VISCOUS
+from ..model.state import CHUNK, Floats, Ints, Model, Tets
 from ..model.topology import Split
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour

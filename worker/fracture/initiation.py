@@ -6,7 +6,8 @@ from conoid.cases.model.schema import Fracture
 
 from ..clock import Clock
 from ..migration.parcel import Parcel
-from ..model.state import MASS, Flags, Model
+from ..model.rows import MASS
+from ..model.state import Flags, Model
 from ..model.topology import Split
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour

@@ -6,7 +6,8 @@ such a facet is among those they share. Whether there is one they tell each othe
 
 import numpy as np
 
-from ..model.state import MASS, Floats, Ints
+from ..model.rows import MASS
+from ..model.state import Floats, Ints
 from ..parallel.comm import Comm, Exchange
 from ..parallel.ownership import Neighbour
 from ..parallel.tags import Tag

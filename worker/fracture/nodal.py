@@ -9,7 +9,8 @@ import numpy as np
 
 from ..kernels.jit import njit, types
 from ..mesh.faces import FACES
-from ..model.state import CHUNK, MASS, PRESSURE, S_XX, S_XY, S_YY, S_YZ, S_ZX, S_ZZ, Flags, Floats, Nodes
+from ..model.rows import MASS, PRESSURE, S_XX, S_XY, S_YY, S_YZ, S_ZX, S_ZZ
+from ..model.state import CHUNK, Flags, Floats, Nodes
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour, complete
 from ..parallel.tags import Tag

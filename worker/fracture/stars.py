@@ -11,8 +11,8 @@ import numpy as np
 from ..kernels.jit import njit, several, types
 from ..mesh.faces import FACES
 from ..model.growing import Rooms
+from ..model.rows import MASS as MASS_ROW
 from ..model.state import CHUNK, INTACT, Indices, Ints, Tets
-from ..model.state import MASS as MASS_ROW
 from ..model.topology import keys
 from .records import MESH
 

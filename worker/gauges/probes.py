@@ -13,7 +13,7 @@ from conoid.cases.model.schema import Case, Probe
 from conoid.cases.shapes.region import Region
 
 from ..errors import InputError
-from ..model.state import (
+from ..model.rows import (
     DAMAGE,
     MASS,
     PLASTIC_STRAIN,
@@ -28,12 +28,8 @@ from ..model.state import (
     VISCOUS,
     WORK,
     WORK_VISCOUS,
-    Block,
-    Floats,
-    Ints,
-    Model,
-    Tets,
 )
+from ..model.state import Block, Floats, Ints, Model, Tets
 from ..output.frames import von_mises
 from ..parallel.fixed_point import Ragged, exact_totals
 from ..scene.marks import held

@@ -8,7 +8,7 @@ import numpy as np
 from conoid.cases.reading.library import material
 from conoid.cases.warnings.unstrained import Strained, could_be_rigid
 
-from ..model.state import PLASTIC_STRAIN
+from ..model.rows import PLASTIC_STRAIN
 from ..output.history import extremes
 from ..parallel.fixed_point import exact_sums
 from ..simulation import Simulation

@@ -10,20 +10,19 @@ from conoid.cases.model.materials import MieGruneisen
 
 from ..elements.tet4 import CHANGE, MODULUS, NODAL, SEEN, VOLUME_SEEN
 from ..kernels.jit import njit
-from ..model.state import (
-    CHUNK,
+from ..model.rows import (
     DILATION,
     HEAT,
     MASS,
+    NODAL_WORK,
     PORES,
     PRESSURE,
-    TOLD,
     VOLUME_RATIO,
     WORK,
     WORK_PLASTIC,
     WORK_VISCOUS,
-    Floats,
 )
+from ..model.state import CHUNK, Floats
 from .elastic import sheared, squeezed
 from .elementary import exp
 from .law import BULK, DENSITY, DILATES, EQUATION, FROM_SHAPE, ORDER, SHEAR, SPALL, Equation
@@ -134,7 +133,7 @@ def mie_gruneisen(w, s, params, n):  # type: ignore[no-untyped-def]
     the pressure; that work is the one on the averaged volume.
     """
     gamma, heating = params[_GAMMA], params[_GAMMA] * params[DENSITY]
-    averaged, bulk = len(s) > TOLD * CHUNK, params[BULK]
+    averaged, bulk = len(s) > NODAL_WORK * CHUNK, params[BULK]
     for i in range(n):
         half = 0.5 * w[SEEN + i]
         ratio = s[_RATIO + i] * (1.0 + half) / (1.0 - half)
@@ -193,5 +192,5 @@ def pole(params: Floats) -> float:
 
 ELASTIC = Equation("", 0, lambda _: (), linear, volumes_by_pressure)
 """The pressure of the elasticity."""
-GRUNEISEN = Equation("mie_gruneisen", VOLUME_RATIO + 1, _gruneisen, mie_gruneisen, volumes_by_ratio, TOLD + 1)
+GRUNEISEN = Equation("mie_gruneisen", VOLUME_RATIO + 1, _gruneisen, mie_gruneisen, volumes_by_ratio, NODAL_WORK + 1)
 """Compression and heat."""

@@ -8,7 +8,8 @@ import numpy as np
 
 from ..elements.tet4 import EDGE, MODULUS, MOVED, RATE, TRIAL, VOLUME
 from ..kernels.jit import njit
-from ..model.state import CHUNK, DISTORTION, MASS, S_XX, S_XY, S_YY, S_YZ, S_ZX, S_ZZ, TET_VOLUME, WORK
+from ..model.rows import DISTORTION, MASS, S_XX, S_XY, S_YY, S_YZ, S_ZX, S_ZZ, TET_VOLUME, WORK
+from ..model.state import CHUNK
 from .law import DENSITY, FROM_SHAPE, SHEAR, Law
 
 _SXX, _SYY, _SZZ = S_XX * CHUNK, S_YY * CHUNK, S_ZZ * CHUNK

@@ -12,8 +12,7 @@ from conoid.cases.laws.johnson_cook import JohnsonCook
 
 from ..elements.tet4 import D_XX, D_XY, D_YY, D_YZ, D_ZX, D_ZZ, NODAL, TRIAL, VOLUME_MID
 from ..kernels.jit import njit
-from ..model.state import (
-    CHUNK,
+from ..model.rows import (
     DAMAGE,
     FLOW,
     MASS,
@@ -29,6 +28,7 @@ from ..model.state import (
     WORK_PLASTIC,
     YIELD,
 )
+from ..model.state import CHUNK
 from .elementary import logarithms, power, powers
 from .law import BEFORE_PRESSURE, FIRST, SHEAR, Law
 from .plastic import equivalent_stress

@@ -30,9 +30,9 @@ from ..elements.tet4 import (
     VOLUME_MID,
 )
 from ..kernels.jit import njit
-from ..model.state import (
+from ..model.rows import (
     BULKING,
-    CHUNK,
+    BULKING_STEP,
     CORNERS,
     DAMAGE,
     MASS,
@@ -44,12 +44,12 @@ from ..model.state import (
     S_YZ,
     S_ZX,
     S_ZZ,
-    UNTOLD,
     VOLUME_RATIO,
     WORK,
     WORK_AVERAGED,
     WORK_PLASTIC,
 )
+from ..model.state import CHUNK
 from .elementary import log, logarithms, powers
 from .equation_of_state import volumes_by_ratio
 from .law import AFTER_PRESSURE, BULK, DENSITY, FIRST, SHEAR, Equation, Law
@@ -60,7 +60,7 @@ _SXX, _SYY, _SZZ = S_XX * CHUNK, S_YY * CHUNK, S_ZZ * CHUNK
 _SYZ, _SZX, _SXY = S_YZ * CHUNK, S_ZX * CHUNK, S_XY * CHUNK
 _P, _STRAIN, _PLASTIC, _WORK = PRESSURE * CHUNK, PLASTIC_STRAIN * CHUNK, WORK_PLASTIC * CHUNK, WORK * CHUNK
 _DAMAGE, _BULKING, _RATIO = DAMAGE * CHUNK, BULKING * CHUNK, VOLUME_RATIO * CHUNK
-_UNTOLD, _CORNERS = UNTOLD * CHUNK, CORNERS * CHUNK
+_BULKING_STEP, _CORNERS = BULKING_STEP * CHUNK, CORNERS * CHUNK
 _AVERAGED, _MASS = WORK_AVERAGED * CHUNK, MASS * CHUNK
 # Rows of the scratch: (p* + T*)^N; (p* + T*)^D2; p*^M; the logarithm of the relative rate.
 _INTACT, _FRACTURE, _CRUMBLED, _FAST = (NODAL + k * CHUNK for k in range(4))
@@ -126,7 +126,7 @@ def crumbling(w, s, params, n):  # type: ignore[no-untyped-def]
     the tension. The pressure says no ratio there: it counts how far the tet has opened itself, not what neighbours that
     have no tension any more have made of their nodes.
     """
-    bulk, averaged = params[BULK], len(s) > _UNTOLD
+    bulk, averaged = params[BULK], len(s) > _BULKING_STEP
     for i in range(n):
         half = 0.5 * w[SEEN + i]
         ratio = s[_RATIO + i] * (1.0 + half) / (1.0 - half)
@@ -210,8 +210,8 @@ def johnson_holmquist(w, s, params, n, dt):  # type: ignore[no-untyped-def]
     equivalent_stress(w, s, n)
     _factors(w, s, params, n)
     shear, bulk, hel = params[SHEAR], params[BULK], params[_STRENGTH]
-    tension, averaged = params[_T], len(s) > _UNTOLD
-    grows = _UNTOLD if averaged else _BULKING
+    tension, averaged = params[_T], len(s) > _BULKING_STEP
+    grows = _BULKING_STEP if averaged else _BULKING
     for i in range(n):
         q, p, damage = w[TRIAL + i], s[_P + i], s[_DAMAGE + i]
         rate = 1.0 + 0.5 * params[_C] * w[_FAST + i]

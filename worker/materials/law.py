@@ -30,7 +30,7 @@ class Law:
     order: int
     """FROM_SHAPE, BEFORE_PRESSURE or AFTER_PRESSURE."""
     rows: Callable[[Any], int]
-    """How many rows of state a tet needs (worker/model/state.py), from its table in the case."""
+    """How many rows of state a tet needs (worker/model/rows.py), from its table in the case."""
     constants: Callable[[Any], tuple[float, ...]]
     """Its constants from its table; they stand from FIRST on."""
     begin: Callable[[Any, float], dict[int, float]]
@@ -56,7 +56,7 @@ class Equation:
     volume: Any
     """Its kernel(w, s, params, n) makes VOLUME_SEEN of n, m^3: of the matter and pores that have the pressure of n."""
     averaged: int = 0
-    """How many it needs in the averaged pressure forms, where it adds a mean over nodes of its own (UNTOLD, HEAT)."""
+    """Rows in the averaged pressure forms if the equation has a nodal mean of its own (BULKING_STEP, HEAT)."""
 
 
 def placed(params: Floats, begin: int, constants: tuple[float, ...], room: int) -> None:

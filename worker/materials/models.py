@@ -12,7 +12,7 @@ from conoid.cases.model.materials import Material
 from conoid.cases.model.schema import Viscosity
 
 from ..kernels.jit import njit
-from ..model import state
+from ..model import rows
 from ..model.state import Floats
 from . import equation_of_state, hyperelastic, johnson_cook, johnson_holmquist, mohr_coulomb, plastic
 from .law import (
@@ -117,14 +117,14 @@ def parameters(material: Material, viscosity: Viscosity | None, *, breaks: bool 
 
 
 def rows_of(material: Material, pressure: str) -> int:
-    """How many rows of state an element of this material needs (worker/model/state.py)."""
+    """How many rows of state an element of this material needs (worker/model/rows.py)."""
     equation = equation_of(material)
-    averaged = 0 if pressure == "standard" else max(state.WORK_AVERAGED + 1, equation.averaged)
-    porous = 0 if material.spall is None else state.PORES + 1
+    averaged = 0 if pressure == "standard" else max(rows.WORK_AVERAGED + 1, equation.averaged)
+    porous = 0 if material.spall is None else rows.PORES + 1
     return max(law_of(material).rows(material.strength), equation.rows, averaged, porous)
 
 
 def beginning(material: Material, temperature: float) -> dict[int, float]:
     """Rows of state that do not begin with zero, as far as a block has them."""
     own = law_of(material).begin(material.strength, temperature)
-    return {state.VOLUME_RATIO: 1.0, state.TEMPERATURE: temperature, **own}
+    return {rows.VOLUME_RATIO: 1.0, rows.TEMPERATURE: temperature, **own}

@@ -14,8 +14,7 @@ from conoid.cases.laws.mohr_coulomb import MohrCoulomb
 
 from ..elements.tet4 import CHANGE, D_XX, D_XY, D_YY, D_YZ, D_ZX, D_ZZ, SEEN, TRIAL, VOLUME_MID, VOLUME_SEEN
 from ..kernels.jit import njit
-from ..model.state import (
-    CHUNK,
+from ..model.rows import (
     DILATION,
     PLASTIC_STRAIN,
     PORES,
@@ -29,6 +28,7 @@ from ..model.state import (
     WORK,
     WORK_PLASTIC,
 )
+from ..model.state import CHUNK
 from .elastic import squeezed
 from .law import AFTER_PRESSURE, BULK, DILATES, FIRST, SHEAR, SPALL, Law
 from .plastic import equivalent_stress

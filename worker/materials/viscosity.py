@@ -4,7 +4,8 @@ import numpy as np
 
 from ..elements.tet4 import AREAS, CHANGE, LENGTH_FACTOR, LIMIT, MODULUS, SEEN, VOLUME, VOLUME_SEEN
 from ..kernels.jit import njit
-from ..model.state import CHUNK, MASS, PRESSURE, VISCOUS, WORK_VISCOUS
+from ..model.rows import MASS, PRESSURE, VISCOUS, WORK_VISCOUS
+from ..model.state import CHUNK
 
 HALF = 0.01
 """Of the wave speed: a difference of speed over a tet at which half of the shock term is there. Chosen between elastic

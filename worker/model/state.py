@@ -25,64 +25,6 @@ Tets = npt.NDArray[np.uint32]
 CHUNK = 376
 """Elements a chunk."""
 
-# Rows of the element state. Rows up to DISTORTION exist in every block, the others where the scene needs them.
-S_XX, S_YY, S_ZZ, S_YZ, S_ZX, S_XY = range(6)
-"""Deviatoric Cauchy stress, Pa."""
-PRESSURE = 6
-"""Pa, without the viscous part."""
-VISCOUS = 7
-"""Bulk-viscosity pressure q, Pa."""
-MASS = 8
-"""kg."""
-WORK = 9
-"""Work of the stress so far, without the viscous part, J."""
-WORK_VISCOUS = 10
-"""Work of the bulk viscosity so far, J."""
-DISTORTION = 11
-"""Elastic energy of the deviatoric stress, J (materials without a strength)."""
-VOLUME_FLUX = 12
-"""Rate of change of the volume at mid-step, m^3/s (averaged pressure forms)."""
-TET_VOLUME = 12
-"""The same row in materials without a strength: volume at the end of the last pass, m^3. The first pass, which takes no
-step, sets it."""
-WORK_AVERAGED = 13
-"""Of WORK, what the pressure has not done on the volume that it sees, J (averaged pressure forms; elements/mean.py)."""
-VOLUME_RATIO = 14
-"""Current over initial volume, by the dilatation that the pressure sees."""
-PLASTIC_STRAIN = 15
-"""Effective plastic strain."""
-WORK_PLASTIC = 16
-"""J."""
-YIELD = 17
-"""Flow stress at vanishing rate, Pa: below it no plastic flow."""
-FLOW = 18
-"""Flow stress of the last plastic step, Pa (the next one's first guess)."""
-BULKING = 18
-"""The same row in Johnson-Holmquist's law: the pressure of its bulking, Pa."""
-DILATION = 18
-"""The same row in Mohr-Coulomb's law: the volume strain of its plastic flow in the last step; below
-zero once the nodes know of it (averaged pressure forms)."""
-TEMPERATURE = 19
-"""K."""
-DAMAGE = 20
-"""0 whole, 1 done for (laws that count it)."""
-PORES = 21
-"""Of the pores that a tension cut-off has opened: their volume over that of the solid matter; with a linear pressure
-the logarithm of one and that."""
-HEAT = 22
-"""Energy that the pressure of a tet is computed with, a volume of matter, over the bulk modulus at rest (averaged
-pressure forms, where the equation of state has heat): of a flat tet its own, of the others a mean over their nodes."""
-UNTOLD = 22
-"""The same row in Johnson-Holmquist's law: bulking of the last step, Pa, that the nodes do not have yet (averaged
-pressure forms)."""
-CORNERS = 23
-"""And the three behind it in Johnson-Holmquist's law: current over initial volume at each node of a tet, as the
-pressure there sees it (averaged pressure forms)."""
-TOLD = 23
-"""Work, J, that the nodes have been told of for it."""
-WORKS = WORK, WORK_VISCOUS, WORK_PLASTIC, WORK_AVERAGED
-"""What the ledger adds up of each tet, also of those that have left."""
-
 INTACT, BROKEN, WIDE = range(3)
 """Bond of a face to the one behind it: whole; broken; broken and so far apart that it is part of the surface."""
 LAID_BARE = -2
@@ -210,48 +152,6 @@ class Copies:
     def n(self) -> int:
         """Number of copies."""
         return len(self.id)
-
-
-@dataclass
-class Load:
-    """Constant forces on corners of tets, in the order of the tets."""
-
-    place: Ints
-    """(m,) of each among all of the load."""
-    tets: Ints
-    """(m,) global ids."""
-    nodes: Ints
-    """(m,) global ids."""
-    force: Floats
-    """(m, 3) N."""
-
-    def take(self, chosen: Flags) -> "Load":
-        """Some of them."""
-        return Load(self.place[chosen], self.tets[chosen], self.nodes[chosen], self.force[chosen])
-
-    def here(self, nodes: Ints, tets: Ints) -> "Load":
-        """What a rank needs that holds these nodes and tets: all forces on its nodes."""
-        return self.take(np.isin(self.nodes, nodes))
-
-
-@dataclass
-class LoadedFaces:
-    """Faces on which a pressure acts that follows the surface."""
-
-    tets: Ints
-    """(m,) global ids."""
-    nodes: Ints
-    """(m, 3) global ids, anticlockwise from outside."""
-    scale: float
-    """Quanta per newton of the forces on nodes; the same on all ranks."""
-
-    def take(self, chosen: Flags) -> "LoadedFaces":
-        """Some of them."""
-        return LoadedFaces(self.tets[chosen], self.nodes[chosen], self.scale)
-
-    def here(self, nodes: Ints, tets: Ints) -> "LoadedFaces":
-        """What a rank needs that holds these nodes and tets: the faces of its tets."""
-        return self.take(np.isin(self.tets, tets))
 
 
 @dataclass

@@ -13,7 +13,8 @@ from conoid.cases.output.fields import counting, damageable
 
 from ..fracture.cohesive import Cohesion
 from ..fracture.columns import Facets
-from ..model.state import DAMAGE, PLASTIC_STRAIN, Block, Floats, Ints, Model
+from ..model.rows import DAMAGE, PLASTIC_STRAIN
+from ..model.state import Block, Floats, Ints, Model
 from ..parallel.comm import Comm
 
 

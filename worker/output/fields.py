@@ -9,7 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..mesh.faces import boundary_faces, normals
-from ..model.state import MASS, Block, Floats, Ints, Nodes
+from ..model.rows import MASS
+from ..model.state import Block, Floats, Ints, Nodes
 
 _ORDER = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))
 """Of the components, as VTK has them."""

@@ -13,7 +13,8 @@ import numpy as np
 
 from conoid.cases.output import layout
 
-from ..model.state import CHUNK, PLASTIC_STRAIN, PRESSURE, S_XX, S_XY, TEMPERATURE, Block, Floats, Ints, Model
+from ..model.rows import PLASTIC_STRAIN, PRESSURE, S_XX, S_XY, TEMPERATURE
+from ..model.state import CHUNK, Block, Floats, Ints, Model
 from ..parallel.comm import Comm
 from . import fields, hdf5
 

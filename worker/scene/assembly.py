@@ -24,8 +24,9 @@ from ..mesh.build import build as build_mesh
 from ..mesh.faces import FACES, across, normals
 from ..mesh.model import TetMesh
 from ..model.hashing import uniform
+from ..model.loads import Load, LoadedFaces
 from ..model.shares import Shares, ranks, shared
-from ..model.state import Floats, Indices, Ints, Load, LoadedFaces
+from ..model.state import Floats, Indices, Ints
 from . import selection
 from .facts import Facts
 from .joint import asked, built_together, grouped

@@ -17,7 +17,8 @@ from ..boundaries.wall_shapes import Walls
 from ..boundaries.walls import RigidWalls
 from ..errors import InputError
 from ..migration.parcel import Parcel
-from ..model.state import Flags, Floats, Indices, Ints, Load, LoadedFaces, Model, Nodes
+from ..model.loads import Load, LoadedFaces
+from ..model.state import Flags, Floats, Indices, Ints, Model, Nodes
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour
 from ..rigid.bodies import of_nodes

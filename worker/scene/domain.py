@@ -21,22 +21,10 @@ from ..bonds.pieces import Pieces
 from ..elements import wear
 from ..errors import InputError
 from ..materials import models
+from ..model.loads import Load, LoadedFaces
+from ..model.rows import MASS
 from ..model.shares import Shares
-from ..model.state import (
-    CHUNK,
-    MASS,
-    Block,
-    Flags,
-    Floats,
-    Indices,
-    Ints,
-    Load,
-    LoadedFaces,
-    Model,
-    Nodes,
-    Tets,
-    chunked,
-)
+from ..model.state import CHUNK, Block, Flags, Floats, Indices, Ints, Model, Nodes, Tets, chunked
 from ..parallel.comm import Comm, SerialComm
 from ..parallel.decompose import bisect
 from ..parallel.ownership import Neighbour

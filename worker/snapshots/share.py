@@ -15,7 +15,8 @@ from conoid.cases.reading.whole import named
 
 from ..fracture.numbers import UNKNOWN
 from ..model.ids import located
-from ..model.state import DAMAGE, MASS, PLASTIC_STRAIN, PRESSURE, S_XX, TEMPERATURE, Block, Floats, Ints, Model, Nodes
+from ..model.rows import DAMAGE, MASS, PLASTIC_STRAIN, PRESSURE, S_XX, TEMPERATURE
+from ..model.state import Block, Floats, Ints, Model, Nodes
 from . import invariants
 
 ROWS = {"plastic_strain": PLASTIC_STRAIN, "temperature": TEMPERATURE, "damage": DAMAGE}
