@@ -1,16 +1,16 @@
-"""What can go wrong in a worker, and the exit code that each failure gives.
+"""Errors of the worker, and their exit codes.
 
 ::
 
-    ConoidError                      exit 1   anything the worker raises on purpose; one of the client's tree, too
-    ├── CompileError             exit 1   kernels cannot be compiled
-    ├── StoppedError             exit 4   somebody has asked the run to stop before its first step
+    ConoidError                      exit 1   base of the errors of the worker
+    ├── CompileError                 exit 1   kernels cannot be compiled
+    ├── StoppedError                 exit 4   the run was asked to stop before its first step
     ├── InputError (ValueError)      exit 2   the case, or a file it names, is wrong
     │   └── MeshError                exit 2   the mesh cannot be made, read or used
-    └── PhysicsError                 exit 3   the run itself failed: diverged
+    └── PhysicsError                 exit 3   the solution has diverged
         └── EnergyError              exit 3   the energy ledger does not close
 
-The text of every one of them is a single line for the person who wrote the case: key, value, what is allowed.
+The text of each error is a single line for the author of the case: key, value, what is allowed.
 """
 
 from typing import ClassVar
@@ -20,7 +20,7 @@ from conoid.cases.run import Cause, ExitCode, State
 
 
 class ConoidError(problems.ConoidError):
-    """Base of the tree, and caught as what a user of Conoid catches (client/errors.py)."""
+    """Base of the tree; a user of Conoid catches problems.ConoidError (client/errors.py)."""
 
     exit_code: ClassVar[int] = ExitCode.CRASHED
     cause: ClassVar[Cause] = Cause.SERVICE
@@ -32,7 +32,7 @@ class CompileError(ConoidError):
 
 
 class StoppedError(ConoidError):
-    """Somebody has asked the run to stop before its first step."""
+    """The run was asked to stop before its first step."""
 
     exit_code = ExitCode.INTERRUPTED
     cause = Cause.CANCELLED
@@ -53,7 +53,7 @@ class MeshError(InputError):
 
 
 class PhysicsError(ConoidError):
-    """The run failed by itself."""
+    """The solution has diverged."""
 
     exit_code = ExitCode.PHYSICS
     cause = Cause.DIVERGED

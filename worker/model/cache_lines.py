@@ -1,4 +1,4 @@
-"""Tables whose rows are cache lines: what a kernel takes of a row costs one access to memory."""
+"""Tables with one cache line a row: a kernel reads a row in one memory access."""
 
 import numpy as np
 
@@ -9,7 +9,7 @@ LINE = 8
 
 
 def cache_lines(n: int) -> Floats:
-    """(n, LINE) that begins where a cache line does; what is in it is anything."""
+    """Return an uninitialised (n, LINE) array whose rows are aligned to cache lines."""
     room = np.empty(n * LINE + LINE)
     first = -(room.ctypes.data // room.itemsize) % LINE
     return room[first : first + n * LINE].reshape(n, LINE)

@@ -1,4 +1,4 @@
-"""Room for what grows by a few rows at a time, so that it need not be made anew."""
+"""Buffers with spare room, for arrays that grow by a few rows at a time or are filled anew in every step."""
 
 from typing import Any
 
@@ -6,8 +6,8 @@ import numpy as np
 
 
 class Scratch:
-    """Room for arrays that every step fills anew, by name. While its length stays an array is the same object, so that
-    tables of arguments (parallel/arguments.py) that have it stay as they are.
+    """Buffers, by name, of arrays that are filled anew in every step. An array keeps its address while its length
+    does not change, so that tables of arguments (parallel/arguments.py) that contain it stay valid.
     """
 
     def __init__(self) -> None:
@@ -15,7 +15,7 @@ class Scratch:
         self._some: dict[str, np.ndarray] = {}
 
     def of(self, name: str, n: int, kind: "type[np.generic]" = np.int64, *columns: int) -> Any:
-        """(n, *columns), whatever is in it; of one name always of one type and as many columns."""
+        """Return an uninitialised (n, *columns) array; a name always has the same type and columns."""
         some = self._some.get(name)
         if some is None or n != len(some):
             room = self._rooms.get(name)
@@ -25,26 +25,28 @@ class Scratch:
         return some
 
     def zeros(self, name: str, n: int, *columns: int) -> Any:
-        """The same of integers, all zero."""
+        """Return the same, of int64 zeros."""
         some = self.of(name, n, np.int64, *columns)
         some.fill(0)
         return some
 
 
 def same_memory(one: np.ndarray, two: np.ndarray) -> bool:
-    """Whether two arrays of one type, both in C order, are the same one."""
+    """Return whether two C-ordered arrays of one type occupy the same memory."""
     return one.shape == two.shape and one.__array_interface__["data"] == two.__array_interface__["data"]
 
 
 class Rooms:
-    """The rooms of some columns of a table. What has room for new rows is not copied when it grows."""
+    """Buffers of some columns of a table: columns with spare room are not copied when rows are appended."""
 
     def __init__(self, *names: str) -> None:
-        """``names`` of the columns among the attributes of the table."""
+        """``names``: attributes of the table that are columns."""
         self._rooms: dict[str, np.ndarray | None] = dict.fromkeys(names)
 
     def of(self, table: object, more: int) -> list[Any]:
-        """The rooms, each with a column of ``table`` in front, and place for ``more`` rows behind it at least."""
+        """Return the buffers; each begins with a column of ``table`` and has room for at least ``more`` rows behind
+        it.
+        """
         for name, room in self._rooms.items():
             column = getattr(table, name)
             n = len(column)
@@ -54,14 +56,14 @@ class Rooms:
         return list(self._rooms.values())
 
     def append(self, table: object, more: int, **rows: Any) -> None:
-        """``more`` rows behind the columns of ``table``: of each column an array, or one value for all."""
+        """Append ``more`` rows to the columns of ``table``: for each column an array, or one value for all rows."""
         for room, name in zip(self.of(table, more), self._rooms, strict=True):
             n = len(getattr(table, name))
             room[n : n + more] = rows[name]
             setattr(table, name, room[: n + more])
 
     def take(self, table: object, m: int) -> None:
-        """Makes the first ``m`` rows of each room the column of ``table``."""
+        """Set each column of ``table`` to the first ``m`` rows of its buffer."""
         for name, room in self._rooms.items():
             assert room is not None
             setattr(table, name, room[:m])

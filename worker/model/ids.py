@@ -1,4 +1,4 @@
-"""Where global ids stand: by a table of all ids up to the largest where many are wanted, by bisection where few are."""
+"""Search for global ids in sorted lists: by a table of all ids up to the largest for many ids, by bisection for few."""
 
 import numpy as np
 import numpy.typing as npt
@@ -6,12 +6,12 @@ import numpy.typing as npt
 _Ids = npt.NDArray[np.int64] | npt.NDArray[np.int32]
 _Places = npt.NDArray[np.int32]
 
-_A_LOOK = 32
-"""Entries of a table that cost as much to lay out as a bisection."""
+_BISECTION = 32
+"""Number of table entries that take as long to fill as one bisection."""
 
 
 def located(known: _Ids, wanted: _Ids) -> _Places:
-    """Where ``wanted`` ids, which must be there, stand among the ascending ``known``, in their shape."""
+    """Return the positions of ``wanted`` ids in the ascending ``known``, in their shape; all must be in it."""
     if _few(known, wanted):
         return np.searchsorted(known, wanted).astype(np.int32)
     table = np.empty(known[-1] + 1, np.int32)
@@ -20,7 +20,9 @@ def located(known: _Ids, wanted: _Ids) -> _Places:
 
 
 def places(known: _Ids, wanted: _Ids) -> _Places:
-    """Where ``wanted`` stand among the ascending ``known``, in their shape; -1 where they do not."""
+    """Return the positions of ``wanted`` ids in the ascending ``known``, in their shape; -1 for ids that are not in
+    it.
+    """
     if not len(known):
         return np.full(wanted.shape, -1, np.int32)
     if _few(known, wanted):
@@ -29,18 +31,18 @@ def places(known: _Ids, wanted: _Ids) -> _Places:
     beyond = int(known[-1]) + 1
     table = np.full(beyond + 1, -1, np.int32)
     table[known] = np.arange(len(known), dtype=np.int32)
-    return np.asarray(table[np.minimum(wanted.astype(np.uint64), np.uint64(beyond))])  # one below 0 is beyond as well
+    return np.asarray(table[np.minimum(wanted.astype(np.uint64), np.uint64(beyond))])  # negative ids become large ones
 
 
 def among(known: _Ids, wanted: _Ids) -> npt.NDArray[np.bool_]:
-    """Which of ``wanted`` are in the ascending ``known``."""
+    """Return which of ``wanted`` ids are in the ascending ``known``, in their shape."""
     return np.asarray(places(known, wanted) >= 0)
 
 
 def unique(ids: _Ids) -> npt.NDArray[np.int64]:
-    """The ids, ascending, each once, without -1, which stands for none."""
+    """Return the distinct ids, ascending, without -1, which stands for no id."""
     largest = int(ids.max(initial=-1))
-    if ids.size * _A_LOOK < largest:
+    if ids.size * _BISECTION < largest:
         return np.unique(ids[ids >= 0]).astype(np.int64)
     table = np.zeros(largest + 2, bool)
     table[ids.reshape(-1)] = True
@@ -48,4 +50,4 @@ def unique(ids: _Ids) -> npt.NDArray[np.int64]:
 
 
 def _few(known: _Ids, wanted: _Ids) -> bool:
-    return not len(known) or wanted.size * _A_LOOK < known[-1]
+    return not len(known) or wanted.size * _BISECTION < known[-1]

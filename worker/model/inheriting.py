@@ -1,4 +1,4 @@
-"""What the copies of nodes take from their parents."""
+"""Initial values of nodes that are copies of other nodes."""
 
 from ..kernels.jit import njit
 
@@ -9,8 +9,8 @@ from ..kernels.jit import njit
     cache=True,
 )
 def inherit(part, x0, x, v, mass, force, stepping, parents, masses, n):  # type: ignore[no-untyped-def]
-    """Rows from ``n`` on of rooms of nodal columns: copies of ``parents`` (k,), without force and with nothing booked,
-    that take ``masses`` (k,) of theirs, kg.
+    """Set the rows from ``n`` on of nodal columns: copies of ``parents`` (k,) with zero force and zero energy
+    booked, that take ``masses`` (k,), kg, from their parents.
     """
     for c in range(len(parents)):
         a = parents[c]

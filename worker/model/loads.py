@@ -1,4 +1,6 @@
-"""Loads on faces of tets, as lists that are cut by rank: constant nodal forces, and faces under a pressure."""
+"""Loads on faces of tets, as lists from which each rank takes its own: constant nodal forces, and faces under a
+pressure.
+"""
 
 from dataclasses import dataclass
 
@@ -9,41 +11,41 @@ from .state import Flags, Floats, Ints
 
 @dataclass
 class Load:
-    """Constant forces on corners of tets, in the order of the tets."""
+    """Constant forces on corners of tets, ordered by tet."""
 
     place: Ints
-    """(m,) of each among all of the load."""
+    """(m,) index in the list of the whole model."""
     tets: Ints
     """(m,) global ids."""
     nodes: Ints
     """(m,) global ids."""
     force: Floats
-    """(m, 3) N."""
+    """(m, 3) force, N."""
 
     def take(self, chosen: Flags) -> "Load":
-        """Some of them."""
+        """Return the chosen forces."""
         return Load(self.place[chosen], self.tets[chosen], self.nodes[chosen], self.force[chosen])
 
     def here(self, nodes: Ints, tets: Ints) -> "Load":
-        """What a rank needs that holds these nodes and tets: all forces on its nodes."""
+        """Return the part of a rank with these nodes and tets: all forces on its nodes."""
         return self.take(np.isin(self.nodes, nodes))
 
 
 @dataclass
 class LoadedFaces:
-    """Faces on which a pressure acts that follows the surface."""
+    """Faces under a pressure that acts along the current normal."""
 
     tets: Ints
     """(m,) global ids."""
     nodes: Ints
     """(m, 3) global ids, anticlockwise from outside."""
     scale: float
-    """Quanta per newton of the forces on nodes; the same on all ranks."""
+    """Quanta per newton of the nodal forces; the same on all ranks."""
 
     def take(self, chosen: Flags) -> "LoadedFaces":
-        """Some of them."""
+        """Return the chosen faces."""
         return LoadedFaces(self.tets[chosen], self.nodes[chosen], self.scale)
 
     def here(self, nodes: Ints, tets: Ints) -> "LoadedFaces":
-        """What a rank needs that holds these nodes and tets: the faces of its tets."""
+        """Return the part of a rank with these nodes and tets: the faces of its tets."""
         return self.take(np.isin(self.tets, tets))

@@ -1,4 +1,4 @@
-"""Nodes that tets of several parts have, as bonds by shared nodes make them: what of each belongs to which part."""
+"""Nodes that have tets of several parts, as bonds by shared nodes make them, and the mass of each part in them."""
 
 from dataclasses import dataclass, field
 
@@ -16,55 +16,56 @@ Flags = npt.NDArray[np.bool_]
 
 @dataclass
 class Shares:
-    """A row for each part of each node that has several, by node and part. No row in a scene without such nodes."""
+    """A row for each part of each node that has several parts, ordered by node and part. No rows without such nodes."""
 
     node: Indices = field(default_factory=lambda: np.zeros(0, np.int32))
     """(k,) local index."""
     part: Indices = field(default_factory=lambda: np.zeros(0, np.int32))
-    """(k,)."""
+    """(k,) index of the part."""
     mass: Floats = field(default_factory=lambda: np.zeros(0))
-    """(k,) of the node, by the tets of the part, kg."""
+    """(k,) part of the mass of the node that comes from tets of the part, kg."""
     rank: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
-    """(parts,) a node of several stands for that of the lowest where it can stand for one alone, as in contact; (0,)
-    where no bond makes such nodes."""
+    """(parts,) precedence of the parts: where a node can count for one part only, as in contact, that of the lowest
+    rank is its representative part; (0,) if no bond makes such nodes."""
 
     @property
     def fraction(self) -> Floats:
-        """(k,) share of the mass of the node."""
+        """Return (k,) the share of the node's mass."""
         whole = np.bincount(self.node, self.mass, minlength=1)
         return np.asarray(self.mass / whole[self.node])
 
     @property
     def key(self) -> Ints:
-        """(k,) node and part as one number, ascending."""
+        """Return (k,) node and part as one integer, ascending."""
         return self.node.astype(np.int64) * MOST_PARTS + self.part
 
     def take(self, chosen: "np.ndarray") -> "Shares":
-        """Some of the rows."""
+        """Return the chosen rows."""
         return Shares(self.node[chosen], self.part[chosen], self.mass[chosen], self.rank)
 
     def members(self, part: Indices) -> tuple[Ints, Indices]:
-        """(m,) nodes and (m,) their parts: all nodes with the ``part`` (n,) that each stands for, and behind them those
-        of several once more for each of the others.
+        """Return (m,) nodes and (m,) their parts: all nodes with their representative ``part`` (n,), and behind them
+        the nodes of several parts once more for each other part.
         """
         more = self.part != part[self.node]
         return np.concatenate([np.arange(len(part)), self.node[more]]), np.concatenate([part, self.part[more]])
 
     def of_nodes(self, local: Indices) -> "Shares":
-        """The rows of the nodes that ``local`` (nodes,) has a new index for, -1 for the others, with this index."""
+        """Return the rows of the nodes that have a new index in ``local`` (nodes,), -1 for none, with this index."""
         some = local[self.node] >= 0
         return Shares(local[self.node[some]], self.part[some], self.mass[some], self.rank)
 
     def standing(self) -> tuple[Indices, Indices]:
-        """The nodes of the rows, each once, and the part that each stands for."""
+        """Return the nodes of the rows, each once, and their representative parts."""
         order = np.lexsort((self.rank[self.part], self.node)) if len(self.node) else np.zeros(0, np.int64)
         nodes, first = np.unique(self.node[order], return_index=True)
         return nodes, self.part[order][first]
 
     def follow(self, node: Indices, part: Indices, mass: Floats) -> "tuple[Shares, Indices, Indices]":
-        """The shares after nodes have separated, by a row for each tet at each node that was touched: the ``node``
-        (r,) that it has now, its ``part`` and what of its mass the node has, kg, in an order that no cut changes.
-        Besides the nodes touched, each once, and the part that each stands for now.
+        """Return the shares after a separation of nodes, and the touched nodes with their representative parts.
+
+        The arguments have a row for each tet at each touched node: its new ``node`` (r,), its ``part`` and the mass
+        that the node has from it, kg, in an order that does not depend on the cut.
         """
         found, at = np.unique(node.astype(np.int64) * MOST_PARTS + part, return_inverse=True)
         nodes, parts = np.divmod(found, MOST_PARTS)
@@ -80,19 +81,20 @@ class Shares:
 
 
 def shared(node: "np.ndarray", part: "np.ndarray", mass: Floats, rank: Ints) -> Shares:
-    """The shares of the nodes of several parts, by a row for each corner of each tet: its ``node``, its ``part``, and
-    what of the mass of the tet the node has, kg.
+    """Return the shares of the nodes of several parts. The arguments have a row for each corner of each tet: its
+    ``node``, its ``part``, and the mass that the node has from the tet, kg.
     """
     empty = Shares(rank=rank)
     return empty.follow(np.asarray(node, np.int32), np.asarray(part, np.int32), mass)[0]
 
 
 def ranks(case: Case) -> Ints:
-    """(parts,) of ``Shares.rank``: parts that meet others in contact come first; (0,) in a case without shared nodes
-    between parts."""
+    """Return (parts,) ``Shares.rank``: parts that are in contact first; (0,) in a case without shared nodes between
+    parts.
+    """
     if not shared_bonds(case):
         return np.zeros(0, np.int64)
-    meets = case.contact.parts if case.contact is not None else ()
-    last = [bool(meets) and part.name not in meets for part in case.parts]
+    touching = case.contact.parts if case.contact is not None else ()
+    last = [bool(touching) and part.name not in touching for part in case.parts]
     order = sorted(range(len(last)), key=lambda i: (last[i], i))
     return np.argsort(order).astype(np.int64)

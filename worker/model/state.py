@@ -1,8 +1,9 @@
-"""How the model lies in memory: node arrays, and blocks of elements in chunks.
+"""Arrays of a rank: nodes, and blocks of elements in chunks.
 
-Elements of one part form a block. Their state is stored chunk by chunk, ``(chunks, rows, CHUNK)``: the rows of a
-chunk stand side by side, at offsets the compiler knows, so that the loops over a chunk use vector instructions and a
-chunk's whole state stays in the first cache levels. All in SI; stress positive in tension, pressure in compression.
+A block holds the elements of one part. Their state is stored chunk by chunk, ``(chunks, rows, CHUNK)``: the rows of
+a chunk are contiguous, at offsets known at compile time, so that loops over a chunk use vector instructions and the
+whole state of a chunk fits in the first cache levels. All in SI; stress positive in tension, pressure in
+compression.
 """
 
 from dataclasses import dataclass, field
@@ -20,19 +21,19 @@ Indices = npt.NDArray[np.int32]
 Flags = npt.NDArray[np.bool_]
 Bits = npt.NDArray[np.uint8]
 Tets = npt.NDArray[np.uint32]
-"""Unsigned: an index that cannot be negative needs no test for counting from the end."""
+"""Unsigned: numba omits the test for negative indices."""
 
 CHUNK = 376
-"""Elements a chunk."""
+"""Elements of a chunk."""
 
 INTACT, BROKEN, WIDE = range(3)
-"""Bond of a face to the one behind it: whole; broken; broken and so far apart that it is part of the surface."""
+"""State of a facet between two tets: intact; broken; broken and so wide open that both sides are surface."""
 LAID_BARE = -2
 """``Block.across`` of a face that erosion has exposed; -1 for one that was exposed at the start."""
 
 
 def extended(array: "np.ndarray", rows: "np.ndarray") -> "np.ndarray":
-    """``array`` with ``rows`` behind it: in the room that its buffer has left, or in a new one half as large again."""
+    """Return ``array`` with ``rows`` appended, in the free room of its buffer or in a new one half as large again."""
     n, m = len(array), len(array) + len(rows)
     if n == m:
         return array
@@ -47,16 +48,16 @@ def extended(array: "np.ndarray", rows: "np.ndarray") -> "np.ndarray":
 
 @dataclass
 class Nodes:
-    """Nodal arrays of one rank; ``n`` nodes, in the order of their global ids."""
+    """Nodal arrays of one rank: ``n`` nodes, in the order of their global ids."""
 
     id: Ints
     """(n,) global ids."""
     part: Indices
-    """(n,) index of the part; of a node of several parts (``shares``) the one that it stands for."""
+    """(n,) index of the part; for a node of several parts (``shares``) its representative part."""
     owner: Indices
-    """(n,) rank that counts the node."""
+    """(n,) rank that owns the node: sums over nodes count it there."""
     owned: npt.NDArray[np.bool_]
-    """(n,) True where that is this rank."""
+    """(n,) whether this rank owns the node."""
     x0: Floats
     """(n, 3) initial position, m."""
     x: Floats
@@ -66,18 +67,18 @@ class Nodes:
     mass: Floats
     """(n,) lumped mass, kg."""
     force: Ints
-    """(n, 3) internal force in quanta."""
+    """(n, 3) internal force, quanta."""
     stepping: Floats
-    """(n,) energy that steps of unequal length have taken, J (energy.py)."""
+    """(n,) energy lost to the change of the step length, J (accounts/energy.py)."""
     scale: float = 1.0
-    """Quanta per newton of ``force`` as it stands."""
+    """Quanta per newton of ``force``."""
     group: Indices = field(default_factory=lambda: np.zeros(0, np.int32))
-    """(n,) see Model.groups; copies stay in that of their parents. (0,) where nobody asks."""
+    """(n,) see Model.groups; a copy has the group of its parent. (0,) if loads of groups are not recorded."""
     marks: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
-    """(n,) the sets of mesh files that each is in, a bit each (marks.py); copies are where their parents are. (0,)
-    where the case is on none."""
+    """(n,) bit set of the sets of mesh files that contain the node (scene/marks.py); a copy has that of its parent.
+    (0,) if the case refers to no set."""
     shares: Shares = field(default_factory=Shares)
-    """Of nodes of several parts."""
+    """Nodes that belong to several parts."""
     _inherited: Rooms = field(
         default_factory=lambda: Rooms("part", "x0", "x", "v", "mass", "force", "stepping"), init=False
     )
@@ -89,27 +90,27 @@ class Nodes:
         return len(self.id)
 
     def places(self, ids: Ints) -> Indices:
-        """Local indices of nodes with these global ids, -1 for those that are not here."""
+        """Return the local indices of nodes with these global ids, -1 for nodes that are not on this rank."""
         return ids_of.places(self.id, ids)
 
     def among(self, chosen: Flags) -> Flags:
-        """(n,) the nodes that have a tet of the ``chosen`` parts (parts,)."""
+        """Return (n,) which nodes have a tet of the ``chosen`` parts (parts,)."""
         found: Flags = chosen[self.part]
         found[self.shares.node[chosen[self.shares.part]]] = True
         return found
 
     def in_part(self, part: int) -> Flags:
-        """(n,) the nodes that have a tet of a part."""
+        """Return (n,) which nodes have a tet of a part."""
         found: Flags = self.part == part
         found[self.shares.node[self.shares.part == part]] = True
         return found
 
     def of_parts(self) -> tuple[Ints, Indices]:
-        """(m,) nodes and (m,) their parts, see Shares.members."""
+        """Return (m,) nodes and (m,) their parts, see Shares.members."""
         return self.shares.members(self.part)
 
     def mass_of(self, part: int) -> Floats:
-        """(n,) what of the mass of each node is of the tets of a part, kg."""
+        """Return (n,) the mass of each node that comes from tets of a part, kg."""
         mass, shares = np.where(self.part == part, self.mass, 0.0), self.shares
         mass[shares.node] = 0.0
         some = shares.part == part
@@ -117,8 +118,9 @@ class Nodes:
         return mass
 
     def grow(self, copies: "Copies") -> None:
-        """Takes up copies of nodes: they begin as their parents are, whose mass is their own less the copies'."""
-        from .inheriting import inherit  # numba, which is not imported before its cache has a name (kernels/store.py)
+        """Append copies of nodes: each has the state of its parent, and takes its mass from it."""
+        # It imports numba, which must not be imported before kernels/store.py has set its cache folder.
+        from .inheriting import inherit
 
         n, m = self.n, self.n + copies.n
         inherited = self._inherited.of(self, copies.n)
@@ -135,18 +137,18 @@ class Nodes:
 
 @dataclass
 class Copies:
-    """Nodes that come into being when others separate; by ascending global id, behind all that a rank has."""
+    """New nodes of a separation, in ascending order of global id, behind all nodes of the rank."""
 
     parents: Ints
-    """(n,) local nodes that they have been part of."""
+    """(n,) local index of the node that each was separated from."""
     id: Ints
     """(n,) global ids."""
     owner: Indices
-    """(n,) rank that counts the node."""
+    """(n,) rank that owns the node."""
     owned: Flags
-    """(n,) True where that is this rank."""
+    """(n,) whether this rank owns the node."""
     mass: Floats
-    """(n,) kg."""
+    """(n,) mass, kg."""
 
     @property
     def n(self) -> int:
@@ -156,7 +158,9 @@ class Copies:
 
 @dataclass
 class Block:
-    """The elements of one part on one rank; the first ``border_chunks`` chunks touch every shared node."""
+    """The elements of one part on one rank; the first ``border_chunks`` chunks contain all tets that touch a shared
+    node.
+    """
 
     part: int
     n: int
@@ -165,49 +169,49 @@ class Block:
     id: Ints
     """(n,) global tet ids."""
     state: Floats
-    """(chunks, rows, CHUNK)."""
+    """(chunks, rows, CHUNK) element state (rows.py)."""
     kind: int
-    """Which strength model (materials/models.py)."""
+    """Number of the strength model (materials/models.py)."""
     eos: int
-    """Which equation of state."""
+    """Number of the equation of state."""
     params: Floats
     """Material constants (materials/models.py)."""
     border_chunks: int = 0
     temperature: float = 293.15
-    """Initial temperature, K; it stays where no material of the block heats up."""
+    """Initial temperature, K; the temperature of every tet if the material has no row for it."""
     across: Indices = field(default_factory=lambda: np.zeros((0, 4), np.int32))
-    """(n, 4) what was behind each face at the start, 4 * global tet id + local face; -1 for an exposed face, LAID_BARE
-    for one that erosion has exposed; (0, 4) in scenes without contact and fracture."""
+    """(n, 4) the neighbour of each face at the start, 4 * global tet id + local face; -1 for an exposed face,
+    LAID_BARE for a face that erosion has exposed; (0, 4) in scenes without contact and fracture."""
     bond: Bits = field(default_factory=lambda: np.zeros((0, 4), np.uint8))
     """(n, 4) INTACT, BROKEN or WIDE; (0, 4) where the part does not fracture."""
     weakest: Floats = field(default_factory=lambda: np.zeros(0))
     """(n,) smallest strength of the faces of each tet, Pa; (0,) where the part does not fracture."""
     hot: Bits = field(default_factory=lambda: np.zeros(0, np.uint8))
-    """(n,) bit k: the tet's own traction on its face k is beyond ``weakest``."""
+    """(n,) bit k: the tet's own traction on face k exceeds ``weakest``."""
     flat: Flags = field(default_factory=lambda: np.zeros(0, bool))
-    """(n,) tets whose volume strain is not averaged (elements/flat.py); (0,) where there is none."""
+    """(n,) flat tets, whose volume strain is not averaged (elements/flat.py); (0,) if there is none."""
     shear_weight: float = 0.0
-    """Of shear against normal traction."""
+    """Weight of the shear traction against the normal traction in the criterion of fracture."""
     worn: Flags = field(default_factory=lambda: np.zeros(0, bool))
-    """(n,) tets that are about to leave; (0,) where the part does not erode."""
+    """(n,) tets that are to be removed; (0,) if the part does not erode."""
     life: Floats = field(default_factory=lambda: np.zeros(5))
-    """What a tet lives through (elements/wear.py)."""
+    """Limits of erosion (elements/wear.py)."""
     rigid: bool = False
-    """Whether the part is rigid: no pass over elements concerns it."""
+    """Whether the part is rigid: passes over elements omit it."""
     seconds: float = 0.0
-    """CPU time of the passes over the block so far, where a rank has several."""
+    """CPU time of the passes over the block, s; counted if the rank has several blocks."""
     group: Indices = field(default_factory=lambda: np.zeros(0, np.int32))
-    """(n,) see Model.groups; (0,) where nobody asks."""
+    """(n,) see Model.groups; (0,) if loads of groups are not recorded."""
     moved: int = 0
-    """Tets that have left so far, for each of which another may stand in another chunk."""
+    """Number of tets removed so far; for each another tet may have moved to another chunk."""
     quiet: Ints = field(default_factory=lambda: np.zeros((0, 3), np.int64))
-    """(chunks, 3) which chunks are at rest (elements/rest.py)."""
+    """(chunks, 3) record of chunks at rest (elements/rest.py)."""
     own_averages: Tets | None = None
-    """(n, 4) see ``averages``; None where these are the nodes."""
+    """(n, 4) see ``averages``; None if they are the nodes."""
 
     @property
     def averages(self) -> Tets:
-        """(n, 4) the means that each corner takes part in (elements/averages.py)."""
+        """(n, 4) index of the nodal mean to which each corner contributes (elements/averages.py)."""
         return self.tets if self.own_averages is None else self.own_averages
 
     @property
@@ -216,32 +220,32 @@ class Block:
         return -(-self.n // CHUNK)
 
     def __post_init__(self) -> None:
-        """The state is the same array for good."""
+        """Views of ``state``, which stays the same array."""
         self.flat_state: Floats = self.state.reshape(-1)
-        """All of the state in one row."""
+        """The whole state as one row."""
         self.rows = int(self.state.shape[1])
-        """Of the state, in a chunk."""
+        """Rows of the state of a chunk."""
 
     def row(self, row: int) -> Floats:
-        """(n,) copy of one row of the state."""
+        """Return (n,) a copy of one row of the state."""
         return np.ascontiguousarray(self.state[:, row, :]).reshape(-1)[: self.n]
 
     def at(self, row: int, places: "np.ndarray") -> Floats:
-        """(k,) copy of one row of the state at ``places`` (k,)."""
-        further = (int(self.state.shape[1]) - 1) * CHUNK  # from a chunk to the next, beyond what a row has
+        """Return (k,) a copy of one row of the state for the tets ``places`` (k,)."""
+        further = (int(self.state.shape[1]) - 1) * CHUNK  # words between the parts of a row in two chunks
         return np.asarray(self.state.reshape(-1)[places + (places // CHUNK * further + row * CHUNK)])
 
     def has(self, row: int) -> bool:
-        """Whether the block carries that row."""
+        """Return whether the block has that row."""
         return row < self.rows
 
     def exposed(self) -> Flags:
-        """(n, 4) which faces are part of the surface."""
+        """Return (n, 4) which faces are part of the surface."""
         bare: Flags = self.across < 0
         return bare | (self.bond == WIDE) if len(self.bond) else bare
 
     def drop(self, gone: Ints) -> None:
-        """Takes the tets at these places out; the last ones move into the holes."""
+        """Remove the tets with these local indices; tets from the end fill the gaps."""
         left = self.n - len(gone)
         holes, movers = gone[gone < left], np.setdiff1d(np.arange(left, self.n), gone)
         tables = self.tets, self.id, self.across, self.worn, self.group, self.flat, self.own_averages
@@ -260,32 +264,33 @@ class Block:
 
 @dataclass
 class Model:
-    """Everything one rank holds of the bodies."""
+    """All bodies on one rank."""
 
     nodes: Nodes
     blocks: list[Block] = field(default_factory=list)
     parts: list[str] = field(default_factory=list)
     elements_global: int = 0
-    """Tets of all ranks that are left."""
+    """Number of tets of all ranks that are not eroded."""
     nodes_global: int = 0
-    """Nodes of all ranks; see ``StepReduction.nodes`` for who knows of them when."""
+    """Number of nodes of all ranks; for when it is up to date see ``StepReduction.nodes``."""
     part_starts: Ints = field(default_factory=lambda: np.zeros(1, np.int64))
     """Global id of the first tet of each part."""
     mean_volumes: Floats = field(default_factory=lambda: np.zeros(0))
-    """(parts,) of the tets of each at the start, m^3."""
+    """(parts,) mean volume of a tet at the start, m^3."""
     size: float = 0.0
-    """Largest coordinate of the whole mesh at the start, m: what round-off in positions is measured by."""
+    """Largest absolute coordinate of the whole mesh at the start, m: scale of the round-off in positions."""
     slack: Floats = field(default_factory=lambda: np.zeros(0))
-    """(parts,) how far outside of a region a node of each part is still in it, m (cases/shapes/region.py)."""
+    """(parts,) tolerance for nodes in a region: distance outside of it that still counts as inside, m
+    (cases/shapes/region.py)."""
     rounding: Floats = field(default_factory=lambda: np.zeros(0))
-    """(parts,) how far off a plane of symmetry a node of each part is still on it, m."""
+    """(parts,) tolerance for nodes on a plane of symmetry: distance that still counts as on it, m."""
     groups: Floats = field(default_factory=lambda: np.zeros((0, 4)))
-    """(groups, 4) centre, m, and number of tets at the start of each group: parts of the mesh that are neighbours then,
-    and whose loads are told (worker/migration/groups.py). They do not know how many ranks there are."""
+    """(groups, 4) centre, m, and number of tets of each group at the start. A group is a set of neighbouring tets
+    whose load is recorded (migration/groups.py); groups do not depend on the number of ranks."""
 
 
 def chunked(values: Floats) -> Floats:
-    """(n,) values as (chunks, CHUNK), the tail filled with the last value so that it is harmless in divisions."""
+    """Return (n,) values as (chunks, CHUNK), padded with the last value, which is safe as a divisor."""
     chunks = -(-len(values) // CHUNK)
     filled = np.empty(chunks * CHUNK)
     filled[: len(values)] = values

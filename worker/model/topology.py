@@ -8,11 +8,11 @@ import numpy as np
 from .state import Copies, Indices, Ints
 
 KEY = 2**31
-"""More than there are tets."""
+"""Larger than any global tet id."""
 
 
 def keys(nodes: Ints, tets: Ints) -> Ints:
-    """(n,) ids of a node and of a tet as one number that orders like them."""
+    """Return (n,) the ids of a node and a tet as one integer, in lexicographic order."""
     return np.asarray(nodes * KEY + tets)
 
 
@@ -20,38 +20,44 @@ class KeptByNode(Protocol):
     """An object with arrays by node that is updated when nodes separate."""
 
     def grow(self, split: "Split", ids: Ints) -> None:
-        """Takes up the copies of a split; ``ids``: of the local nodes."""
+        """Extend the arrays by the copies of a split; ``ids``: global ids of the local nodes."""
 
 
 @dataclass
 class Split:
-    """What separated in a step, on one rank: round every node that it holds."""
+    """Separation of nodes in one step, on one rank: the tets at each separated node of this rank, and their new
+    nodes.
+    """
 
     copies: Copies
     first: int
     """Local index of the first copy."""
     touched: Ints
-    """(ranks,) not 0 for those that have a node of what breaks."""
+    """(ranks,) nonzero for ranks that have a node of the breaking facets."""
     key: Ints
-    """(r,) of the tets whose node has become a copy: ids of the node and of the tet as one number, ascending."""
+    """(r,) node and tet, as one integer of their global ids (``keys``), for each tet whose node became a copy;
+    ascending."""
     node: Indices
-    """(r,) the copy, local."""
+    """(r,) local index of the copy."""
     place: Indices
-    """(r,) of the tet in its block, -1 for one of another rank."""
+    """(r,) index of the tet in its block, -1 for a tet of another rank."""
     corner: Indices
-    """(r,) of the tet."""
+    """(r,) corner of the tet, 0 to 3."""
     block: Indices
     """(r,) index of the block."""
 
     @classmethod
     def elsewhere(cls, first: int, touched: Ints) -> Self:
-        """One of which a rank that has ``first`` nodes gets no copy."""
+        """Return a split without copies on this rank, which has ``first`` nodes."""
         words, places = np.zeros(0, np.int64), np.zeros(0, np.int32)
         copies = Copies(words, words, places, np.zeros(0, bool), np.zeros(0))
         return cls(copies, first, touched, words, places, places, places, places)
 
     def followed(self, nodes: Indices, ids: Ints, tets: Ints) -> Indices:
-        """What local ``nodes`` (n, k) of tets of global ids ``tets`` (n,) have become; ``ids``: of the local nodes."""
+        """Return the new local nodes for ``nodes`` (n, k), local, of tets of global ids ``tets`` (n,).
+
+        ``ids``: global ids of the local nodes.
+        """
         if not len(self.key):
             return nodes.astype(np.int32)
         wanted = keys(ids[nodes], tets[:, None])
@@ -59,5 +65,5 @@ class Split:
         return np.where(self.key[at] == wanted, self.node[at], nodes).astype(np.int32)
 
     def followed_sides(self, nodes: Indices, ids: Ints, tets: Ints) -> Indices:
-        """The same for facets: ``nodes`` (n, 6) of the sides of ``tets`` (n, 2), three each."""
+        """Return the same for facets: ``nodes`` (n, 6), three for each side, of ``tets`` (n, 2)."""
         return np.concatenate([self.followed(nodes[:, 3 * k : 3 * k + 3], ids, tets[:, k]) for k in (0, 1)], axis=1)

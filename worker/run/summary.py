@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from conoid.cases.compression import borne
-from conoid.cases.joined import bodies
+from conoid.cases.estimates.stages import without
+from conoid.cases.model.joined import bodies
 from conoid.cases.outcome import Made, Measured, Outcome, Sharing
-from conoid.cases.quantities import FIELD_UNITS
+from conoid.cases.reading.quantities import FIELD_UNITS
 from conoid.cases.run import Cause, State
-from conoid.cases.stages import without
+from conoid.cases.warnings.compression import borne
 
 from ..accounts import digest
 from ..accounts.timers import Spent, by_phase
