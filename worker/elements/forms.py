@@ -160,7 +160,7 @@ class Elements:
         """Returns when the forces of shared nodes are complete."""
         self.shared_forces.finish(self.model.nodes.force)
         if self._herald is not None:
-            self._herald.hear(self.shared_forces.heard)
+            self._herald.hear(self.shared_forces.received)
 
     def free(self) -> None:
         """Gives the messages of the exchanges back to MPI."""

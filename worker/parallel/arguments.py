@@ -1,10 +1,9 @@
-"""Arguments of a kernel in one table of 64-bit words, so that a kernel takes an address instead of records of arrays.
+"""Tables of kernel arguments: 64-bit words at one address, which a kernel takes instead of records of arrays.
 
-A call with records costs 4 us and more, since numba unpacks every array of theirs; a call with an address costs 0.2 us,
-and any thread can make it. An array takes 1 + ndim words, its address and its shape, and one of any layout its strides
-besides; a number or a flag takes one. What
-a kernel reads from the table are arrays without an owner: nobody counts references to them, and ``Arguments`` keeps
-them alive.
+A call with records costs 4 us and more, since numba unpacks each of their arrays; a call with an address costs 0.2
+us, and any thread can make it. An array takes 1 + ndim words, its address and its shape, and ndim words more for its
+strides if its layout is not C; a number or a flag takes one word. Arrays that a kernel reads from the table have no
+owner and no reference counts: ``Arguments`` holds references to them.
 """
 
 import ctypes
@@ -19,16 +18,16 @@ from llvmlite import ir
 from ..kernels.jit import intrinsic, packed, several, types
 
 _WORD, _BIT = ir.IntType(64), ir.IntType(1)
-"""LLVM's types of a word of the table, and of a flag."""
+"""LLVM types of a word of the table and of a flag."""
 _POINTER: Any = ctypes.PYFUNCTYPE(ctypes.c_int64, ctypes.py_object, ctypes.c_char_p)(
     ("PyCapsule_GetPointer", ctypes.pythonapi)
 )
 _DATA = 40
-"""Place of the address of the data in numpy's PyArrayInterface."""
+"""Offset of the data pointer in numpy's PyArrayInterface, bytes."""
 
 
 class Arguments:
-    """A table for arguments of the numba types ``kinds``; records count as one argument each."""
+    """A table for arguments of the numba types ``kinds``; a record counts as one argument."""
 
     def __init__(self, *kinds: Any) -> None:
         self._kinds = list(_leaves(several(*kinds)))
@@ -45,12 +44,12 @@ class Arguments:
         self._reals = self._words.cast("B").cast("d")
         self._kept: list[Any] = [None] * len(leaves)
         self.address = int(words.ctypes.data)
-        """Of the table: what kernels take."""
+        """Address of the table, for kernels."""
 
     def set(self, *values: Any) -> int:
-        """Takes the arguments, tuples of them at the same places as before; returns the address. Only what is not the
-        object that the table had before is written. Raises ValueError where an array is not of its type, or does not
-        lie in C order and is declared to.
+        """Write the arguments into the table and return its address; only objects that differ from those in the
+        table are written. Records are tuples, at the same positions in every call. Raises ValueError if an array has
+        another type than declared, or is not in C order and is declared so.
         """
         if len(values) != len(self._values):
             sizes = [len(value) if isinstance(value, tuple) else 1 for value in values]
@@ -69,7 +68,7 @@ class Arguments:
         if self._is_array[k]:
             kind, strided, words = self._kinds[k], self._strided[k], self._words
             if not (strided or value.flags.c_contiguous):
-                raise ValueError("an array of a table lies in C order")
+                raise ValueError("an array of a table must be in C order")
             if value.ndim != kind.ndim or value.dtype != self._dtypes[k]:
                 raise ValueError(f"an array of a table is {value.dtype} with {value.ndim} axes instead of {kind}")
             words[at] = _address(value)
@@ -90,7 +89,9 @@ def _dtype(kind: Any) -> np.dtype[Any]:
 
 
 def _address(array: Any) -> int:
-    """Of the first item: ``array.ctypes.data`` in half the time, by numpy's array interface for C."""
+    """Return the address of the first item: ``array.ctypes.data`` in half the time, by numpy's array interface for
+    C.
+    """
     return int(ctypes.c_int64.from_address(_POINTER(array.__array_struct__, None) + _DATA).value)
 
 
@@ -113,7 +114,7 @@ def _words(kind: Any) -> int:
 
 
 def reader(*kinds: Any) -> Any:
-    """For kernels: a function of an address that returns the arguments of these types as a tuple."""
+    """Return a function for kernels, which reads arguments of these types at an address and returns them as a tuple."""
     kind = several(*kinds)
 
     def read(_: Any, address: Any) -> Any:
@@ -126,7 +127,7 @@ def reader(*kinds: Any) -> Any:
 
 
 def _read(context: Any, builder: Any, kind: Any, base: Any, at: int) -> tuple[Any, int]:
-    """The value of that type at a place of the table ``base``, and the place behind it."""
+    """Return the value of that type at word ``at`` of the table ``base``, and the index of the word behind it."""
     if isinstance(kind, types.BaseTuple):
         values = []
         for each in kind.types:  # type: ignore[attr-defined]

@@ -1,7 +1,8 @@
-"""How many of its threads a rank uses: as many as make its regions shorter, by tasks that are timed for some steps.
+"""Choice of the number of threads that a rank uses: the number with the shortest regions, measured over some steps.
 
-A scene can be too small to be shared: tasks are few, or as short as it takes to hand one out. Few threads are tried
-again now and then, since contact and cracks make work; all of them are kept. The answer is the same on any number.
+A scene can be too small for threads: it has few tasks, or tasks as short as the time to hand one out. A smaller
+number is measured again from time to time, since contact and cracks add work; the full number is final. The answer
+does not depend on the number of threads.
 """
 
 import time
@@ -12,23 +13,23 @@ from .projecting import Projecting
 from .team import Team
 
 _STEPS, _SECONDS = 10, 0.1
-"""Of a trial, whichever ends first: one step at least. Chosen."""
+"""Length of a measurement in steps and in s, whichever ends first, at least one step. Chosen."""
 _AGAIN = 20.0
-"""s between two trials. Chosen: a trial takes less than a hundredth of it, but of steps that take longer than that."""
+"""s between two measurements. Chosen: a measurement takes less than a hundredth of it, except with very long steps."""
 _WORTH = 0.98
-"""Of the time in regions: what more threads must come to."""
+"""A larger number of threads is chosen if it takes less than this share of the time in regions. Chosen."""
 
 
 class Choice:
-    """Asked once a step."""
+    """Measures and sets the number of threads; called once a step."""
 
     def __init__(self, team: Team) -> None:
-        self._team, self._told = team, False
+        self._team, self._reported = team, False
         self._steps, self._began, self._due = 0, 0.0, 0.0
         self._costs: Projecting | None = None
 
     def step(self) -> str:
-        """Begins or ends a trial where that is due; once, what it says of threads that are not used."""
+        """Begin or end a measurement if it is time; return a message, once, if fewer threads than given are used."""
         trial, now = self._team.projecting, time.monotonic()
         if trial is None:
             if now >= self._due:
@@ -52,9 +53,9 @@ class Choice:
         if best == self._team.threads:
             self._due = float("inf")
             return ""
-        if self._told or not made.tasks:
+        if self._reported or not made.tasks:
             return ""
-        self._told = True
+        self._reported = True
         task = made.spans[0] / made.tasks
         return (
             f"the scene is too small for {self._team.threads} threads and uses {best}. A colour has "
@@ -64,7 +65,7 @@ class Choice:
 
 
 def best_crew(crews: list[int], spans: list[float]) -> int:
-    """Threads of the crew that is taken; a larger one has to be faster by what it is worth."""
+    """Return the number of threads to use, by the ``spans`` in s that regions take with ``crews`` threads."""
     best = 0
     for k in range(1, len(crews)):
         if spans[k] < _WORTH * spans[best]:

@@ -1,6 +1,6 @@
-"""What ranks say to each other, and its meaning on one rank; mpi.py says it by MPI.
+"""Communication between ranks: the operations, and their meaning on one rank. mpi.py implements them with MPI.
 
-Everything that decides is a maximum over int64 words, or a sum of integers: no order of ranks can change a bit of it.
+All decisions are maxima over int64 words or sums of integers, which do not depend on the order of the ranks.
 """
 
 from collections.abc import Iterable
@@ -16,9 +16,10 @@ from .tags import Tag
 
 @dataclass
 class Sent:
-    """What a rank has sent since the last report: messages to single ranks, and collectives.
+    """Counts of what a rank has sent since the last report: messages to single ranks, and collectives.
 
-    The bytes of a collective are those that the rank puts in. An object takes two of them: its length goes ahead.
+    The bytes of a collective are those that the rank contributes. An object takes two collectives: its length is
+    sent first.
     """
 
     messages: int = 0
@@ -27,95 +28,99 @@ class Sent:
     collective_bytes: int = 0
 
     def message(self, number: int, size: int) -> None:
-        """Counts a number of messages of ``size`` bytes in all."""
+        """Count ``number`` messages of ``size`` bytes in all."""
         self.messages += number
         self.bytes += size
 
     def collective(self, size: int = 0, number: int = 1) -> None:
-        """Counts a collective to which this rank gives ``size`` bytes."""
+        """Count ``number`` collectives to which this rank contributes ``size`` bytes."""
         self.collectives += number
         self.collective_bytes += size
 
     def since_last(self) -> dict[str, int]:
-        """The counts, which begin anew."""
+        """Return the counts and set them to zero."""
         counts = asdict(self)
         self.messages = self.bytes = self.collectives = self.collective_bytes = 0
         return counts
 
 
 class Pending(Protocol):
-    """A communication under way."""
+    """A communication in progress."""
 
     def finish(self) -> None:
-        """Returns when the data has arrived."""
+        """Return when the data has arrived."""
 
 
 class Comm(Protocol):
-    """What the worker asks of a communicator."""
+    """The operations of a communicator. All are collective except ``exchange`` and ``trade``."""
 
     rank: int
     size: int
     waited: float
-    """CPU seconds of this thread in calls that may wait for other ranks, but for the packing of objects."""
+    """CPU seconds of this thread in calls that may wait for other ranks, without the packing of objects."""
     sent: Sent
 
     def begin_maximum(self, words: Ints, result: Ints) -> Pending:
-        """Element-wise maximum of ``words`` over all ranks, in ``result`` once finished."""
+        """Start the element-wise maximum of ``words`` over all ranks; it is in ``result`` once finished."""
 
     def begin_sum(self, words: Ints, result: Ints) -> Pending:
-        """Element-wise sum of ``words`` over all ranks, in ``result`` once finished."""
+        """Start the element-wise sum of ``words`` over all ranks; it is in ``result`` once finished."""
 
     def sum(self, words: Ints) -> Ints:
-        """Element-wise sum over all ranks."""
+        """Return the element-wise sum over all ranks."""
 
     def maximum(self, values: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-        """Element-wise maximum over all ranks."""
+        """Return the element-wise maximum over all ranks."""
 
     def exchange(self, sends: list[tuple[int, Ints]], receives: list[tuple[int, Ints]], tag: Tag) -> "Exchange":
-        """A repeatable exchange of fixed buffers with other ranks."""
+        """Return a repeatable exchange of fixed buffers with other ranks; sends and receives are (rank, buffer)."""
 
     def swap(self, sends: dict[int, Ints]) -> dict[int, Ints]:
-        """What each rank has for this one, flat, by ascending rank, its own included; nothing is sent for no key."""
+        """Send words to each rank that is a key; return the words of each rank for this one, flat, by ascending
+        rank, with those of this rank for itself.
+        """
 
     def trade(self, sends: dict[int, Ints], sources: Iterable[int]) -> dict[int, Ints]:
-        """What each of the ``sources`` has for this rank, flat, in their order. They, and only they, send to it in a
-        call of their own, as it is a source of those that it ``sends`` to. Of any length; what is nothing is sent
-        empty.
+        """Send words of any length to the ranks in ``sends``; return those of the ranks ``sources``, flat, in their
+        order.
+
+        Only the partners take part: a rank is in the ``sources`` of exactly the ranks to which it sends. An empty
+        array is sent as an empty message.
         """
 
     def join(self, words: Ints) -> Ints:
-        """The words of all ranks, flat, one rank's after the other's, on every rank."""
+        """Return the words of all ranks on every rank, flat, in the order of the ranks."""
 
     def share(self, item: Any) -> list[Any]:
-        """The items of all ranks, in order, on every rank."""
+        """Return the items of all ranks on every rank, in the order of the ranks."""
 
     def gather(self, item: Any) -> list[Any] | None:
-        """The items of all ranks, in order, on rank 0; None elsewhere."""
+        """Return the items of all ranks on rank 0, in the order of the ranks; None on the others."""
 
     def scatter(self, items: list[Any] | None) -> Any:
-        """Item ``rank`` of rank 0's list."""
+        """Return item ``rank`` of rank 0's list."""
 
     def broadcast(self, item: Any) -> Any:
-        """Rank 0's item."""
+        """Return rank 0's item."""
 
     def barrier(self) -> None:
-        """Returns when every rank has come here."""
+        """Return when every rank has called it."""
 
     def await_all(self) -> None:
-        """As ``barrier``; the wait may be long, and leaves the core to others."""
+        """The same as ``barrier`` for long waits: it sleeps instead of polling."""
 
 
 class Exchange(Protocol):
-    """A set of messages with fixed partners and buffers, sent again and again."""
+    """A set of messages with fixed partners and buffers, sent repeatedly."""
 
     def begin(self) -> None:
-        """Starts all sends and receives."""
+        """Start all sends and receives."""
 
     def finish(self) -> None:
-        """Returns when the receive buffers are filled and the send buffers may be written again."""
+        """Return when the receive buffers are filled and the send buffers may be written again."""
 
     def free(self) -> None:
-        """Gives the messages back to MPI."""
+        """Free the MPI requests."""
 
 
 class _Done:
@@ -130,7 +135,7 @@ class _Done:
 
 
 class SerialComm:
-    """One rank: every verb keeps its meaning."""
+    """Communicator of a single rank."""
 
     rank = 0
     size = 1
@@ -155,7 +160,7 @@ class SerialComm:
 
     def exchange(self, sends: list[tuple[int, Ints]], receives: list[tuple[int, Ints]], tag: Tag) -> Exchange:
         if sends or receives:
-            raise ValueError("one rank has nobody to exchange with")
+            raise ValueError("a single rank cannot exchange messages")
         return _Done()
 
     def swap(self, sends: dict[int, Ints]) -> dict[int, Ints]:
@@ -163,7 +168,7 @@ class SerialComm:
 
     def trade(self, sends: dict[int, Ints], sources: Iterable[int]) -> dict[int, Ints]:
         if sends or list(sources):
-            raise ValueError("one rank has nobody to trade with")
+            raise ValueError("a single rank cannot trade")
         return {}
 
     def join(self, words: Ints) -> Ints:

@@ -1,12 +1,12 @@
-"""Recursive bisection: which rank computes which tet. Berger and Bokhari 1987, with cuts that halve every phase.
+"""Domain decomposition by recursive bisection. Berger and Bokhari 1987, with cuts that halve every phase of the step.
 
-No rank sees the points of another: a cut is found digit by digit from sums of weights over all ranks.
+No rank has the points of another rank: a cut is found digit by digit from sums of weights over all ranks.
 
-Ranks wait for each other within a step, after contact and after the elements, so that half of the sum is not enough:
-one with all of the contact and another with all of the tets have equal loads and halve nothing. In three dimensions
-there is a plane that halves any three measures at once (the ham sandwich theorem). So where a point has several
-weights, one for each phase, planes of many directions are tried, each where it halves the sum, and the one stands that
-leaves the phases most nearly even.
+Ranks wait for each other within a step, after contact and after the elements, so it is not enough to halve the sum
+of the loads: a rank with all contact and a rank with all tets have equal sums and each waits for the other. In three
+dimensions there is a plane that halves any three measures at once (the ham sandwich theorem). So if a point has
+several weights, one for each phase, planes of many directions are tried, each where it halves the sum, and the one
+is chosen that leaves the phases most nearly even.
 """
 
 from dataclasses import dataclass
@@ -20,30 +20,33 @@ from ..model.state import Flags, Floats, Indices, Ints
 from .comm import Comm
 
 _LEVELS = 2.0**31 - 1.0
-"""Places along a normal that are told apart; points in one place are told apart by their ids."""
+"""Distinct positions along a normal; points at one position are ordered by their ids."""
 _ID_BITS = 32
-"""Below the place in a sorting key of 63 bits, 31 for the place: ids are below 2^32."""
+"""Bits below the position in a sorting key of 63 bits, 31 of them for the position: ids are below 2^32."""
 _DIGIT = 8
-"""Bits of a sorting key that one sum over the ranks settles: 256 counts a box, and eight sums in all. Chosen."""
+"""Bits of a sorting key that one sum over the ranks determines: 256 counts a box, eight sums in all. Chosen."""
 _FINEST = 2.0**30
-"""Quanta of the largest weight: sums of four billion of them are exact."""
+"""Quanta of the largest weight: sums of four billion weights are exact."""
 _BINS = 128
-"""Slices in which the weights along a direction are told apart when directions are compared."""
+"""Slices into which the weights along a direction are binned when directions are compared."""
 _SHORT = 0.2
-"""Of the longest: no cut is made across a direction in which a box is shorter (as ``run.cut_scale`` has it)."""
+"""Share of the longest extent of a box: no cut is made across a direction with a shorter extent (as with
+``run.cut_scale``)."""
 _SURFACE = 0.05
-"""Share of the time that a cut through twice as much as need be is taken to cost."""
+"""Penalty of a cut, as a share of the time, that goes through twice the weight of the best direction."""
 _TOGETHER = 8
-"""Boxes whose slices are summed over the ranks at once, so that their memory does not grow with the ranks."""
+"""Boxes whose slices are summed over the ranks in one call: memory does not grow with the number of ranks."""
 _THICK = 2
-"""Slices on either side of a cut that tell through how much it goes."""
+"""Slices on either side of a cut from which the weight that it goes through is computed."""
 _SAMPLE = 4096
-"""Points of a box, of those that weigh in the first phase alone, by which directions are compared: with 4,000 in 128
-slices the middle lies within a hundredth of the box. Chosen."""
+"""Size of the sample of points of a box, of those with a weight in the first phase only, by which directions are
+compared: with 4,000 points in 128 slices the middle is off by less than a hundredth of the box. Chosen."""
 
 
 def _directions() -> Floats:
-    """(49, 3) unit normals: the axes first, then all whose components are as 0, 1 and 2, but for their sense."""
+    """Return (49, 3) unit normals: the axes first, then all with components in the ratio of 0, 1 and 2; one of each
+    pair of opposites.
+    """
     found = [v for v in product(range(-2, 3), repeat=3) if v > (0, 0, 0) and np.gcd.reduce(v) == 1]
     found.sort(key=lambda v: (sum(map(abs, v)), [-c for c in v]))
     return np.asarray(np.array(found) / np.linalg.norm(found, axis=1)[:, None])
@@ -51,28 +54,30 @@ def _directions() -> Floats:
 
 DIRECTIONS = _directions()
 _AXES = 3
-"""The first directions: x, y and z."""
+"""Number of first directions that are x, y and z."""
 
 
 @dataclass
 class Cut:
-    """The ranks ``first`` .. ``first + parts - 1`` in two: what lies below ``key`` along a normal, and the rest."""
+    """A cut of the ranks ``first`` .. ``first + parts - 1``: points below ``key`` along a normal are on the lower
+    side.
+    """
 
     first: int
     parts: int
     direction: int
-    """Of DIRECTIONS."""
+    """Index in DIRECTIONS."""
     low: float
     high: float
     key: int
 
     @property
     def left(self) -> int:
-        """Ranks on the lower side."""
+        """Number of ranks on the lower side."""
         return self.parts // 2
 
     def keys(self, points: Floats, ids: Ints) -> Ints:
-        """(n,) places of points (n, 3) along the normal, then their ``ids`` (n,)."""
+        """Return (n,) sorting keys: positions of points (n, 3) along the normal, then their ``ids`` (n,)."""
         (x, y, z), extent = DIRECTIONS[self.direction], self.high - self.low
         along = points[:, 0] * x + points[:, 1] * y + points[:, 2] * z  # the same bits in whatever company
         share = (along - self.low) / (extent if extent > 0.0 else 1.0)
@@ -82,11 +87,12 @@ class Cut:
 def bisect(
     points: Floats, ids: Ints, weights: Floats, parts: int, comm: Comm
 ) -> tuple[Indices, list[Cut]]:  # fmt: skip
-    """(n,) part of each of this rank's points (n, 3), and the cuts: boxes cut so that the sums of ``weights``, (n,) or
-    (n, phases), are equal; all ranks take part. With one phase they are cut across their longest axis.
+    """Return (n,) the part of each of this rank's points (n, 3), and the cuts. Collective.
 
-    Points in one place are told apart by their ``ids`` (n,), below 2^32, so the parts do not depend on how the points
-    are spread over the ranks. A number of parts that is no power of two is split as floor : ceiling.
+    Boxes are cut so that the sums of ``weights``, (n,) or (n, phases), are equal; with one phase across their
+    longest axis. Points at one position are ordered by their ``ids`` (n,), below 2^32, so the parts do not depend on
+    the distribution of the points over the ranks. A number of parts that is not a power of two is split as floor :
+    ceiling.
     """
     owner, cuts = np.zeros(len(points), np.int32), []
     phases = weights if weights.ndim == 2 else weights[:, None]
@@ -104,7 +110,7 @@ def bisect(
 
 
 def place(cuts: list[Cut], points: Floats) -> Indices:
-    """(n,) the parts in which other points (n, 3) lie."""
+    """Return (n,) the parts that contain other points (n, 3)."""
     owner, none = np.zeros(len(points), np.int32), np.zeros(len(points), np.int64)
     for cut in cuts:
         inside = np.flatnonzero(owner == cut.first)
@@ -115,8 +121,10 @@ def place(cuts: list[Cut], points: Floats) -> Indices:
 def _level(
     points: Floats, ids: Ints, quanta: Ints, owner: Indices, groups: list[tuple[int, int]], tried: int, comm: Comm
 ) -> list[Cut]:  # fmt: skip
-    """Cuts each of the ``groups`` (first, parts), the points whose ``owner`` is ``first`` so far, across one of the
-    first ``tried`` directions; what lies beyond a cut gets the first owner of the other side.
+    """Return the cuts of the ``groups`` (first, parts), each across one of the first ``tried`` directions.
+
+    The points of a group have ``owner`` equal to ``first``; those beyond the cut get the first rank of the upper
+    side.
     """
     members = [np.flatnonzero(owner == first) for first, _ in groups]
     if tried > _AXES:
@@ -136,8 +144,8 @@ def _level(
 
 
 def _extents(points: Floats, members: list[Ints], directions: list[Floats], comm: Comm) -> Floats:
-    """(groups, 2, k) the highest place of the members of each group along each of its ``directions`` (k, 3), and minus
-    the lowest one; zeros where no rank has any.
+    """Return (groups, 2, k) the largest position of the members of each group along each of its ``directions`` (k,
+    3), and minus the smallest; zeros if no rank has members. Collective.
     """
     reach = np.full((len(members), 2, len(directions[0])), -np.inf)
     for own, chosen, normals in zip(reach, members, directions, strict=True):
@@ -148,8 +156,8 @@ def _extents(points: Floats, members: list[Ints], directions: list[Floats], comm
 def _most_even(
     points: Floats, ids: Ints, quanta: Ints, members: list[Ints], groups: list[tuple[int, int]], comm: Comm
 ) -> Ints:  # fmt: skip
-    """(groups,) the direction across which a cut that divides the sum leaves the phases most nearly even, where cuts
-    that go through more have to be better by more; by a sample of the points.
+    """Return (groups,) the direction of the cut that halves the sum and leaves the phases most nearly even, from a
+    sample of the points. A cut through more weight has a penalty (_SURFACE). Collective.
     """
     luck, many = splitmix64(ids, 0), comm.sum(np.array([len(chosen) for chosen in members], np.int64))
     samples = [_drawn(chosen, luck, quanta, max(int(n) // _SAMPLE, 1)) for chosen, n in zip(members, many, strict=True)]
@@ -174,8 +182,10 @@ def _most_even(
 
 
 def _unevenness(slices: Floats, parts: int) -> tuple[Floats, Floats]:
-    """What a cut that divides the sum of ``slices`` (directions, bins, phases) for ``parts`` ranks loses, as a share of
-    the whole, when ranks wait for each other after each phase; and the mean of the slices round it; (directions,) each.
+    """Return the loss of a cut that halves the sum of ``slices`` (directions, bins, phases) for ``parts`` ranks, and
+    the mean weight of the slices round it, both (directions,).
+
+    The loss is the waiting after each phase, as a share of the whole time.
     """
     every, bins = np.arange(len(slices)), slices.shape[1]
     left, upto = parts // 2, np.cumsum(slices, axis=1)
@@ -195,8 +205,9 @@ def _unevenness(slices: Floats, parts: int) -> tuple[Floats, Floats]:
 
 @njit("Tuple((int64[::1], int64[:, ::1]))(int64[::1], uint64[::1], int64[:, ::1], int64)", cache=True)
 def _drawn(chosen, luck, quanta, stride):  # type: ignore[no-untyped-def]
-    """Of the ``chosen`` points those that weigh in more than the first phase, and one of ``stride`` of the others, by
-    their ``luck`` (n,), in place of as many; with their ``quanta`` (n, phases).
+    """Return the indices of a sample of the ``chosen`` points, and their ``quanta`` (n, phases): all with a weight
+    in a later phase, and one in ``stride`` of the others, by the hash ``luck`` (n,), with ``stride`` times its
+    weight.
     """
     some, weights, n = np.empty(len(chosen), np.int64), np.empty((len(chosen), quanta.shape[1]), np.int64), 0
     for a in chosen:
@@ -214,7 +225,7 @@ def _drawn(chosen, luck, quanta, stride):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[:, ::1], float64[:, ::1], int64[::1], float64[:, ::1])", cache=True)
 def _reach(reach, points, chosen, directions):  # type: ignore[no-untyped-def]
-    """Raises ``reach`` (2, directions) to the highest place of the ``chosen`` points, and minus the lowest one."""
+    """Raise ``reach`` (2, directions) to the largest position of the ``chosen`` points, and to minus the smallest."""
     for a in chosen:
         for k in range(len(directions)):
             along = points[a, 0] * directions[k, 0] + points[a, 1] * directions[k, 1] + points[a, 2] * directions[k, 2]
@@ -226,7 +237,7 @@ def _reach(reach, points, chosen, directions):  # type: ignore[no-untyped-def]
     cache=True,
 )
 def _slice(sums, points, quanta, chosen, directions, low, scale):  # type: ignore[no-untyped-def]
-    """Adds the ``quanta`` (m, phases) of the ``chosen`` (m,) points to their slice of each direction."""
+    """Add the ``quanta`` (m, phases) of the ``chosen`` (m,) points to their slice along each direction."""
     for k in range(len(directions)):
         x, y, z = directions[k, 0] * scale[k], directions[k, 1] * scale[k], directions[k, 2] * scale[k]
         start, slices = low[k] * scale[k], sums[k]
@@ -239,7 +250,9 @@ def _slice(sums, points, quanta, chosen, directions, low, scale):  # type: ignor
 
 
 def _search(cuts: list[Cut], keys: list[Ints], quanta: list[Ints], comm: Comm) -> None:
-    """Sets the key of every cut: the smallest up to which there is more than the left side's share."""
+    """Set the key of every cut: the smallest key at which the sum of the weights below exceeds the share of the
+    lower side. Collective.
+    """
     alive: list[Flags] = [np.ones(len(k), bool) for k in keys]
     total = comm.sum(np.array([q.sum() for q in quanta], np.int64))
     wanted = [int(t) * cut.left // cut.parts for t, cut in zip(total, cuts, strict=True)]

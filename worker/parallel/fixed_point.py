@@ -1,8 +1,8 @@
 """Sums that do not depend on their order: integers in units of a power of two.
 
-The scale of the nodal forces follows the largest contribution of the step before; when a step outgrows it, the sum is
-repeated in a coarser quantum. A contribution has 51 bits; node 0 of a tet may get three of them, so a node could have
-680 tets before its sum wraps: twenty times what a mesh has.
+The scale of the nodal forces follows from the largest contribution of the step before; if a step exceeds it, the sum
+is repeated in a coarser quantum. A contribution has 51 bits; node 0 of a tet may get three of them, so the sum is
+safe for a node with up to 680 tets: twenty times the number in a mesh.
 """
 
 import math
@@ -18,52 +18,53 @@ from ..model.state import Floats, Indices, Ints
 from .comm import Comm
 
 CONTRIBUTION_BITS = 51
-"""A contribution stays below 2^51 quanta, where a float64 beside 1.5 times 2^52 counts integers one by one
+"""A contribution is below 2^51 quanta, where the float64 values round 1.5 times 2^52 are all integers
 (elements/tet4.py)."""
 HEADROOM_BITS = 5
-"""The next step may grow 32-fold before its sum has to be repeated."""
+"""Contributions may grow 32-fold in a step before the sum has to be repeated."""
 _NEAREST_BITS = 0x4338000000000000
 """Bits of NEAREST."""
 _MAGNITUDE, _INFINITE = 0x7FFFFFFFFFFFFFFF, 0x7FF0000000000000
-"""All bits of a float64 but its sign; those of infinity."""
+"""All bits of a float64 except its sign; the bits of infinity."""
 _LIMB_BITS = 30
 _LIMB = 2.0**_LIMB_BITS
-"""Quanta of the low limb in one of the high: 60 bits in two limbs, each of which sums 2^32 values in an int64."""
+"""Ratio of the quanta of the high and the low limb: 60 bits in two limbs, each of which sums 2^32 values in an
+int64."""
 _WORD, _REAL = struct.Struct("=q"), struct.Struct("=d")
 _SMALLEST = -993
-"""Exponent of columns of smaller values: at a lower one the scale would have no bound."""
+"""Smallest exponent of a column: with a lower one the scale would overflow."""
 
 
 def float_of(bits: int) -> float:
-    """The float64 with these bits."""
+    """Return the float64 with these bits."""
     return float(_REAL.unpack(_WORD.pack(bits))[0])
 
 
 def bits_of(value: float) -> int:
-    """The bits of a float64."""
+    """Return the bits of a float64."""
     return int(_WORD.unpack(_REAL.pack(value))[0])
 
 
 def scale_for(largest: float) -> float:
-    """Quanta per newton for contributions up to ``largest``, N, with room to grow."""
+    """Return the quanta per newton for contributions up to ``largest``, N, with headroom."""
     return math.ldexp(1.0, CONTRIBUTION_BITS - HEADROOM_BITS - math.frexp(largest)[1])
 
 
 def outgrown(largest: float, scale: float) -> bool:
-    """Whether a contribution of ``largest``, N, does not fit the scale."""
+    """Return whether a contribution of ``largest``, N, exceeds the scale."""
     return not largest * scale < 2.0**CONTRIBUTION_BITS
 
 
 @njit("float64(int64)", cache=True)
 def magnitude(bits):  # type: ignore[no-untyped-def]
-    """What ``most`` has found; infinite where that is not finite."""
+    """Return the float of ``most``; infinite if some value is not finite."""
     return np.int64(bits).view(np.float64) if bits < _INFINITE else math.inf
 
 
 @njit("int64(float64[::1])", cache=True, error_model="numpy")
 def most(values):  # type: ignore[no-untyped-def]
-    """The largest magnitude, as bits: they have the order of the floats, and what is not finite is above all that are,
-    which no maximum over ranks may drop.
+    """Return the largest magnitude as bits, which have the order of the floats; a value that is not finite is above
+    all finite ones, so that a maximum over ranks keeps it.
     """
     found = np.int64(0)
     for i in range(len(values)):
@@ -73,8 +74,10 @@ def most(values):  # type: ignore[no-untyped-def]
 
 @njit("UniTuple(int64, 2)(float64[::1], float64)", cache=True, error_model="numpy")
 def limbs(values, scale):  # type: ignore[no-untyped-def]
-    """Sums of the high and of the low limbs of ``values``, in quanta of one over ``scale`` and 2^-30 of it: any where
-    these reach 2^51 of them. A number beside NEAREST has the nearest integer in its last bits, the even one of two.
+    """Return the sums of the high and of the low limbs of ``values``, in quanta of 1 / ``scale`` and 2^-30 / ``scale``;
+    undefined if a value reaches 2^51 quanta.
+
+    The last bits of x + NEAREST are the integer nearest to x, the even one of two.
     """
     highs, lows = np.int64(0), np.int64(0)
     for i in range(len(values)):
@@ -87,21 +90,23 @@ def limbs(values, scale):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], int64[::1])", cache=True, error_model="numpy")
 def _largest(largest, values, starts):  # type: ignore[no-untyped-def]
-    """Sets the ``largest`` (k,) magnitude of each column, see ``Columns``."""
+    """Set the ``largest`` (k,) magnitude of each column, see ``Columns``."""
     for j in range(len(largest)):
         largest[j] = magnitude(most(values[starts[j] : starts[j + 1]]))
 
 
 @njit("void(int64[:, ::1], float64[::1], int64[::1], float64[::1])", cache=True, error_model="numpy")
 def _limbs(words, values, starts, scale):  # type: ignore[no-untyped-def]
-    """Sets the sums of the high and of the low limbs of each column, ``words`` (2, k)."""
+    """Set the sums of the high and of the low limbs of each column, ``words`` (2, k)."""
     for j in range(len(scale)):
         words[0, j], words[1, j] = limbs(values[starts[j] : starts[j + 1]], scale[j])
 
 
 @njit("void(int64[:, :, ::1], float64[:, ::1], int32[::1], float64[::1])", cache=True, error_model="numpy")
 def _limbs_by_group(words, columns, group, scale):  # type: ignore[no-untyped-def]
-    """Adds the same of each ``group`` (n,) of ``columns`` (k, n) to ``words`` (groups, 2, k), run by run."""
+    """Add the sums of limbs of each ``group`` (n,) of ``columns`` (k, n) to ``words`` (groups, 2, k), by runs of
+    equal groups.
+    """
     begin = 0
     while begin < len(group):
         end = begin + 1
@@ -115,7 +120,7 @@ def _limbs_by_group(words, columns, group, scale):  # type: ignore[no-untyped-de
 
 
 def _whole(words: Ints) -> Floats:
-    """(..., k) quanta of the low limb that sums of limbs (..., 2, k) are, rounded once."""
+    """Return (..., k) the sums of limbs (..., 2, k) in quanta of the low limb, rounded once."""
     high, low = words[..., 0, :], words[..., 1, :]
     over = high + (low >> _LIMB_BITS)
     if over.size and max(int(over.max()), -int(over.min())) < 2**53:  # exact, so that the sum is what rounds
@@ -125,32 +130,32 @@ def _whole(words: Ints) -> Floats:
 
 
 class Tally:
-    """Sums that grow through a whole run: integers in two limbs, so that neither order nor ranks matter."""
+    """Sums that are accumulated over a whole run: integers in two limbs, independent of order and ranks."""
 
     def __init__(self, largest: Floats) -> None:
-        """``largest`` (k,): the order of magnitude of what is added to each sum; 2^-60 of it is the quantum."""
+        """``largest`` (k,): order of magnitude of the values added to each sum; 2^-60 of it is the quantum."""
         self.scale = np.ldexp(1.0, 30 - np.frexp(largest)[1])
         """(k,) quanta of the high limb per unit."""
         self.words = np.zeros((2, len(largest)), np.int64)
         """(2, k) high and low limbs."""
 
     def quanta(self, values: Floats) -> Ints:
-        """(2, k) what every row of ``values`` (n, k) would add to the words."""
+        """Return (2, k) the limbs of the sum of the rows of ``values`` (n, k)."""
         scaled = values * self.scale
         high = np.rint(scaled)
         low = np.rint((scaled - high) * _LIMB)
         return np.array([high.astype(np.int64).sum(axis=0), low.astype(np.int64).sum(axis=0)])
 
     def add(self, values: Floats) -> None:
-        """Adds every row of ``values`` (n, k)."""
+        """Add every row of ``values`` (n, k)."""
         self.words += self.quanta(values)
         self.carry()
 
     def carry(self) -> None:
-        """Carries what the low limbs have over into the high ones, which leaves the sums as they are, to the bit.
+        """Move the overflow of the low limbs to the high ones; the sums are unchanged to the bit.
 
-        A low limb has 2^29 quanta for each value at most, and values far below a quantum of the high limb are in the
-        low one alone: without this it would wrap after 2^34 of them, as contact may add in a long run.
+        A low limb gets at most 2^29 quanta from each value, and all quanta of values far below a quantum of the high
+        limb: without carry it would overflow after 2^34 values, as contact may add in a long run.
         """
         high, low = self.words
         over = (low + (1 << (_LIMB_BITS - 1))) >> _LIMB_BITS
@@ -158,29 +163,29 @@ class Tally:
         low -= over << _LIMB_BITS
 
     def total(self, comm: Comm) -> Floats:
-        """(k,) sums over all ranks; all ranks take part."""
+        """Return (k,) sums over all ranks. Collective."""
         return self.valued(comm.sum(self.words))
 
     def valued(self, words: Ints) -> Floats:
-        """(k,) what ``words`` (2, k) of all ranks together are."""
+        """Return (k,) the values of the ``words`` (2, k) of all ranks together."""
         return np.asarray(_whole(words) / _LIMB / self.scale)
 
 
 class Columns(Protocol):
-    """Columns of values that are somewhere, not necessarily side by side."""
+    """Columns of values, which need not be contiguous."""
 
     def largest(self) -> Floats:
-        """(k,) largest magnitude of each column; infinite where a value is not finite."""
+        """Return (k,) the largest magnitude of each column; infinite if a value is not finite."""
 
     def limbs(self, scale: Floats) -> Ints:
-        """(groups, 2, k) sums of the high limbs of each column, in quanta of one over ``scale`` (k,), and of the low
-        ones; of each group of rows.
+        """Return (groups, 2, k) the sums of the high and of the low limbs of each column, for each group of rows, in
+        quanta of 1 / ``scale`` (k,).
         """
 
 
 class Ragged:
-    """Columns of any lengths, one after the other in ``values``, of which column k begins at ``starts`` (k + 1,); all
-    rows are in the first of so many groups.
+    """Columns of different lengths in one array ``values``; column k begins at ``starts`` (k + 1,). All rows are in
+    the first of the groups.
     """
 
     def __init__(self, values: Floats, starts: Ints, groups: int = 1) -> None:
@@ -198,7 +203,7 @@ class Ragged:
 
 
 class Table(Ragged):
-    """The columns of an array (n, k); one that is the transpose of another is read where it is."""
+    """The columns of an array (n, k). The transpose of a C-ordered array is used without a copy."""
 
     def __init__(self, values: Floats, groups: int = 1) -> None:
         self._columns = np.ascontiguousarray(values.T)
@@ -207,8 +212,7 @@ class Table(Ragged):
 
 
 class Grouped(Table):
-    """The columns of an array whose row i belongs to ``group`` i, (n,), of so many; quick where neighbours are in
-    one."""
+    """The columns of an array whose row i belongs to ``group`` i, (n,); fast if neighbouring rows are in one group."""
 
     def __init__(self, values: Floats, group: Indices, groups: int) -> None:
         super().__init__(values, groups)
@@ -221,22 +225,24 @@ class Grouped(Table):
 
 
 def exact_sums(comm: Comm, *tables: Floats) -> Floats:
-    """(k,) sums of the columns of ``tables`` (n, .) over all ranks, see ``exact_totals``."""
+    """Return (k,) the sums of the columns of ``tables`` (n, .) over all ranks, see ``exact_totals``."""
     return exact_totals(comm, *map(Table, tables))[0] if tables else np.zeros(0)
 
 
 def exact_totals(comm: Comm, *tables: Columns) -> tuple[Floats, Floats]:
-    """(k,) sums of the columns of ``tables`` over all ranks, and (groups, k) of each group of rows: the same bits for
-    any order and partition. All tables have as many groups.
+    """Return (k,) the sums of the columns of ``tables`` over all ranks, and (groups, k) those of each group of rows:
+    the same bits for any order and partition. All tables have the same number of groups. Collective.
 
     Each value is split into two integer limbs of a common quantum, 2^-60 of the column's largest magnitude; the
-    result is off by at most n times that quantum. The sum of a column with a value that is not finite is not a number.
+    error of the result is at most n times that quantum. The sum of a column with a value that is not finite is NaN.
     """
     return totals_and_words(comm, tables, np.zeros(0, np.int64))[:2]
 
 
 def totals_and_words(comm: Comm, tables: Sequence[Columns], more: Ints) -> tuple[Floats, Floats, Ints]:
-    """What ``exact_totals`` gives, and the sums of integers ``more`` (m,) over all ranks, that go with them."""
+    """Return ``exact_totals``, and the sums of integers ``more`` (m,) over all ranks from the same reduction.
+    Collective.
+    """
     mine = [table.largest() for table in tables]
     largest = comm.maximum(np.concatenate(mine))
     valued = np.isfinite(largest)

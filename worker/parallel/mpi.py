@@ -1,4 +1,4 @@
-"""The one module that imports MPI: the ranks of its world, and how a process leaves it."""
+"""The only module that imports MPI: communicator of all ranks, and the end of a process."""
 
 import os
 import pickle
@@ -15,11 +15,11 @@ from .comm import Comm, Exchange, Pending, Sent, SerialComm
 from .tags import Tag
 
 _NAP = 0.01
-"""s between two checks of a rank that leaves its core to others; a hundredth of what the start of a rank takes."""
+"""s between two tests of a wait that leaves the core to other processes. Chosen: a hundredth of the start of a rank."""
 
 
 class MpiComm:
-    """All ranks of MPI's world."""
+    """Communicator of all ranks of MPI's world."""
 
     def __init__(self) -> None:
         from mpi4py import MPI
@@ -33,11 +33,11 @@ class MpiComm:
         MPI.pickle.__init__(self._pickled, self._unpickled)  # type: ignore[misc]
 
     def waiting(self, sign: int = 1) -> "_Waiting":
-        """Counts the CPU time of the block as waiting; -1: takes it out again."""
+        """Return a context that adds the CPU time of its block to ``waited``; with -1 it subtracts it."""
         return _Waiting(self, sign)
 
     def _pickled(self, item: Any, protocol: int | None = None) -> bytes:
-        """Within a call that waits, this is work."""
+        """Pickle an item; its time is work, although the call around it waits."""
         with self.waiting(-1):
             data = pickle.dumps(item, protocol)
         self.sent.collective_bytes += len(data)
@@ -102,7 +102,7 @@ class MpiComm:
         with self.waiting():
             for rank in sources:
                 while (message := self._world.Improbe(rank, Tag.TRADE, status=status)) is None:
-                    os.sched_yield()  # Mprobe keeps the core that the other rank may need
+                    os.sched_yield()  # Mprobe would poll on a core that the other rank may need
                 theirs[rank] = np.empty(status.Get_count(self._mpi.INT64_T), np.int64)
                 message.Recv(theirs[rank])
             self._mpi.Request.Waitall(requests)
@@ -157,7 +157,7 @@ class MpiComm:
 
 
 class _Waiting:
-    """A block that waits; there are dozens in every step, too many for generators."""
+    """Context of a block that waits; a class, since dozens run in every step and generators take longer."""
 
     __slots__ = ("_comm", "_sign", "_start")
 
@@ -203,10 +203,10 @@ class _MpiExchange:
 
 
 def leave(code: int) -> NoReturn:
-    """Ends this rank with an exit code after all of them have come to their end; no rank is aborted.
+    """End this rank with an exit code after all ranks have finished; no rank is aborted.
 
-    The process must end in good order (no ``os._exit``): MPICH takes its leave of the launcher only then, and where a
-    rank has not taken leave the launcher kills the others.
+    The process must end normally (no ``os._exit``): otherwise MPICH does not sign off at the launcher, and the
+    launcher kills the other ranks.
     """
     from mpi4py import MPI
 
@@ -215,7 +215,7 @@ def leave(code: int) -> NoReturn:
 
 
 def abort(code: int) -> NoReturn:
-    """Ends all ranks of the run now, whatever they are at, with an exit code."""
+    """End all ranks of the run at once, with an exit code."""
     from mpi4py import MPI
 
     MPI.COMM_WORLD.Abort(code)
@@ -223,6 +223,6 @@ def abort(code: int) -> NoReturn:
 
 
 def connect() -> Comm:
-    """MPI's world when it has more than one rank, else the serial twin."""
+    """Return the communicator of MPI's world if it has several ranks, else the serial one."""
     world = MpiComm()
     return world if world.size > 1 else SerialComm()

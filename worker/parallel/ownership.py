@@ -1,7 +1,7 @@
-"""Shared nodes: which ranks hold them, and how their integer sums are completed.
+"""Shared nodes: the ranks that hold them, and the completion of their integer sums.
 
-Each rank sums the contributions of its own tets; one exchange with the neighbours adds the others'. Integer addition
-does not care for the order, so every holder of a node ends with the same bits and integrates the same motion.
+Each rank sums the contributions of its own tets; one exchange with the neighbours adds theirs. Integer addition does
+not depend on the order, so every holder of a node ends with the same bits and integrates the same motion.
 """
 
 from dataclasses import dataclass
@@ -16,19 +16,19 @@ from .tags import Tag
 
 @dataclass
 class Neighbour:
-    """Another rank, and the local nodes shared with it in the order of their global ids; they grow with copies."""
+    """Another rank, and the local nodes shared with it in the order of their global ids, extended by copies."""
 
     rank: int
     nodes: Indices
 
 
 def same(some: list[Neighbour], others: list[Neighbour]) -> bool:
-    """Whether two lists name the same arrays: nothing has grown."""
+    """Return whether two lists hold the same arrays: no node was added."""
     return len(some) == len(others) and all(a.nodes is b.nodes for a, b in zip(some, others, strict=True))
 
 
 def ranks(owners: Indices | Ints) -> list[int]:
-    """Those that own something, ascending."""
+    """Return the ranks in ``owners``, ascending."""
     found: list[int] = np.flatnonzero(np.bincount(owners)).tolist()
     return found
 
@@ -48,7 +48,7 @@ def _add(sums, nodes, buffer):  # type: ignore[no-untyped-def]
 
 
 def complete(comm: Comm, neighbours: list[Neighbour], sums: Ints, tag: Tag) -> None:
-    """Completes nodal sums (nodes, columns) once; all ranks take part."""
+    """Complete nodal sums (nodes, columns) once. Collective."""
     shared = SharedSum(comm, neighbours, sums.shape[1], tag)
     shared.begin(sums)
     shared.finish(sums)
@@ -56,12 +56,12 @@ def complete(comm: Comm, neighbours: list[Neighbour], sums: Ints, tag: Tag) -> N
 
 
 class SharedSum:
-    """Completes nodal sums, (nodes, ``columns``) int64, again and again."""
+    """Repeated completion of nodal sums, (nodes, ``columns``) int64."""
 
     def __init__(
         self, comm: Comm, neighbours: list[Neighbour], columns: int, tag: Tag, *, headed: bool = False
     ) -> None:  # fmt: skip
-        """``headed``: a word for each neighbour goes along."""
+        """``headed``: a word for each neighbour is sent with the sums."""
         self._nodes = [n.nodes for n in neighbours]
         head = np.full(int(headed), -1, np.int32)
         self._every = np.concatenate([head[:0], *(part for nodes in self._nodes for part in (nodes, head))])
@@ -75,17 +75,17 @@ class SharedSum:
         )
 
     def serves(self, neighbours: list[Neighbour]) -> bool:
-        """Whether these neighbours share what they did when it was made."""
+        """Return whether the neighbours share the same nodes as at construction."""
         return all(one.nodes is nodes for one, nodes in zip(neighbours, self._nodes, strict=True))
 
     @property
-    def heard(self) -> Ints:
-        """(neighbours,) the word that came along from each."""
+    def received(self) -> Ints:
+        """(neighbours,) the word that each neighbour has sent with its sums."""
         return np.asarray(self._in[self._heads, 0])
 
     def begin(self, sums: Ints, words: Ints | None = None) -> None:
-        """Sends the local sums of the shared nodes; the tets of shared nodes must all have been summed. ``words``
-        (neighbours,) go along.
+        """Send the local sums of the shared nodes, which all tets of this rank must have been added to, and
+        ``words`` (neighbours,).
         """
         if not self._nodes:
             return
@@ -95,12 +95,12 @@ class SharedSum:
         self._exchange.begin()
 
     def finish(self, sums: Ints) -> None:
-        """Adds what the neighbours sent: the sums of the shared nodes are complete."""
+        """Add the sums of the neighbours: the sums of the shared nodes are complete."""
         if not self._nodes:
             return
         self._exchange.finish()
         _add(sums, self._every, self._in)
 
     def free(self) -> None:
-        """Gives the messages back to MPI."""
+        """Free the MPI requests."""
         self._exchange.free()

@@ -1,4 +1,4 @@
-"""Passes over a range, cut into tasks of one size, by the threads of a rank."""
+"""Passes over a range, cut into tasks of equal size, which the threads of a rank share."""
 
 from typing import Any
 
@@ -10,29 +10,31 @@ from .arguments import Arguments
 from .team import Team
 
 NODES_OF_A_TASK = 4096
-"""Chosen: 10 us of work, against 2 us that a region of threads costs."""
+"""Nodes of a task. Chosen: 10 us of work, against 2 us for a region of threads."""
 
 
 class Ranges:
-    """Has the threads of a team run kernels of the signature team.TASK over ranges.
+    """Runs kernels of the signature team.TASK over ranges on a team of threads.
 
-    Tasks may run at the same time, so what they write must not overlap. The task that begins at ``first`` has the
-    number ``first // size``.
+    Tasks may run at the same time, so they must not write to the same memory. The task that begins at ``first`` has the
+    number ``first
+
+    size``.
     """
 
     def __init__(self, team: Team, size: int = NODES_OF_A_TASK) -> None:
-        """``size``: of a task."""
+        """``size``: length of a task."""
         self.threads, self.size = team.threads, size
         self._team = team
         self._tasks, self._starts, self._n = np.zeros((0, 2), np.int64), np.zeros(2, np.int64), 0
 
     def run(self, kernel: Kernel, table: int, n: int) -> None:
-        """The range from 0 to ``n``, with the arguments at the address ``table``."""
+        """Run over the range from 0 to ``n``, with the arguments at the address ``table``."""
         if n:
             self._team.run(kernel, table, self._cut(n), self._starts)
 
     def many(self, n: int) -> int:
-        """Tasks of the range from 0 to ``n``."""
+        """Return the number of tasks of the range from 0 to ``n``."""
         return -(-n // self.size)
 
     def _cut(self, n: int) -> Ints:
@@ -48,17 +50,17 @@ class Ranges:
 
 
 class Pass:
-    """A kernel with its table of arguments, over ranges."""
+    """A kernel with its table of arguments, run over ranges."""
 
     def __init__(self, team: Team, kernel: Kernel, *kinds: Any, size: int = NODES_OF_A_TASK) -> None:
-        """``kinds``: numba types of the arguments; ``size``: of a task."""
+        """``kinds``: numba types of the arguments; ``size``: length of a task."""
         self._ranges, self._kernel, self._arguments = Ranges(team, size), kernel, Arguments(*kinds)
 
     def run(self, n: int, *values: Any) -> None:
-        """The range from 0 to ``n``; ``values``: the arguments."""
+        """Run over the range from 0 to ``n``; ``values``: the arguments."""
         if n:
             self._ranges.run(self._kernel, self._arguments.set(*values), n)
 
     def many(self, n: int) -> int:
-        """Tasks of the range from 0 to ``n``."""
+        """Return the number of tasks of the range from 0 to ``n``."""
         return self._ranges.many(n)

@@ -1,10 +1,10 @@
-"""What regions would take on more threads than there are cores: their tasks are timed one after the other, and given
-out as a team of each size would do it.
+"""Estimate of the time that regions would take on more threads than there are cores.
 
-The next task goes to the thread that is free first, colour after colour. What it costs to share is measured first, on
-two threads: the ``turn`` of a colour, and after a pause the ``call`` of a thread that sleeps, which its caller pays,
-and its ``wake``, the time until it works. Whoever wakes wakes two more (team.py). That tasks which run together slow
-each other down, through the memory that they share, is not in it.
+The tasks are timed one after the other and assigned as a team of each size would do it: the next task to the thread
+that is free first, colour by colour. The costs of sharing are measured before, on two threads: the ``turn`` of a
+colour, and after a pause the ``call`` of a sleeping thread, which its caller spends, and its ``wake``, the time
+until it works. Each woken thread wakes two more (team.py). The estimate omits the slow-down of simultaneous tasks by
+the memory that they share.
 """
 
 import time
@@ -19,22 +19,22 @@ from .team import Team
 from .words import TASK, call_task, now
 
 _PAUSE = 100_000
-"""ns after which threads sleep that have found no task. Chosen: twice what they look for one (team.py)."""
+"""ns after which threads without a task sleep. Chosen: twice the time for which they poll (team.py)."""
 _REPEATS = 50
 _ROUNDS = 100_000
-"""Of the loop of a task that lasts longer than a thread takes to wake. Chosen: some 100 us."""
+"""Iterations of a task that lasts longer than a thread takes to wake. Chosen: some 100 us."""
 _WORDS = types.int64[::1], types.int64
 _words = reader(*_WORDS)
 
 
 def crews_of(threads: int) -> list[int]:
-    """The teams that are projected: of 1, 2, 4, 8, ... and ``threads`` threads."""
+    """Return the sizes of the teams of the estimate: 1, 2, 4, 8, ... and ``threads`` threads."""
     return sorted({threads} | {1 << k for k in range(threads.bit_length()) if 1 << k <= threads})
 
 
 @dataclass(frozen=True)
 class Costs:
-    """ns, see above."""
+    """Costs of sharing, ns; see above."""
 
     turn: int
     call: int
@@ -43,7 +43,9 @@ class Costs:
 
 @njit("void(boolean, int64[::1], int64[::1], int64[:, ::1])", cache=True)
 def _ready(asleep, costs, crews, free):  # type: ignore[no-untyped-def]
-    """When each thread of each crew can begin with the first task of a colour; last the end of a crew's last task."""
+    """Set the time at which each thread of each crew can begin the first task of a colour; the last column is the
+    end of a crew's last task.
+    """
     for c in range(len(crews)):
         free[c, : crews[c]] = 0
         free[c, crews[c]] = 0
@@ -57,7 +59,7 @@ def _ready(asleep, costs, crews, free):  # type: ignore[no-untyped-def]
 
 @njit("void(int64, int64[::1], int64[:, ::1])", cache=True)
 def _give(took, crews, free):  # type: ignore[no-untyped-def]
-    """Gives a task to the thread of each crew that is free first."""
+    """Assign a task to the thread of each crew that is free first."""
     for c in range(len(crews)):
         first = 0
         for k in range(1, crews[c]):
@@ -70,7 +72,7 @@ def _give(took, crews, free):  # type: ignore[no-untyped-def]
 @njit("int64(int64[::1], int64, int64, int64[:, ::1], int64[::1], int64[::1], int64[::1], int64[:, ::1], int64[::1])",
       cache=True)  # fmt: skip
 def _timed(clock, kernel, table, tasks, starts, costs, crews, free, spans):  # type: ignore[no-untyped-def]
-    """Does all tasks; in ``spans`` (crews,) what each crew would take, ns. How long it has taken, ns."""
+    """Run all tasks; return the time, ns, and set ``spans`` (crews,) to the time that each crew would take, ns."""
     begin = now(clock, 0)
     asleep = begin - clock[2] > _PAUSE
     spans[:] = 0
@@ -89,10 +91,10 @@ def _timed(clock, kernel, table, tasks, starts, costs, crews, free, spans):  # t
 
 
 class Projecting:
-    """Does the tasks of regions one after the other, and adds up what crews would take."""
+    """Runs the tasks of regions one after the other, and sums up the time that crews of other sizes would take."""
 
     def __init__(self, threads: int, costs: Costs | None = None) -> None:
-        """``threads``: of the largest crew; ``costs`` are measured where they are not known."""
+        """``threads``: size of the largest crew; ``costs``: measured if not given."""
         self.crews = crews_of(threads)
         self.costs = costs or measured()
         self.regions = self.colours = self.tasks = 0
@@ -104,12 +106,14 @@ class Projecting:
 
     @property
     def spans(self) -> list[float]:
-        """What each crew would have taken for all regions so far, s."""
+        """Return the time that each crew would have taken for all regions so far, s."""
         return (1e-9 * self._spans).tolist()  # type: ignore[no-any-return]
 
     def run(self, kernel: Kernel, table: int, tasks: Ints, starts: Ints) -> int:
-        """As ``Team.run``; the CPU time that it has taken, ns. Where another program has had the core, what tasks have
-        taken by the clock is too long by the same factor for all of them.
+        """Run the tasks as ``Team.run`` does; return the CPU time, ns.
+
+        If another program had the core, the wall times of the tasks are too long; all are scaled by CPU time over
+        wall time.
         """
         self.regions, self.colours, self.tasks = (
             self.regions + 1,
@@ -127,23 +131,23 @@ class Projecting:
 
 @njit(TASK, cache=True)
 def _spin(table, first, end, thread):  # type: ignore[no-untyped-def]
-    """Work of some length that cannot be left out."""
-    told, rounds = _words(table)
-    total = told[thread]
+    """A loop of some length that the compiler cannot remove."""
+    totals, rounds = _words(table)
+    total = totals[thread]
     for k in range(rounds):
         total = total * 6364136223846793005 + k
-    told[thread] = total
+    totals[thread] = total
 
 
 def measured() -> Costs:
-    """What it costs to share, on two threads of this process; a tenth of all measurements is below it: others may
-    have the cores.
+    """Return the costs of sharing on two threads of this process: the tenth percentile of each, since other programs
+    may use the cores.
     """
-    two, told = Team(2), np.zeros(2, np.int64)
+    two, totals = Team(2), np.zeros(2, np.int64)
     table, tasks = Arguments(*_WORDS), np.array([[0, 1], [1, 2]])
 
     def took(rounds: int, pause: bool, number: int) -> int:
-        address, found = table.set(told, rounds), []
+        address, found = table.set(totals, rounds), []
         for _ in range(_REPEATS):
             if pause:
                 time.sleep(3e-9 * _PAUSE)

@@ -1,16 +1,16 @@
-"""The threads of a rank: a pass is cut into tasks, and each task goes to whichever thread is free.
+"""The threads of a rank: a pass is cut into tasks, and each task is taken by the next free thread.
 
-A task is a range of whatever the pass goes over: chunks of tets, nodes. Tasks of one colour touch nothing in common,
-so threads need no locks and no sums of their own; colours come one after the other. All sums are of integers, so the
-answer is the same on any number of threads.
+A task is a range of the pass: chunks of tets, or nodes. Tasks of one colour write to no common memory, so threads need
+no locks and no sums of their own; colours run one after the other. All sums are of integers, so the answer is the same
+on any number of threads.
 
-The thread that asks works, too, and waits for tasks that have begun, not for threads: where another program has the
-core of a helper it does the tasks itself. OpenMP waits for every thread at the end of every region, which takes
-milliseconds then (docs/performance/scaling.md, "Threads"). One word says which tasks there are: their number, and the
-next one. A thread takes a task by adding one to the word. A colour does not end before its last task, so the arguments
-of a task stay as they are. Helpers look at the word for some 50 us, then sleep until the next pass. To wake a thread
-takes its waker some 20 us, so the asking thread wakes one or two, and whoever is woken wakes two more while there are
-tasks.
+The calling thread works, too, and waits for tasks that have begun, not for threads: if another program has the core
+of a helper, the other threads do its tasks. OpenMP waits for every thread at the end of every region, which takes
+milliseconds in that case (docs/performance/scaling.md, "Threads"). One word holds the tasks: their number, and the
+next one. A thread takes a task by an atomic increment of the word. A colour does not end before its last task, so
+the arguments of a task stay valid. Helpers poll the word for some 50 us, then sleep until the next pass. Waking a
+thread takes its waker some 20 us, so the calling thread wakes one or two, and each woken thread wakes two more while
+there are tasks.
 """
 
 import ctypes
@@ -30,23 +30,23 @@ __all__ = ["TASK", "Team", "team"]
 _NEXT, _DONE, _ASLEEP, _KERNEL, _TABLE, _TASKS, _MOST, _WITHIN, _CLOCK, _SEMAPHORE, _THREADS = (
     0, 8, 16, 24, 25, 26, 27, 28, 29, 32, 40,
 )  # fmt: skip
-"""Places in a job's words; what several threads write has a cache line of its own. _MOST is how many threads may work,
-_WITHIN how long regions have taken so far, ns, and _CLOCK two words of room for the time. From _THREADS on a line for
-each thread: how long it has done tasks, ns, and room for the time."""
+"""Offsets in a job's words; words that several threads write have a cache line of their own. _MOST: how many threads
+may work; _WITHIN: time in regions so far, ns; _CLOCK: two words for reading the clock. From _THREADS on a line for
+each thread: its time in tasks, ns, and words for the clock."""
 _BITS, _MASK = 20, (1 << 20) - 1
-"""Of the next task in the word _NEXT; above it stands the number of tasks."""
+"""Bits of the next task in the word _NEXT; the number of tasks is above them."""
 _LINE = 8
-"""Words in a line of the cache."""
+"""Words in a cache line."""
 _WAKES = 2
-"""Threads that a thread wakes."""
-_LOOKS = 4000
-"""How often a helper looks for a task before it sleeps, and the asking thread before it lets others run. Chosen: some
-50 us, longer than what lies between two colours, much shorter than a step."""
+"""Number of threads that a thread wakes."""
+_POLLS = 4000
+"""Number of polls before a helper sleeps, and before the calling thread yields its core. Chosen: some 50 us, longer
+than the gap between two colours, much shorter than a step."""
 
 
 @njit("boolean(int64[::1], int64)", cache=True)
 def _do_one(job, thread):  # type: ignore[no-untyped-def]
-    """Does a task that nobody has taken; False where there is none."""
+    """Take one task and run it; return False if none is left."""
     word = load(job, _NEXT)
     if word & _MASK >= word >> _BITS:
         return False
@@ -66,7 +66,7 @@ def _do_one(job, thread):  # type: ignore[no-untyped-def]
 
 @njit("void(int64[::1], int64)", cache=True)
 def _wake(job, semaphore):  # type: ignore[no-untyped-def]
-    """Wakes some of those that sleep, as many as there are tasks for and may work."""
+    """Wake sleeping threads: at most _WAKES, and no more than there are tasks and threads that may work."""
     word, threads = load(job, _NEXT), (len(job) - _THREADS) // _LINE
     helpers = min((word >> _BITS) - (word & _MASK), load(job, _MOST)) - 1
     for _ in range(_WAKES):
@@ -81,14 +81,14 @@ def _wake(job, semaphore):  # type: ignore[no-untyped-def]
 
 @njit("void(int64[::1], int64, int64)", cache=True, nogil=True)
 def _help(job, semaphore, thread):  # type: ignore[no-untyped-def]
-    """Does tasks for ever; sleeps where there has been none for a while."""
+    """Run tasks for ever; sleep after a time without tasks."""
     idle = 0
     while True:
         if _do_one(job, thread):
             idle = 0
             continue
         idle += 1
-        if idle == _LOOKS:
+        if idle == _POLLS:
             add(job, _ASLEEP, 1)
             sem_wait(semaphore)
             _wake(job, semaphore)
@@ -97,7 +97,7 @@ def _help(job, semaphore, thread):  # type: ignore[no-untyped-def]
 
 @njit("void(int64[::1], int64, int64, int64, int64, int64[::1])", cache=True)
 def _ask(job, semaphore, kernel, table, tasks, starts):  # type: ignore[no-untyped-def]
-    """Colour after colour; returns when all tasks are done."""
+    """Run the tasks of one colour after the other; return when all are done."""
     begin = now(job, _CLOCK)
     for colour in range(len(starts) - 1):
         many = starts[colour + 1] - starts[colour]
@@ -108,17 +108,17 @@ def _ask(job, semaphore, kernel, table, tasks, starts):  # type: ignore[no-untyp
             _wake(job, semaphore)
         while _do_one(job, 0):
             pass
-        looked = 0
+        polls = 0
         while load(job, _DONE) < many:
-            looked += 1
-            if looked > _LOOKS:
+            polls += 1
+            if polls > _POLLS:
                 sched_yield()
     job[_WITHIN] += now(job, _CLOCK) - begin
 
 
 @njit("void(int64[::1], int64, int64, int64[:, ::1])", cache=True)
 def _alone(job, kernel, table, tasks):  # type: ignore[no-untyped-def]
-    """All tasks, one after the other."""
+    """Run all tasks, one after the other."""
     begin = now(job, _CLOCK)
     for k in range(len(tasks)):
         call_task(kernel, table, tasks[k, 0], tasks[k, 1], 0)
@@ -126,25 +126,27 @@ def _alone(job, kernel, table, tasks):  # type: ignore[no-untyped-def]
 
 
 class Timed(Protocol):
-    """Does tasks one after the other, and adds up what ``crews``, teams of so many threads, would take."""
+    """A replacement for a team: runs tasks one after the other, and sums up the time of teams of the sizes
+    ``crews``.
+    """
 
     crews: list[int]
 
     @property
     def spans(self) -> list[float]:
-        """What each crew would have taken for all regions so far, s."""
+        """Return the time that each crew would have taken for all regions so far, s."""
 
     def run(self, kernel: Kernel, table: int, tasks: Ints, starts: Ints) -> int:
-        """As ``Team.run``; the CPU time that it has taken, ns."""
+        """Run the tasks as ``Team.run`` does; return the CPU time, ns."""
 
 
 class Team:
-    """So many threads, this one among them; they are there until the process ends: see ``team``."""
+    """A number of threads, the calling one among them; they exist until the process ends: see ``team``."""
 
     def __init__(self, threads: int) -> None:
         self.threads = threads
         self.projecting: Timed | None = None
-        """Who does all tasks instead of the threads, where they are to be timed."""
+        """Runs all tasks in place of the threads while tasks are timed."""
         size = _THREADS + _LINE * threads
         room = np.zeros(size + _LINE, np.int64)
         self._job: Ints = room[-(room.ctypes.data // room.itemsize) % _LINE :][:size]
@@ -158,7 +160,7 @@ class Team:
 
     @property
     def most(self) -> int:
-        """How many of the threads may work."""
+        """Number of threads that may work."""
         return int(self._words[_MOST])
 
     @most.setter
@@ -167,17 +169,17 @@ class Team:
 
     @property
     def within(self) -> float:
-        """How long ``run`` has taken so far, by the clock, s: what more threads could share."""
+        """Wall time in ``run`` so far, s: the time that more threads could share."""
         return self._words[_WITHIN] / SECOND
 
     @property
     def helped(self) -> float:
-        """How long the threads besides this one have done tasks so far, all together, s."""
+        """Time in tasks of the threads besides the calling one, all together, s."""
         return float(self._job[_THREADS + _LINE :: _LINE].sum()) / SECOND
 
     def run(self, kernel: Kernel, table: int, tasks: Ints, starts: Ints) -> None:
-        """Does ``tasks`` (k, 2), first and end, by a ``kernel`` of the signature TASK with the arguments at the address
-        ``table``; those from ``starts[c]`` to ``starts[c + 1]``, at most 2^20, touch nothing in common.
+        """Run ``tasks`` (k, 2), first and end, with a ``kernel`` of the signature TASK and the arguments at the
+        address ``table``; tasks ``starts[c]`` to ``starts[c + 1]``, at most 2^20, write to no common memory.
         """
         if self.projecting is not None:
             self._words[_WITHIN] += self.projecting.run(kernel, table, tasks, starts)
@@ -189,5 +191,5 @@ class Team:
 
 @cache
 def team(threads: int) -> Team:
-    """The team of so many threads of this process."""
+    """Return the team of this process with so many threads."""
     return Team(threads)

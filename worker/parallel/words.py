@@ -1,4 +1,4 @@
-"""Words that threads share, the clock, and calls of the C library, as kernels use them."""
+"""Atomic words, the clock and calls of the C library, for kernels."""
 
 from typing import Any
 
@@ -8,10 +8,9 @@ from ..kernels.jit import intrinsic, types
 
 _WORD = ir.IntType(64)
 _MONOTONIC, SECOND = 1, 1_000_000_000
-"""The clock of that number counts from some moment on, in all threads alike; ns in a second."""
+"""Number of the clock CLOCK_MONOTONIC, the same for all threads; ns in a second."""
 TASK = "void(int64, int64, int64, int64)"
-"""The signature of a kernel that does a task: address of its arguments (arguments.py), first, end, number of the
-thread."""
+"""Signature of a kernel that runs a task: address of its arguments (arguments.py), first, end, number of the thread."""
 
 
 def _call(_: Any, kernel: Any, table: Any, first: Any, end: Any, thread: Any) -> Any:
@@ -70,7 +69,7 @@ def _read_clock(_: Any, words: Any, at: Any) -> Any:
 
 
 def _library(name: str, signature: Any) -> Any:
-    """A call of a function of the C library, whose answer is of no interest."""
+    """Return a call of a function of the C library whose result is ignored."""
 
     def emit(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         kind = ir.FunctionType(ir.IntType(32), [_WORD] * len(args))
@@ -82,16 +81,16 @@ def _library(name: str, signature: Any) -> Any:
 
 call_task: Any = intrinsic(_call)
 add: Any = intrinsic(_added)
-"""In a kernel: adds to a word, and returns what it was; two threads never get the same."""
+"""In a kernel: add to a word atomically and return its old value; two threads never get the same."""
 swap: Any = intrinsic(_swapped)
-"""In a kernel: sets a word, and returns what it was. What the thread has written before is there for others that see
-it."""
+"""In a kernel: set a word and return its old value; earlier writes of the thread are visible to threads that read
+the new value."""
 load: Any = intrinsic(_loaded)
-"""In a kernel: a word that other threads write."""
+"""In a kernel: read a word that other threads write."""
 now: Any = intrinsic(_read_clock)
-"""In a kernel: the time, ns; two words at a place are its room."""
+"""In a kernel: return the time, ns; two words at ``at`` are scratch."""
 word_at: Any = intrinsic(_read)
-"""In a kernel: word ``k`` at an address."""
+"""In a kernel: return word ``k`` at an address."""
 sched_yield: Any = intrinsic(lambda _: _library("sched_yield", types.void()))
 sem_wait: Any = intrinsic(lambda _, semaphore: _library("sem_wait", types.void(semaphore)))
 sem_post: Any = intrinsic(lambda _, semaphore: _library("sem_post", types.void(semaphore)))
