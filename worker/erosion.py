@@ -14,8 +14,8 @@ from conoid.cases.model.schema import Case
 
 from .boundaries.boundaries import Boundary
 from .clock import Clock
-from .contact import bare
 from .contact.stage import Contact
+from .contact.surface import exposure
 from .elements.wear import BROKEN, DAMAGED, FREQUENCY, SOUND, TIRED, life
 from .materials.equation_of_state import GRUNEISEN
 from .materials.models import EQUATIONS
@@ -192,12 +192,12 @@ class Erosion:
 
     def _remove(self, state: Nodes) -> None:
         """Removes the marked tets and the nodes that leave with them. Collective."""
-        gone, left, ids = [np.zeros((0, bare.WORDS), np.int64)], [], [np.zeros(0, np.int64)]
+        gone, left, ids = [np.zeros((0, exposure.WORDS), np.int64)], [], [np.zeros(0, np.int64)]
         for block in self._model.blocks:
             worn = np.flatnonzero(block.worn)
             if len(worn):
                 if self._contact is not None:
-                    gone.append(bare.leaving(block, worn, state.id))
+                    gone.append(exposure.leaving(block, worn, state.id))
                 left.append(block.tets[worn].astype(np.int64))
                 ids.append(block.id[worn])
                 self._last.append((left[-1], _forces(block, worn, state.x)))

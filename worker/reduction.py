@@ -85,7 +85,7 @@ class Offer(Fields):
         self.costs: Ints = self.sums[:_COSTS]
         """(4,) energies that contact took from the bodies on this rank (contact/account.py)."""
         self.unsettled: Ints = self.sums[_COSTS:]
-        """(2,) residuals of the contact sweeps on this rank (contact/need.py)."""
+        """(2,) residuals of the contact sweeps on this rank (contact/solver/sweep_count.py)."""
 
 
 class StepReduction(Fields):

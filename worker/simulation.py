@@ -20,8 +20,8 @@ from .boundaries.boundaries import Acts, Boundary
 from .boundaries.mirrors import Mirrors
 from .boundaries.wall_shapes import Walls
 from .clock import Clock
+from .contact.narrow_phase.tied import Tied
 from .contact.stage import Contact
-from .contact.tied import Tied
 from .elements.averages import Averages, volumes
 from .elements.averaging import AveragedElements
 from .elements.crushing import Crushing

@@ -189,7 +189,7 @@ def _offer_contact(sim: Simulation) -> None:
         return
     own.search, own.approach, own.opening = contact.spent(sim.model.nodes), contact.approach, contact.opening
     own.stray = contact.stray
-    own.costs[:], own.unsettled[:] = contact.costs, contact.need.unsettled
+    own.costs[:], own.unsettled[:] = contact.costs, contact.sweep_count.unsettled
 
 
 def _offer(sim: Simulation, fracture: Fracture | None) -> None:

@@ -17,8 +17,8 @@ store.use_cache()
 
 from conoid.cases import load  # noqa: E402
 from conoid.worker import simulation, step  # noqa: E402
-from conoid.worker.contact import layout  # noqa: E402
-from conoid.worker.contact.sides import Sides  # noqa: E402
+from conoid.worker.contact.scene import layout  # noqa: E402
+from conoid.worker.contact.scene.near_surface import NearSurface  # noqa: E402
 from conoid.worker.parallel.comm import Comm  # noqa: E402
 from conoid.worker.parallel.mpi import connect, leave  # noqa: E402
 
@@ -66,7 +66,7 @@ def _measured(name: str, steps: int, world: Comm) -> dict[str, Any]:
 def _noted(function: Any, looked: list[tuple[int, int]]) -> Any:
     """``function`` that notes how many faces a search has, and how many of them come from other ranks."""
 
-    def noted(sides: Sides, *rest: Any) -> Any:
+    def noted(sides: NearSurface, *rest: Any) -> Any:
         found = function(sides, *rest)
         every = len(found.faces.id)
         looked.append((every, every - sides.faces.n))

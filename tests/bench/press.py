@@ -18,7 +18,7 @@ import numpy as np
 from conoid.cases.load import parse_case
 from conoid.cases.model.schema import Case
 from conoid.worker import simulation, step
-from conoid.worker.contact import common_volume
+from conoid.worker.contact.checks import common_volume
 from conoid.worker.parallel.comm import SerialComm
 
 from .table import Cell, table

@@ -7,7 +7,7 @@ import pytest
 
 from conoid.worker.bonds import law as bond_law
 from conoid.worker.bonds.records import DAMAGE, NORMAL, PUSH, TiedRows
-from conoid.worker.contact import inside
+from conoid.worker.contact.checks import inside
 from conoid.worker.simulation import Simulation
 
 from . import scenes

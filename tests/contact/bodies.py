@@ -10,9 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from conoid.cases.model import schema
-from conoid.worker.contact import surface
-from conoid.worker.contact.records import CrackSides, Crowd
-from conoid.worker.contact.surface import Surface
+from conoid.worker.contact.surface import surface
+from conoid.worker.contact.surface.records import CrackSides, SurfaceNodes
+from conoid.worker.contact.surface.surface import Surface
 from conoid.worker.mesh.model import TetMesh
 from conoid.worker.model.state import Model
 from conoid.worker.parallel.comm import Comm, SerialComm
@@ -65,11 +65,11 @@ def surface_of(
     return surface.build(model, on_planes, piece.neighbours, comm or SerialComm(), edges, *nothing)
 
 
-def crowd_of(x: Floats, v: Floats | None = None, part: Indices | None = None) -> Crowd:
+def nodes_of(x: Floats, v: Floats | None = None, part: Indices | None = None) -> SurfaceNodes:
     """Free nodes of 1 kg with ids 0, 1, ... at ``x``."""
     n = len(x)
     flown = np.zeros((n, 3)) if v is None else v
-    return Crowd(
+    return SurfaceNodes(
         np.arange(n), np.arange(n, dtype=np.int32), np.zeros(n, np.int32),
         np.zeros(n, np.int32) if part is None else part, np.ones((n, 3)), x, flown, flown,
     )  # fmt: skip

@@ -5,11 +5,11 @@ from typing import Any
 
 import numpy as np
 
-from conoid.worker.contact import edge_edge as edge_kernels
-from conoid.worker.contact import node_face as face_kernels
-from conoid.worker.contact.active import Kept
-from conoid.worker.contact.company import Company
-from conoid.worker.contact.narrow_phase import (
+from conoid.worker.contact.broad_phase.pairs import PairTable
+from conoid.worker.contact.narrow_phase import edge_edge as edge_kernels
+from conoid.worker.contact.narrow_phase import node_face as face_kernels
+from conoid.worker.contact.narrow_phase.rows import ActiveRows
+from conoid.worker.contact.narrow_phase.tables import (
     DEEP,
     DEEP_SELF,
     PUSH_OUT,
@@ -20,11 +20,11 @@ from conoid.worker.contact.narrow_phase import (
     SlotTable,
     Step,
 )
-from conoid.worker.contact.pairs import PairTable
-from conoid.worker.contact.records import Crowd
-from conoid.worker.contact.rows import ActiveRows
-from conoid.worker.contact.solver import ActiveSet
-from conoid.worker.contact.stops import Stops
+from conoid.worker.contact.solver.active import Kept
+from conoid.worker.contact.solver.shared_sums import SharedSums
+from conoid.worker.contact.solver.solver import ActiveSet
+from conoid.worker.contact.solver.stops import Stops
+from conoid.worker.contact.surface.records import SurfaceNodes
 from conoid.worker.parallel.comm import SerialComm
 from conoid.worker.parallel.fixed_point import Tally
 from conoid.worker.parallel.team import team
@@ -33,9 +33,9 @@ from ..worker.meshes import Floats
 from .bodies import Indices
 
 
-def every_pair(slaves: "np.ndarray", things: int) -> Indices:
-    """(p, 2) every slave with every thing, sorted by slave, then by thing."""
-    return np.column_stack([np.repeat(slaves, things), np.tile(np.arange(things), len(slaves))]).astype(np.int32)
+def every_pair(tested: "np.ndarray", things: int) -> Indices:
+    """(p, 2) every owned with every thing, sorted by owned, then by thing."""
+    return np.column_stack([np.repeat(tested, things), np.tile(np.arange(things), len(tested))]).astype(np.int32)
 
 
 def face_sizes(x: Floats, faces: Indices) -> Floats:
@@ -92,7 +92,7 @@ def step_of(x: Floats, v: Floats, part: "np.ndarray", dt: float, mu: Floats | No
 
 
 def slot_table(first: Indices, normals: Floats, left: Floats, course: Floats) -> SlotTable:
-    """Slots that are all on the surface; see narrow_phase.SlotTable."""
+    """Slots that are all on the surface; see tables.SlotTable."""
     n = len(first)
     return SlotTable(normals, np.ones(n, bool), first, left, course, np.zeros(n, bool))
 
@@ -139,7 +139,7 @@ def node_face(
     x: Floats, v: Floats, faces: Indices, pairs: Indices, dt: float, part: "np.ndarray | None" = None,
     mu: Floats | None = None, out: Floats | None = None, normals: Floats | None = None,
 ) -> ContactRows:  # fmt: skip
-    """The nodes that pass a face; the slaves are of another part unless ``part`` says something else.
+    """The nodes that pass a face; the tested are of another part unless ``part`` says something else.
 
     ``out`` (n, faces, 3): unit normals of a node's faces, all of one area, zero for a node without faces; or
     ``normals`` (n, 12), see SlotTable.
@@ -216,16 +216,16 @@ class Solver:
         part[0] = 0
         none = Stops(nothing, nothing, np.zeros((0, 2)), np.zeros(0), np.zeros(0, bool))
         self.active = active or ActiveSet(scale, stops or none, team(1))
-        self._crowd = Crowd(np.arange(n), every, part, part, mobility, np.zeros((n, 3)), self.v, self.v)
+        self._surface_nodes = SurfaceNodes(np.arange(n), every, part, part, mobility, np.zeros((n, 3)), self.v, self.v)
         self._nodes: Any = SimpleNamespace(v=self.v, part=part, owned=np.ones(n, bool))
         self.begin(np.zeros((n, 3)))
 
     def begin(self, x: Floats) -> None:
         """A step begins, with the nodes at ``x``."""
-        self._crowd.x, met = x, self.met
+        self._surface_nodes.x, met = x, self.met
         rows = ActiveRows(met, np.arange(many(met), dtype=np.int32), n=many(met))
-        alone = Company([], SerialComm()).agree(rows, self._crowd.local)
-        self.active.begin(rows, self._crowd, np.zeros(len(x), bool), alone, size=1.0, dt=1.0)
+        alone = SharedSums([], SerialComm()).agree(rows, self._surface_nodes.local)
+        self.active.begin(rows, self._surface_nodes, np.zeros(len(x), bool), alone, size=1.0, dt=1.0)
         self.active.weigh()
 
     @property
@@ -250,7 +250,7 @@ class Solver:
         return self.v
 
     def _leave(self) -> None:
-        self.active.leave(self._crowd, self.total, self._nodes, np.zeros((2, 3), np.int64), self.unsettled)
+        self.active.leave(self._surface_nodes, self.total, self._nodes, np.zeros((2, 3), np.int64), self.unsettled)
         assert (self.total.sum(axis=0) == 0).all()
 
     @property

@@ -7,9 +7,9 @@ import pytest
 
 from conoid.cases.load import apply_overrides, parse_case, read_data, shipped_path
 from conoid.worker import simulation
-from conoid.worker.contact import booking
 from conoid.worker.contact.account import Account
-from conoid.worker.contact.active import PUSH, ActiveNodes, Loaded
+from conoid.worker.contact.solver import impulse_work
+from conoid.worker.contact.solver.active import PUSH, ActiveNodes, Loaded
 from conoid.worker.errors import EnergyError
 from conoid.worker.parallel.comm import Comm, SerialComm
 from conoid.worker.simulation import Simulation
@@ -93,7 +93,7 @@ def test_the_cost_of_an_impulse_is_the_work_between_two_half_steps() -> None:
     loaded.normal[:, :3], loaded.normal[:, PUSH], loaded.many[0] = (-1.0, 0.0, 0.0), (3.0, 0.0), 2
     loaded.tangent[:, :4], loaded.slots[:] = (1.0, -1.0, 0.0, 0.0), [[0, 1, 2, 3], [1, 0, 2, 3]]
     active.moving[:, :3] = v
-    booking.cost(account.words, loaded, active, before, np.arange(4, dtype=np.int32), account.scale, 0)
+    impulse_work.cost(account.words, loaded, active, before, np.arange(4, dtype=np.int32), account.scale, 0)
     account.settle(account.words)
     _, taken, early, _ = account.known()
     kinetic = 0.5 * np.array([1.0, 3.0, 0.0, 0.0]) @ (before[:, 0] ** 2 - v[:, 0] ** 2)

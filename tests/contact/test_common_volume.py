@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from conoid.worker.contact.common_volume import CommonVolume, intersection, measure
+from conoid.worker.contact.checks.common_volume import CommonVolume, intersection, measure
 from conoid.worker.mesh.model import TetMesh
 from conoid.worker.model.state import Floats
 from conoid.worker.simulation import Simulation

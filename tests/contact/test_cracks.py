@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from conoid.worker.contact.cracks import Cracks, computed
-from conoid.worker.contact.families import Families
-from conoid.worker.contact.kin import Family, apart_from_edges, families, inherited
-from conoid.worker.contact.node_face import chain
+from conoid.worker.contact.narrow_phase.cracks import Cracks, computed
+from conoid.worker.contact.narrow_phase.node_face import chain
+from conoid.worker.contact.scene.split_pairs import Family, apart_from_edges, families, inherited
+from conoid.worker.contact.surface.families import Families
 from conoid.worker.migration.parcel import joined, once
 from conoid.worker.model.state import Copies, Nodes
 from conoid.worker.model.topology import Split

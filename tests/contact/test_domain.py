@@ -3,12 +3,13 @@
 import numpy as np
 import pytest
 
-from conoid.worker.contact import domain, layout
-from conoid.worker.contact.search import Boxes
-from conoid.worker.contact.sides import Rules, Sides
+from conoid.worker.contact.broad_phase import domain
+from conoid.worker.contact.broad_phase.search import Boxes
+from conoid.worker.contact.scene import layout
+from conoid.worker.contact.scene.near_surface import NearSurface, Rules
 
 from ..worker.meshes import block
-from .bodies import Flags, crowd_of, meeting_of, moved, pieces_of, rotation, surface_of
+from .bodies import Flags, meeting_of, moved, nodes_of, pieces_of, rotation, surface_of
 from .ranks import ThreadComm, on_ranks
 
 KINDS = ("box", "arbitrary")
@@ -100,10 +101,10 @@ def faces_received(kind: str, drift: float, ranks: int = 3) -> int:
         piece, model = pieces[comm.rank]
         found, nodes = surface_of(piece, model, comm, edges=False), model.nodes
         used = np.flatnonzero(found.flags | np.isin(nodes.id, found.faces.nodes))
-        crowd = crowd_of(nodes.x, nodes.v, nodes.part)
-        crowd.id, crowd.owner = nodes.id, nodes.owner
-        slaves = nodes.id[found.flags & nodes.owned]
-        sides = Sides(found.faces, found.edges, crowd.take(used), slaves)
+        surface_nodes = nodes_of(nodes.x, nodes.v, nodes.part)
+        surface_nodes.id, surface_nodes.owner = nodes.id, nodes.owner
+        owned = nodes.id[found.flags & nodes.owned]
+        sides = NearSurface(found.faces, found.edges, surface_nodes.take(used), owned)
         rules = Rules(kind, ~np.eye(2, dtype=bool), 2e-3, 1e-4, 4e-4, np.zeros(2, bool))
         return len(layout.build(sides, rules, 5e-6, np.full(3, drift), nodes, comm).faces.id) - sides.faces.n
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from conoid.worker.contact.edge_edge import beyond_ends
-from conoid.worker.contact.narrow_phase import DEEP, DEEP_SELF, NEAR, ContactRows
+from conoid.worker.contact.narrow_phase.edge_edge import beyond_ends
+from conoid.worker.contact.narrow_phase.tables import DEEP, DEEP_SELF, NEAR, ContactRows
 
 from ..worker.meshes import Floats
 from .bodies import Indices, rotation

@@ -6,27 +6,29 @@ from itertools import permutations
 import numpy as np
 import pytest
 
-from conoid.worker.contact import ghosts
-from conoid.worker.contact.records import Crowd, Edges, Faces, merged
+from conoid.worker.contact.scene import ghosts
+from conoid.worker.contact.surface.records import Edges, Faces, SurfaceNodes, merged
 from conoid.worker.model.state import Flags, Model
 from conoid.worker.parallel.comm import SerialComm
 from conoid.worker.parallel.ownership import Neighbour
 from conoid.worker.parallel.tags import Tag
 
 from ..worker.meshes import block
-from .bodies import crowd_of, meeting_of, moved, pieces_of
+from .bodies import meeting_of, moved, nodes_of, pieces_of
 from .ranks import ThreadComm, on_ranks
 
 
-def random_crowd(random: np.random.Generator, n: int) -> Crowd:
-    crowd = crowd_of(random.normal(size=(n, 3)), random.normal(size=(n, 3)), random.integers(0, 5, n).astype(np.int32))
-    crowd.id = np.sort(random.choice(2**40, n, replace=False))
-    crowd.owner = random.integers(0, 9, n).astype(np.int32)
-    crowd.mobility = random.uniform(size=(n, 3)) * random.integers(0, 2, (n, 3))
-    return crowd
+def random_nodes(random: np.random.Generator, n: int) -> SurfaceNodes:
+    surface_nodes = nodes_of(
+        random.normal(size=(n, 3)), random.normal(size=(n, 3)), random.integers(0, 5, n).astype(np.int32)
+    )
+    surface_nodes.id = np.sort(random.choice(2**40, n, replace=False))
+    surface_nodes.owner = random.integers(0, 9, n).astype(np.int32)
+    surface_nodes.mobility = random.uniform(size=(n, 3)) * random.integers(0, 2, (n, 3))
+    return surface_nodes
 
 
-def same(one: Crowd, two: Crowd) -> bool:
+def same(one: SurfaceNodes, two: SurfaceNodes) -> bool:
     """All but ``local``, bit by bit."""
     names = ("id", "owner", "part", "mobility", "x", "v")
     return all(
@@ -48,8 +50,8 @@ def test_what_is_packed_comes_out_bit_by_bit(f: int, e: int, n: int) -> None:
     ends, sides = random.integers(0, 2**40, (e, 6)), random.integers(0, 2**40, (e, 2))
     size, deep = random.normal(size=(2, e))
     edges = Edges(ends, sides, size, deep, random.integers(0, 3, (e, 2), dtype=np.uint8), flags(e))
-    crowd = random_crowd(random, n)
-    got_faces, got_edges, got_crowd = ghosts.unpack(ghosts.pack(faces, edges, crowd))
+    surface_nodes = random_nodes(random, n)
+    got_faces, got_edges, got_nodes = ghosts.unpack(ghosts.pack(faces, edges, surface_nodes))
     assert (got_faces.id == faces.id).all()
     assert (got_faces.nodes == faces.nodes).all()
     assert (got_faces.size == faces.size).all()
@@ -59,13 +61,13 @@ def test_what_is_packed_comes_out_bit_by_bit(f: int, e: int, n: int) -> None:
     assert (got_edges.nodes == edges.nodes).all()
     assert (got_edges.size == edges.size).all()
     assert (got_edges.deep == edges.deep).all()
-    assert same(got_crowd, crowd)
-    assert (got_crowd.local == -1).all()
+    assert same(got_nodes, surface_nodes)
+    assert (got_nodes.local == -1).all()
 
 
-def test_merged_crowds_have_every_node_once_and_prefer_the_first() -> None:
+def test_merged_nodes_have_every_node_once_and_prefer_the_first() -> None:
     random = np.random.default_rng(2)
-    whole = random_crowd(random, 50)
+    whole = random_nodes(random, 50)
     here, there = whole.take(np.arange(0, 50, 2)), whole.take(np.arange(5, 45))
     there.x = there.x + 1.0
     both = merged([here, there])
@@ -82,11 +84,11 @@ def models_of(ranks: int) -> tuple[list[Model], list[list[Neighbour]]]:
     return [model for _, model in pieces], [piece.neighbours for piece, _ in pieces]
 
 
-def everything_of(model: Model) -> Crowd:
+def everything_of(model: Model) -> SurfaceNodes:
     nodes = model.nodes
-    crowd = crowd_of(nodes.x, nodes.v, nodes.part)
-    crowd.id, crowd.owner = nodes.id, nodes.owner
-    return crowd
+    surface_nodes = nodes_of(nodes.x, nodes.v, nodes.part)
+    surface_nodes.id, surface_nodes.owner = nodes.id, nodes.owner
+    return surface_nodes
 
 
 @pytest.mark.parametrize("ranks", [2, 3, 5, 8])
@@ -99,7 +101,7 @@ def test_a_fetched_node_is_its_owners(ranks: int) -> None:
     }
     wanted = [np.random.default_rng([ranks, r]).choice(sorted(rows), 10 * r % 40, replace=False) for r in range(ranks)]
 
-    def work(comm: ThreadComm) -> Crowd:
+    def work(comm: ThreadComm) -> SurfaceNodes:
         ids = wanted[comm.rank].astype(np.int64)
         owners = np.array([rows[int(i)][1] for i in ids], np.int32)
         return ghosts.fetch(ids, owners, everything_of(models[comm.rank]), comm)
@@ -146,20 +148,20 @@ def test_copies_follow_their_owners_whenever_they_are_refreshed(ranks: int) -> N
     def work(comm: ThreadComm) -> None:
         nodes = models[comm.rank].nodes
         random = np.random.default_rng([7, comm.rank])
-        crowd = every.take(np.sort(random.choice(every.n, 30, replace=False)))
-        held = np.isin(crowd.id, nodes.id)
-        crowd.local = np.where(held, np.searchsorted(nodes.id, crowd.id), -1).astype(np.int32)
-        order = ghosts.copies(crowd, nodes, comm, Tag.GHOST)
+        surface_nodes = every.take(np.sort(random.choice(every.n, 30, replace=False)))
+        held = np.isin(surface_nodes.id, nodes.id)
+        surface_nodes.local = np.where(held, np.searchsorted(nodes.id, surface_nodes.id), -1).astype(np.int32)
+        order = ghosts.copies(surface_nodes, nodes, comm, Tag.GHOST)
         for turn in range(3):
             nodes.x[:] = 1000.0 * turn + nodes.id[:, None]
             nodes.v[:] = -nodes.x
-            x, v, before = (np.full((crowd.n, 3), np.nan) for _ in range(3))
+            x, v, before = (np.full((surface_nodes.n, 3), np.nan) for _ in range(3))
             order.note(nodes)
             nodes.v[:] -= 1.0
             comm.barrier()
             order.begin(nodes)
             order.finish(x, v, before)
-            assert (x[~held] == 1000.0 * turn + crowd.id[~held, None]).all()
+            assert (x[~held] == 1000.0 * turn + surface_nodes.id[~held, None]).all()
             assert (before[~held] == -x[~held]).all()
             assert (v[~held] == -x[~held] - 1.0).all()
             assert np.isnan(x[held]).all()

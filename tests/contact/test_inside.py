@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from conoid.worker.contact.inside import Inside, _depths, _from_edges, _from_faces, look
+from conoid.worker.contact.checks.inside import Inside, _depths, _from_edges, _from_faces, look
 from conoid.worker.parallel.comm import SerialComm
 from conoid.worker.simulation import Simulation
 

@@ -3,15 +3,16 @@
 import numpy as np
 import pytest
 
-from conoid.worker.contact import normals, search
-from conoid.worker.contact.beside import TOUCHING
+from conoid.worker.contact.broad_phase import search
+from conoid.worker.contact.broad_phase.search import Primitives
 from conoid.worker.contact.geometry import MARGIN
-from conoid.worker.contact.narrow_phase import DEEP, DEEP_SELF, NEAR, PUSH_OUT, ContactRows
-from conoid.worker.contact.search import Things
+from conoid.worker.contact.narrow_phase.facing import TOUCHING
+from conoid.worker.contact.narrow_phase.tables import DEEP, DEEP_SELF, NEAR, PUSH_OUT, ContactRows
+from conoid.worker.contact.surface import normals
 from conoid.worker.mesh.faces import FACES
 
 from ..worker.meshes import Floats, block
-from .bodies import Indices, crowd_of, meeting_of, pieces_of, sheet, surface_of
+from .bodies import Indices, meeting_of, nodes_of, pieces_of, sheet, surface_of
 from .distances import point_triangle
 from .kernels import every_pair, face_sizes, many, node_face
 
@@ -68,12 +69,12 @@ def random_scene(seed: int, nodes: int = 40, faces: int = 12) -> tuple[Floats, F
 
 
 def expected(
-    x: Floats, v: Floats, faces: Indices, part: "np.ndarray", slaves: "np.ndarray", dt: float
+    x: Floats, v: Floats, faces: Indices, part: "np.ndarray", tested: "np.ndarray", dt: float
 ) -> list[Expected]:
     """Rows in order: by node, then by face; a node that is deep in several faces is held by the nearest of these, but
     not by one of a part to whose front it is nearer."""
     sizes, rows = face_sizes(x, faces), []
-    for s in slaves:
+    for s in tested:
         mine = [Expected(x, v, s, f, sizes[i], part[s] == part[f[0]], dt) for i, f in enumerate(faces)]
         away = point_triangle(x[s][None], x[faces[:, :3]])[0]
         deepest = [DEEP_SELF if part[s] == part[f[0]] else DEEP for f in faces]
@@ -101,11 +102,11 @@ def test_meetings_are_those_of_the_formulas(dt: float) -> None:
     count = 0
     for seed in range(8):
         x, v, faces, part = random_scene(seed)
-        slaves = np.arange(4 * len(faces), len(x))
+        tested = np.arange(4 * len(faces), len(x))
         got = node_face(
-            x, v, faces, every_pair(slaves, len(faces)), dt, part, mu=np.repeat([[1.0], [2.0], [3.0]], 3, axis=1)
+            x, v, faces, every_pair(tested, len(faces)), dt, part, mu=np.repeat([[1.0], [2.0], [3.0]], 3, axis=1)
         )
-        want = sorted(expected(x, v, faces, part, slaves, dt), key=lambda row: tuple(row.nodes))
+        want = sorted(expected(x, v, faces, part, tested, dt), key=lambda row: tuple(row.nodes))
         order = np.lexsort(got.nodes.T[::-1])
         assert got.nodes[order].tolist() == [row.nodes.tolist() for row in want]
         assert got.weights[order] == pytest.approx(np.array([row.weights for row in want]), abs=1e-9)
@@ -236,16 +237,16 @@ def test_a_sliding_node_is_handed_over_between_coplanar_facets(gap: float) -> No
     points = np.concatenate([x, [[3.0, 3.0, -5.0]], slides])
     v = np.zeros_like(points)
     v[len(x) + 1 :, :2] = random.normal(size=(2000, 2)) * 0.01
-    slaves = np.arange(len(x) + 1, len(points))
-    met = node_face(points, v, faces, every_pair(slaves, len(faces)), 0.5)
+    tested = np.arange(len(x) + 1, len(points))
+    met = node_face(points, v, faces, every_pair(tested, len(faces)), 0.5)
     at = -(met.weights[:, 1:, None] * points[met.nodes[:, 1:]]).sum(axis=1)
     start = points[met.nodes[:, 0]]
     looked_at = start + (0.5 * v[met.nodes[:, 0]] if gap > 0.0 else 0.0)
     assert np.abs((at - looked_at)[:, :2]).max() < 3e-3
     assert (met.normals == [0.0, 0.0, 1.0]).all()
-    counts = np.bincount(met.nodes[:, 0], minlength=len(points))[slaves]
+    counts = np.bincount(met.nodes[:, 0], minlength=len(points))[tested]
     assert counts.min() == 1
-    looked_at = points[slaves] + (0.5 * v[slaves] if gap > 0.0 else 0.0)
+    looked_at = points[tested] + (0.5 * v[tested] if gap > 0.0 else 0.0)
     share = looked_at[:, :2] % 1.0
     rim = np.minimum(np.minimum(share, 1.0 - share).min(axis=1), np.abs(share[:, 0] - share[:, 1]))
     assert (counts[rim > 5e-3] == 1).all()
@@ -286,11 +287,11 @@ def test_no_fast_node_passes_a_closed_surface_unmet(seed: int) -> None:
     start = aim - 4.0 * way
     path = way * random.uniform(0.5, 12.0, (n, 1))
     x, v = np.concatenate([body, start]), np.concatenate([np.zeros_like(body), path / dt]) + flight
-    crowd = crowd_of(x, v)
-    nodes = Things(np.arange(len(body), len(x), dtype=np.int32)[:, None], np.full(n, 0.01))
+    surface_nodes = nodes_of(x, v)
+    nodes = Primitives(np.arange(len(body), len(x), dtype=np.int32)[:, None], np.full(n, 0.01))
     part = np.repeat([0, 1], [len(body), n]).astype(np.int32)
-    things = Things(np.ascontiguousarray(faces[:, :3]), np.full(len(faces), 0.3))
-    pairs = search.find(nodes, things, crowd.x, crowd.v, part, ~np.eye(2, dtype=bool), dt, None)
+    things = Primitives(np.ascontiguousarray(faces[:, :3]), np.full(len(faces), 0.3))
+    pairs = search.find(nodes, things, surface_nodes.x, surface_nodes.v, part, ~np.eye(2, dtype=bool), dt, None)
     pairs = pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
     pairs[:, 0] += len(body)
     met = node_face(x, v, faces, pairs, dt, part)

@@ -8,9 +8,9 @@ import pytest
 from conoid.cases.load import parse_case, read_data
 from conoid.worker import simulation, step
 from conoid.worker.accounts.digest import digest
-from conoid.worker.contact.narrow_phase import ContactRows, EdgeTable, FaceTable, Pairs, SlotTable, Step
-from conoid.worker.contact.pairs import PairTable
-from conoid.worker.contact.tracks import Lines, Tracks
+from conoid.worker.contact.broad_phase.pairs import PairTable
+from conoid.worker.contact.broad_phase.reference_motion import Lines, ReferenceMotion
+from conoid.worker.contact.narrow_phase.tables import ContactRows, EdgeTable, FaceTable, Pairs, SlotTable, Step
 from conoid.worker.parallel.comm import SerialComm
 
 from ..worker.meshes import Floats
@@ -69,7 +69,7 @@ class Tables:
         first = np.full(len(shards.x), -1, np.int32)
         self.node_face.hang(first, 0)
         slots, faces, edges, of = shards.tables(first, dt)
-        end, pairs, two = shards.tracks.end, self.node_face.arrays(), self.edge_edge.arrays()
+        end, pairs, two = shards.reference.end, self.node_face.arrays(), self.edge_edge.arrays()
         known, familiar = known_of(pairs, slots.fresh, faces.fresh), known_of(two, edges.fresh, edges.fresh)
         nodes, some = faces_met(pairs, slots, faces, of, end)
         ridges, few = edges_met(two, edges, of, slots.course, end)
@@ -99,7 +99,7 @@ class Shards:
         self.on_surface = draw.uniform(size=len(self.x)) < 0.9
         outward = np.tile(CORNERS - CORNERS.mean(axis=0), (SHARDS, 1))
         self.normals = self.facing(outward)
-        self.tracks = Tracks(self.x, self.v, len(self.faces), len(self.edges), np.zeros(3), np.inf)
+        self.reference = ReferenceMotion(self.x, self.v, len(self.faces), len(self.edges), np.zeros(3), np.inf)
         self.settle()
 
     def settle(self) -> None:
@@ -121,11 +121,11 @@ class Shards:
 
     def tables(self, first: Indices, dt: float) -> tuple[SlotTable, FaceTable, EdgeTable, Step]:
         """Slots, faces, edges and the step, as kernels take them."""
-        tracks, part = self.tracks, self.shard % 3
-        slots = slot_table(first, self.normals, tracks.short.left, tracks.short.course)
+        reference, part = self.reference, self.shard % 3
+        slots = slot_table(first, self.normals, reference.short.left, reference.short.course)
         slots = slots._replace(on_surface=self.on_surface, fresh=self.node_fresh)
-        faces = face_table(self.faces, self.size, tracks.faces)._replace(exposed=self.exposed, fresh=self.face_fresh)
-        edges = edge_table(self.edges, self.length, self.deep, tracks.edges)
+        faces = face_table(self.faces, self.size, reference.faces)._replace(exposed=self.exposed, fresh=self.face_fresh)
+        edges = edge_table(self.edges, self.length, self.deep, reference.edges)
         edges = edges._replace(meets=self.ridges, fresh=self.edge_fresh)
         return slots, faces, edges, step_of(self.x, self.v, part, dt)
 
@@ -149,8 +149,8 @@ class Shards:
         n = len(self.x)
         some = self.draw.choice(n, 3, replace=False)
         copies = np.arange(n, n + 3, dtype=np.int32)
-        self.tracks.add(self.x[some], self.v[some])
-        self.tracks.inherit(copies, some.astype(np.int32))
+        self.reference.add(self.x[some], self.v[some])
+        self.reference.inherit(copies, some.astype(np.int32))
         self.v = np.concatenate([self.v, self.v[some] + self.violence * self.draw.normal(size=(3, 3))])
         for name in ("x", "shard", "normals", "on_surface"):
             setattr(self, name, np.concatenate([getattr(self, name), getattr(self, name)[some]]))
@@ -177,13 +177,13 @@ class Shards:
 
     def begin(self, dt: float, short: bool, *tables: Tables) -> None:
         """A step begins; ``short``: with new lines to measure from."""
-        self.tracks.advance(dt)
+        self.reference.advance(dt)
         if short:
-            self.tracks.shorten(self.x)
+            self.reference.shorten(self.x)
             for table in tables:
                 table.node_face.wake()
                 table.edge_edge.wake()
-        self.tracks.measure(self.x, self.v, self.faces, self.edges)
+        self.reference.measure(self.x, self.v, self.faces, self.edges)
 
 
 def equal(one: list[ContactRows], two: list[ContactRows]) -> bool:
@@ -210,7 +210,7 @@ def flown(seed: int, violence: float, blind: bool = False) -> tuple[int, int, fl
             shards.renew(some, every)
         shards.begin(dt, number % SHORT == SHORT - 1, some, every)
         if blind:
-            for left in (shards.tracks.short.left, shards.tracks.faces, shards.tracks.edges):
+            for left in (shards.reference.short.left, shards.reference.faces, shards.reference.edges):
                 left[:] = 0.0
         found, expected = some.meet(shards, dt), every.meet(shards, dt)
         wrong += not equal(found, expected)

@@ -2,7 +2,7 @@
 
 Shards fly about and are knocked. Some are hidden, as the sides of cracks are; what they leave their lines by is not
 watched until they are searched. All pairs of what is searched are measured in every step. Shards hardly turn: what
-happens to those that do is for the sift to say (test_sift.py).
+happens to those that do is for the sift to say (test_swept_filter.py).
 """
 
 from types import SimpleNamespace
@@ -12,16 +12,17 @@ from unittest.mock import patch
 import numpy as np
 import pytest
 
-from conoid.worker.contact import layout, registration
-from conoid.worker.contact.narrow_phase import DEEP, DEEP_SELF
-from conoid.worker.contact.records import OPEN, Edges, Faces
-from conoid.worker.contact.scene import Scene
-from conoid.worker.contact.sides import Rules, Sides
+from conoid.worker.contact.broad_phase import registration
+from conoid.worker.contact.narrow_phase.tables import DEEP, DEEP_SELF
+from conoid.worker.contact.scene import layout
+from conoid.worker.contact.scene.near_surface import NearSurface, Rules
+from conoid.worker.contact.scene.scene import Scene
+from conoid.worker.contact.surface.records import OPEN, Edges, Faces
 from conoid.worker.model.state import Ints
 from conoid.worker.parallel.comm import SerialComm
 
 from ..worker.meshes import Floats
-from .bodies import Flags, Indices, crowd_of, rotation
+from .bodies import Flags, Indices, nodes_of, rotation
 from .distances import point_triangle, segment_segment
 from .kernels import edge_depths, edge_sizes, face_sizes
 from .shards import CORNERS, EDGES, FACES
@@ -60,13 +61,13 @@ class World:
         faces, edges, nodes = (self.rows(shards, many) for many in (4, 6, 4))
         shown = np.repeat(self.shown, 4)
         opened = np.uint8(OPEN) * shown[self.sides[edges]]
-        crowd = crowd_of(self.x, self.v, self.part).take(nodes)
-        sides = Sides(
+        surface_nodes = nodes_of(self.x, self.v, self.part).take(nodes)
+        sides = NearSurface(
             Faces(faces, self.faces[faces], self.size[faces], shown[faces]),
             Edges(
                 self.edges[edges], self.sides[edges], self.length[edges], self.deep[edges], opened,
                 np.ones(len(edges), bool),
-            ), crowd, nodes,
+            ), surface_nodes, nodes,
         )  # fmt: skip
         all_nodes: Any = SimpleNamespace(n=4 * SHARDS, places=lambda ids: ids.astype(np.int32))
         rules, drift = Rules("arbitrary", ALLOWED, 2.0, SKIN, 1.0, ALLOWED.diagonal()), self.v[nodes].mean(axis=0)
@@ -76,8 +77,8 @@ class World:
             self.carried += 1
         now.slots.on_surface[:] = np.repeat(self.shown, 4)[nodes]
         now.enliven(np.flatnonzero(now.faces.exposed).astype(np.int32))
-        registration.news(now)
-        now.tracks.measure(now.crowd.x, now.crowd.v, now.faces.corners, now.edges.corners)
+        registration.register_new(now)
+        now.reference.measure(now.surface_nodes.x, now.surface_nodes.v, now.faces.corners, now.edges.corners)
         return now
 
     @staticmethod
@@ -105,7 +106,7 @@ class World:
         self.shown[shards] = True
         self.opened += len(shards)
         self.scene.expose(self.rows(shards, 4))
-        self.scene.slots.on_surface[:] = np.repeat(self.shown, 4)[self.scene.crowd.id]
+        self.scene.slots.on_surface[:] = np.repeat(self.shown, 4)[self.scene.surface_nodes.id]
 
     def another_surface(self) -> None:
         """Some shards leave, others come, and hidden ones are uncovered; what is known of the rest is carried over."""
@@ -116,11 +117,11 @@ class World:
 
     def begin(self, dt: float) -> None:
         """A step begins as the stage of contact has it begin; in some another rank registers what has strayed."""
-        now, of = self.scene, self.scene.crowd
+        now, of = self.scene, self.scene.surface_nodes
         of.x[:], of.v[:] = self.x[of.id], self.v[of.id]
-        now.tracks.advance(dt)
-        now.tracks.measure(of.x, of.v, now.faces.corners, now.edges.corners)
-        due = now.tracks.farthest(now.slots.tracked) > 0.5 * SKIN * (1.0 if self.registered % 3 else 0.6)
+        now.reference.advance(dt)
+        now.reference.measure(of.x, of.v, now.faces.corners, now.edges.corners)
+        due = now.reference.farthest(now.slots.tracked) > 0.5 * SKIN * (1.0 if self.registered % 3 else 0.6)
         if due or now.pending:
             registration.renew(now, of.x, of.v, due)
             self.registered += 1
@@ -129,7 +130,7 @@ class World:
         """Whatever may happen before a step, and the step."""
         dt = float(self.draw.uniform(0.02, 0.04))
         self.knock()
-        if self.scene.tracks.end + dt > self.scene.tracks.until:
+        if self.scene.reference.end + dt > self.scene.reference.until:
             self.scene = self.search(None)
         elif number % 5 == 4:
             self.another_surface()
@@ -159,14 +160,14 @@ def common(one: Indices, two: Indices) -> Flags:
 
 def allowed(now: Scene, one: Indices, two: Indices) -> Flags:
     """(n, m) whether things with these corners are of parts that meet."""
-    part = now.crowd.part
+    part = now.surface_nodes.part
     return np.asarray(ALLOWED[part[one[:, 0]][:, None], part[two[:, 0]][None, :]])
 
 
 def near_faces(now: Scene) -> Flags:
     """(slots, faces) searched, and nearer than half of what the skin and the depth have left; of parts that meet."""
-    x, left, part = now.crowd.x, now.tracks.searched.left, now.crowd.part
-    corners, nodes = now.faces.corners[:, :3], np.arange(now.crowd.n, dtype=np.int32)[:, None]
+    x, left, part = now.surface_nodes.x, now.reference.searched.left, now.surface_nodes.part
+    corners, nodes = now.faces.corners[:, :3], np.arange(now.surface_nodes.n, dtype=np.int32)[:, None]
     deep = np.where(part[:, None] == part[corners[:, 0]][None], DEEP_SELF, DEEP) * now.faces.size
     spent = left[:, None] + left[corners].max(axis=1)[None]
     near = point_triangle(x, x[corners]) < 0.5 * (SKIN + deep - spent)
@@ -178,9 +179,9 @@ def near_faces(now: Scene) -> Flags:
 def near_edges(now: Scene) -> Flags:
     """(edges, edges) the same of two edges, that of lower rank first."""
     ends, rank = now.edges.corners[:, :2], now.edges.rank
-    left = now.tracks.searched.left[ends].max(axis=1)
+    left = now.reference.searched.left[ends].max(axis=1)
     deep = np.minimum(now.edges.deep[:, None], now.edges.deep[None])
-    near = segment_segment(now.crowd.x[ends]) < 0.5 * (SKIN + deep - left[:, None] - left[None])
+    near = segment_segment(now.surface_nodes.x[ends]) < 0.5 * (SKIN + deep - left[:, None] - left[None])
     live = now.edges.live[:, None] & now.edges.live & (rank[:, None] < rank[None])
     return np.asarray(near & live & allowed(now, ends, ends) & ~common(ends, ends))
 
@@ -190,8 +191,8 @@ def check(now: Scene) -> Ints:
     is searched is near its lines. Returns how many pairs of either kind are near.
     """
     corners, ends = now.faces.corners[:, :3], now.edges.corners[:, :2]
-    nodes = np.arange(now.crowd.n, dtype=np.int32)[:, None]
-    pairs = matrix(now.node_face.rows, now.crowd.n, len(corners))
+    nodes = np.arange(now.surface_nodes.n, dtype=np.int32)[:, None]
+    pairs = matrix(now.node_face.rows, now.surface_nodes.n, len(corners))
     ridges = matrix(now.edge_edge.rows, len(ends), len(ends))
     near, close = near_faces(now), near_edges(now)
     assert not (near & ~pairs).any()
@@ -202,7 +203,7 @@ def check(now: Scene) -> Ints:
     assert not (pairs & ~(now.slots.live[:, None] & now.faces.live)).any()
     assert not (ridges & ~(now.edges.live[:, None] & now.edges.live)).any()
     assert (now.edges.rank[now.edge_edge.rows[:, 0]] < now.edges.rank[now.edge_edge.rows[:, 1]]).all()
-    assert (now.tracks.searched.left[now.slots.tracked] <= 0.5 * SKIN).all()
+    assert (now.reference.searched.left[now.slots.tracked] <= 0.5 * SKIN).all()
     return np.array([near.sum(), close.sum()])
 
 
@@ -236,7 +237,7 @@ def fails() -> bool:
 
 def test_slots_that_are_searched_for_the_first_time_need_new_lines() -> None:
     """The check can fail: they have flown unwatched, and nobody knows how far their old lines are."""
-    with patch.object(registration, "news", _blind(registration.news)):
+    with patch.object(registration, "register_new", _blind(registration.register_new)):
         assert fails()
     with patch.object(registration, "renew", _blind(registration.renew)):
         assert fails()
@@ -285,7 +286,7 @@ def test_pairs_that_are_found_again_keep_their_impulses(seed: int) -> None:
 def named(now: Scene) -> dict[tuple[int, int], Floats]:
     """What each pair of a node and a face, ids, has kept."""
     node, face = now.node_face.rows.T
-    names = zip(now.crowd.id[node].tolist(), now.faces.id[face].tolist(), strict=True)
+    names = zip(now.surface_nodes.id[node].tolist(), now.faces.id[face].tolist(), strict=True)
     return dict(zip(names, now.node_face.kept.copy(), strict=True))
 
 

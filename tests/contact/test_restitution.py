@@ -8,8 +8,8 @@ import pytest
 from conoid.cases import load
 from conoid.cases.messages import Energy
 from conoid.worker import simulation
-from conoid.worker.contact.narrow_phase import ContactRows
-from conoid.worker.contact.restitution import hold_back, rebound
+from conoid.worker.contact.narrow_phase.tables import ContactRows
+from conoid.worker.contact.solver.restitution import hold_back, rebound
 from conoid.worker.parallel.comm import SerialComm
 
 from ..worker.kernels import run

@@ -11,7 +11,7 @@ import pytest
 from conoid.cases.load import apply_overrides, parse_case, read_data
 from conoid.worker import simulation, step
 from conoid.worker.accounts.digest import digest
-from conoid.worker.contact.sharp import SHARP, turned
+from conoid.worker.contact.surface.sharp import SHARP, turned
 from conoid.worker.mesh.model import TetMesh
 from conoid.worker.parallel.comm import Comm
 

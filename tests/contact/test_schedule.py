@@ -10,7 +10,10 @@ import pytest
 from conoid.cases.load import apply_overrides, parse_case, read_data
 from conoid.worker import simulation, step
 from conoid.worker.accounts.digest import digest
-from conoid.worker.contact import bare, cracks, flight, searches
+from conoid.worker.contact.broad_phase import searches
+from conoid.worker.contact.narrow_phase import cracks
+from conoid.worker.contact.scene import surface_motion
+from conoid.worker.contact.surface import exposure
 from conoid.worker.parallel.comm import Comm, SerialComm
 from conoid.worker.simulation import Simulation
 
@@ -92,8 +95,8 @@ def test_no_answer_depends_on_which_tets_a_search_expects_to_leave(
     monkeypatch: pytest.MonkeyPatch, ranks: int, share: float
 ) -> None:
     """All, few or none: what is laid bare by a tet that was not expected to leave is taken up by a search."""
-    usual, many = bare.TIRING, on_ranks(ranks, lambda comm: ran("eroding", comm))[0][1]
-    monkeypatch.setattr(bare, "TIRING", share)
+    usual, many = exposure.TIRING, on_ranks(ranks, lambda comm: ran("eroding", comm))[0][1]
+    monkeypatch.setattr(exposure, "TIRING", share)
     other, more = on_ranks(ranks, lambda comm: ran("eroding", comm))[0]
     assert other == alone("eroding")[0]
     assert (more > many) == (share > usual)
@@ -102,7 +105,7 @@ def test_no_answer_depends_on_which_tets_a_search_expects_to_leave(
 @pytest.mark.parametrize("name", STEPS)
 def test_no_answer_depends_on_the_horizon(monkeypatch: pytest.MonkeyPatch, name: str) -> None:
     one = alone(name)[0]
-    monkeypatch.setattr(flight, "_LOOKS", flight._LOOKS[:1])
+    monkeypatch.setattr(surface_motion, "_LOOKS", surface_motion._LOOKS[:1])
     assert ran(name, SerialComm())[0] == one
 
 
@@ -115,6 +118,6 @@ def test_nor_on_either_on_several_ranks(ranks: int, changes: tuple[str, ...]) ->
 
 def test_what_a_search_looks_ahead_ends_with_one_search(monkeypatch: pytest.MonkeyPatch) -> None:
     """Not with one that keeps the end, a step or two away, and another one behind it."""
-    monkeypatch.setattr(flight, "_LOOKS", flight._LOOKS[:1])
-    good_for = flight._LOOKS[0] - searches._AHEAD
+    monkeypatch.setattr(surface_motion, "_LOOKS", surface_motion._LOOKS[:1])
+    good_for = surface_motion._LOOKS[0] - searches._AHEAD
     assert ran("meeting", SerialComm())[1] <= 1 + STEPS["meeting"] / good_for

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from conoid.worker.contact import buckets, search
-from conoid.worker.contact.buckets import Table
-from conoid.worker.contact.search import Things
+from conoid.worker.contact.broad_phase import buckets, search
+from conoid.worker.contact.broad_phase.buckets import Table
+from conoid.worker.contact.broad_phase.search import Primitives
 
 from ..worker.meshes import Floats
 from .bodies import Flags, Indices, sheet
@@ -42,15 +42,15 @@ class Cloud:
             self.part[things.corners] = self.part[things.corners[:, :1]]
 
     @staticmethod
-    def things(corners: "np.ndarray", random: np.random.Generator) -> Things:
-        return Things(corners.astype(np.int32), 10.0 ** random.uniform(-2.0, 0.0, len(corners)))
+    def things(corners: "np.ndarray", random: np.random.Generator) -> Primitives:
+        return Primitives(corners.astype(np.int32), 10.0 ** random.uniform(-2.0, 0.0, len(corners)))
 
-    def at(self, things: Things, share: float) -> Floats:
+    def at(self, things: Primitives, share: float) -> Floats:
         """(n, k, 3) corners after a share of the horizon."""
         return np.asarray((self.x + share * self.horizon * self.v)[things.corners])
 
     def find(
-        self, small: Things, large: Things, rank: "np.ndarray | None" = None, allowed: Flags = NEVER_SELF
+        self, small: Primitives, large: Primitives, rank: "np.ndarray | None" = None, allowed: Flags = NEVER_SELF
     ) -> Indices:
         v = self.v - self.v.mean(axis=0)
         return search.find(small, large, self.x, v, self.part, allowed, self.horizon, rank)
@@ -60,7 +60,7 @@ def clouds() -> Iterator[Cloud]:
     return map(Cloud, range(SETS))
 
 
-def reached(cloud: Cloud, small: Things, large: Things, distance: Floats) -> Flags:
+def reached(cloud: Cloud, small: Primitives, large: Primitives, distance: Floats) -> Flags:
     """(small, large) pairs that may meet and come within reach, by their distances (looks, small, large)."""
     near = distance.min(axis=0) < small.reach[:, None] + large.reach[None, :]
     of = [cloud.part[things.corners[:, 0]] for things in (small, large)]
@@ -112,8 +112,8 @@ def test_two_ranks_that_see_each_others_edges_find_every_pair_once_between_them(
     total = np.zeros((n, n), int)
     for mine, theirs in ((half[:15], half[15:]), (half[15:], half[:15])):
         seen = np.concatenate([mine, theirs])
-        large = Things(cloud.edges.corners[seen], cloud.edges.reach[seen])
-        small = Things(large.corners[: len(mine)], large.reach[: len(mine)])
+        large = Primitives(cloud.edges.corners[seen], cloud.edges.reach[seen])
+        small = Primitives(large.corners[: len(mine)], large.reach[: len(mine)])
         pairs = seen[cloud.find(small, large, seen.astype(np.int64))]
         np.add.at(total, tuple(pairs.T), 1)
     alone = as_matrix(cloud.find(cloud.edges, cloud.edges, np.arange(n)), n, n)
@@ -147,13 +147,13 @@ def test_each_pair_is_found_once_where_all_meet_all() -> None:
     """Ten times as many pairs as there is room for at first: a walk is broken off and goes on."""
     n = 120
     cloud = Cloud(5, n)
-    huge = Things(cloud.faces.corners, np.full(n, 1e5))
+    huge = Primitives(cloud.faces.corners, np.full(n, 1e5))
     assert as_matrix(cloud.find(cloud.nodes, huge, allowed=np.ones((3, 3), bool)), n, n).all()
 
 
 def test_things_with_a_node_in_common_are_no_candidates() -> None:
     cloud = Cloud(3)
-    nodes = Things(np.arange(len(cloud.x), dtype=np.int32)[:, None], np.full(len(cloud.x), 10.0))
+    nodes = Primitives(np.arange(len(cloud.x), dtype=np.int32)[:, None], np.full(len(cloud.x), 10.0))
     found = cloud.find(nodes, cloud.faces, allowed=np.ones((3, 3), bool))
     shared = (nodes.corners[found[:, 0]] == cloud.faces.corners[found[:, 1]]).any(axis=1)
     assert len(found) > 100
@@ -173,7 +173,7 @@ def test_only_parts_that_meet_are_candidates() -> None:
 @pytest.mark.parametrize("empty", ["small", "large", "both"])
 def test_nothing_meets_nothing(empty: str) -> None:
     cloud = Cloud(1)
-    none = Things(np.zeros((0, 3), np.int32), np.zeros(0))
+    none = Primitives(np.zeros((0, 3), np.int32), np.zeros(0))
     small = cloud.nodes if empty == "large" else none
     large = cloud.faces if empty == "small" else none
     assert cloud.find(small, large).shape == (0, 2)
@@ -189,10 +189,10 @@ def peak_of(away: float, coarse: int = 40) -> tuple[int, int]:
     gone = random.choice(len(x0), len(x0) // 100, replace=False)
     x[gone] += away * random.normal(size=(len(gone), 3))
     part = np.repeat([0, 1], [len(x0), len(x1)]).astype(np.int32)
-    faces = Things(faces1, np.full(len(faces1), 0.25 * 40.0 / coarse))
+    faces = Primitives(faces1, np.full(len(faces1), 0.25 * 40.0 / coarse))
     tracemalloc.start()
     found = search.find(
-        Things(nodes, np.full(len(nodes), 0.1)), faces, x, np.zeros_like(x), part, ~np.eye(2, dtype=bool), 1.0, None
+        Primitives(nodes, np.full(len(nodes), 0.1)), faces, x, np.zeros_like(x), part, ~np.eye(2, dtype=bool), 1.0, None
     )
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
@@ -221,7 +221,7 @@ def test_memory_does_not_follow_a_huge_thing(size: float) -> None:
     x = np.concatenate([x0, x1 + np.array([0.0, 0.0, 0.1]), [[-size, -size, -size], [size, size, size]]])
     corners = np.concatenate([short, short + len(x0), [[2 * len(x0), 2 * len(x0) + 1]]]).astype(np.int32)
     part = np.repeat([0, 1, 2], [len(x0), len(x0), 2]).astype(np.int32)
-    edges = Things(corners, np.full(len(corners), 0.2))
+    edges = Primitives(corners, np.full(len(corners), 0.2))
     tracemalloc.start()
     found = search.find(edges, edges, x, np.zeros_like(x), part, NEVER_SELF, 1.0, np.arange(len(corners)))
     peak = tracemalloc.get_traced_memory()[1]

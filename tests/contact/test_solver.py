@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from conoid.worker.contact.active import Kept
-from conoid.worker.contact.narrow_phase import CRACK, ContactRows
+from conoid.worker.contact.narrow_phase.tables import CRACK, ContactRows
+from conoid.worker.contact.solver.active import Kept
 
 from ..worker.meshes import Floats
 from .kernels import Solver

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from conoid.cases.model import schema
-from conoid.worker.contact.stops import Stops
+from conoid.worker.contact.solver.stops import Stops
 from conoid.worker.mesh.model import TetMesh
 
 from ..worker.meshes import Floats, block

@@ -6,8 +6,8 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from conoid.worker.contact.records import Edges
-from conoid.worker.contact.surface import Surface
+from conoid.worker.contact.surface.records import Edges
+from conoid.worker.contact.surface.surface import Surface
 from conoid.worker.mesh.faces import FACES, across
 from conoid.worker.mesh.model import TetMesh
 from conoid.worker.model.state import Model

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from conoid.worker.contact.narrow_phase import CRACK, ContactRows
+from conoid.worker.contact.narrow_phase.tables import CRACK, ContactRows
 
 from ..worker.meshes import Floats
 from .bodies import rotation

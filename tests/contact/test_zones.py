@@ -1,4 +1,4 @@
-"""Zones of a crowd: boxes with about as many nodes; and a step by many threads is that by one, to the bit."""
+"""Zones of a surface_nodes: boxes with about as many nodes; and a step by many threads is that by one, to the bit."""
 
 from types import SimpleNamespace
 from typing import Any
@@ -6,15 +6,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from conoid.worker.contact.solver import ActiveSet
-from conoid.worker.contact.zones import Zones
+from conoid.worker.contact.solver.solver import ActiveSet
+from conoid.worker.contact.solver.zones import Zones
 from conoid.worker.parallel.team import team
 
 from .kernels import Solver, network
 
 
-def crowd_of(x: "np.ndarray") -> Any:
-    """What zones ask of a crowd."""
+def nodes_of(x: "np.ndarray") -> Any:
+    """What zones ask of a surface_nodes."""
     return SimpleNamespace(x=x, n=len(x))
 
 
@@ -23,7 +23,7 @@ def test_zones_have_about_as_many_nodes_each_and_nodes_of_one_place_are_of_one(t
     x = np.random.default_rng(threads).normal(size=(4000, 3)) * [9.0, 3.0, 1.0]
     x[2000:] = x[:2000]
     zones = Zones(threads)
-    zone = zones.of(crowd_of(x))
+    zone = zones.of(nodes_of(x))
     counts = np.bincount(zone, minlength=zones.many)
     assert zones.many >= 4 * threads
     assert len(counts) == zones.many
@@ -33,10 +33,10 @@ def test_zones_have_about_as_many_nodes_each_and_nodes_of_one_place_are_of_one(t
 
 def test_nodes_that_come_later_are_of_the_zone_of_their_place_and_the_others_stay() -> None:
     x = np.random.default_rng(1).uniform(size=(500, 3))
-    zones, crowd = Zones(2), crowd_of(x[:400])
-    before = zones.of(crowd).copy()
-    crowd.x, crowd.n = np.concatenate([x[:400] + 0.5, x[:100]]), 500
-    after = zones.of(crowd)
+    zones, surface_nodes = Zones(2), nodes_of(x[:400])
+    before = zones.of(surface_nodes).copy()
+    surface_nodes.x, surface_nodes.n = np.concatenate([x[:400] + 0.5, x[:100]]), 500
+    after = zones.of(surface_nodes)
     assert np.array_equal(after[:400], before)
     assert np.array_equal(after[400:], before[:100])
 
@@ -44,7 +44,7 @@ def test_nodes_that_come_later_are_of_the_zone_of_their_place_and_the_others_sta
 def test_one_thread_has_one_zone() -> None:
     zones = Zones(1)
     assert zones.many == 1
-    assert not zones.of(crowd_of(np.zeros((7, 3)))).any()
+    assert not zones.of(nodes_of(np.zeros((7, 3)))).any()
 
 
 @pytest.mark.parametrize("threads", [2, 5])

@@ -86,10 +86,10 @@ def shared(sim: Simulation) -> dict[str, Any]:
     assert sim.contact is not None
     now, nodes = sim.contact.searches.scene, sim.model.nodes
     assert now is not None
-    ids = now.crowd.id
+    ids = now.surface_nodes.id
     return {
         "holds": set(nodes.id.tolist()), "pushes": set(ids[now.slots.pushes].tolist()),
-        "lacks": sorted(ids[now.crowd.local < 0].tolist()),
+        "lacks": sorted(ids[now.surface_nodes.local < 0].tolist()),
         "sums": {some.rank: ids[some.nodes].tolist() for some in now.messages.company.neighbours},
         "sends": {some.rank: nodes.id[some.nodes].tolist() for some in now.messages.copies.sends},
         "receives": {some.rank: ids[some.nodes].tolist() for some in now.messages.copies.receives},

@@ -17,15 +17,15 @@ import pytest
 from conoid.cases.load import apply_overrides, parse_case, read_data, shipped
 from conoid.cases.model.schema import Case
 from conoid.worker import simulation, step
-from conoid.worker.contact import domain, search
-from conoid.worker.contact.flight import Flight
-from conoid.worker.contact.narrow_phase import ContactRows, Step
-from conoid.worker.contact.normals import means
-from conoid.worker.contact.pairs import PairTable
-from conoid.worker.contact.records import AGED, OPEN
-from conoid.worker.contact.scene import Scene
-from conoid.worker.contact.search import Things
-from conoid.worker.contact.sides import Sides
+from conoid.worker.contact.broad_phase import domain, search
+from conoid.worker.contact.broad_phase.pairs import PairTable
+from conoid.worker.contact.broad_phase.search import Primitives
+from conoid.worker.contact.narrow_phase.tables import ContactRows, Step
+from conoid.worker.contact.scene.near_surface import NearSurface
+from conoid.worker.contact.scene.scene import Scene
+from conoid.worker.contact.scene.surface_motion import SurfaceMotion
+from conoid.worker.contact.surface.normals import means
+from conoid.worker.contact.surface.records import AGED, OPEN
 from conoid.worker.model.state import Ints
 from conoid.worker.parallel.comm import Comm, SerialComm
 from conoid.worker.simulation import Simulation
@@ -80,7 +80,9 @@ class Found:
 
     def meet(self, now: Scene, give: float, dt: float) -> None:
         self._meet(now, give, dt)
-        self.at[self.sim.clock.step] = written(taken(now.active.room, now.active.found[: now.active.n]), now.crowd.id)
+        self.at[self.sim.clock.step] = written(
+            taken(now.active.room, now.active.found[: now.active.n]), now.surface_nodes.id
+        )
 
     def run(self) -> dict[int, Met]:
         """Of some steps, each with the meetings that this rank computed; boundaries and forces act as ever."""
@@ -108,38 +110,38 @@ class Brute(Found):
             self.all[self.sim.clock.step] = self._nodes(sides, step) + self._edges(sides, step)
         super().meet(now, give, dt)
 
-    def _sides(self) -> Sides:
+    def _sides(self) -> NearSurface:
         """The whole surface as it is now: what has been laid bare since the last search, without what has left."""
         exterior = self.contact.exterior
         found = exterior._build(exterior.surface.flags, exterior.surface.turned)
-        return Flight(found, self.sim.model.nodes, exterior.flight.mobility, exterior.size, self.sim.comm).sides
+        return SurfaceMotion(found, self.sim.model.nodes, exterior.motion.mobility, exterior.size, self.sim.comm).sides
 
-    def _step(self, sides: Sides, give: float, dt: float) -> Step:
+    def _step(self, sides: NearSurface, give: float, dt: float) -> Step:
         nodes = self.sim.model.nodes
-        x, v = (state[sides.crowd.local] for state in (nodes.x, nodes.v))
-        return Step.of(x, v, sides.crowd.part, self.contact.searches.mu, give, dt)
+        x, v = (state[sides.surface_nodes.local] for state in (nodes.x, nodes.v))
+        return Step.of(x, v, sides.surface_nodes.part, self.contact.searches.mu, give, dt)
 
-    def _nodes(self, sides: Sides, step: Step) -> Met:
+    def _nodes(self, sides: NearSurface, step: Step) -> Met:
         met = Met()
-        faces, local, slaves = sides.face_places, sides.crowd.local, sides.crowd.places(sides.slaves)
+        faces, local, owned = sides.face_places, sides.surface_nodes.local, sides.surface_nodes.places(sides.owned)
         mean, on_surface = means(self.contact.exterior._moments[local]), self.contact.exterior.surface.flags[local]
         none = np.zeros(len(local))
-        for pairs in self._pairs(sides, slaves[:, None], faces[:, :3]):
+        for pairs in self._pairs(sides, owned[:, None], faces[:, :3]):
             table, first = PairTable(), np.full(len(local), -1, np.int32)
-            table.add(np.column_stack([slaves[pairs[:, 0]], pairs[:, 1]]).astype(np.int32))
+            table.add(np.column_stack([owned[pairs[:, 0]], pairs[:, 1]]).astype(np.int32))
             table.hang(first, 0)
             slots = slot_table(first, mean, none, step.v)._replace(on_surface=on_surface)
             of = face_table(faces, sides.faces.size, np.zeros(len(faces)))
             of = of._replace(id=sides.faces.id, exposed=sides.faces.exposed)
             room, _ = faces_met(table.arrays(), slots, of, step, 0.0)
-            met += written(room, sides.crowd.id)
+            met += written(room, sides.surface_nodes.id)
         return met
 
-    def _edges(self, sides: Sides, step: Step) -> Met:
+    def _edges(self, sides: NearSurface, step: Step) -> Met:
         met = Met()
         edges = sides.edges.take(sides.edges.sharp)
         edges = edges.take(np.lexsort((edges.sides[:, 1], edges.sides[:, 0])))
-        places = sides.crowd.places(edges.nodes)
+        places = sides.surface_nodes.places(edges.nodes)
         of = edge_table(places, edges.size, edges.deep, np.zeros(len(places)))._replace(
             meets=np.asarray((edges.opened >= AGED).all(axis=1) & (edges.opened == OPEN).any(axis=1))
         )
@@ -147,12 +149,12 @@ class Brute(Found):
             pairs, table = every[every[:, 0] < every[:, 1]], PairTable()
             table.add(pairs)
             room, _ = edges_met(table.arrays(), of, step, np.zeros_like(step.x), 0.0)
-            met += written(room, sides.crowd.id)
+            met += written(room, sides.surface_nodes.id)
         return met
 
-    def _pairs(self, sides: Sides, small: Indices, large: Indices) -> Iterator[Indices]:
+    def _pairs(self, sides: NearSurface, small: Indices, large: Indices) -> Iterator[Indices]:
         """(p, 2) all small things with all large ones that their part meets and that have no corner in common."""
-        part, allowed = sides.crowd.part, ~np.isnan(self.contact.searches.mu)
+        part, allowed = sides.surface_nodes.part, ~np.isnan(self.contact.searches.mu)
         for begin in range(0, len(small), max(_MOST // max(len(large), 1), 1)):
             some = small[begin : begin + max(_MOST // max(len(large), 1), 1)]
             meet = allowed[part[some[:, 0]][:, None], part[large[:, 0]][None, :]]
@@ -211,8 +213,8 @@ def test_a_search_without_foresight_is_found_out() -> None:
     case, find = case_of("fast_fragment", "contact.skin=0.1"), search.find
 
     def blind(
-        small: Things,
-        large: Things,
+        small: Primitives,
+        large: Primitives,
         x: Floats,
         v: Floats,
         part: Indices,
@@ -231,8 +233,8 @@ def test_a_search_without_foresight_is_found_out() -> None:
 def test_a_search_without_skin_is_found_out() -> None:
     case, find = case_of("hertz_spheres"), search.find
 
-    def bare(small: Things, large: Things, *rest: Any) -> Indices:
-        one, other = (Things(each.corners, np.zeros_like(each.reach), each.some) for each in (small, large))
+    def bare(small: Primitives, large: Primitives, *rest: Any) -> Indices:
+        one, other = (Primitives(each.corners, np.zeros_like(each.reach), each.some) for each in (small, large))
         return find(one, other, *rest)
 
     with patch.object(search, "find", bare):

@@ -2,7 +2,10 @@
 
 from pathlib import Path
 
-from conoid.worker.contact import detection, follower, held, kin, tasks
+from conoid.worker.contact import tasks
+from conoid.worker.contact.narrow_phase import detection
+from conoid.worker.contact.scene import split_pairs, split_update
+from conoid.worker.contact.solver import slot_numbers
 from conoid.worker.kernels import preload
 
 from .launching import command, ended
@@ -24,8 +27,8 @@ def test_contact_and_fracture_load_no_kernel_once_steps_have_begun(tmp_path: Pat
 
 
 def test_kernels_that_functions_name_are_found_as_their_own_and_as_those_of_other_modules() -> None:
-    found = {*preload.called(follower)}
-    assert {follower._flagged, kin.follow_faces, kin.apart_from_edges} <= found
-    assert kin._become not in found, "which kernels alone call"
-    assert held.gather not in found
+    found = {*preload.called(split_update)}
+    assert {split_update._flagged, split_pairs.follow_faces, split_pairs.apart_from_edges} <= found
+    assert split_pairs._become not in found, "which kernels alone call"
+    assert slot_numbers.gather not in found
     assert tasks.take in {*preload.called(detection)}, "named in a method, within a class"

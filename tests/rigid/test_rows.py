@@ -4,8 +4,8 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from conoid.worker.contact.active import IMPULSE, MOBILITY, ActiveNodes
-from conoid.worker.contact.loading import SHARES
+from conoid.worker.contact.solver.active import IMPULSE, MOBILITY, ActiveNodes
+from conoid.worker.contact.solver.loading import SHARES
 from conoid.worker.rigid import rows
 
 Floats = npt.NDArray[np.float64]

@@ -12,7 +12,7 @@ from conoid.cases.model import materials
 from conoid.cases.model.schema import Case
 from conoid.cases.reading.library import library
 from conoid.worker import simulation, step
-from conoid.worker.contact import common_volume
+from conoid.worker.contact.checks import common_volume
 from conoid.worker.mesh.model import TetMesh
 from conoid.worker.model import rows
 from conoid.worker.parallel.comm import SerialComm
@@ -32,7 +32,7 @@ def depth(sim: Simulation) -> float:
     """How far the deepest node inside another part is from that part's surface, m; of two parts on one rank."""
     assert sim.contact is not None
     x, part = sim.model.nodes.x, sim.model.nodes.part
-    faces = sim.contact.exterior.flight.sides.faces.nodes[:, :3]
+    faces = sim.contact.exterior.motion.sides.faces.nodes[:, :3]
     deepest = 0.0
     for body in sim.model.blocks:
         others, mine = x[np.unique(faces[part[faces[:, 0]] != body.part])], x[part == body.part]
@@ -79,9 +79,9 @@ class Slide:
         """(n, 3) the impulses of contact, N s."""
         self.v[self.first :, 2] -= load
         before = self.v.copy()
-        slaves = np.arange(self.first, len(self.x))
+        tested = np.arange(self.first, len(self.x))
         met = node_face(
-            self.x, self.v, self.faces, every_pair(slaves, len(self.faces)), 1.0, mu=np.full((2, 2), friction)
+            self.x, self.v, self.faces, every_pair(tested, len(self.faces)), 1.0, mu=np.full((2, 2), friction)
         )
         self.v = Solver(met, self.v, self.mobility, 2.0**50).sweep(5)
         self.x += self.v

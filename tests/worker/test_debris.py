@@ -7,7 +7,7 @@ import pytest
 
 from conoid.cases.model import schema
 from conoid.worker import step
-from conoid.worker.contact.inside import look
+from conoid.worker.contact.checks.inside import look
 from conoid.worker.parallel.comm import SerialComm
 from conoid.worker.simulation import Simulation
 

@@ -280,7 +280,7 @@ def test_what_is_laid_bare_meets_in_the_same_step() -> None:
     def candidates() -> set[tuple[int, ...]]:
         now = sim.contact.searches.scene if sim.contact is not None else None
         assert now is not None
-        return {tuple(sorted(row)) for row in now.crowd.id[now.faces.corners[:, :3]].tolist()}
+        return {tuple(sorted(row)) for row in now.surface_nodes.id[now.faces.corners[:, :3]].tolist()}
 
     wanted = {tuple(sorted(int(n) for n in np.delete(meshes[0].tets[face // 4], face % 4))) for face in bare}
     assert not wanted & candidates()

@@ -16,8 +16,8 @@ import numpy as np
 from conoid.cases.model.bonds import GAP, TiedBond
 from conoid.cases.model.schema import Case
 
-from ..contact import search
-from ..contact.search import Things
+from ..contact.broad_phase import search
+from ..contact.broad_phase.search import Primitives
 from ..errors import InputError
 from ..mesh.faces import FACES
 from ..mesh.faces import areas as face_areas
@@ -126,7 +126,7 @@ def _near(x: Floats, one: _Faces, two: _Faces, reach: Floats, other: Floats) -> 
     corners, many = np.ascontiguousarray(faces), len(one.nodes)
     rows = np.arange(len(faces), dtype=np.int32)
     both = np.concatenate([reach, other])
-    small, large = Things(corners, both, rows[:many]), Things(corners, both, rows[many:])
+    small, large = Primitives(corners, both, rows[:many]), Primitives(corners, both, rows[many:])
     found = search.find(small, large, x, np.zeros_like(x), part, ~np.eye(2, dtype=bool), 0.0, None)
     found = found[np.lexsort((found[:, 1], found[:, 0]))]
     return np.ascontiguousarray(found - np.array([0, many], np.int32), np.int32)

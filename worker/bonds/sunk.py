@@ -7,7 +7,7 @@ import numpy as np
 from conoid.cases.model.bonds import GAP, TiedBond
 from conoid.cases.model.schema import Case
 
-from ..contact import overlap
+from ..contact.checks import overlap
 from ..errors import InputError
 from ..mesh.faces import FACES
 from ..mesh.faces import areas as face_areas

@@ -1,1 +1,1 @@
-"""Bodies that meet: exposed faces, search, defence-node and edge-to-edge contact, ghosts of other ranks' surfaces."""
+"""Contact of bodies: surface, broad phase, narrow phase and solver of the impulses, with ghosts of other ranks."""

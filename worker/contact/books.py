@@ -12,7 +12,7 @@ from ..parallel.passes import Pass
 from ..parallel.team import Team
 from . import tasks
 from .account import Account
-from .scene import Scene
+from .scene.scene import Scene
 
 
 class Books:
@@ -99,8 +99,8 @@ class Books:
         if fresh and len(self.pressed):
             self.pressed[scene.own.local] += scene.slots.total[scene.own.slots]
         self._book.run(
-            len(places), self.contact_loss, self.external_work, places, scene.crowd.local, scene.slots.before,
-            scene.slots.total, scene.crowd.mobility, self.scale,
+            len(places), self.contact_loss, self.external_work, places, scene.surface_nodes.local, scene.slots.before,
+            scene.slots.total, scene.surface_nodes.mobility, self.scale,
         )  # fmt: skip
 
     def book_resumed(self, nodes: Nodes, mobility: Floats) -> None:

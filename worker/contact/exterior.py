@@ -10,11 +10,11 @@ from ..model.state import Block, Flags, Floats, Indices, Ints, Model, Nodes, ext
 from ..model.topology import Split
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour
-from . import bare, normals, surface
-from .cracks import Cracks
-from .families import Corners
-from .flight import Flight, typical
-from .scene import Scene
+from .narrow_phase.cracks import Cracks
+from .scene.scene import Scene
+from .scene.surface_motion import SurfaceMotion, typical
+from .surface import exposure, normals, surface
+from .surface.families import Corners
 
 _WORDS = 9 + 2 * normals.SHARE
 """Of the row of a crack that opens (Exterior.widened)."""
@@ -35,7 +35,7 @@ class Exterior:
         self.surface = self._build(np.zeros(model.nodes.n, bool), np.zeros(0, np.int64))
         self.size = typical(self.surface.faces.size, comm)
         """Of the faces of all ranks at the start, m."""
-        self.flight = Flight(self.surface, model.nodes, mobilities(model.nodes, bounds), self.size, comm)
+        self.motion = SurfaceMotion(self.surface, model.nodes, mobilities(model.nodes, bounds), self.size, comm)
         self._moments = np.zeros((model.nodes.n, normals.COLUMNS), np.int64)
         self._broken = False
         """Whether facets of any rank have broken: cracks may be open."""
@@ -46,7 +46,7 @@ class Exterior:
         parcel.nodes["family"] = self.cracks.families.root
         parcel.rows["contact.turned"] = {"tet": self.surface.turned >> 34, "name": self.surface.turned}
         parcel.nodes["contact.flags"], parcel.nodes["contact.moments"] = self.surface.flags, self._moments
-        parcel.nodes["contact.loose"] = self.flight.loose
+        parcel.nodes["contact.loose"] = self.motion.loose
 
     def resume(self, parcel: Parcel, size: float, broken: bool) -> None:
         """Takes them back; all ranks take part."""
@@ -57,8 +57,8 @@ class Exterior:
         self.surface.flags = np.array(parcel.nodes["contact.flags"])
         self._moments = np.array(parcel.nodes["contact.moments"])
         nodes = self._model.nodes
-        self.flight = Flight(self.surface, nodes, mobilities(nodes, self._bounds), size, self._comm)
-        self.flight.loose = np.array(parcel.nodes["contact.loose"])
+        self.motion = SurfaceMotion(self.surface, nodes, mobilities(nodes, self._bounds), size, self._comm)
+        self.motion.loose = np.array(parcel.nodes["contact.loose"])
         root = np.array(parcel.nodes["family"])
         self.cracks = Cracks.resume(parcel.rows["contact.cracks"], root, self._model.blocks, nodes)
 
@@ -87,7 +87,7 @@ class Exterior:
         model, neighbours, comm = self._model, self._neighbours, self._comm
         sides, covered = self.cracks.foresee(), np.zeros((0, 3), np.int32)
         if self._tiring is not None:
-            covered = bare.covered(model.blocks, self._tiring, neighbours, comm)
+            covered = exposure.covered(model.blocks, self._tiring, neighbours, comm)
         found = surface.build(model, self._planes, neighbours, comm, self._edges, sides, covered)
         found.flags[: len(flags)] |= flags
         found.sharpen(turned)
@@ -100,21 +100,21 @@ class Exterior:
             self.surface.sharpen(np.union1d(self.surface.turned, self.surface.edges.names[turned]))
 
     def uncover(self, gone: Ints, loose: Flags, removed: Flags, scene: Scene | None) -> bool:
-        """Mean normals, nodes of the surface and the ``scene`` after tets ``gone`` (k, bare.WORDS) of this rank have
-        left; ``loose`` (nodes,): nodes without tets that fly on, ``removed``: those that have left. Returns whether a
-        search has to take up what has been laid bare; all ranks take part.
+        """Mean normals, nodes of the surface and the ``scene`` after tets ``gone`` (k, exposure.WORDS) of this rank
+        have left; ``loose`` (nodes,): nodes without tets that fly on, ``removed``: those that have left. Returns
+        whether a search has to take up what has been laid bare; all ranks take part.
         """
         if self._tiring is None:
             self._tiring = np.zeros(0, np.int64)
         known = among(self._tiring, gone[:, 0])
-        told = self._comm.join(np.column_stack([known, gone]).reshape(-1)).reshape(-1, 1 + bare.WORDS)
-        laid = bare.laid(told[:, 1:])
-        bare.lay(self._model.blocks, laid.bare)
+        told = self._comm.join(np.column_stack([known, gone]).reshape(-1)).reshape(-1, 1 + exposure.WORDS)
+        laid = exposure.laid(told[:, 1:])
+        exposure.lay(self._model.blocks, laid.bare)
         flags, local = self.surface.flags, self._model.nodes.places(laid.nodes)
         flags[local[local >= 0]] = True
         flags |= loose
         flags &= ~removed
-        self.flight.forget(removed)
+        self.motion.forget(removed)
         self._loosen(loose)
         self.turn()
         if scene is not None:
@@ -123,13 +123,13 @@ class Exterior:
             return True
         scene.uncover(laid.gone, laid.bare, scene.own.place[removed])
         self.show(scene, scene.own.local)
-        scene.crowd.mobility[scene.own.slots] = self.flight.mobility[scene.own.local]
+        scene.surface_nodes.mobility[scene.own.slots] = self.motion.mobility[scene.own.local]
         return False
 
     def _loosen(self, loose: Flags) -> None:
         """Nodes without tets move as what still holds them lets them."""
-        if (loose & ~self.flight.loose).any():
-            self.flight.loose, self.flight.mobility = loose, mobilities(self._model.nodes, self._bounds)
+        if (loose & ~self.motion.loose).any():
+            self.motion.loose, self.motion.mobility = loose, mobilities(self._model.nodes, self._bounds)
 
     def crack(self, tets: Ints, nodes: Indices, sides: Indices) -> None:
         """Takes up broken facets; see ``Cracks.add``."""
@@ -138,7 +138,7 @@ class Exterior:
     def take_up(self) -> None:
         """The surface anew, with what may become part of it before the next search; all ranks take part."""
         if self._tiring is not None:
-            self._tiring = bare.tiring(self._model.blocks)
+            self._tiring = exposure.tiring(self._model.blocks)
         if self._broken or self._tiring is not None:
             self.surface = self._build(self.surface.flags, self.surface.turned)
 
@@ -171,11 +171,11 @@ class Exterior:
         take part.
         """
         nodes = self._model.nodes
-        self.flight.begin(nodes, course, t)
-        if self.flight.found is not self.surface:
-            self.flight.follow(self.surface, nodes)
+        self.motion.begin(nodes, course, t)
+        if self.motion.found is not self.surface:
+            self.motion.follow(self.surface, nodes)
         else:
-            self.flight.refresh(nodes)
+            self.motion.refresh(nodes)
 
     def widened(self, rows: Ints) -> Ints:
         """(k, _WORDS) of the cracks ``rows`` (k,): whether the last search has taken them up; ids of both sides; of the
@@ -205,7 +205,7 @@ class Exterior:
         return bool((told[:, 0] == 0).any())
 
     def narrow(self) -> list[tuple[Block, Corners]]:
-        """Blocks that have broken, and the corners of their narrow sides; see entering.py."""
+        """Blocks that have broken, and the corners of their narrow sides; see corner_contact.py."""
         some = enumerate(self._model.blocks) if len(self.cracks.faces) else ()
         return [(block, self.cracks.corners(b)) for b, block in some if len(block.bond)]
 
@@ -215,16 +215,16 @@ class Exterior:
         if split.copies.n:
             parents = split.copies.parents
             self.cracks.follow(split, self._model.nodes.id)
-            self.flight.grow(parents)
+            self.motion.grow(parents)
             self._moments = extended(self._moments, self._moments[parents])
 
     def grow(self, split: Split) -> None:
         """Takes up the copies of nodes."""
-        parents, flight = split.copies.parents, self.flight
-        flight.mobility = extended(flight.mobility, flight.mobility[parents])
+        parents, motion = split.copies.parents, self.motion
+        motion.mobility = extended(motion.mobility, motion.mobility[parents])
         for some in (parents, split.first + np.arange(split.copies.n)):
-            free = flight.mobility[some] > 0.0
-            flight.mobility[some] = np.where(free, 1.0 / self._model.nodes.mass[some, None], 0.0)
+            free = motion.mobility[some] > 0.0
+            motion.mobility[some] = np.where(free, 1.0 / self._model.nodes.mass[some, None], 0.0)
 
 
 def mobilities(nodes: Nodes, bounds: list[Boundary]) -> Floats:

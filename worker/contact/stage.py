@@ -23,16 +23,17 @@ from ..parallel.ownership import Neighbour
 from ..parallel.team import Team
 from ..reduction import StepReduction
 from ..rigid.stage import Rigid
-from . import normals, pairing, sharp
+from . import part_pairs
 from .books import Books
-from .detection import Ahead, Detected, Detection
+from .broad_phase.searches import Searches
 from .exterior import Exterior
-from .narrow_phase import PUSH_OUT
-from .need import Need
-from .scene import Scene
-from .searches import Searches
-from .solver import ActiveSet
-from .stops import Stops
+from .narrow_phase.detection import Ahead, Detected, Detection
+from .narrow_phase.tables import PUSH_OUT
+from .scene.scene import Scene
+from .solver.solver import ActiveSet
+from .solver.stops import Stops
+from .solver.sweep_count import SweepCount
+from .surface import normals, sharp
 
 _SURFACE, _LISTED, _TESTED, _ACTIVE = 9.0, 0.1, 3.0, 4.0
 """What a step costs for a node of the surface (searches and registrations, shared out), for a pair that is listed, for
@@ -73,10 +74,10 @@ class Contact:
         self.exterior = Exterior(model, neighbours, bounds, case.contact.edges, comm)
         self.searches = Searches(case, model, neighbours, self.exterior, comm, clock)
         largest, speed = extremes
-        mass = pairing.lighter(self.searches.mu, model.nodes, self.exterior.flight.mobility, comm, rigid) or largest
+        mass = part_pairs.lighter(self.searches.mu, model.nodes, self.exterior.motion.mobility, comm, rigid) or largest
         self.books = Books(model.nodes.n, case, mass * speed, mass * speed * speed, team)
         self._active = ActiveSet(self.books.scale, Stops.of(case, model, comm), team, rigid)
-        self._scheme, self.need = _Scheme.of(case), Need(sweeps(case))
+        self._scheme, self.sweep_count = _Scheme.of(case), SweepCount(sweeps(case))
         self.detection = Detection(team)
         self.limit = 0.0
         """One over the step in which no node of any rank passes more than half of a tet that it meets, 1/s."""
@@ -90,7 +91,7 @@ class Contact:
         books = self.books
         parcel.known["contact"] = (
             books.scale, books.friction.scale, self.limit, self.searches.many, self._mean_dt, self.exterior.size,
-            self._active.stops.sides, self.need.known(), books.account.known(),
+            self._active.stops.sides, self.sweep_count.known(), books.account.known(),
         )  # fmt: skip
         self.books.keep(parcel, self.searches.scene)
         self.exterior.keep(parcel)
@@ -104,7 +105,7 @@ class Contact:
             sides, need, account,
         ) = parcel.known["contact"]  # fmt: skip
         self._active.go_on(books.scale, sides)
-        self.need.resume(need)
+        self.sweep_count.resume(need)
         books.resume(parcel, account)
         books.agreed = self._comm.sum(books.account.words)
         self.exterior.resume(parcel, size, self._fractures)
@@ -137,7 +138,7 @@ class Contact:
                 (push, _TESTED, tested),
                 (push, _ACTIVE, now.active.nodes[:, 0]),
             ):
-                at = now.crowd.local[slots]
+                at = now.surface_nodes.local[slots]
                 effort += weight * np.bincount(at[at >= 0], minlength=n)
         return np.column_stack([search, push])
 
@@ -146,7 +147,7 @@ class Contact:
         return self.books.impulses(self._comm)
 
     def uncover(self, gone: Ints, loose: Flags, removed: Flags) -> None:
-        """The surface after tets ``gone`` (k, bare.WORDS) of this rank have left; ``loose`` (nodes,): nodes without
+        """The surface after tets ``gone`` (k, exposure.WORDS) of this rank have left; ``loose`` (nodes,): nodes without
         tets that fly on, ``removed``: those that have left. All ranks take part.
         """
         with self._timers.phase("contact"):
@@ -165,7 +166,7 @@ class Contact:
 
     def agree(self, all_ranks: StepReduction) -> None:
         """Takes what all ranks have found in the step; all ranks take part."""
-        self.need.agree(all_ranks.unsettled)
+        self.sweep_count.agree(all_ranks.unsettled)
         self.books.agreed = all_ranks.costs.reshape(2, 2)
         self.searches.due |= all_ranks.search
         self.found.stray = all_ranks.stray
@@ -201,7 +202,7 @@ class Contact:
             self.searches.due |= self.exterior.open(told, self.searches.scene)
 
     def separate(self, split: Split) -> None:
-        """Follows nodes as they separate; called on all ranks, see news.py for those that take part."""
+        """Follows nodes as they separate; called on all ranks, see topology_updates.py for those that take part."""
         self.exterior.separate(split)
         self.searches.separate(split)
 
@@ -214,9 +215,9 @@ class Contact:
         """Before the kick: keeps v(n-1/2), and books the second half of the last impulses' work."""
         now = self.searches.scene
         self.books.due()
-        self.need.unsettled[:] = 0
+        self.sweep_count.unsettled[:] = 0
         if now is None:
-            self.books.book_resumed(state, self.exterior.flight.mobility)
+            self.books.book_resumed(state, self.exterior.motion.mobility)
             return
         with self._timers.phase("contact"):
             now.look(state)
@@ -251,24 +252,24 @@ class Contact:
                 self._push(now, state, dt, t)
 
     def _push(self, now: Scene, state: Nodes, dt: float, t: float) -> None:
-        crowd, books, active = now.crowd, self.books, self._active
+        surface_nodes, books, active = now.surface_nodes, self.books, self._active
         now.messages.copies.begin(state)
         self.detection.take(now, state)
-        now.messages.copies.finish(crowd.x, crowd.v, now.slots.before)
+        now.messages.copies.finish(surface_nodes.x, surface_nodes.v, now.slots.before)
         give = PUSH_OUT if books.account.settle(books.agreed) else 0.0
         self._meet(now, give, dt)
         self.detection.retarget(now, self._scheme.restitution, give)
-        shared = now.messages.company.agree(now.active, crowd.local)
-        active.begin(now.active, crowd, self.exterior.flight.loose, shared, self.exterior.size, dt)
+        shared = now.messages.company.agree(now.active, surface_nodes.local)
+        active.begin(now.active, surface_nodes, self.exterior.motion.loose, shared, self.exterior.size, dt)
         active.weigh()
         kept = now.stored(self.exterior.cracks.kept)
         active.resume(kept, self._resume(give))
-        active.sweep(self.need.sweeps)
+        active.sweep(self.sweep_count.sweeps)
         active.store(kept)
         if self.searches.rubs:
             active.heat(books.friction, now.slots.before)
-        active.cost(books, now.slots.before, crowd.part)
-        if active.leave(crowd, now.slots.total, state, books.parts, self.need.unsettled):
+        active.cost(books, now.slots.before, surface_nodes.part)
+        if active.leave(surface_nodes, now.slots.total, state, books.parts, self.sweep_count.unsettled):
             self.last_push = t
         shared.free()
         books.book(now, active.places, fresh=True)
@@ -284,7 +285,7 @@ class Contact:
         return ratio if give > 0.0 or self._scheme.restitution > 0.0 else 0.0
 
     def _meet(self, now: Scene, give: float, dt: float) -> None:
-        """Finds the active contacts of the step; ``give``: of penetrations, taken back (narrow_phase.PUSH_OUT)."""
+        """Finds the active contacts of the step; ``give``: of penetrations, taken back (tables.PUSH_OUT)."""
         step = self._clock.step
         if step % _FORESIGHT == 0:
             self.searches.foresee()

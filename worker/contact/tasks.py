@@ -6,11 +6,12 @@ Each task puts its rows behind each other from a place of its own on, and into `
 from ..kernels.jit import njit, types
 from ..parallel.arguments import reader
 from ..parallel.team import TASK
-from . import booking, cracks, edge_edge, entering, haste, held, loading, node_face, restitution, sweeps
-from .active import CONTACTS, KEPT, LOADED, NODES
-from .entering import NARROW
-from .families import CORNERS
-from .narrow_phase import CONTACT_ROWS, EDGES, FACES, PAIRS, SLOTS, STEP
+from .narrow_phase import closing_speed, corner_contact, cracks, edge_edge, node_face
+from .narrow_phase.corner_contact import NARROW
+from .narrow_phase.tables import CONTACT_ROWS, EDGES, FACES, PAIRS, SLOTS, STEP
+from .solver import impulse_work, loading, restitution, slot_numbers, sweeps
+from .solver.active import CONTACTS, KEPT, LOADED, NODES
+from .surface.families import CORNERS
 
 PAIRS_OF_A_TASK = 1024
 """Chosen: some 20 us of work, of which a region of threads costs 2."""
@@ -83,14 +84,14 @@ def across_cracks(table, first, stop, thread):  # type: ignore[no-untyped-def]
 def entering_nodes(table, first, stop, thread):  # type: ignore[no-untyped-def]
     """``entering.entering``."""
     out, base, each, narrow, of, step, counts = _entering(table)
-    counts[first // FAMILIES_OF_A_TASK] = entering.entering(out, base, each, narrow, of, step, first, stop)
+    counts[first // FAMILIES_OF_A_TASK] = corner_contact.entering(out, base, each, narrow, of, step, first, stop)
 
 
 @njit(TASK, cache=True)
 def approach(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``haste.approach``."""
+    """``closing_rate.approach``."""
     out, found, pairs, faces, step, most = _approach(table)
-    most[first // CONTACTS_OF_A_TASK] = haste.approach(out, found, pairs, faces, step, first, stop)
+    most[first // CONTACTS_OF_A_TASK] = closing_speed.approach(out, found, pairs, faces, step, first, stop)
 
 
 @njit(TASK, cache=True)
@@ -107,7 +108,7 @@ def rebound(table, first, stop, thread):  # type: ignore[no-untyped-def]
 def mark(table, first, stop, thread):  # type: ignore[no-untyped-def]
     """``held.mark``."""
     touched, set_of, nodes, found, zone, shared, many = _mark(table)
-    held.mark(touched, set_of, nodes, found, zone, shared, many, first // CONTACTS_OF_A_TASK, first, stop)
+    slot_numbers.mark(touched, set_of, nodes, found, zone, shared, many, first // CONTACTS_OF_A_TASK, first, stop)
 
 
 @njit(TASK, cache=True)
@@ -115,14 +116,14 @@ def sort(table, first, stop, thread):  # type: ignore[no-untyped-def]
     """``held.sort``."""
     row, slots, reach, begins, set_of, found, nodes, slot = _sort(table)
     task = first // CONTACTS_OF_A_TASK
-    held.sort(row, slots, reach, begins, set_of, found, nodes, slot, task, first, stop)
+    slot_numbers.sort(row, slots, reach, begins, set_of, found, nodes, slot, task, first, stop)
 
 
 @njit(TASK, cache=True)
 def load(table, first, stop, thread):  # type: ignore[no-untyped-def]
     """``held.load``."""
     active, places, v, mobility, fastest = _load(table)
-    fastest[first // SLOTS_OF_A_TASK] = held.load(active, places, v, mobility, first, stop)
+    fastest[first // SLOTS_OF_A_TASK] = slot_numbers.load(active, places, v, mobility, first, stop)
 
 
 @njit(TASK, cache=True)
@@ -172,9 +173,9 @@ def cost(table, first, stop, thread):  # type: ignore[no-untyped-def]
     words, loaded, active, before, places, joule, rubs = _cost(table)
     for k in range(first, stop):
         if rubs:
-            booking.heat(words[k], loaded, active, before, places, joule, k)
+            impulse_work.heat(words[k], loaded, active, before, places, joule, k)
         else:
-            booking.cost(words[k], loaded, active, before, places, joule, k)
+            impulse_work.cost(words[k], loaded, active, before, places, joule, k)
 
 
 @njit(TASK, cache=True)
@@ -182,21 +183,21 @@ def leave(table, first, stop, thread):  # type: ignore[no-untyped-def]
     """``held.leave``, with sums of each task."""
     node_v, parts, unsettled, total, active, places, index, part, owned = _leave(table)
     k = first // SLOTS_OF_A_TASK
-    held.leave(node_v, parts[k], unsettled[k], total, active, places, index, part, owned, first, stop)
+    slot_numbers.leave(node_v, parts[k], unsettled[k], total, active, places, index, part, owned, first, stop)
 
 
 @njit(TASK, cache=True)
 def book(table, first, stop, thread):  # type: ignore[no-untyped-def]
     """``booking.book``."""
     loss, external, places, index, before, total, mobility, scale = _book(table)
-    booking.book(loss, external, places, index, before, total, mobility, scale, first, stop)
+    impulse_work.book(loss, external, places, index, before, total, mobility, scale, first, stop)
 
 
 @njit(TASK, cache=True)
 def take(table, first, stop, thread):  # type: ignore[no-untyped-def]
     """``held.take``."""
     x, v, slots, node_x, node_v, local = _take(table)
-    held.take(x, v, slots, node_x, node_v, local, first, stop)
+    slot_numbers.take(x, v, slots, node_x, node_v, local, first, stop)
 
 
 @njit("int64(int32[::1], int64, int64[::1], int64[::1])", cache=True)

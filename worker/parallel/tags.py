@@ -20,15 +20,15 @@ class Tag(IntEnum):
     GRADIENT = 3
     """Sums of nodal pressure gradients, in every step of the ``split`` form (elements/averaging.py)."""
     SURFACE = 10
-    """Flags of surface nodes, when the surface is built (contact/surface.py)."""
+    """Flags of surface nodes, when the surface is built (contact/surface/surface.py)."""
     GHOST = 11
-    """Positions and velocities of the nodes of ghost faces, in every step with contact (contact/ghosts.py)."""
+    """Positions and velocities of the nodes of ghost faces, in every step with contact (contact/scene/ghosts.py)."""
     CONTACT_FLAGS = 12
-    """Flags of shared nodes in contact, in every step with contact (contact/company.py)."""
+    """Flags of shared nodes in contact, in every step with contact (contact/solver/shared_sums.py)."""
     CONTACT = 13
-    """Sums of the row weights and of the impulses of a sweep at nodes in contact (contact/company.py)."""
+    """Sums of the row weights and of the impulses of a sweep at nodes in contact (contact/solver/shared_sums.py)."""
     NORMAL = 14
-    """Sums of the face normals at nodes, in every sixteenth step and after erosion (contact/normals.py)."""
+    """Sums of the face normals at nodes, in every sixteenth step and after erosion (contact/surface/normals.py)."""
     TETS_AT_NODE = 15
     """Number of tets at a node, at the start and in every removal (erosion.py)."""
     TRACTION = 17
@@ -37,7 +37,9 @@ class Tag(IntEnum):
     NODAL_STRESS = 18
     """Sums of stress and mass at nodes, for the ``nodal`` criterion (fracture/nodal.py)."""
     COURSE = 19
-    """Sums of the rigid motions of the tets at nodes, in every search of a body that fractures (contact/course.py)."""
+    """Sums of the rigid motions of the tets at nodes, in every search of a body that fractures
+    (contact/broad_phase/extrapolation.py).
+    """
     RELEASE = 20
     """Changes of the forces of unloaded cohesive facets, in every step once facets have broken
     (fracture/release.py)."""

@@ -1,17 +1,16 @@
 """Rigid bodies in the sweeps of contact: one node with six degrees of freedom each.
 
-A contact gives integer impulses to slots (contact/sweeps.py), which are completed as those of other nodes are. At the
-rank that owns the node, those of the slots of a rigid body are summed as integers, with their moments about its centre,
-and then over the ranks; the body moves, and its slots with it. So the rows of one body are coupled through its mass and
-inertia, and the sweeps are Jacobi's as they are for shared nodes: the norm
-of a row is bounded by the l1 norm over all rows of the body (``norms``), and no order of contacts or ranks changes a
-bit.
+A contact gives integer impulses to slots (contact/solver/sweeps.py), which are completed as those of other nodes are.
+At the rank that owns the node, those of the slots of a rigid body are summed as integers, with their moments about its
+centre, and then over the ranks; the body moves, and its slots with it. So the rows of one body are coupled through its
+mass and inertia, and the sweeps are Jacobi's as they are for shared nodes: the norm of a row is bounded by the l1 norm
+over all rows of the body (``norms``), and no order of contacts or ranks changes a bit.
 """
 
 import numpy as np
 
-from ..contact.active import IMPULSE, MOBILITY, NODES, V
-from ..contact.loading import SHARES
+from ..contact.solver.active import IMPULSE, MOBILITY, NODES, V
+from ..contact.solver.loading import SHARES
 from ..kernels.jit import njit, types
 
 WEIGHTS = 8

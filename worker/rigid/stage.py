@@ -15,8 +15,8 @@ from conoid.cases.model.schema import Case, Wall
 from conoid.cases.shapes.region import GENERATED
 
 from ..boundaries.wall_shapes import Walls
-from ..contact.active import IMPULSE, ActiveNodes
-from ..contact.records import Crowd
+from ..contact.solver.active import IMPULSE, ActiveNodes
+from ..contact.surface.records import SurfaceNodes
 from ..errors import InputError
 from ..model.state import Floats, Indices, Ints, Nodes
 from ..parallel.comm import Comm
@@ -29,7 +29,7 @@ _TURN = 0.1
 """rad that a body may turn in a step. Chosen: the phase of a tumbling body is then off by a thousandth of a turn each
 turn, and a node leaves its chord by a thousandth of the arm."""
 _SMALL = 16
-"""Bits of an impulse that do not count in what is unsettled (contact/held.py)."""
+"""Bits of an impulse that do not count in what is unsettled (contact/solver/slot_numbers.py)."""
 _KEPT = ("contact_loss", "external_work", "friction_loss", "_later", "_before")
 """What the accounts remember."""
 
@@ -219,15 +219,15 @@ class Rigid:
 
     # Contact ----------------------------------------------------------------------------------------------------------
 
-    def take_up(self, places: Indices, crowd: Crowd, scale: float) -> None:
-        """The slots of a step at ``places`` of the crowd; ``scale``: quanta per N s."""
-        body = self.of_part[crowd.part[places]]
+    def take_up(self, places: Indices, surface_nodes: SurfaceNodes, scale: float) -> None:
+        """The slots of a step at ``places`` of the surface_nodes; ``scale``: quanta per N s."""
+        body = self.of_part[surface_nodes.part[places]]
         self._slots: Indices = np.flatnonzero(body >= 0).astype(np.int32)
         self._of_slots: Indices = body[self._slots]
         at = places[self._slots]
-        self._slot_arms = np.ascontiguousarray(crowd.x[at] - self.bodies.centre[self._of_slots])
-        self._owned = crowd.owner[at] == self._comm.rank
-        self._slot_nodes = crowd.local[at]
+        self._slot_arms = np.ascontiguousarray(surface_nodes.x[at] - self.bodies.centre[self._of_slots])
+        self._owned = surface_nodes.owner[at] == self._comm.rank
+        self._slot_nodes = surface_nodes.local[at]
         self._slot_impulses = np.zeros((len(at), 3), np.int64)
         self._scale = scale
 
@@ -264,7 +264,7 @@ class Rigid:
 
     def unsettled(self) -> Ints:
         """(2,) l1 norms of what the last sweep has changed of the bodies' impulses and moments, and of these
-        (contact/need.py): of all ranks, on the first.
+        (contact/solver/sweep_count.py): of all ranks, on the first.
         """
         both = np.zeros(2, np.int64)
         if self._comm.rank == 0 and self.active:

@@ -17,7 +17,7 @@ from conoid.cases.warnings.compression import borne
 
 from ..accounts import digest
 from ..accounts.timers import Spent, by_phase
-from ..contact import common_volume, inside
+from ..contact.checks import common_volume, inside
 from ..errors import PhysicsError
 from ..gauges import reference, unstrained
 from ..model.state import Ints
@@ -130,7 +130,7 @@ def _penetration(sim: Simulation, labels: list[Ints]) -> tuple[dict[str, Any], l
     found = {
         "inside": nodes.nodes, "deepest": nodes.deepest, "overlapping": common.large, "overlap": common.share,
     }  # fmt: skip
-    return found, [*nodes.warnings, *common.warnings, *sim.contact.need.warnings]
+    return found, [*nodes.warnings, *common.warnings, *sim.contact.sweep_count.warnings]
 
 
 def _probes(loop: Loop, folder: Path) -> list[Measured]:

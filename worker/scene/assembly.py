@@ -18,7 +18,8 @@ from ..bonds import interface
 from ..bonds.pieces import Pieces
 from ..bonds.sunk import sunk
 from ..boundaries import surface_pressure
-from ..contact import overlap, pairing
+from ..contact import part_pairs
+from ..contact.checks import overlap
 from ..errors import InputError
 from ..mesh.build import build as build_mesh
 from ..mesh.faces import FACES, across, normals
@@ -162,7 +163,7 @@ def _apart(case: schema.Case, made: Stacked) -> Floats:
     x, tets, body, part, exposed = made.points, made.tets, made.body, made.part_of_body, made.across < 0
     tet, face = np.nonzero(exposed)
     faces = tets[tet[:, None], FACES[face]]
-    meets = ~np.isnan(pairing.friction(case))
+    meets = ~np.isnan(part_pairs.friction(case))
     for _, one, two in interface.tied_pairs(case):
         meets[one, two] = meets[two, one] = False
     allowed = made.any_of_body(meets[part[:, None], part])

@@ -8,7 +8,8 @@ from conoid.cases.figures import counted
 from conoid.cases.model.schema import Case
 from conoid.cases.model.solids import Measured
 
-from ..contact import overlap, pairing
+from ..contact import part_pairs
+from ..contact.checks import overlap
 from ..errors import InputError
 from ..fracture.connectivity import components
 from ..mesh.model import TetMesh
@@ -39,7 +40,7 @@ def pieces(case: Case, index: int, mesh: TetMesh, overlaps: bool) -> tuple[Indic
         return whole, []
     if many > _MANY:
         return whole, [f"{said}: whether they overlap each other at the start is found out for {_MANY} at most"]
-    if case.contact is not None and not np.isnan(pairing.friction(case)[index, index]):
+    if case.contact is not None and not np.isnan(part_pairs.friction(case)[index, index]):
         return piece, []
     told = [
         f"{said}, and they do not meet each other: merge the nodes where they coincide, or let the part meet itself "

@@ -1,0 +1,122 @@
+"""The contact domain: which faces and edges of this rank another rank must see.
+
+``box`` compares bounding boxes (Paik et al.): a thing goes to every rank whose box of nodes and edges it touches.
+``arbitrary`` asks once more (the paper's eqs 5 to 16, in three dimensions): the other rank names the cells that its
+nodes and edges lie in, and gets what touches one of them. Since only nodes of the surface are entered, every
+occupied cell is an outside cell already, and the paper's test of a cell's neighbours has nothing left to do.
+"""
+
+import numpy as np
+
+from ...kernels.jit import njit
+from ...model.state import Flags, Floats
+from ...parallel.comm import Comm
+from .buckets import bucket_at
+from .search import Boxes
+
+_NONE = np.zeros(0, np.int64)
+
+
+def choose(kind: str, askers: Boxes, things: list[Boxes], edge: float, comm: Comm) -> dict[int, list[Flags]]:
+    """For every other rank that needs some: which of each list of this rank's ``things`` go there.
+
+    ``askers`` are the boxes of this rank's nodes and edges; ``edge`` that of a cell, m, equal on all ranks.
+    """
+    mine = np.concatenate([askers.hull, np.minimum.reduce([t.hull for t in things])])
+    hulls = comm.join(mine.view(np.int64)).view(np.float64).reshape(comm.size, 2, 6)
+    asks, offers = hulls[:, 0], hulls[:, 1]
+    near = {rank: [t.touching(asks[rank]) for t in things] for rank in _touching(offers[comm.rank], asks, comm)}
+    if kind == "arbitrary":
+        asked = {rank: askers.touching(offers[rank]) for rank in _touching(asks[comm.rank], offers, comm)}
+        near = _in_cells(near, askers, asked, things, edge, comm)
+    return {rank: flags for rank, flags in near.items() if any(f.any() for f in flags)}
+
+
+def _touching(hull: Floats, hulls: Floats, comm: Comm) -> list[int]:
+    """The other ranks whose ``hulls`` (ranks, 6) touch this one."""
+    touch = np.all((hulls[:, :3] <= -hull[3:]) & (-hulls[:, 3:] >= hull[:3]), axis=1)
+    touch[comm.rank] = False
+    found: list[int] = np.flatnonzero(touch).tolist()
+    return found
+
+
+def _in_cells(
+    near: dict[int, list[Flags]], askers: Boxes, asked: dict[int, Flags], things: list[Boxes], edge: float, comm: Comm
+) -> dict[int, list[Flags]]:
+    """Keeps what touches a cell that the other rank has named; ``asked``: which boxes ask which rank."""
+    cells = comm.swap({
+        rank: np.sort(_cells(askers.low, askers.high, some, edge)) for rank, some in asked.items() if some.any()
+    })  # fmt: skip
+    return {
+        rank: [_named(flag, thing.low, thing.high, cells.get(rank, _NONE), edge)
+               for flag, thing in zip(flags, things, strict=True)]
+        for rank, flags in near.items()
+    }  # fmt: skip
+
+
+@njit("int64(float64, float64)", cache=True)
+def _cell(x, edge):  # type: ignore[no-untyped-def]
+    """Index along an axis of the cell that a coordinate lies in."""
+    return np.int64(np.floor(x / edge))
+
+
+@njit("int64(int64, int64, int64)", cache=True)
+def _code(ix, iy, iz):  # type: ignore[no-untyped-def]
+    """A cell as one number. Two have the same only if they are 2^20 cells apart: then a thing is sent that is not
+    needed.
+    """
+    return (ix << 42) + (iy << 21) + iz
+
+
+@njit("int64[::1](float64[:, ::1], float64[:, ::1], boolean[::1], float64)", cache=True)
+def _cells(low, high, some, edge):  # type: ignore[no-untyped-def]
+    """The code of every cell that ``some`` of the boxes touch, each once."""
+    bits, n = 6, 0
+    codes, used, found = np.empty(1 << bits, np.int64), np.zeros(1 << bits, np.bool_), np.empty(1 << bits, np.int64)
+    for j in range(len(low)):
+        if not some[j]:
+            continue
+        for ix in range(_cell(low[j, 0], edge), _cell(high[j, 0], edge) + 1):
+            for iy in range(_cell(low[j, 1], edge), _cell(high[j, 1], edge) + 1):
+                for iz in range(_cell(low[j, 2], edge), _cell(high[j, 2], edge) + 1):
+                    code = _code(ix, iy, iz)
+                    at = _place(codes, used, code, bits)
+                    if used[at]:
+                        continue
+                    codes[at], used[at], found[n] = code, True, code
+                    n += 1
+                    if 2 * n > len(codes):
+                        bits += 1
+                        codes, used = np.empty(1 << bits, np.int64), np.zeros(1 << bits, np.bool_)
+                        found = np.concatenate((found, np.empty(len(found), np.int64)))
+                        for k in range(n):
+                            at = _place(codes, used, found[k], bits)
+                            codes[at], used[at] = found[k], True
+    return found[:n].copy()
+
+
+@njit("int64(int64[::1], boolean[::1], int64, int64)", cache=True)
+def _place(codes, used, code, bits):  # type: ignore[no-untyped-def]
+    """Where a code stands in a table of 2^bits places, or would: its hash, or the next place behind it that is free."""
+    at = bucket_at(code, bits)
+    while used[at] and codes[at] != code:
+        at = (at + 1) % len(codes)
+    return at
+
+
+@njit("boolean[::1](boolean[::1], float64[:, ::1], float64[:, ::1], int64[::1], float64)", cache=True)
+def _named(flags, low, high, cells, edge):  # type: ignore[no-untyped-def]
+    """Which of the flagged boxes touch one of ``cells``, codes in ascending order."""
+    kept = np.zeros(len(flags), np.bool_)
+    if len(cells) == 0:
+        return kept
+    for j in range(len(flags)):
+        if not flags[j]:
+            continue
+        for ix in range(_cell(low[j, 0], edge), _cell(high[j, 0], edge) + 1):
+            for iy in range(_cell(low[j, 1], edge), _cell(high[j, 1], edge) + 1):
+                first = _code(ix, iy, _cell(low[j, 2], edge))
+                at = np.searchsorted(cells, first)
+                if at < len(cells) and cells[at] <= _code(ix, iy, _cell(high[j, 2], edge)):
+                    kept[j] = True
+    return kept

@@ -1,0 +1,157 @@
+"""Candidate pairs of what has changed: found anew, each once, on this rank alone.
+
+The pairs of a changed node, face or edge are dropped, and found again among everything that is searched. What has
+changed is what has left its line (reference_motion.py) and what has come to the surface. A search from nothing is the
+same with everything changed. No bit of the answer depends on what is found beyond what meets.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...model.ids import places
+from ...model.state import Flags, Floats, Indices, Ints
+from ..narrow_phase.tables import DEEP, DEEP_SELF
+from ..scene.scene import Scene
+from . import search, swept_filter
+from .search import Primitives
+
+_PARTLY = 0.5
+"""Of the half skin by which one slot may leave its line: others that have left theirs as far get new ones with it."""
+
+
+@dataclass
+class _Flight:
+    """The lines of a scene from the beginning of the step on."""
+
+    x: Floats
+    """(slots, 3) m."""
+    course: Floats
+    """(slots, 3) less what all drift with, m/s."""
+    part: Indices
+    """(slots,)."""
+    horizon: float
+    """s."""
+
+    def find(self, small: Primitives, large: Primitives, allowed: Flags, rank: Ints | None) -> Indices:
+        """search.find of what is on these lines."""
+        return search.find(small, large, self.x, self.course, self.part, allowed, self.horizon, rank)
+
+
+def register_new(scene: Scene) -> None:
+    """Registers what is new, before a step begins."""
+    scene.reference.begin_anew(scene.settle_live(), scene.surface_nodes.x)
+    _register(scene)
+
+
+def renew(scene: Scene, x: Floats, v: Floats, strayed: bool) -> None:
+    """Registers what is new and, with ``strayed``, gives new lines to what has left its own.
+
+    ``x``, ``v`` (slots, 3): as the step begins, v before contact.
+    """
+    off = scene.settle_live()
+    if strayed:
+        off |= scene.slots.tracked & (scene.reference.searched.left > 0.5 * _PARTLY * scene.rules.skin)
+        scene.slots.new |= off
+        scene.faces.new |= off[scene.faces.corners[:, :3]].any(axis=1)
+        scene.edges.new |= off[scene.edges.corners[:, :2]].any(axis=1)
+    scene.reference.begin_anew(off, x)
+    scene.reference.measure(x, v, scene.faces.corners, scene.edges.corners)
+    knocked = off & (scene.reference.searched.left > 0.5 * scene.rules.skin)
+    if knocked.any():
+        scene.reference.aim(knocked, x, v)
+        scene.reference.measure(x, v, scene.faces.corners, scene.edges.corners)
+    _register(scene)
+
+
+def carry(now: Scene, old: Scene) -> None:
+    """What ``old`` knows of the surface stays good on the one of ``now``, which is not connected yet: lines, what is
+    searched and what has to be registered, and the pairs of what is still there. The pairs of a copy were with the rank
+    of its parent, and are with that of its own owner from now on.
+    """
+    slots, faces = _numbers(now.surface_nodes.id, old.surface_nodes.id), _numbers(now.faces.id, old.faces.id)
+    edges = _numbers(now.edges.names, old.edges.names)
+    now.reference.take_over(slots, old.reference)
+    now.slots.tracked[slots[slots >= 0]] = old.slots.tracked[slots >= 0]
+    now.reference.until = old.reference.until
+    for mine, theirs, rows in (
+        (now.slots, old.slots, slots),
+        (now.faces, old.faces, faces),
+        (now.edges, old.edges, edges),
+    ):
+        for name in ("live", "new", "fresh"):
+            getattr(mine, name)[rows[rows >= 0]] = getattr(theirs, name)[rows >= 0]
+    kept = edges[edges >= 0]
+    now.edges.fresh[kept] |= now.edges.meets[kept] & ~old.edges.meets[edges >= 0]
+    now.slots.live &= now.slots.owned
+    here = np.flatnonzero(slots >= 0)
+    slots[here[~now.slots.owned[slots[here]]]] = -1
+    now.node_face = old.node_face.carried(slots, faces)
+    now.edge_edge = old.edge_edge.carried(edges, edges)
+
+
+def _numbers(now: Ints, old: Ints) -> Indices:
+    """Where the names ``old`` stand among ``now``, -1 where they do not."""
+    order = np.argsort(now, kind="stable")
+    at = places(now[order], old)
+    return np.where(at >= 0, order[at], -1).astype(np.int32) if len(order) else at
+
+
+def _register(scene: Scene) -> None:
+    reference, pairs = scene.reference, scene.node_face
+    nodes, faces, edges = (some.new & some.live for some in (scene.slots, scene.faces, scene.edges))
+    flight = _Flight(
+        reference.positions(),
+        reference.searched.course - scene.reference.drift,
+        scene.surface_nodes.part,
+        scene.reference.until - reference.t,
+    )
+    some = pairs.pushed
+    old, kept = pairs.rows[some], pairs.kept[some]
+    pairs.drop(nodes, faces)
+    scene.edge_edge.drop(edges, edges)
+    pairs.add(_node_face(scene, nodes, faces, flight))
+    scene.edge_edge.add(_edge_edge(scene, edges, flight))
+    scene.chain()
+    pairs.recall(scene.slots.first, old, kept)
+    scene.slots.new[:], scene.faces.new[:], scene.edges.new[:] = False, False, False
+
+
+def _node_face(scene: Scene, nodes: Flags, faces: Flags, flight: _Flight) -> Indices:
+    """(p, 2) slot and face: changed nodes with all faces, changed faces with the other nodes."""
+    half, size = 0.5 * scene.rules.skin, scene.faces.size
+    every = np.arange(scene.surface_nodes.n, dtype=np.int32)[:, None], np.full(scene.surface_nodes.n, half)
+    changed, others = (Primitives(*every, _rows(some)) for some in (nodes, scene.slots.live & ~nodes))
+    corners, own = np.ascontiguousarray(scene.faces.corners[:, :3]), np.eye(len(scene.rules.allowed), dtype=bool)
+    found = [np.zeros((0, 2), np.int32)]
+    for deep, which in ((DEEP_SELF, own), (DEEP, ~own)):
+        if (allowed := scene.rules.allowed & which).any():
+            of = corners, half + deep * size
+            found.append(flight.find(changed, Primitives(*of, _rows(scene.faces.live)), allowed, None))
+            found.append(flight.find(Primitives(*of, _rows(faces)), others, allowed, None)[:, ::-1])
+    pairs = np.concatenate(found)
+    sifted = swept_filter.faces(
+        pairs, scene.faces.corners, size, flight.x, flight.course, flight.part, scene.rules.skin, flight.horizon
+    )  # fmt: skip
+    return np.asarray(pairs[sifted])
+
+
+def _edge_edge(scene: Scene, edges: Flags, flight: _Flight) -> Indices:
+    """(p, 2) edges of which one has changed, that of lower rank first; its rank has the pair."""
+    of = np.ascontiguousarray(scene.edges.corners[:, :2]), 0.5 * (scene.rules.skin + scene.edges.deep)
+    allowed, rank = scene.rules.allowed, scene.edges.rank
+    changed, others = (Primitives(*of, _rows(some)) for some in (edges, scene.edges.live & ~edges))
+    one, two = flight.find(changed, changed, allowed, rank), flight.find(changed, others, allowed, None)
+    turned = rank[two[:, 0]] > rank[two[:, 1]]
+    two[turned] = two[turned, ::-1]
+    pairs = np.concatenate([one, two])
+    if not scene.edges.own.all():
+        pairs = pairs[scene.edges.own[pairs[:, 0]]]
+    sifted = swept_filter.edges(
+        pairs, scene.edges.corners, scene.edges.deep, flight.x, flight.course, scene.rules.skin, flight.horizon
+    )  # fmt: skip
+    return np.asarray(pairs[sifted])
+
+
+def _rows(flags: Flags) -> Indices:
+    return np.flatnonzero(flags).astype(np.int32)

@@ -1,0 +1,120 @@
+"""Candidates sifted: of the pairs whose boxes touch, those that come near each other indeed.
+
+A box round a face or an edge is much larger than what it encloses. Two edges go when one direction separates them all
+the time. The height of a node over a face and its place in the face's plane are followed through the free flight, at
+its beginning, middle and end. Each is nearly a parabola in time: what it may do between two of these moments is an
+eighth of its second difference, twice of which is allowed for. A pair goes only when one and the same measure excludes
+it all the time, by the skin and the depth at which contacts are active; so one that nothing excludes at the beginning
+stays.
+"""
+
+import numpy as np
+
+from ...kernels.jit import njit
+from ...model.state import Flags, Floats, Indices
+from ..geometry import VECTOR, at, beyond, cross, dot, minus, nearest
+from ..narrow_phase.tables import DEEP, DEEP_SELF
+
+_V2, _N2 = "float64[:, ::1]", "int32[:, ::1]"
+
+
+def faces(
+    pairs: Indices, places: Indices, size: Floats, x: Floats, v: Floats, part: Indices, skin: float, horizon: float
+) -> Flags:  # fmt: skip
+    """(p,) which of ``pairs`` (p, 2), slot and face, may meet; ``places`` (f, 4); ``x``, ``v`` (slots, 3): lines."""
+    return np.asarray(_near_faces(pairs, places, size, x, v, part, skin, horizon))
+
+
+def edges(
+    pairs: Indices, places: Indices, deep: Floats, x: Floats, v: Floats, skin: float, horizon: float
+) -> Flags:  # fmt: skip
+    """(p,) which of ``pairs`` (p, 2), two edges, may meet; ``places`` (e, 6); ``deep`` (e,): how deep they hold, m;
+    ``x``, ``v`` (slots, 3): lines.
+    """
+    return np.asarray(_near_edges(pairs, places, deep, x, v, skin, horizon))
+
+
+@njit("float64(float64, float64, float64)", cache=True)
+def _least(f, g, h):  # type: ignore[no-untyped-def]
+    """Lower bound of what is f, g and h at beginning, middle and end."""
+    return min(f, g, h) - 0.25 * abs(f - 2.0 * g + h)
+
+
+@njit(f"{VECTOR}({_V2}, {_V2}, int64, float64)", cache=True)
+def _then(x, v, s, t):  # type: ignore[no-untyped-def]
+    """Where slot s is at time t."""
+    return beyond(at(x, s), t, at(v, s))
+
+
+@njit(f"Tuple((float64, {VECTOR}))({VECTOR}, {VECTOR}, {VECTOR}, {VECTOR})", cache=True, error_model="numpy")
+def _over(s, i, j, k):  # type: ignore[no-untyped-def]
+    """Height of the point s over the face i, j, k, and how far it is outside of each of the sides, m."""
+    e, f, r = minus(j, i), minus(k, i), minus(s, i)
+    g, q = minus(f, e), minus(r, e)
+    n = cross(e, f)
+    length = np.sqrt(dot(n, n))
+    one = -dot(cross(n, e), r) / (length * np.sqrt(dot(e, e)))
+    two = -dot(cross(f, n), r) / (length * np.sqrt(dot(f, f)))
+    three = -dot(cross(n, g), q) / (length * np.sqrt(dot(g, g)))
+    return dot(n, r) / length, (one, two, three)
+
+
+@njit(
+    f"boolean[::1]({_N2}, {_N2}, float64[::1], {_V2}, {_V2}, int32[::1], float64, float64)",
+    cache=True,
+    error_model="numpy",
+)
+def _near_faces(pairs, faces, size, x, v, part, skin, horizon):  # type: ignore[no-untyped-def]
+    kept, half = np.ones(len(pairs), np.bool_), 0.5 * horizon
+    for p in range(len(pairs)):
+        s, face = pairs[p, 0], pairs[p, 1]
+        i, j, k = faces[face, 0], faces[face, 1], faces[face, 2]
+        far = skin + (DEEP_SELF if part[s] == part[i] else DEEP) * size[face]
+        h0, o0 = _over(at(x, s), at(x, i), at(x, j), at(x, k))
+        if abs(h0) <= far and max(o0[0], o0[1], o0[2]) <= far:
+            continue
+        h1, o1 = _over(_then(x, v, s, half), _then(x, v, i, half), _then(x, v, j, half), _then(x, v, k, half))
+        h2, o2 = _over(
+            _then(x, v, s, horizon), _then(x, v, i, horizon), _then(x, v, j, horizon), _then(x, v, k, horizon)
+        )  # fmt: skip
+        apart = _least(h0, h1, h2) > far or _least(-h0, -h1, -h2) > far
+        for m in range(3):
+            apart |= _least(o0[m], o1[m], o2[m]) > far
+        kept[p] = not apart
+    return kept
+
+
+@njit(f"boolean({VECTOR}, {VECTOR}, {VECTOR}, {VECTOR}, {VECTOR}, float64)", cache=True)
+def _beyond(axis, a, b, c, d, far):  # type: ignore[no-untyped-def]
+    """Whether the segment cd lies further beyond ab than ``far``, along ``axis``."""
+    one, two = max(dot(axis, a), dot(axis, b)), min(dot(axis, c), dot(axis, d))
+    return two - one > far * np.sqrt(dot(axis, axis))
+
+
+@njit(f"boolean({_V2}, {_V2}, int64, int64, int64, int64, float64, float64, float64)", cache=True)
+def _separated(x, v, a, b, c, d, begin, end, far):  # type: ignore[no-untyped-def]
+    """Whether the segments ab and cd stay further apart than ``far`` from time ``begin`` to ``end``, along the
+    direction in which they are nearest in between: on straight lines their distance along a fixed direction is least at
+    either end.
+    """
+    half = 0.5 * (begin + end)
+    axis = nearest(_then(x, v, a, half), _then(x, v, b, half), _then(x, v, c, half), _then(x, v, d, half))
+    return _beyond(
+        axis, _then(x, v, a, begin), _then(x, v, b, begin), _then(x, v, c, begin), _then(x, v, d, begin), far
+    ) and _beyond(axis, _then(x, v, a, end), _then(x, v, b, end), _then(x, v, c, end), _then(x, v, d, end), far)
+
+
+@njit(f"boolean[::1]({_N2}, {_N2}, float64[::1], {_V2}, {_V2}, float64, float64)", cache=True, error_model="numpy")
+def _near_edges(pairs, edges, deep, x, v, skin, horizon):  # type: ignore[no-untyped-def]
+    kept, half = np.ones(len(pairs), np.bool_), 0.5 * horizon
+    for p in range(len(pairs)):
+        one, two = pairs[p, 0], pairs[p, 1]
+        a, b, c, d = edges[one, 0], edges[one, 1], edges[two, 0], edges[two, 1]
+        far = skin + min(deep[one], deep[two])
+        r = nearest(at(x, a), at(x, b), at(x, c), at(x, d))
+        if dot(r, r) > far * far:
+            kept[p] = not (
+                _separated(x, v, a, b, c, d, 0.0, horizon, far)
+                or (_separated(x, v, a, b, c, d, 0.0, half, far) and _separated(x, v, a, b, c, d, half, horizon, far))
+            )
+    return kept

@@ -1,0 +1,216 @@
+"""What contact has not held: nodes that are inside of another body or fragment, and nodes without tets inside of the
+part that they come from, whether that meets itself or not.
+
+A node that lies in a tet which nothing holds together with its own has come through that body's surface. How deep it
+is below the surface the tet alone tells: below the nearest of its own open faces; and in one that has no open face but
+a corner on the surface, below the nearest of its faces at least; nowhere deeper than it is away from a corner of the
+tet on the surface. In a tet without one it is deeper than the outermost layer; but where that has been squeezed flat it
+may lie on the surface all the same, as the nearest open faces of the body tell. One on an edge between two corners on
+the surface is taken to touch it: a tet that has an edge there may have no open face beside it; what is on an edge that
+runs through a plate of one tet is so taken, too. Nodes of the surface and nodes that have separated are looked at,
+against the tets of all ranks, so that no cut changes what is found.
+"""
+
+from dataclasses import dataclass
+from itertools import combinations
+from typing import NamedTuple
+
+import numpy as np
+
+from ...mesh.faces import FACES
+from ...model.state import INTACT, Block, Flags, Floats, Indices, Ints, Model
+from ...parallel.comm import Comm
+from ..broad_phase import search
+from ..broad_phase.search import Primitives
+from ..stage import Contact
+from .overlap import to_borders
+
+SLIGHT = 0.05
+"""Of the typical size of a face: depths below this are none. Chosen: what sweeps leave undone is less."""
+_WORDS = 5
+"""Of what is told of a node."""
+_ROUNDING = 1e-9
+"""Of the shares of a tet's corners: a node on a face between two tets is in both."""
+DEEP = 0.25
+"""The same: deeper than this is worth a warning. Chosen: half of the altitude of a regular tet, about."""
+
+
+@dataclass(frozen=True)
+class Inside:
+    """Equal on all ranks."""
+
+    looked: int
+    """Nodes that were looked at."""
+    nodes: int
+    """Those of them that are inside of another body or fragment, or without tets inside of their own part, deeper than
+    SLIGHT."""
+    own: int
+    """Those of these that are inside of their own part alone, and have no tets."""
+    buried: int
+    """Those of these in tets without a corner on the surface, further than SLIGHT from any open face of their body."""
+    deepest: float
+    """Of the others, in typical sizes of a face; 0 where no node is deeper than SLIGHT."""
+
+    @property
+    def warnings(self) -> list[str]:
+        """One line, if any is deeper than DEEP."""
+        if not self.buried and self.deepest <= DEEP:
+            return []
+        how = [f"{self.own} of them, without tets, into the part that they come from"] if self.own else []
+        how += [f"{self.buried} of them through the outermost tets"] if self.buried else []
+        if self.nodes > self.buried:
+            how.append(f"{'the others ' if self.buried else ''}up to {self.deepest:.2g} of a face deep")
+        return [
+            f"contact has let {self.nodes} of {self.looked} nodes into other bodies or fragments, {', '.join(how)}: "
+            "compare with a finer mesh there"
+        ]
+
+
+def look(contact: Contact, model: Model, labels: list[Ints] | None, comm: Comm) -> Inside:
+    """Who is inside of what, at the positions as they are; all ranks take part.
+
+    ``labels``: for each block (n,) the fragment of each tet; without, every part is one.
+    """
+    fragments = labels or [np.full(block.n, block.part, np.int64) for block in model.blocks]
+    outer, may = outermost(contact), _may(contact)
+    seen = _seen(outer, model, fragments, comm)
+    x, parts = seen.x, seen.part
+    points, part = np.concatenate([model.nodes.x, x]), np.concatenate([model.nodes.part, parts])
+    found, size = [np.zeros((0, 4))], contact.exterior.size
+    for block, fragment in zip(model.blocks, fragments, strict=True):
+        one = Primitives(np.arange(model.nodes.n, len(points), dtype=np.int32)[:, None], np.zeros(len(x)))
+        other = Primitives(np.ascontiguousarray(block.tets, np.int32), np.zeros(block.n))
+        pairs = search.find(one, other, points, np.zeros_like(points), part, may, 0.0, None)
+        pairs = pairs[seen.fragment[pairs[:, 0]] != fragment[pairs[:, 1]]]
+        tets, opened = block.tets[pairs[:, 1]], _open(block, contact, outer)[pairs[:, 1]]
+        places, corners = x[pairs[:, 0]], model.nodes.x[tets]
+        depth = _depths(places, corners, opened, outer[tets])
+        some = (depth > SLIGHT * size) & (_from_edges(places, corners, outer[tets]) > SLIGHT * size)
+        which = np.column_stack([pairs[some, 0], depth[some] / size, fragment[pairs[some, 1]]])
+        found.append(np.column_stack([which, np.full(len(which), float(block.part))]))
+    everywhere = np.concatenate(comm.share(np.concatenate(found)))
+    buried = np.isinf(everywhere[:, 1])
+    row, of = everywhere[buried][:, [0, 2]].astype(np.int64).T
+    at_surface = comm.sum(_at_surface(x[row], parts[row], of, contact, model, fragments)) > 0
+    everywhere = np.concatenate([everywhere[~buried], everywhere[buried][~at_surface]])
+    buried = np.isinf(everywhere[:, 1])
+    rows = everywhere[:, 0].astype(np.int64)
+    others = rows[(seen.fragment[rows] >= 0) | (parts[rows] != everywhere[:, 3])]
+    every = len(np.unique(rows))
+    return Inside(
+        len(x), every, every - len(np.unique(others)), len(np.unique(rows[buried])),
+        float(everywhere[~buried, 1].max(initial=0.0)),
+    )  # fmt: skip
+
+
+def _may(contact: Contact) -> Flags:
+    """(parts, parts) which parts are asked about: those that meet, and of each of these its own nodes without tets."""
+    meet = ~np.isnan(contact.searches.mu)
+    return np.asarray(meet | (np.eye(len(meet), dtype=bool) & meet.any(axis=1)))
+
+
+class _Seen(NamedTuple):
+    """Nodes that are looked at; equal on all ranks."""
+
+    part: Indices
+    """(k,)."""
+    fragment: Ints
+    """(k,) -1 for one that has lost its tets."""
+    x: Floats
+    """(k, 3) m."""
+
+
+def _seen(outer: Flags, model: Model, fragments: list[Ints], comm: Comm) -> _Seen:
+    """The ``outer`` nodes (nodes,) of all ranks; all ranks take part."""
+    nodes = model.nodes
+    some = nodes.owned & outer
+    told = comm.join(np.column_stack([nodes.id, nodes.part, nodes.x.view(np.int64)])[some]).reshape(-1, _WORDS)
+    here = np.full(nodes.n + 1, -1, np.int64)  # the last one: of a node that is not here
+    for block, fragment in zip(model.blocks, fragments, strict=True):
+        here[block.tets] = fragment[:, None]
+    known = here[nodes.places(told[:, 0])].astype(np.float64)
+    x = np.ascontiguousarray(told[:, 2:]).view(np.float64)
+    return _Seen(told[:, 1].astype(np.int32), comm.maximum(known).astype(np.int64), x)
+
+
+def outermost(contact: Contact) -> Flags:
+    """(nodes,) of the surface, and those that have separated."""
+    ring = contact.exterior.cracks.families.ring
+    return np.asarray(contact.exterior.surface.flags | (ring != np.arange(len(ring))))
+
+
+def _at_surface(
+    x: Floats, parts: Indices, of: Ints, contact: Contact, model: Model, fragments: list[Ints]
+) -> Ints:  # fmt: skip
+    """(p,) how many open faces of this rank, of the fragments ``of`` (p,), lie within SLIGHT of ``x`` (p, 3)."""
+    if not len(x):
+        return np.zeros(0, np.int64)
+    points, part = np.concatenate([model.nodes.x, x]), np.concatenate([model.nodes.part, parts])
+    reach, allowed = SLIGHT * contact.exterior.size, _may(contact)
+    one = Primitives(np.arange(model.nodes.n, len(points), dtype=np.int32)[:, None], np.full(len(x), reach))
+    near = np.zeros(len(x), np.int64)
+    for block, fragment in zip(model.blocks, fragments, strict=True):
+        tet, side = np.nonzero(_exposed(block, contact))
+        faces = np.ascontiguousarray(block.tets[tet[:, None], FACES[side]], np.int32)
+        other = Primitives(faces, np.zeros(len(faces)))
+        pairs = search.find(one, other, points, np.zeros_like(points), part, allowed, 0.0, None)
+        pairs = pairs[of[pairs[:, 0]] == fragment[tet[pairs[:, 1]]]]
+        away = _from_faces(x[pairs[:, 0]], points[faces[pairs[:, 1]]])
+        near += np.bincount(pairs[away <= reach, 0], minlength=len(x))
+    return near
+
+
+def _exposed(block: Block, contact: Contact) -> Flags:
+    """(n, 4) faces of tets that are exposed or broken, those in symmetry planes left out."""
+    faces = contact.exterior.surface.faces
+    opened = np.isin(4 * block.id[:, None] + np.arange(4), faces.id[faces.exposed])
+    if len(block.bond):
+        opened |= block.bond != INTACT
+    return np.asarray(opened)
+
+
+def _open(block: Block, contact: Contact, outer: Flags) -> Flags:
+    """(n, 4) faces of tets that are ``_exposed``; all faces of a tet that has none but a corner on the surface."""
+    opened = _exposed(block, contact)
+    touching = np.asarray(outer[block.tets].any(axis=1))
+    return np.asarray(opened | (touching & ~opened.any(axis=1))[:, None])
+
+
+def _depths(points: Floats, corners: Floats, opened: Flags, outer: Flags) -> Floats:
+    """(p,) how deep points (p, 3) in tets (p, 4, 3) are below the nearest face that is ``opened`` (p, 4), or from the
+    nearest corner on the surface, ``outer`` (p, 4), m: infinite where none is, negative outside of the tet and in a tet
+    without volume.
+    """
+    edges = corners[:, 1:] - corners[:, :1]
+    solid = np.linalg.det(edges) > 0.0
+    edges = np.linalg.inv(np.where(solid[:, None, None], edges, np.eye(3)))
+    tail = np.einsum("pi,pij->pj", points - corners[:, 0], edges)
+    shares = np.column_stack([1.0 - tail.sum(axis=1), tail])
+    steepness = np.linalg.norm(np.concatenate([edges.sum(axis=2)[:, None], np.swapaxes(edges, 1, 2)], axis=1), axis=2)
+    heights = np.where(opened, shares / steepness, np.inf).min(axis=1)
+    away = np.where(outer, np.linalg.norm(points[:, None] - corners, axis=2), np.inf).min(axis=1)
+    return np.where(solid & (shares >= -_ROUNDING).all(axis=1), np.minimum(heights, away), -1.0)
+
+
+def _from_faces(points: Floats, corners: Floats) -> Floats:
+    """(p,) how far points (p, 3) are from triangles (p, 3, 3), m."""
+    sides, arms = np.roll(corners, -1, axis=1) - corners, points[:, None] - corners
+    normal = np.cross(sides[:, 0], sides[:, 1])
+    length = np.linalg.norm(normal, axis=1)
+    over = (length > 0.0) & ((np.cross(normal[:, None], sides) * arms).sum(axis=2) >= 0.0).all(axis=1)
+    height = np.abs((arms[:, 0] * normal).sum(axis=1)) / np.where(length > 0.0, length, 1.0)
+    return np.asarray(np.where(over, height, to_borders(points[:, None], corners)))
+
+
+def _from_edges(points: Floats, corners: Floats, outer: Flags) -> Floats:
+    """(p,) how far points (p, 3) are from the nearest edge of tets (p, 4, 3) between two corners on the surface,
+    ``outer`` (p, 4), m; infinite where there is none.
+    """
+    nearest = np.full(len(points), np.inf)
+    for a, b in combinations(range(4), 2):
+        along, arm = corners[:, b] - corners[:, a], points - corners[:, a]
+        square = (along * along).sum(axis=1)
+        share = np.clip((arm * along).sum(axis=1) / np.where(square > 0.0, square, 1.0), 0.0, 1.0)
+        away = np.linalg.norm(arm - share[:, None] * along, axis=1)
+        nearest = np.minimum(nearest, np.where(outer[:, a] & outer[:, b], away, np.inf))
+    return nearest

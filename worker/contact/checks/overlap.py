@@ -1,0 +1,243 @@
+"""Bodies that overlap before the first step: where and how deep; moving them apart, and when that has not helped."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...mesh.faces import normals as face_normals
+from ...model.state import Flags, Floats, Indices
+from ..broad_phase import search
+from ..broad_phase.search import Primitives
+from ..narrow_phase.facing import FACING
+
+_INSIDE = 1e-9
+"""Smallest share of a tet's corners, negative, at which a node still counts as inside."""
+_ROUNDING = 1e-6
+"""Of the size of a face: depths below this are none."""
+_TRIES = 30
+"""Times overlapping bodies are moved apart before that is given up. Chosen."""
+
+
+_THROUGH = 0.1
+"""Of the size of a face: an edge whose ends lie further in front of it and behind it goes through it, if it does so at
+that share of its height from its sides. Less is what rims, and facets of two round bodies that fit, have in common.
+Chosen."""
+_CRUSHED = 0.1
+"""Of its volume: a tet that is left with less has been pushed too far. Chosen."""
+
+
+@dataclass(frozen=True)
+class Surface:
+    """Exposed faces of all parts."""
+
+    faces: Indices
+    """(f, 3) nodes of the mesh."""
+    part: Indices
+    """(f,)."""
+    exposed: Flags
+    """(tets, 4) which faces of the tets these are."""
+
+
+@dataclass(frozen=True)
+class Overlaps:
+    """Nodes inside another part: their depth below its surface, m, and the unit way out."""
+
+    nodes: Indices
+    part: Indices
+    """(n,) the part that each is inside of."""
+    depth: Floats
+    way: Floats
+
+
+def find(points: Floats, tets: Indices, part: Indices, surface: Surface, allowed: Flags) -> Overlaps:
+    """Nodes (n, 3) of the surface that lie inside the tets (k, 4) of another part that theirs meets."""
+    others = allowed & ~np.eye(len(allowed), dtype=bool)
+    nodes = np.unique(surface.faces).astype(np.int32)
+    small = Primitives(nodes[:, None].copy(), np.zeros(len(nodes)))
+    large = Primitives(np.ascontiguousarray(tets, np.int32), np.zeros(len(tets)))
+    pairs = search.find(small, large, points, np.zeros_like(points), part, others, 0.0, None)
+    node, corners = nodes[pairs[:, 0]], tets[pairs[:, 1]]
+    shares = _shares(points[node], points[corners])
+    inside = np.asarray((shares >= -_INSIDE).all(axis=1))
+    outward = _normals(points, surface.faces)
+    at = (shares < _ROUNDING) & surface.exposed[pairs[:, 1]]
+    inward = _inward(points[corners])
+    resting = inside & (at & _faced(outward[node], inward)).any(axis=1)
+    asked, face = np.nonzero((inside & ~resting)[:, None] & at)
+    for pair, side, ways in zip(asked, face, _ways(points, tets, node[asked]), strict=True):
+        resting[pair] |= _clear(-inward[pair, side][None], ways)[0]
+    met, of = np.unique(np.column_stack([node[inside], part[corners[inside, 0]]]), axis=0, return_inverse=True)
+    met = met[np.bincount(of.reshape(-1), resting[inside], len(met)) == 0]
+    depth, way = np.zeros(len(met)), np.zeros((len(met), 3))
+    for k, ((a, other), ways) in enumerate(zip(met, _ways(points, tets, met[:, 0]), strict=True)):
+        depth[k], way[k] = _nearest(points[a], outward[a], ways, points[surface.faces[surface.part == other]])
+    kept = depth > 0.0
+    return Overlaps(met[kept, 0].astype(np.int32), met[kept, 1].astype(np.int32), depth[kept], way[kept])
+
+
+def move_apart(
+    points: Floats, tets: Indices, part: Indices, surface: Surface, allowed: Flags
+) -> tuple[Floats, Indices]:
+    """Points with overlapping nodes moved to the surface that they are below, half the way at a time, in turns; and the
+    part that each has been moved out of last, -1 for none.
+    """
+    moved, out_of = points.copy(), np.full(len(points), -1, np.int32)
+    for _ in range(_TRIES):
+        found = find(moved, tets, part, surface, allowed)
+        if not len(found.nodes):
+            break
+        moved[found.nodes] += 0.51 * found.depth[:, None] * found.way
+        out_of[found.nodes] = found.part
+    return moved, out_of
+
+
+def crushed(before: Floats, after: Floats, tets: Indices) -> Indices:
+    """Tets that being moved apart has left with a tenth of their volume, or turned inside out."""
+    had = _volumes(before[tets])
+    return np.flatnonzero((had > 0.0) & (_volumes(after[tets]) < _CRUSHED * had)).astype(np.int32)
+
+
+def nested(points: Floats, tets: Indices, part: Indices, surface: Surface, allowed: Flags) -> Indices:
+    """(n, 2) tets of the surface whose centre lies inside a tet of another part that theirs meets, and those tets.
+
+    Bodies whose surfaces coincide have no node inside each other: their nodes rest on each other's faces.
+    """
+    others = allowed & ~np.eye(len(allowed), dtype=bool)
+    outer = np.flatnonzero(surface.exposed.any(axis=1)).astype(np.int32)
+    centres = points[tets[outer]].mean(axis=1)
+    every, of = np.concatenate([points, centres]), np.concatenate([part, part[tets[outer, 0]]])
+    places = np.arange(len(points), len(every), dtype=np.int32)
+    small, large = (Primitives(of_them, np.zeros(len(of_them))) for of_them in (places[:, None], tets))
+    pairs = search.find(small, large, every, np.zeros_like(every), of, others, 0.0, None)
+    inside = (_shares(centres[pairs[:, 0]], points[tets[pairs[:, 1]]]) > _ROUNDING).all(axis=1)
+    return np.column_stack([outer[pairs[inside, 0]], pairs[inside, 1]])
+
+
+def within(points: Floats, tets: Indices, body: Indices) -> tuple[Indices, Indices]:
+    """Nodes, and tets by their centres, that lie inside a tet of another body, their surfaces left out; ``body`` (n,)
+    of the nodes.
+    """
+    every = np.concatenate([points, points[tets].mean(axis=1)])
+    of = np.concatenate([body, body[tets[:, 0]]])
+    places = np.arange(len(every), dtype=np.int32)
+    small, large = (
+        Primitives(rows, np.zeros(len(rows))) for rows in (places[:, None], np.ascontiguousarray(tets, np.int32))
+    )
+    others = ~np.eye(int(body.max(initial=0)) + 1, dtype=bool)
+    pairs = search.find(small, large, every, np.zeros_like(every), of, others, 0.0, None)
+    inside = (_shares(every[pairs[:, 0]], points[tets[pairs[:, 1]]]) > _ROUNDING).all(axis=1)
+    found = np.unique(pairs[inside, 0])
+    return found[found < len(points)], found[found >= len(points)] - len(points)
+
+
+def crossing(points: Floats, part: Indices, surface: Surface, allowed: Flags) -> Indices:
+    """(n, 2) nodes at one end of edges of the surface that go through a face of another part that theirs meets, and at
+    a corner of these faces: bodies that cross each other may have no node inside each other.
+    """
+    others, faces = allowed & ~np.eye(len(allowed), dtype=bool), np.ascontiguousarray(surface.faces, np.int32)
+    edges = np.unique(np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
+    small, large = Primitives(edges, np.zeros(len(edges))), Primitives(faces, np.zeros(len(faces)))
+    pairs = search.find(small, large, points, np.zeros_like(points), part, others, 0.0, None)
+    (p, q), (a, b, c) = (np.moveaxis(points[rows], 1, 0) for rows in (edges[pairs[:, 0]], faces[pairs[:, 1]]))
+    normal = np.cross(b - a, c - a)
+    above, below = ((each - a) * normal for each in (p, q))
+    above, below = above.sum(axis=1), below.sum(axis=1)
+    deep = _THROUGH * (normal * normal).sum(axis=1) ** 0.75
+    through = (above * below < 0.0) & (np.minimum(np.abs(above), np.abs(below)) > deep)
+    share = above / np.where(through, above - below, 1.0)
+    at = p + share[:, None] * (q - p)
+    sides = ((b - a, a), (c - b, b), (a - c, c))
+    most = _THROUGH * (normal * normal).sum(axis=1)
+    inner = [(np.cross(side, at - start) * normal).sum(axis=1) > most for side, start in sides]
+    found = through & np.logical_and.reduce(inner)
+    return np.column_stack([edges[pairs[found, 0], 0], faces[pairs[found, 1], 0]])
+
+
+def _volumes(corners: Floats) -> Floats:
+    """(n,) six times the volumes of tets (n, 4, 3)."""
+    return np.asarray(np.linalg.det(corners[:, 1:] - corners[:, :1]))
+
+
+def _shares(nodes: Floats, corners: Floats) -> Floats:
+    """(p, 4) volume coordinates of nodes (p, 3) in tets (p, 4, 3): none is negative inside, one is zero on a face."""
+    edges = corners[:, 1:] - corners[:, :1]
+    tail = np.einsum("pi,pij->pj", nodes - corners[:, 0], np.linalg.inv(edges))
+    return np.column_stack([1.0 - tail.sum(axis=1), tail])
+
+
+def _faced(outward: Floats, inward: Floats) -> Flags:
+    """(p, 4) the faces, by their normals into tets (p, 4, 3), that look against the way out (p, 3) of a node.
+
+    Where sides of two bodies lie in one plane, the rim of one that sinks into the other is on a face of it and does not
+    rest there.
+    """
+    return np.asarray((inward * outward[:, None]).sum(axis=2) >= -FACING)
+
+
+def _inward(corners: Floats) -> Floats:
+    """(p, 4, 3) unit normals, into tets (p, 4, 3), of the faces across from each corner."""
+    tail = np.swapaxes(np.linalg.inv(corners[:, 1:] - corners[:, :1]), 1, 2)
+    inward = np.concatenate([-tail.sum(axis=1, keepdims=True), tail], axis=1)
+    return np.asarray(inward / np.linalg.norm(inward, axis=2)[:, :, None])
+
+
+def _clear(normals: Floats, ways: Floats) -> Flags:
+    """(f,) of planes through a node with these unit ``normals`` (f, 3), whether none of its ``ways`` (w, 3) leads
+    behind them: then it rests there, whatever the mean of its normals. A corner on the rim of two slanted sides may
+    face neither.
+    """
+    return np.asarray((normals @ ways.T).min(axis=1) >= -_ROUNDING * np.linalg.norm(ways, axis=1).max())
+
+
+def _ways(points: Floats, tets: Indices, nodes: Indices) -> Iterator[Floats]:
+    """For each of the ``nodes`` (p,) the ways (w, 3), m, to the corners of its tets (k, 4)."""
+    rows, corner = np.nonzero(np.isin(tets, nodes))
+    owner = tets[rows, corner]
+    order = np.argsort(owner, kind="stable")
+    begin, end = np.searchsorted(owner[order], nodes), np.searchsorted(owner[order], nodes, side="right")
+    for node, first, last in zip(nodes, begin, end, strict=True):
+        yield (points[tets[rows[order[first:last]]]] - points[node]).reshape(-1, 3)
+
+
+def _normals(points: Floats, faces: Indices) -> Floats:
+    """(n, 3) unit outward normals of the nodes, zero off the faces (f, 3)."""
+    normals, areas = np.zeros_like(points), face_normals(points, faces)
+    for k in range(3):
+        np.add.at(normals, faces[:, k], areas)
+    lengths = np.linalg.norm(normals, axis=1)
+    return np.asarray(normals / np.where(lengths > 0.0, lengths, 1.0)[:, None])
+
+
+def _nearest(node: Floats, outward: Floats, ways: Floats, triangles: Floats) -> tuple[float, Floats]:
+    """Depth below the nearest of the triangles (f, 3, 3) that the node faces, m, and the unit normal there: by the mean
+    of its normals, or since none of its tets, whose corners are ``ways`` (w, 3) from it, reaches behind their plane.
+
+    The depth is zero for a node on the surface, and where no triangle that it faces has its foot. Where the surface is
+    dented the nearest one need not have it: a ridge of the dent may be nearest, and the foot lie on the far side.
+    """
+    e, f, r = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0], node - triangles[:, 0]
+    normals = np.cross(e, f)
+    area = np.linalg.norm(normals, axis=1)
+    normals /= area[:, None]
+    heights = (normals * r).sum(axis=1)
+    ee, ff, ef = (e * e).sum(axis=1), (f * f).sum(axis=1), (e * f).sum(axis=1)
+    er, fr = (e * r).sum(axis=1), (f * r).sum(axis=1)
+    s, t = (ff * er - ef * fr) / area**2, (ee * fr - ef * er) / area**2
+    faced = ((normals @ outward <= FACING) | _clear(normals, ways)) & (heights <= _ROUNDING * np.sqrt(area))
+    over = (np.minimum(np.minimum(s, t), 1.0 - s - t) >= -_INSIDE) & faced
+    if not over.any():
+        return 0.0, np.zeros(3)
+    away = np.where(over, -heights, to_borders(node, triangles))
+    best = np.flatnonzero(faced)[np.argmin(away[faced])]
+    depth = -float(heights[best])
+    return (depth if depth > _ROUNDING * np.sqrt(area[best]) else 0.0), normals[best]
+
+
+def to_borders(node: Floats, triangles: Floats) -> Floats:
+    """(f,) distance, m, of a node, or of one each (f, 1, 3), from the nearest border of the triangles (f, 3, 3)."""
+    along = np.roll(triangles, -1, axis=1) - triangles
+    square = (along * along).sum(axis=2)
+    share = (along * (node - triangles)).sum(axis=2) / np.where(square > 0.0, square, 1.0)
+    off = triangles + np.clip(share, 0.0, 1.0)[:, :, None] * along - node
+    return np.asarray(np.linalg.norm(off, axis=2).min(axis=1))

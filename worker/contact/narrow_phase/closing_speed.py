@@ -1,0 +1,68 @@
+"""How fast active contacts close: what bounds the next step, so that no node passes too much of a tet in it."""
+
+import numpy as np
+
+from ...kernels.jit import njit, types
+from .tables import CONTACT_ROWS, FACES, PAIRS, STEP, altitude
+
+_F = types.float64
+
+
+@njit("float64(float64[:, ::1])", cache=True)
+def spread(v):  # type: ignore[no-untyped-def]
+    """No two of the velocities ``v`` (n, 3) differ by more, m/s: the diagonal of their box."""
+    low, high = np.full(3, np.inf), np.full(3, -np.inf)
+    for a in range(len(v)):
+        for i in range(3):
+            low[i], high[i] = min(low[i], v[a, i]), max(high[i], v[a, i])
+    return np.sqrt(((high - low) ** 2).sum()) if len(v) > 0 else 0.0
+
+
+@njit(_F(STEP, types.int32[:, ::1], types.int64, types.int64), cache=True)
+def fastest_of(step, corners, s, f):  # type: ignore[no-untyped-def]
+    """Square of the largest speed of node s against a corner of face f, m^2/s^2."""
+    most = 0.0
+    for m in range(3):
+        speed = 0.0
+        for i in range(3):
+            speed += (step.v[s, i] - step.v[corners[f, m], i]) ** 2
+        most = max(most, speed)
+    return most
+
+
+@njit(_F(STEP, types.int32[:, ::1], types.int64, types.int64, _F), cache=True, error_model="numpy")
+def closing_rate(step, corners, s, f, fastest):  # type: ignore[no-untyped-def]
+    """Square of what contact may give to node s or to face f over the least altitude of a tet of theirs, 1/s^2, where
+    they come nearer by more than ``step.fast`` in a step; else 0. ``fastest``: of them (``fastest_of``).
+    """
+    if not fastest * step.beyond**2 > step.fast**2:
+        return 0.0
+    x, a, b, c, d = step.x, corners[f, 0], corners[f, 1], corners[f, 2], corners[f, 3]
+    one, two = min(altitude(x, a, b, c, d), altitude(x, b, c, d, a)), altitude(x, c, d, a, b)
+    return step.rebound**2 * fastest / min(one, two, altitude(x, d, a, b, c), step.least[s])
+
+
+@njit(
+    types.float64(CONTACT_ROWS, types.int32[::1], PAIRS, FACES, STEP, types.int64, types.int64),
+    cache=True,
+    error_model="numpy",
+)
+def approach(out, found, pairs, faces, step, first, stop):  # type: ignore[no-untyped-def]
+    """Square of the largest relative speed of a node over the altitude of its face's tet, 1/s^2, of the active contacts
+    ``found`` from ``first`` to ``stop``, rows of ``out``; or ``closing_rate``.
+    """
+    e, f, r = np.empty(3), np.empty(3), np.empty(3)
+    x, most = step.x, 0.0
+    for q in range(first, stop):
+        row = found[q]
+        s, face = pairs.rows[out.pair[row], 0], pairs.rows[out.pair[row], 1]
+        corners, fastest = faces.corners[face], fastest_of(step, faces.corners, s, face)
+        a, b, c, d = corners[0], corners[1], corners[2], corners[3]
+        for i in range(3):
+            e[i], f[i], r[i] = x[b, i] - x[a, i], x[c, i] - x[a, i], x[d, i] - x[a, i]
+        nx, ny, nz = e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2], e[0] * f[1] - e[1] * f[0]
+        square = (nx * r[0] + ny * r[1] + nz * r[2]) ** 2 / (nx * nx + ny * ny + nz * nz)
+        most = max(most, fastest / square)
+        if step.beyond > 0.0:
+            most = max(most, closing_rate(step, faces.corners, s, face, fastest))
+    return most

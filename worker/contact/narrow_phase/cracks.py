@@ -1,0 +1,290 @@
+"""Contact across cracks.
+
+The two sides of a facet that has broken lie on each other, and no search is needed to know that they meet: from the
+moment of separation the nodes across, which were one, push each other apart along the normal of their facet, from a gap
+of exactly zero. That holds as long as they are near. What else could reach the faces of a crack has to enter it, so
+they are no part of the surface until they are apart by a share of a facet's size. In the step in which they are, they
+open: they, their nodes and edges are surface like all other from the next step on. A search takes them up before, so
+that opening calls for none. However finely a body shatters, what has not moved costs no search.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ...kernels.jit import njit, prefetch, types
+from ...migration.parcel import Table, once
+from ...model.cache_lines import LINE
+from ...model.state import WIDE, Block, Flags, Floats, Indices, Ints, Nodes, extended
+from ...model.topology import Split
+from ..geometry import at, cross, dot, half, minus, plus
+from ..scene.split_pairs import touching
+from ..surface.families import Corners, Families, by_family
+from ..surface.records import CrackSides
+from .tables import CONTACT_ROWS, CRACK, DEEP_SELF, NEAR, STEP, needed
+
+_WIDE = 0.2
+"""Of the typical size of a face: two sides that have moved so far apart are surface from then on. At 0.1, 33 of 38
+searches in the first 500 steps of the glass bar are called by cracks that open within a search; at 0.2, 2 of 32.
+"""
+_FORESEEN = 0.5
+"""Of that width: the faces of a crack as wide as this are searched, so that they have their pairs when it opens."""
+AGE, _YOUNG = 16, 0.3
+"""Steps between two in which cracks may come of age, and the share of young ones from which on they do
+(docs/theory/contact.md, "Edges at cracks")."""
+_KEPT = 12
+"""Columns of what a crack has kept."""
+_AHEAD = 8
+"""How many cracks ahead the nodes are brought near."""
+
+
+@dataclass
+class Cracks:
+    """Facets that have broken and are not surface yet, with a side on this rank."""
+
+    faces: Ints
+    """(m, 2) global ids of the sides, that of the smaller tet first."""
+    nodes: Indices
+    """(m, 6) local nodes of the first side, counter-clockwise seen from outside of it, and those across."""
+    sides: Indices
+    """(m, 2, 3) block, place and face of either side, -1 for one of another rank."""
+    foreseen: Flags
+    """(m,) whether the scene of the last search has the sides."""
+    aged: Flags
+    """(m,) whether it was there when cracks came of age: edges between its sides and surface meet others since."""
+    places: Indices
+    """(m, 6) of the nodes, in the scene; all -1 for a crack without nodes that have separated, and for one that another
+    rank computes, that of the first side."""
+    kept: Floats
+    """(m, 12) of each of the three pairs of nodes across: impulse of the last step times its row norm, zero where it
+    was not active, along the normal and across (3), m/s; of one that another rank computes, nothing that counts."""
+    families: Families
+    """Of all nodes here."""
+    _corners: dict[int, Corners] = field(default_factory=dict)
+    """By block; none after a change."""
+
+    @classmethod
+    def none(cls, ids: Ints) -> "Cracks":
+        """No facet; ``ids``: of the local nodes."""
+        faces, sides = np.zeros((0, 2), np.int64), np.zeros((0, 2, 3), np.int32)
+        families, none, flags = Families.of(ids), np.zeros((0, 6), np.int32), np.zeros(0, bool)
+        return cls(faces, none, sides, flags, flags, none, np.zeros((0, _KEPT)), families)
+
+    def add(self, tets: Ints, nodes: Indices, sides: Indices, blocks: list[Block]) -> None:
+        """Takes up facets of ``tets`` (m, 2) with their three ``nodes`` (m, 3)."""
+        faces = 4 * tets + sides[:, :, 2]
+        for b, block in enumerate(blocks):
+            for k in (0, 1):
+                mine = (sides[:, k, 0] == b) & (sides[:, k, 1] >= 0)
+                faces[mine, 1 - k] = block.across[sides[mine, k, 1], sides[mine, k, 2]]
+        self.faces, self.sides = extended(self.faces, faces), extended(self.sides, sides)
+        self.nodes = extended(self.nodes, np.concatenate([nodes, nodes], axis=1))
+        self.foreseen = extended(self.foreseen, np.zeros(len(faces), bool))
+        self.aged = extended(self.aged, np.zeros(len(faces), bool))
+        self.places = extended(self.places, np.full((len(faces), 6), -1, np.int32))
+        self.kept = extended(self.kept, np.zeros((len(faces), _KEPT)))
+        self._corners = {}
+
+    def corners(self, block: int) -> Corners:
+        """Those of narrow sides of a block; see corner_contact.py."""
+        if block not in self._corners:
+            families = self.families
+            self._corners[block] = by_family(self.nodes, self.sides, block, families.ring, families.leader)
+        return self._corners[block]
+
+    def follow(self, split: Split, ids: Ints) -> None:
+        """Takes up the copies of a split; ``ids``: of the local nodes."""
+        parents = np.zeros(len(ids), bool)
+        parents[split.copies.parents] = True
+        rows = touching(self.nodes, parents)
+        self.nodes[rows] = split.followed_sides(self.nodes[rows], ids, self.faces[rows] // 4)
+        self.families.grow(split)
+        self._corners = {}
+
+    def keep(self, ids: Ints) -> Table:
+        """The facets as a table, a row a side; ``ids``: of the local nodes."""
+        rows, k = np.nonzero(self.sides[:, :, 1] >= 0)
+        faces = self.faces[rows]
+        return {"tet": faces[range(len(rows)), k] // 4, "key": 2 * faces[:, 0] + k, "faces": faces,
+                "with": ids[self.nodes[rows]], "aged": self.aged[rows], "kept": self.kept[rows]}  # fmt: skip
+
+    @classmethod
+    def resume(cls, table: Table, root: Ints, blocks: list[Block], nodes: Nodes) -> "Cracks":
+        """Facets from a table by ascending key. The row of the first side is taken where it is there: a rank that has
+        had the second one alone may have begun with another node, and the last bit of a normal depends on that; nor has
+        it computed the crack, and so kept anything of it.
+        """
+        table = once(table, table["faces"][:, 0])
+        faces = np.array(table["faces"])
+        sides = np.full((len(faces), 2, 3), -1, np.int32)
+        for b, block in enumerate(blocks):
+            order = np.argsort(block.id)
+            at = order[np.minimum(np.searchsorted(block.id[order], faces // 4), block.n - 1)]
+            rows, k = np.nonzero(block.id[at] == faces // 4)
+            sides[rows, k] = np.column_stack([np.full(len(rows), b), at[rows, k], faces[rows, k] % 4])
+        nowhere, kept = np.full((len(faces), 6), -1, np.int32), np.array(table["kept"])
+        families = Families.of(root)
+        foreseen, aged = np.zeros(len(faces), bool), np.array(table["aged"])
+        return cls(faces, nodes.places(table["with"]), sides, foreseen, aged, nowhere, kept, families)
+
+    def foresee(self) -> CrackSides:
+        """All sides here, which a scene takes up."""
+        self.foreseen[:] = True
+        sides, aged = self.sides.reshape(-1, 3), np.repeat(self.aged, 2)
+        here = sides[:, 1] >= 0
+        return CrackSides(sides[here & ~aged], sides[here & aged])
+
+    @property
+    def ages(self) -> Ints:
+        """(2,) how many are young, and how many there are, each counted by the rank that has its first side."""
+        mine = self.sides[:, 0, 1] >= 0
+        return np.array([int((mine & ~self.aged).sum()), int(mine.sum())])
+
+    def age(self, ages: Ints) -> bool:
+        """All come of age if enough are young, by the ``ages`` of all ranks; whether they do. That is not left to the
+        searches that other things call for: no answer depends on when they happen.
+        """
+        if due := bool(ages[0] > _YOUNG * ages[1]):
+            self.aged[:] = True
+        return due
+
+    def beside(self, rows: Ints, blocks: list[Block]) -> tuple[Flags, Flags]:
+        """(nodes,) which nodes the tets here at some of the cracks and the families at their corners have; and which
+        of these have separated.
+        """
+        families, near = self.families, np.zeros(len(self.families.ring), bool)
+        nodes = self.nodes[rows]
+        torn = nodes != nodes[:, [3, 4, 5, 0, 1, 2]]
+        sides = self.sides[rows[torn.any(axis=1)]].reshape(-1, 3)
+        for b, block in enumerate(blocks):
+            near[block.tets[sides[(sides[:, 0] == b) & (sides[:, 1] >= 0), 1]]] = True
+        near |= families.members(nodes[torn].astype(np.int64))
+        return near, near & (families.ring != np.arange(len(near)))
+
+    def arrange(self) -> None:
+        """By the places of their first nodes, as the scene has them: what is near in space is near in memory."""
+        order = np.argsort(self.places[:, 0], kind="stable")
+        for column in self._columns().values():
+            column[:] = column[order]
+        self._corners = {}
+
+    def open(self, faces: Ints, blocks: list[Block]) -> None:
+        """Makes surface of the cracks whose first sides are among ``faces``, ascending, and forgets them: the last ones
+        move into the holes.
+        """
+        rows = named(self.faces[:, 0], faces)
+        sides = self.sides[rows].reshape(-1, 3)
+        for b, block in enumerate(blocks):
+            mine = sides[(sides[:, 0] == b) & (sides[:, 1] >= 0)]
+            block.bond[mine[:, 1], mine[:, 2]] = WIDE
+        left = len(self.faces) - len(rows)
+        stays = np.ones(len(rows), bool)
+        stays[rows[rows >= left] - left] = False
+        holes, movers = rows[rows < left], left + np.flatnonzero(stays)
+        for name, column in self._columns().items():
+            column[holes] = column[movers]
+            setattr(self, name, column[:left])
+        self._corners = {}
+
+    def _columns(self) -> "dict[str, np.ndarray]":
+        """What has a row for each facet."""
+        return {name: column for name, column in vars(self).items() if name not in ("families", "_corners")}
+
+
+@njit("int64[::1](int32[:, ::1], float64[:, ::1], float64)", cache=True)
+def widening(cracks, x, typical):  # type: ignore[no-untyped-def]
+    """Rows of ``cracks`` (m, 6), slots, that are so wide at the positions ``x`` (slots, 3) that their faces have to be
+    searched; ``typical``: size of a face, m.
+    """
+    rows, n = np.empty(len(cracks), np.int64), 0
+    for c in range(len(cracks)):
+        if cracks[c, 0] < 0:
+            continue
+        most = 0.0
+        for k in range(3):
+            p, q, apart = cracks[c, k], cracks[c, 3 + k], 0.0
+            for i in range(3):
+                apart += (x[q, i] - x[p, i]) ** 2
+            most = max(most, apart)
+        if most >= (_FORESEEN * _WIDE * typical) ** 2:
+            rows[n] = c
+            n += 1
+    return rows[:n].copy()
+
+
+@njit("int64[::1](int64[:], int64[::1])", cache=True)
+def named(ids, wanted):  # type: ignore[no-untyped-def]
+    """Which of ``ids`` are among the ascending ``wanted``."""
+    rows, n = np.empty(len(ids), np.int64), 0
+    for i in range(len(ids)):
+        at = np.searchsorted(wanted, ids[i])
+        if at < len(wanted) and wanted[at] == ids[i]:
+            rows[n] = i
+            n += 1
+    return rows[:n].copy()
+
+
+@njit("int64[::1](int64[::1], int32[:, ::1], int32[:, :, ::1])", cache=True)
+def computed(rows, nodes, sides):  # type: ignore[no-untyped-def]
+    """Those of some ``rows`` of the cracks that have nodes that have separated, and the first side here: this rank
+    computes them.
+    """
+    some, n = np.empty(len(rows), np.int64), 0
+    for c in rows:
+        apart = nodes[c, 0] != nodes[c, 3] or nodes[c, 1] != nodes[c, 4] or nodes[c, 2] != nodes[c, 5]
+        if sides[c, 0, 1] >= 0 and apart:
+            some[n] = c
+            n += 1
+    return some[:n].copy()
+
+
+@njit(
+    types.UniTuple(types.int64, 2)(  # type: ignore[no-untyped-call]
+        CONTACT_ROWS, types.int64, types.int64[::1], types.int32[:, ::1], types.float64, STEP, types.int64, types.int64
+    ),
+    cache=True,
+    error_model="numpy",
+)
+def across(out, base, opening, cracks, typical, step, first, stop):  # type: ignore[no-untyped-def]
+    """Nodes across the ``cracks`` (m, 6; -1 for those that do not count) from ``first`` to ``stop`` that close on each
+    other: rows of ``out`` from ``base + 3 first`` on.
+
+    ``typical``: size of a face, m. Returns how many, and how many of the cracks have become so wide that they open;
+    ``opening`` (m,) says which, from ``first`` on.
+    """
+    x, v, part, mu, dt = step.x, step.v, step.part, step.mu, step.dt
+    n, wide = base + 3 * first, first
+    for c in range(first, stop):
+        for k in range(6):
+            near = max(cracks[min(c + _AHEAD, len(cracks) - 1), k], 0)
+            prefetch(x, LINE * near)
+            prefetch(v, 3 * near)
+        if cracks[c, 0] < 0:
+            continue
+        start = plus(at(x, cracks[c, 0]), at(x, cracks[c, 3]))
+        e = half(minus(plus(at(x, cracks[c, 1]), at(x, cracks[c, 4])), start))
+        f = half(minus(plus(at(x, cracks[c, 2]), at(x, cracks[c, 5])), start))
+        m = cross(e, f)
+        twice = np.sqrt(dot(m, m))
+        size, m = np.sqrt(twice), (m[0] / twice, m[1] / twice, m[2] / twice)
+        most = 0.0
+        for k in range(3):
+            p, q = cracks[c, k], cracks[c, 3 + k]
+            if p == q:
+                continue
+            width = minus(at(x, q), at(x, p))
+            most = max(most, dot(width, width))
+            gap0, speed = dot(m, width), dot(m, minus(at(v, q), at(v, p)))
+            gap1 = gap0 + dt * speed
+            if not (gap1 <= NEAR * size and gap0 >= -DEEP_SELF * size and mu[part[p], part[q]] >= 0.0):
+                continue
+            out.nodes[n, 0], out.nodes[n, 1], out.nodes[n, 2], out.nodes[n, 3] = q, p, p, p
+            out.weights[n, 0], out.weights[n, 1], out.weights[n, 2], out.weights[n, 3] = 1.0, -1.0, 0.0, 0.0
+            out.normals[n, 0], out.normals[n, 1], out.normals[n, 2] = m
+            out.wanted[n] = speed + needed(gap0, gap1, speed, step.give, dt)
+            out.friction[n], out.pair[n] = mu[part[p], part[q]], CRACK - (3 * c + k)
+            n += 1
+        if most >= (_WIDE * typical) ** 2:
+            opening[wide] = c
+            wide += 1
+    return n - base - 3 * first, wide - first

@@ -1,0 +1,213 @@
+"""The active contacts of a step: pairs that are due are registered, then the narrow phase tests what may meet."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...model.state import Block, Floats, Ints, Nodes
+from ...parallel.passes import Pass
+from ...parallel.team import Team
+from .. import tasks
+from ..broad_phase import registration
+from ..exterior import Exterior
+from ..scene.scene import Scene
+from ..surface.families import Corners
+from ..tasks import CONTACTS_OF_A_TASK, CRACKS_OF_A_TASK, FAMILIES_OF_A_TASK, PAIRS_OF_A_TASK, SLOTS_OF_A_TASK
+from .closing_speed import spread
+from .corner_contact import NarrowSides
+from .cracks import Cracks
+from .node_face import nearest
+from .tables import FAST, Step, StepRoom
+from .tied import Tied
+
+_KINEMATIC = 2.0
+"""One over the share of a tet's altitude that anything may pass in a step."""
+_FACES, _EDGES, _CRACKS = 0, 1, 2
+"""Kinds of contacts (rows.py): nodes and faces, edges, nodes across cracks; behind them those at corners."""
+_JOIN = 0.6
+"""Of the distance at which a slot has to be registered anew: a rank whose slots have strayed so far does it when
+another one has to, so that ranks do not wait for one after the other. No bit of the answer depends on it."""
+
+
+@dataclass
+class Detected:
+    """What a step has found; the active contacts themselves are rows of the scene."""
+
+    approach: float
+    """One over the step in which no node passes more than half of a tet that it meets, or will in the next step,
+    1/s."""
+    opening: Ints
+    """Rows of the cracks that have become so wide that they open."""
+    stray: bool
+    """Whether a slot will have strayed so far in the next step that it is registered anew; of any rank, once they have
+    agreed on the step."""
+
+    @classmethod
+    def nothing(cls) -> "Detected":
+        """Before the first step."""
+        return cls(0.0, np.zeros(0, np.int64), False)
+
+
+@dataclass(frozen=True)
+class Ahead:
+    """How far ahead contacts are found."""
+
+    dt: float
+    """The step ahead, s."""
+    most: float
+    """The longest step that may follow it, s."""
+    size: float
+    """The typical one of a face, m."""
+    rebound: float
+    """See tables.Step."""
+
+    def beyond(self, v: Floats) -> float:
+        """The step that follows if in it anything of ``v`` (slots, 3) may come nearer to anything by FAST of a face;
+        else 0. No such pair is bounded, so that a rank where nothing is so fast need not know of any.
+        """
+        fastest = spread(v)
+        return self.most if fastest * self.most > FAST * self.size else 0.0
+
+
+class Detection:
+    """Finds the active contacts of a rank, by the threads of its ``team``."""
+
+    def __init__(self, team: Team) -> None:
+        self.tied: Tied | None = None
+        """The bonds of the scene."""
+        self.found = Detected.nothing()
+        """What the last step has found here."""
+        pairs, some = PAIRS_OF_A_TASK, CONTACTS_OF_A_TASK
+        self._take = Pass(team, tasks.take, *tasks.TAKE, size=SLOTS_OF_A_TASK)
+        self._rebound = Pass(team, tasks.rebound, *tasks.REBOUND, size=some)
+        self._due_faces = Pass(team, tasks.due_faces, *tasks.DUE_FACES, size=pairs)
+        self._node_face = Pass(team, tasks.node_face_pairs, *tasks.NODE_FACE, size=pairs)
+        self._edge_edge = Pass(team, tasks.edge_edge_pairs, *tasks.EDGE_EDGE, size=pairs)
+        self._approach = Pass(team, tasks.approach, *tasks.APPROACH, size=some)
+        self._across = Pass(team, tasks.across_cracks, *tasks.ACROSS, size=CRACKS_OF_A_TASK)
+        self._entering = Pass(team, tasks.entering_nodes, *tasks.ENTERING, size=FAMILIES_OF_A_TASK)
+        self._scratch = StepRoom()
+        self._rows_of_corner = 1
+        """Rows that there is room for, for each corner of a narrow side in the mean of a task."""
+
+    def take(self, now: Scene, nodes: Nodes) -> None:
+        """Positions and velocities of the nodes of this rank, for the scene."""
+        own, surface_nodes = now.own, now.surface_nodes
+        self._take.run(len(own.slots), surface_nodes.x, surface_nodes.v, own.slots, nodes.x, nodes.v, own.local)
+
+    def retarget(self, now: Scene, share: float, give: float) -> None:
+        """Target velocities of the active contacts: see restitution.rebound for a ``share``, and ``hold_back`` where
+        there is nothing to ``give`` of penetrations (tables.PUSH_OUT).
+        """
+        if share > 0.0 or give == 0.0:
+            rows = now.active
+            self._rebound.run(rows.n, rows.room, rows.found, now.surface_nodes.v, now.slots.before, share, give == 0.0)
+
+    def detect(
+        self, now: Scene, surface: Exterior, mu: Floats, give: float, ahead: Ahead, redraw: bool, together: bool
+    ) -> Detected:  # fmt: skip
+        """The active contacts of the step ahead, of the positions and velocities of the scene's nodes.
+
+        ``surface``: of this rank; ``mu`` (parts, parts): friction, NaN where two parts do not meet; ``give``: see
+        tables.PUSH_OUT; ``redraw``: whether short lines are drawn anew (reference_motion.py); ``together``: whether
+        some rank registers what has strayed.
+        """
+        surface_nodes, reference = now.surface_nodes, now.reference
+        beyond = ahead.beyond(surface_nodes.v)
+        reference.advance(ahead.dt, beyond)
+        if redraw:
+            reference.shorten(surface_nodes.x)
+            now.node_face.wake()
+            now.edge_edge.wake()
+        reference.measure(surface_nodes.x, surface_nodes.v, now.faces.corners, now.edges.corners)
+        stray = _renewed(now, together)
+        step = Step.of(surface_nodes.x, surface_nodes.v, surface_nodes.part, mu, give, ahead.dt, self._scratch)
+        step = step.followed(beyond, FAST * ahead.size, ahead.rebound, now.face_table(), self._scratch)
+        if self.tied is not None:
+            step = step._replace(tied=self.tied.bits(surface_nodes))
+        now.active.begin(len(now.node_face), len(now.edge_edge), 3 * len(now.cracks))
+        for block, corners in surface.narrow():
+            self._corners(now, block, corners, surface.cracks, step)
+        opening = self._cracks(now, ahead.size, step)
+        limit = self._nodes_and_faces(now, step)
+        self._edges(now, step)
+        now.faces.fresh[:], now.edges.fresh[:], now.slots.fresh[:] = False, False, False
+        self.found = Detected(_KINEMATIC * limit, opening, stray)
+        return self.found
+
+    def _nodes_and_faces(self, now: Scene, step: Step) -> float:
+        """Adds contacts of nodes and faces; returns the largest speed over the altitude of a tet, 1/s."""
+        table, rows, slots, faces, end = (
+            now.node_face,
+            now.active,
+            now.slot_table(),
+            now.face_table(),
+            now.reference.end,
+        )
+        pairs, n = table.arrays(), len(table)
+        many, depth = self._due_faces.many(n), rows.depth
+        due, counts = self._scratch.of("due", many), self._scratch.of("on faces", many)
+        coming = self._scratch.of("coming", many, np.float64)
+        self._due_faces.run(n, pairs, slots, faces, end + step.beyond, due)
+        some = rows.room, depth, rows.begins(_FACES), pairs, slots, faces, step, end
+        self._node_face.run(n, *some, due, counts, coming)
+        begins = PAIRS_OF_A_TASK * np.arange(len(due))
+        table.take_tested(pairs.active, begins, due)
+        before = rows.n
+        rows.collect(_FACES, begins, counts)
+        found, holder = rows.found[before : rows.n], rows.holder(now.surface_nodes.n)
+        m = int(nearest(found, rows.room, depth, pairs, faces, step.part, holder))
+        rows.n = before + m
+        most = self._scratch.of("most", self._approach.many(m), np.float64)
+        self._approach.run(m, rows.room, found, pairs, faces, step, most)
+        return float(np.sqrt(max(coming.max(initial=0.0), most.max(initial=0.0))))
+
+    def _edges(self, now: Scene, step: Step) -> None:
+        """Adds contacts of edges."""
+        table, rows, reference = now.edge_edge, now.active, now.reference
+        pairs, n = table.arrays(), len(table)
+        many = self._edge_edge.many(n)
+        due, counts = self._scratch.of("tested", many), self._scratch.of("on edges", many)
+        some = rows.room, rows.begins(_EDGES), pairs, now.edge_table(), step, reference.short.course, reference.end
+        self._edge_edge.run(n, *some, due, counts)
+        begins = PAIRS_OF_A_TASK * np.arange(len(due))
+        table.take_tested(pairs.active, begins, due)
+        rows.collect(_EDGES, begins, counts)
+
+    def _cracks(self, now: Scene, size: float, step: Step) -> Ints:
+        """Adds contacts across cracks; returns which cracks open."""
+        rows, n = now.active, len(now.cracks)
+        many, scratch = self._across.many(n), self._scratch
+        counts, wide, opening = scratch.of("across", many), scratch.of("wide", many), scratch.of("opening", n)
+        self._across.run(n, rows.room, rows.begins(_CRACKS), opening, now.cracks, size, step, counts, wide)
+        begins = CRACKS_OF_A_TASK * np.arange(len(wide))
+        rows.collect(_CRACKS, 3 * begins, counts)
+        return np.concatenate([opening[:0], *(opening[k : k + m] for k, m in zip(begins, wide, strict=True) if m)])
+
+    def _corners(self, now: Scene, block: Block, corners: Corners, cracks: Cracks, step: Step) -> None:
+        """Adds contacts of nodes that come in at ``corners`` of a block."""
+        n = len(corners.start) - 1
+        begins = corners.start[:n:FAMILIES_OF_A_TASK].astype(np.int64)
+        counts, spaces = np.zeros(len(begins), np.int64), np.diff(np.append(begins, corners.start[-1]))
+        narrow = NarrowSides(
+            cracks.nodes, cracks.sides, block.tets, block.across, block.bond, cracks.families.ring, now.own.place
+        )  # fmt: skip
+        while True:
+            each, rows = self._rows_of_corner, now.active
+            kind = rows.more(each * len(corners.corners))
+            self._entering.run(n, rows.room, rows.begins(kind), each, narrow, corners, step, counts)
+            if (counts <= each * spaces).all():
+                break
+            self._rows_of_corner *= 2
+        now.active.collect(kind, each * begins, counts)
+
+
+def _renewed(now: Scene, together: bool) -> bool:
+    """Registers what has to be; whether in the next step something will have strayed too far, if it goes on so."""
+    reference, most, before = now.reference, 0.5 * now.rules.skin, now.reference.strayed
+    reference.strayed = reference.farthest(now.slots.tracked)
+    due = reference.strayed > (_JOIN if together else 1.0) * most
+    if due or now.pending:
+        registration.renew(now, now.surface_nodes.x, now.surface_nodes.v, due)
+        before = reference.strayed = reference.farthest(now.slots.tracked)
+    return 2.0 * reference.strayed - before > most

@@ -1,0 +1,231 @@
+"""Narrow phase of sharp edges: who passes whom in the step ahead, and who need not be tested for a while.
+
+Edges meet where they cross, but for their ends, which are nodes and meet faces: the end of an edge that lies on another
+one slides along a surface.
+"""
+
+import numpy as np
+
+from ...kernels.jit import njit, prefetch, types
+from ...model.cache_lines import LINE
+from ..geometry import VECTOR, at, beyond, cross, distance, dot, lowest_height, minus, plus, segments
+from .tables import CONTACT_ROWS, DEEP, DEEP_SELF, EDGES, NEAR, PAIRS, STEP, bonded, needed
+
+_PARALLEL = 1e-3
+"""Sine of the angle below which edges are left to nodes and faces. Ridges may pass each other through a gap that is as
+wide as this share of an edge; where edges cross is known to 1e-10 of them there."""
+_END = 1e-4
+"""Of the length of an edge: none meets nearer to its end, which is a node and meets faces. Chosen: a tenth of MARGIN,
+by which a node may be beside a face, so that what slides over a rim is held by the edge until the node is."""
+_FLUSH = 0.05
+"""Sine of the angle by which the normal of a contact may lie beyond that of a face: edges of faces that lie on each
+other cross there, a little to either side. Chosen by fragments that are pressed together (docs/theory/contact.md, "Face
+on face")."""
+_ROUND = 0.01
+"""Of the length of an edge: added to the distance at which a pair may meet."""
+_WORTH = 0.02
+"""The same: a pair with less to spare is tested in every step, which costs less than to measure it."""
+_STRETCH = 0.1
+"""Largest motion of nodes against each other, of the lengths of two edges, that ``beyond_ends`` allows for."""
+_SPARE = 0.006
+"""Of the length of an edge: as _WORTH, of pairs that cross beyond an end. Chosen: ends of glass that shatters leave
+their short lines by a fifth of that."""
+_SOON, _NEXT = 16, 8
+"""How many pairs ahead the edges and their ends are brought near."""
+_X2, _V2, _N2 = "float64[:, :]", "float64[:, ::1]", "int32[:, ::1]"
+_SECTOR = f"Tuple((float64, {VECTOR}, {VECTOR}))"
+_I = types.int64
+
+
+@njit(f"{_SECTOR}({VECTOR}, {_X2}, {_V2}, {_N2}, int64, float64)", cache=True, error_model="numpy")
+def _sector(u, x, v, edges, e, h):  # type: ignore[no-untyped-def]
+    """u times the normals of the two faces of edge e, along u, after a time ``h``; and before them the sense in which
+    the first normal turns to the second one, 0 where the edge is not convex.
+    """
+    a, c, d = edges[e, 0], edges[e, 2], edges[e, 3]
+    to, fro = minus(at(x, c), at(x, a)), minus(at(x, d), at(x, a))
+    to, fro = beyond(to, h, minus(at(v, c), at(v, a))), beyond(fro, h, minus(at(v, d), at(v, a)))
+    one, two = cross(u, to), cross(fro, u)
+    if not dot(one, fro) < 0.0:
+        return 0.0, one, two
+    return np.sign(dot(cross(one, two), u)), cross(u, one), cross(u, two)
+
+
+@njit(f"boolean({_SECTOR}, {VECTOR}, float64)", cache=True)
+def _points_out(sector, n, sign):  # type: ignore[no-untyped-def]
+    """Whether ``sign`` n, square to a convex edge, points out between the normals of its two faces (``_sector``), or
+    along one of them: edges of faces that lie on each other cross there.
+    """
+    sense, one, two = sector
+    along = sense * sign
+    least, most = -_FLUSH * np.sqrt(dot(one, one)), _FLUSH * np.sqrt(dot(two, two))
+    return sense != 0.0 and along * dot(one, n) >= least and along * dot(two, n) <= most
+
+
+@njit(
+    f"float64({VECTOR}, {_X2}, {_V2}, int64, int64, int64, int64, float64, float64, float64)",
+    cache=True,
+    error_model="numpy",
+)
+def _apart(m, x, v, a, b, c, d, s, t, h):  # type: ignore[no-untyped-def]
+    """How far point t of cd lies beyond point s of ab along m after a time ``h``, m."""
+    gap = 0.0
+    for k in range(3):
+        near = (1.0 - s) * (x[a, k] + h * v[a, k]) + s * (x[b, k] + h * v[b, k])
+        gap += m[k] * ((1.0 - t) * (x[c, k] + h * v[c, k]) + t * (x[d, k] + h * v[d, k]) - near)
+    return gap
+
+
+@njit(f"float64({VECTOR}, {VECTOR}, {VECTOR})", cache=True)
+def _volume(u, w, r):  # type: ignore[no-untyped-def]
+    """u x w . r: six times the volume, m^3, between two edges; it changes sign when their lines cross."""
+    return dot(cross(u, w), r)
+
+
+@njit(f"float64({_V2}, int64, int64, int64, int64)", cache=True)
+def _fastest(course, a, b, c, d):  # type: ignore[no-untyped-def]
+    """Largest relative speed of an end of ab and one of cd, m/s."""
+    p, q, r, s = at(course, a), at(course, b), at(course, c), at(course, d)
+    return max(distance(p, r), distance(p, s), distance(q, r), distance(q, s))
+
+
+@njit(f"float64({VECTOR}, {VECTOR}, {VECTOR}, float64, float64)", cache=True, error_model="numpy")
+def beyond_ends(u, w, r, s, t):  # type: ignore[no-untyped-def]
+    """How far the ends of edge u may move against those of edge w, m, while the edges cross beyond an end of one of
+    them: at ``s`` of u and ``t`` of w as they are, with ``r`` from the beginning of u to that of w. 0 if they do not.
+
+    Of the edge a beyond an end of which they cross, a share S of its length from there, with k from that end to one of
+    the other edge b and n = a x b: (k x b) . n = -S n . n, and they cross there while that is negative. If ends move by
+    h against each other, a and b change by 2 h and k by h, so n by no more than B h and k x b by no more than A h with
+    the bounds below, in which h is a small share (_STRETCH) of |a| and |b|.
+    """
+    past_s, past_t, uu, ww = max(-s, s - 1.0), max(-t, t - 1.0), dot(u, u), dot(w, w)
+    share, a, b, k = past_s, u, w, r if s < 0.0 else minus(r, u)
+    if not past_s > 0.0 or (past_t > 0.0 and past_t * past_t * ww > past_s * past_s * uu):
+        back = r if t < 0.0 else plus(r, w)
+        share, a, b, k = past_t, w, u, (-back[0], -back[1], -back[2])
+    if not share > 0.0:
+        return 0.0
+    n, across, other = cross(a, b), cross(k, b), plus(k, b)
+    long_a, long_b, near = np.sqrt(dot(a, a)), np.sqrt(dot(b, b)), np.sqrt(min(dot(k, k), dot(other, other)))
+    A = (1.0 + 2.0 * _STRETCH) * long_b + 2.0 * near
+    B = 2.0 * long_b + 2.0 * (1.0 + 2.0 * _STRETCH) * long_a
+    nn = dot(n, n)
+    p = np.sqrt(dot(across, across)) * B + np.sqrt(nn) * A
+    return min(2.0 * share * nn / (p + np.sqrt(p * p + 4.0 * A * B * share * nn)), _STRETCH * min(long_a, long_b))
+
+
+@njit(types.float64(types.float64[:, :], EDGES, types.int64), cache=True, error_model="numpy")
+def _deep(x, edges, e):  # type: ignore[no-untyped-def]
+    """How deep edge e holds, m: no deeper than DEEP of the lowest height of the tets of its faces."""
+    least = DEEP_SELF * edges.size[e]
+    if not edges.deep[e] > least:
+        return edges.deep[e]
+    a, b, c, d = edges.corners[e, 0], edges.corners[e, 1], edges.corners[e, 2], edges.corners[e, 3]
+    low = min(lowest_height(x, a, b, c, edges.corners[e, 4]), lowest_height(x, a, b, d, edges.corners[e, 5]))
+    return max(min(DEEP * low, edges.deep[e]), least)
+
+
+@njit(f"boolean({_N2}, int64, int64)", cache=True)
+def _opposite(edges, one, two):  # type: ignore[no-untyped-def]
+    """Whether an edge joins the nodes that the faces of the other one have besides it: both are of one tet, alone."""
+    a, b, c, d = edges[one, 2], edges[one, 3], edges[two, 0], edges[two, 1]
+    return (a == c and b == d) or (a == d and b == c)
+
+
+@njit(
+    types.UniTuple(_I, 2)(CONTACT_ROWS, _I, PAIRS, EDGES, STEP, types.float64[:, ::1], types.float64, _I, _I),  # type: ignore[no-untyped-call]
+    cache=True,
+    error_model="numpy",
+)
+def edge_edge(out, base, pairs, edges, step, course, end, first, stop):  # type: ignore[no-untyped-def]
+    """Edges that pass an edge, of the pairs from ``first`` to ``stop``: rows of ``out`` from ``base + first`` on;
+    returns how many, and how many pairs were tested, ``pairs.active`` from ``first`` on.
+
+    An edge whose ends are one node has gone. The opposite edges of a flat tet do not pass each other: it is as thick as
+    they are apart. Pairs of these, and of what is no surface, are left alone until that changes.
+
+    ``course`` (slots, 3): velocities of the reference motions, m/s; ``end``: of the step, s after the search.
+    """
+    rows, until, speed, active = pairs.rows[first:], pairs.until[first:], pairs.speed[first:], pairs.active[first:]
+    meets, fresh = edges.meets, edges.fresh
+    corners, size, left = edges.corners, edges.size, edges.left
+    nodes, weights, normals, wanted = out.nodes, out.weights, out.normals, out.wanted
+    x, v, ahead, dt = step.x, step.v, step.ahead, step.dt
+    due, n, tested = 0, base + first, 0
+    for p in range(stop - first):
+        one, two = rows[p, 0], rows[p, 1]
+        active[due] = p
+        due += fresh[one] | fresh[two] | (not until[p] > left[one] + left[two] + speed[p] * end)
+    for q in range(due):
+        p, soon, later = active[q], active[min(q + _NEXT, due - 1)], active[min(q + _SOON, due - 1)]
+        for k in range(2):
+            prefetch(corners, 6 * rows[later, k])
+            prefetch(x, LINE * corners[rows[soon, k], 0])
+            prefetch(x, LINE * corners[rows[soon, k], 1])
+        one, two = rows[p, 0], rows[p, 1]
+        if fresh[one] or fresh[two]:
+            until[p], speed[p] = -np.inf, np.nan
+        a, b, c, d = corners[one, 0], corners[one, 1], corners[two, 0], corners[two, 1]
+        if not (meets[one] and meets[two]) or a == b or c == d or _opposite(corners, one, two):
+            until[p], speed[p] = np.inf, 0.0
+            continue
+        active[tested] = first + p
+        tested += 1
+        if len(step.tied) > 0 and bonded(step, a, b, c, d):
+            continue
+        known = not np.isnan(until[p])
+        if known:  # left alone while it cannot meet
+            if np.isnan(speed[p]):
+                speed[p] = _fastest(course, a, b, c, d)
+            slack = segments(at(ahead, a), at(ahead, b), at(ahead, c), at(ahead, d))
+            slack -= _ROUND * max(size[one], size[two]) + min(edges.deep[one], edges.deep[two])
+            until[p] = slack - left[one] - left[two] + speed[p] * end if slack > _WORTH * size[one] else np.nan
+        u0, w0, r0 = minus(at(x, b), at(x, a)), minus(at(x, d), at(x, c)), minus(at(x, c), at(x, a))
+        u, w = minus(at(ahead, b), at(ahead, a)), minus(at(ahead, d), at(ahead, c))
+        r = minus(at(ahead, c), at(ahead, a))
+        before, after = _volume(u0, w0, r0), _volume(u, w, r)
+        share = 1.0
+        if before * after < 0.0:
+            share = before / (before - after)
+            u, w = beyond(u0, share, minus(u, u0)), beyond(w0, share, minus(w, w0))
+            r = beyond(r0, share, minus(r, r0))
+        uu, uw, ww, ur, wr = dot(u, u), dot(u, w), dot(w, w), dot(u, r), dot(w, r)
+        area = uu * ww - uw * uw
+        if not area > _PARALLEL * _PARALLEL * uu * ww:
+            continue
+        s, t = (ww * ur - uw * wr) / area, (uw * ur - uu * wr) / area
+        if not (min(s, t) >= _END and max(s, t) <= 1.0 - _END):
+            if known and share == 1.0 and np.isnan(until[p]):
+                slack = beyond_ends(u, w, r, s, t)
+                if slack > _SPARE * size[one]:
+                    until[p] = slack - left[one] - left[two] + speed[p] * end
+            continue
+        h, m, length = share * dt, cross(u, w), np.sqrt(area)
+        m = m[0] / length, m[1] / length, m[2] / length
+        gap0, gap1 = _apart(m, x, v, a, b, c, d, s, t, 0.0), _apart(m, x, v, a, b, c, d, s, t, dt)
+        near, deep = NEAR * min(size[one], size[two]), min(edges.deep[one], edges.deep[two])
+        if (gap1 > near or gap0 < -deep) and (-gap1 > near or -gap0 < -deep):
+            continue
+        sector, sign = _sector(u, x, v, corners, one, h), 1.0
+        if not _points_out(sector, m, 1.0):
+            sign = -1.0
+            if not _points_out(sector, m, -1.0):
+                continue
+        gap0, gap1 = sign * gap0, sign * gap1
+        if gap1 > near or gap0 < -deep:
+            continue
+        if not _points_out(_sector(w, x, v, corners, two, h), m, -sign):
+            continue
+        if gap0 < 0.0 and gap0 < -min(_deep(x, edges, one), _deep(x, edges, two)):
+            continue
+        nodes[n, 0], nodes[n, 1], nodes[n, 2], nodes[n, 3] = c, d, a, b
+        weights[n, 0], weights[n, 1], weights[n, 2], weights[n, 3] = 1.0 - t, t, s - 1.0, -s
+        rate = 0.0
+        for k in range(3):
+            normals[n, k] = sign * m[k]
+            rate += normals[n, k] * ((1.0 - t) * v[c, k] + t * v[d, k] - (1.0 - s) * v[a, k] - s * v[b, k])
+        wanted[n] = rate + needed(gap0, gap1, rate, step.give, dt)
+        out.friction[n], out.pair[n] = step.mu[step.part[a], step.part[c]], -1
+        n += 1
+    return n - base - first, tested

@@ -1,0 +1,168 @@
+"""On which side of a body a node is: what faces what, and who is beside an edge, in front of another face there."""
+
+import numpy as np
+
+from ...kernels.jit import njit, types
+from ..geometry import MARGIN, VECTOR, at, dot, foot, height, minus, off
+from .tables import DEEP, DEEP_SELF, FACES, NEAR, PAIRS, STEP
+
+TOUCHING = 1e-3
+"""Of the size of a face: deeper than this, a node is held by the nearest face of that part only."""
+FACING = 0.1
+"""A node faces a face when the cosines of the face's normal and those of its own faces have a mean less deviation below
+minus this, and a mean below it; or when its own faces rise from it, by the sine of the mean slope, by more than this.
+So does a corner of a flake that is the lowest of its tet, whatever the mean of its three normals."""
+_SOME = 0.25
+"""A node of another part that passes a face from outside meets it when the mean less deviation is below minus this:
+then some face of its faces it. Of cosines none of which is negative it is (1 - sqrt(2)) / 2 = -0.207 at least."""
+RIM = 0.01
+"""Of the size of a face: a node that faces both faces of a convex edge, and slides along one no deeper below it, is
+beside the edge. Chosen: twice what a sharp edge that slides along another was seen to sink in as its end comes there,
+1e-3 to 4e-3, for edges do not meet at their ends."""
+_SLIDES = 2e-3
+"""Of the size of a face: what slides along it comes no nearer in a step. What is faster cuts the corner: it passes
+beside the edge up to TOUCHING only, or a shot is seen a step late (H15). Chosen: twice the fastest seen to slide."""
+_BEHIND = 0.1
+"""Of the size of a face: the sum of the depths of its corners behind another face, from which on the edge between them
+is convex. Chosen: less for a face that is bent by 25 degrees than that has, more than rounding."""
+_OVER = 0.1
+"""What the mean direction from a node to its faces' middles, of unit vectors, has along a face at least when it reaches
+over it: less is that of a blunt edge, whatever it is. Chosen: a third of what the corner of a cube has."""
+_F, _VECTOR = types.float64, types.UniTuple(types.float64, 3)  # type: ignore[no-untyped-call]
+
+
+@njit(f"UniTuple(float64, 2)(float64[:, ::1], int64, {VECTOR})", cache=True)
+def facing(normals, s, m):  # type: ignore[no-untyped-def]
+    """By how much m has to turn until node s faces a face of this normal (FACING), and until it does or one of its own
+    faces does (_SOME); none, or less, when it does, and -1 for a node without faces, which faces any.
+    """
+    mean, square, length, rise = 0.0, 0.0, 0.0, 0.0
+    for a in range(3):
+        b, c = (a + 1) % 3, (a + 2) % 3
+        mean += normals[s, a] * m[a]
+        rise += normals[s, 9 + a] * m[a]
+        length += normals[s, a] * normals[s, a]
+        square += normals[s, 3 + a] * m[a] * m[a] + 2.0 * normals[s, 6 + a] * m[b] * m[c]
+    if length == 0.0:
+        return -1.0, -1.0
+    least = mean - np.sqrt(max(square - mean * mean, 0.0))
+    turn = max(min(mean - FACING, FACING - rise), 0.5 * (least + FACING))
+    return turn, min(turn, 0.5 * (least + _SOME))
+
+
+@njit(f"boolean(float64[:, ::1], int64, {VECTOR}, {VECTOR}, {VECTOR}, float64)", cache=True, error_model="numpy")
+def reaches_over(normals, s, b, e, f, size):  # type: ignore[no-untyped-def]
+    """Whether the faces of node s, whose foot on the face of sides ``e`` and ``f`` has the area coordinates ``b``,
+    reach from there over the face, by their mean direction, and not away from it.
+
+    Then its body comes onto the face and not beside it: of two bodies that meet with equal faces all nodes do so on
+    the border, and none is ever inside of the other body if their tets grow narrower behind it.
+    """
+    way = normals[s, 9], normals[s, 10], normals[s, 11]
+    ee, ff, ef, er, fr = dot(e, e), dot(f, f), dot(e, f), dot(e, way), dot(f, way)
+    area = (ee * ff - ef * ef) / size
+    two, three = (ff * er - ef * fr) / area, (ee * fr - ef * er) / area
+    rates, least, most = (-two - three, two, three), np.inf, 0.0
+    for k in range(3):
+        if b[k] <= RIM:
+            least, most = min(least, rates[k]), max(most, rates[k])
+    return least >= -MARGIN and most >= _OVER
+
+
+@njit(_VECTOR(FACES, types.float64[:, :], types.int64), cache=True, error_model="numpy", forceinline=True)
+def plane(faces, ahead, f):  # type: ignore[no-untyped-def]
+    """Unit normal of face ``f`` at the end of the step; ``ahead``: where slots are then."""
+    i, j, k = faces.corners[f, 0], faces.corners[f, 1], faces.corners[f, 2]
+    _, m = height(at(ahead, i), at(ahead, i), at(ahead, j), at(ahead, k))
+    return m
+
+
+@njit(types.boolean(PAIRS, FACES, types.int32[::1], types.int64, types.int64, _F, _F), cache=True, forceinline=True)
+def _asked(pairs, faces, part, q, body, strayed, end):  # type: ignore[no-untyped-def]
+    """Whether the face of pair ``q`` is exposed, of a part ``body``, and not left alone; see outside."""
+    f = pairs.rows[q, 1]
+    far = pairs.until[q] > strayed + faces.left[f] + pairs.speed[q] * end and not pairs.turned[q]
+    return (faces.fresh[f] or not far) and faces.exposed[f] and part[faces.corners[f, 0]] == body
+
+
+@njit(
+    types.boolean(PAIRS, types.int32[::1], FACES, types.float64[:, :], types.int32[::1], types.int64, _F, _F, _F),
+    cache=True,
+    error_model="numpy",
+    forceinline=True,
+)
+def outside(pairs, first, faces, x, part, p, depth, strayed, end):  # type: ignore[no-untyped-def]
+    """Whether the node of pair ``p``, ``depth`` below its face, is nearer to the front of another face of that part.
+
+    Then it is beside an acute edge and not in the body: the nearest face decides on which side a node is. Only faces
+    within the share of their size that every list of candidates has are asked, and of these none that its pair is left
+    alone for: it is further away. ``strayed``: how far the node leaves its line, infinite when pairs are not known;
+    ``end``: of the step, with the length of the step once more, for a pair may just have been measured at its end, by
+    another thread.
+    """
+    rows, corners, size = pairs.rows, faces.corners, faces.size
+    s, body = rows[p, 0], part[corners[rows[p, 1], 0]]
+    point, reach, following = at(x, s), DEEP_SELF if part[s] == body else DEEP, first[s]
+    while following >= 0:
+        q, following = following, pairs.next[following]
+        if not _asked(pairs, faces, part, q, body, strayed, end):
+            continue
+        f = rows[q, 1]
+        i, j, k = corners[f, 0], corners[f, 1], corners[f, 2]
+        o, a, b = at(x, i), at(x, j), at(x, k)
+        near, (away, _) = min(depth, reach * size[f]), height(point, o, a, b)
+        if not 0.0 < away < near:
+            continue
+        on, _ = foot(minus(point, o), minus(a, o), minus(b, o))
+        if not on:
+            away = min(off(point, o, a), off(point, a, b), off(point, b, o))
+        if away < near:
+            return True
+    return False
+
+
+@njit(
+    types.boolean(PAIRS, types.int32[::1], FACES, STEP, types.float64[:, ::1], types.int64, _F, _F, _F, _F),
+    cache=True,
+    error_model="numpy",
+    forceinline=True,
+)
+def in_front(pairs, first, faces, step, normals, p, gap0, gap1, strayed, end):  # type: ignore[no-untyped-def]
+    """Whether the node of pair ``p``, whose foot is on the border (RIM) of its face, is beside it, in front of another
+    face of that part which it faces.
+
+    That is nearer at the end of the step, and the node no deeper below it than TOUCHING; or the node slides along it,
+    rather than along its own, and is no deeper than RIM. The edge between them is convex: they have a corner in common,
+    and its own lies behind the other. ``gap0``, ``gap1``: height over its own at the beginning and end of the step;
+    ``strayed``, ``end``: see outside.
+    """
+    rows, corners, size, ahead, part = pairs.rows, faces.corners, faces.size, step.ahead, step.part
+    s, g = rows[p, 0], rows[p, 1]
+    a, b, c = corners[g, 0], corners[g, 1], corners[g, 2]
+    point, body, following = at(ahead, s), part[a], first[s]
+    while following >= 0:
+        q, following = following, pairs.next[following]
+        if q == p or not _asked(pairs, faces, part, q, body, strayed, end):
+            continue
+        f = rows[q, 1]
+        i, j, k = corners[f, 0], corners[f, 1], corners[f, 2]
+        if a not in (i, j, k) and b not in (i, j, k) and c not in (i, j, k):
+            continue
+        o, e, h = at(ahead, i), at(ahead, j), at(ahead, k)
+        m = plane(faces, ahead, f)
+        behind = dot(m, minus(at(ahead, a), o)) + dot(m, minus(at(ahead, b), o)) + dot(m, minus(at(ahead, c), o))
+        if not behind < -_BEHIND * size[g]:
+            continue
+        above, _ = height(point, o, e, h)
+        before, _ = height(at(step.x, s), at(step.x, i), at(step.x, j), at(step.x, k))
+        least, along = min(before, above), abs(above - before)
+        slides = along < abs(gap1 - gap0) and along <= _SLIDES * size[f] and least > -RIM * size[f]
+        if not ((slides or (above > gap1 and least > -TOUCHING * size[f])) and above <= NEAR * size[f]):
+            continue
+        every, some = facing(normals, s, m)
+        if not (every if part[s] == body else some) <= 0.0:
+            continue
+        on, _ = foot(minus(point, o), minus(e, o), minus(h, o))
+        if on:
+            return True
+    return False

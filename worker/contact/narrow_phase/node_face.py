@@ -1,0 +1,256 @@
+"""Narrow phase of nodes and faces: who passes whom in the step ahead, and who need not be tested for a while.
+
+The point of the face is the one where the node passes its plane, so that a node that slides from facet to facet is
+handed over.
+"""
+
+import numpy as np
+
+from ...kernels.jit import njit, prefetch, types
+from ...model.cache_lines import LINE
+from ..geometry import VECTOR, at, beyond, distance, dot, foot, height, minus, off
+from .closing_speed import closing_rate, fastest_of
+from .facing import RIM, TOUCHING, facing, in_front, outside, plane, reaches_over
+from .tables import CONTACT_ROWS, DEEP, DEEP_SELF, FACES, NEAR, PAIRS, SLOTS, STEP, bonded, needed
+
+_ROUND = 0.01
+"""Of the size of a face: added to the distance at which a pair may meet."""
+_WORTH = 0.02
+"""Of the size of a face: a pair with less to spare is tested in every step, which costs less than to measure it."""
+_BEND = 0.1
+"""Largest motion of two corners of a face against each other, of the face's two sides, that is allowed for."""
+
+_SOON, _NEXT = 8, 4
+"""How many pairs ahead a node and a face, and the corners of a face, are brought near."""
+_X2, _V2, _N2 = "float64[:, :]", "float64[:, ::1]", "int32[:, ::1]"
+_F, _I, _N1 = types.float64, types.int64, types.int32[::1]
+_VECTOR = types.UniTuple(types.float64, 3)  # type: ignore[no-untyped-call]
+
+
+@njit("void(int32[::1], int32[::1], int32[:, ::1], int64)", cache=True)
+def chain(first, following, pairs, begin):  # type: ignore[no-untyped-def]
+    """Hangs the pairs of node and face from row ``begin`` on into the chains of their nodes: ``first`` (slots,), and
+    ``following`` (p,) the pair after each, -1 for none.
+    """
+    for p in range(begin, len(pairs)):
+        following[p], first[pairs[p, 0]] = first[pairs[p, 0]], p
+
+
+@njit(f"float64({_X2}, int64, int64, int64, int64)", cache=True, error_model="numpy")
+def _distance(x, s, i, j, k):  # type: ignore[no-untyped-def]
+    """Of node s from the face i, j, k, m."""
+    p, o, a, b = at(x, s), at(x, i), at(x, j), at(x, k)
+    on, _ = foot(minus(p, o), minus(a, o), minus(b, o))
+    if on:
+        above, _ = height(p, o, a, b)
+        return abs(above)
+    return min(off(p, o, a), off(p, a, b), off(p, b, o))
+
+
+@njit(f"float64(float64, {_X2}, int64, int64, int64)", cache=True, error_model="numpy")
+def _bent(turn, x, i, j, k):  # type: ignore[no-untyped-def]
+    """Half of the D, m, that a face has to spare until its normal has changed by ``turn``.
+
+    The normal of a face of sides e, f and area A changes by less than D (|e| + |f| + D) / A while no two of its corners
+    have moved by D against each other.
+    """
+    e, f = minus(at(x, j), at(x, i)), minus(at(x, k), at(x, i))
+    ee, ff, ef = dot(e, e), dot(f, f), dot(e, f)
+    sides = np.sqrt(ee) + np.sqrt(ff)
+    return 0.5 * min(0.5 * turn * np.sqrt(ee * ff - ef * ef) / ((1.0 + _BEND) * sides), _BEND * sides)
+
+
+@njit(
+    f"Tuple((boolean, {VECTOR}))({_X2}, {_X2}, {_N2}, int64, int64, {VECTOR}, float64, float64, float64)",
+    cache=True,
+    error_model="numpy",
+)
+def _passes(x, ahead, corners, s, f, m, gap0, gap1, most):  # type: ignore[no-untyped-def]
+    """Whether node s, at height ``gap0`` over face f of normal ``m`` and ``gap1`` at the end of the step, passes it, no
+    deeper than ``most``; and where, in area coordinates.
+    """
+    i, j, k, d = corners[f, 0], corners[f, 1], corners[f, 2], corners[f, 3]
+    deep = not gap0 >= -most
+    if gap0 < 0.0:
+        altitude = -dot(m, minus(at(x, d), at(x, i)))
+        deep |= gap0 < -0.5 * altitude
+    if deep:
+        return False, m
+    tau = 0.0
+    if gap0 > 0.0:
+        tau = 1.0 if gap1 >= 0.0 else gap0 / (gap0 - gap1)
+    o, then = at(x, i), at(ahead, i)
+    r, e, f = minus(at(x, s), o), minus(at(x, j), o), minus(at(x, k), o)
+    return foot(
+        beyond(r, tau, minus(minus(at(ahead, s), then), r)),
+        beyond(e, tau, minus(minus(at(ahead, j), then), e)),
+        beyond(f, tau, minus(minus(at(ahead, k), then), f)),
+    )
+
+
+@njit(
+    _F(STEP, types.float64[:, ::1], FACES, types.int64, types.int64, _VECTOR, _F),
+    cache=True,
+    error_model="numpy",
+)
+def _coming(step, normals, faces, s, f, m, gap):  # type: ignore[no-untyped-def]
+    """``closing_rate`` of node s and face f if they will meet in a step of ``step.beyond`` after this one; else 0.
+    ``m``, ``gap``: normal of the face, and height over it, m, at the end of this one.
+    """
+    v, ahead, corners = step.v, step.ahead, faces.corners
+    i, j, k = corners[f, 0], corners[f, 1], corners[f, 2]
+    rate = dot(m, minus(at(v, s), at(v, i)))
+    if not gap + step.beyond * rate < 0.0:
+        return 0.0
+    every, some = facing(normals, s, m)
+    if not (every if step.part[s] == step.part[i] else some) <= 0.0:
+        return 0.0
+    tau = -gap / rate
+    p, o = beyond(at(ahead, s), tau, at(v, s)), beyond(at(ahead, i), tau, at(v, i))
+    a, b = beyond(at(ahead, j), tau, at(v, j)), beyond(at(ahead, k), tau, at(v, k))
+    above, _ = height(p, o, a, b)
+    on, _ = foot(minus(p, o), minus(a, o), minus(b, o))
+    if not (on and abs(above) <= DEEP_SELF * faces.size[f]):
+        return 0.0
+    return closing_rate(step, corners, s, f, fastest_of(step, corners, s, f))
+
+
+@njit(_I(PAIRS, SLOTS, FACES, _F, _I, _I), cache=True, error_model="numpy")
+def due(pairs, slots, faces, end, first, stop):  # type: ignore[no-untyped-def]
+    """Which of the pairs from ``first`` to ``stop`` are to be tested: ``pairs.active`` from ``first`` on; returns how
+    many. ``end``: of the step and what is looked ahead, s after the search.
+
+    Nothing is known of them from now on, but that some are too close to be left alone, so that a thread that asks for
+    one (facing.py) while another measures it takes it as one to be asked. Those that are no surface are left alone
+    until they are.
+    """
+    rows, until, speed, turned = pairs.rows[first:], pairs.until[first:], pairs.speed[first:], pairs.turned[first:]
+    active, exposed, on_surface = pairs.active[first:], faces.exposed, slots.on_surface
+    left, fresh, strayed, other = faces.left, faces.fresh, slots.left, slots.fresh
+    n, m = 0, 0
+    for p in range(stop - first):
+        s, f = rows[p, 0], rows[p, 1]
+        active[n] = p
+        n += other[s] | fresh[f] | (not until[p] > strayed[s] + left[f] + speed[p] * end)
+    for q in range(n):
+        p = active[q]
+        s, f = rows[p, 0], rows[p, 1]
+        if not exposed[f] or not on_surface[s]:
+            until[p], speed[p] = np.inf, 0.0
+            continue
+        if other[s] or fresh[f] or not np.isnan(until[p]):
+            until[p], speed[p], turned[p] = -np.inf, np.nan, True
+        active[m] = first + p
+        m += 1
+    return m
+
+
+@njit(
+    types.Tuple((_I, _F))(CONTACT_ROWS, types.float64[::1], _I, PAIRS, SLOTS, FACES, STEP, _F, _I, _I),  # type: ignore[no-untyped-call]
+    cache=True,
+    error_model="numpy",
+)
+def node_face(out, depth, base, pairs, slots, faces, step, end, first, stop):  # type: ignore[no-untyped-def]
+    """Nodes that pass a face, of the pairs in ``pairs.active`` from ``first`` to ``stop``: rows of ``out`` from
+    ``base + first`` on; returns how many, and the largest square of a speed over the altitude of a tet, 1/s^2, of those
+    that will meet in the next step (``_coming``).
+
+    A node meets a face that it faces: the rim of a bar not the side of another one of the same width, the surface under
+    a block that slides not its front, which stands across. ``depth`` (room,): of a node that is inside, by which the
+    nearest face of each part is taken (``nearest``), m; else 0. ``end``: of the step, s after the search.
+    """
+    rows, until, speed, turned, active = pairs.rows, pairs.until, pairs.speed, pairs.turned, pairs.active
+    corners, size, left = faces.corners, faces.size, faces.left
+    normals, strayed, other, course = slots.normals, slots.left, slots.fresh, slots.course
+    nodes, weights, out_normals, wanted, pair = out.nodes, out.weights, out.normals, out.wanted, out.pair
+    x, v, ahead, part = step.x, step.v, step.ahead, step.part
+    chains, n, most = slots.first, base + first, 0.0
+    for q in range(first, stop):
+        p, soon, later = active[q], active[min(q + _NEXT, stop - 1)], active[min(q + _SOON, stop - 1)]
+        prefetch(corners, 4 * rows[later, 1])
+        prefetch(normals, 12 * rows[later, 0])
+        prefetch(normals, 12 * rows[later, 0] + 11)
+        prefetch(x, LINE * rows[later, 0])
+        for k in range(3):
+            prefetch(x, LINE * corners[rows[soon, 1], k])
+        s, f = rows[p, 0], rows[p, 1]
+        i, j, k = corners[f, 0], corners[f, 1], corners[f, 2]
+        if len(step.tied) > 0 and bonded(step, s, i, j, k):
+            continue
+        m = plane(faces, ahead, f)
+        gap1 = dot(m, minus(at(ahead, s), at(ahead, i)))
+        reach = DEEP_SELF if part[s] == part[i] else DEEP
+        if not np.isnan(until[p]):  # left alone while it cannot meet
+            a, b, c = at(course, i), at(course, j), at(course, k)
+            rate = max(distance(at(course, s), a), distance(at(course, s), b), distance(at(course, s), c))
+            slack = _distance(ahead, s, i, j, k) - (_ROUND + max(reach, NEAR)) * size[f]
+            bends = not slack > _WORTH * size[f]
+            if bends:
+                every, some = facing(normals, s, m)
+                slack = _bent(every if part[s] == part[i] else some, ahead, i, j, k)
+                rate = max(distance(a, b), distance(a, c))
+            speed[p], turned[p] = rate, bends
+            until[p] = slack - strayed[s] - left[f] + rate * end if slack > _WORTH * size[f] else np.nan
+        if not gap1 <= NEAR * size[f]:
+            if step.beyond > 0.0:
+                most = max(most, _coming(step, normals, faces, s, f, m, gap1))
+            continue
+        every, some = facing(normals, s, m)
+        if not (every if part[s] == part[i] else some) <= 0.0:
+            continue
+        gap0, now = height(at(x, s), at(x, i), at(x, j), at(x, k))
+        if not (every <= 0.0 or gap0 >= -NEAR * size[f]):
+            continue
+        passes, b = _passes(x, ahead, corners, s, f, now, gap0, gap1, reach * size[f])
+        if not passes:
+            continue
+        leaves, until_end = np.inf if other[s] else strayed[s], end + step.dt
+        sides = minus(at(x, j), at(x, i)), minus(at(x, k), at(x, i))
+        beside = min(b[0], b[1], b[2]) <= RIM and not reaches_over(normals, s, b, sides[0], sides[1], size[f])
+        if beside and in_front(pairs, chains, faces, step, normals, p, gap0, gap1, leaves, until_end):
+            continue
+        depth[n] = 0.0
+        if gap0 < -TOUCHING * size[f]:
+            if outside(pairs, chains, faces, x, part, p, -gap0, leaves, until_end):
+                continue
+            depth[n] = -gap0
+        nodes[n, 0], nodes[n, 1], nodes[n, 2], nodes[n, 3] = s, i, j, k
+        weights[n, 0], weights[n, 1], weights[n, 2], weights[n, 3] = 1.0, -b[0], -b[1], -b[2]
+        rate = 0.0
+        for a in range(3):
+            out_normals[n, a] = m[a]
+            rate += m[a] * (v[s, a] - (b[0] * v[i, a] + b[1] * v[j, a] + b[2] * v[k, a]))
+        wanted[n] = rate + needed(gap0, gap1, rate, step.give, step.dt)
+        out.friction[n], pair[n] = step.mu[part[s], part[i]], p
+        n += 1
+    return n - base - first, most
+
+
+@njit(_I(_N1, CONTACT_ROWS, types.float64[::1], PAIRS, FACES, _N1, _N1), cache=True)
+def nearest(found, out, depth, pairs, faces, part, holder):  # type: ignore[no-untyped-def]
+    """Of the contacts ``found``, rows of ``out``, those that hold: a node that is inside of
+    several faces of a part is held by the nearest of them, of two as near by that of the lower id. Returns how many;
+    ``holder`` (slots,): -1, and so again.
+    """
+    earlier, m = np.empty(len(found), np.int32), 0
+    for q in range(len(found)):
+        row = found[q]
+        found[m] = row
+        if depth[row] == 0.0:
+            m += 1
+            continue
+        s = out.nodes[row, 0]
+        h = holder[s]
+        while h >= 0 and part[out.nodes[found[h], 1]] != part[out.nodes[row, 1]]:
+            h = earlier[h]
+        if h < 0:
+            earlier[m], holder[s] = holder[s], m
+            m += 1
+            continue
+        same = depth[row] == depth[found[h]]
+        lower = faces.id[pairs.rows[out.pair[row], 1]] < faces.id[pairs.rows[out.pair[found[h]], 1]]
+        if depth[row] < depth[found[h]] or (same and lower):
+            found[h] = row
+    for q in range(m):
+        holder[out.nodes[found[q], 0]] = -1
+    return m

@@ -1,0 +1,69 @@
+"""The rows of the active contacts of a step: where the passes that find contacts put them, and which there are."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ...model.state import Floats, Indices, Ints
+from ..tasks import collected
+from .tables import ContactRows
+
+_SPARE = 2
+"""Times the rows that are needed, room is made for."""
+
+
+@dataclass
+class ActiveRows:
+    """Every kind of candidate has a range of the ``room``, and every task a part of that; rows stay where they are, and
+    the first ``n`` of ``found`` are the numbers of those that are active.
+    """
+
+    room: ContactRows = field(default_factory=lambda: ContactRows.room(0))
+    found: Indices = field(default_factory=lambda: np.zeros(0, np.int32))
+    depth: Floats = field(default_factory=lambda: np.zeros(0))
+    """(room,) of a node that is inside of a face, m; see node_face."""
+    n: int = 0
+    _ends: list[int] = field(default_factory=lambda: [0], init=False)
+    _holder: Indices = field(default_factory=lambda: np.zeros(0, np.int32), init=False)
+
+    def begin(self, *many: int) -> None:
+        """A step begins, with no contact, and room for so ``many`` rows of each kind."""
+        self._ends, self.n = [0, *np.cumsum(many).tolist()], 0
+        self._reserve(self._ends[-1])
+
+    def more(self, many: int) -> int:
+        """Room for ``many`` rows of one kind more; returns its number."""
+        self._ends.append(self._ends[-1] + many)
+        self._reserve(self._ends[-1])
+        return len(self._ends) - 2
+
+    def begins(self, kind: int) -> int:
+        """The first row of the range of a ``kind``."""
+        return self._ends[kind]
+
+    def collect(self, kind: int, begins: Ints, counts: Ints) -> None:
+        """Takes up the rows that tasks have found, ``counts`` from each of ``begins`` on in the range of their
+        ``kind``.
+        """
+        self.n = int(collected(self.found, self.n, self._ends[kind] + begins, counts))
+
+    @property
+    def nodes(self) -> Indices:
+        """(n, 4) slots of the active contacts."""
+        return np.asarray(self.room.nodes[self.found[: self.n]])
+
+    def holder(self, slots: int) -> Indices:
+        """(slots,) room for a number of each slot, -1 now; whoever uses it leaves it so."""
+        if len(self._holder) < slots:
+            self._holder = np.full(_SPARE * slots, -1, np.int32)
+        return self._holder[:slots]
+
+    def _reserve(self, most: int) -> None:
+        known = len(self.found)
+        if most > known:
+            old, self.room = self.room, ContactRows.room(_SPARE * most)
+            for name in old._fields:
+                getattr(self.room, name)[:known] = getattr(old, name)
+            more = _SPARE * most - known
+            self.found = np.concatenate([self.found, np.empty(more, np.int32)])
+            self.depth = np.concatenate([self.depth, np.empty(more)])

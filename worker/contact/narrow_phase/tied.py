@@ -1,0 +1,34 @@
+"""Which slots bonds tie (worker/bonds): contact sees no pair whose nodes are all tied by one bond."""
+
+from typing import Protocol
+
+import numpy as np
+
+from ...model.state import Ints
+from ..surface.records import SurfaceNodes
+
+NOTHING: Ints = np.zeros(0, np.int64)
+"""Of a scene without bonds."""
+
+
+class Ties(Protocol):
+    """What contact asks of the bonds."""
+
+    version: int
+
+    def bits(self, ids: Ints) -> Ints:
+        """(k,) the bonds that tie each node, as bits."""
+
+
+class Tied:
+    """The bonds of the slots of a scene, found anew where either has changed."""
+
+    def __init__(self, bonds: Ties) -> None:
+        self._bonds, self._ids, self._version, self._found = bonds, NOTHING, -1, NOTHING
+
+    def bits(self, surface_nodes: SurfaceNodes) -> Ints:
+        """(slots,) see Ties.bits."""
+        if self._ids is not surface_nodes.id or self._version != self._bonds.version:
+            self._ids, self._version = surface_nodes.id, self._bonds.version
+            self._found = self._bonds.bits(surface_nodes.id)
+        return self._found

@@ -1,0 +1,202 @@
+"""Nodes that several ranks push: who they are, copies of their state, and the lists for completing sums over them."""
+
+from itertools import pairwise
+
+import numpy as np
+
+from ...kernels.jit import njit
+from ...model.state import Flags, Floats, Indices, Ints, Nodes
+from ...parallel.comm import Comm
+from ...parallel.ownership import Neighbour, ranks
+from ...parallel.tags import Tag
+from ..surface.records import Edges, Faces, SurfaceNodes
+
+_CROWD_WORDS = 15
+"""Words of a node in a message (``pack``)."""
+_ROOM = 32
+"""Rows by which the message of a rank grows, so that few nodes that separate need no new one. Chosen: 2 kB."""
+
+
+def pack(faces: Faces, edges: Edges, surface_nodes: SurfaceNodes) -> Ints:
+    """One flat message of things and their nodes; floats travel as their bits."""
+    return np.concatenate([
+        np.array([faces.n, edges.n], np.int64),
+        faces.id, faces.nodes.reshape(-1), faces.size.view(np.int64), faces.exposed,
+        edges.nodes.reshape(-1), edges.sides.reshape(-1), edges.size.view(np.int64), edges.deep.view(np.int64),
+        edges.opened.reshape(-1), edges.sharp,
+        pack_nodes(surface_nodes).reshape(-1),
+    ])  # fmt: skip
+
+
+def unpack(words: Ints) -> tuple[Faces, Edges, SurfaceNodes]:
+    """What ``pack`` made one message of."""
+    f, e = int(words[0]), int(words[1])
+    ends = np.cumsum([2, f, 4 * f, f, f, 6 * e, 2 * e, e, e, 2 * e, e])
+    pieces = [words[a:b] for a, b in pairwise(ends)]
+    faces = Faces(pieces[0], pieces[1].reshape(f, 4), pieces[2].view(np.float64), pieces[3] > 0)
+    sides, size, deep = pieces[5].reshape(e, 2), pieces[6].view(np.float64), pieces[7].view(np.float64)
+    edges = Edges(pieces[4].reshape(e, 6), sides, size, deep, pieces[8].reshape(e, 2).astype(np.uint8), pieces[9] > 0)
+    return faces, edges, unpack_nodes(words[ends[-1] :])
+
+
+def pack_nodes(surface_nodes: SurfaceNodes) -> Ints:
+    """(n, 15) rows of nodes."""
+    floats = np.concatenate([surface_nodes.mobility, surface_nodes.x, surface_nodes.v, surface_nodes.course], axis=1)
+    return np.column_stack(
+        [surface_nodes.id, surface_nodes.owner, surface_nodes.part, np.ascontiguousarray(floats).view(np.int64)]
+    )
+
+
+def unpack_nodes(words: Ints) -> SurfaceNodes:
+    """The nodes of ``pack_nodes``, as copies."""
+    rows = words.reshape(-1, _CROWD_WORDS)
+    floats = np.ascontiguousarray(rows[:, 3:]).view(np.float64)
+    return SurfaceNodes(
+        rows[:, 0].copy(), np.full(len(rows), -1, np.int32), rows[:, 1].astype(np.int32), rows[:, 2].astype(np.int32),
+        floats[:, :3].copy(), floats[:, 3:6].copy(), floats[:, 6:9].copy(), floats[:, 9:].copy(),
+    )  # fmt: skip
+
+
+def fetch(ids: Ints, owners: Indices, held: SurfaceNodes, comm: Comm) -> SurfaceNodes:
+    """Copies of nodes (ids, owners) that this rank does not hold; all ranks take part. ``held``: every own node."""
+    asked = comm.swap({rank: ids[owners == rank] for rank in ranks(owners)})
+    answers = comm.swap({rank: pack_nodes(held.take(held.places(want))) for rank, want in asked.items()})
+    return unpack_nodes(np.concatenate([np.zeros(0, np.int64), *answers.values()]))
+
+
+def members(used: Ints, owners: Indices, holders: list[Neighbour], nodes: Nodes, comm: Comm) -> dict[int, Ints]:
+    """For every other rank: the ids, ascending, of the nodes that it and this rank both hold or push.
+
+    ``used`` (k,) ids of the nodes that this rank pushes and ``owners`` (k,) who owns each; ``holders``: shared nodes.
+    The owner of a node hears of everybody who pushes it and tells all of them, and all who hold it.
+    """
+    pushed, rows = np.zeros(nodes.n, bool), [used[:0]]
+    pushed[nodes.places(used[owners == comm.rank])] = True
+    asked = {rank: used[owners == rank] for rank in ranks(owners) if rank != comm.rank}
+    for rank, ids in comm.swap(asked).items():
+        pushed[nodes.places(ids)] = True
+        rows.append(_rows(ids, rank, comm))
+    for other in holders:
+        some = other.nodes[pushed[other.nodes] & nodes.owned[other.nodes]]
+        rows.append(_rows(nodes.id[some], other.rank, comm))
+    table = np.sort(np.concatenate(rows))
+    table = table[_begins(table)]
+    every = table // comm.size
+    table = np.sort(np.concatenate([table, _rows(every[_begins(every)], comm.rank, comm)]))
+    node, holder = table // comm.size, table % comm.size
+    group = np.cumsum(_begins(node)) - 1
+    told = comm.swap({member: _company(node, holder, group, member) for member in ranks(holder)})
+    pairs = np.concatenate([np.zeros((0, 2), np.int64), *(words.reshape(-1, 2) for words in told.values())])
+    pairs = pairs[np.lexsort((pairs[:, 0], pairs[:, 1]))]
+    return {other: pairs[pairs[:, 1] == other, 0] for other in ranks(pairs[:, 1]) if other != comm.rank}
+
+
+def _begins(values: Ints) -> Flags:
+    """(n,) which of the ascending values is the first of its kind."""
+    return np.concatenate([np.ones(min(len(values), 1), bool), values[1:] != values[:-1]])
+
+
+def _rows(ids: Ints, rank: int, comm: Comm) -> Ints:
+    """Node and rank as one number."""
+    return ids * comm.size + rank
+
+
+def _company(node: Ints, holder: Ints, group: Ints, member: int) -> Ints:
+    """Rows (node, holder) of the nodes that ``member`` is a member of, its own rows left out; ``group`` (n,): rows of
+    one node.
+    """
+    held = np.zeros(group[-1] + 1, bool)
+    held[group[holder == member]] = True
+    some = held[group] & (holder != member)
+    return np.column_stack([node[some], holder[some]])
+
+
+class Copies:
+    """Positions and velocities of nodes, before and after the kick, sent in every step by a rank that holds them."""
+
+    def __init__(self, sends: list[Neighbour], receives: list[Neighbour], comm: Comm, tag: Tag) -> None:
+        """``sends``: local nodes, ``receives``: places in the surface_nodes."""
+        self._comm, self._tag = comm, tag
+        self._rows: tuple[list[int], list[int]] | None = None
+        self.take(sends, receives)
+
+    def take(self, sends: list[Neighbour], receives: list[Neighbour]) -> None:
+        """Other nodes. Messages that have room for them stay."""
+        self.sends, self.receives = sends, receives
+        rows = _rooms(sends), _rooms(receives)
+        self._from, self._to = _padded(sends, rows[0]), _padded(receives, rows[1])
+        if rows == self._rows:
+            return
+        if self._rows is not None:
+            self.free()
+        self._rows = rows
+        self._out, self._in = np.zeros((len(self._from), 9)), np.empty((len(self._to), 9))
+        into = _slices(self._in, receives, rows[1])
+        self._exchange = self._comm.exchange(_slices(self._out, sends, rows[0]), into, self._tag)
+
+    def note(self, nodes: Nodes) -> None:
+        """Keeps v(n-1/2) for the others."""
+        _pack(self._out, 6, nodes.v, self._from)
+
+    def begin(self, nodes: Nodes) -> None:
+        """Sends positions and velocities."""
+        _pack(self._out, 0, nodes.x, self._from)
+        _pack(self._out, 3, nodes.v, self._from)
+        self._exchange.begin()
+
+    def finish(self, x: Floats, v: Floats, before: Floats) -> None:
+        """Fills the copies' rows of ``x``, of ``v`` and of v(n-1/2), (surface_nodes, 3) each."""
+        self._exchange.finish()
+        _unpack(x, v, before, self._to, self._in)
+
+    def free(self) -> None:
+        """Gives the messages back to MPI."""
+        self._exchange.free()
+
+
+@njit("void(float64[:, ::1], int64, float64[:, ::1], int32[::1])", cache=True)
+def _pack(out, first, values, rows):  # type: ignore[no-untyped-def]
+    for r in range(len(rows)):
+        if rows[r] >= 0:
+            for i in range(3):
+                out[r, first + i] = values[rows[r], i]
+
+
+@njit("void(float64[:, ::1], float64[:, ::1], float64[:, ::1], int32[::1], float64[:, ::1])", cache=True)
+def _unpack(x, v, before, rows, got):  # type: ignore[no-untyped-def]
+    for r in range(len(rows)):
+        if rows[r] >= 0:
+            for i in range(3):
+                x[rows[r], i], v[rows[r], i], before[rows[r], i] = got[r, i], got[r, 3 + i], got[r, 6 + i]
+
+
+def _rooms(others: list[Neighbour]) -> list[int]:
+    """Rows of each rank's message."""
+    return [_ROOM * (1 + len(other.nodes) // _ROOM) for other in others]
+
+
+def _padded(others: list[Neighbour], rooms: list[int]) -> Indices:
+    """The nodes of each rank in turn, -1 behind them up to its ``rooms``."""
+    rows, begin = np.full(sum(rooms), -1, np.int32), 0
+    for other, room in zip(others, rooms, strict=True):
+        rows[begin : begin + len(other.nodes)] = other.nodes
+        begin += room
+    return rows
+
+
+def _slices(buffer: Floats, others: list[Neighbour], rooms: list[int]) -> list[tuple[int, Ints]]:
+    """The words of each rank in turn."""
+    words, ends = buffer.view(np.int64), np.cumsum(rooms).tolist()
+    return [(other.rank, words[end - room : end]) for other, room, end in zip(others, rooms, ends, strict=True)]
+
+
+def copies(surface_nodes: SurfaceNodes, nodes: Nodes, comm: Comm, tag: Tag) -> Copies:
+    """The standing order for the state of the nodes of ``surface_nodes`` that are not held here, with their owners; all
+    ranks take part.
+    """
+    far = np.flatnonzero(surface_nodes.local < 0)
+    owners = surface_nodes.owner[far]
+    asked = comm.swap({rank: surface_nodes.id[far[owners == rank]] for rank in ranks(owners)})
+    receives = [Neighbour(rank, far[owners == rank].astype(np.int32)) for rank in ranks(owners)]
+    sends = [Neighbour(rank, np.searchsorted(nodes.id, ids).astype(np.int32)) for rank, ids in asked.items()]
+    return Copies(sends, receives, comm, tag)

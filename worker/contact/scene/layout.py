@@ -1,0 +1,43 @@
+"""The surface laid out as a scene: slots, faces and edges, without pairs."""
+
+import numpy as np
+
+from ...model.ids import places
+from ...model.state import Floats, Nodes
+from ...parallel.comm import Comm
+from ..broad_phase import buckets
+from ..broad_phase.reference_motion import ReferenceMotion
+from .columns import OwnSlots, SceneEdges, SceneFaces, SceneSlots
+from .near_surface import NearSurface, Rules, with_ghosts
+from .scene import Scene
+
+
+def build(sides: NearSurface, rules: Rules, horizon: float, drift: Floats, nodes: Nodes, comm: Comm) -> Scene:
+    """The scene of ``sides``, which flies on for ``horizon``, s, without pairs; all ranks take part and know of the
+    same ``drift`` (3,), m/s.
+
+    Who shares which node is settled by a SplitUpdate.
+    """
+    seen = with_ghosts(sides, rules, horizon, drift, comm) if comm.size > 1 else sides
+    order = np.argsort(buckets.curve(seen.surface_nodes.x, rules.cell))
+    surface_nodes, faces, edges = seen.surface_nodes.take(order), seen.faces, seen.edges
+    slot = np.empty(surface_nodes.n, np.int32)
+    slot[order] = np.arange(surface_nodes.n)
+    corners, ends = slot[seen.face_places], slot[seen.edge_places]
+    surface_nodes.local = nodes.places(surface_nodes.id)
+    owned, pushes = np.zeros(surface_nodes.n, bool), np.zeros(surface_nodes.n, bool)
+    owned[slot[seen.surface_nodes.places(sides.owned)]] = True
+    pushes[corners[:, :3]] = pushes[ends[:, :2]] = True
+    rank = np.arange(edges.n)
+    if edges.n > sides.edges.n:
+        rank[np.lexsort((edges.sides[:, 1], edges.sides[:, 0]))] = np.arange(edges.n)
+    own = np.arange(edges.n) < sides.edges.n
+    return Scene(
+        surface_nodes=surface_nodes, own=OwnSlots.of(surface_nodes, nodes.n), slots=SceneSlots.at_rest(owned, pushes |
+        owned), faces=SceneFaces.at_rest(corners, faces.id, faces.size, faces.exposed.copy()), edges=SceneEdges.at_rest(
+            ends, edges.sides, places(faces.id, edges.sides), np.stack([edges.size, edges.deep]), edges.opened.copy(),
+            edges.sharp.copy(), own, rank,
+        ),
+        rules=rules, reference=ReferenceMotion(surface_nodes.x, surface_nodes.course, faces.n, edges.n, drift, horizon),
+        cracks=np.zeros((0, 6), np.int32),
+    )  # fmt: skip

@@ -1,0 +1,90 @@
+"""The surface near a rank: its own, and what other ranks have near it."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ...model.state import Flags, Floats, Indices, Ints
+from ...parallel.comm import Comm
+from ..broad_phase import domain, search
+from ..broad_phase.search import Boxes, Primitives
+from ..narrow_phase.tables import DEEP
+from ..surface.records import Edges, Faces, SurfaceNodes, merged
+from . import ghosts
+
+HALO = 1.0
+"""Of the typical size of a face: two slots of different ranks that leave their lines by half of this, each, may meet
+unseen; a search of all ranks comes before."""
+
+
+@dataclass(frozen=True)
+class Rules:
+    """How to search; equal on all ranks."""
+
+    domain: str
+    allowed: Flags
+    """(parts, parts) which parts meet."""
+    cell: float
+    """Edge of a cell of the contact domain, m."""
+    skin: float
+    """Two slots that leave their lines by half of this, each, may meet without being candidates, m."""
+    halo: float
+    """The same of slots of different ranks, m."""
+    itself: Flags
+    """(parts,) whether the body of each may meet itself."""
+
+
+@dataclass
+class NearSurface:
+    """A share of the surface, with its nodes."""
+
+    faces: Faces
+    """By ascending id."""
+    edges: Edges
+    surface_nodes: SurfaceNodes
+    """Every node of the faces and edges, and every node of the surface that is held here."""
+    owned: Ints
+    """Ids of the owned nodes of the surface, and of cracks that may open."""
+
+    @cached_property
+    def face_places(self) -> Indices:
+        """(f, 4)."""
+        return self.surface_nodes.places(self.faces.nodes)
+
+    @cached_property
+    def edge_places(self) -> Indices:
+        """(e, 4)."""
+        return self.surface_nodes.places(self.edges.nodes)
+
+    def boxes(self, horizon: float, drift: Floats, margin: float) -> list[Boxes]:
+        """Of the owned, the faces and the edges, with ``margin``, m, on all sides."""
+        x, course = self.surface_nodes.x, self.surface_nodes.course - drift
+        owned = Primitives(self.surface_nodes.places(self.owned[:, None]), np.full(len(self.owned), margin))
+        faces = Primitives(np.ascontiguousarray(self.face_places[:, :3]), margin + DEEP * self.faces.size)
+        edges = Primitives(np.ascontiguousarray(self.edge_places[:, :2]), margin + 0.5 * self.edges.deep)
+        return [search.swept(things, x, course, horizon) for things in (owned, faces, edges)]
+
+
+def with_ghosts(sides: NearSurface, rules: Rules, horizon: float, drift: Floats, comm: Comm) -> NearSurface:
+    """The sides with what other ranks' surfaces have near this one's, own edges first."""
+    nodes, faces, edges = sides.boxes(horizon, drift, 0.5 * rules.halo)
+    askers = Boxes(np.concatenate([nodes.low, edges.low]), np.concatenate([nodes.high, edges.high]))
+    chosen = domain.choose(rules.domain, askers, [faces, edges], rules.cell, comm)
+    got = comm.swap({rank: ghosts.pack(*_some_of(sides, *flags)) for rank, flags in chosen.items()})
+    others = [ghosts.unpack(words) for words in got.values()]
+    return _joined(sides, others)
+
+
+def _some_of(sides: NearSurface, faces: Flags, edges: Flags) -> tuple[Faces, Edges, SurfaceNodes]:
+    """Some of the faces and of the edges, and the nodes of these."""
+    nodes = np.zeros(sides.surface_nodes.n, bool)
+    nodes[sides.face_places[faces]] = nodes[sides.edge_places[edges]] = True
+    return sides.faces.take(faces), sides.edges.take(edges), sides.surface_nodes.take(nodes)
+
+
+def _joined(sides: NearSurface, others: list[tuple[Faces, Edges, SurfaceNodes]]) -> NearSurface:
+    faces = Faces.joined([sides.faces, *(faces for faces, _, _ in others)])
+    edges = Edges.joined([sides.edges, *(edges for _, edges, _ in others)])
+    surface_nodes = merged([sides.surface_nodes, *(surface_nodes for _, _, surface_nodes in others)])
+    return NearSurface(faces.take(np.argsort(faces.id)), edges, surface_nodes, sides.owned)

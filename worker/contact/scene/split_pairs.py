@@ -1,0 +1,223 @@
+"""What a split makes of faces, edges and candidates: whose copies are whose, what corners have become, and the new
+candidates: what a copy has from its parent, and what had nodes in common until it separated.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ...kernels.jit import njit, several, types
+from ...model.state import Indices
+from ...model.topology import KEY
+
+_I, _I1, _I2, _N1, _N2, _B1 = (
+    types.int64, types.int64[::1], types.int64[:, ::1], types.int32[::1], types.int32[:, ::1], types.boolean[::1],
+)  # fmt: skip
+
+
+class Family(NamedTuple):
+    """Nodes that separate, and what comes out of them."""
+
+    first: Indices
+    """(surface_nodes,) row of ``member`` where the copies of a node begin, -1 for one that has none."""
+    member: Indices
+    """(c, 2) place of each copy, and whether it is its parent's last."""
+    most: int
+    """Largest number of copies of a node."""
+    pairs: Indices
+    """(c, 2) places of the parent and of the copy."""
+
+
+@njit(several(_N1, _N2, _I, _N2)(_N2, _I), cache=True)
+def families(places, n):  # type: ignore[no-untyped-def]
+    """``Family`` of the parents and copies at ``places`` (c, 2), those of a parent one after the other, in a
+    surface_nodes of ``n``; -1 for what is not there.
+    """
+    first, k = np.full(n, np.int32(-1), np.int32), 0
+    member, pairs = np.empty_like(places), np.empty_like(places)
+    most, count = 0, 0
+    for c in range(len(places)):
+        parent, copy = places[c, 0], places[c, 1]
+        if parent < 0 or copy < 0:
+            continue
+        if first[parent] < 0:
+            first[parent], count = k, 0
+        else:
+            member[k - 1, 1] = 0
+        count += 1
+        most = max(most, count)
+        member[k, 0], member[k, 1] = copy, 1
+        pairs[k, 0], pairs[k, 1] = parent, copy
+        k += 1
+    return first, member[:k].copy(), most, pairs[:k].copy()
+
+
+@njit(types.int32(_I1, _I1, _N1, types.int32, _I), cache=True)
+def _become(ids, key, became, node, tet):  # type: ignore[no-untyped-def]
+    """What the ``node`` of a tet (global id) has become; ``ids``: of the nodes; ``key`` and ``became``:
+    TopologyUpdate.
+    """
+    wanted = ids[node] * KEY + tet
+    at = np.searchsorted(key, wanted)
+    return became[at] if at < len(key) and key[at] == wanted else node
+
+
+@njit(_I1(_N2, _N1), cache=True)
+def _torn(corners, first):  # type: ignore[no-untyped-def]
+    """Rows of ``corners`` (n, 4 or 6) with a node that has copies; ``first``: see Family."""
+    rows, n = np.empty(len(corners), np.int64), 0
+    for row in range(len(corners)):
+        for k in range(corners.shape[1]):
+            if first[corners[row, k]] >= 0:
+                rows[n] = row
+                n += 1
+                break
+    return rows[:n].copy()
+
+
+@njit(several(_I1, _N2)(_N2, _B1, _I1, _N1, _I1, _I1, _N1), cache=True)
+def follow_faces(corners, fresh, faces, first, ids, key, became):  # type: ignore[no-untyped-def]
+    """Gives faces of the ids ``faces`` (f,) the copies of their ``corners`` (f, 4); ``first``: see Family, ``ids``: of
+    the nodes, ``key`` and ``became``: see TopologyUpdate, as places. Returns the rows of those that have lost a node,
+    and their corners until then.
+    """
+    rows = _torn(corners, first)
+    old = np.empty((len(rows), 4), np.int32)
+    for r in range(len(rows)):
+        f = rows[r]
+        fresh[f] = True
+        for k in range(4):
+            old[r, k] = corners[f, k]
+            if first[corners[f, k]] >= 0:
+                corners[f, k] = _become(ids, key, became, corners[f, k], faces[f] // 4)
+    return rows, old
+
+
+@njit(several(_I1, _N2, _B1)(_N2, _B1, _I2, _N1, _I1, _I1, _N1), cache=True)
+def follow_edges(corners, fresh, sides, first, ids, key, became):  # type: ignore[no-untyped-def]
+    """The same for edges between ``sides`` (e, 2), ids of faces; and which of them are gone, whose faces have separated
+    there.
+    """
+    rows = _torn(corners, first)
+    old, gone = np.empty((len(rows), 6), np.int32), np.zeros(len(rows), np.bool_)
+    for r in range(len(rows)):
+        e = rows[r]
+        fresh[e] = True
+        one, two = sides[e, 0] // 4, sides[e, 1] // 4
+        gone[r] = corners[e, 0] == corners[e, 1]
+        for k in range(6):
+            old[r, k] = corners[e, k]
+        for k in range(2):
+            corners[e, k] = _become(ids, key, became, old[r, k], one)
+            gone[r] |= corners[e, k] != _become(ids, key, became, old[r, k], two)
+        for k in range(2, 6, 2):
+            corners[e, k] = _become(ids, key, became, old[r, k], one)
+            corners[e, k + 1] = _become(ids, key, became, old[r, k + 1], two)
+        if gone[r]:
+            corners[e, 1:] = corners[e, 0]
+    return rows, old, gone
+
+
+@njit("int32[:, ::1](int32[:, ::1], int32[::1], int32[::1], int32[:, ::1])", cache=True)
+def inherited(family, first, following, pairs):  # type: ignore[no-untyped-def]
+    """(p, 2) candidates, node and face, of the copies of a ``family`` (c, 2), places of parents and copies: those of
+    their parents. ``first`` (nodes,), ``following`` and ``pairs``: see node_face.chain.
+    """
+    n = 0
+    for write in range(2):
+        if write:
+            found = np.empty((n, 2), np.int32)
+        n = 0
+        for c in range(len(family)):
+            p = first[family[c, 0]]
+            while p >= 0:
+                if write:
+                    found[n, 0], found[n, 1] = family[c, 1], pairs[p, 1]
+                n += 1
+                p = following[p]
+    return found
+
+
+@njit(
+    "int64(int32[:, ::1], int64[::1], int32[:, ::1], int32[:, ::1], int32[::1], int32[:, ::1], boolean[::1], "
+    "boolean[::1])",
+    cache=True,
+)
+def apart_from_faces(pairs, rows, old, now, first, member, owned, meets):  # type: ignore[no-untyped-def]
+    """Pairs of nodes and faces, of ``rows``, that had a corner in common before the split, and have none now.
+
+    ``old`` and ``now`` (r, 4): their corners; ``first`` and ``member``: Family; returns how many there are.
+    """
+    n = 0
+    for r in range(len(rows)):
+        for k in range(3):
+            node = old[r, k]
+            if first[node] < 0 or not owned[node] or not meets[r]:
+                continue
+            at, end = first[node], False
+            while True:
+                if node != now[r, 0] and node != now[r, 1] and node != now[r, 2]:
+                    pairs[n, 0], pairs[n, 1] = node, rows[r]
+                    n += 1
+                if end:
+                    break
+                node, end = member[at, 0], member[at, 1] != 0
+                at += 1
+    return n
+
+
+@njit(_I2(_N2, _N2, _N1, _B1), cache=True)
+def apart_from_edges(old, now, first, own):  # type: ignore[no-untyped-def]
+    """(p, 2) pairs of edges, by ascending faces, that had an end in common before the split and have none now, where
+    the one of smaller faces, the first, is this rank's own.
+
+    ``old`` and ``now`` (e, 6): their nodes; ``first``: see Family.
+    """
+    ends, m = np.empty(2 * len(old), np.int32), 0
+    at = np.empty(2 * len(old), np.int64)
+    for e in range(len(old)):
+        for k in range(2):
+            if first[old[e, k]] >= 0:
+                ends[m], at[m] = old[e, k], e
+                m += 1
+    order, many = np.argsort(ends[:m], kind="mergesort"), 0
+    for write in range(2):
+        if write:
+            pairs = np.empty((many, 2), np.int64)
+        many, i = 0, 0
+        while i < m:
+            j, node = i, ends[order[i]]
+            while j < m and ends[order[j]] == node:
+                j += 1
+            for a in range(i, j):
+                for b in range(a + 1, j):
+                    one, two = at[order[a]], at[order[b]]
+                    if not own[one]:
+                        continue
+                    common = False
+                    for k in range(2):
+                        common |= now[one, k] == now[two, 0] or now[one, k] == now[two, 1]
+                    both = True
+                    for k in range(2):
+                        both &= old[one, k] == old[two, 0] or old[one, k] == old[two, 1]
+                    if common or (both and node != old[one, 0]):
+                        continue
+                    if write:
+                        pairs[many, 0], pairs[many, 1] = one, two
+                    many += 1
+            i = j
+    return pairs
+
+
+@njit("int64[::1](int32[:, ::1], boolean[::1])", cache=True)
+def touching(table, flags):  # type: ignore[no-untyped-def]
+    """Rows of ``table`` (n, k) with an entry that is flagged."""
+    rows = np.empty(len(table), np.int64)
+    n = 0
+    for i in range(len(table)):
+        for k in range(table.shape[1]):
+            if flags[table[i, k]]:
+                rows[n] = i
+                n += 1
+                break
+    return rows[:n].copy()

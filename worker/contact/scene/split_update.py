@@ -1,0 +1,291 @@
+"""A scene that follows nodes as they separate, until the next search.
+
+What the last search has found stays good while nodes separate: faces take up the copies of their corners, and a copy
+has the candidates of the node that it was part of, with the rank that computes that one's.
+"""
+
+import numpy as np
+
+from ...kernels.jit import njit
+from ...model.state import Block, Flags, Indices, Ints, Nodes, extended
+from ...parallel.comm import Comm
+from ...parallel.ownership import Neighbour
+from ..narrow_phase.cracks import Cracks, computed
+from ..surface.records import SurfaceNodes
+from . import ghosts, split_pairs
+from .scene import Scene
+from .split_pairs import Family
+from .topology_updates import TopologyUpdate, meets
+
+
+class SplitUpdate:
+    """Brings one scene up to date with a split."""
+
+    def __init__(self, scene: Scene, here: SurfaceNodes, nodes: Nodes) -> None:
+        """``here``: every node of this rank, by local index."""
+        self._scene, self._here = scene, here
+        self._nodes = nodes
+        scene.own.grow(nodes.n)
+
+    def places(self, ids: Ints) -> Indices:
+        """Where ids stand in the surface_nodes, in their shape, -1 where they do not."""
+        own = self._scene.own
+        found = _located(ids.ravel(), self._nodes.id, own.place, own.far_ids, own.far)
+        return np.asarray(found.reshape(ids.shape))
+
+    def follow(self, heard: TopologyUpdate, cracks: Cracks, blocks: list[Block], neighbours: list[Neighbour]) -> None:
+        """Faces, edges and candidates after the split, and the places of the cracks."""
+        rows = split_pairs.touching(cracks.nodes, _flagged(self._nodes.id, heard.rows.id))
+        near, apart = cracks.beside(rows, blocks)
+        rows = computed(rows, cracks.nodes, cracks.sides)
+        self._join(heard, neighbours)
+        self._hold(_lacking(near, rows, cracks.nodes, self._scene.own.place))
+        family = Family(*split_pairs.families(self.places(heard.family), self._scene.surface_nodes.n))
+        became = self.places(heard.became)
+        self._candidates(family)
+        self._faces(heard, became, family)
+        self._edges(heard, became, family)
+        self._across(cracks, rows, apart)
+
+    def _join(self, heard: TopologyUpdate, neighbours: list[Neighbour]) -> None:
+        """Takes the families of the surface_nodes's nodes and of those that other ranks hold into the surface_nodes;
+        and the masses of all that have separated.
+        """
+        local, have = self._nodes.places(heard.family[:, 0]), self.places(heard.family[:, 0]) >= 0
+        for other in neighbours:
+            _mark(have, local, other.nodes)
+        rows, at = heard.rows, self.places(heard.rows.id)
+        self._add(rows.take(_joining(rows.id, at, heard.family, have)))
+        at = self.places(rows.id)
+        self._scene.surface_nodes.mobility[at[at >= 0]] = rows.mobility[at >= 0]
+
+    def cracks(self, cracks: Cracks, blocks: list[Block]) -> None:
+        """The places of all cracks that this rank computes."""
+        every = np.arange(len(cracks.nodes))
+        rows, (near, apart) = computed(every, cracks.nodes, cracks.sides), cracks.beside(every, blocks)
+        cracks.places[:] = -1
+        self._hold(_lacking(near, rows, cracks.nodes, self._scene.own.place))
+        self._across(cracks, rows, apart)
+        cracks.arrange()
+
+    def _across(self, cracks: Cracks, rows: Ints, apart: Flags) -> None:
+        """Places some of the cracks. Their nodes that have separated, and those that are ``apart`` (nodes,) of the
+        tets, may be pushed.
+        """
+        scene = self._scene
+        _place(cracks.places, scene.slots.pushes, rows, cracks.nodes, scene.own.place)
+        scene.slots.pushes[scene.own.place[apart]] = True
+        scene.cracks = cracks.places
+
+    def settle(self, neighbours: list[Neighbour], comm: Comm) -> None:
+        """Asks all ranks who shares which node; all take part."""
+        scene, nodes = self._scene, self._nodes
+        if comm.size == 1:
+            scene.connect([], nodes, comm)
+            return
+        used = np.sort(scene.surface_nodes.id[scene.slots.pushes])
+        owners = scene.surface_nodes.owner[self.places(used)]
+        shared = ghosts.members(used, owners, neighbours, nodes, comm)
+        local = nodes.places(np.unique(np.concatenate([used[:0], *shared.values()])))
+        self._hold(local[(local >= 0) & (scene.own.place[local] < 0)])
+        scene.connect([Neighbour(rank, self.places(ids)) for rank, ids in sorted(shared.items())], nodes, comm)
+
+    def share(self, heard: TopologyUpdate, neighbours: list[Neighbour]) -> None:
+        """Follows who shares which node. Nobody has to be asked: who shares a node shares its copies, since they are
+        held, pushed and sent by the same ranks as it; and a node that separates is shared by all that hold it, since it
+        may be pushed across the crack.
+        """
+        messages, surface_nodes, nodes = self._scene.messages, self._scene.surface_nodes, self._nodes
+        family = heard.family[np.argsort(heard.family[:, 1])]
+        local, at = nodes.places(family), self.places(family)
+        held, there = np.zeros(nodes.n, bool), np.zeros(surface_nodes.n, bool)
+        company, none = {some.rank: some for some in messages.company.neighbours}, np.zeros(0, np.int32)
+        for other in neighbours:
+            some = company.get(other.rank, Neighbour(other.rank, none))
+            parents = _newly_shared(family[:, 0], local[:, 0], at[:, 0], other.nodes, some.nodes, there)
+            if len(parents):
+                company[other.rank] = Neighbour(other.rank, extended(some.nodes, parents))
+        self._scene.extend(
+            [_heirs(some, at, there) for _, some in sorted(company.items())],
+            [_heirs(some, local, held) for some in messages.copies.sends],
+            [_heirs(some, at, there) for some in messages.copies.receives],
+        )
+
+    def _hold(self, local: Indices) -> None:
+        """Adds nodes of this rank, which the surface_nodes lacks."""
+        if len(local):
+            self._add(self._here.take(local))
+
+    def _add(self, rows: SurfaceNodes) -> None:
+        scene = self._scene
+        if not rows.n:
+            return
+        first = scene.surface_nodes.n
+        scene.surface_nodes.append(rows)
+        scene.slots.add(rows)
+        scene.reference.add(rows.x, rows.course)
+        scene.own.add(first, rows)
+
+    def _faces(self, heard: TopologyUpdate, became: Indices, family: Family) -> None:
+        """Faces take up the copies of their corners; a node meets those that have just left it, too."""
+        faces, slots, surface_nodes = self._scene.faces, self._scene.slots, self._scene.surface_nodes
+        rows, old = split_pairs.follow_faces(
+            faces.corners, faces.fresh, faces.id, family.first, surface_nodes.id, heard.key, became
+        )  # fmt: skip
+        if not len(rows):
+            return
+        pairs = np.empty((3 * len(rows) * (1 + family.most), 2), np.int32)
+        searched = faces.live[rows] & self._meets(old[:, 0])
+        n = split_pairs.apart_from_faces(
+            pairs, rows, old, faces.corners[rows], family.first, family.member, slots.live, searched
+        )  # fmt: skip
+        self._add_pairs(pairs[:n])
+
+    def _edges(self, heard: TopologyUpdate, became: Indices, family: Family) -> None:
+        """An edge goes when its two faces have separated there; it meets those that have left its ends."""
+        edges, surface_nodes = self._scene.edges, self._scene.surface_nodes
+        rows, old, gone = split_pairs.follow_edges(
+            edges.corners, edges.fresh, edges.sides, family.first, surface_nodes.id, heard.key, became
+        )  # fmt: skip
+        some = edges.live[rows] & ~gone & self._meets(old[:, 0])
+        if some.any():
+            rows, old = rows[some], old[some]
+            order = np.argsort(edges.names[rows])
+            rows, old = rows[order], old[order]
+            found = split_pairs.apart_from_edges(old, edges.corners[rows], family.first, edges.own[rows])
+            self._scene.edge_edge.add(rows[found].astype(np.int32))
+
+    def _meets(self, places: Indices) -> Flags:
+        """(n,) whether the bodies of nodes at ``places`` meet themselves."""
+        return np.asarray(self._scene.rules.itself[self._scene.surface_nodes.part[places]])
+
+    def _candidates(self, family: Family) -> None:
+        """A copy has the candidates and the normals of its parent, and is pushed by the ranks that push that one."""
+        scene, (parent, copy) = self._scene, family.pairs.T
+        scene.slots.inherit(copy, parent)
+        scene.reference.inherit(copy, parent)
+        self._add_pairs(
+            split_pairs.inherited(family.pairs, scene.slots.first, scene.node_face.next, scene.node_face.rows)
+        )
+
+    def _add_pairs(self, pairs: Indices) -> None:
+        """More candidates of nodes and faces."""
+        if len(pairs):
+            scene, n = self._scene, len(self._scene.node_face)
+            scene.node_face.add(pairs)
+            scene.node_face.hang(scene.slots.first, n)
+
+
+def _heirs(some: Neighbour, family: Indices, flags: Flags) -> Neighbour:
+    """Nodes shared with a rank, and behind them their copies: ``family`` (c, 2) parents and copies, -1 for none here;
+    ``flags``: room, all false.
+    """
+    heirs = family[meets(flags, some.nodes, family), 1]
+    return Neighbour(some.rank, extended(some.nodes, heirs)) if len(heirs) else some
+
+
+@njit("boolean[::1](int64[::1], int64[::1])", cache=True)
+def _flagged(ids, wanted):  # type: ignore[no-untyped-def]
+    """(n + 1,) which of the ascending ``ids`` are ``wanted``; the last stands for what is not there, -1."""
+    flags = np.zeros(len(ids) + 1, np.bool_)
+    for i in range(len(wanted)):
+        at = np.searchsorted(ids, wanted[i])
+        if at < len(ids) and ids[at] == wanted[i]:
+            flags[at] = True
+    return flags
+
+
+@njit("void(boolean[::1], int32[::1], int32[::1])", cache=True)
+def _mark(flags, some, others):  # type: ignore[no-untyped-def]
+    """Flags those of ``some`` that are among the ascending ``others``."""
+    for i in range(len(some)):
+        at = np.searchsorted(others, some[i])
+        if at < len(others) and others[at] == some[i]:
+            flags[i] = True
+
+
+@njit("int64[::1](int64[::1], int32[::1], int64[:, ::1], boolean[::1])", cache=True)
+def _joining(ids, places, family, have):  # type: ignore[no-untyped-def]
+    """Which of ``ids`` have no place yet and are of a ``family`` (c, 2) that the scene shall ``have``."""
+    wanted = np.sort(family[have].reshape(-1))
+    rows, n = np.empty(len(ids), np.int64), 0
+    for i in range(len(ids)):
+        at = np.searchsorted(wanted, ids[i])
+        if places[i] < 0 and at < len(wanted) and wanted[at] == ids[i]:
+            rows[n] = i
+            n += 1
+    return rows[:n].copy()
+
+
+@njit("int32[::1](boolean[::1], int64[::1], int32[:, ::1], int32[::1])", cache=True)
+def _lacking(near, rows, nodes, place):  # type: ignore[no-untyped-def]
+    """Which nodes of the ``rows`` of cracks, and of those ``near`` (nodes,), ascending, have no place yet."""
+    flags, n = near.copy(), 0
+    for c in rows:
+        for k in range(6):
+            flags[nodes[c, k]] = True
+    some = np.empty(len(flags), np.int32)
+    for a in range(len(flags)):
+        if flags[a] and place[a] < 0:
+            some[n] = a
+            n += 1
+    return some[:n].copy()
+
+
+@njit("void(int32[:, ::1], boolean[::1], int64[::1], int32[:, ::1], int32[::1])", cache=True)
+def _place(places, pushes, rows, nodes, place):  # type: ignore[no-untyped-def]
+    """Slots of the nodes of some ``rows`` of cracks; those that have separated may be pushed."""
+    for c in rows:
+        for k in range(6):
+            places[c, k] = place[nodes[c, k]]
+            if nodes[c, k] != nodes[c, (k + 3) % 6]:
+                pushes[places[c, k]] = True
+
+
+@njit("int32[::1](int64[:], int32[:], int32[:], int32[::1], int32[::1], boolean[::1])", cache=True)
+def _newly_shared(ids, local, places, holds, shares, flags):  # type: ignore[no-untyped-def]
+    """Places, by ascending id and each once, of parents that a rank ``holds`` and that are not among those that it
+    ``shares`` yet; ``flags``: room, all false. ``ids``, ``local`` and ``places``: of the parents.
+    """
+    some, n = np.empty(len(ids), np.int64), 0
+    for i in range(len(ids)):
+        at = np.searchsorted(holds, local[i])
+        if local[i] >= 0 and at < len(holds) and holds[at] == local[i]:
+            some[n] = i
+            n += 1
+    if n == 0:
+        return np.empty(0, np.int32)
+    flags[shares] = True
+    found, m = np.empty(n, np.int64), 0
+    for i in some[:n]:
+        if not flags[places[i]]:
+            flags[places[i]] = True
+            found[m] = i
+            m += 1
+    flags[shares] = False
+    fresh = np.empty(m, np.int64)
+    for k in range(m):
+        flags[places[found[k]]] = False
+        fresh[k] = ids[found[k]]
+    out = np.empty(m, np.int32)
+    order = np.argsort(fresh)
+    for k in range(m):
+        out[k] = places[found[order[k]]]
+    return out
+
+
+@njit("int32[::1](int64[::1], int64[::1], int32[::1], int64[::1], int32[::1])", cache=True)
+def _located(wanted, ids, place, far_ids, far):  # type: ignore[no-untyped-def]
+    """(n,) the ``place`` of those that are among the ``ids`` of this rank, ``far`` of the others, -1 for no place."""
+    found = np.empty(len(wanted), np.int32)
+    for i in range(len(wanted)):
+        found[i] = -1
+        at = np.searchsorted(ids, wanted[i])
+        if at < len(ids) and ids[at] == wanted[i]:
+            found[i] = place[at]
+        if found[i] >= 0:
+            continue
+        at = np.searchsorted(far_ids, wanted[i])
+        if at < len(far_ids) and far_ids[at] == wanted[i]:
+            found[i] = far[at]
+    return found

@@ -1,0 +1,87 @@
+"""Topology changes of a split near one rank: those of its own nodes, and of ghosts, exchanged between ranks."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...kernels.jit import njit
+from ...model.state import Indices, Ints
+from ...model.topology import Split
+from ...parallel.comm import Comm
+from ..surface.records import SurfaceNodes
+from . import ghosts
+from .scene import Scene
+
+
+@dataclass
+class TopologyUpdate:
+    """What a rank knows of a split: round every node that it holds or has a copy of."""
+
+    key: Ints
+    """(r,) ids of a node and of a tet as one number, ascending."""
+    became: Ints
+    """(r,) id of the copy that the node of that tet has become."""
+    family: Ints
+    """(c, 2) ids of the parents of all copies, ascending, and of the copies."""
+    rows: SurfaceNodes
+    """Parents and copies."""
+
+
+def gather(split: Split, scene: Scene, here: SurfaceNodes, comm: Comm) -> TopologyUpdate | None:
+    """None where there is none. ``here``: every node of this rank, by local index. Of nodes that it does not hold, a
+    rank hears from the one that sends it their state; such ranks take part.
+    """
+    sources = [other.rank for other in scene.messages.copies.receives if split.touched[other.rank]]
+    if not (sources or split.touched[comm.rank]):
+        return None
+    parents, copies = split.copies.parents, split.first + np.arange(split.copies.n)
+    table = np.column_stack([split.key, here.id[split.node]])
+    local = np.column_stack([parents, copies]).astype(np.int32)
+    told = _told(split, scene, here, table, local) if split.touched[comm.rank] else {}
+    heard = [words for words in comm.trade(told, sources).values() if len(words)]
+    if not (split.copies.n or heard):
+        return None
+    family, rows = here.id[local], here.take(np.unique(local))
+    if heard:
+        for words in heard:
+            ends = 2 + 2 * np.cumsum(words[:2])
+            table = np.concatenate([table, words[2 : ends[0]].reshape(-1, 2)])
+            family = np.concatenate([family, words[ends[0] : ends[1]].reshape(-1, 2)])
+            rows = SurfaceNodes.joined([rows, ghosts.unpack_nodes(words[ends[1] :])])
+        table, family = table[np.argsort(table[:, 0])], family[np.lexsort((family[:, 1], family[:, 0]))]
+    return TopologyUpdate(table[:, 0].copy(), table[:, 1].copy(), family, rows)
+
+
+def _told(split: Split, scene: Scene, here: SurfaceNodes, table: Ints, local: Indices) -> dict[int, Ints]:
+    """What other ranks must hear: rows of ``table`` (TopologyUpdate.key and became) and families, and their nodes;
+    ``local`` (c, 2): the families of this rank.
+    """
+    told, flags = {}, np.zeros(here.n, bool)
+    for other in scene.messages.copies.sends:
+        told[other.rank] = np.zeros(0, np.int64)
+        some = meets(flags, other.nodes, local)
+        if len(some):
+            flags[some] = True
+            round_it = table[flags[split.node - split.first]]
+            flags[some] = False
+            packed = ghosts.pack_nodes(here.take(np.unique(local[some])))
+            lengths = np.array([len(round_it), len(some)])
+            told[other.rank] = np.concatenate([
+                lengths, round_it.reshape(-1), here.id[local[some]].reshape(-1), packed.reshape(-1)
+            ])  # fmt: skip
+    return told
+
+
+@njit("int64[::1](boolean[::1], int32[::1], int32[:, ::1])", cache=True)
+def meets(flags, nodes, family):  # type: ignore[no-untyped-def]
+    """Rows of a ``family`` (c, 2) whose parents are among the ``nodes``; ``flags``: room, all false."""
+    rows, n = np.empty(len(family), np.int64), 0
+    for a in nodes:
+        flags[a] = True
+    for c in range(len(family)):
+        if family[c, 0] >= 0 and flags[family[c, 0]]:
+            rows[n] = c
+            n += 1
+    for a in nodes:
+        flags[a] = False
+    return rows[:n].copy()

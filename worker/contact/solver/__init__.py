@@ -1,0 +1,1 @@
+"""Impulses of the active contacts: projected Jacobi sweeps, and sums over ranks."""

@@ -1,0 +1,121 @@
+"""Which contacts are swept: those that have asked for an impulse in the step are loaded, the others are idle.
+
+A contact that has had no impulse in the step and closes no faster than it may changes nothing until sweeps have moved
+its nodes by as much as it has left, its reach. The loaded ones have an infinite reach, and their data lie together.
+"""
+
+import numpy as np
+
+from ...kernels.jit import njit, types
+from ..narrow_phase.tables import CRACK
+from .active import CONTACTS, KEPT, LAST, LOADED, MOBILITY, MU, NODES, PUSH, PUSH_T, ROW_NORM, ROW_NORM_T, WANTED, V
+
+SHARES = float(2**30)
+"""Quanta per unit of weight."""
+_ACROSS = (1.0, -1.0, 0.0, 0.0)
+"""Weights of the nodes on either side of a crack."""
+_ROUNDING = 2.0**-40
+"""Of the velocities: far more than what a contact's speed, a sum of twelve products, may be off by."""
+_ROWS, _F1, _F, _I = types.int32[::1], types.float64[::1], types.float64, types.int64
+
+
+@njit(types.void(LOADED, CONTACTS, NODES, _I, _I), cache=True, error_model="numpy")
+def fill(loaded, contacts, active, first, end):  # type: ignore[no-untyped-def]
+    """The data of the loaded contacts from ``first`` to ``end``, without impulses; ``loaded.row`` has their numbers,
+    then their rows.
+
+    Row norms are bounds of l1 norms along the normal and across, 1/kg; infinite where nothing moves.
+    """
+    slots, weights, normals, fixed, sums = (
+        contacts.slots, contacts.weights, contacts.normals, active.fixed, active.row_weights,
+    )  # fmt: skip
+    normal, tangent = loaded.normal, loaded.tangent
+    for q in range(first, end):
+        c = loaded.row[q]
+        p, two = contacts.row[c], slots[c, 2] < 0
+        loaded.row[q] = p
+        for k in range(4):
+            tangent[q, k], loaded.slots[q, k] = _ACROSS[k] if two else weights[p, k], slots[c, k]
+        for i in range(3):
+            normal[q, i], tangent[q, PUSH_T + i] = normals[p, i], 0.0
+        along, across = 0.0, 0.0
+        for k in range(2 if two else 4):
+            s, weight, most = slots[c, k], abs(tangent[q, k]) / SHARES, 0.0
+            for i in range(3):
+                along += weight * abs(normal[q, i]) * sums[s, i] * fixed[s, MOBILITY + i]
+                most = max(most, fixed[s, MOBILITY + i])
+            across += weight * sums[s, 3] * most
+        normal[q, WANTED], normal[q, PUSH], normal[q, MU] = contacts.wanted[p], 0.0, contacts.friction[p]
+        normal[q, LAST] = 0.0
+        normal[q, ROW_NORM] = along if along > 0.0 else np.inf
+        tangent[q, ROW_NORM_T] = across if across > 0.0 else np.inf
+
+
+@njit(_I(_ROWS, CONTACTS, _F1, _I, _I), cache=True)
+def _due(due, contacts, path, first, end):  # type: ignore[no-untyped-def]
+    """Which of the contacts from ``first`` to ``end`` have nodes of ``path`` (slots,) that may have used up their
+    reach; returns how many. Few have, and every sweep asks: one takes 1 ns, and 2 if numbers of slots may be negative.
+    """
+    slots, reach, n = contacts.slots, contacts.reach, 0
+    for q in range(first, end):
+        paths = path[np.uint32(slots[q, 0])] + path[np.uint32(slots[q, 1])]
+        if slots[q, 2] >= 0:
+            paths = paths + path[np.uint32(slots[q, 2])] + path[np.uint32(slots[q, 3])]
+        if paths >= reach[q]:
+            due[n] = q
+            n += 1
+    return n
+
+
+@njit(types.void(LOADED, CONTACTS, NODES, _F, _I), cache=True, error_model="numpy")
+def load(loaded, contacts, active, fastest, k):  # type: ignore[no-untyped-def]
+    """Takes those of the idle contacts of set ``k`` among the loaded that close faster than they may.
+
+    The speed of a contact changes by no more than the paths of its nodes times the largest of its weights; an idle one
+    is computed anew when they may have used up what it had left. ``fastest``: bound of the l1 norm of any velocity at
+    the beginning of the step, m/s.
+    """
+    slots, weights, normals, wanted = contacts.slots, contacts.weights, contacts.normals, contacts.wanted
+    moving, path, reach, first, end = active.moving, active.path, contacts.reach, loaded.begin[k], loaded.begin[k + 1]
+    before = first + loaded.many[k]
+    row = loaded.row[before:]
+    n = 0
+    for q in range(_due(row, contacts, path, first, end)):
+        each = row[q]
+        a, b, c, d = slots[each, 0], slots[each, 1], slots[each, 2], slots[each, 3]
+        p, speed, most, paths, two = contacts.row[each], 0.0, 1.0, path[a] + path[b], c < 0
+        for i in range(3):
+            if two:
+                rate = 0.0 + moving[a, V + i] - moving[b, V + i]
+            else:
+                rate = 0.0 + weights[p, 0] * moving[a, V + i] + weights[p, 1] * moving[b, V + i]
+                rate = rate + weights[p, 2] * moving[c, V + i] + weights[p, 3] * moving[d, V + i]
+            speed += normals[p, i] * rate
+        if wanted[p] > speed:
+            row[n], reach[each] = each, np.inf
+            n += 1
+            continue
+        if not two:
+            paths = paths + path[c] + path[d]
+            for j in range(4):
+                most = max(most, abs(weights[p, j]))
+        left = (speed - wanted[p]) / most
+        reach[each] = paths + left - _ROUNDING * (fastest + paths + left + abs(wanted[p]))
+    fill(loaded, contacts, active, before, before + n)
+    loaded.many[k] += n
+
+
+@njit(types.void(LOADED, CONTACTS, NODES, KEPT, _I), cache=True)
+def load_kept(loaded, contacts, active, kept, k):  # type: ignore[no-untyped-def]
+    """Takes those of the contacts of set ``k``, all idle, among the loaded that have ``kept`` an impulse of the step
+    before.
+    """
+    pair, pairs, cracks, first = contacts.pair, kept.pairs, kept.cracks, loaded.begin[k]
+    n = first
+    for each in range(first, loaded.begin[k + 1]):
+        j = pair[contacts.row[each]]
+        if (j >= 0 and pairs[j, 0] > 0.0) or (j <= CRACK and cracks[CRACK - j, 0] > 0.0):
+            loaded.row[n], contacts.reach[each] = each, np.inf
+            n += 1
+    fill(loaded, contacts, active, first, n)
+    loaded.many[k] = n - first

@@ -1,0 +1,57 @@
+"""The work of the solver as the threads of a rank share it: by sets of contacts (zones.py), and by slots."""
+
+from ...kernels.jit import Kernel
+from ...model.state import Ints
+from ...parallel.arguments import Arguments
+from ...parallel.passes import Pass
+from ...parallel.team import Team
+from .. import tasks
+from ..tasks import CONTACTS_OF_A_TASK, SLOTS_OF_A_TASK
+from . import zones
+from .shared_sums import ActiveSum
+
+
+class Sets:
+    """Kernels over the sets of the active contacts, each with its table of arguments."""
+
+    def __init__(self, team: Team, many: int) -> None:
+        """``many`` zones."""
+        self._team = team
+        self._border, self._inner = zones.tasks(many)
+        self.weigh, self.resume = Arguments(*tasks.WEIGH), Arguments(*tasks.RESUME)
+        self.sweep, self.store = Arguments(*tasks.SWEEP), Arguments(*tasks.STORE)
+        self.cost = Arguments(*tasks.COST)
+
+    @property
+    def alone(self) -> bool:
+        """Whether there is one thread."""
+        return self._team.threads == 1
+
+    def run(self, kernel: Kernel, table: int) -> None:
+        """The work of all contacts; ``table``: of the arguments."""
+        self._team.run(kernel, table, *self._border)
+        self._team.run(kernel, table, *self._inner)
+
+    def complete(self, kernel: Kernel, table: int, shared: ActiveSum, words: Ints, first: int, columns: int) -> None:
+        """The same, and completes these columns of the ``words`` of ``shared`` slots; contacts without shared slots are
+        worked on while the sums of the others travel.
+        """
+        if not len(shared.shared):
+            self._team.run(kernel, table, *self._inner)
+            return
+        self._team.run(kernel, table, *self._border)
+        shared.begin(words, first, columns)
+        self._team.run(kernel, table, *self._inner)
+        shared.finish(words, first, columns)
+
+
+class Slots:
+    """Passes over active contacts and their slots."""
+
+    def __init__(self, team: Team) -> None:
+        some, of_slots = CONTACTS_OF_A_TASK, SLOTS_OF_A_TASK
+        self.mark = Pass(team, tasks.mark, *tasks.MARK, size=some)
+        self.sort = Pass(team, tasks.sort, *tasks.SORT, size=some)
+        self.load = Pass(team, tasks.load, *tasks.LOAD, size=of_slots)
+        self.give = Pass(team, tasks.give, *tasks.GIVE, size=of_slots)
+        self.leave = Pass(team, tasks.leave, *tasks.LEAVE, size=of_slots)

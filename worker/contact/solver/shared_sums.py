@@ -1,0 +1,174 @@
+"""Nodes that several ranks push or hold, and their sums over these ranks.
+
+Most of the nodes that a rank shares with another are pushed by neither in a step. So ranks first tell each other, by
+two bits a node, which nodes their active contacts have, and of which they want to hear: those and the ones that they
+hold. Only what one pushes and the other wants to hear of is sent in that step. Sums are of integers: what is left out
+is zero.
+"""
+
+import numpy as np
+
+from ...kernels.jit import njit
+from ...model.state import Indices, Ints
+from ...parallel.comm import Comm, Exchange
+from ...parallel.ownership import Neighbour
+from ...parallel.tags import Tag
+from ..narrow_phase.rows import ActiveRows
+
+_WORD = 63
+"""Bits of a word that are used."""
+_ROOM = 4
+"""Words by which the messages of a rank grow. Chosen: some 250 nodes that separate need no new messages."""
+_COLUMNS = 4
+"""The most that are summed at once (active.ActiveNodes.row_weights)."""
+
+
+class SharedSums:
+    """Other ranks, and the slots that either pushes or holds and any rank pushes."""
+
+    def __init__(self, neighbours: list[Neighbour], comm: Comm) -> None:
+        """``neighbours``: the slots in the same order on both ranks."""
+        self._comm = comm
+        self._words = np.zeros(0, np.int64)
+        self._exchange: Exchange | None = None
+        none = np.zeros(0, np.int32)
+        self._nothing = ActiveSum([], none, none, np.zeros((0, 2), np.int64), comm)
+        self.take(neighbours)
+
+    def take(self, neighbours: list[Neighbour]) -> None:
+        """Other slots. Messages that have room for them stay."""
+        self.neighbours = neighbours
+        self._every = np.concatenate([np.zeros(0, np.int32), *(some.nodes for some in neighbours)])
+        self._ends = np.cumsum([0, *(len(some.nodes) for some in neighbours)])
+        words = np.cumsum([0, *(2 * _ROOM * (1 + len(some.nodes) // (_ROOM * _WORD)) for some in neighbours)])
+        if self._exchange is not None and np.array_equal(words, self._words):
+            return
+        self.free()
+        self._words = words
+        self._out, self._in = (np.zeros(words[-1], np.int64) for _ in range(2))
+        self._exchange = self._comm.exchange(self._slices(self._out), self._slices(self._in), Tag.CONTACT_FLAGS)
+
+    def _slices(self, words: Ints) -> list[tuple[int, Ints]]:
+        begins, ends = self._words[:-1], self._words[1:]
+        return [(o.rank, words[a:b]) for o, a, b in zip(self.neighbours, begins, ends, strict=True)]
+
+    def agree(self, contacts: ActiveRows, local: Indices) -> "ActiveSum":
+        """The sums of a step with active ``contacts``; ``local`` (surface_nodes,): -1 for what is not held."""
+        if not self.neighbours:
+            return self._nothing
+        assert self._exchange is not None
+        _tell(self._out, self._every, self._ends, self._words, contacts.nodes, local)
+        self._exchange.begin()
+        self._exchange.finish()
+        sends, receives, counts = _agreed(self._out, self._in, self._every, self._ends, self._words)
+        ranks = [some.rank for some in self.neighbours]
+        return ActiveSum(ranks, sends, receives, counts, self._comm)
+
+    def free(self) -> None:
+        """Gives its messages back to MPI."""
+        if self._exchange is not None:
+            self._exchange.free()
+
+
+class ActiveSum:
+    """Completes sums of a step at nodes that are pushed."""
+
+    def __init__(self, ranks: list[int], sends: Indices, receives: Indices, counts: Ints, comm: Comm) -> None:
+        """``sends`` and ``receives``: slots of the surface_nodes, rank after rank; ``counts`` (ranks, 2): how many of
+        each.
+        """
+        self._sends, self._receives = sends, receives
+        self.shared: Indices = np.concatenate([sends, receives])
+        """Slots of the surface_nodes that are sent or received; some stand there several times."""
+        self._out, self._in = (np.zeros((len(some), _COLUMNS), np.int64) for some in (sends, receives))
+        out, into = (_parts(words, ranks, many) for words, many in zip((self._out, self._in), counts.T, strict=True))
+        self._exchange = comm.exchange(out, into, Tag.CONTACT)
+
+    def number(self, slots: Indices) -> None:
+        """From now on ``slots`` (surface_nodes,) are the rows of what is summed."""
+        self._sends, self._receives = slots[self._sends], slots[self._receives]
+
+    def begin(self, words: Ints, first: int, columns: int) -> None:
+        """Sends the sums of this rank: some columns of ``words`` (rows, k)."""
+        _pack(self._out, self._sends, words, first, columns)
+        self._exchange.begin()
+
+    def finish(self, words: Ints, first: int, columns: int) -> None:
+        """Adds those of the others."""
+        self._exchange.finish()
+        _add(words, first, self._receives, self._in, columns)
+
+    def free(self) -> None:
+        """Gives its messages back to MPI."""
+        self._exchange.free()
+
+
+def _parts(words: Ints, ranks: list[int], counts: Ints) -> list[tuple[int, Ints]]:
+    """The rows of each rank that has any."""
+    parts, end = [], 0
+    for rank, many in zip(ranks, counts.tolist(), strict=True):
+        end += many
+        if many:
+            parts.append((rank, words[end - many : end]))
+    return parts
+
+
+@njit("void(int64[::1], int32[::1], int64[::1], int64[::1], int32[:, ::1], int32[::1])", cache=True)
+def _tell(out, nodes, ends, words, contacts, local):  # type: ignore[no-untyped-def]
+    """Bits of the nodes of each rank in ``out``: which this rank pushes; and, behind them, pushes or holds."""
+    pushed = np.zeros(len(local), np.bool_)
+    for p in range(len(contacts)):
+        for k in range(4):
+            pushed[contacts[p, k]] = True
+    out[:] = 0
+    for r in range(len(ends) - 1):
+        first, behind = words[r], (words[r + 1] - words[r]) // 2
+        for at in range(ends[r], ends[r + 1]):
+            a, place = nodes[at], at - ends[r]
+            word, bit = first + place // _WORD, np.int64(1) << np.int64(place % _WORD)
+            if pushed[a]:
+                out[word] |= bit
+            if pushed[a] or local[a] >= 0:
+                out[word + behind] |= bit
+
+
+@njit(
+    "Tuple((int32[::1], int32[::1], int64[:, ::1]))(int64[::1], int64[::1], int32[::1], int64[::1], int64[::1])",
+    cache=True,
+)
+def _agreed(mine, theirs, nodes, ends, words):  # type: ignore[no-untyped-def]
+    """Nodes to send and nodes to receive, rank after rank, and (ranks, 2) how many of each."""
+    sends, receives = np.empty(len(nodes), np.int32), np.empty(len(nodes), np.int32)
+    counts = np.zeros((len(ends) - 1, 2), np.int64)
+    n, m = 0, 0
+    for r in range(len(ends) - 1):
+        first, behind = words[r], (words[r + 1] - words[r]) // 2
+        for word in range(first, first + behind):
+            to, fro = mine[word] & theirs[word + behind], theirs[word] & mine[word + behind]
+            if to | fro == 0:
+                continue
+            for place in range(_WORD):
+                bit, at = np.int64(1) << np.int64(place), ends[r] + (word - first) * _WORD + place
+                if to & bit:
+                    sends[n] = nodes[at]
+                    n += 1
+                    counts[r, 0] += 1
+                if fro & bit:
+                    receives[m] = nodes[at]
+                    m += 1
+                    counts[r, 1] += 1
+    return sends[:n].copy(), receives[:m].copy(), counts
+
+
+@njit("void(int64[:, ::1], int32[::1], int64[:, ::1], int64, int64)", cache=True)
+def _pack(out, rows, words, first, columns):  # type: ignore[no-untyped-def]
+    for r in range(len(rows)):
+        for i in range(columns):
+            out[r, i] = words[rows[r], first + i]
+
+
+@njit("void(int64[:, ::1], int64, int32[::1], int64[:, ::1], int64)", cache=True)
+def _add(words, first, rows, heard, columns):  # type: ignore[no-untyped-def]
+    for r in range(len(rows)):
+        for i in range(columns):
+            words[rows[r], first + i] += heard[r, i]

@@ -1,0 +1,137 @@
+"""Between the nodes of a rank, those of the surface_nodes, and the slots of the active set.
+
+``held`` (h,) places in the surface_nodes and ``local`` (h,) indices on the rank of the same nodes. ``places`` (slots,)
+where the nodes of the active set stand in the surface_nodes, and ``index`` (surface_nodes,) what each of the
+surface_nodes is on the rank, -1 for a copy.
+"""
+
+import numpy as np
+
+from ...kernels.jit import njit, prefetch, types
+from .active import CHANGED, IMPULSE, MOBILITY, NODES, TOTAL, V
+
+_SMALL = 16
+"""Bits of an impulse that do not count in what is unsettled: 2^-30 of the largest (fixed_point.py), so that the sum
+over 2^28 nodes fits."""
+_AHEAD = 16
+"""How many nodes ahead is brought near what is gathered from the rank's own."""
+_I2, _N1, _N2, _U1 = types.int64[:, ::1], types.int32[::1], types.int32[:, ::1], types.uint8[::1]
+_F1, _F2, _F, _I, _I1, _B1 = (
+    types.float64[::1], types.float64[:, ::1], types.float64, types.int64, types.int64[::1], types.boolean[::1],
+)  # fmt: skip
+
+
+@njit(types.void(_F2, _F2, _N1, _N1), cache=True)
+def gather(out, v, held, local):  # type: ignore[no-untyped-def]
+    """Velocities of the held nodes."""
+    for h in range(len(local)):
+        prefetch(v, 3 * local[min(h + _AHEAD, len(local) - 1)])
+        for i in range(3):
+            out[held[h], i] = v[local[h], i]
+
+
+@njit(types.void(_F2, _F2, _N1, _F2, _F2, _N1, _I, _I), cache=True)
+def take(x, v, held, node_x, node_v, local, first, stop):  # type: ignore[no-untyped-def]
+    """Positions and velocities of the held nodes from ``first`` to ``stop``."""
+    for h in range(first, stop):
+        near = 3 * local[min(h + _AHEAD, len(held) - 1)]
+        prefetch(node_x, near)
+        prefetch(node_v, near)
+        for i in range(3):
+            x[held[h], i], v[held[h], i] = node_x[local[h], i], node_v[local[h], i]
+
+
+@njit(types.void(_U1, _N1, _N2, _N1, _N1, _U1, _I2, _I, _I, _I), cache=True)
+def mark(touched, set_of, nodes, found, zone, shared, many, task, first, stop):  # type: ignore[no-untyped-def]
+    """Sets of the contacts ``found`` from ``first`` to ``stop``, and how ``many`` of each (tasks, sets) this task has.
+
+    Contacts of nodes of one ``zone`` (surface_nodes,) are the set of that, the others the last one; before these come
+    as many sets of contacts with a ``shared`` (surface_nodes,) node. ``nodes`` (room, 4); ``touched`` (surface_nodes,):
+    all their nodes.
+    """
+    sets = many.shape[1] // 2
+    for q in range(first, stop):
+        p = found[q]
+        at, border, other = zone[nodes[p, 0]], False, False
+        for k in range(2 if nodes[p, 1] == nodes[p, 2] else 4):
+            a = nodes[p, k]
+            touched[a] = 1
+            border |= shared[a] != 0
+            other |= zone[a] != at
+        set_of[q] = (0 if border else sets) + (sets - 1 if other else at)
+        many[task, set_of[q]] += 1
+
+
+@njit(_I(_N1, _N1, _U1), cache=True)
+def number(places, slot, touched):  # type: ignore[no-untyped-def]
+    """Numbers what is ``touched`` of a surface_nodes, in its order; returns how many slots there are. ``slot``
+    (surface_nodes,) is the inverse of ``places``. None is touched any more.
+    """
+    n = 0
+    for a in range(len(touched)):
+        places[n], slot[a] = a, n
+        n += touched[a]
+        touched[a] = 0
+    return n
+
+
+@njit(types.void(_N1, _N2, _F1, _I2, _N1, _N1, _N2, _N1, _I, _I, _I), cache=True)
+def sort(row, slots, reach, begins, set_of, found, nodes, slot, task, first, stop):  # type: ignore[no-untyped-def]
+    """Puts the contacts ``found`` from ``first`` to ``stop`` into the order of their sets, all idle: their rows, slots,
+    and ``reach``, -1, for none is known to stay so. ``begins`` (tasks, sets): where those of this task begin, and after
+    it where they end; ``slot`` (surface_nodes,): see ``number``.
+    """
+    for q in range(first, stop):
+        p, kind = found[q], set_of[q]
+        at = begins[task, kind]
+        begins[task, kind] += 1
+        row[at], reach[at] = p, -1.0
+        for k in range(4):
+            slots[at, k] = slot[nodes[p, k]]
+        if nodes[p, 1] == nodes[p, 2]:
+            slots[at, 2] = -1
+
+
+@njit(_F(NODES, _N1, _F2, _F2, _I, _I), cache=True)
+def load(active, places, v, mobility, first, stop):  # type: ignore[no-untyped-def]
+    """Takes velocities and mobilities (surface_nodes, 3) to the slots from ``first`` to ``stop``, all without an
+    impulse. Returns the largest l1 norm of a velocity, m/s.
+    """
+    moving, words, fixed, total, sums = (
+        active.moving, active.moving_words, active.fixed, active.fixed_words, active.row_weights,
+    )  # fmt: skip
+    fastest = 0.0
+    for s in range(first, stop):
+        a = places[s]
+        fastest = max(fastest, abs(v[a, 0]) + abs(v[a, 1]) + abs(v[a, 2]))
+        for i in range(3):
+            moving[s, V + i], fixed[s, MOBILITY + i] = v[a, i], mobility[a, i]
+            words[s, IMPULSE + i] = total[s, TOTAL + i] = sums[s, i] = 0
+        sums[s, 3], total[s, CHANGED], active.path[s] = 0, 0, 0.0
+    return fastest
+
+
+@njit(types.void(_F2, _I2, _I1, _I2, NODES, _N1, _N1, _N1, _B1, _I, _I), cache=True)
+def leave(node_v, parts, unsettled, total, active, places, index, part, owned, first, stop):  # type: ignore[no-untyped-def]
+    """Velocities of the slots from ``first`` to ``stop`` to the nodes that this rank holds, impulses of the step to
+    ``total`` (surface_nodes, 3), and those of owned nodes to the sums of their parts and to what is ``unsettled`` (3,):
+    see sweep_count.py, and how many held nodes were pushed.
+    """
+    moving, words = active.moving, active.fixed_words
+    for s in range(first, stop):
+        a = places[s]
+        h = index[a]
+        size = np.int64(0)
+        for i in range(3):
+            j = words[s, TOTAL + i]
+            size += abs(j)
+            total[a, i] = j
+            if h >= 0:
+                node_v[h, i] = moving[s, V + i]
+                if owned[h]:
+                    parts[part[h], i] += j
+        if h >= 0:
+            unsettled[2] += size != 0
+            if owned[h]:
+                unsettled[0] += words[s, CHANGED] >> _SMALL
+                unsettled[1] += size >> _SMALL

@@ -1,0 +1,234 @@
+"""The impulses of a step: from the active contacts that the narrow phase has found to the velocities v(n+1/2)."""
+
+from typing import Protocol
+
+import numpy as np
+
+from ...model.growing import Scratch
+from ...model.state import Flags, Floats, Indices, Ints, Nodes
+from ...parallel.fixed_point import Tally
+from ...parallel.team import Team
+from .. import tasks
+from ..books import Books
+from ..narrow_phase.rows import ActiveRows
+from ..surface.records import SurfaceNodes
+from . import impulse_work, slot_numbers, stops, sweeps
+from .active import IMPULSE, PUSH, PUSH_T, ActiveContacts, ActiveNodes, Kept, Loaded
+from .sets import Sets, Slots
+from .shared_sums import ActiveSum
+from .stops import Braced, Stops
+from .zones import Zones
+
+_ROW_WEIGHTS = 4
+"""Columns of ``ActiveNodes.row_weights``."""
+_SPARE = 1.25
+"""Times the nodes and contacts there are, room is made for: while a body breaks they become more in nearly every step,
+and the system clears every page of memory that is new. Chosen: a bar of glass has a quarter more after 400 steps."""
+
+
+class Bodies(Protocol):
+    """Rigid bodies, of which a slot is a node (rigid/rows.py)."""
+
+    active: bool
+    """Whether any rank has an active contact with one."""
+
+    def take_up(self, places: Indices, surface_nodes: SurfaceNodes, scale: float) -> None:
+        """Which slots are theirs."""
+
+    def weigh(self, active: ActiveNodes) -> None:
+        """Row weights of these, once all contacts have added theirs; all ranks take part."""
+
+    def give(self, active: ActiveNodes) -> None:
+        """Takes their impulses, and gives them the velocities that the bodies have with these; all ranks take part."""
+
+    def unsettled(self) -> Ints:
+        """See sweep_count.py."""
+
+    def of_contact(self, parts: Ints) -> None:
+        """Adds the impulses of the step to those of the ``parts`` (parts, 3), quanta."""
+
+    def add_pressed(self, pressed: Ints) -> None:
+        """Adds them to those of this rank's nodes, ``pressed`` (nodes, 3), quanta."""
+
+
+class ActiveSet:
+    """The active contacts of a rank in a step, and the slots of their nodes."""
+
+    def __init__(self, scale: float, near: Stops, team: Team, bodies: Bodies | None = None) -> None:
+        """``scale``: quanta per N s, a power of two; ``near``: walls and planes of symmetry; ``bodies``: rigid ones."""
+        self.scale, self.stops, self._bodies = scale, near, bodies
+        self.places: Indices = np.zeros(0, np.int32)
+        """(slots,) where the nodes of the last step stand in the surface_nodes."""
+        self._zones, self._passes = Zones(team.threads), Slots(team)
+        self._sets, self._room = Sets(team, self._zones.many), _Room(0, 0, 0, self._zones.many)
+        self._scratch = Scratch()
+
+    def go_on(self, scale: float, sides: Floats) -> None:
+        """Of a run that goes on; ``sides`` as of its stops."""
+        self.scale, self.stops = scale, self.stops._replace(sides=sides.reshape(self.stops.sides.shape))
+
+    def begin(
+        self, rows: ActiveRows, surface_nodes: SurfaceNodes, loose: Flags, shared: ActiveSum, size: float, dt: float
+    ) -> None:  # fmt: skip
+        """Takes up the contacts that were found in a step ``dt``, s, and the nodes whose sums are ``shared``; ``loose``
+        (nodes,): those without tets; ``size``: of a face, m.
+        """
+        self._sum, found = shared, rows.room
+        if rows.n > len(self._room.row) or surface_nodes.n > len(self._room.touched):
+            self._room = _Room(
+                int(_SPARE * rows.n), int(_SPARE * surface_nodes.n), len(self.stops.points), self._zones.many
+            )
+        room = self._room
+        self._number(rows, self._zones.of(surface_nodes))
+        self._fastest = self._loaded(surface_nodes)
+        stops.find(
+            room.braced,
+            room.active,
+            self.stops,
+            self.places,
+            surface_nodes.x,
+            surface_nodes.part,
+            surface_nodes.local,
+            loose,
+            size,
+            dt,
+        )
+        stops.stop(room.active, room.braced)
+        if self._bodies is not None:
+            self._bodies.take_up(self.places, surface_nodes, self.scale)
+        self._contacts = ActiveContacts(
+            room.row, room.slots, room.reach, found.weights, found.normals, found.wanted, found.friction, found.pair
+        )  # fmt: skip
+
+    def _number(self, rows: ActiveRows, zone: Indices) -> None:
+        """The contacts by sets, all idle, and the slots of their nodes and of shared ones."""
+        room, n, shared, nodes = self._room, rows.n, self._sum.shared, rows.room.nodes
+        many = self._scratch.zeros("many", self._passes.mark.many(n), len(room.loaded.many))
+        room.touched[shared] = room.shared[shared] = 1
+        self._passes.mark.run(n, room.touched, room.set_of, nodes, rows.found, zone, room.shared, many)
+        room.shared[shared] = 0
+        slots = slot_numbers.number(room.places, room.slot, room.touched)
+        if slots != len(self.places) or self.places.base is not room.places.base:
+            self.places = room.places[:slots]
+        self._sum.number(room.slot)
+        counts = many.sum(axis=0)
+        begin = np.cumsum(counts) - counts
+        begins = self._scratch.of("begins", len(many), np.int64, len(counts))
+        np.cumsum(many, axis=0, out=begins)
+        begins += begin - many
+        self._passes.sort.run(
+            n, room.row, room.slots, room.reach, begins, room.set_of, rows.found, nodes, room.slot
+        )  # fmt: skip
+        room.loaded.begin[:-1], room.loaded.begin[-1] = begin, n
+        room.loaded.many[:] = 0
+
+    def _loaded(self, surface_nodes: SurfaceNodes) -> float:
+        fastest = self._scratch.of("fastest", self._passes.load.many(len(self.places)), np.float64)
+        self._passes.load.run(
+            len(self.places), self._room.active, self.places, surface_nodes.v, surface_nodes.mobility, fastest
+        )
+        return float(fastest.max(initial=0.0))
+
+    def weigh(self) -> None:
+        """Row weights, completed over the ranks."""
+        room = self._room
+        table = self._sets.weigh.set(room.active, self._contacts, room.loaded)
+        self._sets.complete(tasks.weigh, table, self._sum, room.active.row_weights, 0, _ROW_WEIGHTS)
+        if self._bodies is not None:
+            self._bodies.weigh(room.active)
+
+    def resume(self, kept: Kept, ratio: float) -> None:
+        """Begins with ``ratio`` times what contacts have ``kept`` of the step before."""
+        room = self._room
+        table = self._sets.resume.set(room.active, self._contacts, room.loaded, kept, ratio, self.scale)
+        self._sets.complete(tasks.resume, table, self._sum, room.active.moving_words, IMPULSE, 3)
+        if self._bodies is not None:
+            self._bodies.give(room.active)
+        self._passes.give.run(len(self.places), room.active, self.scale, False)
+        stops.stop(room.active, room.braced)
+
+    def sweep(self, many: int) -> None:
+        """So many sweeps."""
+        room, scale, bodies = self._room, self.scale, self._bodies
+        if self._sets.alone and not len(self._sum.shared) and (bodies is None or not bodies.active):
+            sweeps.sweep_all(
+                room.active, room.loaded, self._contacts, room.braced, len(self.places), self._fastest, scale, many
+            )  # fmt: skip
+            return
+        for k in range(many):
+            ahead = sweeps.momentum(k, many)
+            table = self._sets.sweep.set(room.active, self._contacts, room.loaded, self._fastest, ahead, scale)
+            self._sets.complete(tasks.sweep, table, self._sum, room.active.moving_words, IMPULSE, 3)
+            if bodies is not None:
+                bodies.give(room.active)
+            self._passes.give.run(len(self.places), room.active, scale, k + 1 == many)
+            stops.stop(room.active, room.braced)
+
+    def cost(self, books: Books, before: Floats, part: Indices) -> None:
+        """Books what the impulses take from the bodies, and what parts give each other where that is asked for;
+        ``before`` (surface_nodes, 3): v(n-1/2), ``part`` (surface_nodes,).
+        """
+        self._add(books.account.words, before, books.account.scale, rubs=False)
+        books.account.carry()
+        for k in range(len(self._room.loaded.many) if len(books.pairs) else 0):
+            impulse_work.between(books.pairs, self._room.loaded, self.places, part, self.scale, k)
+
+    def heat(self, friction: Tally, before: Floats) -> None:
+        """Books the work of friction, see impulse_work.heat."""
+        self._add(friction.words, before, float(friction.scale[0]), rubs=True)
+        friction.carry()
+
+    def _add(self, words: Ints, before: Floats, joule: float, *, rubs: bool) -> None:
+        room = self._room
+        each = self._scratch.zeros("words", len(room.loaded.many), *words.shape)
+        table = self._sets.cost.set(each, room.loaded, room.active, before, self.places, joule, rubs)
+        self._sets.run(tasks.cost, table)
+        words += each.sum(axis=0)
+
+    def store(self, kept: Kept) -> None:
+        """What contacts have ``kept`` of this step."""
+        kept.pairs[:], kept.cracks[:] = 0.0, 0.0
+        self._sets.run(tasks.store, self._sets.store.set(kept, self._room.loaded, self._contacts.pair))
+
+    def leave(self, surface_nodes: SurfaceNodes, total: Ints, state: Nodes, parts: Ints, unsettled: Ints) -> bool:
+        """Gives velocities to the nodes that are held here, and impulses to ``total`` (surface_nodes, 3), to the sums
+        of the ``parts`` (parts, 3) and to what is ``unsettled`` (2,); whether any was pushed.
+        """
+        room, n = self._room, len(self.places)
+        stops.let_go(room.active, room.braced)
+        many = self._passes.leave.many(n)
+        left, pushes = self._scratch.zeros("left", many, 3), self._scratch.zeros("pushes", many, *parts.shape)
+        some = surface_nodes.local, state.part, state.owned
+        self._passes.leave.run(n, state.v, pushes, left, total, room.active, self.places, *some)
+        parts += pushes.sum(axis=0)
+        unsettled += left[:, :2].sum(axis=0)
+        if self._bodies is not None:
+            self._bodies.of_contact(parts)
+            unsettled += self._bodies.unsettled()
+        return bool(left[:, 2].any())
+
+    def press(self, pressed: Ints) -> None:
+        """Adds the impulses of rigid bodies in the step to ``pressed`` (nodes, 3), quanta, where somebody asks."""
+        if self._bodies is not None and len(pressed):
+            self._bodies.add_pressed(pressed)
+
+    def pushes(self) -> tuple[Indices, Floats]:
+        """Which contacts have asked for an impulse in the step, and (k, 4) their impulses along the normal, and of
+        friction, N s.
+        """
+        loaded = self._room.loaded
+        ranges = [range(a, a + n) for a, n in zip(loaded.begin[:-1], loaded.many, strict=True)]
+        some = np.concatenate([np.asarray(each, np.int64) for each in ranges])
+        return loaded.row[some], np.column_stack([loaded.normal[some, PUSH], loaded.tangent[some, PUSH_T:]])
+
+
+class _Room:
+    """Arrays for as many contacts, nodes of the surface_nodes, stops, and zones."""
+
+    def __init__(self, contacts: int, nodes: int, many: int, of: int) -> None:
+        self.row, self.set_of = np.empty((2, contacts), np.int32)
+        self.slots, self.reach = np.empty((contacts, 4), np.int32), np.empty(contacts)
+        self.places, self.slot = np.empty((2, nodes + 1), np.int32)
+        self.touched, self.shared = np.zeros((2, nodes), np.uint8)
+        self.active, self.braced = ActiveNodes.of(nodes), Braced.room(many * nodes)
+        self.loaded = Loaded.of(contacts, 2 * (of + 1))

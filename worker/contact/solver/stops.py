@@ -1,0 +1,170 @@
+"""Walls, and planes of symmetry beside nodes, within the sweeps: what presses on a node there moves it no further.
+
+Walls and mirror images act after contact (walls.py, mirrors.py), node by node. If contact knew nothing of them, a node
+between a body and a wall would give way in every sweep as if it were free, and the wall would take that back when the
+impulses are made. So after every sweep each node that would end the step behind one is stopped there, by an impulse
+that may become smaller in a later sweep, but never pulls, and by friction across it. At the end these impulses are
+taken off again: the boundary gives them to the node anew, and books them. Every rank that has a copy of a node stops it
+alike.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from conoid.cases.model import schema
+from conoid.cases.model.schema import Case
+
+from ...boundaries.walls import ACROSS
+from ...kernels.jit import njit, record, types
+from ...model.state import Flags, Floats, Indices, Ints, Model
+from ...parallel.comm import Comm
+from ...scene.conditions import AXES, part_sides
+from ...scene.selection import named
+from .active import MOBILITY, NODES, V
+
+_NEAR = 0.25
+"""Of the typical size of a face: what is further from a plane is not looked at. Chosen: no step takes a node so far
+(clock.py), and if one did, the boundary would stop it all the same."""
+
+
+class Stops(NamedTuple):
+    """Half spaces."""
+
+    points: Floats
+    """(k, 3), m."""
+    normals: Floats
+    """(k, 3) unit, to the inside."""
+    sides: Floats
+    """(k, parts) 1 where a part stays in front, -1 behind, 0 where it is not held."""
+    friction: Floats
+    """(k,) Coulomb's coefficient."""
+    mirrors: Flags
+    """(k,) which are planes of symmetry: they let nodes without tets pass."""
+
+    @classmethod
+    def of(cls, case: Case, model: Model, comm: Comm) -> "Stops":
+        """Of the walls and planes of symmetry of a case. A part with nodes on both sides of a plane is left to the
+        boundary alone, and so should be what has a prescribed motion, but here only what is held counts. All ranks
+        take part.
+        """
+        walls, planes = case.boundaries_of(schema.Wall), case.boundaries_of(schema.Symmetry)
+        axes = [np.eye(3)[AXES[plane.axis]] for _, plane in planes]
+        heights = [plane.at for _, plane in planes]
+        walls = [(index, wall) for index, wall in walls if wall.plain]
+        points = [wall.point for _, wall in walls] + [at * axis for at, axis in zip(heights, axes, strict=True)]
+        normals = np.array([wall.normal for _, wall in walls] + axes, float).reshape(-1, 3)
+        held = np.zeros((len(points), len(model.parts)))
+        for k, (_, wall) in enumerate(walls):
+            held[k] = named(wall, model.parts)
+        for k, (_, plane) in enumerate(planes, len(walls)):
+            held[k] = part_sides(plane, model, comm)
+        held[:, case.rigid] = 0.0  # rigid bodies have their own (rigid/stops.py)
+        normals /= np.linalg.norm(normals, axis=1)[:, None]
+        friction = np.array([*(wall.friction for _, wall in walls), *(0.0 for _ in planes)])
+        mirrors = np.arange(len(points)) >= len(walls)
+        return cls(np.array(points, float).reshape(-1, 3), normals, held, friction, mirrors)
+
+
+class Braced(NamedTuple):
+    """Slots near stops, one row for each of both."""
+
+    rows: Indices
+    """(room, 2) slot and stop."""
+    normal: Floats
+    """(room, 3) of the stop to the side of the node, without held components."""
+    least: Floats
+    """(room,) the speed along it that takes the node there in the step, m/s."""
+    push: Floats
+    """(room,) change of that speed by the stop so far, m/s."""
+    rub: Floats
+    """(room, 3) change of the velocity across the normal by its friction so far, m/s."""
+    mu: Floats
+    """(room,) its coefficient of friction."""
+    many: Ints
+    """(1,) how many rows."""
+
+    @classmethod
+    def room(cls, n: int) -> "Braced":
+        """For as many."""
+        return cls(
+            np.empty((n, 2), np.int32), np.empty((n, 3)), np.empty(n), np.empty(n), np.empty((n, 3)), np.empty(n),
+            np.zeros(1, np.int64),
+        )  # fmt: skip
+
+
+_F1, _F2, _N1, _N2 = types.float64[::1], types.float64[:, ::1], types.int32[::1], types.int32[:, ::1]
+_B1 = types.boolean[::1]
+STOPS = record(Stops, _F2, _F2, _F2, _F1, _B1)
+BRACED = record(Braced, _N2, _F2, _F1, _F1, _F2, _F1, types.int64[::1])
+
+
+@njit(types.void(BRACED, NODES, STOPS, _N1, _F2, _N1, _N1, _B1, types.float64, types.float64), cache=True)
+def find(braced, active, stops, places, x, part, local, loose, size, dt):  # type: ignore[no-untyped-def]
+    """The slots near a stop in a step ``dt``, s; ``x``, ``part`` and ``local`` of the surface_nodes; ``loose``
+    (nodes,): those of this rank without tets, which are nobody else's; ``size`` of a face, m.
+    """
+    fixed, n = active.fixed, 0
+    for k in range(len(stops.points)):
+        for s in range(len(places)):
+            a = places[s]
+            side = stops.sides[k, part[a]]
+            if side == 0.0 or (stops.mirrors[k] and local[a] >= 0 and loose[local[a]]):
+                continue
+            gap, along = 0.0, 0.0
+            for i in range(3):
+                gap += side * stops.normals[k, i] * (x[a, i] - stops.points[k, i])
+                if fixed[s, MOBILITY + i] > 0.0:
+                    along += stops.normals[k, i] * stops.normals[k, i]
+            if gap < _NEAR * size and along > ACROSS:
+                for i in range(3):
+                    free = fixed[s, MOBILITY + i] > 0.0
+                    braced.normal[n, i] = side * stops.normals[k, i] if free else 0.0
+                    braced.rub[n, i] = 0.0
+                braced.rows[n, 0], braced.rows[n, 1] = s, k
+                braced.least[n], braced.push[n], braced.mu[n] = -gap / dt, 0.0, stops.friction[k]
+                n += 1
+    braced.many[0] = n
+
+
+@njit(types.void(NODES, BRACED), cache=True)
+def stop(active, braced):  # type: ignore[no-untyped-def]
+    """Stops the nodes that would end the step behind, lets go what would not."""
+    v, path, slide = active.moving, active.path, np.empty(3)
+    for r in range(braced.many[0]):
+        s, speed, along = braced.rows[r, 0], 0.0, 0.0
+        for i in range(3):
+            speed += braced.normal[r, i] * v[s, V + i]
+            along += braced.normal[r, i] * braced.normal[r, i]
+        push = max(0.0, braced.push[r] + (braced.least[r] - speed) / along)
+        change = push - braced.push[r]
+        if change != 0.0:
+            braced.push[r] = push
+            for i in range(3):
+                v[s, V + i] += change * braced.normal[r, i]
+                path[s] += abs(change * braced.normal[r, i])
+        if braced.mu[r] > 0.0 and (push > 0.0 or change != 0.0):
+            speed, size = 0.0, 0.0
+            for i in range(3):
+                speed += braced.normal[r, i] * v[s, V + i]
+            for i in range(3):
+                held = active.fixed[s, MOBILITY + i] == 0.0
+                slide[i] = 0.0 if held else braced.rub[r, i] - v[s, V + i] + speed / along * braced.normal[r, i]
+                size += slide[i] * slide[i]
+            most = braced.mu[r] * push
+            share = most / np.sqrt(size) if size > most * most else 1.0
+            for i in range(3):
+                change = share * slide[i] - braced.rub[r, i]
+                braced.rub[r, i] = share * slide[i]
+                v[s, V + i] += change
+                path[s] += abs(change)
+
+
+@njit(types.void(NODES, BRACED), cache=True)
+def let_go(active, braced):  # type: ignore[no-untyped-def]
+    """Takes their impulses off again."""
+    for r in range(braced.many[0]):
+        for i in range(3):
+            active.moving[braced.rows[r, 0], V + i] -= braced.push[r] * braced.normal[r, i] + braced.rub[r, i]
+            braced.rub[r, i] = 0.0
+        braced.push[r] = 0.0

@@ -1,0 +1,201 @@
+"""Impulses that keep active contacts from passing: projected Jacobi sweeps whose order does not matter.
+
+Every contact asks for a normal velocity of at least ``wanted``. A sweep corrects each by its own want over a bound of
+the l1 norm of its row of the contact matrix (Baker, Falgout, Kolev and Yang 2011): the sum over its nodes k and axes i
+of |w_k| |n_i| S_ki / m_k, with S_ki the sum of |w| |n_i| over all contacts at the node. That is exact for one contact
+alone and for any number along one normal, and never an overshoot however many share a node. That bound is far from
+the diagonal where many share a node, and plain sweeps crawl: so every impulse along a normal goes on as it has changed,
+by a share that grows with the sweeps (``momentum``). Impulses never pull; friction is Coulomb's, on the sum over the
+sweeps. Impulses are integers: a contact's add up to zero, and no order of contacts or ranks changes a bit. A pair of a
+node and a face, and nodes across a crack, begin with their impulses of the step before: what sticks does not creep, and
+what is under pressure does not sink in, however few the sweeps are.
+
+Only contacts that have asked for an impulse in the step are swept (loading.py).
+
+Kernels call no kernel within a loop over contacts: records of arrays are counted as references at each call.
+"""
+
+import numpy as np
+
+from ...kernels.jit import njit, types
+from ..narrow_phase.tables import CRACK
+from .active import (  # fmt: skip
+    CHANGED,
+    CONTACTS,
+    IMPULSE,
+    KEPT,
+    LAST,
+    LOADED,
+    MOBILITY,
+    MU,
+    NODES,
+    PUSH,
+    PUSH_T,
+    ROW_NORM,
+    ROW_NORM_T,
+    TOTAL,
+    WANTED,
+    V,
+)
+from .loading import SHARES, load
+from .stops import BRACED, stop
+
+_PAIR, _CRACK = 0.8, 1.0
+"""Share of the last push along the normal that a node and a face begin with, for all of it would lag behind and make
+energy; and nodes across a crack, of which so many press on each other that sweeps cannot make up for any of it
+(docs/theory/contact.md, "Dust under pressure")."""
+
+_ROWS, _F, _I = types.int32[::1], types.float64, types.int64
+
+
+@njit(types.void(NODES, CONTACTS, LOADED, _I), cache=True)
+def add_row_weights(active, contacts, loaded, k):  # type: ignore[no-untyped-def]
+    """Adds |w| |n_i| and |w| of the contacts of set ``k`` to the row weights of their nodes, in quanta."""
+    sums, slots, weights, normals = active.row_weights, contacts.slots, contacts.weights, contacts.normals
+    for q in range(loaded.begin[k], loaded.begin[k + 1]):
+        p, two = contacts.row[q], slots[q, 2] < 0
+        for m in range(2 if two else 4):
+            a, weight = slots[q, m], SHARES if two else abs(weights[p, m]) * SHARES
+            for i in range(3):
+                sums[a, i] += np.int64(np.rint(weight * abs(normals[p, i])))
+            sums[a, 3] += np.int64(np.rint(weight))
+
+
+@njit(types.void(NODES, LOADED, KEPT, _ROWS, _F, _F, _I), cache=True)
+def resume(active, loaded, kept, pair, ratio, scale, k):  # type: ignore[no-untyped-def]
+    """The loaded contacts of set ``k`` begin with ``ratio`` times what they have ``kept``, along and across the normal
+    as it is now: over the row norms as they are now, so that a node that has separated, and is lighter, or that shares
+    its load with others begins with less.
+    """
+    words, normal, tangent, slots, row = active.moving_words, loaded.normal, loaded.tangent, loaded.slots, loaded.row
+    pairs, cracks, last = kept.pairs, kept.cracks, np.empty(4)
+    for q in range(loaded.begin[k], loaded.begin[k] + loaded.many[k]):
+        p, along = pair[row[q]], 0.0
+        for i in range(4):
+            last[i] = pairs[p, i] if p >= 0 else cracks[CRACK - p, i]
+        for i in range(3):
+            along += last[1 + i] * normal[q, i]
+        normal[q, PUSH] = normal[q, LAST] = (_PAIR if p >= 0 else _CRACK) * ratio * last[0] / normal[q, ROW_NORM]
+        for i in range(3):
+            tangent[q, PUSH_T + i] = ratio * (last[1 + i] - along * normal[q, i]) / tangent[q, ROW_NORM_T]
+            change = normal[q, PUSH] * normal[q, i] + tangent[q, PUSH_T + i]
+            rest = np.int64(0)
+            for j in range(1, 4 if p >= 0 else 2):
+                part = np.int64(np.rint(tangent[q, j] * change * scale))
+                words[slots[q, j], IMPULSE + i] += part
+                rest += part
+            words[slots[q, 0], IMPULSE + i] -= rest
+
+
+@njit(types.float64(_I, _I), cache=True)
+def momentum(k, many):  # type: ignore[no-untyped-def]
+    """How far impulses go on in sweep ``k`` of ``many`` as they have changed (Nesterov 1983; Mazhar, Heyn, Negrut and
+    Tasora 2015 for contact); not at all in the last, which ends with impulses that a plain sweep has made.
+    """
+    return k / (k + 3.0) if k + 1 < many else 0.0
+
+
+@njit(types.void(NODES, LOADED, _F, _F, _I), cache=True, error_model="numpy")
+def sweep(active, loaded, ahead, scale, k):  # type: ignore[no-untyped-def]
+    """Adds the corrections of the loaded contacts of set ``k`` to the impulses of their nodes; they add up to zero.
+    ``ahead``: of what an impulse along the normal has changed by since the last sweep, how much it goes on.
+    """
+    values, words = active.moving, active.moving_words
+    first = loaded.begin[k]
+    normal, tangent, slots = loaded.normal[first:], loaded.tangent[first:], loaded.slots[first:]
+    rate, change = np.empty(3), np.empty(3)
+    for q in range(loaded.many[k]):
+        a, b, c, d = slots[q, 0], slots[q, 1], slots[q, 2], slots[q, 3]
+        speed = 0.0
+        for i in range(3):
+            if c < 0:
+                rate[i] = 0.0 + values[a, V + i] - values[b, V + i]
+            else:
+                rate[i] = 0.0 + tangent[q, 0] * values[a, V + i] + tangent[q, 1] * values[b, V + i]
+                rate[i] = rate[i] + tangent[q, 2] * values[c, V + i] + tangent[q, 3] * values[d, V + i]
+            speed += normal[q, i] * rate[i]
+        old, mu = normal[q, PUSH], normal[q, MU]
+        least = max(0.0, old + (normal[q, WANTED] - speed) / normal[q, ROW_NORM])
+        push = max(0.0, least + ahead * (least - normal[q, LAST]))
+        normal[q, LAST] = least
+        if push == old and (old == 0.0 or mu == 0.0):
+            continue
+        normal[q, PUSH] = push
+        for i in range(3):
+            change[i] = (push - old) * normal[q, i]
+        if mu > 0.0:
+            size = 0.0
+            for i in range(3):
+                rate[i] = tangent[q, PUSH_T + i] - (rate[i] - speed * normal[q, i]) / tangent[q, ROW_NORM_T]
+                size += rate[i] * rate[i]
+            most = mu * push
+            factor = most / np.sqrt(size) if size > most * most else 1.0
+            for i in range(3):
+                change[i] += factor * rate[i] - tangent[q, PUSH_T + i]
+                tangent[q, PUSH_T + i] = factor * rate[i]
+        for i in range(3):
+            if c < 0:
+                rest = np.int64(np.rint(-change[i] * scale))
+            else:
+                rest = np.int64(np.rint(tangent[q, 1] * change[i] * scale))
+                part = np.int64(np.rint(tangent[q, 2] * change[i] * scale))
+                last = np.int64(np.rint(tangent[q, 3] * change[i] * scale))
+                words[c, IMPULSE + i] += part
+                words[d, IMPULSE + i] += last
+            words[b, IMPULSE + i] += rest
+            if c >= 0:
+                rest += part + last
+            words[a, IMPULSE + i] -= rest
+
+
+@njit(types.void(NODES, _F, types.boolean, _I, _I), cache=True)
+def give(active, scale, last, first, stop):  # type: ignore[no-untyped-def]
+    """Turns the completed impulses of a sweep at the slots from ``first`` to ``stop`` into velocities, adds them to
+    those of the step and clears them; keeps how much they are in the ``last`` sweep of a step.
+    """
+    v, words, path = active.moving[first:stop], active.moving_words[first:stop], active.path[first:stop]
+    mobility, total, a_quantum = active.fixed[first:stop], active.fixed_words[first:stop], 1.0 / scale
+    if last:
+        for s in range(stop - first):
+            total[s, CHANGED] = abs(words[s, IMPULSE]) + abs(words[s, IMPULSE + 1]) + abs(words[s, IMPULSE + 2])
+    for s in range(stop - first):
+        if words[s, IMPULSE] | words[s, IMPULSE + 1] | words[s, IMPULSE + 2]:
+            length = 0.0
+            for i in range(3):
+                j = words[s, IMPULSE + i]
+                change = j * (mobility[s, MOBILITY + i] * a_quantum)
+                length += abs(change)
+                v[s, V + i] += change
+                total[s, TOTAL + i] += j
+                words[s, IMPULSE + i] = 0
+            path[s] += length
+
+
+@njit(types.void(NODES, LOADED, CONTACTS, BRACED, _I, _F, _F, _I), cache=True)
+def sweep_all(active, loaded, contacts, braced, n, fastest, scale, many):  # type: ignore[no-untyped-def]
+    """``many`` sweeps (``load``, ``sweep``, ``give``, ``stop``) of all sets and ``n`` slots, none of them shared."""
+    for k in range(many):
+        for each in range(len(loaded.many)):
+            load(loaded, contacts, active, fastest, each)
+            sweep(active, loaded, momentum(k, many), scale, each)
+        give(active, scale, k + 1 == many, 0, n)
+        stop(active, braced)
+
+
+@njit(types.void(KEPT, LOADED, _ROWS, _I), cache=True)
+def store(kept, loaded, pair, k):  # type: ignore[no-untyped-def]
+    """What the loaded contacts of set ``k`` have ``kept``: their impulses times their row norms."""
+    pairs, cracks, normal, tangent, row = kept.pairs, kept.cracks, loaded.normal, loaded.tangent, loaded.row
+    last = np.empty(4)
+    for q in range(loaded.begin[k], loaded.begin[k] + loaded.many[k]):
+        p = pair[row[q]]
+        last[0] = normal[q, PUSH] * normal[q, ROW_NORM]
+        if not last[0] > 0.0:
+            continue
+        for i in range(3):
+            last[1 + i] = tangent[q, PUSH_T + i] * tangent[q, ROW_NORM_T]
+        for i in range(4):
+            if p >= 0:
+                pairs[p, i] = last[i]
+            elif p <= CRACK:
+                cracks[CRACK - p, i] = last[i]

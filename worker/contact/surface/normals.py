@@ -1,0 +1,110 @@
+"""Mean normals of the nodes of the surface, and where their faces lie: which faces a node may meet (node_face.facing).
+
+They are taken anew at every ``EVERY``-th step and when erosion has changed the surface; a face that a crack exposes in
+between adds its share to its nodes. So they depend on the steps alone, not on when candidates were searched.
+"""
+
+import numpy as np
+
+from ...kernels.jit import njit
+from ...mesh.faces import FACES
+from ...model.state import WIDE, Flags, Floats, Indices, Ints, Model
+from ...parallel.comm import Comm
+from ...parallel.ownership import Neighbour, complete
+from ...parallel.tags import Tag
+from ..solver.loading import SHARES
+
+EVERY = 16
+"""Steps. A fragment that turns at 1e5 rad/s (100 m/s over 1 mm) turns by 3 degrees meanwhile."""
+COLUMNS, SHARE = 12, 18
+"""Sums of a node, and what a face adds to those of its three."""
+_NOTHING = 1e-300
+"""m^2: keeps a face of no area from a division by zero."""
+
+
+def moments(model: Model, planes: Flags, size: float, neighbours: list[Neighbour], comm: Comm) -> Ints:
+    """(nodes, COLUMNS) sums over the exposed faces of all ranks at each node: area times n, times n n (xx, yy, zz, yz,
+    zx, xy), and times the unit vector from the node to the middle of the face's other side, in quanta of ``size``^2 /
+    SHARES m^2; all ranks take part. ``planes``: see surface.build.
+    """
+    sums = np.zeros((model.nodes.n, COLUMNS), np.int64)
+    for block in model.blocks:
+        _add_exposed(sums, model.nodes.x, block.tets, block.across, block.bond, planes, SHARES / size**2)
+    complete(comm, neighbours, sums, Tag.NORMAL)
+    return sums
+
+
+def means(sums: Ints) -> Floats:
+    """(n, COLUMNS) means by area of n, n n and the ways to the faces; zero where there is no face."""
+    area = sums[:, 3:6].sum(axis=1)
+    return np.asarray(sums / np.where(area > 0, area, 1)[:, None])
+
+
+def shares(x: Floats, faces: Indices, size: float) -> Ints:
+    """(f, SHARE) what each of the ``faces`` (f, 3) adds to the ``moments`` of its nodes: 9 words to those of all, and 3
+    more to those of each.
+    """
+    out = np.empty((len(faces), SHARE), np.int64)
+    for f in range(len(faces)):
+        a, b, c = faces[f]
+        _share(out[f], x, a, b, c, SHARES / size**2)
+    return out
+
+
+@njit("void(int64[::1], float64[:, ::1], int64, int64, int64, float64)", cache=True, error_model="numpy")
+def _share(out, x, a, b, c, scale):  # type: ignore[no-untyped-def]
+    ways = np.empty((3, 3))
+    ex, ey, ez = x[b, 0] - x[a, 0], x[b, 1] - x[a, 1], x[b, 2] - x[a, 2]
+    fx, fy, fz = x[c, 0] - x[a, 0], x[c, 1] - x[a, 1], x[c, 2] - x[a, 2]
+    nx, ny, nz = ey * fz - ez * fy, ez * fx - ex * fz, ex * fy - ey * fx
+    size = max(np.sqrt(nx * nx + ny * ny + nz * nz), _NOTHING)
+    moments = nx, ny, nz, nx * nx / size, ny * ny / size, nz * nz / size, ny * nz / size, nz * nx / size, nx * ny / size
+    for i in range(9):
+        out[i] = np.int64(np.rint(moments[i] * scale))
+    for i in range(3):
+        to, fro = x[b, i] - x[a, i], x[c, i] - x[a, i]
+        ways[0, i], ways[1, i], ways[2, i] = to + fro, fro - 2.0 * to, to - 2.0 * fro
+    for m in range(3):
+        length = np.sqrt(ways[m, 0] ** 2 + ways[m, 1] ** 2 + ways[m, 2] ** 2)
+        for i in range(3):
+            out[9 + 3 * m + i] = np.int64(np.rint(ways[m, i] * (size / max(length, _NOTHING)) * scale))
+
+
+@njit("void(int64[:, ::1], int64, int64[::1], int64)", cache=True)
+def _add(sums, node, share, corner):  # type: ignore[no-untyped-def]
+    """The ``share`` of a face to the sums of the node that is its ``corner``."""
+    for i in range(9):
+        sums[node, i] += share[i]
+    for i in range(3):
+        sums[node, 9 + i] += share[9 + 3 * corner + i]
+
+
+@njit(
+    "void(int64[:, ::1], float64[:, ::1], uint32[:, ::1], int32[:, ::1], uint8[:, ::1], boolean[:, ::1], float64)",
+    cache=True,
+)
+def _add_exposed(sums, x, tets, across, bond, planes, scale):  # type: ignore[no-untyped-def]
+    share = np.empty(SHARE, np.int64)
+    for e in range(len(tets)):
+        for k in range(4):
+            if across[e, k] >= 0 and not (len(bond) > 0 and bond[e, k] == WIDE):
+                continue
+            a, b, c = tets[e, FACES[k, 0]], tets[e, FACES[k, 1]], tets[e, FACES[k, 2]]
+            mirrored = False
+            for i in range(planes.shape[1]):
+                mirrored |= planes[a, i] and planes[b, i] and planes[c, i]
+            if mirrored:
+                continue
+            _share(share, x, a, b, c, scale)
+            _add(sums, a, share, 0)
+            _add(sums, b, share, 1)
+            _add(sums, c, share, 2)
+
+
+@njit("void(int64[:, ::1], int64[:, ::1], int32[:, ::1])", cache=True)
+def add(sums, some, faces):  # type: ignore[no-untyped-def]
+    """Adds ``some`` shares (f, SHARE) to the sums of the nodes of ``faces`` (f, 3); -1 for nodes that are not here."""
+    for f in range(len(faces)):
+        for m in range(3):
+            if faces[f, m] >= 0:
+                _add(sums, faces[f, m], some[f], m)

@@ -1,0 +1,240 @@
+"""Edges: where two faces of the surface meet; those that are sharp, at an angle, can meet other edges.
+
+A half edge is an edge as one face sees it, (a, b) of the face abc. Every two half edges that run against each other
+between the same nodes make an edge, but those of the two sides of one facet. An edge is sharp when its faces meet at an
+angle at the start, or have done so, and bulge, when all are looked at: every normals.EVERY steps, or every
+PRESSED: flow makes edges, too. So it depends on the steps alone, not on when candidates were searched.
+"""
+
+import math
+
+import numpy as np
+
+from ...kernels.jit import njit
+from ...materials.turning import sine_and_cosine
+from ...model.ids import among
+from ...model.state import Bits, Flags, Floats, Indices, Ints, Model
+from ...parallel.comm import Comm
+from ...parallel.ownership import Neighbour, ranks
+from ..geometry import at, cross, dot, lowest_height, minus
+from ..narrow_phase.tables import DEEP, DEEP_SELF
+from .records import Edges, Faces
+
+SHARP = sine_and_cosine(math.radians(25.0))[1]
+"""Edges between faces whose normals differ by more than this can meet other edges."""
+BENT, PRESSED = sine_and_cosine(math.radians(5.0))[1], 4
+"""The same of parts that are pressed together beyond their strength (cases/estimates/impact.py), and after how many
+steps edges are looked at there: ridges of surfaces that were flat cross without a node inside, and what overlaps has no
+pressure. Chosen by flyer plates of copper at 1 to 2.4 km/s (docs/theory/contact.md, "Ridges under pressure")."""
+
+_A, _B, _C, _D, _OWNER, _TOP, _FACE, _OPEN, _LENGTH, _LOW, _NORMAL = range(11)
+"""Columns of a half edge that travels: its nodes, the third node of its face and the one opposite, the owners of these
+two, the face, how far that is open, initial length, m, the lowest initial height of its tet, m, and the unit normal of
+the face; floats as their bits."""
+_HALF, _ROW = 13, 17
+"""Columns of a half edge, and of an edge (``_matched``)."""
+
+
+def none() -> tuple[Edges, Ints, Indices]:
+    """No edge (``find``)."""
+    nothing = np.zeros((0, 6), np.int64)
+    lengths = np.zeros(0), np.zeros(0)
+    edges = Edges(nothing, nothing[:, :2], *lengths, np.zeros((0, 2), np.uint8), np.zeros(0, bool))
+    return edges, np.zeros(0, np.int64), np.zeros(0, np.int32)
+
+
+def find(
+    model: Model,
+    faces: Faces,
+    local: Indices,
+    units: Floats,
+    some: Flags,
+    opened: Bits,
+    neighbours: list[Neighbour],
+    comm: Comm,
+) -> tuple[Edges, Ints, Indices]:
+    """The edges by the ids of their faces, and ids of the nodes of theirs that are not held here, with their owners.
+
+    Of ``some`` (f,) of the faces, with the ``local`` nodes (f, 4) and unit normals (f, 3); ``opened`` (f,): see Edges.
+    Where other ranks may hold faces of an edge, the owner of the lower node brings them together, and the rank of the
+    face of smaller id has the edge.
+    """
+    half = np.repeat(some[:, None], 3, axis=1)
+    away = half & _common(local, model.nodes.n, neighbours) if neighbours else np.zeros_like(half)
+    pairs = _pairs(local, half & ~away, units, model.nodes.n, SHARP)
+    n, heights = len(pairs), _heights(local, model.nodes.x0)
+    nodes, sides, either = np.empty((n, 6), np.int64), np.empty((n, 2), np.int64), np.empty((n, 2), np.uint8)
+    size, low = np.empty((2, n))
+    _fill(nodes, sides, size, low, either, pairs, local, faces.nodes, faces.id, opened, model.nodes.x0, heights)
+    edges = Edges(nodes, sides, size, depths(size, low), either, pairs[:, 4] > 0)
+    if comm.size == 1:
+        return edges, *none()[1:]
+    rows = _elsewhere(model, faces, local, units, heights, away, opened, comm)
+    size, low = np.ascontiguousarray(rows[:, 12:14].T).view(np.float64)
+    far = Edges(rows[:, :6], rows[:, 10:12], size, depths(size, low), rows[:, 14:16].astype(np.uint8), rows[:, 16] > 0)
+    edges = Edges.joined([edges, far])
+    ends, owners = rows[:, 2:6].reshape(-1), rows[:, 6:10].reshape(-1)
+    absent = ~among(model.nodes.id, ends)
+    missing, first = np.unique(ends[absent], return_index=True)
+    edges = edges.take(np.lexsort((edges.sides[:, 1], edges.sides[:, 0])))
+    return edges, missing, owners[absent][first].astype(np.int32)
+
+
+def depths(size: Floats, low: Floats) -> Floats:
+    """(e,) how deep edges of the initial length ``size`` hold, m, whose tets are as ``low`` at the start."""
+    return np.maximum(DEEP * np.minimum(size, low), DEEP_SELF * size)
+
+
+def _common(local: Indices, n: int, neighbours: list[Neighbour]) -> Flags:
+    """(f, 3) which half edges have two of the ``n`` nodes that other ranks hold, too."""
+    shared = np.zeros(n, bool)
+    for other in neighbours:
+        shared[other.nodes] = True
+    a, b = shared[local[:, :3]], shared[local[:, [1, 2, 0]]]
+    return np.asarray(a & b)
+
+
+def _elsewhere(
+    model: Model, faces: Faces, local: Indices, units: Floats, heights: Floats, away: Flags, opened: Bits, comm: Comm
+) -> Ints:
+    """Rows (``_matched``) of this rank's edges among the half edges ``away`` (f, 3); ``heights`` (f,): lowest of
+    their tets, m; all ranks take part.
+    """
+    nodes, (f, k) = model.nodes, np.nonzero(away)
+    a, b, c, d = (*(local[f, (k + i) % 3] for i in range(3)), local[f, 3])
+    floats = np.column_stack([np.linalg.norm(nodes.x0[b] - nodes.x0[a], axis=1), heights[f], units[f]]).view(np.int64)
+    known = *(nodes.id[some] for some in (a, b, c, d)), nodes.owner[c], nodes.owner[d], faces.id[f], opened[f]
+    halves, home = np.column_stack([*known, floats]), nodes.owner[np.minimum(a, b)]
+    found = comm.swap({rank: halves[home == rank] for rank in ranks(home)})
+    gathered = np.concatenate([halves[:0], *(words.reshape(-1, _HALF) for words in found.values())])
+    sender = np.repeat(np.array(list(found), np.int64), [len(words) // _HALF for words in found.values()])
+    rows, target = _matched(gathered, sender)
+    back = comm.swap({rank: rows[target == rank] for rank in ranks(target)})
+    return np.concatenate([rows[:0], *(words.reshape(-1, _ROW) for words in back.values())])
+
+
+def _matched(halves: Ints, sender: Ints) -> tuple[Ints, Ints]:
+    """Rows (nodes of records.Edges, owners of the last four, face abc, face bad, length, lowest height of either tet,
+    how far either face is open, whether it is sharp) of the edges of ``halves``, and the sender of the first face of
+    each.
+    """
+    order = np.argsort(halves[:, _FACE], kind="stable")
+    halves, sender = halves[order], sender[order]
+    ids, corners = np.unique(halves[:, : _C + 1], return_inverse=True)
+    half = np.zeros((len(halves), 3), bool)
+    half[:, 0] = True
+    units = np.ascontiguousarray(halves[:, _NORMAL:]).view(np.float64)
+    pairs = _pairs(corners.reshape(-1, 3).astype(np.int32), half, units, len(ids), SHARP)
+    one, two = halves[pairs[:, 0]], halves[pairs[:, 2]]
+    others = (np.column_stack([one[:, k], two[:, k]]) for k in (_C, _D, _OWNER, _TOP, _FACE))
+    opened = np.column_stack([one[:, _OPEN], two[:, _OPEN]])
+    low = np.minimum(one[:, _LOW], two[:, _LOW])
+    rows = np.column_stack([one[:, [_A, _B]], *others, one[:, _LENGTH], low, opened, pairs[:, 4]])
+    return rows, sender[pairs[:, 0]]
+
+
+@njit("int32[:, ::1](int32[:, ::1], boolean[:, ::1], float64[:, ::1], int64, float64)", cache=True)
+def _pairs(corners, half, units, nodes, sharp):  # type: ignore[no-untyped-def]
+    """(p, 5) edges: a face, which of its half edges, the same of the other face, and whether it is sharp; by face, then
+    by face.
+
+    ``corners`` (f, 3 or more) of faces by ascending id, fewer than ``nodes``; ``half`` (f, 3): which of their half
+    edges, k from corner k to the next, count; ``sharp``: cosine of the least angle between their ``units``.
+    """
+    begin = _by_lower_node(corners, half, nodes)
+    at, higher, which = begin[:-1].copy(), np.empty(begin[nodes], np.int32), np.empty(begin[nodes], np.int32)
+    for f in range(len(corners)):
+        for k in range(3):
+            if half[f, k]:
+                a, b = corners[f, k], corners[f, (k + 1) % 3]
+                higher[at[min(a, b)]], which[at[min(a, b)]] = max(a, b), 3 * f + k
+                at[min(a, b)] += 1
+    found, n = np.empty((len(which) // 2 + 1, 5), np.int32), 0
+    at[:] = begin[:-1]
+    for f in range(len(corners)):
+        first = n
+        for k in range(3):
+            if not half[f, k]:
+                continue
+            a, b, c = corners[f, k], corners[f, (k + 1) % 3], corners[f, (k + 2) % 3]
+            low, high = min(a, b), max(a, b)
+            at[low] += 1
+            for i in range(at[low], begin[low + 1]):
+                if higher[i] != high:
+                    continue
+                g, m = which[i] // 3, which[i] % 3
+                if corners[g, m] == a or corners[g, (m + 2) % 3] == c:
+                    continue
+                cosine = units[f, 0] * units[g, 0] + units[f, 1] * units[g, 1] + units[f, 2] * units[g, 2]
+                if n == len(found):
+                    found = np.concatenate((found, np.empty_like(found)))
+                j = n
+                while j > first and found[j - 1, 2] > g:
+                    found[j] = found[j - 1]
+                    j -= 1
+                found[j, 0], found[j, 1], found[j, 2], found[j, 3], found[j, 4] = f, k, g, m, cosine < sharp
+                n += 1
+    return found[:n].copy()
+
+
+@njit("int64[::1](int32[:, ::1], boolean[:, ::1], int64)", cache=True)
+def _by_lower_node(corners, half, nodes):  # type: ignore[no-untyped-def]
+    """(nodes + 1,) where the half edges of each lower node begin."""
+    begin = np.zeros(nodes + 1, np.int64)
+    for f in range(len(corners)):
+        for k in range(3):
+            if half[f, k]:
+                begin[min(corners[f, k], corners[f, (k + 1) % 3]) + 1] += 1
+    for a in range(nodes):
+        begin[a + 1] += begin[a]
+    return begin
+
+
+@njit(
+    "void(int64[:, ::1], int64[:, ::1], float64[::1], float64[::1], uint8[:, ::1], int32[:, ::1], int32[:, ::1], "
+    "int64[:, ::1], int64[::1], uint8[::1], float64[:, ::1], float64[::1])",
+    cache=True,
+)
+def _fill(nodes, sides, size, low, opened, pairs, local, face_nodes, face_id, face_opened, x, heights):  # type: ignore[no-untyped-def]
+    """The columns of the edges that are ``pairs``, with the ``low`` height of their tets of the ``heights`` (f,)."""
+    for p in range(len(pairs)):
+        f, k, g, m = pairs[p, 0], pairs[p, 1], pairs[p, 2], pairs[p, 3]
+        for i in range(3):
+            nodes[p, i] = face_nodes[f, (k + i) % 3]
+        nodes[p, 3], nodes[p, 4], nodes[p, 5] = face_nodes[g, (m + 2) % 3], face_nodes[f, 3], face_nodes[g, 3]
+        sides[p, 0], sides[p, 1] = face_id[f], face_id[g]
+        opened[p, 0], opened[p, 1] = face_opened[f], face_opened[g]
+        a, b = local[f, k], local[f, (k + 1) % 3]
+        dx, dy, dz = x[b, 0] - x[a, 0], x[b, 1] - x[a, 1], x[b, 2] - x[a, 2]
+        size[p], low[p] = np.sqrt(dx * dx + dy * dy + dz * dz), min(heights[f], heights[g])
+
+
+@njit("float64[::1](int32[:, ::1], float64[:, ::1])", cache=True)
+def _heights(local, x):  # type: ignore[no-untyped-def]
+    """(f,) lowest height of the tet of each face, of ``local`` nodes (f, 4), m."""
+    low = np.empty(len(local))
+    for f in range(len(local)):
+        low[f] = lowest_height(x, local[f, 0], local[f, 1], local[f, 2], local[f, 3])
+    return low
+
+
+@njit(
+    "boolean[::1](boolean[::1], int32[:, ::1], boolean[::1], float64[:, ::1], int32[::1], float64[::1])",
+    cache=True,
+)
+def turned(sharp, corners, meets, x, part, least):  # type: ignore[no-untyped-def]
+    """(e,) which edges whose faces allow that others meet them, ``meets``, are not ``sharp`` yet, bulge at the
+    positions ``x`` (slots, 3), m, and have faces whose normals have a cosine below the ``least`` (parts,) of their
+    ``part`` (slots,); ``corners`` (e, 6): see records.Edges.
+    """
+    found = np.zeros(len(sharp), np.bool_)
+    for e in range(len(sharp)):
+        a, b = corners[e, 0], corners[e, 1]
+        if sharp[e] or a == b or not meets[e]:
+            continue
+        o = at(x, a)
+        u, to, fro = minus(at(x, b), o), minus(at(x, corners[e, 2]), o), minus(at(x, corners[e, 3]), o)
+        one, two = cross(u, to), cross(fro, u)
+        cosine = dot(one, two) / np.sqrt(dot(one, one) * dot(two, two))
+        found[e] = dot(one, fro) < 0.0 and cosine < least[part[a]]
+    return found
