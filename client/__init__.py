@@ -7,11 +7,11 @@ and gives its result; a result is viewed.
 from conoid.cases.reading.problems import CaseError, ConoidError
 
 from .errors import ClientError, NotFoundError, ServiceError, UnfinishedError, UnreachableError, ViewError
+from .remote.run_info import RunInfo
 from .remote.session import Session, connect
-from .remote.told import RunInfo
 from .result import Result
 from .run import Run
-from .sweeps.found import Found
+from .sweeps.adaptive_result import Found
 from .sweeps.sweep import Sweep
 
 __all__ = [

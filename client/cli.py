@@ -13,12 +13,12 @@ from conoid.cases.load import CaseError
 from conoid.cases.run import ExitCode
 from conoid.cases.shapes.loaded import loads
 
-from .commands import benches, commands, converging, hard, listing, reports, shelf, sweeping, validated, viewing
+from .commands import benches, converging, hard, listing, reports, server_runs, shipped, sweeping, validated, viewing
 from .commands.batch import batch_run
 from .commands.console import echo, echo_json, one_line, prepare
 from .commands.helping import Grouped
-from .commands.once import run_once
 from .commands.options import CaseArgument, Json, Overrides, Ranks, Threads, aloud, complain, on_cores, show, warn
+from .commands.run_command import run_once
 from .decks.command import import_deck
 from .drawing.fields import FIELDS
 from .errors import ClientError
@@ -127,16 +127,16 @@ def validate(case: CaseArgument, overrides: Overrides = None, as_json: Json = Fa
     show(validated.estimate_table(checked, expected))
 
 
-app.command(short_help="Hand a case to the server.")(commands.submit)
+app.command(short_help="Hand a case to the server.")(server_runs.submit)
 app.command(name="runs", short_help="List runs: which run was it.")(listing.runs)
 app.command(name="ls", hidden=True)(listing.runs)
-app.command(name="show", short_help="Show one run: where it is, or how it ended.")(commands.show_run)
-app.command(name="watch", short_help="Follow a run until it ends.")(commands.watch_run)
-app.command(short_help="Stop a run at its next step.")(commands.cancel)
-app.command(short_help="Ask a run for a checkpoint.")(commands.checkpoint)
-app.command(short_help="Ask a run for a snapshot of its fragments.")(commands.snapshot)
-app.command(short_help="Go on from a checkpoint of a run.")(commands.restart)
-app.command(short_help="Copy the files of a run here.")(commands.get)
+app.command(name="show", short_help="Show one run: where it is, or how it ended.")(server_runs.show_run)
+app.command(name="watch", short_help="Follow a run until it ends.")(server_runs.watch_run)
+app.command(short_help="Stop a run at its next step.")(server_runs.cancel)
+app.command(short_help="Ask a run for a checkpoint.")(server_runs.checkpoint)
+app.command(short_help="Ask a run for a snapshot of its fragments.")(server_runs.snapshot)
+app.command(short_help="Go on from a checkpoint of a run.")(server_runs.restart)
+app.command(short_help="Copy the files of a run here.")(server_runs.get)
 app.command(name="batch", short_help="Hand a case to Slurm, without a server.")(batch_run)
 app.command(name="view", short_help="Draw frames, off screen.")(viewing.view_frames)
 app.command(name="replay-balance", short_help="Show the loads of a run under another balance policy.")(
@@ -174,9 +174,9 @@ def run_case(
     raise typer.Exit(run_once(case, chosen, out, picture, field, plain=plain, check=check, as_json=as_json))
 
 
-app.add_typer(shelf.cases, name="cases")
-app.command(short_help="Print the keys of a case, for editors or people.")(shelf.schema)
-app.command(short_help="List the material library, or one material.")(shelf.materials)
+app.add_typer(shipped.cases, name="cases")
+app.command(short_help="Print the keys of a case, for editors or people.")(shipped.schema)
+app.command(short_help="List the material library, or one material.")(shipped.materials)
 
 
 def main() -> None:

@@ -20,10 +20,10 @@ from conoid.cases.run import State
 from conoid.cases.units import parse_quantity
 
 from .columns import Columns, joined, read_columns
-from .drawing.look import FILMS
 from .drawing.picture import Drawn
 from .drawing.planes import Mirror, Wall
 from .drawing.scene import Scene, draw
+from .drawing.view_options import FILMS
 from .errors import ClientError, LookError, NotFoundError, UnfinishedError, ViewError
 from .journal import from_line
 from .local.folders import Folder, LocalFolder
@@ -203,8 +203,8 @@ class Result:
         """Draws frames: as a PNG, side by side where there are several, or as a film (``out`` ends in .gif or .mp4).
 
         ``frame`` has their numbers, ``time`` times in s or as ``"60 us"``, of each the nearest frame. Without both it
-        is the last one, of a film every one. ``options`` are the fields of ``conoid.client.drawing.look.Look``. Raises
-        ViewError.
+        is the last one, of a film every one. ``options`` are the fields of ``conoid.client.drawing.view_options.Look``.
+        Raises ViewError.
         """
         every = str(out or "").lower().endswith(FILMS)
         if not self.frames:

@@ -18,10 +18,10 @@ from conoid.cases.output import keys
 
 from .errors import ClientError, NotFoundError, ServiceError, UnfinishedError, UnreachableError, passes
 from .live import Live
-from .local.places import inside, quoted
+from .local.safe_paths import inside, quoted
 from .remote.http import Http
 from .remote.link import Link
-from .remote.told import EventPage, FileInfo, Listing, RunInfo, SnapshotPage
+from .remote.run_info import EventPage, FileInfo, Listing, RunInfo, SnapshotPage
 from .result import Result
 from .snapshots import Snapshot
 

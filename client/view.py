@@ -23,7 +23,7 @@ def view(
     """Draws frames of a result, of a run's folder, or a frame file: a PNG, a GIF or an MP4. Raises ViewError.
 
     Which frames, and by which numbers or times, is as ``Result.view`` has it; ``options`` are the fields of
-    ``conoid.client.drawing.look.Look``.
+    ``conoid.client.drawing.view_options.Look``.
     """
     require_field(field)
     if isinstance(source, Result):

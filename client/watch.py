@@ -13,7 +13,7 @@ from conoid.cases.figures import clock, duration
 from conoid.cases.messages import AnyMessage, Log, Progress, Snapshot, Status
 from conoid.cases.run import State
 
-from .commands import silence
+from .commands import progress
 from .commands.console import PlainConsole, one_line
 from .commands.display import line, panel, seen
 from .errors import ClientError, UnreachableError
@@ -105,7 +105,7 @@ def tell(messages: Iterable[AnyMessage], known: Live, write: Callable[[str], Non
     takes hours more and more rarely.
     """
     told, texts = -1, set[str]()
-    with silence.broken(write, lambda: _waiting(known)) as say:
+    with progress.broken(write, lambda: _waiting(known)) as say:
         for message in messages:
             known.take(message)
             at = int(100.0 * known.fraction + 1e-9)

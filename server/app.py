@@ -18,26 +18,25 @@ from .database import identity
 from .database.store import Store
 from .intake import reader
 from .intake.receiving import Receiver
-from .intake.sent import SentFiles
 from .intake.submission import Desk
 from .intake.sweeps import Sweeps
-from .keeping import keeper
-from .keeping.farewells import Farewells
-from .keeping.keeper import Keeper
+from .intake.uploads import Uploads
+from .keeping.removal import Removal, restore
+from .keeping.removed_runs import RemovedRuns
 from .launch import Launcher
 from .launch.local import LocalLauncher
 from .launch.slurm import SlurmLauncher
 from .readiness import Readiness
 from .requests import connections, limits
-from .requests.crowd import Crowd
-from .requests.door import Door
-from .requests.heads import Heads
-from .requests.lanes import Lanes
-from .routes import cases, events, files, health, history, logs, me, runs, sent, snapshots, table
+from .requests.admission import Admission
+from .requests.head_requests import HeadRequests
+from .requests.thread_pool import ThreadPool
+from .requests.user_limits import UserLimits
+from .routes import cases, events, files, health, history, logs, me, runs, snapshots, table, uploads
 from .routes import sweeps as sweep_routes
-from .runs.bell import Bell
-from .runs.present import Present
+from .runs.existing import ExistingRuns
 from .runs.supervisor import Supervisor
+from .runs.wakeup import Wakeups
 from .service import Service
 from .settings import Settings
 from .telemetry import Telemetry
@@ -52,7 +51,7 @@ ROUTERS = (
     sweep_routes.router,
     logs.router,
     files.router,
-    sent.router,
+    uploads.router,
     me.router,
     health.router,
 )
@@ -82,12 +81,12 @@ def opened(settings: Settings) -> Iterator[Service]:
             tokens = store.tokens() if settings.auth else None
             telemetry = Telemetry(settings.runs, settings.host, settings.zenoh_port, tokens, settings.site.slurm)
             stack.callback(telemetry.close)
-        bell = Bell()
-        lines = Farewells(settings.runs)
-        keeper.restore(store, lines)
-        supervisor = Supervisor(settings, store, launcher_of(settings), telemetry, bell.ring)
-        files_sent = SentFiles(settings.runs, settings.site.files, settings.caps.free_disk)
-        desk = Desk(settings, store, supervisor, files_sent)
+        wakeups = Wakeups()
+        removed_runs = RemovedRuns(settings.runs)
+        restore(store, removed_runs)
+        supervisor = Supervisor(settings, store, launcher_of(settings), telemetry, wakeups.ring)
+        uploads = Uploads(settings.runs, settings.site.files, settings.caps.free_disk)
+        desk = Desk(settings, store, supervisor, uploads)
         sweeps = Sweeps(settings, desk)
         supervisor.held_back = sweeps.held
         supervisor.start()
@@ -95,37 +94,37 @@ def opened(settings: Settings) -> Iterator[Service]:
         stack.callback(supervisor.close)
         if settings.end_runs:
             stack.callback(supervisor.end_all)
-        watchman = Keeper(settings, store, lines, lambda run_id: supervisor.current(run_id) is not None, files_sent)
-        watchman.needed = sweeps.needed
-        desk.kept = watchman.kept
+        removal = Removal(settings, store, removed_runs, lambda run_id: supervisor.current(run_id) is not None, uploads)
+        removal.needed = sweeps.needed
+        desk.kept = removal.kept
         if (most := settings.site.quota.output_bytes) is not None:
-            files_sent.left = lambda owner: most - watchman.kept(owner)
-        watchman.start()
-        stack.callback(watchman.close)
+            uploads.left = lambda owner: most - removal.kept(owner)
+        removal.start()
+        stack.callback(removal.close)
         http = settings.site.http
-        lanes = Lanes(http.threads, http.waiting, http.seconds)
+        pool = ThreadPool(http.threads, http.waiting, http.seconds)
         yield Service(
             settings=settings,
             store=store,
-            bell=bell,
+            wakeups=wakeups,
             telemetry=telemetry,
             supervisor=supervisor,
             desk=desk,
             histories=Histories(),
             cards=Cards(settings.runs, store),
             readiness=Readiness(settings, store),
-            crowd=Crowd(http, connections.raise_limit()),
-            downloads=Downloads(lanes),
-            lanes=lanes,
-            readers=reader.lanes(reader.CASE),
+            user_limits=UserLimits(http, connections.raise_limit()),
+            downloads=Downloads(pool),
+            pool=pool,
+            readers=reader.pool(reader.CASE),
             surveyors=reader.surveyors(),
-            sweepers=reader.lanes(reader.SWEEP),
+            sweepers=reader.pool(reader.SWEEP),
             sweeps=sweeps,
-            sent=files_sent,
-            receiver=Receiver(files_sent, lanes),
-            keeper=watchman,
-            farewells=lines,
-            present=Present(settings.runs),
+            uploads=uploads,
+            receiver=Receiver(uploads, pool),
+            removal=removal,
+            removed_runs=removed_runs,
+            existing=ExistingRuns(settings.runs),
         )
 
 
@@ -140,9 +139,9 @@ def build_app(service: Service) -> FastAPI:
 
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
-        service.bell.attach(asyncio.get_running_loop())
+        service.wakeups.attach(asyncio.get_running_loop())
         yield
-        service.bell.close()
+        service.wakeups.close()
 
     app = FastAPI(
         title="Conoid",
@@ -158,8 +157,8 @@ def build_app(service: Service) -> FastAPI:
     errors.install(app)
     openapi.install(app)
     app.state.metrics = Metrics(service)
-    app.add_middleware(Door, service=service)
-    app.add_middleware(Heads)
+    app.add_middleware(Admission, service=service)
+    app.add_middleware(HeadRequests)
     app.add_middleware(_SafeHeaders)
     app.add_middleware(Timed, metrics=app.state.metrics)
     for router in ROUTERS:

@@ -23,7 +23,7 @@ from starlette.exceptions import HTTPException
 
 from conoid.cases.reading.problems import Problem
 
-from .runs.holds import DAMAGE
+from .runs.retries import DAMAGE
 
 MEDIA_TYPE = "application/problem+json"
 _log = logging.getLogger("conoid.server")

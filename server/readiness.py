@@ -10,7 +10,7 @@ from sqlalchemy.exc import SQLAlchemyError
 from . import durable
 from .database.store import Store
 from .errors import ServiceError
-from .requests.lanes import Lanes
+from .requests.thread_pool import ThreadPool
 from .settings import Settings
 
 _FRESH = 1.0
@@ -61,7 +61,7 @@ class _Check:
     """One check: in a thread of its own, once for all requests at the same time."""
 
     def __init__(self, look: Callable[[], bool]) -> None:
-        self._look, self._thread = look, Lanes(each=1, waiting=1, patience=_LIMIT, most=1)
+        self._look, self._thread = look, ThreadPool(each=1, waiting=1, patience=_LIMIT, most=1)
         self._until, self._passed = 0.0, False
         self._asked: asyncio.Task[None] | None = None
 

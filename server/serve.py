@@ -16,7 +16,7 @@ import uvicorn
 from . import durable, heap
 from .alone import only_one
 from .app import build_app, opened
-from .requests import connections, quiet
+from .requests import connections, log_filter
 from .service import Service
 from .settings import Settings, StartError
 
@@ -44,7 +44,7 @@ def serve(settings: Settings) -> None:
     os.umask(0o077)
     sys.setswitchinterval(_SWITCH)
     heap.share()
-    quiet.install()
+    log_filter.install()
     settings.runs.mkdir(parents=True, exist_ok=True)
     with only_one(settings.runs), _listening(settings) as listener:
         (settings.runs / ADDRESS_FILE).unlink(missing_ok=True)
@@ -108,7 +108,7 @@ class _Server(uvicorn.Server):
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         left = "are cancelled" if self._service.settings.end_runs else "go on"
         _log.info("the server ends: %s; its runs %s", self._why or "no signal", left)
-        self._service.bell.close()
+        self._service.wakeups.close()
         if self._writing is not None:
             self._writing.cancel()
         await super().shutdown(sockets)

@@ -10,17 +10,17 @@ from .answers.download import Downloads
 from .answers.history import Histories
 from .database.store import Store
 from .intake.receiving import Receiver
-from .intake.sent import SentFiles
 from .intake.submission import Desk
 from .intake.sweeps import Sweeps
-from .keeping.farewells import Farewells
-from .keeping.keeper import Keeper
+from .intake.uploads import Uploads
+from .keeping.removal import Removal
+from .keeping.removed_runs import RemovedRuns
 from .readiness import Readiness
-from .requests.crowd import Crowd
-from .requests.lanes import Lanes
-from .runs.bell import Bell
-from .runs.present import Present
+from .requests.thread_pool import ThreadPool
+from .requests.user_limits import UserLimits
+from .runs.existing import ExistingRuns
 from .runs.supervisor import Supervisor
+from .runs.wakeup import Wakeups
 from .settings import Settings
 from .telemetry import Telemetry
 
@@ -31,29 +31,29 @@ class Service:
 
     settings: Settings
     store: Store
-    bell: Bell
+    wakeups: Wakeups
     telemetry: Telemetry | None
     supervisor: Supervisor
     desk: Desk
     histories: Histories
     cards: Cards
     readiness: Readiness
-    crowd: Crowd
+    user_limits: UserLimits
     downloads: Downloads
-    lanes: Lanes
+    pool: ThreadPool
     """For the disk and the database."""
-    readers: Lanes
+    readers: ThreadPool
     """For cases that are read."""
-    surveyors: Lanes
+    surveyors: ThreadPool
     """For cases that may name files, which are read for seconds; and for restarts, whose case may."""
-    sweepers: Lanes
+    sweepers: ThreadPool
     """For sweeps, each of which is read for seconds: nobody who hands in a run waits for them."""
     sweeps: Sweeps
-    sent: SentFiles
+    uploads: Uploads
     receiver: Receiver
-    keeper: Keeper
-    farewells: Farewells
-    present: Present
+    removal: Removal
+    removed_runs: RemovedRuns
+    existing: ExistingRuns
 
 
 def _service(request: Request) -> Service:

@@ -13,7 +13,7 @@ from ..errors import UsageError
 from ..remote.session import Session
 from ..remote.submission import data_of, folder_of, locate
 from ..sweeps.adaptive import MOST, found_by
-from ..sweeps.found import Found
+from ..sweeps.adaptive_result import Found
 from ..sweeps.goal import spans_of
 from .console import echo, echo_json
 from .options import aloud, complain

@@ -14,7 +14,7 @@ from conoid.cases.run import ExitCode
 from conoid.cases.units import parse_quantity
 
 from ..errors import UsageError
-from ..local.saving import save_text
+from ..local.atomic import save_text
 from ..remote.submission import case_of
 from ..studies import chart, study
 from ..studies.projection import Network, bandwidth

@@ -16,8 +16,8 @@ from conoid.cases.reading.similar import allowed
 from conoid.cases.run import ExitCode
 
 from ..errors import UsageError
-from ..local.local import LocalServer
-from ..local.saving import save_text
+from ..local.atomic import save_text
+from ..local.own_server import LocalServer
 from ..remote.session import Session, connect
 from ..remote.submission import data_of, folder_of
 from ..studies import converged

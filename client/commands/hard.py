@@ -21,8 +21,8 @@ from conoid.cases.suite import Hard, drift, faults, is_free, suite
 
 from ..columns import Columns
 from ..errors import UsageError
-from ..local.local import LocalServer
-from ..local.saving import save_text
+from ..local.atomic import save_text
+from ..local.own_server import LocalServer
 from ..remote.session import Session
 from ..run import Run
 from ..studies.scaling import CORES

@@ -10,8 +10,8 @@ from ..remote.rows import differing
 from ..remote.session import connect
 from . import tables
 from .console import echo, echo_json
-from .moments import moment
 from .options import Json, Labels, Token, Url, labels_of, show_lines
+from .times import moment
 
 _VALUES = 4
 """Values that are told of a run, at most. Chosen: as many as a line has room for."""

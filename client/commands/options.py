@@ -23,7 +23,7 @@ from ..remote.session import Session, connect
 from ..remote.submission import data_of, locate
 from ..result import Result
 from ..run import Run
-from . import silence
+from . import progress
 from .console import PlainConsole, echo, one_line
 
 _MOST_WARNINGS = 12
@@ -184,7 +184,7 @@ def aloud(what: str) -> Iterator[Callable[[str], None]]:
             complain(text)
             due = _RARER * spent
 
-    with silence.broken(say, lambda: f"{at}, {duration(time.monotonic() - began)} so far"):
+    with progress.broken(say, lambda: f"{at}, {duration(time.monotonic() - began)} so far"):
         yield name
 
 

@@ -11,8 +11,8 @@ from conoid.cases.figures import exact
 from conoid.cases.output.history import header, split
 
 from ..errors import UsageError
+from .sweep_columns import Row, number_of, telling
 from .tables import short_names, table
-from .telling import Row, number_of, telling
 
 _MOST = 4
 """Results that are shown when nobody names any. Chosen: with keys and state they fit 80 characters."""

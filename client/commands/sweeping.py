@@ -19,8 +19,8 @@ from conoid.cases.output.points import KEY, to_csv
 from conoid.cases.run import State
 
 from ..errors import ServiceError, UsageError
-from ..local.local import LocalServer
-from ..local.saving import save_text
+from ..local.atomic import save_text
+from ..local.own_server import LocalServer
 from ..remote.session import Session, connect
 from ..remote.submission import data_of, folder_of, locate
 from ..sweeps.sweep import Point, Sweep, SweepInfo, SweepPoint, points_in, points_of, text_rows

@@ -35,7 +35,7 @@ from conoid.cases.reference.flat import Scalar
 from conoid.cases.run import State
 
 from ..remote.rows import RunRow
-from ..remote.told import RunInfo
+from ..remote.run_info import RunInfo
 from ..reports.compare import AT_THE_END, Comparison
 from ..studies.replay import Account
 from .display import STATE_STYLE

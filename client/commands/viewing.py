@@ -10,11 +10,11 @@ import typer
 from conoid.cases.figures import si
 
 from ..drawing.fields import FIELDS
-from ..drawing.look import SMALLEST, VECTORS
 from ..drawing.planes import VIEWS
+from ..drawing.view_options import SMALLEST, VECTORS
 from ..errors import LookError
+from ..remote.run_info import ID
 from ..remote.session import connect
-from ..remote.told import ID
 from ..result import seconds
 from ..view import view
 from .console import echo, echo_json

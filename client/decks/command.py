@@ -14,7 +14,7 @@ from conoid.cases.run import ExitCode
 from ..commands.console import echo
 from ..commands.options import Json, aloud, complain
 from ..errors import ClientError, UsageError
-from ..local.saving import save_text
+from ..local.atomic import save_text
 from .dialects import DIALECTS
 from .importing import Imported, as_json, lines, read_deck
 from .toml import NOTE

@@ -12,10 +12,10 @@ from PIL import ImageDraw, ImageFont
 
 from conoid.cases.figures import exacts
 
-from . import camera, hues
+from . import camera, part_colours
 from .fields import Field
+from .picture_layout import Box, Sheet
 from .scales import Scale
-from .sheet import Box, Sheet
 
 _AXES = "#d1495b", "#2f9e60", "#3f74d8"
 _MOST_NAMES = 24
@@ -219,9 +219,9 @@ def beside_legend(entries: Sequence[tuple[str, str]], note: str, size: int) -> i
 def entries(field: str, present: Sequence[int], parts: Sequence[str]) -> list[tuple[str, str]]:
     """Names and colours of the parts or ranks that there are."""
     names = parts if field in ("part", "fragment") else []
-    colours = hues.of_names(present)
+    colours = part_colours.of_names(present)
     kind = "part" if field == "fragment" else field
     return [
-        (names[i] if i < len(names) else f"{kind} {i}", hues.css(colour))
+        (names[i] if i < len(names) else f"{kind} {i}", part_colours.css(colour))
         for i, colour in zip(present, colours, strict=True)
     ]

@@ -5,8 +5,8 @@ A ``Picture`` is one drawing of one frame, of several side by side, or of severa
 
 import msgspec
 
-from .look import FILMS, Look
 from .planes import Mirror, Vector, Wall
+from .view_options import FILMS, Look
 
 
 class Picture(msgspec.Struct, kw_only=True, frozen=True):

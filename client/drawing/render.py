@@ -1,7 +1,7 @@
 """Draws frames as one file: ``python -m conoid.client.drawing.render`` reads a Picture as JSON and prints a Drawn.
 
-``surfaces`` has what is drawn of a frame (a ``shot``), ``camera`` from where, ``studio`` draws it, ``ink`` adds lines;
-``printer`` puts the panels on a ``sheet`` and has ``captions`` written beside them.
+``surfaces`` has what is drawn of a frame (a ``shot``), ``camera`` from where, ``offscreen`` draws it, ``outlines`` adds
+lines; ``composition`` puts the panels on a ``picture_layout`` and has ``captions`` written beside them.
 """
 
 import sys
@@ -14,10 +14,10 @@ import numpy as np
 
 from ..errors import LookError, ViewError
 from . import camera, films, scales, surfaces, vtk
+from .composition import Printer
 from .fields import FIELDS, NAMED
 from .picture import Drawn, Picture
 from .planes import Mirror
-from .printer import Printer
 from .renderer import reason
 from .scales import Scale
 from .shot import Shot

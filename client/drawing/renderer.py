@@ -16,7 +16,7 @@ import msgspec
 from conoid.cases.figures import duration
 
 from ..errors import ClientError, LookError, ViewError
-from ..local.saving import whole
+from ..local.atomic import whole
 from .picture import Drawn, Picture
 
 _SECONDS = 180.0

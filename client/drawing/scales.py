@@ -8,7 +8,7 @@ import numpy as np
 
 from ..errors import ViewError
 from .fields import Field
-from .look import Look
+from .view_options import Look
 
 _PARTS = 6
 """Parts of a colour bar, at most. Chosen."""

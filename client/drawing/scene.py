@@ -10,9 +10,9 @@ from conoid.cases.reading.similar import allowed
 from ..errors import LookError
 from . import renderer
 from .fields import require_field
-from .look import chosen
 from .picture import Drawn, Picture
 from .planes import Mirror, Wall, direction, mirrors, planes
+from .view_options import chosen
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from conoid.cases.reading.problems import problem
 
 from ..errors import ClientError
 from . import one_deck
-from .saving import whole as whole_file
+from .atomic import whole as whole_file
 
 _CHUNK = 1 << 20
 State = tuple[int, int, int, int]

@@ -14,11 +14,11 @@ from conoid.cases.site import slurm
 
 from ..errors import ClientError, UnfinishedError
 from ..live import Live
-from ..remote.told import FileInfo, RunInfo
+from ..remote.run_info import FileInfo, RunInfo
 from ..result import Result
+from .atomic import whole as whole_file
 from .folders import LocalFolder
-from .places import inside
-from .saving import whole as whole_file
+from .safe_paths import inside
 
 _ID = re.compile(r"[0-9a-z]{22}")
 """The id of a run of a server, by which ``conoid get`` calls the folder that it copies into."""

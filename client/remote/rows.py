@@ -8,7 +8,7 @@ import msgspec
 
 from conoid.cases.reference.flat import Scalar
 
-from .told import RunInfo
+from .run_info import RunInfo
 
 _NEVER = frozenset({"run.ranks", "run.threads", "run.profile"})
 """Keys of a case that other columns of a list have."""

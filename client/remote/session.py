@@ -16,19 +16,19 @@ from conoid.cases.load import CaseError, Overrides, Problem
 from conoid.cases.reading.problems import shown
 
 from ..errors import MissingError, NotFoundError, ServiceError, UsageError
-from ..local.places import quoted
+from ..local.safe_paths import quoted
 from ..run import Run
 from ..sweeps.adaptive import MOST, found_by
-from ..sweeps.found import Found
+from ..sweeps.adaptive_result import Found
 from ..sweeps.goal import span_of
 from ..sweeps.sweep import Point, Sweep, SweepInfo, SweepPage, listed, points_along
-from .asked import Moment, query_of, words_of
 from .config import target
 from .http import NOT_FOUND, Http
 from .outbox import SURVEY, Outbox, place_of
 from .rows import RunRow, TablePage, rows_of
+from .run_info import ID, RunInfo
+from .run_query import Moment, query_of, words_of
 from .submission import CaseSource, data_of, to_json
-from .told import ID, RunInfo
 
 _CANDIDATES = 8
 """Ids that are named where several begin as one was given. Chosen: as many as a line has room for."""

@@ -24,7 +24,7 @@ from conoid.cases.run import State
 from ..errors import AnswerError, ClientError, passes
 from .http import Router
 from .link import Link
-from .order import InOrder, Refill
+from .message_order import InOrder, Refill
 
 T = TypeVar("T")
 

@@ -1,4 +1,4 @@
-"""What a report says in words and tables, card by card; pictures and charts are in ``plates``."""
+"""What a report says in words and tables, card by card; pictures and charts are in ``pictures``."""
 
 import json
 from collections.abc import Sequence

@@ -14,7 +14,7 @@ from conoid.cases.output.fragments import DUST
 
 from ..columns import Columns, by_part
 from ..errors import ClientError, UsageError
-from ..local.saving import whole
+from ..local.atomic import whole
 from .compare import Material
 
 _INK, _FAINT = "#1d2733", "#b5bcc4"

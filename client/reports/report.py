@@ -12,9 +12,9 @@ from pathlib import Path
 from conoid.cases.outcome import Outcome
 
 from ..errors import ClientError, UnfinishedError
-from ..local.saving import save_text
+from ..local.atomic import save_text
 from ..result import Result
-from . import cards, plates, replay3d
+from . import cards, pictures, replay3d
 
 _WEB = Path(__file__).parent.parent / "web"
 _SHEETS = ("style.css", "body.css")
@@ -68,7 +68,7 @@ def write(
     say("replay")
     stage = replay3d.html(result)
     say("pictures")
-    drawn = plates.pictures(result, shown, at)
+    drawn = pictures.pictures(result, shown, at)
     pictured = _card("Pictures", f'<div class="plates">{drawn}</div>' if drawn else "", wide=True)
     about = _card("Case", cards.case(case), wide=True)
     kind = "stage" if stage else "stage plain"
@@ -124,17 +124,23 @@ def _charts(result: Result, ended: Outcome | None, say: Callable[[str], None]) -
     found = [_card("Cost and error", cards.cost(ended)), *_energy(result, ended)]
     say("fragments")
     if result.fragment_tables:
-        found += [*map(_chart, plates.fragments(result)), _card("Fragments", cards.fragments(result))]
+        found += [*map(_chart, pictures.fragments(result)), _card("Fragments", cards.fragments(result))]
     say("time step and probes")
-    found += [*map(_chart, plates.curve(result, "steps")), *map(_chart, plates.curve(result, "columns"))]
+    found += [
+        *map(_chart, pictures.curve(result, "steps")),
+        *map(_chart, pictures.curve(result, "columns")),
+    ]
     say("balance")
     if _has_journal(result):
-        found += [*map(_chart, plates.balance(result)), _card("Ranks and balance", cards.balance(result, ended))]
+        found += [
+            *map(_chart, pictures.balance(result)),
+            _card("Ranks and balance", cards.balance(result, ended)),
+        ]
     return "".join(found)
 
 
 def _energy(result: Result, ended: Outcome | None) -> list[str]:
-    return [*map(_chart, plates.curve(result, "energy")), _card("Energy", cards.energy(result, ended))]
+    return [*map(_chart, pictures.curve(result, "energy")), _card("Energy", cards.energy(result, ended))]
 
 
 def _chart(body: str) -> str:

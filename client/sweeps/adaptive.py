@@ -17,11 +17,11 @@ from conoid.cases.run import State
 from ..errors import ClientError, MissingError, UsageError
 from ..remote.http import Me
 from ..remote.outbox import Outbox
-from ..remote.told import RunInfo
+from ..remote.run_info import RunInfo
 from ..run import Run
 from . import ballistic
+from .adaptive_result import Book, Found, Tried
 from .bracket import Bracket, Sample, between, bracket, widest
-from .found import Book, Found, Tried
 from .goal import Goal, Span, changes, goal_of, tolerance_of
 
 MOST = 40

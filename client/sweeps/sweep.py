@@ -20,9 +20,9 @@ from conoid.cases.reading.problems import shown
 from conoid.cases.run import State
 
 from ..errors import AnswerError, ClientError
-from ..local.places import quoted
+from ..local.safe_paths import quoted
 from ..remote.http import Http
-from ..remote.told import ID, RunInfo
+from ..remote.run_info import ID, RunInfo
 from ..run import Run
 
 _LOOK = 2.0
@@ -152,9 +152,9 @@ class Sweep:
         ClientError.
         """
         from ..reports import curves
-        from . import swept
+        from . import sweep_plot
 
-        return curves.save(swept.figure(self.table(), self.keys(), x, columns), Path(out))
+        return curves.save(sweep_plot.figure(self.table(), self.keys(), x, columns), Path(out))
 
 
 def text_rows(text: str) -> list[dict[str, str]]:

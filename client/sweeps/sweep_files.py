@@ -12,7 +12,7 @@ from conoid.cases.output.points import Column, Point
 from conoid.cases.reading import whole
 
 from ..errors import UsageError
-from . import found
+from . import adaptive_result
 
 
 class _Plan(msgspec.Struct):
@@ -35,7 +35,7 @@ def columns_of(path: Path) -> list[Column]:
     except OSError as error:
         raise UsageError(f"{path}: {error.strerror}") from None
     except msgspec.MsgspecError:
-        return found.table(found.read(path))
+        return adaptive_result.table(adaptive_result.read(path))
     pairs = zip(plan.points, plan.runs, strict=False)
     return points.table([_point(path.parent.parent / run, values) for values, run in pairs])
 

@@ -5,11 +5,11 @@ import { h } from "./figures.js";
 import { offer } from "./libraries.js";
 import { ComparePage } from "./compare.js";
 import { NewPage } from "./new.js";
-import { addressOf, place } from "./place.js";
+import { addressOf, place } from "./address.js";
 import { RunPage } from "./run.js";
 import { RunsPage } from "./runs.js";
 import { SweepPage } from "./sweep.js";
-import { isShort, wholeNames } from "./whole.js";
+import { isShort, wholeNames } from "./shortids.js";
 
 const page = document.getElementById("page");
 const who = document.getElementById("who");

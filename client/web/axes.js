@@ -17,7 +17,7 @@ export function whole(alone, option) {
 }
 
 // What all charts have: the theme's colours, zoom with Ctrl and the wheel; those that stand `alone` a tooltip of one item,
-// the others the cursor, for which readout.js has the values.
+// the others the cursor, for which cursorbox.js has the values.
 export function common(alone) {
   return {
     animation: false,

@@ -20,7 +20,7 @@ const HOLLOW = "this snapshot has no file of all tets, so its section is not fil
 
 export class Body {
   // `onShow` gets the snapshot that is on the screen. `bare`: without tools and the time line, for several beside each other:
-  // `ready` is the View3d once it is there (share() of eye.js), at(t) shows a time.
+  // `ready` is the View3d once it is there (share() of camera.js), at(t) shows a time.
   constructor(run, onShow = () => {}, { bare = false } = {}) {
     Object.assign(this, { run, onShow, bare, entries: [], kept: new Map(), volumes: new Map(), noun: "fragment", following: true, picked: null, wanted: null, planes: [] });
     this.path = `v1/runs/${encodeURIComponent(run)}`;

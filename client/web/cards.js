@@ -2,7 +2,7 @@
 // which one stands beside is the same at the next visit.
 
 import { h } from "./figures.js";
-import { recall, remember } from "./remember.js";
+import { recall, remember } from "./storage.js";
 
 export class Cards {
   // `first` is the card that stands beside the body until another one is chosen.

@@ -3,7 +3,7 @@
 import { colour, whole } from "./axes.js";
 import { h } from "./figures.js";
 import { echarts } from "./libraries.js";
-import { readout } from "./readout.js";
+import { readout } from "./cursorbox.js";
 import { save, tableOf, toCsv } from "./tables.js";
 
 const GROUP = "run";

@@ -1,5 +1,5 @@
 // Colours of the view: a hue for each part, variations of it for the fragments of the part.
-// client/drawing/hues.py has the same function.
+// client/drawing/part_colours.py has the same function.
 
 // Degrees in OKLCH of the first parts.
 const HUES = [252, 70, 165, 15, 305, 120, 205, 345];

@@ -2,7 +2,7 @@
 
 import { count, duration, exact, scaleOf, si, UNKNOWN, when } from "./figures.js";
 import { FINAL } from "./live.js";
-import { valueOf } from "./told.js";
+import { valueOf } from "./runtable.js";
 
 const STATES = ["running", "stopping", "starting", "queued", "accepted", "succeeded", "cancelled", "timed_out", "failed", "lost"];
 

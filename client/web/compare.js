@@ -3,15 +3,15 @@
 import { axis, largest, lineStyle, logarithmic, series, time } from "./axes.js";
 import { binary, call, refused } from "./api.js";
 import { Chart } from "./charts.js";
-import { called, common, differences, inWords, keyColumns, results } from "./contrast.js";
+import { called, common, differences, inWords, keyColumns, results } from "./differences.js";
 import { count, h, pill } from "./figures.js";
 import { everyLine, readColumns, readPlan } from "./history.js";
-import { swatch } from "./lines.js";
+import { swatch } from "./linestyles.js";
 import { FINAL } from "./live.js";
 import { fitted } from "./plots.js";
-import { recall, remember } from "./remember.js";
-import { Sheet } from "./sheet.js";
-import { SideBySide } from "./side.js";
+import { recall, remember } from "./storage.js";
+import { ResultTable } from "./resulttable.js";
+import { SideBySide } from "./sidebyside.js";
 import { decode } from "./snapshot.js";
 
 const TALL = 260;
@@ -28,7 +28,7 @@ export class ComparePage {
     Object.assign(this, { ids, again, runs: [], hidden: new Set(), charts: [], abort: new AbortController() });
     this.head = h("section.card", {}, h("h1", {}, `${ids.length} runs`), h("p.hint", {}, "Loading …"));
     this.grid = h("div.cards.charts");
-    this.sheet = new Sheet();
+    this.sheet = new ResultTable();
     this.bodies = new SideBySide();
     this.sizes = new Chart(TALL, "number of fragments of a size and larger, of each run", () => this.ofSizes(), { alone: true, name: () => "fragment_sizes", table: undefined });
     this.element = h("div.work", {}, this.head, this.grid, this.sheet.element, this.bodies.element);

@@ -2,7 +2,7 @@
 
 import { call, download } from "./api.js";
 import { counted, h, size } from "./figures.js";
-import { fold } from "./remember.js";
+import { fold } from "./storage.js";
 
 const MOST = 500; // Files of a folder that are listed.
 

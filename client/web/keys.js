@@ -1,4 +1,4 @@
-// Keys of the body, beside those that turn it (eye.js).
+// Keys of the body, beside those that turn it (camera.js).
 
 const AXES = ["x", "y", "z"];
 const KEYS = {

@@ -2,7 +2,7 @@
 
 import { tail } from "./api.js";
 import { clock, count, counted, h, size } from "./figures.js";
-import { fold } from "./remember.js";
+import { fold } from "./storage.js";
 
 // Warnings and errors of the whole run, each text once.
 export class Warnings {

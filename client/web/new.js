@@ -5,8 +5,8 @@ import { isJson, lineOf, valueOf, withKey } from "./casetext.js";
 import { Editor } from "./editor.js";
 import { counted, h } from "./figures.js";
 import { Outbox } from "./outbox.js";
-import { recall, remember } from "./remember.js";
-import { filesTable, verdict } from "./verdict.js";
+import { recall, remember } from "./storage.js";
+import { filesTable, verdict } from "./validation.js";
 
 const IDLE = 500; // ms without a key after which the case is checked.
 const AGAIN = 3000; // ms after which a server that did not answer is asked again.

@@ -2,7 +2,7 @@
 
 import { alike, count, duration, fixed, h, large, moment, rough, si } from "./figures.js";
 import { FINAL, pieces } from "./live.js";
-import { fold } from "./remember.js";
+import { fold } from "./storage.js";
 
 const entry = (name, value, note) =>
   h("div", {}, h("dt", {}, name), h("dd", {}, h("span.value", {}, value), note ? h("small", {}, note) : null));

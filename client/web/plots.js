@@ -8,7 +8,7 @@ import { everyLine, everyReport } from "./history.js";
 import { Live } from "./live.js";
 import { nearest, ofImbalance, ofSpent, ofWork, workTable } from "./loads.js";
 import { Chooser, columnsOf, ofForces, ofProbes } from "./probes.js";
-import { recall, remember } from "./remember.js";
+import { recall, remember } from "./storage.js";
 import { tableOf } from "./tables.js";
 import { sizes } from "./snapshot.js";
 

@@ -3,7 +3,7 @@
 import { axis, expected, largest, lineStyle, series, time } from "./axes.js";
 import { end } from "./energies.js";
 import { h } from "./figures.js";
-import { recall, remember } from "./remember.js";
+import { recall, remember } from "./storage.js";
 
 const MOST_AT_FIRST = 8;
 const MOMENTA = /^(angular_)?momentum_[xyz]$/;

@@ -12,7 +12,7 @@ import { Logs, Warnings } from "./logs.js";
 import { Numbers, ended, residual } from "./numbers.js";
 import { Balances, Ranks, checksTable } from "./panels.js";
 import { nothing, plots } from "./plots.js";
-import { Situation } from "./situation.js";
+import { RunState } from "./runstate.js";
 
 const CHARTS_EVERY = 500; // ms; the head and the bars are drawn with every message.
 const QUEUE_EVERY = 3; // s after which the place in the queue is asked for.
@@ -44,7 +44,7 @@ export class RunPage {
     this.logs = new Logs(live);
     this.warnings = new Warnings();
     this.files = new Files(live.run);
-    this.situation = new Situation(live.run, () => this.files.read());
+    this.situation = new RunState(live.run, () => this.files.read());
     this.charts = plots(live, (place) => this.balances.open(place));
     this.body = new Body(live.run, (snapshot) => {
       this.charts.snapshot = snapshot;

@@ -5,9 +5,9 @@ import { columnsOf } from "./columns.js";
 import { count, counted, h } from "./figures.js";
 import { Grid } from "./grid.js";
 import { FINAL } from "./live.js";
-import { grouped, matcher, sorted } from "./order.js";
-import { recall, remember } from "./remember.js";
-import { Told, differing, shorts } from "./told.js";
+import { grouped, matcher, sorted } from "./sorting.js";
+import { recall, remember } from "./storage.js";
+import { RunTable, differing, shorts } from "./runtable.js";
 import { Toolbar } from "./toolbar.js";
 
 const FIRST = 200; // Runs of the first answer; those after it come in larger pages.
@@ -26,7 +26,7 @@ const kept = { text: "", state: "", days: "", open: new Set(), marked: new Set()
 export class RunsPage {
   // `onRefused` is called where the server does not accept the token any more.
   constructor(onRefused) {
-    Object.assign(this, { onRefused, told: new Told(), sweeps: new Map(), abort: new AbortController(), cache: {} });
+    Object.assign(this, { onRefused, told: new RunTable(), sweeps: new Map(), abort: new AbortController(), cache: {} });
     this.build();
     document.title = "Runs · Conoid";
     this.start();

@@ -7,10 +7,10 @@ import { columnsOf } from "./columns.js";
 import { counted, exact, h, meter, pill, si, words } from "./figures.js";
 import { Grid } from "./grid.js";
 import { FINAL } from "./live.js";
-import { sorted } from "./order.js";
-import { recall, remember } from "./remember.js";
+import { sorted } from "./sorting.js";
+import { recall, remember } from "./storage.js";
 import { curves, matrix, telling, together } from "./response.js";
-import { Told, shorts } from "./told.js";
+import { RunTable, shorts } from "./runtable.js";
 import { fill } from "./toolbar.js";
 
 const AGAIN = 2000; // ms until a sweep that goes on is read again.
@@ -21,7 +21,7 @@ const BRIEF = 9; // Letters of the id that are shown.
 export class SweepPage {
   // `onRefused` is called where the server does not accept the token any more.
   constructor(id, onRefused) {
-    Object.assign(this, { id, onRefused, told: new Told(), abort: new AbortController(), marked: new Set(), points: [], columns: [], sort: { id: "point", down: false } });
+    Object.assign(this, { id, onRefused, told: new RunTable(), abort: new AbortController(), marked: new Set(), points: [], columns: [], sort: { id: "point", down: false } });
     this.path = `v1/sweeps/${encodeURIComponent(id)}`;
     this.build();
     document.title = "Sweep · Conoid";

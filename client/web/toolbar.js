@@ -1,7 +1,7 @@
 // What stands above the table of runs: filter, groups, order, columns, and what is done with the marked runs.
 
 import { count, h, words } from "./figures.js";
-import { recall, remember } from "./remember.js";
+import { recall, remember } from "./storage.js";
 
 const DAYS = [["", "any time"], ["1", "last day"], ["7", "last 7 days"], ["30", "last 30 days"]];
 const GROUPS = [["", "no groups"], ["sweep", "by sweep"], ["case", "by case"]];

@@ -1,7 +1,7 @@
 // The bar of tools of the body: colour, section, camera, scale, parts, what is shown, fragments, saving. It keeps what is chosen.
 
 import { named } from "./colours.js";
-import { VIEW_NAMES } from "./eye.js";
+import { VIEW_NAMES } from "./camera.js";
 import { h, si, words } from "./figures.js";
 import { hindrance } from "./saving.js";
 import { scaleOf } from "./scales.js";

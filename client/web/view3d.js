@@ -1,8 +1,8 @@
 // The body in 3-D: a canvas with the picture and one over it with axes, scale bar and legend. Frames are drawn when something
-// has changed. It fills the element that holds it, and may be there several times; share() of eye.js has them move together.
+// has changed. It fills the element that holds it, and may be there several times; share() of camera.js has them move together.
 
 import { Arrows } from "./arrows.js";
-import { Eye } from "./eye.js";
+import { ViewCamera } from "./camera.js";
 import { h } from "./figures.js";
 import { Outlines } from "./outlines.js";
 import { draw as drawOver } from "./overlay.js";
@@ -29,7 +29,7 @@ export class View3d {
     this.extras = new THREE.Scene();
     this.extras.add(this.arrows.mesh);
     this.point = new THREE.WebGLRenderTarget(1, 1);
-    this.eye = new Eye(modules, this.canvas, () => this.turned(), () => ({ ...this.look, snapshot: this.snapshot, shown: (part) => this.opacity(part) > 0.005 }));
+    this.eye = new ViewCamera(modules, this.canvas, () => this.turned(), () => ({ ...this.look, snapshot: this.snapshot, shown: (part) => this.opacity(part) > 0.005 }));
     this.picked = -1;
     this.pickable(onPick);
     this.dark = matchMedia("(prefers-color-scheme: dark)");

@@ -7,7 +7,7 @@ from collections import OrderedDict
 from typing import BinaryIO
 from weakref import WeakValueDictionary
 
-from ..requests.lanes import Lanes
+from ..requests.thread_pool import ThreadPool
 
 State = tuple[int, int, int, int, int]
 """State of a file: device, inode, times of the last change of content and of the inode in ns, size in bytes."""
@@ -26,9 +26,9 @@ def state_of(file: BinaryIO) -> State:
 class Digests:
     """Digests of files. Used in the thread of the event loop."""
 
-    def __init__(self, lanes: Lanes) -> None:
+    def __init__(self, pool: ThreadPool) -> None:
         """None is known yet."""
-        self._lanes = lanes
+        self._pool = pool
         self._known: OrderedDict[State, bytes] = OrderedDict()
         self._locks: WeakValueDictionary[State, asyncio.Lock] = WeakValueDictionary()
 
@@ -44,7 +44,7 @@ class Digests:
 
     async def _computed(self, file: BinaryIO, size: int) -> bytes:
         total, offset = hashlib.sha256(), 0
-        while offset < size and (read := await self._lanes.run(_add, total, file, offset, min(_SLICE, size - offset))):
+        while offset < size and (read := await self._pool.run(_add, total, file, offset, min(_SLICE, size - offset))):
             offset += read
         return total.digest()
 

@@ -16,8 +16,8 @@ from starlette.responses import Response, StreamingResponse
 from starlette.types import Receive, Scope, Send
 
 from ..errors import ServiceError, not_found
-from ..requests.crowd import place_of
-from ..requests.lanes import Lanes
+from ..requests.thread_pool import ThreadPool
+from ..requests.user_limits import place_of
 from .digests import Digests, State, state_of
 
 _CHUNK = 1 << 18
@@ -88,9 +88,9 @@ def _walk(folder: Path, parts: list[str]) -> int:
 class Downloads:
     """Belongs to the event loop."""
 
-    def __init__(self, lanes: Lanes) -> None:
+    def __init__(self, pool: ThreadPool) -> None:
         """Files are read in the lane of who asks."""
-        self._lanes, self._digests = lanes, Digests(lanes)
+        self._pool, self._digests = pool, Digests(pool)
 
     async def respond(self, request: Request, folder: Path, relative: str, ended: bool) -> Response:
         """The file as it is now, honouring Range, If-Range and If-None-Match; its sha256 stands in Repr-Digest.
@@ -98,7 +98,7 @@ class Downloads:
         A large file of a run that goes on has no Repr-Digest: it may grow faster than it is read. A file that is still
         growing is sent up to its size at this moment. Raises ServiceError 404, 416, 429, 503.
         """
-        file, state = await self._lanes.run(_opened, folder, relative)
+        file, state = await self._pool.run(_opened, folder, relative)
         try:
             size = state[-1]
             if size > _SMALL:
@@ -120,7 +120,7 @@ class Downloads:
             begin, end, status = _part(request, size, etag)
             if status == 206:
                 headers["Content-Range"] = f"bytes {begin}-{end - 1}/{size}"
-            return _FileResponse(self._lanes, file, begin, end, status, headers)
+            return _FileResponse(self._pool, file, begin, end, status, headers)
         except BaseException:
             file.close()
             raise
@@ -129,11 +129,11 @@ class Downloads:
         self, request: Request, folder: Path, relative: str, headers: Mapping[str, str], media_type: str
     ) -> Response:
         """A file that does not change, with headers of the caller's. Raises ServiceError 404, 429, 503."""
-        file, state = await self._lanes.run(_opened, folder, relative)
+        file, state = await self._pool.run(_opened, folder, relative)
         try:
             if state[-1] > _SMALL:
                 place_of(request).lengthen()
-            return _FileResponse(self._lanes, file, 0, state[-1], 200, {**headers, "Content-Type": media_type})
+            return _FileResponse(self._pool, file, 0, state[-1], 200, {**headers, "Content-Type": media_type})
         except BaseException:
             file.close()
             raise
@@ -178,9 +178,9 @@ class _FileResponse(StreamingResponse):
     """A part of an open file; closes it, also when the client leaves in the middle."""
 
     def __init__(
-        self, lanes: Lanes, file: BinaryIO, begin: int, end: int, status: int, headers: Mapping[str, str]
+        self, pool: ThreadPool, file: BinaryIO, begin: int, end: int, status: int, headers: Mapping[str, str]
     ) -> None:
-        super().__init__(_chunks(lanes, file, begin, end), status, {**headers, "Content-Length": str(end - begin)})
+        super().__init__(_chunks(pool, file, begin, end), status, {**headers, "Content-Length": str(end - begin)})
         self._file = file
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -190,7 +190,7 @@ class _FileResponse(StreamingResponse):
             self._file.close()
 
 
-async def _chunks(lanes: Lanes, file: BinaryIO, begin: int, end: int) -> AsyncIterator[bytes]:
-    while begin < end and (chunk := await lanes.run(os.pread, file.fileno(), min(_CHUNK, end - begin), begin)):
+async def _chunks(pool: ThreadPool, file: BinaryIO, begin: int, end: int) -> AsyncIterator[bytes]:
+    while begin < end and (chunk := await pool.run(os.pread, file.fileno(), min(_CHUNK, end - begin), begin)):
         begin += len(chunk)
         yield chunk

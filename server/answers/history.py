@@ -19,7 +19,7 @@ from conoid.cases.run import State
 
 from ..runs.journal import DAMAGED, Tail, seq_of
 from .columns import Columns
-from .notes import KINDS, Notes
+from .log_messages import KINDS, Notes
 
 _SAMPLES = 4096
 """Largest number of reports that are kept of a run. Chosen: some times the pixels of a chart."""

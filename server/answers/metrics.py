@@ -57,7 +57,7 @@ class _Runs(Collector):
     def _counts(self) -> Counts[State]:
         """Of the runs that are there. Raises SQLAlchemyError, OSError."""
         ended = self._service.store.ended()
-        gone = Counts(ended[run_id] for run_id in self._service.present.gone(ended.keys()))
+        gone = Counts(ended[run_id] for run_id in self._service.existing.gone(ended.keys()))
         return Counts(self._service.store.count_by_state()) - gone
 
     def collect(self) -> Iterable[Metric]:
@@ -71,7 +71,7 @@ class _Runs(Collector):
         told: tuple[tuple[str, str, Callable[[], float]], ...] = (
             ("conoid_slots", "Ranks that may run at a time.", lambda: self._service.settings.slots),
             ("conoid_slots_used", "Ranks that run now.", supervisor.slots_used),
-            ("conoid_listeners", "Open event streams and waiting requests.", lambda: self._service.bell.listening),
+            ("conoid_listeners", "Open event streams and waiting requests.", lambda: self._service.wakeups.listening),
             ("conoid_stranded", "Open runs that nobody looks after: 0.", lambda: len(supervisor.stranded())),
         )
         for name, text, value in told:

@@ -214,7 +214,7 @@ class SentFile(msgspec.Struct, kw_only=True):
     url: str
 
 
-class SentFiles(msgspec.Struct, kw_only=True):
+class Uploads(msgspec.Struct, kw_only=True):
     """The files that a user has sent, and their bytes together."""
 
     files: list[SentFile]
@@ -339,7 +339,7 @@ class Health(msgspec.Struct, kw_only=True):
 
 
 ALL = (
-    Problem, Receipt, RunPage, RunStatus, Table, Validation, Gallery, EventPage, Files, SentFile, SentFiles,
+    Problem, Receipt, RunPage, RunStatus, Table, Validation, Gallery, EventPage, Files, SentFile, Uploads,
     Snapshots, FragmentCourse, History, Me, Health, Wish,
     SweepPage, Sweep,
 )  # fmt: skip

@@ -27,12 +27,12 @@ def event(line: Line) -> bytes:
 async def events(service: Service, may: Pass, run_id: str, path: Path, after: int) -> AsyncIterator[bytes]:
     """Every event with ``seq`` above ``after``, those to come as well; ends when the run has ended, or ``may`` not."""
     tail, silent = Tail(path, after), time.monotonic()
-    with service.bell.listen(run_id) as listener:
+    with service.wakeups.listen(run_id) as listener:
         yield b"retry: 1000\n\n"
-        while not service.bell.closed and await may.holds():
+        while not service.wakeups.closed and await may.holds():
             listener.clear()
             over = not service.supervisor.is_open(run_id)
-            lines = await service.lanes.run(tail.read)
+            lines = await service.pool.run(tail.read)
             if lines:
                 yield b"".join(map(event, lines))
                 silent = time.monotonic()

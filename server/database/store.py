@@ -15,7 +15,7 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from conoid.cases.run import Cause, State
 
-from ..answers.chosen import OPEN, Chosen
+from ..answers.filters import OPEN, Chosen
 from ..queue.usage import Took
 from ..runs.events import Run
 from .engine import engine_of, failure, identity_of

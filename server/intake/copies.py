@@ -16,7 +16,7 @@ from .. import durable
 from ..errors import ServiceError
 from ..runs.folder import APART
 from .reading import FileName
-from .sent import SentFiles, give
+from .uploads import Uploads, give
 
 _LACKING = "you have sent no such file, or it has been removed since; send it first (PUT /v1/files/{sha256})"
 _NAMING = re.compile(rb"""path["']?[ \t]*[=:]|\\[uUx]""")
@@ -24,7 +24,7 @@ Source = Callable[[FileName, Path], None]
 """Puts a file that a case names at a path. Raises FileNotFoundError, OSError."""
 
 
-def of_owner(sent: SentFiles, owner: str) -> Source:
+def of_owner(sent: Uploads, owner: str) -> Source:
     """Copies of files that a user has sent."""
     return lambda file, target: sent.give(owner, file.sha256, target)
 

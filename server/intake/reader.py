@@ -16,7 +16,7 @@ import msgspec
 from conoid.cases.estimates.cores import usable_cores
 
 from ..errors import ServiceError
-from ..requests.lanes import Lanes
+from ..requests.thread_pool import ThreadPool
 from .reading import CPU, PID, WALL, Answer, Question, Reading, WrongCaseError
 
 _log = logging.getLogger("conoid.server")
@@ -33,15 +33,15 @@ CASE, SWEEP, FILES = 120.0, 900.0, 300.0
 Chosen."""
 
 
-def lanes(patience: float) -> Lanes:
+def pool(patience: float) -> ThreadPool:
     """As many cases at a time as there are cores; one owner alone never takes the last place."""
     places = max(2, usable_cores())
-    return Lanes(each=places - 1, waiting=_WAITING, patience=patience, most=places)
+    return ThreadPool(each=places - 1, waiting=_WAITING, patience=patience, most=places)
 
 
-def surveyors() -> Lanes:
+def surveyors() -> ThreadPool:
     """One case with files of an owner at a time, and of all owners as many as there are cores."""
-    return Lanes(each=1, waiting=_WAITING, patience=FILES, most=max(2, usable_cores()))
+    return ThreadPool(each=1, waiting=_WAITING, patience=FILES, most=max(2, usable_cores()))
 
 
 class Reader:

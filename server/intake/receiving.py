@@ -16,10 +16,10 @@ from dataclasses import dataclass, field
 from starlette.requests import ClientDisconnect, Request
 
 from ..errors import ServiceError
-from ..requests.crowd import place_of
-from ..requests.lanes import Lanes
 from ..requests.limits import check_encoding
-from .sent import Part, Sent, SentFiles
+from ..requests.thread_pool import ThreadPool
+from ..requests.user_limits import place_of
+from .uploads import Part, Upload, Uploads
 
 _RANGE = re.compile(r"bytes (?:(\d{1,18})-(\d{1,18})|\*)/(\d{1,18})")
 _GATHERED = 1 << 18
@@ -64,14 +64,14 @@ class _Transfer:
 class Receiver:
     """Used in the thread of the event loop; disks are used in the lane of the caller."""
 
-    def __init__(self, sent: SentFiles, lanes: Lanes) -> None:
+    def __init__(self, sent: Uploads, pool: ThreadPool) -> None:
         """No connection sends yet."""
-        self._sent, self._lanes = sent, lanes
+        self._sent, self._pool = sent, pool
         self._open: dict[tuple[str, str], _Transfer] = {}
 
     async def receive(
         self, request: Request, owner: str, sha256: str, check: Callable[[], Awaitable[None]]
-    ) -> tuple[Sent, bool]:
+    ) -> tuple[Upload, bool]:
         """Receives the body; returns what is there then, and whether the file has become complete. ``check`` raises
         where the right to send has ended. Raises ServiceError: 400, 408, 409, 411, 413, 415, 422, 429, 503, 507.
         """
@@ -79,17 +79,17 @@ class Receiver:
         place_of(request).lengthen()
         transfer = await self._begun(owner, sha256)
         try:
-            part = await self._lanes.run(self._opened, owner, sha256, span)
-            if isinstance(part, Sent):
+            part = await self._pool.run(self._opened, owner, sha256, span)
+            if isinstance(part, Upload):
                 return part, False
             await self._taken(request, transfer, part, check)
             if part.offset < span.end:
                 raise ServiceError(400, "incomplete", f"the body broke off at byte {part.offset}", retryable=True)
             if part.offset < span.total:
-                return Sent(sha256, span.total, part.offset, False, time.time()), False
+                return Upload(sha256, span.total, part.offset, False, time.time()), False
             transfer.busy = True
             await self._verify(owner, sha256, part)
-            return Sent(sha256, span.total, span.total, True, time.time()), True
+            return Upload(sha256, span.total, span.total, True, time.time()), True
         except OSError as error:
             detail = f"the file cannot be kept: {error.strerror}"
             raise ServiceError(507, "storage", detail, retryable=True) from error
@@ -107,7 +107,7 @@ class Receiver:
         made = self._open[owner, sha256] = _Transfer()
         return made
 
-    def _opened(self, owner: str, sha256: str, span: Span) -> Part | Sent:
+    def _opened(self, owner: str, sha256: str, span: Span) -> Part | Upload:
         """The incomplete file, open at the first byte of the body; the complete file where it exists. Raises
         ServiceError 409, 413, 429, 507, OSError.
         """
@@ -128,24 +128,24 @@ class Receiver:
                 gathered += chunk
                 transfer.heard = time.monotonic()
                 if len(gathered) >= _GATHERED:
-                    await self._lanes.run(part.write, bytes(gathered))
+                    await self._pool.run(part.write, bytes(gathered))
                     gathered.clear()
                     await check()
         finally:
             if gathered:
-                await self._lanes.run(part.write, bytes(gathered))
+                await self._pool.run(part.write, bytes(gathered))
 
     async def _verify(self, owner: str, sha256: str, part: Part) -> None:
         """Gives the verified file its name, on disk on return. Raises ServiceError 422 where the hash differs: then
         the bytes are removed."""
         total, offset = hashlib.sha256(), 0
         while offset < part.size:
-            offset = await self._lanes.run(_hashed, total, part, offset)
+            offset = await self._pool.run(_hashed, total, part, offset)
         if total.hexdigest() != sha256:
-            await self._lanes.run(self._sent.remove, owner, sha256)
+            await self._pool.run(self._sent.remove, owner, sha256)
             detail = f"the bytes that have arrived have the sha256 {total.hexdigest()}: none of them is kept"
             raise ServiceError(422, "wrong_hash", detail, pointer="sha256")
-        await self._lanes.run(self._sent.finish, owner, part)
+        await self._pool.run(self._sent.finish, owner, part)
 
 
 async def _next(chunks: AsyncIterator[bytes], transfer: _Transfer) -> bytes | None:

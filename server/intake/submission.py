@@ -21,15 +21,15 @@ from ..errors import ServiceError, database_away, invalid_case
 from ..requests import limits
 from ..runs import folder, restarts
 from ..runs.folder import Copy, Submission
-from ..runs.holds import words
+from ..runs.retries import words
 from ..runs.supervisor import Supervisor
 from ..settings import Settings
 from . import copies
 from .copies import Source, apart, of_owner, of_run
 from .reader import the_reader
 from .reading import Question, Reading, WrongCaseError
-from .sent import SentFiles
 from .surveys import surveyed
+from .uploads import Uploads
 
 _log = logging.getLogger("conoid.server")
 KINDS = {"application/toml": "case.toml", "application/json": "case.json"}
@@ -61,7 +61,7 @@ class Wishes:
 class Desk:
     """Where cases are handed in. Methods may be called from any thread."""
 
-    def __init__(self, settings: Settings, store: Store, supervisor: Supervisor, sent: SentFiles) -> None:
+    def __init__(self, settings: Settings, store: Store, supervisor: Supervisor, sent: Uploads) -> None:
         """One desk a server: its lock is what makes two requests with one key one run. ``sent`` has users' files."""
         self._settings, self._store, self._supervisor, self._sent = settings, store, supervisor, sent
         self._reader, self._limits = the_reader(), limits.of(settings)

@@ -22,12 +22,12 @@ from conoid.cases.reading import whole
 
 from .. import durable
 from ..errors import ServiceError
-from ..queue.waiting import Need
+from ..queue.scheduling import Need
 from ..runs import folder
 from ..settings import Settings
 from .reading import Reading
 from .submission import Desk, Wishes
-from .sweep_wish import Wish, at_point, changed, wish_of
+from .sweep_request import Wish, at_point, changed, wish_of
 
 _log = logging.getLogger("conoid.server")
 FOLDER = "sweeps"

@@ -17,7 +17,7 @@ from conoid.cases.output import layout
 from conoid.cases.reading import whole
 from conoid.cases.site import batch, slurm, slurm_call
 
-from .handed import SlurmWorker
+from .slurm_run import SlurmWorker
 
 _log = logging.getLogger("conoid.server")
 _SETTLES = 0.5

@@ -15,8 +15,8 @@ from conoid.cases.estimates.cores import core_numbers, usable_cores
 from conoid.cases.output import checkpoints, layout
 from conoid.cases.reading import whole
 
-from ..runs import farewell
 from ..runs import folder as run_folder
+from ..runs import launcher_log
 from ..runs.folder import Process
 from ..settings import Settings, command
 from . import DamagedError, Exit, Job, LaunchError, Phase, Trace, Worker, memory, processes
@@ -188,8 +188,8 @@ class LocalWorker:
         self._kills.count()
         if self.alive() or processes.end_run(self._run):
             return None
-        starved = self._kills.ended(farewell.rank_killed(self._folder) or self.process.pid)
-        return Exit(self._child.returncode if self._child else None, starved, farewell.last_words(self._folder))
+        starved = self._kills.ended(launcher_log.rank_killed(self._folder) or self.process.pid)
+        return Exit(self._child.returncode if self._child else None, starved, launcher_log.last_words(self._folder))
 
     def stop(self) -> None:
         """Sends SIGTERM to ``mpiexec``, which forwards it to every rank."""

@@ -18,10 +18,10 @@ from conoid.cases.site.slurm import Entry
 
 from ..settings import Settings
 from . import DamagedError, Job, LaunchError, Trace
+from .accounting import Accounting
 from .arrays import Arrays
-from .clerk import Clerk
-from .handed import SlurmWorker
 from .local import find_mpiexec
+from .slurm_run import SlurmWorker
 
 _log = logging.getLogger("conoid.server")
 
@@ -35,7 +35,7 @@ class SlurmLauncher:
     def __init__(self, settings: Settings, site: batch.Slurm) -> None:
         """The thread starts with the first run."""
         self._mpiexec, self._worker, self._site = settings.mpiexec, settings.worker, site
-        self._arrays, self._clerk = Arrays(settings.runs, site), Clerk(site.bin)
+        self._arrays, self._accounting = Arrays(settings.runs, site), Accounting(site.bin)
         self._workers: dict[str, SlurmWorker] = {}
         self._lock, self._thread = threading.Lock(), threading.Thread(target=self._work, name="slurm", daemon=True)
 
@@ -55,7 +55,7 @@ class SlurmLauncher:
         except (OSError, ValueError) as error:
             failed = DamagedError if isinstance(error, OSError) else LaunchError
             raise failed(f"the job cannot be written down: {error}") from None
-        return self._take(job.run, SlurmWorker(job.folder, record, self._site, job.group, self._clerk))
+        return self._take(job.run, SlurmWorker(job.folder, record, self._site, job.group, self._accounting))
 
     def find(self, run: str, folder: Path) -> Trace:
         """Finds the job by its record, which was submitted or was about to be. Raises OSError, ValueError."""
@@ -65,7 +65,7 @@ class SlurmLauncher:
             raise ValueError(f"{layout.JOB}: {error}") from None
         if record is None:
             return Trace(None, False, False)
-        return Trace(self._take(run, SlurmWorker(folder, record, self._site, clerk=self._clerk)), True, False)
+        return Trace(self._take(run, SlurmWorker(folder, record, self._site, accounting=self._accounting)), True, False)
 
     def tidy(self) -> None:
         """Nothing to do: Slurm cleans its nodes."""

@@ -15,9 +15,9 @@ from ..runs import folder
 from ..runs.events import Run
 from ..runs.folder import Submission
 from ..settings import Settings
-from . import waiting
+from . import scheduling
+from .scheduling import Busy, Need, Room
 from .usage import Took, Usage
-from .waiting import Busy, Need, Room
 
 _REST = 1.0
 """s after which the queue is looked at again though nothing is known to have changed: what was taken is forgotten with
@@ -78,9 +78,9 @@ class Waitlist:
         queued = [run for run in runs if run.state is State.QUEUED and run.id not in has]
         working = [(run, self._need(run)) for run in runs if run.id in has]
         taken = self._taken(working, now)
-        queue = waiting.ordered([self._need(run) for run in queued], taken, self._rules.users)
+        queue = scheduling.ordered([self._need(run) for run in queued], taken, self._rules.users)
         blocked = self._blocks(working, held)
-        made = waiting.plan(queue, [_busy(*one) for one in working], self._room(), now, blocked)
+        made = scheduling.plan(queue, [_busy(*one) for one in working], self._room(), now, blocked)
         self._why = made.why
         return made.start
 

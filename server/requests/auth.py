@@ -13,7 +13,7 @@ from ..database.store import Token
 from ..errors import ServiceError
 from ..service import Service, ServiceOf
 from ..settings import loopback
-from .door import LOCAL_OWNER
+from .admission import LOCAL_OWNER
 from .tokens import SCOPES
 
 RECHECK = 2.0
@@ -35,7 +35,7 @@ class Identity:
 
 
 async def identify(request: Request, service: ServiceOf) -> Identity:
-    """The identity of a request; the middleware ``door`` has looked up its token. Raises ServiceError 401."""
+    """The identity of a request; the middleware ``admission`` has looked up its token. Raises ServiceError 401."""
     if not service.settings.auth:
         _same_machine_page(request)
         return Identity(LOCAL_OWNER, None)
@@ -101,7 +101,7 @@ class Pass:
         if now - self._looked < RECHECK:
             return True
         self._looked = now
-        return await self._service.lanes.run(self._valid)
+        return await self._service.pool.run(self._valid)
 
     def _valid(self) -> bool:
         """A database that does not answer does not end a stream."""

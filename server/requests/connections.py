@@ -74,8 +74,8 @@ class Connection(H11Protocol):
     def _make_room(self) -> None:
         """Of the oldest idle connections, one without a token is closed, else one of the user with most connections."""
         some = list(islice(self.idle, _SOME))
-        crowd = Counter(one.who for one in some)
-        oldest = max(some, key=lambda one: (one is not self, not one.owner, crowd[one.who]))
+        counts = Counter(one.who for one in some)
+        oldest = max(some, key=lambda one: (one is not self, not one.owner, counts[one.who]))
         del self.idle[oldest]  # at once: of many connections that arrive in one turn of the loop, each closes one
         if oldest is self:
             self.transport.write(_FULL)

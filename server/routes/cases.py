@@ -16,7 +16,7 @@ from ..errors import entry, not_found
 from ..intake.copies import names_files
 from ..intake.reading import WrongCaseError
 from ..requests.auth import Reader, Submitter
-from ..requests.lanes import blocking
+from ..requests.thread_pool import blocking
 from ..service import ServiceOf
 from .runs import Body
 
@@ -34,8 +34,8 @@ async def validate(
     and what the files that it names hold; in both cases ``files``, those that it names.
     """
     try:
-        lanes, desk = service.surveyors if names_files(body) else service.readers, service.desk
-        reading = await lanes.run(desk.read, body, content_type, desk.source(identity.owner))
+        pool, desk = service.surveyors if names_files(body) else service.readers, service.desk
+        reading = await pool.run(desk.read, body, content_type, desk.source(identity.owner))
     except CaseError as error:
         files = error.files if isinstance(error, WrongCaseError) else []
         problems = [entry(problem) for problem in error.problems]

@@ -10,8 +10,8 @@ from conoid.cases.output import layout
 from ..answers import stream
 from ..errors import ServiceError
 from ..requests.auth import Pass, Reader
-from ..requests.crowd import place_of
-from ..requests.lanes import blocking
+from ..requests.thread_pool import blocking
+from ..requests.user_limits import place_of
 from ..runs import journal
 from ..service import ServiceOf
 from .runs import OwnedRun
@@ -77,7 +77,7 @@ async def follow(
     path = service.settings.runs / run.id / layout.JOURNAL
     if not service.supervisor.is_open(run.id):
         tail = journal.Tail(path, after)
-        if not await service.lanes.run(tail.read):
+        if not await service.pool.run(tail.read):
             return Response(status_code=204)
     place_of(request).lengthen()
     body = stream.events(service, Pass(service, identity, seconds), run.id, path, after)

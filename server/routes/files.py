@@ -9,7 +9,7 @@ from fastapi import APIRouter, Request, Response
 from starlette.convertors import PathConvertor, register_url_convertor
 
 from ..answers import download
-from ..requests.lanes import blocking
+from ..requests.thread_pool import blocking
 from ..runs.events import Run
 from ..service import ServiceOf
 from .runs import OwnedRun

@@ -8,7 +8,7 @@ from prometheus_client import CONTENT_TYPE_PLAIN_0_0_4
 
 from ..answers.metrics import Metrics
 from ..requests.auth import Identity, requires
-from ..requests.lanes import blocking
+from ..requests.thread_pool import blocking
 from ..service import ServiceOf
 
 router = APIRouter()

@@ -10,7 +10,7 @@ from conoid.cases.output import layout
 from ..answers import download, series
 from ..answers.columns import Columns
 from ..errors import ServiceError
-from ..requests.lanes import blocking
+from ..requests.thread_pool import blocking
 from ..service import ServiceOf
 from .runs import OwnedRun
 

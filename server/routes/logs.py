@@ -14,7 +14,7 @@ from conoid.cases.output import layout
 from ..answers import download, stream
 from ..errors import ServiceError
 from ..requests.auth import Pass, Reader
-from ..requests.crowd import place_of
+from ..requests.user_limits import place_of
 from ..service import Service, ServiceOf
 from .events import Seconds
 from .runs import OwnedRun
@@ -57,10 +57,10 @@ async def log(
 async def _follow(service: Service, may: Pass, run_id: str, folder: Path, relative: str) -> AsyncIterator[bytes]:
     """The log's bytes as they come, without bytes 0, and such a byte while it is silent; it need not exist yet."""
     offset, spoke = 0, time.monotonic()
-    with service.bell.listen(run_id) as listener:
+    with service.wakeups.listen(run_id) as listener:
         while await may.holds():
-            over = service.bell.closed or not service.supervisor.is_open(run_id)
-            chunk = await service.lanes.run(_read, folder, relative, offset)
+            over = service.wakeups.closed or not service.supervisor.is_open(run_id)
+            chunk = await service.pool.run(_read, folder, relative, offset)
             offset += len(chunk)
             if text := chunk.replace(ALIVE, b""):
                 yield text

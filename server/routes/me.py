@@ -7,7 +7,7 @@ from fastapi import APIRouter, Depends, Request
 from ..errors import ServiceError
 from ..requests.auth import Identity, identify
 from ..requests.connections import BODY
-from ..requests.lanes import blocking
+from ..requests.thread_pool import blocking
 from ..service import Service, ServiceOf
 from ..settings import loopback
 from ..telemetry import TelemetryError
@@ -54,12 +54,12 @@ def _quota(service: Service) -> dict[str, float | None]:
 
 def _used(service: Service, owner: str) -> dict[str, float]:
     running, seconds = service.supervisor.taken(owner)
-    files = service.sent.of(owner)
+    files = service.uploads.of(owner)
     return {
         "queued": service.store.open_runs(owner),
         "running": running,
         "core_seconds": seconds,
-        "output_bytes": service.keeper.kept_now(owner),
+        "output_bytes": service.removal.kept_now(owner),
         "file_bytes": sum(file.size for file in files),
         "files": len(files),
     }

@@ -16,18 +16,18 @@ from conoid.cases.run import State
 from conoid.cases.site.policy import PRIORITY
 
 from ..answers import download, openapi, view
-from ..answers.chosen import Chosen
+from ..answers.filters import Chosen
 from ..errors import ServiceError, invalid_case, not_found
 from ..intake.copies import names_files
 from ..intake.submission import Wishes, labels_of
 from ..requests.auth import Identity, Pass, Reader, Submitter, unauthorized
-from ..requests.crowd import place_of
-from ..requests.lanes import blocking
 from ..requests.limits import read_body
+from ..requests.thread_pool import blocking
+from ..requests.user_limits import place_of
 from ..runs import folder, pins, restarts
 from ..runs.events import Run
 from ..service import Service, ServiceOf
-from .choice import ChosenOf
+from .list_query import ChosenOf
 
 router = APIRouter()
 Body = Annotated[bytes, Depends(read_body)]
@@ -53,8 +53,8 @@ async def submit(
 ) -> Response:
     """Takes a case as TOML or JSON. The same Idempotency-Key and body give the same run and the same answer."""
     wishes = Wishes(labels_of(label or ()), profile, priority)
-    lanes = service.surveyors if names_files(body) else service.readers
-    receipt = await lanes.run(service.desk.submit, identity.owner, body, content_type, idempotency_key, wishes)
+    pool = service.surveyors if names_files(body) else service.readers
+    receipt = await pool.run(service.desk.submit, identity.owner, body, content_type, idempotency_key, wishes)
     return JSONResponse(receipt, 202, {"Location": receipt["url"]})
 
 
@@ -89,7 +89,7 @@ def listed(service: Service, owner: str, chosen: Chosen, cursor: str | None, mos
 def _pages(service: Service, owner: str, chosen: Chosen, before: str | None, size: int) -> Iterator[Run]:
     """The runs of an owner that are there, newest first, so many at a time from the store."""
     while some := service.store.page(owner, chosen, before, size):
-        yield from service.present.left(some)
+        yield from service.existing.left(some)
         if len(some) < size:
             return
         before = some[-1].id
@@ -111,14 +111,14 @@ def find(service: Service, identity: Identity, run_id: str) -> Run:
     run = (service.supervisor.current(run_id) or service.store.get(run_id)) if folder.is_id(run_id) else None
     if run is None or run.owner != identity.owner:
         raise not_found(f"run {run_id[:40]!r}")
-    if run.state.final and not service.present.there(run.id):
+    if run.state.final and not service.existing.there(run.id):
         raise _gone(service, run)
     return run
 
 
 def _gone(service: Service, run: Run) -> ServiceError:
     """410 with what is kept of the run."""
-    line = service.farewells.get(run.id)
+    line = service.removed_runs.get(run.id)
     why = f" ({line.why})" if line is not None else ""
     return ServiceError(
         410, "gone", f"run {run.id}: its folder has been removed{why}; it ended as {run.state.value}",
@@ -137,12 +137,12 @@ async def show(
     """The run. With ``wait``, the answer comes when its state has changed, or, when If-None-Match is sent, when
     anything has; at most so many seconds later. A run that has ended is answered at once."""
     known = request.headers.get("if-none-match")
-    first = await service.lanes.run(view.snapshot, service, run)
+    first = await service.pool.run(view.snapshot, service, run)
     if wait > 0.0 and not first.state.final:
         place_of(request).lengthen()
     latest, deadline, may = first, time.monotonic() + wait, Pass(service, identity)
-    with service.bell.listen(run.id) as listener:
-        while not (latest.state.final or service.bell.closed):
+    with service.wakeups.listen(run.id) as listener:
+        while not (latest.state.final or service.wakeups.closed):
             changed = latest.state is not first.state if known is None else not download.is_known(latest.etag, known)
             left = deadline - time.monotonic()
             if changed or left <= 0:
@@ -152,7 +152,7 @@ async def show(
             if not await may.holds():
                 raise unauthorized()
             if news:
-                latest = await service.lanes.run(lambda: view.snapshot(service, find(service, identity, run.id)))
+                latest = await service.pool.run(lambda: view.snapshot(service, find(service, identity, run.id)))
     headers = {"ETag": latest.etag, "Cache-Control": "private, no-cache"}
     if known is not None and download.is_known(latest.etag, known):
         return Response(status_code=304, headers=headers)
@@ -167,8 +167,8 @@ def purge(run_id: str, service: ServiceOf, identity: Submitter) -> Response:
     if not run.state.final or service.supervisor.current(run.id) is not None:
         raise ServiceError(409, "not_ended", f"run {run.id} is {run.state.value}; a run that has ended can be removed")
     try:
-        service.keeper.remove(run, f"by {identity.owner}")
-        service.present.there(run.id)
+        service.removal.remove(run, f"by {identity.owner}")
+        service.existing.there(run.id)
     except FileNotFoundError:
         raise _gone(service, run) from None
     except OSError as error:
@@ -231,7 +231,7 @@ async def restart(
 ) -> Response:
     """A new run of the same case that goes on from the newest checkpoint of this one, and ends with the same answer.
     This one stays as it is. One that has used up run.max_steps needs a larger max_steps: 409 without."""
-    run = await service.lanes.run(find, service, identity, run_id)
+    run = await service.pool.run(find, service, identity, run_id)
     wishes = Wishes({restarts.LABEL: run.id}, profile, priority, run.id)
     numbers = ranks, threads, max_steps
     receipt = await service.surveyors.run(_restarted, service, run, numbers, idempotency_key, wishes)

@@ -10,9 +10,9 @@ from fastapi import Path as PathParameter
 from conoid.cases.messages import Snapshot
 from conoid.cases.output import layout
 
-from ..answers import download, pieces, series
+from ..answers import download, fragment_history, series
 from ..errors import not_found
-from ..requests.lanes import blocking
+from ..requests.thread_pool import blocking
 from ..runs.events import Run
 from ..service import Service, ServiceOf
 from .history import Known
@@ -45,14 +45,14 @@ async def content(
     request: Request, run: OwnedRun, service: ServiceOf, n: Number, if_none_match: Known = ""
 ) -> Response:
     """One snapshot, as docs/reference/snapshots.md has it; its ETag is its sha256, and it never changes."""
-    told = await service.lanes.run(_told, service, run, n)
+    told = await service.pool.run(_told, service, run, n)
     return await _sent(request, service, run, told.path, told.sha256, if_none_match)
 
 
 @router.get("/v1/runs/{run_id}/snapshots/{n}/tets", responses=_BYTES, response_class=Response)
 async def tets(request: Request, run: OwnedRun, service: ServiceOf, n: Number, if_none_match: Known = "") -> Response:
     """All tets of a snapshot, for sections, packed by gzip; 404 where it has none."""
-    told = await service.lanes.run(_told, service, run, n)
+    told = await service.pool.run(_told, service, run, n)
     if not told.tets:
         raise not_found(f"the tets of snapshot {n} of run {run.id}")
     path = str(Path(told.path).with_suffix(layout.TETS_SUFFIX))
@@ -70,7 +70,7 @@ def fragment(run: OwnedRun, service: ServiceOf, label: Label, if_none_match: Kno
     with found.lock:
         found.catch_up()
         told = [_decode(found.snapshots[n]) for n in sorted(found.snapshots)]
-    return download.tagged(msgspec.json.encode(pieces.course(folder, told, label)), if_none_match)
+    return download.tagged(msgspec.json.encode(fragment_history.course(folder, told, label)), if_none_match)
 
 
 async def _sent(request: Request, service: Service, run: Run, path: str, tag: str, known: str) -> Response:

@@ -15,8 +15,8 @@ from ..answers import openapi, view
 from ..errors import not_found
 from ..intake.sweeps import Plan
 from ..requests.auth import Identity, Reader, Submitter
-from ..requests.lanes import blocking
 from ..requests.limits import read_body
+from ..requests.thread_pool import blocking
 from ..runs.events import Run
 from ..service import Service, ServiceOf
 from .runs import ask_to_stop
@@ -31,7 +31,7 @@ async def submit(
 ) -> Response:
     """Takes a case and the points at which it is to be run; all runs are accepted, or none."""
     plan = await service.sweepers.run(service.sweeps.submit, identity.owner, body, idempotency_key)
-    shown = await service.lanes.run(_shown, service, plan)
+    shown = await service.pool.run(_shown, service, plan)
     return JSONResponse(shown, 202, {"Location": f"/v1/sweeps/{plan.id}"})
 
 
@@ -76,10 +76,10 @@ async def again(service: ServiceOf, identity: Submitter, sweep_id: str, body: Bo
     """Runs the points again whose runs have ended without success, or were removed. The request is that with which the
     sweep was handed in. Asking again changes nothing while these runs go on.
     """
-    plan = await service.lanes.run(_find, service, identity, sweep_id)
-    failed = await service.lanes.run(_failed, service, plan)
+    plan = await service.pool.run(_find, service, identity, sweep_id)
+    failed = await service.pool.run(_failed, service, plan)
     plan = await service.sweepers.run(service.sweeps.again, plan, body, failed)
-    return JSONResponse(await service.lanes.run(_shown, service, plan), 202)
+    return JSONResponse(await service.pool.run(_shown, service, plan), 202)
 
 
 def _failed(service: Service, plan: Plan) -> dict[int, str]:
@@ -107,7 +107,7 @@ def _pairs(service: Service, plan: Plan) -> list[tuple[dict[str, Any], Run]]:
     """Each point with its run; without those whose folder has been removed, or of which nothing is known any more."""
     kept = service.store.some(plan.runs)
     found = [run for run_id in plan.runs if (run := service.supervisor.current(run_id) or kept.get(run_id))]
-    left = {run.id: run for run in service.present.left(found)}
+    left = {run.id: run for run in service.existing.left(found)}
     return [(point, left[run_id]) for point, run_id in zip(plan.points, plan.runs, strict=False) if run_id in left]
 
 

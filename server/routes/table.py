@@ -9,9 +9,9 @@ from fastapi import APIRouter, Header, Query, Response
 from ..answers import download, view
 from ..answers.rows import Table
 from ..requests.auth import Reader
-from ..requests.lanes import blocking
+from ..requests.thread_pool import blocking
 from ..service import ServiceOf
-from .choice import ChosenOf
+from .list_query import ChosenOf
 from .runs import Cursor, listed
 
 router = APIRouter()

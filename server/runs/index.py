@@ -8,7 +8,7 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from ..database.store import Store
 from .events import Run
-from .holds import words
+from .retries import words
 
 _log = logging.getLogger("conoid.server")
 _REST = 5.0

@@ -17,7 +17,7 @@ from ..settings import Settings
 from ..telemetry import Telemetry
 from . import ends, folder, journal
 from .events import Action, Adopt, Journal, Kill, Launch, LaunchFailed, LaunchPutOff, Run, Stop, WriteOutcome
-from .holds import passing
+from .retries import passing
 from .watch import Watch
 
 _log = logging.getLogger("conoid.server")

@@ -12,7 +12,7 @@ from conoid.cases.output import layout
 from conoid.cases.run import State
 
 from ..launch import Launcher, Trace, Worker
-from . import ends, farewell, folder, journal
+from . import ends, folder, journal, launcher_log
 from .events import Found, Run
 from .folder import Submission
 
@@ -40,7 +40,7 @@ def look(path: Path, known: Run | None, launcher: Launcher) -> Left:
     told = _told(path)
     trace = launcher.find(accepted.id, path)
     run = _mended(folder.replay(accepted, told), bool(told), known, path, trace, launcher.queues)
-    code, full = farewell.exit_code(path), farewell.disk_failed(path)
+    code, full = launcher_log.exit_code(path), launcher_log.disk_failed(path)
     found = Found(_fate(path, trace), _outcome(path), trace.rebooted, code, full, ends.when(path))
     return Left(
         _stopping(run, known, path, launcher.queues), made.idempotency_key if made else None, found, trace.worker

@@ -15,18 +15,18 @@ from conoid.cases.run import State
 
 from ..database.store import Store
 from ..launch import Launcher, LaunchError
-from ..queue import waiting
-from ..queue.waiting import Need
+from ..queue import scheduling
+from ..queue.scheduling import Need
 from ..queue.waitlist import Held, Waitlist
 from ..settings import Settings
 from ..telemetry import Telemetry, TelemetryError
+from .earlier_runs import EarlierRuns
 from .events import ONCE, Admitted, Broken, CancelAsked, Event, Granted, LaunchPutOff, Run
-from .holds import Holds, words
 from .index import Index
-from .leavings import Leavings
 from .lifecycle import advance
 from .perform import Performer, of_launch
 from .recovery import Left
+from .retries import Retries, words
 
 _log = logging.getLogger("conoid.server")
 _LOOK = 0.02
@@ -66,9 +66,9 @@ class Supervisor:
         self._hands = Performer(settings, launcher, telemetry)
         self._watches = self._hands.watches
         self._batch = launcher.queues
-        self._holds = Holds()
+        self._retries = Retries()
         self._index = Index(store)
-        self._leavings = Leavings(settings.runs, store, self._index, launcher, self._found)
+        self._earlier_runs = EarlierRuns(settings.runs, store, self._index, launcher, self._found)
         self._waitlist = Waitlist(settings, launcher.queues)
         self.held_back: Callable[[Need, Iterable[Need]], str] = lambda need, active: ""
         self._thread = threading.Thread(target=self._work, name="supervisor", daemon=True)
@@ -135,7 +135,7 @@ class Supervisor:
 
     def reason(self, run_id: str) -> str:
         """What a queued run waits for, and what a batch system has to say of any; else empty."""
-        if why := self._holds.why(run_id):
+        if why := self._retries.why(run_id):
             return f"tried again soon: {why}"
         watch = self._watches.get(run_id)
         if watch is not None and (note := watch.worker.note()):
@@ -149,8 +149,8 @@ class Supervisor:
 
     def stranded(self) -> list[str]:
         """Open runs that have neither a watch nor a place in the queue nor a timer: none, at any time."""
-        looked_after = {*self._watches, *self._index.unsaved, *self._holds.timed()}
-        return waiting.stranded(tuple(self._open.values()), looked_after)
+        looked_after = {*self._watches, *self._index.unsaved, *self._retries.timed()}
+        return scheduling.stranded(tuple(self._open.values()), looked_after)
 
     # The supervisor's own thread --------------------------------------------------------------------------------------
 
@@ -166,10 +166,10 @@ class Supervisor:
         self._answer()
         for run_id in tuple(self._watches):
             self._attend(run_id)
-        for run_id, event in self._holds.due():
+        for run_id, event in self._retries.due():
             self._apply(run_id, event)
-        for run in waiting.in_state(tuple(self._open.values()), State.ACCEPTED):
-            if not self._holds.held(run.id):
+        for run in scheduling.in_state(tuple(self._open.values()), State.ACCEPTED):
+            if not self._retries.held(run.id):
                 self._apply(run.id, Admitted())
         self._grant()
         if time.monotonic() - self._tidied > _TIDY:
@@ -178,7 +178,7 @@ class Supervisor:
     def _answer(self) -> None:
         """Takes what was asked; waits for it no longer than until the next look."""
         try:
-            asked = self._inbox.get(timeout=_LOOK if self._watches else _AGAIN if self._holds else _TIDY)
+            asked = self._inbox.get(timeout=_LOOK if self._watches else _AGAIN if self._retries else _TIDY)
         except queue.Empty:
             return
         if asked is not None:
@@ -187,7 +187,7 @@ class Supervisor:
 
     def _attend(self, run_id: str) -> None:
         watch = self._watches[run_id]
-        if self._holds.held(run_id):
+        if self._retries.held(run_id):
             return
         try:
             for event in watch.look():
@@ -201,7 +201,7 @@ class Supervisor:
         """Starts those whose turn it is. One that cannot be started now holds nobody up; nothing is announced that
         could not be written.
         """
-        held = Held(self._holds.held, self.held_back)
+        held = Held(self._retries.held, self.held_back)
         for run_id in self._waitlist.turn(tuple(self._open.values()), tuple(self._watches), held):
             try:
                 self._hands.probe(run_id)
@@ -231,9 +231,9 @@ class Supervisor:
         except Exception as error:
             return self._fail(before, event, error)
         if isinstance(event, LaunchPutOff):
-            self._holds.rest(run_id, event.message)
+            self._retries.rest(run_id, event.message)
         else:
-            self._holds.done(run_id, event)
+            self._retries.done(run_id, event)
         if after != before:
             self._settle(after)
         return None
@@ -243,10 +243,14 @@ class Supervisor:
         if not isinstance(event, Broken):
             if self._hands.gone(run.id):
                 return self._apply(run.id, Broken(_GONE))
-            if self._holds.damaged(run.id, error) and not self._hands.lives(run.id) and self._hands.beyond_use(run.id):
+            if (
+                self._retries.damaged(run.id, error)
+                and not self._hands.lives(run.id)
+                and self._hands.beyond_use(run.id)
+            ):
                 return self._apply(run.id, Broken(f"{_DAMAGED}: {words(error)}"))
         self._waitlist.changed()
-        return self._holds.put_off(run.id, error, event if isinstance(event, ONCE) else None)
+        return self._retries.put_off(run.id, error, event if isinstance(event, ONCE) else None)
 
     def _settle(self, run: Run) -> None:
         """The step is made: memory first, then the database, then those who wait for news."""
@@ -254,7 +258,7 @@ class Supervisor:
         self._open[run.id] = run
         if run.state.final:
             self._watches.pop(run.id, None)
-            self._holds.forget(run.id)
+            self._retries.forget(run.id)
         self._save(run)
         self._ring(run.id)
 
@@ -267,7 +271,7 @@ class Supervisor:
     def _tidy(self) -> None:
         """Does again what failed before, and lets the router know the tokens as they are."""
         self._tidied = time.monotonic()
-        self._leavings.again()
+        self._earlier_runs.again()
         for run_id in tuple(self._index.unsaved):
             self._save(self._open[run_id])
         for run_id, run in tuple(self._open.items()):
@@ -275,7 +279,7 @@ class Supervisor:
                 self._apply(run_id, Broken(_GONE))
         for run_id in self.stranded():
             _log.error("run %s was not looked after; it is taken up again", run_id)
-            self._leavings.take_up(self._settings.runs / run_id)
+            self._earlier_runs.take_up(self._settings.runs / run_id)
         if self._telemetry is not None:
             try:
                 self._telemetry.follow(self._store.tokens())
@@ -284,7 +288,7 @@ class Supervisor:
 
     def _take_up(self) -> None:
         """Makes memory and database agree with the runs' folders, and goes on with what an earlier server left."""
-        self._leavings.all()
+        self._earlier_runs.all()
         for run_id, run in self._store.open().items():
             if run_id not in self._open and self._hands.gone(run_id):
                 self._open[run_id] = run

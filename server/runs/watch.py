@@ -11,9 +11,9 @@ from conoid.cases.messages import Progress, Status
 from conoid.cases.output import layout
 from conoid.cases.run import State
 
-from ..keeping import weights
+from ..keeping import disk_usage
 from ..launch import Phase, Worker
-from . import ends, farewell, folder, journal
+from . import ends, folder, journal, launcher_log
 from .events import Event, GraceOver, OutputOver, WallTimeOver, WorkerExited, WorkerRuns, WorkerStarts, WorkerWaits
 
 _FAREWELL = 10.0
@@ -60,8 +60,8 @@ class Watch:
             yield WorkerRuns()
         if exit_ is not None:
             told = folder.outcome(self._folder)
-            code = farewell.exit_code(self._folder) if exit_.code is None else exit_.code
-            self._full = told is None and (self._full or farewell.disk_failed(self._folder))
+            code = launcher_log.exit_code(self._folder) if exit_.code is None else exit_.code
+            self._full = told is None and (self._full or launcher_log.disk_failed(self._folder))
             traces = self._traces(exit_.last_words)
             at = ends.when(self._folder) if unseen or told is not None else 0.0
             yield WorkerExited(code, told, exit_.out_of_memory, self._full, traces, exit_.reading, at)
@@ -74,7 +74,7 @@ class Watch:
             yield WallTimeOver()
         elif self._most is not None and now >= self._weigh_at:
             self._weigh_at = now + _WEIGHED
-            if weights.size(self._folder) > self._most:
+            if disk_usage.size(self._folder) > self._most:
                 self._most = None
                 yield OutputOver()
 

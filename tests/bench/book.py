@@ -25,7 +25,7 @@ from conoid.cases.model.schema import Case
 from conoid.cases.suite import suite
 from conoid.client.commands import hard
 from conoid.client.errors import ClientError
-from conoid.client.local.local import LocalServer
+from conoid.client.local.own_server import LocalServer
 from conoid.client.run import Run
 from conoid.client.studies.scaling import CORES
 from conoid.client.studies.variants import sizes

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from conoid.cases import messages
 from conoid.cases.output import layout
-from conoid.client.local.local import LocalServer
+from conoid.client.local.own_server import LocalServer
 
 from .startup_phases import PHASES
 from .table import Cell, table

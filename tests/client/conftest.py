@@ -9,11 +9,11 @@ import zenoh
 
 from conoid.client.drawing import renderer
 from conoid.client.drawing.picture import Picture
-from conoid.client.local.local import LocalServer
+from conoid.client.local.own_server import LocalServer
 from conoid.client.remote.http import Router
 
+from .drawing_process import Ended, studio
 from .fakes import FAKE_WORKER, Broker, free_port
-from .studio import Ended, studio
 
 
 @pytest.fixture(scope="module")

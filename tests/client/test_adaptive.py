@@ -15,11 +15,11 @@ from conoid.cases.outcome import Measured, Outcome, to_json
 from conoid.cases.run import State
 from conoid.client.errors import ClientError, MissingError, UsageError
 from conoid.client.remote.http import Me
-from conoid.client.remote.told import RunInfo
+from conoid.client.remote.run_info import RunInfo
 from conoid.client.sweeps.adaptive import found_by
+from conoid.client.sweeps.adaptive_result import Found, read, table
 from conoid.client.sweeps.ballistic import Fit
 from conoid.client.sweeps.bracket import Sample, between, bracket, widest
-from conoid.client.sweeps.found import Found, read, table
 from conoid.client.sweeps.goal import Goal, span_of, spans_of, tolerance_of
 
 KEY = "parts[0].velocity[2]"

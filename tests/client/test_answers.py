@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 
 from conoid.client.cli import app
 from conoid.client.errors import AnswerError, ClientError, UsageError
-from conoid.client.local.places import inside
+from conoid.client.local.safe_paths import inside
 from conoid.client.remote import http
 from conoid.client.remote.config import address
 from conoid.client.remote.http import Http

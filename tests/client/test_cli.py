@@ -18,7 +18,7 @@ from typer.testing import CliRunner, Result
 from conoid.cases.estimates.cores import usable_cores
 from conoid.cases.load import read_case, resolved_json, shipped_path
 from conoid.client.cli import app
-from conoid.client.local.local import LocalServer
+from conoid.client.local.own_server import LocalServer
 
 from .bodies import write_run
 from .fakes import FAKE_WORKER, case_file

@@ -7,9 +7,9 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from conoid.client.cli import app
-from conoid.client.commands.moments import moment
+from conoid.client.commands.times import moment
 from conoid.client.errors import UsageError
-from conoid.client.local.local import LocalServer
+from conoid.client.local.own_server import LocalServer
 
 from .fakes import case_file
 

@@ -10,18 +10,18 @@ from rich.console import Console
 
 from conoid.cases.messages import AnyMessage, Load, Log
 from conoid.cases.run import State
-from conoid.client.commands import display, silence
+from conoid.client.commands import display, progress
 from conoid.client.errors import UnreachableError
 from conoid.client.live import Live, exit_code, grouped
 from conoid.client.remote.link import Link
 from conoid.client.watch import show, tell, watch
 
-from . import stories
+from . import run_messages
 
 
 def told(last: int) -> Live:
-    live = Live(stories.RUN, title="A bar")
-    for message in stories.whole()[:last]:
+    live = Live(run_messages.RUN, title="A bar")
+    for message in run_messages.whole()[:last]:
         live.take(message)
     return live
 
@@ -47,7 +47,7 @@ def test_phases_are_grouped_and_the_rest_of_the_interval_is_descheduled() -> Non
 
 def test_the_other_threads_of_a_rank_are_busy_by_the_time_of_their_tasks() -> None:
     live = told(6)
-    load = next(each for each in stories.whole() if isinstance(each, Load))
+    load = next(each for each in run_messages.whole() if isinstance(each, Load))
     live.take(msgspec.structs.replace(load, threads=4, helped=[3.0, 0.0]))
     assert live.helped == [3.0 / (3 * 2.0), 0.0]
     assert "65 % busy, its threads 50 %" in rendered(live)
@@ -79,7 +79,7 @@ def test_exit_codes(state: State, cause: str | None, code: int) -> None:
 
 
 def test_a_run_that_has_not_begun_says_how_long_it_waits(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("conoid.client.commands.display.time.time", lambda: stories.START + 3 + 42)
+    monkeypatch.setattr("conoid.client.commands.display.time.time", lambda: run_messages.START + 3 + 42)
     assert "starting  42 s" in rendered(told(3))
     assert "running  42 s" not in rendered(told(6))
 
@@ -97,7 +97,7 @@ def test_the_panel_shows_everything_that_is_watched(width: int) -> None:
     for shown in (
         "A bar", "running", "50.0 %", "40.0 µs of 80.0 µs", "8.10 ns", "tet 7 (bar): sound speed", "30 s",
         "9.70 M updates/s", "rank 0", "65 % busy", "35 % busy", "imbalance 1.20", "kinetic", "6.00 J", "2.0e-4",
-        "warning: the foot has folded", "310 nodes", "fragments", "descheduled 25 %", stories.RUN,
+        "warning: the foot has folded", "310 nodes", "fragments", "descheduled 25 %", run_messages.RUN,
     ):  # fmt: skip
         assert shown in text, shown
     assert "elastic" not in text, "terms that are zero are left out"
@@ -107,7 +107,7 @@ def test_the_panel_shows_everything_that_is_watched(width: int) -> None:
 def test_a_warning_is_shown_once_and_whole() -> None:
     live, words = told(9), "contact has let some tets of the dust into each other, " * 3
     for n in range(20, 24):
-        live.take(Log(run=stories.RUN, seq=n, wall=stories.START, level="warning", text=words + "the end"))
+        live.take(Log(run=run_messages.RUN, seq=n, wall=run_messages.START, level="warning", text=words + "the end"))
     text = rendered(live, 60)
     assert (text.count("warning: contact"), "the end (4 times)" in text) == (1, True)
 
@@ -121,7 +121,7 @@ def test_the_panel_fits_the_height_of_the_terminal() -> None:
     live = told(11)
     live.phases = {"compute": [1.0] * 40}
     for n in range(20, 30):
-        live.take(Log(run=stories.RUN, seq=n, wall=stories.START, level="warning", text=f"tet {n} is flat"))
+        live.take(Log(run=run_messages.RUN, seq=n, wall=run_messages.START, level="warning", text=f"tet {n} is flat"))
     text = rendered(live, 60, height=24)
     assert len(text.splitlines()) < 24
     assert "tet 29 is flat" in text
@@ -142,9 +142,9 @@ def test_many_ranks_are_cut_and_said_so() -> None:
 
 def test_plain_lines_tell_each_state_and_percent_and_each_warning_once() -> None:
     lines: list[str] = []
-    story = stories.whole()
-    often = [msgspec.structs.replace(stories.progress(6, 0.25 + n / 1e4), seq=6) for n in range(100)]
-    live = tell([*story[:6], *often, *story[6:10], *story[9:]], Live(stories.RUN), lines.append)
+    story = run_messages.whole()
+    often = [msgspec.structs.replace(run_messages.progress(6, 0.25 + n / 1e4), seq=6) for n in range(100)]
+    live = tell([*story[:6], *often, *story[6:10], *story[9:]], Live(run_messages.RUN), lines.append)
     assert live.state is State.SUCCEEDED
     assert [line.split()[2] for line in lines] == [
         "accepted", "queued", "starting", "running", "running", "warning:", "running", "running", "running",
@@ -156,14 +156,14 @@ def test_plain_lines_tell_each_state_and_percent_and_each_warning_once() -> None
 
 def test_what_a_start_is_at_is_told_and_changes_no_state() -> None:
     lines: list[str] = []
-    words = [stories.status(4 + n, "starting", message=f"compiling kernels: {n} of 3") for n in range(4)]
-    live = tell([stories.status(3, "starting"), *words], Live(stories.RUN), lines.append)
+    words = [run_messages.status(4 + n, "starting", message=f"compiling kernels: {n} of 3") for n in range(4)]
+    live = tell([run_messages.status(3, "starting"), *words], Live(run_messages.RUN), lines.append)
     assert [line.partition("starting")[2].strip() for line in lines] == ["", *(word.message for word in words)]
-    assert live.changed == stories.START + 3
+    assert live.changed == run_messages.START + 3
 
 
 def test_a_silent_run_is_heard_of(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(silence, "LONGEST", 0.05)
+    monkeypatch.setattr(progress, "LONGEST", 0.05)
     lines: list[str] = []
     heard = threading.Event()
 
@@ -173,11 +173,11 @@ def test_a_silent_run_is_heard_of(monkeypatch: pytest.MonkeyPatch) -> None:
             heard.set()
 
     def story() -> Iterator[AnyMessage]:
-        yield stories.status(1, "starting", message="meshing tile, part 2 of 3")
+        yield run_messages.status(1, "starting", message="meshing tile, part 2 of 3")
         assert heard.wait(30.0)
-        yield stories.status(2, "running")
+        yield run_messages.status(2, "running")
 
-    tell(story(), Live(stories.RUN), write)
+    tell(story(), Live(run_messages.RUN), write)
     assert lines[0].endswith("starting  meshing tile, part 2 of 3")
     assert "still starting, for " in lines[1]
     assert lines[1].endswith(": meshing tile, part 2 of 3")
@@ -186,13 +186,13 @@ def test_a_silent_run_is_heard_of(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_a_failure_tells_its_cause() -> None:
     lines: list[str] = []
-    tell([stories.status(1, "failed", "energy", "the residual passed 0.05")], Live(stories.RUN), lines.append)
+    tell([run_messages.status(1, "failed", "energy", "the residual passed 0.05")], Live(run_messages.RUN), lines.append)
     assert lines[0].endswith("failed  energy  the residual passed 0.05")
 
 
 def test_the_live_screen_ends_with_the_last_picture() -> None:
     out = Console(file=io.StringIO(), width=100, height=40, force_terminal=True)
-    show(stories.whole(), Live(stories.RUN), out)
+    show(run_messages.whole(), Live(run_messages.RUN), out)
     assert isinstance(out.file, io.StringIO)
     assert "succeeded" in out.file.getvalue()
 
@@ -200,7 +200,7 @@ def test_the_live_screen_ends_with_the_last_picture() -> None:
 class Queued:
     """A run that waits until somebody has been told why."""
 
-    id, title, reason = stories.RUN, "A bar", "waiting for 4 of 2 slots; 1 free"
+    id, title, reason = run_messages.RUN, "A bar", "waiting for 4 of 2 slots; 1 free"
 
     def __init__(self) -> None:
         self.heard = threading.Event()
@@ -212,10 +212,10 @@ class Queued:
         return Nothing()
 
     def messages(self, *, link: Link) -> Iterator[AnyMessage]:
-        yield stories.status(1, "queued")
+        yield run_messages.status(1, "queued")
         assert self.heard.wait(10)
-        yield stories.status(2, "running")
-        yield stories.status(3, "succeeded")
+        yield run_messages.status(2, "running")
+        yield run_messages.status(3, "succeeded")
 
 
 class Deserted(Queued):
@@ -230,14 +230,14 @@ class Deserted(Queued):
     asked = False
 
     def messages(self, *, link: Link) -> Iterator[AnyMessage]:
-        yield stories.status(1, "running")
+        yield run_messages.status(1, "running")
         assert self.heard.wait(10)
-        yield stories.status(2, "succeeded")
+        yield run_messages.status(2, "succeeded")
 
 
 def test_a_server_that_is_gone_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     """Nobody knows then whether the run still runs."""
-    monkeypatch.setattr(silence, "LONGEST", 0.05)
+    monkeypatch.setattr(progress, "LONGEST", 0.05)
     monkeypatch.setattr("conoid.client.watch.REASON_EVERY", 0.01)
     run, lines = Deserted(), list[str]()
 
@@ -250,7 +250,7 @@ def test_a_server_that_is_gone_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     known = watch(run, live=False, console=Heard(file=io.StringIO()))
     assert any(line.endswith("it was running when it was last heard of") for line in lines)
     assert "no server answers" not in rendered(known), "it has come back"
-    known.away = stories.START
+    known.away = run_messages.START
     assert "no server answers" in rendered(known), "the panel tells it too"
 
 
@@ -267,7 +267,7 @@ class Nothing:
 
 
 def test_what_a_run_in_the_queue_waits_for_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(silence, "LONGEST", 0.05)
+    monkeypatch.setattr(progress, "LONGEST", 0.05)
     monkeypatch.setattr("conoid.client.watch.REASON_EVERY", 0.01)
     run, out = Queued(), io.StringIO()
 

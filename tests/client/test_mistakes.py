@@ -14,7 +14,7 @@ from conoid.client.cli import app
 from conoid.client.commands import sweeping
 from conoid.client.errors import ClientError
 from conoid.client.local.following import FolderRun
-from conoid.client.local.places import inside
+from conoid.client.local.safe_paths import inside
 from conoid.client.remote import http
 from conoid.client.remote.config import DEFAULT_URL
 from conoid.client.remote.session import Session

@@ -10,9 +10,9 @@ from conoid.cases.messages import AnyMessage, Status
 from conoid.cases.run import State
 from conoid.client.errors import ServiceError, UnreachableError
 from conoid.client.remote.http import Http
+from conoid.client.remote.run_info import RunInfo
 from conoid.client.remote.session import Session
 from conoid.client.remote.stream import follow
-from conoid.client.remote.told import RunInfo
 from conoid.client.run import Run
 from conoid.client.sweeps.sweep import SweepInfo
 

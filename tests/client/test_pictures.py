@@ -10,12 +10,12 @@ import pytest
 from matplotlib.image import imread
 from PIL import Image
 
-from conoid.client.drawing import captions, films, hues, scales, sheet
+from conoid.client.drawing import captions, films, part_colours, picture_layout, scales
 from conoid.client.drawing.camera import Camera
 from conoid.client.drawing.fields import FIELDS
-from conoid.client.drawing.look import Look
 from conoid.client.drawing.picture import Drawn
 from conoid.client.drawing.scene import Scene, draw
+from conoid.client.drawing.view_options import Look
 from conoid.client.errors import LookError, ViewError
 
 from .bodies import quarter_bar, write_frame
@@ -210,7 +210,7 @@ def test_a_fixed_range_is_that_of_the_run(frame: Path, tmp_path: Path) -> None:
 @pytest.mark.parametrize("size", [(200, 200), (320, 240), (700, 500), (1280, 720), (1920, 1080), (500, 1400)])
 def test_no_text_is_cut_off_at_any_size(size: tuple[int, int]) -> None:
     """Nothing is painted on the outermost pixels, whatever the field and however long a name is."""
-    font = sheet.font(size)
+    font = picture_layout.font(size)
     right, above, towards = np.linalg.qr(np.random.default_rng(sum(size)).normal(size=(3, 3)))[0]
     eye = Camera(np.zeros(3), towards, right, above, half=0.05, deep=0.1)
     parts = ["a part whose name is as long as nobody would write it", *map(str, range(60))]
@@ -224,7 +224,7 @@ def test_no_text_is_cut_off_at_any_size(size: tuple[int, int]) -> None:
         side = captions.beside_bar(field, scale, font) if scale else captions.beside_legend(entries, "1 fragment", font)
         side, head = min(side, round(0.34 * size[0])), 3 * font
         panel = (0, head, size[0] - side, size[1] - head)
-        laid = sheet.Sheet([panel], (0, 0, size[0], head), (panel[2], head, side, panel[3]), 1, font, eye)
+        laid = picture_layout.Sheet([panel], (0, 0, size[0], head), (panel[2], head, side, panel[3]), 1, font, eye)
         image = Image.new("RGB", size, "#ffffff")
         painter = captions.Painter(image, laid, captions.LIGHT)
         painter.title("A title of a case that goes on and on, " * 5, "t = 123.4 µs")
@@ -283,7 +283,7 @@ def test_a_picture_has_the_colours_of_the_fragments(frame: Path, tmp_path: Path)
     drawn(frame, "fragment", tmp_path / "a.png", camera="x", outlines=False)
     pixels = np.asarray(Image.open(tmp_path / "a.png").convert("RGB")).astype(float)
     for number, part in ((0, 0), (1, 1), (2, 1)):
-        colour = hues.of_fragments([number], [part], 2)[0].astype(float)
+        colour = part_colours.of_fragments([number], [part], 2)[0].astype(float)
         shares = pixels / np.maximum(pixels.sum(axis=2, keepdims=True), 1.0)
         near = np.abs(shares - colour / colour.sum()).max(axis=2) < 0.012
         assert (near & (pixels.max(axis=2) < 255)).sum() > 300, (number, part)

@@ -14,9 +14,9 @@ import pytest
 from typer.testing import CliRunner
 
 from conoid.client.cli import app
-from conoid.client.commands import options, silence
+from conoid.client.commands import options, progress
 from conoid.client.errors import ClientError, UnfinishedError
-from conoid.client.local.saving import save_text
+from conoid.client.local.atomic import save_text
 from conoid.client.reports import replay3d, report
 from conoid.client.result import Result
 from conoid.server.answers import page
@@ -158,7 +158,7 @@ def test_the_command_names_the_file_after_the_run(folder: Path, quiet_home: Path
 
 
 def test_what_takes_long_says_what_it_is_at(folder: Path, quiet_home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(silence, "LONGEST", 0.05)
+    monkeypatch.setattr(progress, "LONGEST", 0.05)
     heard = threading.Event()
 
     def told(*lines: str) -> None:
@@ -204,7 +204,7 @@ def test_a_replay_has_every_module_that_it_imports(folder: Path, tmp_path: Path)
     there = modules(html)
     assert "conoid/view3d.js" in there
     for name in ("colours.js", "shaders.js"):
-        own = (Path(replay3d.__file__).parent / "web" / name).read_text(encoding="utf-8")
+        own = (Path(replay3d.__file__).parent.parent / "web" / name).read_text(encoding="utf-8")
         assert own.replace('"./', '"conoid/') == there[f"conoid/{name}"], "the report has the colours of the page"
     for name, code in there.items():
         if name != "conoid/three":

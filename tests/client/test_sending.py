@@ -15,12 +15,12 @@ from conoid.cases.output import layout
 from conoid.cases.reading.files import Named
 from conoid.client.cli import app
 from conoid.client.errors import ClientError, ServiceError
-from conoid.client.local.local import LocalServer
 from conoid.client.local.local_files import Hashes, LocalFile, state_of
+from conoid.client.local.own_server import LocalServer
 from conoid.client.remote import sending
 from conoid.client.remote.session import Session
 
-from .line import line_to
+from .slow_proxy import line_to
 
 CASE = """
 name = "bar"

@@ -7,7 +7,7 @@ import pytest
 from conoid.cases.reading.problems import CaseError
 from conoid.cases.run import State
 from conoid.client.errors import NotFoundError, ServiceError, UnfinishedError
-from conoid.client.local.local import LocalServer
+from conoid.client.local.own_server import LocalServer
 from conoid.client.remote.session import Session
 from conoid.client.remote.stream import SseLink, ZenohLink
 

@@ -14,7 +14,7 @@ import pytest
 from conoid.cases.load import CaseError
 from conoid.cases.reading.problems import ConoidError
 from conoid.client.errors import AnswerError, ClientError, NotFoundError, ServiceError, UnreachableError, UsageError
-from conoid.client.local.places import inside
+from conoid.client.local.safe_paths import inside
 from conoid.client.remote.config import DEFAULT_URL, target
 from conoid.client.remote.session import Session
 from conoid.client.remote.submission import body_of

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from conoid.client.errors import ClientError, ServiceError, UnfinishedError
-from conoid.client.local.local import LocalServer
+from conoid.client.local.own_server import LocalServer
 from conoid.client.remote.session import Session
 from conoid.client.remote.stream import SseLink, ZenohLink
 from conoid.client.snapshots import read

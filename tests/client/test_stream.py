@@ -15,10 +15,10 @@ from conoid.client.remote.http import Router
 from conoid.client.remote.link import Link
 from conoid.client.remote.stream import SseLink, StreamError, ZenohLink, follow
 
-from . import stories
+from . import run_messages
 from .fakes import OWNER, Broker, free_port
 
-PREFIX = keys.run_prefix(OWNER, stories.RUN)
+PREFIX = keys.run_prefix(OWNER, run_messages.RUN)
 
 
 class Journal:
@@ -57,10 +57,10 @@ def subscribed(broker: Broker) -> ZenohLink:
     """A link that the router knows: a declaration takes a moment to arrive. What it heard meanwhile has seq 0."""
     link = ZenohLink(broker.router, PREFIX)
     deadline = time.monotonic() + 10
-    broker.publish(stories.status(0, "running"))
+    broker.publish(run_messages.status(0, "running"))
     while link.get(0.02) is None:
         assert time.monotonic() < deadline
-        broker.publish(stories.status(0, "running"))
+        broker.publish(run_messages.status(0, "running"))
     while link.get(0.05) is not None:
         pass
     return link
@@ -74,7 +74,7 @@ def until(truth: Callable[[], bool]) -> None:
 
 
 def test_a_late_joiner_reads_history_then_stream_without_gap_or_repeat(broker: Broker) -> None:
-    journal, story = Journal(), stories.whole()
+    journal, story = Journal(), run_messages.whole()
     journal.lines = story[:6]
     link = subscribed(broker)
     broker.publish(story[4])  # It was on its way while the reader subscribed.
@@ -89,7 +89,7 @@ def test_a_late_joiner_reads_history_then_stream_without_gap_or_repeat(broker: B
 
 
 def test_a_gap_is_refilled_from_the_journal(broker: Broker) -> None:
-    journal, story = Journal(), stories.whole()
+    journal, story = Journal(), run_messages.whole()
     told, thread = reading(subscribed(broker), journal)
     until(lambda: journal.reads == 1)
     for message in story:
@@ -101,7 +101,7 @@ def test_a_gap_is_refilled_from_the_journal(broker: Broker) -> None:
 
 
 def test_a_router_that_falls_silent_loses_nothing(broker: Broker) -> None:
-    journal, story = Journal(), stories.whole()
+    journal, story = Journal(), run_messages.whole()
     told, thread = reading(subscribed(broker), journal)
     broker.publish(story[0])
     journal.lines = story
@@ -111,7 +111,7 @@ def test_a_router_that_falls_silent_loses_nothing(broker: Broker) -> None:
 
 def test_a_run_that_ended_without_a_last_word_ends_the_stream(broker: Broker) -> None:
     journal = Journal()
-    journal.lines = stories.whole()[:9]
+    journal.lines = run_messages.whole()[:9]
     told, thread = reading(subscribed(broker), journal, ended=lambda: True)
     thread.join(10)
     assert not thread.is_alive()
@@ -121,12 +121,12 @@ def test_a_run_that_ended_without_a_last_word_ends_the_stream(broker: Broker) ->
 def test_other_runs_and_rubbish_are_not_heard(broker: Broker) -> None:
     link = subscribed(broker)
     try:
-        other = msgspec.structs.replace(stories.status(1, "running"), run="r2")
+        other = msgspec.structs.replace(run_messages.status(1, "running"), run="r2")
         broker.publish(other)
         broker.session.put(f"{PREFIX}/event", b"not a message")
-        broker.publish(stories.status(2, "queued"))
+        broker.publish(run_messages.status(2, "queued"))
         heard = link.get(5.0)
-        assert heard == stories.status(2, "queued")
+        assert heard == run_messages.status(2, "queued")
         assert link.get(0.05) is None
     finally:
         link.close()
@@ -146,7 +146,7 @@ def test_no_router_is_told_at_once() -> None:
 
 
 def test_sse_tells_the_same_and_its_break_is_bridged_by_the_journal() -> None:
-    journal, story = Journal(), stories.whole()
+    journal, story = Journal(), run_messages.whole()
     journal.lines = story
 
     def events() -> Iterator[AnyMessage]:
@@ -161,7 +161,7 @@ def test_sse_tells_the_same_and_its_break_is_bridged_by_the_journal() -> None:
 def test_a_server_that_restarts_is_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("conoid.client.remote.stream.time.sleep", lambda _: None)
     journal = Journal()
-    journal.lines = stories.whole()
+    journal.lines = run_messages.whole()
     failures = iter([True, True, False])
 
     def refill(after: int) -> list[AnyMessage]:
@@ -186,7 +186,7 @@ def test_a_server_that_stays_away_is_told(monkeypatch: pytest.MonkeyPatch) -> No
 def test_a_full_mailbox_drops_instead_of_waiting() -> None:
     mailbox = stream.Mailbox()
     for seq in range(1, stream._CAPACITY + 100):
-        mailbox.put(stories.status(seq, "running"))
+        mailbox.put(run_messages.status(seq, "running"))
     first = mailbox.get(0.0)
     assert first is not None
     assert first.seq == 1
@@ -198,7 +198,7 @@ def test_a_stream_that_nobody_can_read_is_told_once_and_the_journal_is_read() ->
         yield
 
     journal = Journal()
-    journal.lines = [stories.status(1, "running"), stories.status(2, "succeeded")]
+    journal.lines = [run_messages.status(1, "running"), run_messages.status(2, "succeeded")]
     link = SseLink(unreadable)
     until(lambda: bool(link.trouble))
     warning, *told = follow(link, journal.after, lambda: True)

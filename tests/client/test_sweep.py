@@ -9,8 +9,8 @@ from conoid.cases.load import CaseError
 from conoid.cases.run import State
 from conoid.client.commands import sweeping
 from conoid.client.errors import ClientError
-from conoid.client.remote.told import RunInfo
-from conoid.client.sweeps import swept
+from conoid.client.remote.run_info import RunInfo
+from conoid.client.sweeps import sweep_plot
 from conoid.client.sweeps.sweep import SweepPoint, listed, points_along, points_in, points_of
 
 
@@ -96,7 +96,9 @@ ROWS = [
 
 
 def test_what_differs_is_drawn_over_what_was_changed() -> None:
-    made = swept.figure([*ROWS, {**ROWS[0], "fragments": "", "energy.plastic [J]": ""}], ["v", "run.ranks"], None, [])
+    made = sweep_plot.figure(
+        [*ROWS, {**ROWS[0], "fragments": "", "energy.plastic [J]": ""}], ["v", "run.ranks"], None, []
+    )
     assert [axes.get_ylabel() for axes in made.axes] == ["fragments", "energy.plastic, J"]
     assert made.axes[0].get_xlabel() == "v, m/s"
     assert [line.get_label() for line in made.axes[0].lines] == ["run.ranks 1", "run.ranks 2"]
@@ -106,7 +108,7 @@ def test_what_differs_is_drawn_over_what_was_changed() -> None:
 @pytest.mark.parametrize("x", [None, "w"])
 def test_keys_that_go_together_are_one_axis(x: str | None) -> None:
     rows = [{"v [m/s]": row["v [m/s]"], "w [K]": f"{9000 / float(row['v [m/s]']):g}", **row} for row in ROWS]
-    made = swept.figure(rows, ["v", "w", "run.ranks"], x, ["cpu"])
+    made = sweep_plot.figure(rows, ["v", "w", "run.ranks"], x, ["cpu"])
     assert made.axes[0].get_xlabel() == f"{'w, K' if x else 'v, m/s'}\nand 1 more that goes with it"
     assert [(line.get_label(), len(np.asarray(line.get_xydata()))) for line in made.axes[0].lines] == [
         ("run.ranks 1", 3), ("run.ranks 2", 3)
@@ -114,7 +116,7 @@ def test_keys_that_go_together_are_one_axis(x: str | None) -> None:
 
 
 def test_words_on_the_axis_and_columns_by_name() -> None:
-    made = swept.figure(
+    made = sweep_plot.figure(
         [{**row, "v [m/s]": f"law {row['v [m/s]'][0]}"} for row in ROWS], ["v", "run.ranks"], "v", ["cpu"]
     )
     assert [axes.get_ylabel() for axes in made.axes] == ["cpu, s"]
@@ -124,12 +126,12 @@ def test_words_on_the_axis_and_columns_by_name() -> None:
 @pytest.mark.parametrize(("x", "columns", "words"), [("w", [], "x = 'w'"), (None, ["mass"], "'mass': the table has")])
 def test_a_plot_of_what_is_not_there_is_refused(x: str | None, columns: list[str], words: str) -> None:
     with pytest.raises(ClientError, match=words):
-        swept.figure(ROWS, ["v", "run.ranks"], x, columns)
+        sweep_plot.figure(ROWS, ["v", "run.ranks"], x, columns)
 
 
 def test_nothing_to_draw_is_told() -> None:
     with pytest.raises(ClientError, match="no run of the sweep has ended"):
-        swept.figure([{**ROWS[0], "cpu [s]": ""}], ["v"], None, [])
+        sweep_plot.figure([{**ROWS[0], "cpu [s]": ""}], ["v"], None, [])
 
 
 def test_a_sweep_that_has_not_succeeded_names_a_run() -> None:

@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from conoid.client.cli import app
-from conoid.client.local.local import LocalServer
+from conoid.client.local.own_server import LocalServer
 
 from .fakes import FAKE_WORKER, case_file
 

@@ -13,7 +13,7 @@ from conoid.client.commands.options import show_lines
 from conoid.client.commands.tables import end_tables, outcome_table, runs_table, short_names
 from conoid.client.errors import UsageError
 from conoid.client.remote.rows import Alike, RunRow, differing
-from conoid.client.remote.told import RunInfo
+from conoid.client.remote.run_info import RunInfo
 from conoid.client.sweeps.sweep import text_rows
 
 NAME, ID = "glass_steel_bar_at_210_metres_a_second", "0mb3k2d9x7f1q0a5z8w4ty"

@@ -13,13 +13,13 @@ import pytest
 from matplotlib.image import imread
 from PIL import Image
 
-from conoid.client.drawing import camera, hues, renderer
+from conoid.client.drawing import camera, part_colours, renderer
 from conoid.client.drawing.fields import FIELDS
 from conoid.client.drawing.frame import require_whole
-from conoid.client.drawing.look import Look
 from conoid.client.drawing.picture import Picture
 from conoid.client.drawing.planes import Mirror, direction, mirrors
 from conoid.client.drawing.renderer import explain, reason
+from conoid.client.drawing.view_options import Look
 from conoid.client.errors import LookError, UnfinishedError, ViewError
 from conoid.client.view import view
 
@@ -280,11 +280,11 @@ def test_panels_are_laid_so_that_bodies_are_large() -> None:
 
 
 def test_a_fragment_keeps_its_colour_and_a_part_its_hue() -> None:
-    early = hues.of_fragments([0, 0, 0, 7, 9], [0, 0, 0, 0, 1], 2)
-    late = hues.of_fragments([9, 1, 9, 9, 11], [1, 1, 1, 1, 1], 2)
+    early = part_colours.of_fragments([0, 0, 0, 7, 9], [0, 0, 0, 0, 1], 2)
+    late = part_colours.of_fragments([9, 1, 9, 9, 11], [1, 1, 1, 1, 1], 2)
     assert (early[4] == late[0]).all()
     assert len(np.unique(late, axis=0)) == 3
-    pieces = hues.of_fragments(range(2, 2000), [1] * 1998, 2).astype(int)
+    pieces = part_colours.of_fragments(range(2, 2000), [1] * 1998, 2).astype(int)
     assert len(np.unique(pieces, axis=0)) > 1950
     assert (pieces[:, 0] > pieces[:, 2]).all(), "pieces of the second part are between red and yellow"
 

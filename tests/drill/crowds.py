@@ -28,7 +28,7 @@ from conoid.server.runs import folder
 from conoid.server.runs.folder import Submission
 from conoid.server.settings import Settings
 
-from ..server.spoken import told, write
+from ..server.journal_lines import told, write
 from .attacker import KINDS
 from .judge import TRUE, Row
 from .stand import Stand

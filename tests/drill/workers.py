@@ -16,7 +16,7 @@ from .stand import Stand
 
 NODE, PREEMPTED = frozenset({"lost/node"}), frozenset({"failed/preempted"})
 FAILED = frozenset({"failed/service", "failed/launch"})
-Sent = tuple[str, signal.Signals]
+Upload = tuple[str, signal.Signals]
 """To whom, and what."""
 
 
@@ -26,7 +26,7 @@ class Blow:
 
     name: str
     states: frozenset[str]
-    sends: Sent | None = None
+    sends: Upload | None = None
     plan: tuple[tuple[str, object], ...] = ()
     cancels: bool = False
     goes: bool = False

@@ -13,10 +13,10 @@ REQUEST = b"GET /v1/runs HTTP/1.1\r\nHost: x\r\nAuthorization: Bearer conoid_gue
 def main(host: str, port: int, seconds: float, threads: int) -> None:
     answers: Counter[str] = Counter()
     deadline = time.monotonic() + seconds
-    crowd = [threading.Thread(target=ask, args=(host, port, deadline, answers)) for _ in range(threads)]
-    for one in crowd:
+    senders = [threading.Thread(target=ask, args=(host, port, deadline, answers)) for _ in range(threads)]
+    for one in senders:
         one.start()
-    for one in crowd:
+    for one in senders:
         one.join()
     print(json.dumps(answers))
 

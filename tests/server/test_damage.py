@@ -11,7 +11,7 @@ from sqlalchemy.exc import OperationalError
 
 from conoid.cases.output import layout
 from conoid.cases.run import State
-from conoid.server.runs import farewell, folder, holds, index
+from conoid.server.runs import folder, index, launcher_log, retries
 from conoid.server.runs.events import Run
 
 from .faulty import House, Plan, faults
@@ -20,8 +20,8 @@ from .running import TOML, Running, case_text
 
 @pytest.fixture(autouse=True)
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(holds, "_AGAIN", 0.01)
-    monkeypatch.setattr(holds, "_LASTING", 0.02)
+    monkeypatch.setattr(retries, "_AGAIN", 0.01)
+    monkeypatch.setattr(retries, "_LASTING", 0.02)
 
 
 def folder_in_place(path: Path) -> None:
@@ -120,9 +120,9 @@ def test_complaints_of_a_disk_are_known(tmp_path: Path, said: str) -> None:
     (tmp_path / layout.LOGS).mkdir()
     log = tmp_path / layout.LOGS / layout.LAUNCHER_LOG
     log.write_text("a tet has turned inside out\n")
-    assert not farewell.disk_failed(tmp_path)
+    assert not launcher_log.disk_failed(tmp_path)
     log.write_text(f"OSError: {said}\n")
-    assert farewell.disk_failed(tmp_path)
+    assert launcher_log.disk_failed(tmp_path)
 
 
 def test_an_outcome_that_nobody_can_read_makes_room(tmp_path: Path) -> None:
@@ -140,11 +140,11 @@ def test_a_disk_that_was_full_at_the_end_is_remembered(tmp_path: Path, monkeypat
     house.puppets.ends = "never"
     run = house.accept()
     turned(house, run, State.RUNNING)
-    monkeypatch.setattr(farewell, "disk_failed", lambda _: True)
+    monkeypatch.setattr(launcher_log, "disk_failed", lambda _: True)
     watch = house.supervisor._watches[run.id]
     house.puppets.made[0].alive = False
     list(watch.look())
-    monkeypatch.setattr(farewell, "disk_failed", lambda _: False)
+    monkeypatch.setattr(launcher_log, "disk_failed", lambda _: False)
     assert turned(house, run).cause == "storage"
     house.store.close()
 

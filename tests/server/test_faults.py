@@ -17,7 +17,7 @@ from conoid.cases.run import State
 from conoid.server import durable
 from conoid.server.alone import AloneError, only_one
 from conoid.server.launch import processes
-from conoid.server.runs import folder, holds
+from conoid.server.runs import folder, retries
 from conoid.server.runs.events import Run
 
 from .faulty import House
@@ -26,7 +26,7 @@ from .running import PATIENCE, TOML, MakeProcess, Running, User, case_text
 
 @pytest.fixture(autouse=True)
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(holds, "_AGAIN", 0.02)
+    monkeypatch.setattr(retries, "_AGAIN", 0.02)
     monkeypatch.setattr("conoid.server.runs.supervisor._TIDY", 0.2)
 
 

@@ -16,7 +16,7 @@ from starlette.types import Message
 from conoid.cases.run import State
 from conoid.server.answers import stream
 from conoid.server.answers.download import Downloads
-from conoid.server.requests.lanes import Lanes
+from conoid.server.requests.thread_pool import ThreadPool
 
 from .running import PATIENCE, Running
 
@@ -163,7 +163,7 @@ def test_a_file_that_grows_is_sent_up_to_its_size(folder: Path) -> None:
 
     async def asked() -> str:
         request = Request({"type": "http", "method": "GET", "headers": []})
-        answer = await Downloads(Lanes(1, 1, PATIENCE)).respond(request, folder, "history.csv", ended=False)
+        answer = await Downloads(ThreadPool(1, 1, PATIENCE)).respond(request, folder, "history.csv", ended=False)
         with path.open("ab") as file:
             file.write(b" and after")
         await answer({"type": "http"}, receive, send)

@@ -17,7 +17,7 @@ from conoid.cases.run import State
 from conoid.server.app import opened
 from conoid.server.requests import auth, connections
 from conoid.server.requests.connections import Connection
-from conoid.server.requests.quiet import Quiet
+from conoid.server.requests.log_filter import FloodFilter
 from conoid.server.requests.tokens import create_token
 from conoid.server.serve import ADDRESS_FILE, _listening, _Server
 from conoid.server.settings import Settings
@@ -91,12 +91,12 @@ def test_a_header_that_comes_a_byte_at_a_time_is_read_in_few_pieces(ann: User, m
 
 
 def test_half_requests_keep_nobody_out(ann: User) -> None:
-    crowd = [knock(ann) for _ in range(400)]
+    knocks = [knock(ann) for _ in range(400)]
     for _ in range(5):
         with httpx2.Client(base_url=ann.http.base_url, timeout=5.0) as other:
             assert other.get("/healthz").status_code == 200
     assert len(Connection.idle) <= 21
-    for one in crowd:
+    for one in knocks:
         one.close()
 
 
@@ -155,7 +155,7 @@ def revoke(user: User) -> None:
 
 
 def test_a_flood_of_one_line_is_short_in_the_log(monkeypatch: pytest.MonkeyPatch) -> None:
-    quiet, now = Quiet(), [1000.0]
+    quiet, now = FloodFilter(), [1000.0]
     monkeypatch.setattr(time, "monotonic", lambda: now[0])
 
     def say() -> logging.LogRecord | None:
@@ -212,13 +212,13 @@ def test_a_user_with_many_idle_connections_keeps_nobody_out(ann: User) -> None:
     """20 connections are let in at a time."""
     place = ann.http.base_url.host, ann.http.base_url.port
     request = f"GET /v1/me HTTP/1.1\r\nHost: x\r\nAuthorization: {ann.http.headers['Authorization']}\r\n\r\n".encode()
-    crowd = [socket.create_connection(place, timeout=PATIENCE) for _ in range(30)]
-    for one in crowd:
+    idle = [socket.create_connection(place, timeout=PATIENCE) for _ in range(30)]
+    for one in idle:
         with suppress(ConnectionError):
             one.sendall(request)
             one.recv(1 << 16)
     for _ in range(5):
         with httpx2.Client(base_url=ann.http.base_url, timeout=5.0) as other:
             assert other.get("/healthz").status_code == 200
-    for one in crowd:
+    for one in idle:
         one.close()

@@ -16,8 +16,8 @@ from conoid.cases.messages import Status
 from conoid.cases.output import layout
 from conoid.cases.run import State
 
+from .journal_lines import told, write
 from .running import Process, User, case_text, processes
-from .spoken import told, write
 
 REJECTED, ACCEPTED = "ST202", "ST201"
 """What schemathesis calls a request that suits the schema and is refused, and one that does not and is taken."""

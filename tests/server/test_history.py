@@ -17,8 +17,8 @@ from conoid.cases.run import State
 from conoid.server.answers import history
 from conoid.server.answers.history import History
 
+from .journal_lines import snapshot, told, write
 from .running import Running
-from .spoken import snapshot, told, write
 
 
 def shown(server: Running, run: str, **query: int) -> dict[str, Any]:

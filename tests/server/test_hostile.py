@@ -134,8 +134,8 @@ def test_half_sent_requests_keep_nobody_waiting(users: tuple[User, User]) -> Non
     run = bob.submit()
     bob.wait_for(run)
     url = bob.http.base_url
-    crowd = threading.Thread(target=half_sent, args=(url.host, url.port, 1024, 15.0))
-    measure("1,024 half-sent requests", bob, run, [crowd])
+    flood = threading.Thread(target=half_sent, args=(url.host, url.port, 1024, 15.0))
+    measure("1,024 half-sent requests", bob, run, [flood])
 
 
 @pytest.mark.slow
@@ -156,16 +156,16 @@ def test_a_flood_without_a_token_keeps_nobody_waiting(users: tuple[User, User]) 
 
 def half_sent(host: str, port: int, count: int, seconds: float) -> None:
     """So many begin a request; those that are sent away are replaced, and none is ever finished."""
-    crowd: list[socket.socket] = []
+    open_sockets: list[socket.socket] = []
     deadline = time.monotonic() + seconds
     while time.monotonic() < deadline:
-        while len(crowd) < count:
+        while len(open_sockets) < count:
             one = socket.create_connection((host, port))
             one.sendall(b"GET /v1/runs HTTP/1.1\r\nHost: x\r\nX-Long: ")
             one.setblocking(False)
-            crowd.append(one)
+            open_sockets.append(one)
         time.sleep(0.2)
-        for one in tuple(crowd):
+        for one in tuple(open_sockets):
             with suppress(BlockingIOError):
                 try:
                     gone = one.recv(1) == b""
@@ -173,8 +173,8 @@ def half_sent(host: str, port: int, count: int, seconds: float) -> None:
                     gone = True
                 if gone:
                     one.close()
-                    crowd.remove(one)
-    for one in crowd:
+                    open_sockets.remove(one)
+    for one in open_sockets:
         one.close()
 
 

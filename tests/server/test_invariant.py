@@ -14,7 +14,7 @@ import pytest
 
 from conoid.cases.output import layout
 from conoid.cases.run import State
-from conoid.server.runs import folder, holds
+from conoid.server.runs import folder, retries
 from conoid.server.runs.events import CancelAsked, Run
 
 from .faulty import CrashError, House, Plan, faults, fsync, write
@@ -85,7 +85,7 @@ def house(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Home]:
 
 @pytest.fixture(autouse=True)
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(holds, "_AGAIN", 0.0)
+    monkeypatch.setattr(retries, "_AGAIN", 0.0)
     monkeypatch.setattr(os, "fsync", fsync)
     monkeypatch.setattr(os, "write", write)
 

@@ -14,8 +14,8 @@ from conoid.cases.messages import Status
 from conoid.cases.output import layout
 from conoid.cases.reading import whole
 from conoid.cases.run import State
-from conoid.server.keeping.farewells import Farewells
-from conoid.server.runs import ends, farewell, folder, journal, pins, restarts
+from conoid.server.keeping.removed_runs import RemovedRuns
+from conoid.server.runs import ends, folder, journal, launcher_log, pins, restarts
 from conoid.worker.output import hdf5, storage
 from conoid.worker.output.journal import Journal
 
@@ -51,7 +51,7 @@ READERS: dict[str, Callable[[Path], Any]] = {
     layout.STOP_REQUEST: folder.stop_asked,
     ".keep": pins.told,
     layout.RESOLVED_CASE: restarts._every,
-    f"{layout.LOGS}/{layout.LAUNCHER_LOG}": lambda path: (farewell.exit_code(path), farewell.rank_killed(path)),
+    f"{layout.LOGS}/{layout.LAUNCHER_LOG}": lambda path: (launcher_log.exit_code(path), launcher_log.rank_killed(path)),
     "case.toml": lambda path: restarts.body(path / "case.toml", None),
 }
 
@@ -86,7 +86,7 @@ def test_no_writer_waits_and_none_writes_to_a_device(tmp_path: Path, kind: str) 
         journal.Tail(tmp_path / layout.JOURNAL).read()
     in_place(tmp_path / "purged.jsonl", kind)
     with pytest.raises(IsADirectoryError):
-        Farewells(tmp_path)
+        RemovedRuns(tmp_path)
 
 
 def test_an_outcome_that_is_a_pipe_keeps_no_request_waiting(server: Running) -> None:

@@ -15,21 +15,21 @@ from conoid.cases.run import State
 from conoid.cases.site.batch import Site
 from conoid.cases.site.policy import Retention
 from conoid.server.database.store import Store
-from conoid.server.keeping import keeper
-from conoid.server.keeping.farewells import FILE, Farewells
-from conoid.server.keeping.keeper import Keeper
-from conoid.server.runs import pins, present
-from conoid.server.runs.present import Present
+from conoid.server.keeping import removal
+from conoid.server.keeping.removal import Removal
+from conoid.server.keeping.removed_runs import FILE, RemovedRuns
+from conoid.server.runs import existing, pins
+from conoid.server.runs.existing import ExistingRuns
 
 from .running import PATIENCE, TOML, Running, User, case_text
 
 
-def keeper_of(server: Running, **rules: Any) -> Keeper:
+def keeper_of(server: Running, **rules: Any) -> Removal:
     """One with rules of its own, looked with by hand."""
     service = server.service
     settings = replace(service.settings, site=Site(retention=Retention(**rules)))
-    return Keeper(settings, service.store, service.farewells, lambda run: service.supervisor.current(run) is not None,
-                  service.sent)  # fmt: skip
+    return Removal(settings, service.store, service.removed_runs,
+                   lambda run: service.supervisor.current(run) is not None, service.uploads)  # fmt: skip
 
 
 def ended(server: Running, label: str = "") -> str:
@@ -112,7 +112,7 @@ def told(user: User, run: str) -> dict[str, bool]:
 def test_a_run_whose_folder_was_removed_by_hand_is_told_of_nowhere(
     server: Running, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(present, "_FRESH", 0.0)
+    monkeypatch.setattr(existing, "_FRESH", 0.0)
     run, _ = ended(server), ended(server)
     everywhere, nowhere = dict.fromkeys(told(server.ann, run), True), dict.fromkeys(told(server.ann, run), False)
     assert told(server.ann, run) == everywhere
@@ -127,9 +127,9 @@ def test_a_list_reads_names_once_a_second_and_no_folder(server: Running, monkeyp
     runs = [ended(server) for _ in range(3)]
     shutil.rmtree(server.ann.runs / runs[0])
     looked: list[str] = []
-    there, names = Present.there, os.listdir
+    there, names = ExistingRuns.there, os.listdir
 
-    def one(self: Present, run: str) -> bool:
+    def one(self: ExistingRuns, run: str) -> bool:
         looked.append(run)
         return there(self, run)
 
@@ -137,9 +137,9 @@ def test_a_list_reads_names_once_a_second_and_no_folder(server: Running, monkeyp
         looked.append("names")
         return names(path)
 
-    monkeypatch.setattr(Present, "there", one)
+    monkeypatch.setattr(ExistingRuns, "there", one)
     monkeypatch.setattr(os, "listdir", every)
-    listed = Present(server.ann.runs)
+    listed = ExistingRuns(server.ann.runs)
     known = [run for run in server.service.store.all() if run.id in runs]
     for _ in range(20):
         assert sorted(run.id for run in listed.left(known)) == sorted(runs[1:])
@@ -164,21 +164,21 @@ def test_lines_survive_a_lost_database_and_a_torn_end(server: Running, tmp_path:
     server.ann.http.delete(f"/v1/runs/{run}")
     path = server.ann.runs / FILE
     path.write_bytes(path.read_bytes() + b'{"id": "to')
-    lines = Farewells(server.ann.runs)
+    lines = RemovedRuns(server.ann.runs)
     told = server.service.store.get(other)
     assert told is not None
     lines.add(farewell(lines, run, other))
-    again = Farewells(server.ann.runs)
+    again = RemovedRuns(server.ann.runs)
     assert [again.get(one) is not None for one in (run, other, "nobody")] == [True, True, False]
     fresh = Store(f"sqlite:///{tmp_path / 'fresh.sqlite'}")
-    keeper.restore(fresh, again)
+    removal.restore(fresh, again)
     found = fresh.get(run)
     fresh.close()
     assert found is not None
     assert (found.owner, found.state) == ("ann", State.SUCCEEDED)
 
 
-def farewell(lines: Farewells, run: str, other: str) -> Any:
+def farewell(lines: RemovedRuns, run: str, other: str) -> Any:
     """The line of a run, for another one."""
     line = lines.get(run)
     assert line is not None
@@ -211,7 +211,7 @@ def test_who_asks_is_told_what_his_runs_have_on_disk_where_no_rule_has_them_look
     def told(user: User) -> int:
         return int(user.http.get("/v1/me").json()["used"]["output_bytes"])
 
-    monkeypatch.setattr(keeper, "_PATIENCE", 0.0)
+    monkeypatch.setattr(removal, "_PATIENCE", 0.0)
     assert told(server.ann) == 0
     (server.ann.runs / ended(server) / "large").write_bytes(bytes(1_000_000))
     assert 1_000_000 < told(server.ann) < 1_100_000
@@ -241,13 +241,13 @@ def test_no_error_ends_the_looks(server: Running, monkeypatch: pytest.MonkeyPatc
     looked = threading.Event()
     left = [2]
 
-    def fails(self: Keeper) -> None:
+    def fails(self: Removal) -> None:
         left[0] -= 1
         if left[0] >= 0:
             raise KeyError("something that nobody has thought of")
         looked.set()
 
-    monkeypatch.setattr(Keeper, "look", fails)
+    monkeypatch.setattr(Removal, "look", fails)
     looks = keeper_of(server, age="1 h", every="0.01 s")
     looks.start()
     assert looked.wait(5)

@@ -13,7 +13,7 @@ from conoid.cases.messages import Log, to_json
 from conoid.cases.output import layout
 from conoid.cases.run import State
 from conoid.server.answers import digests, series, view
-from conoid.server.answers.chosen import Chosen
+from conoid.server.answers.filters import Chosen
 from conoid.server.app import opened
 from conoid.server.database.store import Store
 from conoid.server.queue.usage import Took
@@ -195,7 +195,7 @@ def _made(n: int) -> folder.Submission:
 
 
 def test_sweeps_are_paged(server: Running, monkeypatch: pytest.MonkeyPatch) -> None:
-    from .swept import handed_in, wish
+    from .sweep_bodies import handed_in, wish
 
     sweeps = [handed_in(server.ann, wish()) for _ in range(3)]
     made = [sweep["id"] for sweep in sweeps]

@@ -11,8 +11,8 @@ import pytest
 from conoid.cases.output import layout
 from conoid.cases.reading import survey
 from conoid.cases.reading.survey import Survey, Surveyed
-from conoid.server.intake import sent, submission
-from conoid.server.keeping import weights
+from conoid.server.intake import submission, uploads
+from conoid.server.keeping import disk_usage
 from conoid.server.requests import limits
 from conoid.server.settings import Caps, Settings
 
@@ -77,7 +77,7 @@ def test_a_run_has_its_own_copy_and_reads_no_path(server: Running, quick: list[P
     folder = server.ann.runs / told["id"]
     copy = folder / layout.FILES / f"{HASH}.inp"
     assert copy.read_bytes() == MESH
-    assert copy.stat().st_ino == (server.ann.runs / sent.FOLDER / "ann" / HASH).stat().st_ino, "it takes no room"
+    assert copy.stat().st_ino == (server.ann.runs / uploads.FOLDER / "ann" / HASH).stat().st_ino, "it takes no room"
     assert json.loads((folder / layout.SUBMISSION).read_bytes())["files"] == told["files"]
     assert HASH in (folder / layout.RESOLVED_CASE).read_text()
     assert not list(server.ann.runs.glob(".new*")), "the folder in which it was read is gone"
@@ -101,7 +101,7 @@ def test_a_file_is_used_by_those_who_have_sent_it(server: Running, quick: list[P
     send(server.bob)
     hand_in(server.bob, case())
     for user in (server.ann, server.bob):
-        assert (user.runs / sent.FOLDER / user.name / HASH).exists(), "each has his own"
+        assert (user.runs / uploads.FOLDER / user.name / HASH).exists(), "each has his own"
 
 
 def validated(user: User, data: dict[str, Any], status: int) -> dict[str, Any]:
@@ -143,7 +143,7 @@ def test_a_file_that_is_removed_at_the_last_moment_makes_no_run(
     real = server.service.desk._check_room
 
     def removed(owner: str, more: int = 1) -> None:
-        server.service.sent.remove("ann", HASH)
+        server.service.uploads.remove("ann", HASH)
         real(owner, more)
 
     monkeypatch.setattr(server.service.desk, "_check_room", removed)
@@ -208,7 +208,7 @@ def test_a_sweep_that_is_being_handed_in_needs_its_files(server: Running, quick:
 
 
 def submission_wish() -> Any:
-    from conoid.server.intake.sweep_wish import Wish
+    from conoid.server.intake.sweep_request import Wish
 
     return Wish(case=case(), points=[{"parts[0].mesh.sha256": "0" * 64}])
 
@@ -219,14 +219,14 @@ def test_the_keeper_removes_what_nobody_needs_without_being_asked(server: Runnin
     send(server.ann)
     run = hand_in(server.ann, case())["id"]
     server.ann.wait_for(run)
-    folder = server.ann.runs / sent.FOLDER / "ann"
+    folder = server.ann.runs / uploads.FOLDER / "ann"
     for path in folder.iterdir():
         os.utime(path, (0, 0))
-    server.service.keeper.look()
+    server.service.removal.look()
     assert [path.name for path in folder.iterdir()] == [HASH]
     assert server.ann.http.get(f"/v1/files/{other}").status_code == 404
     server.ann.http.delete(f"/v1/runs/{run}")
-    server.service.keeper.look()
+    server.service.removal.look()
     assert not folder.exists()
 
 
@@ -237,20 +237,20 @@ def test_a_file_counts_once_for_each_user(server: Running, quick: list[Path]) ->
     runs = [hand_in(server.ann, case(sha256=sha256))["id"] for _ in range(3)]
     for run in runs:
         server.ann.wait_for(run)
-        assert weights.size(server.ann.runs / run) < 50_000
-    kept = server.service.keeper.kept_now("ann")
+        assert disk_usage.size(server.ann.runs / run) < 50_000
+    kept = server.service.removal.kept_now("ann")
     assert len(data) < kept < 2 * len(data)
     assert server.ann.http.get("/v1/me").json()["used"]["output_bytes"] == kept
-    assert server.service.keeper.kept_now("bob") == 0
+    assert server.service.removal.kept_now("bob") == 0
 
 
 def test_a_file_is_gone_with_the_last_run_that_has_it() -> None:
-    known = weights.Weights()
+    known = disk_usage.DiskUsage()
     for n, run in enumerate(("a", "b", "c")):
         known.note(run, "ann", 10, {(1, n % 2): 100})
     known.keep({"a", "b", "c"}, {"bob": {(1, 7): 5}})
     assert known.by_owner() == {"ann": 230, "bob": 5}
-    left = weights.Left(known)
+    left = disk_usage.Left(known)
     totals = [left.total]
     for run in ("a", "b", "c", "c"):
         left.drop(run)

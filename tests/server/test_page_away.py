@@ -199,10 +199,10 @@ def test_a_run_that_has_ended_says_why_and_what_it_was_warned_of(web: Path) -> N
 
 def test_a_run_that_has_used_up_its_steps_goes_on_with_more(web: Path) -> None:
     script = """
-        const { Situation } = await load("situation.js");
+        const { RunState } = await load("runstate.js");
         state.served = (path) => path.endsWith(":restart") ? { id: "b" } : 404;
         const point = { path: "checkpoints/000000500/manifest.json" };
-        const shown = new Situation("a", async () => [point]);
+        const shown = new RunState("a", async () => [point]);
         const one = { state: "timed_out", cause: "steps", message: "", snapshots: [], finished: { steps: 500 } };
         const asked = [];
         const real = fetch;
@@ -251,15 +251,15 @@ def test_a_page_by_a_short_id_waits_for_the_server_and_claims_nothing(web: Path)
 def test_results_of_runs_that_have_not_succeeded_are_marked_and_come_last(web: Path) -> None:
     script = """
         const { columnsOf } = await load("columns.js");
-        const { sorted } = await load("order.js");
-        const { Sheet } = await load("sheet.js");
+        const { sorted } = await load("sorting.js");
+        const { ResultTable } = await load("resulttable.js");
         const states = ["failed", "succeeded", "running", "succeeded"];
         const rows = states.map((state, i) => ({ ...RUN, id: String(i), state, results: new Map([["probe.speed",
             i < 1 ? 0 : 10 - i]]) }));
         const column = columnsOf(rows, [], new Map([["probe.speed", "m/s"]])).find(({
             id }) => id === "result:probe.speed");
         const ids = (down) => sorted(rows, column, down).map(({ id }) => id).join("");
-        const sheet = new Sheet();
+        const sheet = new ResultTable();
         sheet.draw(rows.map(({ state }, i) => ({ name: String(i), href: "", line: i, state })), [], () => [{
             title: "speed", unit: "", values: [0, 9, 8, 7], text: String }]);
         const orders = [false, true].map((down) => { Object.assign(sheet, { by: "speed", down });
@@ -304,7 +304,7 @@ def test_what_erosion_leaves_is_counted_by_the_snapshots_alone(web: Path) -> Non
 
 def test_what_stands_beside_a_failure_is_of_the_outcome(web: Path) -> None:
     script = """
-        const { Situation } = await load("situation.js");
+        const { RunState } = await load("runstate.js");
         const { Numbers } = await load("numbers.js");
         const { Live } = await load("live.js");
         const energy = { residual: 6.4e-8 };
@@ -312,7 +312,7 @@ def test_what_stands_beside_a_failure_is_of_the_outcome(web: Path) -> None:
             end_time: 1e-6, step: 14, energy } });
         const outcome = { cause: "energy", steps: 20, time: 5.11e-7, energy, worst_residual: 1.02e-6, made: [{
             line: "contact", share: 0.25, time: 5e-7 }] };
-        const [shown, numbers] = [new Situation("a", async () => []), new Numbers()];
+        const [shown, numbers] = [new RunState("a", async () => []), new Numbers()];
         shown.draw(live, outcome);
         numbers.draw(live, {}, outcome);
         await pause(50);

@@ -11,7 +11,7 @@ import pytest
 
 from conoid.cases.output import layout
 from conoid.client import snapshots
-from conoid.client.drawing import hues
+from conoid.client.drawing import part_colours
 from conoid.client.snapshots import Snapshot
 
 from .visitor import DEMO_CASE
@@ -101,6 +101,6 @@ def test_page_and_pictures_give_each_fragment_one_colour_at_all_times(seen: list
         command = [str(NODE), str(Path(__file__).with_name("scripts.mjs"))]
         drawn = json.loads(subprocess.run(command, input=told, capture_output=True, text=True, check=True).stdout)
         numbers, parts = zip(*pairs, strict=True)
-        assert drawn == hues.of_fragments(numbers, parts, 2).tolist()
+        assert drawn == part_colours.of_fragments(numbers, parts, 2).tolist()
         for (label, _), colour in zip(pairs, drawn, strict=True):
             assert colours.setdefault(label, tuple(colour)) == tuple(colour)

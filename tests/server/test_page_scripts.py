@@ -16,7 +16,7 @@ import pytest
 from scipy.spatial import ConvexHull
 
 from conoid.cases.output import fragments
-from conoid.client.drawing import hues, scales
+from conoid.client.drawing import part_colours, scales
 from conoid.client.drawing.fields import FIELDS
 from conoid.client.snapshots import Snapshot
 from conoid.worker.snapshots import blob
@@ -34,8 +34,8 @@ def test_parts_and_fragments_have_the_colours_of_pictures(ask: Ask) -> None:
     numbers = [-1, 0, 1, 2, 3, 7, 8, 9, 100, 12_690, 10**6, *random.integers(0, 2**40, 500).tolist()]
     parts = random.integers(0, 30, len(numbers)).tolist()
     script = "data[0].map((id, i) => page.ofFragment(BigInt(id), data[1][i], 3))"
-    assert ask("colours.js", script, [numbers, parts]) == hues.of_fragments(numbers, parts, 3).tolist()
-    assert ask("colours.js", "data.map(page.ofName)", parts) == hues.of_names(parts).tolist()
+    assert ask("colours.js", script, [numbers, parts]) == part_colours.of_fragments(numbers, parts, 3).tolist()
+    assert ask("colours.js", "data.map(page.ofName)", parts) == part_colours.of_names(parts).tolist()
 
 
 @pytest.fixture(scope="module")
@@ -137,12 +137,12 @@ def test_a_long_series_is_thinned_and_keeps_its_ends(ask: Ask) -> None:
 def test_keys_that_differ_are_told_by_their_place(ask: Ask) -> None:
     one = {"name": "a", "parts": [{"name": "bar", "v": [0, 0, 1]}], "run": {"ranks": 1, "frames": None}, "list": [1, 2]}
     other = {"name": "b", "parts": [{"name": "bar", "v": [0, 0, 2]}], "run": {"ranks": 1, "seed": None}, "list": [1]}
-    assert ask("contrast.js", "page.differences(data)", [one, other, {**one, "new": True}]) == [
+    assert ask("differences.js", "page.differences(data)", [one, other, {**one, "new": True}]) == [
         ["parts[0].v[2]", 1, 2, 1], ["list[1]", 2, None, 2], ["new", None, None, True],
     ]  # fmt: skip
     script = "data[1].map((key) => page.about(key, data[0]))"
     keys = ["parts[0].v[2]", "list[1]", "run.ranks", "materials.mild_steel.A"]
-    assert ask("contrast.js", script, [one, keys]) == ["bar v z", "list 1", "ranks", "mild steel A"]
+    assert ask("differences.js", script, [one, keys]) == ["bar v z", "list 1", "ranks", "mild steel A"]
 
 
 def test_runs_are_called_by_what_tells_them_apart(ask: Ask) -> None:
@@ -151,7 +151,7 @@ def test_runs_are_called_by_what_tells_them_apart(ask: Ask) -> None:
         plan = {"parts": [{"name": "bar", "v": [0, 0, 1]}]}
         runs = [{"info": {"name": name, "id": id_}, "plan": plan} for name, id_ in zip(names, ids, strict=True)]
         script = "page.called(data[0], data[1], { 'parts[0].v[2]': 'm/s' })"
-        found: list[str] = ask("contrast.js", script, [runs, differing])
+        found: list[str] = ask("differences.js", script, [runs, differing])
         return found
 
     keys = [["parts[0].v[2]", 1, 2500]]
@@ -170,7 +170,7 @@ def test_a_column_of_results_has_one_unit(ask: Ask) -> None:
         return {"info": {"outcome": outcome}, "plan": plan, "columns": {"units": {"push": "N"}, "extremes": extremes}}
 
     script = "page.results(data, 'most').map(({ title, unit, values, text }) => [title, unit, values.map(text)])"
-    assert ask("contrast.js", script, [run(3.0, True), run(2e3, False), run(None, True)]) == [
+    assert ask("differences.js", script, [run(3.0, True), run(2e3, False), run(None, True)]) == [
         ["push", "kN", ["0.006", "4", "–"]], ["speed (reference)", "mm/s", ["1", "1", "1"]],
         ["references met", "", ["100 %", "0 %", "100 %"]], ["fragments", "", ["1\u202f200"] * 3],
     ]  # fmt: skip
@@ -241,9 +241,9 @@ def test_the_box_beside_the_cursor_has_the_nearest_points_of_all_lines(ask: Ask)
         {"name": "low", "data": [[0, 1], [2, 2], [3, 3]]}, {"name": "high", "data": [{"value": [1, 9]}]},
         {"name": "gap", "data": [[2.5, None]]}, {"name": "pins", "aside": True, "data": [[2.6, 5]]},
     ]  # fmt: skip
-    assert ask("readout.js", script, lines) == [["high", "9 J"], ["low", "3 J"]]
+    assert ask("cursorbox.js", script, lines) == [["high", "9 J"], ["low", "3 J"]]
     stacked = [{"name": name, "stack": "s", "data": [[0, value]]} for name, value in (("below", 9), ("above", 1))]
-    assert ask("readout.js", script, stacked) == [["above", "1 J"], ["below", "9 J"]]
+    assert ask("cursorbox.js", script, stacked) == [["above", "1 J"], ["below", "9 J"]]
 
 
 def test_forces_go_by_who_pushes_whom_and_a_magnitude_needs_all_components(ask: Ask) -> None:
@@ -323,8 +323,8 @@ def test_an_address_that_cannot_be_read_is_the_list(ask: Ask) -> None:
         "#/runs/a/b": ["runs"], "#/toString/a": ["runs"], "#/constructor": ["runs"],
     }  # fmt: skip
     script = "data.map((hash) => { const { page: shown, names } = page.place(hash); return [shown, ...names]; })"
-    assert ask("place.js", script, list(found)) == list(found.values())
-    assert ask("place.js", "page.place('#/new?from=a%20b').query.get('from')") == "a b"
+    assert ask("address.js", script, list(found)) == list(found.values())
+    assert ask("address.js", "page.place('#/new?from=a%20b').query.get('from')") == "a b"
 
 
 # Sections, frames and scales of the body ------------------------------------------------------------------------------
@@ -455,7 +455,7 @@ def test_what_the_browser_keeps_is_used_where_it_has_the_kind_that_is_wanted(ask
     script = """((globalThis.localStorage = { getItem: () => data[0] }), page.recall("x", data[1]))"""
     sort = {"id": "submitted", "down": True}
     for text in ("null", "5", '"a"', "[]", "{", "[1]", '{"id":5,"down":true}', '{"id":"a"}', "\u202e"):
-        assert ask("remember.js", script, [text, sort]) == sort, text
+        assert ask("storage.js", script, [text, sort]) == sort, text
     for text, otherwise in (
         ("null", []),
         ("[null]", []),
@@ -465,7 +465,7 @@ def test_what_the_browser_keeps_is_used_where_it_has_the_kind_that_is_wanted(ask
         ("{}", ""),
         ("1", False),
     ):
-        assert ask("remember.js", script, [text, otherwise]) == otherwise, text
+        assert ask("storage.js", script, [text, otherwise]) == otherwise, text
     for kept, wanted in (
         ({"id": "a", "down": False}, sort),
         (["a"], []),
@@ -473,7 +473,7 @@ def test_what_the_browser_keeps_is_used_where_it_has_the_kind_that_is_wanted(ask
         ("b", ""),
         (True, False),
     ):
-        assert ask("remember.js", script, [json.dumps(kept), wanted]) == kept
+        assert ask("storage.js", script, [json.dumps(kept), wanted]) == kept
 
 
 def test_the_tooltip_of_a_chart_stays_text_whatever_a_chart_adds_to_it(ask: Ask) -> None:

@@ -15,7 +15,7 @@ pytestmark = pytest.mark.skipif(NODE is None, reason="no node on this machine")
 
 SPEED, SIZE = "parts[0].velocity[2]", "parts[0].mesh.element_size"
 TOLD = """
-    const told = new page.Told();
+    const told = new page.RunTable();
     told.take(data);
     const all = [...told.rows.values()];
 """
@@ -68,13 +68,13 @@ def some() -> dict[str, Any]:
 def test_values_and_results_of_a_run_are_those_that_the_server_has(ask: Ask, some: dict[str, Any]) -> None:
     pair = f"[page.valueOf(row, '{SPEED}'), row.results.get('fragments') ?? null]"
     script = f"{TOLD} return all.map((row) => {pair});"
-    assert asked(ask, "told.js", script, some) == [[-100 * n, 3 * n] for n in range(5)] + [[None, None]]
+    assert asked(ask, "runtable.js", script, some) == [[-100 * n, 3 * n] for n in range(5)] + [[None, None]]
 
 
 def test_columns_are_the_keys_that_differ_within_cases_that_are_alike(ask: Ask, some: dict[str, Any]) -> None:
     some_of_them = "all.filter(({ id }) => id === 'run1' || id === 'run3')"
     script = f"{TOLD} return [page.differing(all, 9), page.differing({some_of_them}, 9)];"
-    found = asked(ask, "told.js", script, some)
+    found = asked(ask, "runtable.js", script, some)
     assert set(found[0]) == {SPEED, SIZE}
     assert found[1] == [SPEED]
 
@@ -85,13 +85,13 @@ def test_a_second_answer_changes_what_it_tells_and_removed_runs_go(ask: Ask, som
         const after = told.take({{ ...data, runs: [{{ ...data.runs[0], state: "lost" }}] }});
         told.keepOnly(data.runs.slice(1), true);
         return [same, after, told.rows.size, told.rows.has("run0")];"""
-    assert asked(ask, "told.js", script, some) == [False, True, 5, False]
+    assert asked(ask, "runtable.js", script, some) == [False, True, 5, False]
 
 
-MODULES = "columns.js told.js order.js response.js"
+MODULES = "columns.js runtable.js sorting.js response.js"
 COLUMNS = """
-    const { Told, differing } = page;
-    const told = new Told();
+    const { RunTable, differing } = page;
+    const told = new RunTable();
     told.take(data);
     const all = [...told.rows.values()];
     const columns = page.columnsOf(all, differing(all, 9), told.units);
@@ -148,7 +148,7 @@ def test_rows_are_sorted_by_any_column_and_what_has_no_value_comes_last(ask: Ask
 def test_short_ids_are_those_of_the_server(ask: Ask) -> None:
     draw = random.Random(7)
     ids = sorted({"".join(draw.choices("ab", k=22)) for _ in range(200)})
-    assert ask("told.js", "Object.fromEntries(page.shorts(data))", ids) == rows.short(ids, 7)
+    assert ask("runtable.js", "Object.fromEntries(page.shorts(data))", ids) == rows.short(ids, 7)
 
 
 def test_a_thousand_rows_are_sorted_in_a_moment(ask: Ask) -> None:

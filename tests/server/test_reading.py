@@ -21,7 +21,7 @@ from conoid.server.intake.submission import Desk
 from conoid.server.requests.limits import Limits
 
 from .running import PATIENCE, Running, case_text
-from .swept import ENDS, handed_in, wish
+from .sweep_bodies import ENDS, handed_in, wish
 
 QUESTION = Question(
     body=case_text().encode(), json=False,

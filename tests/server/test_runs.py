@@ -207,7 +207,7 @@ def test_wait_with_a_known_etag_answers_when_anything_changes(server: Running, t
 
 
 def test_a_full_disk_delays_and_loses_nothing(server: Running, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    from conoid.server.runs import holds, journal
+    from conoid.server.runs import journal, retries
 
     run = server.ann.submit(wait=str(tmp_path / "go"))
     server.ann.wait_for(run, State.RUNNING)
@@ -218,7 +218,7 @@ def test_a_full_disk_delays_and_loses_nothing(server: Running, monkeypatch: pyte
             raise OSError(28, "No space left on device")
         return real(*arguments)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(holds, "_AGAIN", 0.05)
+    monkeypatch.setattr(retries, "_AGAIN", 0.05)
     monkeypatch.setattr(journal, "append", append)
     (tmp_path / "go").touch()
     assert server.ann.wait_for(run)["state"] == "succeeded"

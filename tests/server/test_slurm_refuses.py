@@ -11,8 +11,8 @@ from conoid.cases.run import Cause, State
 from conoid.cases.site import batch, slurm, slurm_call
 from conoid.cases.site.batch import Profile, Slurm
 from conoid.cases.site.slurm import Entry
-from conoid.server.launch import clerk as clerks
-from conoid.server.launch.handed import SlurmWorker
+from conoid.server.launch.accounting import Accounting
+from conoid.server.launch.slurm_run import SlurmWorker
 
 from .fake_slurm import commands
 
@@ -52,12 +52,12 @@ def place(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def worker_of(place: Path, name: str = "run", clerk: clerks.Clerk | None = None) -> SlurmWorker:
+def worker_of(place: Path, name: str = "run", accounting: Accounting | None = None) -> SlurmWorker:
     """A run that nobody has handed over yet."""
     folder = place / name
     (folder / layout.LOGS).mkdir(parents=True)
     job = batch.new_job(name, 1, ("a", Profile()), ["true"], 0.0, place=str(place / "bin"))
-    made = SlurmWorker(folder, job, Slurm(profiles={"a": Profile()}, bin=str(place / "bin")), clerk=clerk)
+    made = SlurmWorker(folder, job, Slurm(profiles={"a": Profile()}, bin=str(place / "bin")), accounting=accounting)
     made.write_down()
     return made
 
@@ -200,9 +200,9 @@ def test_a_database_of_accounting_that_hangs_holds_up_nobody(place: Path) -> Non
     commands(place, "echo 7")
     (place / "bin" / "sacct").write_text("#!/bin/sh\nexec sleep 20\n")
     (place / "bin" / "sacct").chmod(0o755)
-    clerk, began = clerks.Clerk(str(place / "bin")), time.monotonic()
+    accounting, began = Accounting(str(place / "bin")), time.monotonic()
     for name in ("one", "two", "three"):
-        worker = worker_of(place, name, clerk)
+        worker = worker_of(place, name, accounting)
         worker.write_down(job="7")
         worker.turn([Entry("7", "FAILED", 5.0, worker.name, "None")])
         assert worker.exited() is not None

@@ -34,7 +34,7 @@ from conoid.server.runs import folder
 from conoid.server.settings import Caps, Settings
 
 from .running import Running, User, case_text
-from .swept import ENDS, Killed, Never, after, handed_in, wish
+from .sweep_bodies import ENDS, Killed, Never, after, handed_in, wish
 
 
 def test_a_sweep_ends_in_a_table(server: Running) -> None:

@@ -17,7 +17,7 @@ from conoid.server.requests import limits
 from conoid.server.settings import Settings
 
 from .running import Running, User, case_text
-from .swept import ENDS, Killed, Never, after, handed_in, wish
+from .sweep_bodies import ENDS, Killed, Never, after, handed_in, wish
 
 
 def again(user: User, sweep: dict[str, Any], body: bytes, status: int = 202) -> dict[str, Any]:

@@ -14,13 +14,13 @@ from conoid.cases import outcome
 from conoid.cases.output import layout
 from conoid.cases.run import State
 from conoid.server.answers import card, cards, rows
-from conoid.server.answers.chosen import Chosen
+from conoid.server.answers.filters import Chosen
 from conoid.server.database.store import Store
 from conoid.server.runs import folder
 from conoid.server.runs.events import Run
 
 from .running import TOML, Running, User, case_text
-from .swept import handed_in, wish
+from .sweep_bodies import handed_in, wish
 
 CHOICES: tuple[bool | float | str, ...] = (1.0, 2.0, "a", True)
 

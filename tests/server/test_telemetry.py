@@ -195,9 +195,9 @@ def test_without_tokens_anybody_on_this_machine_may_listen(tmp_path: Path) -> No
 def test_silent_connections_close_the_port_to_nobody(telemetry: Telemetry) -> None:
     """Neither those that are open, nor those that come instead of those that were closed."""
     ann, worker = telemetry.reader("ann", ANN), telemetry.worker("ann", "r1")
-    with ExitStack() as crowd:
+    with ExitStack() as stack:
         for _ in range(150):
-            crowd.enter_context(socket.create_connection(("127.0.0.1", telemetry.port)))
+            stack.enter_context(socket.create_connection(("127.0.0.1", telemetry.port)))
         began = time.monotonic()
         with (
             client(telemetry.port, worker.user, worker.password) as workers,

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import pytest
 
 from conoid.cases.site.policy import Share
+from conoid.server.queue.scheduling import Busy, Need, Room, ordered, plan
 from conoid.server.queue.usage import Took, Usage
-from conoid.server.queue.waiting import Busy, Need, Room, ordered, plan
 from conoid.server.queue.waitlist import need_of
 from conoid.server.runs.folder import Submission
 

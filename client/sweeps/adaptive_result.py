@@ -1,0 +1,210 @@
+"""What an adaptive sweep has found, and the plain file that keeps it: the same command goes on from it."""
+
+from collections.abc import Mapping, Sequence
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from conoid.cases.figures import counted, duration, number
+from conoid.cases.output import history, points
+from conoid.cases.reading import whole
+from conoid.cases.reading.problems import shown
+
+from ..errors import ClientError, UsageError
+from ..local.atomic import save_text
+from ..reports.compare import differing
+from .ballistic import Fit
+from .goal import Goal
+
+_TOLD = 3
+"""Keys of a changed case that are named."""
+
+
+class Tried(msgspec.Struct, kw_only=True, frozen=True):
+    """A point: the value of the first key, what was changed, the run, what came out; ``f`` is ``value`` less the
+    threshold, ``cpu`` in s. Without a result ``problem`` says why.
+    """
+
+    x: float
+    values: dict[str, Any]
+    run: str
+    state: str
+    value: float | None = None
+    f: float | None = None
+    cpu: float = 0.0
+    problem: str = ""
+    results: dict[str, int | float | str | None] = {}
+    """Columns of the table of a sweep."""
+
+    def but(self, **changes: Any) -> "Tried":
+        """The same with other values."""
+        return msgspec.structs.replace(self, **changes)
+
+
+class Found(msgspec.Struct, kw_only=True, frozen=True):
+    """Where the result passes its threshold: at ``limit``, give or take ``uncertainty``, half of the bracket, of which
+    ``ends`` has the values of the key and of the result. Without a limit ``ends`` are those of the range.
+    """
+
+    key: str
+    unit: str
+    goal: Goal
+    tolerance: float
+    ends: Sequence[tuple[float, float | None]] = ()
+    limit: float | None = None
+    uncertainty: float | None = None
+    fit: Fit | None = None
+    changes: int = 0
+    """How often the threshold is passed."""
+    mixed: tuple[float, float] | None = None
+    """Between which values it is passed again and again."""
+    why: str = ""
+    """Why it ended before the tolerance was reached."""
+    points: int
+    """Runs that count, of earlier commands, too; ``failed`` of them have no result."""
+    fresh: int
+    """Runs of this command."""
+    failed: int
+    cpu: float
+    """s, of all runs."""
+
+    def but(self, **changes: Any) -> "Found":
+        """The same with other values."""
+        return msgspec.structs.replace(self, **changes)
+
+    @property
+    def reached(self) -> bool:
+        """Whether the bracket is as narrow as was asked for."""
+        return self.limit is not None and not self.why
+
+    def lines(self) -> list[str]:
+        """For people."""
+        told = [self._first(), *self._passes()]
+        if self.fit is not None:
+            told.append(_curve(self.fit, self.unit))
+            if not self._within(self.fit.limit):
+                told.append("the curve has its limit outside of the bracket: near it the results do not follow the law")
+        if self.why:
+            told.append(f"not as close as asked for ({self._x(self.tolerance)}): {self.why}")
+        failed = f", {self.failed} of them without a result" if self.failed else ""
+        told.append(
+            f"{counted(self.points, 'run')}{failed}, {self.fresh} of them now; {duration(self.cpu)} of CPU time"
+        )
+        return told
+
+    def _first(self) -> str:
+        passes = f"{self.goal.result} = {number(self.goal.threshold)} {self.goal.unit}".strip()
+        ends = " and ".join(f"{self._y(value)} at {self._x(x)}" for x, value in self.ends)
+        if self.limit is None or self.uncertainty is None:
+            return f"{self.key}: no {passes} in the range: {self.goal.result} is {ends}"
+        return f"{self.key} = {number(self.limit)} +- {self._x(self.uncertainty)} where {passes}: {ends}"
+
+    def _passes(self) -> list[str]:
+        if self.mixed is None:
+            return []
+        a, b = self.mixed
+        again = f"passed {self.changes} times between {number(min(a, b))} and {self._x(max(a, b))}"
+        return [f"not monotonic, or it scatters: the threshold is {again}; the first of them is given"]
+
+    def _within(self, limit: float) -> bool:
+        """Whether the limit of a curve lies in the bracket; a curve of velocities has magnitudes."""
+        low, high = sorted(abs(x) for x, _ in self.ends)
+        return low <= abs(limit) <= high
+
+    def _x(self, x: float) -> str:
+        return f"{number(x)} {self.unit}".strip()
+
+    def _y(self, value: float | None) -> str:
+        return "not known" if value is None else f"{number(value)} {self.goal.unit}".strip()
+
+
+def _curve(fit: Fit, unit: str) -> str:
+    error = "" if fit.error is None else f" +- {number(fit.error)}"
+    power = "" if fit.exponent is None else f", p = {number(fit.exponent)}"
+    constants = f"a = {number(fit.factor)}{power}, " if fit.law != "line" else ""
+    return f"{fit.law}: {number(fit.limit)}{error} {unit} ({constants}{counted(fit.points, 'point')})"
+
+
+class Kept(msgspec.Struct, kw_only=True):
+    """The file: what is looked for, in which case, all points, and what was found."""
+
+    version: str
+    case: dict[str, Any]
+    goal: Goal
+    keys: list[str]
+    points: list[Tried] = []
+    found: Found | None = None
+
+
+class Book:
+    """The points of an adaptive sweep in a file, which is written after each of them; without a file in memory."""
+
+    def __init__(self, path: Path | None, case: Mapping[str, Any], goal: Goal, keys: Sequence[str]) -> None:
+        """Reads what is there. Raises UsageError for a file of another case or goal, or of something else."""
+        self.path = path
+        fresh = Kept(version=metadata.version("conoid"), case=_plain(case), goal=goal, keys=list(keys))
+        self.kept = fresh
+        if path is not None and path.exists():
+            self.kept = read(path)
+            _require_same(path, self.kept, fresh)
+
+    def good(self) -> list[Tried]:
+        """The points that have a result."""
+        return [each for each in self.kept.points if each.f is not None]
+
+    def add(self, tried: Tried) -> None:
+        """Takes a point in, in the place of an earlier one at the same x."""
+        self.kept.points = [*(each for each in self.kept.points if each.x != tried.x), tried]
+        self._write()
+
+    def close(self, found: Found) -> Found:
+        """Keeps what was found."""
+        self.kept.found = found
+        self._write()
+        return found
+
+    def _write(self) -> None:
+        if self.path is not None:
+            save_text(self.path, msgspec.json.format(msgspec.json.encode(self.kept), indent=1) + b"\n")
+
+
+def read(path: Path) -> Kept:
+    """The file of an adaptive sweep. Raises UsageError."""
+    try:
+        return msgspec.json.decode(whole.read(path), type=Kept)
+    except OSError as error:
+        raise UsageError(f"{path}: {error.strerror}") from None
+    except msgspec.MsgspecError:
+        raise UsageError(f"{path}: this is no file of an adaptive sweep; name another one with --out") from None
+
+
+def _require_same(path: Path, kept: Kept, fresh: Kept) -> None:
+    other = "name another file with --out, or remove it"
+    if (kept.goal, kept.keys) != (fresh.goal, fresh.keys):
+        told = f"{kept.goal.result} = {number(kept.goal.threshold)} over {', '.join(kept.keys)}"
+        raise UsageError(f"{path}: holds another sweep, {told}; {other}")
+    if kept.version != fresh.version:
+        raise UsageError(f"{path}: its runs are of Conoid {kept.version}, this is {fresh.version}; {other}")
+    if changed := differing(kept.case, fresh.case):
+        keys = ", ".join(f"{one.key} was {shown(one.a)} and is {shown(one.b)}" for one in changed[:_TOLD])
+        more = f", and {len(changed) - _TOLD} more keys" if len(changed) > _TOLD else ""
+        raise ClientError(f"{path}: the case has changed since: {keys}{more}; {other}")
+
+
+def _plain(case: Mapping[str, Any]) -> dict[str, Any]:
+    """As it is read back."""
+    data: dict[str, Any] = msgspec.json.decode(msgspec.json.encode(case))
+    return data
+
+
+def table(kept: Kept) -> list[points.Column]:
+    """The table of its points, in the order of x."""
+    return points.table([
+        points.Point(
+            values=each.values, run=each.run, state=each.state, cause=each.problem,
+            results={history.split(title): value for title, value in each.results.items()},
+        )
+        for each in sorted(kept.points, key=lambda each: each.x)
+    ])  # fmt: skip

@@ -1,0 +1,230 @@
+// The camera: it fits what it is to show, follows a part or stays, looks along the axes, and can be shared by several views.
+
+import { mirrored, points, stand } from "./framing.js";
+
+const ANGLE = 30; // Degrees, of the height of the picture.
+const MARGIN = 1.06; // Round what is fitted.
+const TURN = Math.PI / 24; // Of one arrow key.
+const FREE = 0.16; // Of the height: free for axes and scale bar.
+const LEGEND = [90, 0.2]; // Free at the right for the legend: px, of the width at most.
+const VIEWS = { "+x": [1, 0, 0], "-x": [-1, 0, 0], "+y": [0, 1, 0], "-y": [0, -1, 0], "+z": [0, 0, 1], "-z": [0, 0, -1] };
+
+export const VIEW_NAMES = [...Object.keys(VIEWS), "isometric"];
+
+export class ViewCamera {
+  // `changed` is called when the picture has to be drawn anew, `framed` gives what frames depend on: { snapshot, explode, mirrors, shown }.
+  constructor({ THREE, OrbitControls }, canvas, changed, framed) {
+    Object.assign(this, { three: THREE, framed, changed, mode: "fit", part: null, others: new Set() });
+    this.camera = new THREE.PerspectiveCamera(ANGLE, 1, 1e-3, 10);
+    this.controls = new OrbitControls(this.camera, canvas);
+    Object.assign(this.controls, { enableDamping: false, zoomToCursor: true });
+    this.controls.addEventListener("change", () => this.moved());
+    this.controls.addEventListener("start", () => { this.touched = this.distance; this.held = true; });
+    this.controls.addEventListener("end", () => { this.held = false; this.released(); });
+    this.quiet = false;
+    this.reserved = 0;
+  }
+
+  // The unit vector from what is looked at to the camera.
+  back() { return this.camera.position.clone().sub(this.controls.target).normalize().toArray(); }
+
+  // From where to where what the frame shows reaches along a direction, m.
+  along(normal) {
+    const list = this.list();
+    const ends = [Infinity, -Infinity];
+    for (let i = 0; i < list.length; i += 3) {
+      const at = normal[0] * list[i] + normal[1] * list[i + 1] + normal[2] * list[i + 2];
+      [ends[0], ends[1]] = [Math.min(ends[0], at), Math.max(ends[1], at)];
+    }
+    return ends;
+  }
+
+  // The diagonal of what the frame shows, m.
+  reach() { return Math.hypot(...[[1, 0, 0], [0, 1, 0], [0, 0, 1]].map((axis) => this.along(axis)).map(([low, high]) => high - low)); }
+
+  get distance() { return this.camera.position.distanceTo(this.controls.target); }
+
+  moved() {
+    this.changed();
+    if (this.quiet) return;
+    for (const other of this.others) other.copy(this);
+  }
+
+  // Turning keeps the frame; whoever zooms or shifts has a frame of his own.
+  released() {
+    const shifted = this.framedAt && this.controls.target.distanceTo(this.framedAt) > 1e-6 * this.distance;
+    if (this.mode !== "free" && (shifted || Math.abs(this.distance / this.touched - 1) > 1e-3)) this.follow(this.mode === "part" ? "part" : "free", this.part);
+    this.onMode?.();
+  }
+
+  // "fit", "all", "free", or "part" with its number.
+  follow(mode, part = null) {
+    const before = [this.mode, this.part];
+    Object.assign(this, { mode, part, home: null });
+    if (mode === "part" && (before[0] !== "part" || before[1] !== part)) this.fit({ only: part });
+    else if (mode === "fit" || mode === "all") this.fit();
+  }
+
+  // A new snapshot, or another thing that a frame depends on.
+  keep() {
+    if (!this.direction) this.first();
+    else if (this.mode === "fit" || this.mode === "all") this.fit();
+    else if (this.mode === "part") this.carry();
+  }
+
+  // A long body lies along the picture, seen a little from above and from the side that planes of symmetry have cut open.
+  first() {
+    const list = this.list();
+    const side = [0, 1, 2].map((axis) => extent(list, axis));
+    const longest = side.indexOf(Math.max(...side));
+    const up = longest === 2 ? 1 : 2;
+    const across = 3 - longest - up;
+    const away = [0, 0, 0];
+    [away[longest], away[up], away[across]] = [0.35, 0.45, longest === 2 ? 1 : -1];
+    for (const { axis, at } of this.framed().cuts) if (axis === across || axis === up) away[axis] = Math.abs(away[axis]) * (middle(list, axis) > at ? -1 : 1);
+    this.look(away, up);
+  }
+
+  // From a direction; `up` is an axis.
+  look(away, up) {
+    this.direction = true;
+    this.camera.up.set(0, 0, 0).setComponent(up, 1);
+    this.camera.position.fromArray(away).normalize().add(this.controls.target);
+    this.camera.lookAt(this.controls.target);
+    this.fit(this.mode === "part" ? { only: this.part } : {});
+  }
+
+  // One of VIEW_NAMES.
+  view(name) {
+    const away = VIEWS[name] ?? [1, -1, 0.8];
+    const up = VIEWS[name]?.[2] ? 1 : 2;
+    if (this.mode === "free") this.mode = "fit";
+    this.look(away, up);
+    this.onMode?.();
+  }
+
+  // Places that the frame shows, of all views that share it.
+  list(more = {}) {
+    return [this, ...this.others].flatMap((eye) => eye.places({ all: this.mode === "all", ...more }));
+  }
+
+  places(more) {
+    const { snapshot, mirrors, shown } = this.framed();
+    if (!snapshot) return [];
+    return mirrored(points(snapshot, { shown, ...more }), mirrors);
+  }
+
+  fit(more = {}) {
+    const { camera, controls } = this;
+    if (!this.framed().snapshot) return;
+    camera.updateMatrixWorld();
+    const [right, up, back] = [0, 1, 2].map((column) => new this.three.Vector3().setFromMatrixColumn(camera.matrixWorld, column).toArray());
+    const half = Math.tan((camera.fov * Math.PI) / 360);
+    const list = this.pulled(this.list(more));
+    const wide = (half * camera.aspect) / MARGIN;
+    const { place, depth } = stand(list, { right, up, back }, [wide, wide * (1 - 2 * this.reserved)], (half * (1 - FREE)) / MARGIN);
+    camera.position.fromArray(place);
+    controls.target.fromArray(place.map((value, i) => value - depth * back[i]));
+    this.settle();
+    this.framedAt = controls.target.clone();
+    if (this.mode === "part") this.home = this.centre();
+  }
+
+  // Fragments that are drawn apart need more room.
+  pulled(list) {
+    const { explode, snapshot: { header: { box } } } = this.framed();
+    if (!explode) return list;
+    return list.map((value, i) => value + explode * (value - (box[0][i % 3] + box[1][i % 3]) / 2));
+  }
+
+  // Moves with the mass of its part.
+  carry() {
+    const now = this.centre();
+    if (!now || !this.home) return;
+    const shift = now.clone().sub(this.home);
+    this.camera.position.add(shift);
+    this.controls.target.add(shift);
+    this.home = now;
+    this.settle();
+  }
+
+  centre() {
+    const { snapshot } = this.framed();
+    const list = points(snapshot, { only: this.part, shown: () => true });
+    return new this.three.Vector3(...[0, 1, 2].map((axis) => middle(list, axis)));
+  }
+
+  settle() {
+    const size = Math.hypot(...this.framed().snapshot.header.box[1].map((value, i) => value - this.framed().snapshot.header.box[0][i])) || 1;
+    const far = this.distance + 20 * size;
+    Object.assign(this.camera, { near: Math.max(this.distance / 200, far / 1e5), far });
+    this.camera.updateProjectionMatrix();
+    this.controls.update();
+    this.moved();
+  }
+
+  aspect(width, height) {
+    this.reserved = Math.min(LEGEND[0] / width, LEGEND[1]);
+    this.camera.aspect = width / height;
+    this.camera.updateProjectionMatrix();
+    if (this.framed().snapshot && this.direction && (this.mode === "fit" || this.mode === "all")) this.fit();
+  }
+
+  // A key turns, shifts (with Shift) or zooms; whether it is one of these.
+  key(name, shift) {
+    const moves = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
+    if (moves[name] && shift) this.shift(...moves[name]);
+    else if (moves[name]) this.turn(moves[name][0] * TURN, moves[name][1] * TURN, 1);
+    else if (name === "+" || name === "=") this.turn(0, 0, 0.9);
+    else if (name === "-") this.turn(0, 0, 1 / 0.9);
+    else return false;
+    return true;
+  }
+
+  turn(about, over, nearer) {
+    const { Spherical, Vector3, Quaternion } = this.three;
+    const level = new Quaternion().setFromUnitVectors(this.camera.up, new Vector3(0, 1, 0));
+    const away = this.camera.position.clone().sub(this.controls.target).applyQuaternion(level);
+    const place = new Spherical().setFromVector3(away);
+    place.set(place.radius * nearer, place.phi + over, place.theta + about).makeSafe();
+    this.camera.position.copy(away.setFromSpherical(place).applyQuaternion(level.invert()).add(this.controls.target));
+    if (nearer !== 1 && this.mode !== "part") this.mode = "free";
+    this.controls.update();
+    this.onMode?.();
+  }
+
+  shift(right, down) {
+    const step = this.distance / 15;
+    const way = new this.three.Vector3(right * step, -down * step, 0).applyQuaternion(this.camera.quaternion);
+    this.camera.position.add(way);
+    this.controls.target.add(way);
+    if (this.mode !== "part") this.mode = "free";
+    this.controls.update();
+    this.onMode?.();
+  }
+
+  // The same view as another one has. `share` has all of some views move together.
+  copy(other) {
+    this.quiet = true;
+    this.direction = true;
+    for (const name of ["position", "up", "quaternion"]) this.camera[name].copy(other.camera[name]);
+    this.controls.target.copy(other.controls.target);
+    Object.assign(this.camera, { near: other.camera.near, far: other.camera.far });
+    Object.assign(this, { mode: "free" });
+    this.camera.updateProjectionMatrix();
+    this.controls.update();
+    this.changed();
+    this.quiet = false;
+  }
+}
+
+// All views move when one of them does; each is { eye }. The others of the first, which fits, follow it.
+export function share(views) {
+  for (const { eye } of views) eye.others = new Set(views.map((other) => other.eye).filter((other) => other !== eye));
+  if (views[0]?.eye.direction) views[0].eye.moved();
+}
+
+const each = (list, axis) => list.filter((_, i) => i % 3 === axis);
+const bounds = (list, axis) => each(list, axis).reduce(([low, high], value) => [Math.min(low, value), Math.max(high, value)], [Infinity, -Infinity]);
+const extent = (list, axis) => bounds(list, axis)[1] - bounds(list, axis)[0];
+const middle = (list, axis) => (bounds(list, axis)[0] + bounds(list, axis)[1]) / 2;

@@ -1,0 +1,280 @@
+"""The files that users have sent: plain files in ``<runs>/uploads/<owner>/``, each under its sha256.
+
+::
+
+    <sha256>              whole: it has this hash, and never changes
+    <sha256>.<size>.part  on its way: its length says how much has arrived of so many bytes
+
+Each user has files of his own, and everything here is asked with the name of a user: nobody finds out what another
+one has sent. A run gets a second name of each file in its own folder (``give``): what is removed here stays there. A
+file was last wanted at its time of access, which is set whenever somebody asks for it.
+"""
+
+import os
+import shutil
+import threading
+import time
+from collections.abc import Callable, Container
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from conoid.cases.figures import size
+from conoid.cases.reading.files import HASH
+from conoid.cases.site.policy import Files
+
+from .. import durable
+from ..errors import ServiceError
+from ..requests.limits import later
+
+FOLDER = "uploads"
+_PART = ".part"
+_SYNCED = 1 << 26
+"""Bytes after which what has arrived goes to disk. Chosen: a second of a slow disk, so that no write waits for more."""
+
+
+@dataclass(frozen=True)
+class Upload:
+    """A file of a user: ``size`` bytes, ``offset`` of which are there; ``asked`` in Unix s."""
+
+    sha256: str
+    size: int
+    offset: int
+    whole: bool
+    asked: float
+
+
+class Part:
+    """A file on its way, open to be written. It is closed when nobody refers to it any more: a thread may still write
+    to a disk that hangs when its request has been given up.
+    """
+
+    def __init__(self, path: Path, size: int, *, anew: bool) -> None:
+        """Raises OSError, also where a link lies there."""
+        flags = os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC | (os.O_TRUNC if anew else 0)
+        self._fd = os.open(path, flags, 0o600)
+        self.path, self.size = path, size
+        self.offset = os.fstat(self._fd).st_size
+        self._unsynced = 0
+
+    def __del__(self) -> None:
+        """Closes it."""
+        with suppress(AttributeError):
+            os.close(self._fd)
+
+    def write(self, data: bytes) -> None:
+        """Puts bytes behind those that are there. Raises OSError."""
+        view = memoryview(data)
+        while view:
+            written = os.pwrite(self._fd, view, self.offset)
+            self.offset += written
+            self._unsynced += written
+            view = view[written:]
+        if self._unsynced >= _SYNCED:
+            self.sync()
+
+    def sync(self) -> None:
+        """What has arrived is on disk when this returns. Raises OSError."""
+        os.fsync(self._fd)
+        self._unsynced = 0
+
+    def read(self, most: int, offset: int) -> bytes:
+        """Bytes that have arrived. Raises OSError."""
+        return os.pread(self._fd, most, offset)
+
+
+class Uploads:
+    """May be used from any thread. Nothing is kept in memory: what lies in the folder is the truth."""
+
+    def __init__(self, runs: Path, rules: Files, free_disk: int) -> None:
+        """Makes nothing yet. ``free_disk``: bytes of the disk that nobody's file may take."""
+        self._runs, self._folder, self._rules, self._free_disk = runs, runs / FOLDER, rules, free_disk
+        self._locks: dict[str, threading.Lock] = {}
+        self.left: Callable[[str], int | None] = lambda owner: None
+        """Bytes that an owner may have besides what he has; None: no limit but that of ``rules``."""
+
+    def _lock(self, owner: str) -> threading.Lock:
+        """By owner: nobody waits for the disk of another one's files."""
+        return self._locks.setdefault(owner, threading.Lock())
+
+    def of(self, owner: str) -> list[Upload]:
+        """All files of an owner, by hash. Raises OSError."""
+        try:
+            with os.scandir(self._folder / owner) as entries:
+                found = [sent for entry in entries if (sent := _sent(entry)) is not None]
+        except FileNotFoundError:
+            return []
+        return sorted(found, key=lambda sent: sent.sha256)
+
+    def find(self, owner: str, sha256: str) -> Upload | None:
+        """The file of an owner, whole or on its way; it is kept for a while from now on. Raises OSError."""
+        with self._lock(owner):
+            for path in self._paths(owner, sha256):
+                with suppress(FileNotFoundError):
+                    status = os.stat(path, follow_symlinks=False)
+                    _want(path, status)
+                    return _told(path.name, status)
+        return None
+
+    def _paths(self, owner: str, sha256: str) -> list[Path]:
+        """Where the file may be: whole, and on its way."""
+        folder = self._folder / owner
+        return [folder / sha256, *(p for p in folder.glob(f"{sha256}.*{_PART}") if _size_of(p.name) is not None)]
+
+    def begin(self, owner: str, sha256: str, total: int, first: int | None = None) -> Part:
+        """Opens what is on its way, to go on with the byte ``first``, or from the beginning for None; the size of the
+        file counts from now on. Raises ServiceError 409, 413, 429, 507, OSError.
+        """
+        path = self._folder / owner / f"{sha256}.{total}{_PART}"
+        with self._lock(owner):
+            for other in self._paths(owner, sha256)[1:]:
+                if other != path:
+                    other.unlink(missing_ok=True)
+            there = path.stat().st_size if path.exists() else None
+            if first not in {None, there or 0}:
+                raise _wrong_offset(there or 0, first)
+            if there is None:
+                self._check_room(owner, total)
+            self._check_disk(total - (first or 0))
+            path.parent.mkdir(0o700, parents=True, exist_ok=True)
+            return Part(path, total, anew=first is None)
+
+    def _check_room(self, owner: str, total: int) -> None:
+        rules, there = self._rules, self.of(owner)
+        hint = f"a file that no run has goes {rules.age} after it was last asked for, or with DELETE /v1/files/SHA256"
+        if total > rules.size:
+            told = f"the file has {size(total)}; this server allows {size(rules.size)}"
+            raise ServiceError(413, "too_large", told)
+        if len(there) >= rules.number:
+            raise later(
+                "file_quota", f"you have sent {len(there)} files; this server keeps {rules.number} of a user", hint
+            )
+        sent = sum(each.size for each in there)
+        if sent + total > rules.bytes:
+            told = f"the file has {size(total)}, and your files {size(sent)}; this server allows {size(rules.bytes)}"
+            raise later("file_quota", told, hint)
+        left = self.left(owner)
+        if left is not None and total > left:
+            told = f"the file has {size(total)}, and you may have {size(max(0, left))} more on disk: remove some runs"
+            raise later("output_quota", told)
+
+    def _check_disk(self, more: int) -> None:
+        free = shutil.disk_usage(self._runs).free - more
+        if free < self._free_disk:
+            detail = f"the server's disk has no room for {size(more)}; it keeps {size(self._free_disk)} free"
+            raise ServiceError(507, "disk_full", detail, retryable=True)
+
+    def finish(self, owner: str, part: Part) -> None:
+        """The file of an owner is whole, and has been verified: it is there under its name, on disk, when this returns.
+
+        Raises OSError.
+        """
+        part.sync()
+        whole = part.path.with_name(part.path.name.partition(".")[0])
+        with self._lock(owner):
+            os.chmod(part.path, 0o400)
+            _want(part.path, os.stat(part.path))
+            os.replace(part.path, whole)
+            durable.sync_folder(whole.parent)
+
+    def give(self, owner: str, sha256: str, target: Path) -> None:
+        """A second name of the file in the folder of a run. Raises FileNotFoundError, OSError."""
+        with self._lock(owner):
+            give(self._folder / owner / sha256, target)
+
+    def remove(self, owner: str, sha256: str) -> bool:
+        """Removes a file, whole or on its way; False where there is none. Runs keep theirs. Raises OSError."""
+        with self._lock(owner):
+            there = [path for path in self._paths(owner, sha256) if path.exists()]
+            for path in there:
+                path.unlink(missing_ok=True)
+        return bool(there)
+
+    def purge(self, now: float, needed: Container[str] = ()) -> list[str]:
+        """Removes what no run has and nobody has asked for lately, but for the hashes that are ``needed``; returns
+        a line of each. A file that a run has as well takes no room here, and stays. Raises OSError.
+        """
+        gone: list[str] = []
+        for owner in self.owners():
+            hashes = [sent.sha256 for sent in self.of(owner) if sent.sha256 not in needed]
+            gone += [f"file {sha256} of {owner}" for sha256 in hashes if self._dropped(owner, sha256, now)]
+            with self._lock(owner), suppress(OSError):
+                (self._folder / owner).rmdir()  # where it is empty
+        return gone
+
+    def _dropped(self, owner: str, sha256: str, now: float) -> bool:
+        """Whether the file was old, and has been removed. Nobody can ask for it while it is looked at."""
+        with self._lock(owner):
+            for path in self._paths(owner, sha256):
+                with suppress(FileNotFoundError):
+                    status = os.stat(path, follow_symlinks=False)
+                    if status.st_nlink > 1 or now - _asked(path.name, status) <= self._rules.oldest:
+                        return False
+                    path.unlink()
+        return True
+
+    def owners(self) -> list[str]:
+        """Those who have sent something. Raises OSError."""
+        try:
+            return sorted(entry.name for entry in os.scandir(self._folder) if entry.is_dir(follow_symlinks=False))
+        except FileNotFoundError:
+            return []
+
+    def weigh(self, owner: str) -> dict[tuple[int, int], int]:
+        """Bytes of each file of an owner, by device and inode: a run that has a link of one has the same."""
+        found: dict[tuple[int, int], int] = {}
+        with suppress(FileNotFoundError), os.scandir(self._folder / owner) as entries:
+            for entry in entries:
+                with suppress(FileNotFoundError):
+                    status = entry.stat(follow_symlinks=False)
+                    found[status.st_dev, status.st_ino] = status.st_size
+        return found
+
+
+def _wrong_offset(there: int, first: int | None) -> ServiceError:
+    detail = f"the server has {there} bytes of the file, and the body begins at {first}"
+    headers = {"Upload-Offset": str(there)}
+    return ServiceError(409, "wrong_offset", detail, pointer="Content-Range", headers=headers)
+
+
+def give(source: Path, target: Path) -> None:
+    """A second name of a file that never changes, or a copy where the file system has no second names; on disk with its
+    folder. Raises FileNotFoundError, OSError.
+    """
+    try:
+        os.link(source, target, follow_symlinks=False)
+    except FileNotFoundError:
+        raise
+    except OSError:
+        durable.copy(source, target)
+
+
+def _want(path: Path, status: os.stat_result) -> None:
+    """The file is wanted now."""
+    os.utime(path, ns=(time.time_ns(), status.st_mtime_ns), follow_symlinks=False)
+
+
+def _sent(entry: "os.DirEntry[str]") -> Upload | None:
+    """None for what is no file of ours, or has gone."""
+    with suppress(FileNotFoundError):
+        return _told(entry.name, entry.stat(follow_symlinks=False))
+    return None
+
+
+def _told(name: str, status: os.stat_result) -> Upload | None:
+    sha256, _, rest = name.partition(".")
+    if not HASH.fullmatch(sha256) or (rest and _size_of(name) is None):
+        return None
+    there, asked = status.st_size, _asked(name, status)
+    return Upload(sha256, _size_of(name) if rest else there, there, not rest, asked)  # type: ignore[arg-type]
+
+
+def _asked(name: str, status: os.stat_result) -> float:
+    """When a file was last wanted, or some of it arrived."""
+    return max(status.st_atime, status.st_mtime) if name.endswith(_PART) else status.st_atime
+
+
+def _size_of(name: str) -> int | None:
+    """The size that a file will have, by the name of what has arrived; None for another name."""
+    size_, _, ending = name.partition(".")[2].partition(".")
+    return int(size_) if size_.isdecimal() and f".{ending}" == _PART else None

@@ -1,0 +1,44 @@
+"""Queries of Slurm's accounting database, in a thread of their own, so that nothing waits for them."""
+
+import logging
+import queue
+import threading
+from typing import Protocol
+
+from conoid.cases.site import slurm
+
+_log = logging.getLogger("conoid.server")
+
+
+class Taker(Protocol):
+    """A run whose job has ended."""
+
+    def took(self, found: dict[str, str]) -> None:
+        """Stores the answer of the database. Raises OSError."""
+
+
+class Accounting:
+    """For use from any thread."""
+
+    def __init__(self, place: str = "") -> None:
+        """``place``: the folder of Slurm's commands. The thread starts with the first job."""
+        self._place = place
+        self._waiting: queue.SimpleQueue[tuple[Taker, str]] = queue.SimpleQueue()
+        self._thread = threading.Thread(target=self._work, name="sacct", daemon=True)
+        self._lock = threading.Lock()
+
+    def note(self, run: Taker, job: str) -> None:
+        """Queries in turn, and stores the answers."""
+        self._waiting.put((run, job))
+        with self._lock:
+            if not self._thread.is_alive():
+                self._thread.start()
+
+    def _work(self) -> None:
+        while True:
+            run, job = self._waiting.get()
+            try:
+                if found := slurm.taken(self._place, job):
+                    run.took(found)
+            except Exception:
+                _log.exception("what job %s took is not written down", job)

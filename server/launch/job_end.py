@@ -1,0 +1,48 @@
+"""The end of a Slurm job, by its record, the run's folder, and Slurm's list."""
+
+from pathlib import Path
+
+from conoid.cases.run import Cause, State
+from conoid.cases.site.batch import Job
+from conoid.cases.site.slurm import Entry
+
+from ..runs import launcher_log
+from . import Exit, Reading
+
+_READINGS: dict[str, Reading] = {
+    "CANCELLED": (State.CANCELLED, Cause.CANCELLED, "was cancelled"),
+    "TIMEOUT": (State.TIMED_OUT, Cause.WALLTIME, "has reached its time limit"),
+    "DEADLINE": (State.TIMED_OUT, Cause.WALLTIME, "has missed its deadline"),
+    "OUT_OF_MEMORY": (State.FAILED, Cause.MEMORY, "has used more memory than it has"),
+    "BOOT_FAIL": (State.LOST, Cause.NODE, "has lost its node"),
+    "NODE_FAIL": (State.LOST, Cause.NODE, "has lost its node"),
+    "REVOKED": (State.LOST, Cause.NODE, "was revoked"),
+}
+
+
+def exit_of(folder: Path, job: Job, entry: Entry) -> Exit:
+    """The end of the job ``entry`` of the run in ``folder``; ``job``: its record with the accounting data."""
+    return Exit(_code(job), False, _last_words(folder, job), _reading(entry))
+
+
+def _code(job: Job) -> int | None:
+    """Exit code of the job's script; minus the number of its signal; None where it is not known."""
+    code, _, number = job.accounting.get("ExitCode", "").partition(":")
+    if not code.isdigit() or not number.isdigit():
+        return None
+    return -int(number) if int(number) else int(code)
+
+
+def _last_words(folder: Path, job: Job) -> str:
+    """Exit code of the ranks; for a task of an array that ended before them, of its script."""
+    own = launcher_log.last_words(folder)
+    if own or not job.array:
+        return own
+    return launcher_log.last_words(folder, Path(job.array) / f"{job.task}.log")
+
+
+def _reading(entry: Entry) -> Reading | None:
+    if entry.state not in _READINGS:
+        return None
+    state, cause, message = _READINGS[entry.state]
+    return state, cause, f"Slurm job {entry.job} {message}"

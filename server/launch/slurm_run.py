@@ -1,0 +1,285 @@
+"""A run that was submitted to Slurm. The job name identifies it; its folder shows how it ends, Slurm how it waits."""
+
+import time
+from collections.abc import Mapping, Set
+from pathlib import Path
+
+import msgspec
+
+from conoid.cases.output import layout
+from conoid.cases.reading import whole
+from conoid.cases.run import Cause, State
+from conoid.cases.site import batch, slurm, slurm_call
+from conoid.cases.site.batch import Job
+from conoid.cases.site.slurm import Entry
+
+from . import Exit, Phase
+from .accounting import Accounting
+from .job_end import exit_of
+
+_LAG = 5.0
+"""s after the end of a job in which its last files may still arrive over a network file system. Chosen."""
+_LATE = 10.0
+"""s after which an outcome in a folder without new writes is the end of the run, whatever Slurm reports. Chosen."""
+_MOST = 20
+"""Largest number of jobs submitted for one run, each because the one before was lost. Chosen."""
+_RELEASES = 3
+"""Times that a job is released which a node failed to start: a busy or restarting node recovers, a broken one does
+not. Chosen."""
+_POLITE, _LONGEST_PAUSE = 2.0, 60.0
+"""s until Slurm is asked again after a refusal that may pass: first, and at most. Chosen."""
+
+
+class SlurmWorker:
+    """The first methods are for any thread and do not block; ``turn`` is for the launcher's thread."""
+
+    def __init__(
+        self, folder: Path, job: Job, site: batch.Slurm, group: str = "", accounting: Accounting | None = None
+    ) -> None:  # fmt: skip
+        """``job``: a job that an earlier server has submitted or was about to submit, or a new one. ``group``: runs
+        to submit as one array, for runs that were never submitted.
+        """
+        self.folder = self._folder = folder
+        self._job, self._site, self._accounting = job, site, accounting or Accounting()
+        self.group, self.since = group, time.monotonic()
+        self._entry: Entry | None = None
+        self._exit: Exit | None = None
+        self._stop, self._kill, self._told = (folder / layout.STOP_REQUEST).exists(), False, ""
+        self._missing, self._ended, self._away, self._why = 0, 0.0, 0.0, ""
+        self._released = 0
+        self._later, self._pause, self._not_before = "", _POLITE, 0.0
+
+    @property
+    def name(self) -> str:
+        """Name and index in an array; unique."""
+        return self._job.key
+
+    @property
+    def record(self) -> Job:
+        """The record as it stands in the folder."""
+        return self._job
+
+    @property
+    def fresh(self) -> bool:
+        """True while it may become a task of an array: it was never submitted."""
+        return bool(self.group) and not self._job.job and not self._stop
+
+    @property
+    def waits_for_array(self) -> bool:
+        """True when it is to be submitted as a task of an array."""
+        waits = not self._job.job and self._job.task is not None and not self._stop and self._exit is None
+        return waits and time.monotonic() >= self._not_before
+
+    # From any thread --------------------------------------------------------------------------------------------------
+
+    def phase(self) -> Phase:
+        """The state by the last list of Slurm."""
+        entry = self._entry
+        if entry is None:
+            return "unknown" if self._job.job else "waits"
+        return "waits" if entry.state in slurm.PENDING else "runs"
+
+    def began(self) -> float:
+        """Unix time of its last start, s."""
+        entry = self._entry
+        return entry.start if entry is not None and entry.state not in slurm.PENDING else 0.0
+
+    def note(self) -> str:
+        """Why it waits, or since when Slurm does not answer."""
+        entry, number = self._entry, self._job.job
+        if self._away:
+            last = f"; job {number} was {entry.state.lower()} then" if entry else ""
+            return f"unknown: Slurm has not answered for {time.monotonic() - self._away:.0f} s ({self._why}){last}"
+        if self._later and entry is None:
+            return f"Slurm takes no job now, and is asked again: {self._later}"
+        if entry is None:
+            return f"Slurm is asked about job {number}" if number else "is being handed to Slurm"
+        return f"Slurm job {number} is pending: {entry.reason}" if entry.state in slurm.PENDING else ""
+
+    def exited(self) -> Exit | None:
+        """The end; None while its job waits or runs. An outcome in a folder without new writes is an end also when
+        Slurm does not answer.
+        """
+        return self._exit or (Exit(None, False, "") if self._complete() else None)
+
+    def _complete(self) -> bool:
+        try:
+            age = time.time() - (self._folder / layout.OUTCOME).stat().st_mtime
+            return (bool(self._away) or age > _LATE) and not slurm.held(self._folder)
+        except OSError:
+            return False
+
+    def stop(self) -> None:
+        """Asks the run to stop by a file; Slurm cancels a waiting job and signals a running one. Raises OSError."""
+        (self._folder / layout.STOP_REQUEST).touch()
+        self._stop = True
+
+    def kill(self) -> None:
+        """Has its job killed."""
+        self._stop = self._kill = True
+
+    # The launcher's thread --------------------------------------------------------------------------------------------
+
+    @property
+    def over(self) -> bool:
+        """True when nothing is left to do with Slurm."""
+        return self._exit is not None
+
+    def silent(self, why: str) -> None:
+        """Slurm does not answer; the last known state stays."""
+        self._away, self._why = self._away or time.monotonic(), why
+
+    def turn(self, entries: list[Entry], arrays: Set[str] = frozenset()) -> None:
+        """Does what is due. ``entries``: the jobs of this name in Slurm's list; ``arrays``: the ids of all arrays with
+        a task in the list. Raises SlurmError, OSError.
+
+        A controller that has crashed may have lost the start of a job, which then waits for ever.
+        """
+        self._away = 0.0
+        if self.waits_for_array or (self._job.task is not None and not self._job.job and not self._stop):
+            return
+        self.group = ""
+        if not self._job.job:
+            self._hand_over()
+            return
+        entry = self._chosen(entries)
+        if entry is None:
+            self._look_for_it(arrays)
+            return
+        self._missing, self._entry = 0, entry
+        if entry.state in slurm.FINAL:
+            self._end(entry)
+        elif entry.state in slurm.PENDING and (self._folder / layout.OUTCOME).exists():
+            slurm.cancel(self._site.bin, entry.job)
+            self._exit = Exit(None, False, "")
+        elif entry.not_launched and not self._stop:
+            self._launch_again(entry)
+        elif self._kill:
+            slurm.kill(self._site.bin, entry.job)
+        elif self._stop and self._told != entry.state:
+            slurm.notify(self._site.bin, entry.job)
+            self._told = entry.state
+
+    def _launch_again(self, entry: Entry) -> None:
+        """Releases a job that Slurm holds after a failed start on a node."""
+        if self._released < _RELEASES:
+            self._released += 1
+            slurm.release(self._site.bin, entry.job)
+            return
+        slurm.cancel(self._site.bin, entry.job)
+        why = f"no node has started Slurm job {entry.job}, which was released {_RELEASES} times"
+        self._exit = Exit(None, False, "", (State.LOST, Cause.NODE, why))
+
+    def _hand_over(self) -> None:
+        if self._stop:
+            known = [entry for entry in slurm.jobs(self._site.bin, self._job.name) if entry.name == self._job.key]
+            if known:
+                self.write_down(job=known[0].job)
+            else:
+                self._exit = Exit(None, False, "")
+            return
+        if time.monotonic() < self._not_before:
+            return
+        profile = batch.profile_of(self._site, self._job.profile)[1]
+        try:
+            self.write_down(job=slurm.submit(self._site.bin, self._folder, self._job, profile))
+            self._later, self._pause = "", _POLITE
+        except slurm_call.LaterError as error:
+            self.wait(str(error))
+        except slurm_call.RefusedError as error:
+            self._exit = Exit(None, False, "", (State.FAILED, Cause.LAUNCH, f"Slurm refuses the job: {error}"))
+
+    def wait(self, why: str) -> None:
+        """Slurm accepts no job now: it is asked again after a delay that doubles."""
+        self._later, self._not_before = why, time.monotonic() + self._pause
+        self._pause = min(2.0 * self._pause, _LONGEST_PAUSE)
+
+    def leave_array(self) -> None:
+        """The array was refused: the run is submitted alone, under a name of its own. Raises OSError."""
+        job, self.group = self._job, ""
+        profile = batch.profile_of(self._site, job.profile)
+        fresh = batch.new_job(
+            job.run, job.ranks, profile, job.command, job.submitted, job.attempt, job.bin, job.threads
+        )
+        self.write_down(name=fresh.name, task=None, array="")
+
+    def write_down(self, **changes: object) -> None:
+        """Writes the record; it is on disk before anything follows from it. Raises OSError."""
+        job = msgspec.structs.replace(self._job, **changes)
+        whole.write(self._folder / layout.JOB, batch.to_json(job))
+        self._job = job
+
+    def _chosen(self, entries: list[Entry]) -> Entry | None:
+        """The running job, else the first; a second job, which only a crash of the controller can cause, is
+        cancelled."""
+        begun = slurm.begun(self._folder, self._job) if len(entries) > 1 else ""
+        ordered = sorted(entries, key=lambda entry: (entry.job != begun, entry.state in slurm.FINAL, entry.job))
+        for extra in ordered[1:]:
+            if extra.state not in slurm.FINAL:
+                slurm.cancel(self._site.bin, extra.job)
+        if ordered and ordered[0].job != self._job.job:
+            self.write_down(job=ordered[0].job)
+        return ordered[0] if ordered else None
+
+    def _look_for_it(self, arrays: Set[str]) -> None:
+        """Slurm has no job of this name: acted on after two lists in a row."""
+        self._missing += 1
+        if self._missing < 2 or slurm.held(self._folder):
+            return
+        if (self._folder / layout.OUTCOME).exists():
+            self._exit = Exit(None, False, "")
+        elif slurm.begun(self._folder, self._job):
+            self._again("Slurm has forgotten the job")
+        elif self._array_number in arrays or self._others_began():
+            why = f"Slurm job {self._job.job} was cancelled while it waited"
+            self._exit = Exit(None, False, "", (State.CANCELLED, Cause.CANCELLED, why))
+        else:
+            self._missing = 0
+            self.write_down(job="")
+
+    @property
+    def _array_number(self) -> str:
+        """Id of the array of which its job is a task."""
+        number, task, _ = self._job.job.partition("_")
+        return number if task else ""
+
+    def _others_began(self) -> bool:
+        """Whether another task of the array has started: then Slurm has the whole array on its disk. A task that is
+        cancelled while it waits leaves no entry in the list.
+        """
+        if not self._array_number:
+            return False
+        folders = msgspec.json.decode(whole.read(Path(self._job.array) / layout.ARRAY), type=list[str])
+        begun = (slurm.begun(Path(folder), self._job) for folder in folders)
+        return any(number.partition("_")[0] == self._array_number for number in begun)
+
+    def _end(self, entry: Entry) -> None:
+        """The job has ended; the folder shows the meaning."""
+        self._ended = self._ended or time.monotonic()
+        there = (self._folder / layout.OUTCOME).exists()
+        begun = bool(slurm.begun(self._folder, self._job))
+        if not there and begun and (slurm.held(self._folder) or time.monotonic() - self._ended < _LAG):
+            return
+        self.write_down(accounting=slurm.accounting(self._site.bin, entry.job))
+        left = (self._folder / layout.INTERRUPTED).exists() and entry.state != "CANCELLED"
+        if not there and (left or entry.state in {"PREEMPTED", "NODE_FAIL", "BOOT_FAIL"}):
+            self._again(f"job {entry.job} ended as {entry.state}")
+        else:
+            self._exit = exit_of(self._folder, self._job, entry)
+            self._accounting.note(self, entry.job)
+
+    def took(self, found: Mapping[str, str]) -> None:
+        """Stores the accounting data of the last job. Raises OSError."""
+        self.write_down(accounting={**self._job.accounting, **found})
+
+    def _again(self, why: str) -> None:
+        """Submits another job, which continues from the checkpoint, unless a stop was asked for."""
+        if self._stop or self._job.attempt >= _MOST:
+            self._exit = Exit(None, False, "", (State.LOST, Cause.NODE, f"{why}, attempt {self._job.attempt}"))
+            return
+        profile = batch.profile_of(self._site, self._job.profile)
+        job, attempt = self._job, self._job.attempt + 1
+        fresh = batch.new_job(job.run, job.ranks, profile, job.command, time.time(), attempt, job.bin, job.threads)
+        whole.write(self._folder / layout.JOB, batch.to_json(fresh))
+        self._job, self._entry, self._ended, self._missing, self._told = fresh, None, 0.0, 0, ""
+        self._released = 0

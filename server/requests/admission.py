@@ -1,0 +1,111 @@
+"""Middleware: finds the token of a request and waits for its turn (``request_order``); limits: ``user_limits``."""
+
+import hashlib
+import time
+from collections import OrderedDict
+from typing import Any
+
+from sqlalchemy.exc import SQLAlchemyError
+from starlette.datastructures import Headers
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from ..database.store import Token
+from ..errors import ServiceError, database_away
+from ..service import Service
+from .request_order import RequestOrder
+from .thread_pool import asking
+from .tokens import check_token
+
+ALIVE = "/healthz"
+"""/healthz: waits for its turn and for nothing else."""
+LOCAL_OWNER = "local"
+"""Owner of all runs on a server without access control."""
+_SEEN = 1000
+"""Number of recently valid tokens that are kept. Chosen."""
+_FRESH = 1.0
+"""s for which a valid token is not looked up again. Chosen: a revoked token is refused after that time."""
+
+
+class Admission:
+    """Middleware of all requests. The app reads the token and the place of the request from the state of the scope."""
+
+    def __init__(self, app: ASGIApp, service: Service) -> None:
+        self._app, self._service = app, service
+        self._seen: OrderedDict[bytes, tuple[float, Token]] = OrderedDict()
+        """By hash of a token: until when it is taken as valid; after that the database is asked, in the lane of its
+        owner."""
+        self._turns = RequestOrder()
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answers 429 and 503 itself where a request is not let in."""
+        if scope["type"] != "http":
+            await self._app(scope, receive, send)
+            return
+        if scope["path"] == ALIVE:
+            await self._turns.wait(_address(scope))
+            await self._app(scope, receive, send)
+            return
+        began = False
+
+        async def noted(message: Message) -> None:
+            nonlocal began
+            began = True
+            await send(message)
+
+        try:
+            await self._enter(scope, receive, noted)
+        except ServiceError as error:
+            if began:
+                raise
+            await error.response()(scope, receive, send)
+
+    async def _enter(self, scope: Scope, receive: Receive, send: Send) -> None:
+        state: dict[str, Any] = scope.setdefault("state", {})
+        token = state["token"] = await self._token(scope)
+        who = self._who(scope, token)
+        asking.set(who)
+        if (connection := state.get("connection")) is not None:
+            connection.owner = token.owner if token is not None else ""
+        async with self._service.user_limits.place(who) as state["place"]:
+            await self._app(scope, receive, send)
+
+    def _who(self, scope: Scope, token: Token | None) -> str:
+        if not self._service.settings.auth:
+            return LOCAL_OWNER
+        return token.owner if token is not None else _address(scope)
+
+    async def _token(self, scope: Scope) -> Token | None:
+        """The token of the request; None where it has no valid one. Raises ServiceError 429, 503, 507."""
+        scheme, _, text = Headers(scope=scope).get("authorization", "").partition(" ")
+        if not self._service.settings.auth:
+            await self._turns.wait(LOCAL_OWNER)
+            return None
+        if scheme.lower() != "bearer":
+            await self._turns.wait(_address(scope))
+            return None
+        shown = hashlib.sha256(text.strip().encode()).digest()
+        until, known = self._seen.get(shown, (0.0, None))
+        who = known.owner if known is not None else _address(scope)
+        await self._turns.wait(who)
+        if time.monotonic() < until:
+            return known
+        asking.set(who)
+        try:
+            token = await self._service.pool.run(check_token, self._service.store, text.strip())
+        except SQLAlchemyError as error:
+            raise database_away(error) from error
+        self._note(shown, token)
+        return token
+
+    def _note(self, shown: bytes, token: Token | None) -> None:
+        self._seen.pop(shown, None)
+        if token is not None:
+            self._seen[shown] = time.monotonic() + _FRESH, token
+            if len(self._seen) > _SEEN:
+                self._seen.popitem(last=False)
+
+
+def _address(scope: Scope) -> str:
+    """A name that no user can have: names of users have no blank."""
+    client = scope.get("client")
+    return f"address {client[0]}" if client else "address"

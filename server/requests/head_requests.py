@@ -1,0 +1,26 @@
+"""HEAD for every route with GET: the same headers, at once, without a body."""
+
+import anyio
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+
+class HeadRequests:
+    """Middleware that calls the app with GET and ends the answer after its headers, however long the body would be."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self._app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Passes on requests other than HEAD."""
+        if scope["type"] != "http" or scope["method"] != "HEAD":
+            await self._app(scope, receive, send)
+            return
+        with anyio.CancelScope() as answer:
+
+            async def first(message: Message) -> None:
+                if message["type"] == "http.response.start" and not answer.cancel_called:
+                    await send(message)
+                    await send({"type": "http.response.body", "body": b"", "more_body": False})
+                    answer.cancel()
+
+            await self._app({**scope, "method": "GET"}, receive, first)

@@ -1,0 +1,42 @@
+"""The order in which requests begin: one in each turn of the event loop, the users in rotation.
+
+An answer that computes nothing takes 0.5 to 0.8 ms of the event loop, and a GET that reads a file waits for the loop
+ten times. If all requests that have arrived began in one turn of the loop, a user with 40 connections would make each
+of these waits 20 ms or more for everybody else (docs/reference/load.md, "Beside an attacker").
+"""
+
+import asyncio
+from collections import OrderedDict, deque
+
+
+class RequestOrder:
+    """Belongs to the event loop."""
+
+    def __init__(self) -> None:
+        self._lines: OrderedDict[str, deque[asyncio.Future[None]]] = OrderedDict()
+        """The requests that have not begun, by who has made them; the one whose turn is next stands first."""
+        self._called = False
+
+    async def wait(self, who: str) -> None:
+        """Returns when the next request of ``who`` may begin."""
+        loop = asyncio.get_running_loop()
+        turn: asyncio.Future[None] = loop.create_future()
+        self._lines.setdefault(who, deque()).append(turn)
+        if not self._called:
+            self._called = True
+            loop.call_soon(self._begin, loop)
+        await turn
+
+    def _begin(self, loop: asyncio.AbstractEventLoop) -> None:
+        """Begins one request, and comes back in the next turn of the loop while others wait."""
+        while self._lines:
+            who, line = self._lines.popitem(last=False)
+            turn = line.popleft()
+            if line:
+                self._lines[who] = line
+            if not turn.done():
+                turn.set_result(None)
+                break
+        self._called = bool(self._lines)
+        if self._called:
+            loop.call_soon(self._begin, loop)

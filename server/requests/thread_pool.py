@@ -1,0 +1,137 @@
+"""Threads for work that may block: the disk, the database, long computations. Each user has a few at a time.
+
+The event loop never waits for a disk. Work that takes too long is answered with 503; its thread stays in use until
+the work ends, so that a disk that hangs takes no more threads than are allowed.
+"""
+
+import asyncio
+import queue
+import threading
+from collections import Counter, deque
+from collections.abc import Awaitable, Callable
+from contextvars import ContextVar
+from dataclasses import dataclass, field
+from functools import partial, wraps
+from typing import Any, ParamSpec, TypeVar
+
+from ..errors import ServiceError
+
+P = ParamSpec("P")
+T = TypeVar("T")
+THREADS = 64
+"""Threads for all users. Chosen: a disk answers some ten requests at a time; a thread takes some 100 kB."""
+asking: ContextVar[str] = ContextVar("asking", default="nobody")
+"""The caller of the present request: the name of a user, or an address."""
+
+
+@dataclass(eq=False)
+class _Job:
+    who: str
+    work: Callable[[], Any]
+    done: asyncio.Future[Any]
+    loop: asyncio.AbstractEventLoop = field(default_factory=asyncio.get_running_loop)
+    begun: bool = False
+
+
+class ThreadPool:
+    """One lane for each user. Used in the thread of the event loop."""
+
+    def __init__(self, each: int, waiting: int, patience: float, most: int = THREADS) -> None:
+        """``each``: threads at a time, ``waiting``: waiting jobs, both of one user; ``most``: threads of all users;
+        ``patience``: s that a job may take with its waiting.
+        """
+        self._each, self._waiting, self._patience, self._most = each, waiting, patience, most
+        self._jobs: dict[str, deque[_Job]] = {}
+        self._taken: Counter[str] = Counter()
+        self._handed: queue.SimpleQueue[_Job] = queue.SimpleQueue()
+        self._threads = self._busy = 0
+
+    async def run(self, work: Callable[P, T], *args: P.args, **words: P.kwargs) -> T:
+        """The result of ``work``, computed in a thread for the caller; raises its errors. Raises ServiceError 429
+        when too many jobs of the user wait, 503 when the work takes too long.
+        """
+        who, loop = asking.get(), asyncio.get_running_loop()
+        waiting = self._jobs.setdefault(who, deque())
+        if len(waiting) >= self._waiting:
+            raise busy(f"{self._waiting} of your requests wait for the server's disk or its processors")
+        job = _Job(who, partial(work, *args, **words), loop.create_future())
+        waiting.append(job)
+        self._begin()
+        try:
+            if not (await asyncio.wait([job.done], timeout=self._patience))[0]:
+                raise self._late(job)
+            value: T = job.done.result()
+            return value
+        finally:
+            self._forget(job)
+
+    def _late(self, job: _Job) -> ServiceError:
+        other = "" if job.begun else "your other requests "
+        detail = f"the server's disk or database did not answer {other}for {self._patience:g} s"
+        return ServiceError(503, "unavailable", detail, retryable=True, headers={"Retry-After": "5"})
+
+    def _forget(self, job: _Job) -> None:
+        """Gives a job up; one that has not begun is not started."""
+        if not job.begun:
+            self._jobs[job.who].remove(job)
+            if not self._jobs[job.who]:
+                del self._jobs[job.who]
+
+    def _begin(self) -> None:
+        """Gives jobs to threads, one user after the other."""
+        while self._busy < self._most:
+            who = next((who for who, jobs in self._jobs.items() if jobs and self._taken[who] < self._each), None)
+            if who is None:
+                return
+            jobs = self._jobs.pop(who)
+            job = jobs.popleft()
+            if jobs:
+                self._jobs[who] = jobs
+            job.begun = True
+            self._taken[who] += 1
+            self._busy += 1
+            if self._busy > self._threads:
+                self._threads += 1
+                threading.Thread(target=self._work, name="pool", daemon=True).start()
+            self._handed.put(job)
+
+    def _work(self) -> None:
+        """A daemon thread: one that hangs does not keep the server from ending."""
+        while True:
+            job = self._handed.get()
+            value, error = None, None
+            try:
+                value = job.work()
+            except BaseException as raised:
+                error = raised
+            try:
+                job.loop.call_soon_threadsafe(self._end, job, value, error)
+            except RuntimeError:  # the loop is closed: the server ends
+                return
+            del job, value, error
+
+    def _end(self, job: _Job, value: Any, error: BaseException | None) -> None:
+        self._busy -= 1
+        self._taken[job.who] -= 1
+        if not self._taken[job.who]:
+            del self._taken[job.who]
+        if not job.done.done():
+            job.done.set_result(value) if error is None else job.done.set_exception(error)
+            job.done.exception()  # read, since the caller may have left
+        self._begin()
+
+
+def busy(detail: str) -> ServiceError:
+    """429: too many requests of the same user are in progress."""
+    return ServiceError(429, "busy", detail, retryable=True, headers={"Retry-After": "5"})
+
+
+def blocking(route: Callable[P, T]) -> Callable[P, Awaitable[T]]:
+    """Decorator for a route, or a dependency, that may block: it takes ``service`` and runs in the user's lane."""
+
+    @wraps(route)
+    async def run(*args: P.args, **words: P.kwargs) -> T:
+        pool: ThreadPool = words["service"].pool  # type: ignore[attr-defined]
+        return await pool.run(route, *args, **words)
+
+    return run

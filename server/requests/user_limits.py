@@ -1,0 +1,102 @@
+"""Limits of each user: requests in progress, and long answers.
+
+A request is in progress until its answer is sent, so this limits the bodies and answers in memory, too.
+"""
+
+import asyncio
+from collections import Counter
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+
+from starlette.requests import Request
+
+from conoid.cases.site.policy import Http
+
+from .thread_pool import busy
+
+PATIENCE = 60.0
+"""s that a request waits for its turn. Chosen: longer than most answers take."""
+
+
+class Place:
+    """The place of one request among those in progress."""
+
+    def __init__(self, user_limits: "UserLimits", who: str) -> None:
+        """``who``: the user of the request."""
+        self._user_limits, self._who = user_limits, who
+        self.is_long = False
+
+    def lengthen(self) -> None:
+        """Counts the answer among the long ones from now on: it takes as long as a run or a download.
+
+        Raises ServiceError 429.
+        """
+        if not self.is_long:
+            self._user_limits.lengthen(self._who)
+            self.is_long = True
+
+
+class UserLimits:
+    """Counts of requests by user. Used in the thread of the event loop."""
+
+    def __init__(self, limits: Http, connections: int) -> None:
+        """``connections``: limit for all users; one user gets at most half of it for waiting requests and long
+        answers."""
+        self._requests = limits.requests
+        self._waiting, self._streams = min(limits.waiting, connections // 4), min(limits.streams, connections // 4)
+        self._turns: dict[str, asyncio.Semaphore] = {}
+        self._asked: Counter[str] = Counter()
+        """Requests that wait or are in progress, by user."""
+        self._long: Counter[str] = Counter()
+
+    @asynccontextmanager
+    async def place(self, who: str) -> AsyncIterator[Place]:
+        """Waits for the turn of a request. Raises ServiceError 429 when too many requests of the user wait, or when
+        it waits too long."""
+        if self._asked[who] >= self._requests + self._waiting:
+            raise busy(f"{self._requests} of your requests are in progress and {self._waiting} wait")
+        place, turn = Place(self, who), self._turns.setdefault(who, asyncio.Semaphore(self._requests))
+        self._asked[who] += 1
+        try:
+            await _turn(turn)
+        except BaseException:
+            self._leave(who)
+            raise
+        try:
+            yield place
+        finally:
+            if place.is_long:
+                self._long[who] -= 1
+                self._long += Counter()  # keeps counts above 0 only
+            else:
+                turn.release()
+                self._leave(who)
+
+    def lengthen(self, who: str) -> None:
+        """Moves a request in progress to the long answers. Raises ServiceError 429."""
+        if self._long[who] >= self._streams:
+            raise busy(
+                f"you have {self._streams} event streams, followed logs, waits or downloads; no more are allowed"
+            )
+        self._long[who] += 1
+        self._turns[who].release()
+        self._leave(who)
+
+    def _leave(self, who: str) -> None:
+        self._asked[who] -= 1
+        if not self._asked[who]:
+            del self._asked[who], self._turns[who]
+
+
+def place_of(request: Request) -> Place:
+    """The place of the request that is being answered."""
+    place: Place = request.scope["state"]["place"]
+    return place
+
+
+async def _turn(turn: asyncio.Semaphore) -> None:
+    try:
+        async with asyncio.timeout(PATIENCE):
+            await turn.acquire()
+    except TimeoutError:
+        raise busy(f"your other requests are in progress since {PATIENCE:g} s") from None

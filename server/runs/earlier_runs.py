@@ -1,0 +1,73 @@
+"""Runs of an earlier server: each folder is read once, and again where that failed."""
+
+import logging
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+
+from sqlalchemy.exc import SQLAlchemyError
+
+from ..database.store import Store
+from ..launch import Launcher
+from . import folder, pins, recovery
+from .events import Run
+from .index import Index
+from .recovery import Left
+from .retries import words
+
+_log = logging.getLogger("conoid.server")
+
+
+class EarlierRuns:
+    """Used in the supervisor's thread."""
+
+    def __init__(
+        self, runs: Path, store: Store, index: Index, launcher: Launcher, found: Callable[[Left], None]
+    ) -> None:
+        """``found`` takes each run that can be read, ended or not."""
+        self._runs, self._store, self._index, self._launcher, self._found = runs, store, index, launcher, found
+        self._failed: dict[Path, str] = {}
+
+    def all(self) -> None:
+        """Reads every run that is not known to have ended, also one whose folder is empty now. Raises OSError,
+        SQLAlchemyError.
+        """
+        ended, known, last = self._store.ended(), self._store.open(), ""
+        emptied = set(known)
+        for path in folder.scan(self._runs):
+            last = path.name
+            emptied.discard(path.name)
+            if path.name not in ended:
+                self._take_up(path, partial(known.get, path.name))
+        for run_id in sorted(emptied):
+            if (self._runs / run_id).is_dir():
+                self._take_up(self._runs / run_id, partial(known.get, run_id))
+        if last:
+            folder.begin_after(last)
+        if self._store.unlabelled:
+            for run in self._store.all():
+                self._store.relabel(run, pins.labels(self._runs / run.id))
+
+    def again(self) -> None:
+        """Runs that could not be read."""
+        for path in tuple(self._failed):
+            self.take_up(path)
+
+    def take_up(self, path: Path) -> None:
+        """An error is logged once; the run is read again with the next pass."""
+        self._take_up(path, lambda: self._store.get(path.name))
+
+    def _take_up(self, path: Path, known_of: Callable[[], Run | None]) -> None:
+        """Writes the database only where it is behind the folder, so that a thousand runs do not wait for a disk."""
+        told = self._failed.pop(path, "")
+        try:
+            known = known_of()
+            left = recovery.look(path, known, self._launcher)
+            if left.run != known:
+                self._index.add(left.run, left.key, pins.labels(path))
+        except (OSError, ValueError, SQLAlchemyError) as error:
+            self._failed[path] = words(error)
+            if told != words(error):
+                _log.error("run %s cannot be taken up: %s", path.name, words(error))
+            return
+        self._found(left)

@@ -1,0 +1,114 @@
+"""Steps of runs that failed and are tried again: which run, when, and why. The timers of the supervisor."""
+
+import errno
+import logging
+import time
+from dataclasses import dataclass
+
+from .events import Event
+
+_log = logging.getLogger("conoid.server")
+_AGAIN, _LONGEST = 1.0, 8.0
+"""s until a failed step is tried again: first, and at most; the delay doubles. Chosen."""
+_QUIET = 60.0
+"""s for which the same error of the same run is not logged again. Chosen."""
+_PASSING = frozenset(
+    {errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EROFS, errno.ESTALE, errno.EMFILE, errno.ENFILE, errno.ENOMEM,
+     errno.EAGAIN}
+)  # fmt: skip
+_LASTING = 4.0
+"""s of delay from which an error of a run's own files counts as lasting. Chosen: the fourth try, after 7 s."""
+DAMAGE = frozenset({errno.EISDIR, errno.ENOTDIR, errno.EACCES, errno.EPERM, errno.ELOOP, errno.EROFS})
+"""Errors of one folder, which last although other folders can be written."""
+
+
+def passing(error: BaseException) -> bool:
+    """True for errors of the machine that may end, such as a full disk, anywhere in the chain of causes."""
+    cause = error.__cause__ or error.__context__
+    if isinstance(error, OSError) and error.errno in _PASSING:
+        return True
+    return cause is not None and passing(cause)
+
+
+def words(error: BaseException) -> str:
+    """The error in one line."""
+    said = error.strerror if isinstance(error, OSError) else str(error)
+    return (said or type(error).__name__).splitlines()[0]
+
+
+@dataclass(frozen=True)
+class _Hold:
+    until: float
+    delay: float
+    why: str
+    event: Event | None
+    logged: float
+
+
+class Retries:
+    """Used in the supervisor's thread; ``why`` may be called from any thread."""
+
+    def __init__(self) -> None:
+        """No run waits."""
+        self._retries: dict[str, _Hold] = {}
+
+    def __len__(self) -> int:
+        """Number of runs that wait for another try."""
+        return len(self._retries)
+
+    def put_off(self, run_id: str, error: Exception, event: Event | None = None) -> Exception:
+        """Schedules another try: of the step that the run waits for, or of ``event``, which is not sent again by
+        itself."""
+        before = self._retries.get(run_id)
+        self._hold(run_id, words(error), event or (before.event if before else None))
+        return error
+
+    def rest(self, run_id: str, why: str) -> None:
+        """The run is not started for a while."""
+        self._hold(run_id, why, None)
+
+    def _hold(self, run_id: str, why: str, event: Event | None) -> None:
+        before, now = self._retries.get(run_id), time.monotonic()
+        delay = _AGAIN if before is None else min(_LONGEST, 2.0 * before.delay)
+        known = before is not None and before.why == why and now < before.logged + _QUIET
+        if not known:
+            _log.error("run %s: tried again in %g s: %s", run_id, delay, why)
+        self._retries[run_id] = _Hold(now + delay, delay, why, event, before.logged if before and known else now)
+
+    def held(self, run_id: str) -> bool:
+        """True before the time of the next try."""
+        hold = self._retries.get(run_id)
+        return hold is not None and hold.until > time.monotonic()
+
+    def due(self) -> list[tuple[str, Event]]:
+        """The events whose time has come."""
+        now = time.monotonic()
+        return [(run_id, hold.event) for run_id, hold in self._retries.items() if hold.event and hold.until <= now]
+
+    def timed(self) -> set[str]:
+        """The runs that have a scheduled event."""
+        return {run_id for run_id, hold in tuple(self._retries.items()) if hold.event is not None}
+
+    def done(self, run_id: str, event: Event) -> None:
+        """The run has made a step; a scheduled event stays."""
+        hold = self._retries.get(run_id)
+        if hold is not None and hold.event in (None, event):
+            del self._retries[run_id]
+
+    def lasts(self, run_id: str) -> bool:
+        """True after several failed tries."""
+        hold = self._retries.get(run_id)
+        return hold is not None and hold.delay >= _LASTING
+
+    def damaged(self, run_id: str, error: Exception) -> bool:
+        """Whether the error is of the run's own files, and lasts."""
+        return isinstance(error, OSError) and error.errno in DAMAGE and self.lasts(run_id)
+
+    def forget(self, run_id: str) -> None:
+        """Removes a run that has ended."""
+        self._retries.pop(run_id, None)
+
+    def why(self, run_id: str) -> str:
+        """The error of the last step; empty without one."""
+        hold = self._retries.get(run_id)
+        return hold.why if hold is not None else ""
