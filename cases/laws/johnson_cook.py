@@ -1,4 +1,4 @@
-"""Johnson-Cook plasticity: its constants, and what is known of it before anything runs."""
+"""Johnson-Cook plasticity: constants, checks and estimates."""
 
 import math
 from collections.abc import Iterator
@@ -12,24 +12,26 @@ from .law import Law, Likely, Wrong
 
 
 class JohnsonCookDamage(Model):
-    """Damage: the sum of plastic strain over (D1 + D2 e^(D3 t)) (1 + D4 ln max(rate/reference_rate, 1)) (1 + D5 T*).
+    """Johnson-Cook damage: sum of plastic strain increments over the fracture strain ``(D1 + D2 e^(D3 t)) (1 + D4 ln
+    max(rate/reference_rate, 1)) (1 + D5 T*)``, t the mean stress over the flow stress.
 
-    t is the mean stress over the flow stress. At ``erosion.damage`` a tet leaves. Johnson and Cook 1985. The flow
-    stress is multiplied by 1 - softening * damage: Borvik, Hopperstad, Berstad and Langseth 2001.
+    A tet is deleted at ``erosion.damage``. The flow stress is multiplied by ``1 - softening * damage``. Sources:
+    Johnson and Cook 1985; softening: Borvik, Hopperstad, Berstad and Langseth 2001.
     """
 
     D1: Ratio
     """Fracture strain at high tension."""
     D2: Ratio
-    """How much more it is without tension."""
+    """Increase of the fracture strain without tension."""
     D3: Ratio
-    """How fast that goes with the tension; negative where tension shortens the strain."""
+    """Exponent of the tension; negative where tension reduces the fracture strain."""
     D4: Ratio = 0.0
-    """Rate dependence."""
+    """Coefficient of the strain rate."""
     D5: Ratio = 0.0
-    """Dependence on the temperature."""
+    """Coefficient of the temperature."""
     softening: Annotated[Ratio, Field(ge=0, lt=1)] = 0.0
-    """Share of the flow stress that damage 1 takes: the critical damage of Borvik and others. 0: damage takes none."""
+    """Share of the flow stress that is lost at damage 1 (critical damage of Borvik and others). 0: damage does not
+    change the flow stress."""
 
     @property
     def in_tension(self) -> float:
@@ -38,35 +40,37 @@ class JohnsonCookDamage(Model):
 
 
 class JohnsonCook(Law):
-    """Flow stress (A + B e^n)(1 + C ln max(rate/reference_rate, 1))(1 - T*^m), adiabatic heating.
+    """Johnson-Cook plasticity: flow stress ``(A + B e^n) (1 + C ln max(rate/reference_rate, 1)) (1 - T*^m)``, with
+    adiabatic heating.
 
-    T* = (T - reference_temperature) / (melt_temperature - reference_temperature), clamped to [0, 1].
+    ``T* = (T - reference_temperature) / (melt_temperature - reference_temperature)``, limited to [0, 1]; e is the
+    effective plastic strain. Source: Johnson and Cook 1983.
     """
 
     model: Literal["johnson_cook"]
-    """The law."""
+    """Selects this law."""
     A: Annotated[Stress, Positive]
-    """Flow stress before any plastic strain."""
+    """Initial yield stress."""
     B: Annotated[Stress, Field(ge=0)]
-    """Hardening."""
+    """Hardening coefficient."""
     n: Annotated[Ratio, Field(gt=0, le=1)]
-    """Exponent of the hardening."""
+    """Hardening exponent."""
     C: Annotated[Ratio, Field(ge=0)]
-    """Rate dependence."""
+    """Coefficient of the strain rate."""
     m: Annotated[Ratio, Positive]
     """Exponent of the thermal softening."""
     reference_rate: Annotated[Rate, Positive] = 1.0
-    """Rate of plastic strain at which A, B and n were measured."""
+    """Plastic strain rate at which A, B and n were measured. Below it the rate has no effect."""
     reference_temperature: Annotated[Temperature, Field(ge=0)] = 293.15
-    """Temperature below which nothing softens."""
+    """Temperature at which A, B and n were measured; below it there is no softening."""
     melt_temperature: Annotated[Temperature, Positive]
-    """Temperature at which nothing is left of the strength; above the reference."""
+    """Temperature at which the strength is 0; above ``reference_temperature``."""
     specific_heat: Annotated[SpecificHeat, Positive]
-    """Heat that warms the material."""
+    """Specific heat, for the temperature rise by plastic work."""
     taylor_quinney: Annotated[Ratio, Field(ge=0, le=1)] = 0.9
-    """Share of the plastic work that becomes heat."""
+    """Taylor-Quinney coefficient: share of the plastic work that becomes heat."""
     damage: JohnsonCookDamage | None = None
-    """What counts as damage; none by default."""
+    """Damage. Default: no damage is computed."""
 
     nanoseconds: ClassVar[float] = 40.0
 

@@ -1,4 +1,4 @@
-"""Johnson-Holmquist 2, the law of brittle materials that crumble: its constants, and what is known of it beforehand."""
+"""Johnson-Holmquist 2, a law of brittle materials: constants, checks and estimates."""
 
 from collections.abc import Iterator
 from typing import Annotated, ClassVar, Literal
@@ -11,48 +11,50 @@ from .law import Law, Wrong
 
 
 class JohnsonHolmquist(Law):
-    """Johnson-Holmquist 2: strength between intact, A (p* + T*)^N, and fractured, B p*^M, by the damage D; pressure
-    with bulking; no tension beyond T (1 - D).
+    """Johnson-Holmquist 2 (JH-2), for ceramics and glass under high pressure: pressure-dependent strength that falls
+    with damage D from intact, ``A (p* + T*)^N``, to fractured, ``B p*^M``, with bulking.
 
-    Pressures with a star are over ``pressure_hel``, strengths over that at the elastic limit, 3/2 (hel - pressure_hel);
-    both grow with 1 + C ln max(rate/reference_rate, 1), and the fractured one is never above the intact one. D grows by
-    the plastic strain over D1 (p* + T*)^D2. The pressure is K m + K2 m^2 + K3 m^3, m = V0/V - 1, K from ``elastic``,
-    and in tension K m; of the elastic energy that damage sets free the share ``beta`` becomes pressure. Johnson and
-    Holmquist 1994.
+    ``p*`` and ``T*`` are pressure and ``tension`` over ``pressure_hel``; strengths are over that at the Hugoniot
+    elastic limit, ``3/2 (hel - pressure_hel)``, and are multiplied by ``1 + C ln max(rate/reference_rate, 1)``. The
+    fractured strength is never above the intact one. D is the sum of plastic strain increments over ``D1 (p* +
+    T*)^D2``. The largest tensile pressure is ``tension * (1 - D)``.
+
+    The pressure is ``K m + K2 m^2 + K3 m^3`` with ``m = V0/V - 1`` and K from ``elastic``; in tension K m. The share
+    ``beta`` of the elastic energy that damage releases becomes pressure. Source: Johnson and Holmquist 1994.
     """
 
     model: Literal["johnson_holmquist"]
-    """The law."""
+    """Selects this law."""
     hel: Annotated[Stress, Positive]
-    """Stress at the Hugoniot elastic limit, in the direction of the impact."""
+    """Hugoniot elastic limit: axial stress."""
     pressure_hel: Annotated[Stress, Positive]
-    """Pressure there."""
+    """Pressure at the Hugoniot elastic limit; below ``hel``."""
     tension: Annotated[Stress, Positive]
-    """T: largest tension, as a negative pressure, of what is whole."""
+    """T: largest tensile pressure of intact material."""
     A: Annotated[Ratio, Positive]
-    """Strength of what is whole."""
+    """Coefficient of the intact strength."""
     N: Annotated[Ratio, Positive]
-    """Exponent of the pressure there."""
+    """Exponent of the pressure in the intact strength."""
     B: Annotated[Ratio, Field(ge=0)]
-    """Strength of what has crumbled."""
+    """Coefficient of the fractured strength."""
     M: Annotated[Ratio, Positive]
-    """Exponent of the pressure there."""
+    """Exponent of the pressure in the fractured strength."""
     C: Annotated[Ratio, Field(ge=0)] = 0.0
-    """Rate dependence."""
+    """Coefficient of the strain rate."""
     reference_rate: Annotated[Rate, Positive] = 1.0
-    """Rate of strain at which A and B hold."""
+    """Strain rate at which A and B were measured. Below it the rate has no effect."""
     largest_fractured: Annotated[Ratio, Positive] | None = None
-    """Largest strength of what has crumbled, over that at the elastic limit; none by default."""
+    """Largest fractured strength, over that at the Hugoniot elastic limit. Default: no limit."""
     D1: Annotated[Ratio, Positive]
-    """Plastic strain to fracture where p* + T* is one."""
+    """Plastic strain to fracture at ``p* + T* = 1``."""
     D2: Annotated[Ratio, Field(ge=0)]
-    """Exponent of the pressure there."""
+    """Exponent of the pressure in the plastic strain to fracture."""
     K2: Stress = 0.0
     """Second coefficient of the pressure."""
     K3: Stress = 0.0
     """Third coefficient of the pressure."""
     beta: Annotated[Ratio, Field(ge=0, le=1)] = 1.0
-    """Share of the elastic energy of the deviator that bulking turns into pressure where damage sets it free."""
+    """Bulking: share of the deviatoric elastic energy released by damage that becomes pressure."""
 
     nanoseconds: ClassVar[float] = 60.0
     own_pressure: ClassVar[bool] = True

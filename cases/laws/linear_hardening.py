@@ -1,4 +1,4 @@
-"""J2 plasticity with linear hardening: its constants, and what is known of it before anything runs."""
+"""J2 plasticity with linear hardening: constants, checks and estimates."""
 
 from collections.abc import Iterator
 from typing import Annotated, ClassVar, Literal
@@ -11,14 +11,15 @@ from .law import Law, Likely
 
 
 class LinearHardening(Law):
-    """J2 plasticity: yield stress ``yield + hardening * plastic strain``, Pa."""
+    """J2 (von Mises) plasticity with isotropic linear hardening: flow stress ``yield_stress + hardening * plastic
+    strain``."""
 
     model: Literal["linear_hardening"]
-    """The law."""
+    """Selects this law."""
     yield_stress: Annotated[Stress, Positive]
-    """Flow stress before any plastic strain."""
+    """Initial yield stress."""
     hardening: Annotated[Stress, Field(ge=0)] = 0.0
-    """Rise of the flow stress with the plastic strain."""
+    """Plastic modulus: increase of the flow stress per effective plastic strain."""
 
     nanoseconds: ClassVar[float] = 30.0
 

@@ -1,4 +1,4 @@
-"""Mohr-Coulomb strength: its constants, and what is known of it before anything runs."""
+"""Mohr-Coulomb strength: constants, checks and estimates."""
 
 import math
 from collections.abc import Iterator
@@ -18,31 +18,33 @@ def _acute(angle: float) -> float:
 
 
 class MohrCoulomb(Law):
-    """Brittle strength (s1 - s3) + (s1 + s3) sin(friction_angle) <= 2 cohesion cos(friction_angle), s1 >= s2 >= s3.
+    """Mohr-Coulomb strength of brittle materials: ``(s1 - s3) + (s1 + s3) sin(friction_angle) <= 2 cohesion
+    cos(friction_angle)``, with principal stresses s1 >= s2 >= s3, tension positive.
 
-    Tension is positive. Flow keeps the volume, but for a dilation that is asked for. Tension beyond the apex takes the
-    deviatoric stress and leaves the pressure as it is. Next to a face at which a shock begins the first 20 tets flow
-    too far, by half of their plastic strain where the pressure is averaged: ``pressure = "standard"`` and a load that
-    rises have less of that.
+    Flow preserves the volume, except with ``dilation_angle``. Tension beyond the apex removes the deviatoric stress
+    and leaves the pressure unchanged. Next to a face at which a shock starts, the first 20 tets flow too much: up to
+    half of their plastic strain is an error where the pressure is averaged, less with ``pressure = "standard"`` and
+    with a load that rises over some time steps.
     """
 
     model: Literal["mohr_coulomb"]
-    """The law."""
+    """Selects this law."""
     cohesion: Annotated[Stress, Positive]
-    """Shear strength without pressure."""
+    """Cohesion: shear strength at zero pressure."""
     friction_angle: Annotated[Angle, AfterValidator(_acute)]
-    """How fast strength grows with pressure: ``"55 deg"``, at least 0 and below 90 deg."""
+    """Angle of internal friction, such as ``"55 deg"``; at least 0 and below 90 deg."""
     dilation_angle: Annotated[Angle, AfterValidator(_acute)] = 0.0
-    """psi: flow lets the volume grow by sin(psi) of its shear, until it fails; at most the friction angle. 0 keeps the
-    volume, the friction angle makes the flow associated. Needs the linear pressure: no table ``eos``."""
+    """Dilation angle psi: flow increases the volume by sin(psi) of the shear, until failure. 0: no volume change;
+    equal to ``friction_angle`` (the largest value): associated flow. Not with ``eos``."""
     strength_cap: Annotated[Stress, Positive] | None = None
-    """Largest s1 - s3, however high the pressure; none by default."""
+    """Largest s1 - s3 at any pressure. Default: no limit."""
     failure_strain: Annotated[Ratio, Positive] | None = None
-    """Effective plastic strain beyond which the residual values hold; without it material never fails."""
+    """Effective plastic strain at failure; beyond it the residual values apply. Default: no failure."""
     residual_cohesion: Annotated[Stress, Field(ge=0)] | None = None
-    """Cohesion after failure; 0 by default."""
+    """Cohesion after failure; at most ``cohesion``. Default: 0. Needs ``failure_strain``."""
     residual_friction_angle: Annotated[Angle, AfterValidator(_acute)] | None = None
-    """Friction angle after failure; 30 deg by default, or the friction angle if that is smaller."""
+    """Angle of internal friction after failure; at most ``friction_angle``. Default: 30 deg, or ``friction_angle``
+    if that is smaller. Needs ``failure_strain``."""
 
     nanoseconds: ClassVar[float] = 60.0
 

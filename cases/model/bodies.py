@@ -1,4 +1,4 @@
-"""The bodies of a case and their meshes: primitives that are generated, and mesh files."""
+"""Bodies and their meshes: primitives that Conoid meshes, and mesh files."""
 
 from typing import Annotated, Literal
 
@@ -25,181 +25,188 @@ Edge = Annotated[Count, Field(ge=1, le=1000)]
 
 
 class Primitive(Model):
-    """What all generated meshes share. ``structured`` is the regular generator kept for verification."""
+    """Keys of all primitives."""
 
     element_size: Annotated[Length, Positive]
-    """Edge of a tet, about; not above the smallest extent of the body, and a quarter of the thickness where it bends:
-    with 4 tets through it the averaged forms are 13 % too stiff, with 2 50 %, ``standard`` is 26 and 100 %."""
+    """Edge length of the tets, approximately. At most the smallest extent of the body. Use a quarter of the
+    thickness or less where a body bends: with 4 tets through the thickness ``nodal`` and ``split`` are 13 % too
+    stiff, with 2 tets 50 % (``standard``: 26 and 100 %). The time step is proportional to it, the number of tets to
+    its third power."""
     generator: Literal["gmsh", "structured"] = "gmsh"
-    """``gmsh`` makes unstructured meshes; ``structured`` cuts the cells of a regular grid into tets, but
-    for spheres."""
+    """Mesh generator. ``gmsh``: unstructured, for all shapes. ``structured``: cells of a regular grid, each cut into
+    tets; for box, plate, cylinder and tube, for verification and for ``slit``."""
     split: Literal[5, 6] = 6
-    """Tets per hexahedron of the structured generator."""
+    """With ``generator = "structured"``: tets per hexahedral cell."""
     sector: Literal["full", "half", "quarter"] = "full"
-    """Which part of the body is modelled: the positive side of its centre (of a box: of the origin) in the first, or
-    both, of the two directions across ``axis`` (in cyclic order: x, y for z; y, z for x; z, x for y)."""
+    """Modelled part of the body, for scenes with planes of symmetry. ``half``: the positive side of its centre (box:
+    of the origin) in the first direction across ``axis``; ``quarter``: in both. The directions across ``axis`` in
+    cyclic order are x, y for z; y, z for x; z, x for y. Each plane also needs a boundary ``symmetry``."""
     grading: Grading | None = None
-    """Coarser tets away from a place, with ``generator = "gmsh"``."""
+    """Coarser tets away from a region of interest, with ``generator = "gmsh"``."""
 
 
 class Slit(Model):
-    """A crack that is there from the start: a rectangle across ``axis`` at ``at``, on planes of nodes of the structured
-    generator. It ends at those of its borders that lie inside the body.
+    """An initial crack: a rectangle normal to ``axis``, on a plane of nodes of the structured generator. A border of
+    the rectangle inside the body is a crack front.
 
     ``low`` and ``high`` are its corners in the two directions across ``axis`` (x, y for z; y, z for x; z, x for y).
     """
 
     axis: Axis
-    """The normal of the rectangle."""
+    """Normal of the rectangle."""
     at: Length
-    """Where its plane cuts the axis: on a plane of nodes inside the body."""
+    """Coordinate of the rectangle along ``axis``: a plane of nodes inside the body."""
     low: tuple[Length, Length]
-    """Lowest corner."""
+    """Corner with the lowest coordinates."""
     high: tuple[Length, Length]
-    """Highest corner."""
+    """Corner with the highest coordinates."""
 
 
 class Box(BoxForm, Primitive):
-    """A rectangular block between two corners. The sector is cut at the origin of the coordinates."""
+    """A rectangular block between two corners. A sector is cut at the origin of the coordinates."""
 
     axis: Axis = "z"
-    """The direction across which a sector is cut."""
+    """Direction across which a sector is cut."""
     slit: Slit | None = None
-    """A crack that is there from the start, with ``generator = "structured"``."""
+    """An initial crack, with ``generator = "structured"``."""
 
 
 class Symmetric(Primitive):
-    """What bodies have in common that are symmetric about the planes at which sectors are cut."""
+    """Keys of primitives that are symmetric about the planes of a sector."""
 
     aligned: bool | None = None
-    """Whether a half or a whole is meshed as quarters that have faces in common, with ``generator = "gmsh"``: the tets
-    at the axis are those of a quarter then, else up to twice as large. By default where the part erodes: the hole of a
-    rod is as deep in a whole as in a quarter (docs/theory/erosion.md)."""
+    """Whether a half or a full body is meshed as quarters with common faces, with ``generator = "gmsh"``: tets on
+    the axis are then as small as those of a quarter, otherwise up to twice as large. Default: ``true`` for parts
+    with ``erosion``, so that a rod penetrates equally deep in a full model and in a quarter
+    (docs/theory/erosion.md)."""
 
 
 class Plate(PlateForm, Symmetric):
-    """A rectangular plate: ``thickness`` along ``axis``, ``width`` x ``height`` across it, centred on ``base``'s axis.
+    """A rectangular plate: ``thickness`` along ``axis``, ``width`` and ``height`` across it.
 
-    ``base`` is the centre of the face from which the thickness is measured in the positive direction.
+    ``base`` is the centre of the face at the low end of ``axis``.
     """
 
     slit: Slit | None = None
-    """A crack that is there from the start, with ``generator = "structured"``."""
+    """An initial crack, with ``generator = "structured"``."""
 
 
 class Cylinder(CylinderForm, Symmetric):
-    """A solid cylinder; ``base`` is the centre of its lower end face."""
+    """A solid cylinder. ``base`` is the centre of the end face at the low end of ``axis``."""
 
 
 class Tube(TubeForm, Symmetric):
-    """A hollow cylinder."""
+    """A hollow cylinder. ``base`` is the centre of the end face at the low end of ``axis``."""
 
 
 class Sphere(SphereForm, Symmetric):
-    """A ball."""
+    """A solid sphere."""
 
 
 class Drawn(Primitive):
-    """A primitive that only gmsh meshes."""
+    """A primitive for which gmsh is the only mesh generator."""
 
     generator: Literal["gmsh"] = "gmsh"
-    """gmsh alone makes these."""
+    """Mesh generator; gmsh is the only one for this shape."""
 
 
 class Cone(ConeForm, Drawn):
-    """A cone or a frustum of one: ``radius`` at ``base``, ``top_radius`` at the high end of ``axis``."""
+    """A cone or a truncated cone: ``radius`` at ``base``, ``top_radius`` at the high end of ``axis``."""
 
 
 class Ogive(OgiveForm, Drawn):
-    """A shank with an ogive on it, as bullets and projectiles have: the outline of the nose is an arc of a circle.
+    """A projectile: a cylindrical shank with an ogival nose, whose outline is an arc of a circle.
 
-    The nose is a tangent ogive, whose arc goes on smoothly from the shank, of the length D sqrt(crh - 1/4) for the
-    diameter D, where one of ``crh`` and ``nose`` is given; a secant ogive, which has an edge there, where both are.
+    With one of ``crh`` and ``nose`` given, the nose is a tangent ogive: its arc continues the shank smoothly, and
+    its length is D sqrt(crh - 1/4), D the diameter. With both given it is a secant ogive, with an edge at the shank.
     """
 
 
 class Hemisphere(HemisphereForm, Drawn):
-    """Half of a ball."""
+    """Half of a sphere."""
 
 
 class SphericalCap(SphericalCapForm, Drawn):
-    """What a plane cuts off a ball."""
+    """A segment of a sphere, cut off by a plane."""
 
 
 class RingSector(RingSectorForm, Drawn):
-    """A piece of a tube between two half-planes through its axis; of a solid cylinder with ``inner_radius = 0``."""
+    """A segment of a tube between two half-planes through its axis; a segment of a cylinder with ``inner_radius =
+    0``."""
 
 
 class Loose(Primitive):
-    """Tets of edge ``element_size``, put one by one: there are no sectors, and one generator."""
+    """Single tets of edge ``element_size``: without sectors, grading and choice of the generator."""
 
     generator: Literal["structured"] = "structured"
-    """Of no meaning here."""
+    """Has no effect on this shape."""
     sector: Literal["full"] = "full"
-    """There are none here."""
+    """Always the full body."""
     grading: None = None
-    """There is none here."""
+    """Not available for this shape."""
 
 
 class TwoTets(Loose):
-    """Two tets with a common face, whose centre is ``centre`` and whose normal is ``axis``; one corner of the face lies
-    in the first direction across ``axis``. The line through their free corners and the centre leans that way, too."""
+    """Two tets with a common face, for verification. ``centre`` is the centre of the face, ``axis`` its normal; one
+    corner of the face lies in the first direction across ``axis``. With ``lean`` the line from the centre to the
+    free corners is inclined in that direction."""
 
     shape: Literal["two_tets"]
-    """The kind of body."""
+    """Selects this shape."""
     centre: Point = (0.0, 0.0, 0.0)
-    """Of the common face."""
+    """Centre of the common face."""
     axis: Axis = "z"
     """Normal of the common face."""
     lean: Annotated[Angle, Field(ge=0, le=1.1)] = 0.0
-    """``"30 deg"``: the tets keep their altitude, and are regular when they do not lean."""
+    """Inclination of the tets, such as ``"30 deg"``. Their altitude stays the same; at 0 they are regular."""
 
 
 class Shards(Loose):
-    """Tets that are not connected with each other: ``count`` of them along x, y, z from the corner ``base``, each in a
-    cube of its own and turned at random."""
+    """Separate tets, for verification: ``count`` of them along x, y, z from the corner ``base``, each in a cube of
+    its own and in a random orientation."""
 
     shape: Literal["shards"]
-    """The kind of body."""
+    """Selects this shape."""
     base: Point = (0.0, 0.0, 0.0)
-    """Corner with the lowest coordinates."""
+    """Corner of the group with the lowest coordinates."""
     count: tuple[Edge, Edge, Edge]
-    """Tets along x, y, z."""
+    """Number of tets along x, y, z."""
     gap: Annotated[Length, Field(ge=0)] = 0.0
-    """Smallest distance of neighbours, however they are turned."""
+    """Smallest distance between neighbouring tets in any orientation."""
     perturbation: Annotated[Ratio, Field(ge=0, le=0.15)] = 0.0
-    """How far each coordinate of a node is moved at most, at random, of the edge."""
+    """Largest random displacement of each coordinate of a node, over the edge length."""
     seed: Annotated[Count, Field(ge=0, lt=2**63)] = 0
-    """Another one turns and moves the tets otherwise."""
+    """Seed of the random orientations and displacements."""
 
     @property
     def axis(self) -> Axis:
-        """Of no meaning here; every body has one."""
+        """A direction, as every body has one; it has no effect."""
         return "z"
 
 
 class MeshFile(Measured):
-    """A mesh made elsewhere: gmsh .msh 4.1 or 2.2, Abaqus .inp, LS-DYNA .k, .key or .dyn, Radioss .rad, VTK
-    .vtu. ``unit`` is the length unit of its coordinates.
+    """A tet mesh from a file: gmsh .msh 4.1 or 2.2, Abaqus .inp, LS-DYNA .k, .key or .dyn, Radioss .rad, VTK .vtu.
+    docs/howto/meshes.md describes which elements and sets are read.
     """
 
     shape: Literal["file"]
-    """The kind of body."""
+    """Selects a mesh file."""
     path: str
-    """Of the file; a relative one begins in the folder of the case. Commands that hand the case to a server send the
-    file with it: there the path is a name, and ``sha256`` says which file is meant (docs/howto/meshes.md)."""
+    """Path of the file, relative to the folder of the case. Commands that submit the case to a server send the file
+    too; ``sha256`` identifies it there (docs/howto/meshes.md)."""
     unit: Annotated[Length, Positive]
-    """Length of 1 in the file: ``"1 mm"``."""
+    """Length unit of the coordinates in the file, such as ``"1 mm"``."""
     group: str | None = None
-    """Of elements: a physical group of gmsh by its name or number; of Abaqus an element set, ``Bar-1.Set-1`` (a set of
-    an instance or a part), an instance or a part; of LS-DYNA and Radioss a part, a set or a subset. All when absent.
-    docs/howto/meshes.md has what is read of a file."""
+    """Group of elements that is the part; all elements when absent. gmsh: a physical group by name or number.
+    Abaqus: an element set (``Bar-1.Set-1`` for a set of an instance or a part), an instance or a part. LS-DYNA and
+    Radioss: a part, a set or a subset."""
     second_order: Literal["auto", "corners", "eight"] = "auto"
-    """Tets of 10 nodes as the tets of their 4 corners, or as eight tets of 4 nodes each. ``auto`` is ``eight`` where
-    the corners alone would lose more than a thousandth of the volume, else ``corners``; a warning says which."""
+    """Treatment of tets with 10 nodes. ``corners``: one tet of its 4 corners. ``eight``: eight tets of 4 nodes.
+    ``auto``: ``eight`` where the corners alone would lose more than 0.1 % of the volume, otherwise ``corners``; a
+    warning reports the choice."""
     sha256: Sha256 | None = None
-    """Of the file, 64 hexadecimal digits; a file with another one is refused. Commands that send the file fill it in;
-    a server needs it. Not checked when absent."""
+    """SHA-256 hash of the file, 64 hexadecimal digits. A file with another hash is refused. Commands that send the
+    file add the key; a server requires it. Default: not checked."""
 
 
 Mesh = Annotated[

@@ -1,4 +1,4 @@
-"""What holds or drives nodes: symmetry planes, walls, prescribed motion, gravity, tractions."""
+"""The models of boundaries: planes of symmetry, walls, prescribed motion, gravity, tractions."""
 
 from typing import Annotated, Literal
 
@@ -9,126 +9,130 @@ from .motion import Spin
 from .tables import Axis, Direction, Model, Name, Point, SetName, Velocity
 
 Course = tuple[tuple[Time, Ratio], ...]
-"""Times and factors, in this order."""
+"""Pairs of a time and a factor."""
 
 
 class Symmetry(Model):
-    """Nodes that start on the plane ``axis = at`` stay on it. What flies at it meets its mirror image there: no node
-    passes the plane, and none sticks to it. Nodes without tets do not meet each other: they are reflected, and nothing
-    holds them on the plane. No friction. All parts when ``parts`` is empty. No crack opens in the plane
-    itself, as the one below a blow in the middle of a plate would: half of a body that fractures is not the whole.
+    """A plane of symmetry ``axis = at``, without friction. Nodes that start on the plane stay on it; nodes that move
+    towards it are in contact with their mirror image. No node passes the plane. Free nodes (without tets) are
+    reflected by it. A crack cannot open in the plane itself: half of a body that fractures in its middle is not
+    equivalent to the full body.
     """
 
     kind: Literal["symmetry"]
-    """The kind of boundary."""
+    """Selects this boundary."""
     axis: Axis
-    """The normal of the plane."""
+    """Normal of the plane."""
     at: Length = 0.0
-    """Where the plane cuts the axis."""
+    """Coordinate of the plane along ``axis``."""
     parts: tuple[Name, ...] = ()
-    """Parts that it holds; all when empty."""
+    """Names of the parts to which it applies; all parts when empty."""
 
 
 class Wall(Model):
-    """A rigid surface that nodes cannot pass: a plane, a cylinder or a sphere; fixed, driven along a ``course``, or
-    free with a ``mass``. It does not turn, and what it stops does not limit the time step.
+    """A rigid wall that nodes cannot pass: a plane, a cylinder or a sphere; fixed, moving on a prescribed course, or
+    free with a ``mass``. It does not rotate, and does not limit the time step.
     """
 
     kind: Literal["wall"]
-    """The kind of boundary."""
+    """Selects this boundary."""
     name: Name = "wall"
-    """For messages; each wall has its own."""
+    """Name of the wall in messages and for probes. No two walls have the same name."""
     shape: Literal["plane", "cylinder", "sphere"] = "plane"
-    """Of its surface; a cylinder has no ends."""
+    """Surface of the wall. A cylinder is infinitely long."""
     point: Point
-    """At the start: any point of a plane, any point of the axis of a cylinder, the centre of a sphere."""
+    """Position at the start: any point of a plane, any point of the axis of a cylinder, centre of a sphere."""
     normal: Direction | None = None
-    """Of a plane: points out of the wall, to the side where bodies are; its length does not count."""
+    """With ``shape = "plane"``: normal, which points out of the wall to the side of the bodies. Its length has no
+    effect."""
     axis: Direction | None = None
-    """Of a cylinder: the direction of its axis; its length does not count."""
+    """With ``shape = "cylinder"``: direction of the axis. Its length has no effect."""
     radius: Annotated[Length, Field(gt=0)] | None = None
-    """Of a cylinder or a sphere."""
+    """With ``shape = "cylinder"`` or ``"sphere"``: radius."""
     side: Literal["outside", "inside"] = "outside"
-    """Of a cylinder or a sphere: where bodies are, round it or in it."""
+    """With ``shape = "cylinder"`` or ``"sphere"``: whether the bodies are outside or inside of the surface."""
     velocity: Velocity = (0.0, 0.0, 0.0)
-    """How it moves: all the time where it has no ``mass``, and then what it does is work from outside; at the start
-    where it has one."""
+    """Velocity of the wall. Without ``mass`` it is prescribed during the whole run, and its work is external work;
+    with ``mass`` it is the initial velocity."""
     course: Course = ()
-    """Pairs of a time and a factor of the velocity, as of a prescribed velocity; not with ``mass``."""
+    """Factor of ``velocity`` over time, as pairs of time and factor (see ``kind = "velocity"``). Not with ``mass``."""
     mass: Annotated[Mass, Field(gt=0)] | None = None
-    """With it the wall is free: it moves by the impulses that it gets, and only by these."""
+    """Mass of a free wall: only the impulses of the bodies change its velocity. Default: the velocity is prescribed."""
     parts: tuple[Name, ...] = ()
-    """Parts that it stops; all when empty."""
+    """Names of the parts that it stops; all parts when empty."""
     friction: Annotated[Ratio, Field(ge=0)] = 0.0
-    """Coulomb's coefficient."""
+    """Coulomb's coefficient of friction."""
 
     @property
     def plain(self) -> bool:
-        """Whether it is a plane that never moves."""
+        """Whether the wall is a fixed plane."""
         return self.shape == "plane" and self.mass is None and not any(self.velocity)
 
 
 class Prescribed(Model):
-    """Nodes that start inside the box ``low``..``high`` (all of the parts when absent) move with a given velocity.
-    Nodes no further outside of it than a hundredth of the shortest edge of their part are in.
+    """A prescribed velocity of the nodes that start in the box ``low`` to ``high``; of all nodes of the parts without a
+    box.
 
-    Only the components that are given are prescribed. Two boundaries may not prescribe one component of a node in two
-    ways. Walls do not hold nodes of which a component is prescribed.
+    Components that are absent are free. Two boundaries cannot prescribe different values for the same component of a
+    node. Walls do not stop nodes of which a component is prescribed. Nodes up to a hundredth of the shortest edge of
+    their part outside the box count as inside.
     """
 
     kind: Literal["velocity"]
-    """The kind of boundary."""
+    """Selects this boundary."""
     parts: tuple[Name, ...] = ()
-    """Parts that it moves; all when empty."""
+    """Names of the parts to which it applies; all parts when empty."""
     low: Point | None = None
-    """Lowest corner of the box; with ``high``."""
+    """Corner of the box with the lowest coordinates; together with ``high``."""
     high: Point | None = None
-    """Highest corner of the box; with ``low``."""
+    """Corner of the box with the highest coordinates; together with ``low``."""
     x: Speed | None = None
-    """Velocity along x; without it the nodes are free along x."""
+    """Velocity along x. Default: free."""
     y: Speed | None = None
-    """Velocity along y; without it the nodes are free along y."""
+    """Velocity along y. Default: free."""
     z: Speed | None = None
-    """Velocity along z; without it the nodes are free along z."""
+    """Velocity along z. Default: free."""
     on: SetName | None = None
-    """A set of nodes or a surface of the mesh file of its parts, by name (docs/howto/meshes.md): its nodes move so.
-    With a box those that are in both."""
+    """Name of a node set or a surface in the mesh file of the parts (docs/howto/meshes.md), instead of a box. With a
+    box: the nodes that are in both."""
     course: Course = ()
-    """Pairs of a time and a factor of the velocity: linear in between, constant before the first and after the last.
-    Without them the velocity is constant. ``[["0 us", 0], ["2 us", 1]]`` is a ramp."""
+    """Factor of the velocity over time, as pairs of time and factor, such as ``[["0 us", 0], ["2 us", 1]]`` for a
+    ramp: linear between the pairs, constant before the first and after the last. Default: constant velocity."""
 
 
 class Rotation(Model):
-    """All nodes of the parts turn rigidly, exactly, at the given spin; walls do not hold them."""
+    """A prescribed rigid rotation of all nodes of the parts at constant angular velocity. Walls do not stop these
+    nodes."""
 
     kind: Literal["rotation"]
-    """The kind of boundary."""
+    """Selects this boundary."""
     parts: tuple[Name, ...] = ()
-    """Parts that turn; all when empty."""
+    """Names of the parts that rotate; all parts when empty."""
     spin: Spin
-    """The line that they turn about, and how fast."""
+    """Axis of rotation and angular velocity."""
     on: SetName | None = None
-    """A set of nodes or a surface of the mesh file of its parts, by name (docs/howto/meshes.md): its nodes alone
-    turn."""
+    """Name of a node set or a surface in the mesh file of the parts (docs/howto/meshes.md): only its nodes are
+    prescribed."""
 
 
 class Gravity(Model):
-    """An acceleration of all nodes of the parts, of all parts when ``parts`` is empty."""
+    """A uniform acceleration of the parts."""
 
     kind: Literal["gravity"]
-    """The kind of boundary."""
+    """Selects this boundary."""
     acceleration: tuple[Acceleration, Acceleration, Acceleration]
-    """Along x, y, z; not zero."""
+    """Acceleration along x, y, z; not zero."""
     course: Course = ()
-    """Pairs of a time and a factor of the acceleration: linear in between, constant before the first and after the
-    last. Without them it is constant from the first moment on, and what stood free begins to bounce."""
+    """Factor of the acceleration over time, as pairs of time and factor (see ``kind = "velocity"``). Default:
+    constant from the start, which makes bodies at rest vibrate; a ramp avoids that."""
     parts: tuple[Name, ...] = ()
-    """Parts that it acts on; all when empty. Of a body that bonds of the kind ``shared`` make, all parts or none."""
+    """Names of the parts on which it acts; all parts when empty. Of a body that ``shared`` bonds join, either all
+    parts or none."""
 
 
 class Around(Model):
-    """What lies between two radii round a line, however far along it. With the ``radius`` of its hole it is the bore of
-    a tube, with its outer one as ``inner_radius`` the outside.
+    """The region between two radii around an infinite line. The bore of a tube: ``radius`` equal to that of the
+    bore; its outside: ``inner_radius`` equal to the outer radius, and a larger ``radius``.
     """
 
     base: Point = (0.0, 0.0, 0.0)
@@ -138,45 +142,46 @@ class Around(Model):
     inner_radius: Annotated[Length, Field(ge=0)] = 0.0
     """Smallest distance from the line."""
     radius: Annotated[Length, Field(gt=0)]
-    """Largest distance from the line; not below ``inner_radius``. Nodes that are no further outside of either than a
-    hundredth of the shortest edge of their part are in."""
+    """Largest distance from the line; not below ``inner_radius``. Nodes up to a hundredth of the shortest edge of
+    their part beyond either radius count as inside."""
 
 
 class Traction(Model):
-    """A force per area, Pa, on the exposed faces whose three nodes start inside the box ``low``..``high`` and the
-    ``cylinder`` (all of the parts when both are absent). By default it is per initial area and turns with nothing; a
-    pressure that ``follows`` acts on the surface as it is. A face has its load until erosion takes its tet, or, of a
-    pressure that ``follows``, until its tet has come off alone, all four faces of it being surface; faces that come to
-    the surface later have none. Nodes no further outside than a hundredth of the shortest edge of their part are in.
-    Either ``stress`` or ``pressure`` is given. ``conoid validate`` says about how large the faces are together; a run
-    whose faces are not warns.
+    """A distributed load on the free faces whose three nodes start in the region (box, cylinder and set; the whole
+    surface of the parts without a region). Either ``stress`` or ``pressure`` is given.
+
+    The load is a force per initial area with a constant direction; a pressure that ``follows`` acts on the deformed
+    surface. A face is loaded until its tet is deleted; with ``follows`` also until its tet has separated from all
+    others. Faces that become free later are not loaded. Nodes up to a hundredth of the shortest edge of their part
+    outside the region count as inside. ``conoid validate`` prints the approximate loaded area; the run warns where
+    the mesh has another one.
     """
 
     kind: Literal["traction"]
-    """The kind of boundary."""
+    """Selects this boundary."""
     stress: tuple[Stress, Stress, Stress] | None = None
     """Force per area along x, y, z; not zero."""
     pressure: Stress | None = None
-    """Force per area against the outward normal of each face; not zero. Of the initial area and normal, but for a
-    pressure that ``follows``."""
+    """Force per area against the outward normal of each face; not zero. Area and normal are the initial ones, except
+    with ``follows``."""
     follows: bool = False
-    """Whether ``pressure`` follows the surface: it acts on the present area of each face, against its present normal,
-    as that of a gas or a liquid does. Its work is that of the forces along the way of the nodes. On a closed surface it
-    is no force and no moment in sum, but for rounding."""
+    """Whether ``pressure`` acts on the current area of each face, against its current normal, as a gas or a liquid
+    does. On a closed surface its resultant force and moment are zero up to rounding."""
     course: Course = ()
-    """Pairs of a time and a factor of the force: linear in between, constant before the first and after the last.
-    Without them the force is constant from the first moment on."""
+    """Factor of the load over time, as pairs of time and factor (see ``kind = "velocity"``). Default: constant from
+    the start."""
     parts: tuple[Name, ...] = ()
-    """Parts that it acts on; all when empty."""
+    """Names of the parts on which it acts; all parts when empty."""
     low: Point | None = None
-    """Lowest corner of the box; with ``high``."""
+    """Corner of the box with the lowest coordinates; together with ``high``."""
     high: Point | None = None
-    """Highest corner of the box; with ``low``."""
+    """Corner of the box with the highest coordinates; together with ``low``."""
     cylinder: Around | None = None
-    """``{ axis = "z", radius = "5 mm" }`` is the bore of a tube with this inner radius; with a box, what is in both."""
+    """Region around a line: ``{ axis = "z", radius = "5 mm" }`` is the bore of a tube with this inner radius. With a
+    box: the faces that are in both."""
     on: SetName | None = None
-    """A surface of the mesh file of its parts, by name (docs/howto/meshes.md), or a set of nodes: the exposed faces all
-    of whose nodes are in it. With a box or a cylinder what is in both."""
+    """Name of a surface or a node set in the mesh file of the parts (docs/howto/meshes.md): the free faces of which
+    all nodes are in it. With a box or a cylinder: the faces that are in both."""
 
 
 Boundary = Annotated[Symmetry | Wall | Prescribed | Rotation | Gravity | Traction, Field(discriminator="kind")]

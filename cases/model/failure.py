@@ -1,4 +1,4 @@
-"""How a part fails: tets that leave it, facets that break."""
+"""The models of failure: deletion of tets (erosion), and fracture of facets."""
 
 from typing import Annotated, Literal
 
@@ -9,51 +9,57 @@ from .tables import Model, Positive
 
 
 class Erosion(Model):
-    """Tets that are worn out leave the body: what lay behind them is laid bare, and meets other bodies from then on.
+    """Erosion: tets that exceed a limit are deleted, and the surface behind them comes into contact. Not together with
+    ``fracture``.
 
-    A tet leaves when any of these is passed, one that has only strained enough within ten steps. Its elastic energy is
-    booked as eroded. A part that erodes cannot fracture.
+    A tet is deleted when it exceeds any of the limits: within ten time steps for strain and damage, at once for the
+    others. Its elastic energy is booked as eroded.
     """
 
     plastic_strain: Annotated[Ratio, Positive] | None = None
-    """Largest effective plastic strain; none by default."""
+    """Largest effective plastic strain. Default: no limit."""
     damage: Annotated[Ratio, Field(gt=0, le=1)] | None = None
-    """Damage, of a law that counts it, at which a tet leaves: 1 for Johnson and Cook's; none by default."""
+    """Largest damage; needs a law with damage (Johnson-Cook: 1 is complete damage). Default: no limit."""
     volume: tuple[Annotated[Ratio, Field(gt=0, lt=1)], Annotated[Ratio, Field(gt=1)]] = (0.1, 10.0)
-    """Smallest and largest volume, of the initial one."""
+    """Smallest and largest volume of a tet over its initial volume."""
     time_step: Annotated[Ratio, Field(gt=0, lt=1)] = 0.02
-    """Smallest stable step of a tet, of the first step of the run."""
+    """Smallest stable time step of a tet over the first time step of the run. Larger values make the run cheaper and
+    delete more."""
     nodes: Literal["strike", "particles", "remove"] = "strike"
-    """What becomes of a node without tets, a particle with its mass and no volume. ``strike``: it flies on and leaves
-    after contact with a face has pushed it. ``particles``: it flies on for ever; many of them gather on a line and dig
-    a hole there that matter with a volume would not dig. ``remove``: it leaves at once. Mass, momentum and energy of
-    what leaves are booked."""
+    """Treatment of free nodes, which have lost all tets and are particles with mass and without volume. ``strike``:
+    a free node moves on, and is deleted after a face has pushed it. ``particles``: it is never deleted; many of them
+    can gather on a line and dig a hole that real material would not dig. ``remove``: it is deleted at once. Mass,
+    momentum and energy of deleted nodes are booked."""
 
 
 class Fracture(Model):
-    """Facets between tets break, nodes separate, and the pieces meet each other. The material must be ``brittle``; a
-    part that fractures cannot erode.
+    """Fracture: facets between tets break, nodes separate, and the fragments are in contact with each other. Needs
+    ``brittle`` in the material; not together with ``erosion``.
     """
 
     model: Literal["instant", "cohesive"] = "instant"
-    """``instant``: a facet that breaks carries nothing from then on (the paper). ``cohesive``: its traction falls
-    linearly with the opening and takes the fracture energy with it (Camacho and Ortiz 1996)."""
+    """Behaviour of a broken facet. ``instant``: it carries no traction. ``cohesive``: its traction falls linearly
+    with the opening and absorbs the fracture energy (Camacho and Ortiz 1996)."""
     shear_weight: Annotated[Ratio, Field(ge=0)] | None = None
-    """beta_tau of sqrt(<t_n>^2 + beta_tau t_s^2): 0 for ``instant`` (the paper: largest normal traction), 1 for
-    ``cohesive`` by default, where it must be above 0. At 1 a facet breaks by shear alone at its strength: what is
-    compressed across the crack, as a disc between platens, breaks early unless ``friction`` holds it."""
+    """Weight beta_tau of the shear traction in the effective traction ``sqrt(<t_n>^2 + beta_tau t_s^2)``, which is
+    compared with the strength. Default: 0 (largest normal traction) for ``instant``, 1 for ``cohesive``, which needs
+    a value above 0. With 1, shear alone breaks a facet at the tensile strength: material that is compressed across
+    the crack, such as a disc between platens, breaks early unless ``friction`` prevents it."""
     friction: Annotated[Ratio, Field(ge=0)] = 0.0
-    """Internal friction: under a pressure |t_n| a facet breaks by t_s - friction * |t_n|."""
+    """Coefficient of internal friction: under a compressive traction |t_n| the shear traction is reduced by
+    ``friction * |t_n|``."""
     traction: Literal["tets", "nodes"] = "tets"
-    """On a facet, from the stress of its two tets; or besides from that of its three nodes, each the mean of the tets
-    round it by volume, and the facet must pass by both: smoother."""
+    """Traction of a facet. ``tets``: from the stress of its two tets. ``nodes``: also from the stress of its three
+    nodes, each a volume-weighted mean over the tets around it; both must exceed the strength. Smoother."""
     delay: Annotated[Ratio, Field(ge=0)] = 1.0
-    """t_c = delay * density * c * energy / strength^2 of the delayed criterion. The paper prints 0.5, its own equations
-    give 1; 0 breaks a facet in the step in which it passes the strength."""
+    """Factor of the delay ``t_c = delay * density * c * energy / strength^2`` during which a facet must be
+    overstressed. 0: it breaks in the step in which it exceeds the strength. The published criterion is printed with
+    0.5; its own equations give 1."""
     order: Literal["simultaneous", "local_maximum"] = "simultaneous"
-    """Which of the facets that pass break in a step: all, or of those that share a node only the one that is furthest
-    beyond its strength."""
+    """Facets that break in one time step. ``simultaneous``: all that fulfil the criterion. ``local_maximum``: of
+    facets with a common node only the one with the largest overstress."""
     resolve: Literal["none", "strength"] = "none"
-    """``strength`` lowers the strength until ``resolution`` elements fit in the cohesive zone, with the same energy."""
+    """Adaptation to the mesh. ``strength``: reduce the strength until ``resolution`` elements fit in the cohesive
+    zone, at the same fracture energy."""
     resolution: Annotated[Ratio, Positive] = 3.0
-    """Elements that shall fit in the cohesive zone, with ``resolve = "strength"``."""
+    """With ``resolve = "strength"``: number of elements in the cohesive zone."""

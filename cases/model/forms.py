@@ -1,4 +1,4 @@
-"""The forms that bodies have, without their meshes: what a mesh primitive and an operand of a combination share."""
+"""The shapes of bodies without their meshes: common to mesh primitives and to operands of combinations."""
 
 from typing import Annotated, Literal
 
@@ -12,130 +12,133 @@ class BoxForm(Model):
     """A rectangular block between two corners."""
 
     shape: Literal["box"]
-    """The kind of body."""
+    """Selects this shape."""
     low: Point
-    """Lowest corner."""
+    """Corner with the lowest coordinates."""
     high: Point
-    """Highest corner, above ``low`` in every direction."""
+    """Corner with the highest coordinates; above ``low`` in every direction."""
 
 
 class PlateForm(Model):
-    """A rectangular plate: ``thickness`` along ``axis``, ``width`` x ``height`` across it, centred on its axis."""
+    """A rectangular plate: ``thickness`` along ``axis``, ``width`` and ``height`` across it."""
 
     shape: Literal["plate"]
-    """The kind of body."""
+    """Selects this shape."""
     base: Point = (0.0, 0.0, 0.0)
-    """Centre of the face at the low end of ``axis``: the plate lies between it and ``base`` plus ``thickness``."""
+    """Centre of the face at the low end of ``axis``; the plate extends from it by ``thickness``."""
     axis: Axis = "z"
     """Direction of the thickness."""
     width: Annotated[Length, Positive]
-    """Extent in the first direction across ``axis``, half of it to each side: x for z, y for x, z for y."""
+    """Extent in the first direction across ``axis`` (x for z, y for x, z for y), half of it to each side of
+    ``base``."""
     height: Annotated[Length, Positive]
-    """Extent in the second direction across ``axis``: y for z, z for x, x for y."""
+    """Extent in the second direction across ``axis`` (y for z, z for x, x for y), half of it to each side of
+    ``base``."""
     thickness: Annotated[Length, Positive]
     """Extent along ``axis``."""
 
 
 class CylinderForm(Model):
-    """A solid cylinder; ``base`` is the centre of its lower end face."""
+    """A solid cylinder. ``base`` is the centre of the end face at the low end of ``axis``."""
 
     shape: Literal["cylinder"]
-    """The kind of body."""
+    """Selects this shape."""
     base: Point = (0.0, 0.0, 0.0)
-    """Centre of the end face at the low end of ``axis``: the cylinder lies between it and ``base`` plus ``length``."""
+    """Centre of the end face at the low end of ``axis``; the cylinder extends from it by ``length``."""
     axis: Axis = "z"
     """Direction of the cylinder's axis."""
     radius: Annotated[Length, Positive]
-    """Of the cylinder."""
+    """Radius of the cylinder."""
     length: Annotated[Length, Positive]
-    """Extent along ``axis``."""
+    """Length of the cylinder, along ``axis``."""
 
 
 class TubeForm(Model):
     """A hollow cylinder."""
 
     shape: Literal["tube"]
-    """The kind of body."""
+    """Selects this shape."""
     base: Point = (0.0, 0.0, 0.0)
-    """Centre of the end face at the low end of ``axis``: the tube lies between it and ``base`` plus ``length``."""
+    """Centre of the end face at the low end of ``axis``; the tube extends from it by ``length``."""
     axis: Axis = "z"
     """Direction of the tube's axis."""
     inner_radius: Annotated[Length, Positive]
-    """Of the hole; below ``radius``."""
+    """Inner radius; below ``radius``."""
     radius: Annotated[Length, Positive]
-    """Of the outside."""
+    """Outer radius."""
     length: Annotated[Length, Positive]
-    """Extent along ``axis``."""
+    """Length of the tube, along ``axis``."""
 
 
 class SphereForm(Model):
-    """A ball."""
+    """A solid sphere."""
 
     shape: Literal["sphere"]
-    """The kind of body."""
+    """Selects this shape."""
     centre: Point = (0.0, 0.0, 0.0)
-    """Of the ball."""
+    """Centre of the sphere."""
     axis: Axis = "z"
-    """The direction across which a sector is cut."""
+    """Direction across which a sector is cut."""
     radius: Annotated[Length, Positive]
-    """Of the ball."""
+    """Radius of the sphere."""
 
 
 class ConeForm(Model):
-    """A cone or a frustum of one: ``radius`` at ``base``, ``top_radius`` at the high end of ``axis``."""
+    """A cone or a truncated cone: ``radius`` at ``base``, ``top_radius`` at the high end of ``axis``."""
 
     shape: Literal["cone"]
-    """The kind of body."""
+    """Selects this shape."""
     base: Point = (0.0, 0.0, 0.0)
-    """Centre of the end at the low end of ``axis``: the cone lies between it and ``base`` plus ``length``."""
+    """Centre of the end at the low end of ``axis``; the cone extends from it by ``length``."""
     axis: Axis = "z"
     """Direction of the cone's axis."""
     radius: Annotated[Length, Field(ge=0)]
-    """At ``base``; 0 where the tip is there."""
+    """Radius at ``base``; 0: the tip is there."""
     top_radius: Annotated[Length, Field(ge=0)] = 0.0
-    """At the high end of ``axis``; 0 where the tip is there. Not both are 0."""
+    """Radius at the high end of ``axis``; 0: the tip is there. Not both radii are 0."""
     length: Annotated[Length, Positive]
-    """Extent along ``axis``."""
+    """Height of the cone, along ``axis``."""
 
 
 class OgiveForm(Model):
-    """A shank with an ogive on it."""
+    """A projectile: a cylindrical shank with an ogival nose."""
 
     shape: Literal["ogive"]
-    """The kind of body."""
+    """Selects this shape."""
     base: Point = (0.0, 0.0, 0.0)
-    """Centre of the low end of ``axis``: of the rear face, or of the tip where ``pointing = "low"``."""
+    """Centre of the low end of ``axis``: of the rear face, or of the tip with ``pointing = "low"``."""
     axis: Axis = "z"
-    """Direction of the body's axis."""
+    """Direction of the projectile's axis."""
     pointing: Literal["high", "low"] = "high"
-    """At which end of ``axis`` the tip is."""
+    """End of ``axis`` to which the tip points."""
     radius: Annotated[Length, Positive]
-    """Of the shank: half of the calibre."""
+    """Radius of the shank, half of the calibre."""
     shank: Annotated[Length, Field(ge=0)] = 0.0
     """Length of the cylinder behind the nose."""
     crh: Annotated[Ratio, Field(ge=0.5, le=1000)] | None = None
-    """Calibre radius head: the radius of the arc over the diameter, 2 ``radius``. At 0.5 a tangent ogive is a
-    hemisphere."""
+    """Calibre radius head: radius of the arc over the diameter. At 0.5 a tangent ogive is a hemisphere."""
     nose: Annotated[Length, Positive] | None = None
-    """Length of the nose to its sharp tip. At least one of ``crh`` and ``nose`` is needed; with both the ogive is
-    secant, and ``crh`` not below that of the tangent one, (nose / D)^2 + 1/4."""
+    """Length of the nose up to its sharp tip. At least one of ``crh`` and ``nose`` is required. With both, ``crh``
+    must be at least that of the tangent ogive, (nose / D)^2 + 1/4."""
     tip_radius: Annotated[Length, Field(ge=0)] = 0.0
-    """Of the ball that rounds the tip, tangent to the arc; which shortens the nose. 0 is a sharp tip, or a flat one."""
+    """Radius of a sphere that rounds the tip, tangent to the arc; it shortens the nose. 0: no rounding. Not together
+    with ``meplat``."""
     meplat: Annotated[Length, Field(ge=0)] = 0.0
-    """Diameter of the flat end that cuts off the tip; which shortens the nose. 0 is a sharp tip, or a round one."""
+    """Diameter of a flat face that cuts off the tip (meplat); it shortens the nose. 0: none. Not together with
+    ``tip_radius``."""
 
 
 class BallPiece(Model):
-    """What a plane cuts off a ball."""
+    """Keys of segments of a sphere."""
 
     base: Point = (0.0, 0.0, 0.0)
-    """Centre of the low end of ``axis``: of the flat face, or of the pole where ``pointing = "low"``."""
+    """Centre of the low end of ``axis``: of the flat face, or of the pole with ``pointing = "low"``."""
     axis: Axis = "z"
     """Normal of the flat face."""
     pointing: Literal["high", "low"] = "high"
-    """At which end of ``axis`` the pole is."""
+    """End of ``axis`` at which the pole is."""
     radius: Annotated[Length, Positive]
-    """Of the ball."""
+    """Radius of the sphere."""
 
     @property
     def rise(self) -> float:
@@ -144,19 +147,19 @@ class BallPiece(Model):
 
 
 class HemisphereForm(BallPiece):
-    """Half of a ball."""
+    """Half of a sphere."""
 
     shape: Literal["hemisphere"]
-    """The kind of body."""
+    """Selects this shape."""
 
 
 class SphericalCapForm(BallPiece):
-    """What a plane cuts off a ball."""
+    """A segment of a sphere, cut off by a plane."""
 
     shape: Literal["spherical_cap"]
-    """The kind of body."""
+    """Selects this shape."""
     height: Annotated[Length, Positive]
-    """Extent along ``axis``, below 2 ``radius``."""
+    """Extent along ``axis``; below 2 ``radius``."""
 
     @property
     def rise(self) -> float:
@@ -165,21 +168,22 @@ class SphericalCapForm(BallPiece):
 
 
 class RingSectorForm(Model):
-    """A piece of a tube between two half-planes through its axis."""
+    """A segment of a tube between two half-planes through its axis."""
 
     shape: Literal["ring_sector"]
-    """The kind of body."""
+    """Selects this shape."""
     base: Point = (0.0, 0.0, 0.0)
-    """A point of the axis at the low end of ``axis``: the body lies between it and ``base`` plus ``length``."""
+    """Point of the axis at the low end of ``axis``; the body extends from it by ``length``."""
     axis: Axis = "z"
     """Direction of the tube's axis."""
     inner_radius: Annotated[Length, Field(ge=0)] = 0.0
-    """Of the bore; below ``radius``."""
+    """Inner radius; below ``radius``. 0: a segment of a solid cylinder."""
     radius: Annotated[Length, Positive]
-    """Of the outside."""
+    """Outer radius."""
     length: Annotated[Length, Positive]
-    """Extent along ``axis``."""
+    """Length of the segment, along ``axis``."""
     start: Angle = 0.0
-    """Where it begins, from the first direction across ``axis`` (x for z, y for x, z for y) to the second."""
+    """Angle at which the segment starts, measured from the first direction across ``axis`` (x for z, y for x, z for
+    y) to the second."""
     angle: Annotated[Angle, Field(gt=0, lt=6.283185307179586)]
-    """From its beginning to its end, below a whole turn: ``"60 deg"``."""
+    """Angle from the start to the end of the segment, below a full turn, such as ``"60 deg"``."""

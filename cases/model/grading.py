@@ -1,4 +1,4 @@
-"""Element sizes that grow with the distance from a place."""
+"""Graded meshes: the element size grows with the distance from a region of interest."""
 
 from typing import Annotated
 
@@ -9,23 +9,23 @@ from .tables import Axis, Model, Point, Positive
 
 
 class Grading(Model):
-    """Element size grows from ``element_size`` to ``far_size`` with the distance from a point, an axis line, or a
-    sphere or cylinder round one of them.
+    """A graded mesh: ``element_size`` up to the distance ``near``, ``far_size`` from the distance ``far``, linear in
+    between.
 
-    Within ``near`` of the origin (or the line through it along ``axis``) the size is ``element_size``, beyond ``far``
-    it is ``far_size``, linear between. With ``radius`` distances are from the sphere (or cylinder) of that radius, on
-    either side of it.
+    Distances are measured from the point ``origin``; with ``axis`` from the line through it; with ``radius`` from
+    the surface of the sphere (with ``axis``: cylinder) around it, to both sides.
     """
 
     origin: Point = (0.0, 0.0, 0.0)
-    """Where distances begin."""
+    """Point from which distances are measured."""
     axis: Axis | None = None
-    """Distances are from the line along it through ``origin``; without it from the point."""
+    """Direction of a line through ``origin`` from which distances are measured instead."""
     radius: Annotated[Length, Field(ge=0)] = 0.0
-    """Of the sphere, or cylinder, from which distances are measured: 0 is the point, or the line."""
+    """Radius of a sphere, or with ``axis`` of a cylinder, from whose surface distances are measured. 0: the point or
+    line itself."""
     near: Annotated[Length, Field(ge=0)]
-    """Up to this distance the size is ``element_size``; below ``far``."""
+    """Distance up to which the size is ``element_size``; below ``far``."""
     far: Annotated[Length, Positive]
-    """From this distance on the size is ``far_size``."""
+    """Distance from which the size is ``far_size``."""
     far_size: Annotated[Length, Positive]
-    """Not below ``element_size``."""
+    """Element size at a distance of ``far`` and more; not below ``element_size``."""

@@ -1,4 +1,4 @@
-"""Bodies of several parts: those that bonds by shared nodes hold together."""
+"""Bodies of several parts, joined by bonds with shared nodes."""
 
 from typing import Any, Protocol
 
@@ -6,23 +6,23 @@ from .bonds import Bonded, SharedBond
 
 
 class Joined(Protocol):
-    """What of a case says which bodies its parts make."""
+    """The keys of a case that determine which parts form one body."""
 
     @property
     def parts(self) -> tuple[Any, ...]:
-        """Its parts (schema.Part)."""
+        """Parts of the case (schema.Part)."""
 
     @property
     def bond(self) -> tuple[Bonded, ...]:
-        """Its bonds."""
+        """Bonds of the case."""
 
     @property
     def self_contact(self) -> tuple[str, ...]:
-        """The names of the parts that may meet themselves."""
+        """Names of the parts with self-contact."""
 
 
 def shared_bonds(case: Joined) -> list[tuple[int, SharedBond, int, int]]:
-    """The bonds by shared nodes: the place of each in ``bond``, and the numbers of its parts, the lower one first."""
+    """The bonds by shared nodes: index of each in ``bond``, and indices of its parts, the lower one first."""
     numbers = {part.name: i for i, part in enumerate(case.parts)}
     found = [(k, bond, sorted(numbers[name] for name in bond.parts)) for k, bond in enumerate(case.bond)
              if isinstance(bond, SharedBond)]  # fmt: skip
@@ -30,7 +30,7 @@ def shared_bonds(case: Joined) -> list[tuple[int, SharedBond, int, int]]:
 
 
 def bodies(case: Joined) -> list[int]:
-    """(parts,) the body of each part: the lowest number of the parts that shared nodes hold together with it."""
+    """(parts,) body of each part: the lowest index of the parts that shared nodes join to it."""
     of = list(range(len(case.parts)))
     for _, _, i, j in shared_bonds(case):
         low, high = sorted((of[i], of[j]))
@@ -39,7 +39,7 @@ def bodies(case: Joined) -> list[int]:
 
 
 def breakable(case: Joined) -> list[bool]:
-    """(parts,) whether facets of the body of each part may break: those of one of its parts, or a bond between two."""
+    """(parts,) whether facets of the body of each part can break: those of one of its parts, or a bond between two."""
     of = bodies(case)
     some = {of[i] for i, part in enumerate(case.parts) if part.fracture is not None}
     some |= {of[i] for _, bond, i, _ in shared_bonds(case) if bond.breaks}
@@ -47,14 +47,14 @@ def breakable(case: Joined) -> list[bool]:
 
 
 def cohesive(case: Joined) -> set[int]:
-    """The parts that may have cohesive facets: of their own, or of a bond."""
+    """Indices of the parts that can have cohesive facets, of their own or of a bond."""
     own = {i for i, part in enumerate(case.parts) if part.fracture is not None and part.fracture.model == "cohesive"}
     return own.union(*({i, j} for _, bond, i, j in shared_bonds(case) if bond.cohesive))
 
 
 def meeting(case: Joined) -> list[bool]:
-    """(parts,) whether the parts of the body of each may meet each other: where it may break, or one of them may meet
-    itself. The parts of one body that cannot come apart do not meet.
+    """(parts,) whether parts of the same body can be in contact with each other: where the body can break, or one of
+    its parts has self-contact. Parts of one body that cannot separate are not in contact.
     """
     of, names = bodies(case), set(case.self_contact)
     some = {of[i] for i, part in enumerate(case.parts) if part.name in names}

@@ -1,4 +1,5 @@
-"""What bodies are made of: density, elasticity, strength, equation of state, fracture. Constants in SI once read."""
+"""The models of materials: density, elasticity, strength, equation of state, fracture. All constants are in SI units
+once read."""
 
 from typing import Annotated, Literal
 
@@ -18,7 +19,7 @@ __all__ = [
 
 
 class Elastic(Model):
-    """Isotropic elasticity: Young's modulus, Pa, and Poisson's ratio."""
+    """Isotropic elasticity."""
 
     young: Annotated[Stress, Positive]
     """Young's modulus."""
@@ -40,66 +41,69 @@ Strength = Annotated[LinearHardening | JohnsonCook | MohrCoulomb | JohnsonHolmqu
 
 
 class MieGruneisen(Model):
-    """Mie-Grueneisen equation of state on the Hugoniot U_s = c0 + S u_p."""
+    """Mie-Grüneisen equation of state, with the Hugoniot U_s = c0 + S u_p as reference curve."""
 
     model: Literal["mie_gruneisen"]
-    """The equation."""
+    """Selects this equation of state."""
     c0: Annotated[Speed, Positive]
-    """Bulk speed of sound."""
+    """Bulk sound speed: U_s at u_p = 0."""
     S: Annotated[Ratio, Field(ge=0)]
-    """Slope of the Hugoniot."""
+    """Slope of the Hugoniot, dU_s/du_p."""
     gamma0: Annotated[Ratio, Field(ge=0)]
-    """Grüneisen's coefficient."""
+    """Grüneisen coefficient."""
 
 
 class Scatter(Model):
-    """Weibull's scatter of the strength over facets of area A: ``minimum + (strength - minimum) *
-    (-ln(1 - r) * area / A)^(1 / modulus)``, r from a hash of ``seed`` and the facet's global id.
+    """Weibull scatter of the tensile strength. A facet of area A has the strength ``minimum + (strength - minimum) *
+    (-ln(1 - r) * area / A)^(1 / modulus)``, with r in [0, 1) from a hash of ``seed`` and the facet's global id:
+    every run has the same strengths.
     """
 
     modulus: Annotated[Ratio, Positive]
-    """Weibull's modulus: a larger one scatters less."""
+    """Weibull modulus: the larger, the less scatter."""
     area: Annotated[Area, Positive] | None = None
-    """Of the specimens that ``strength`` was measured with; without it every facet counts alike, whatever its area."""
+    """Area of the specimens on which ``strength`` was measured. Default: no size effect, area / A = 1."""
     minimum: Annotated[Stress, Field(ge=0)] = 0.0
-    """Strength that every facet has."""
+    """Smallest strength of a facet."""
     seed: Annotated[Count, Field(ge=0)] = 0
-    """Another one gives other facets the weak places."""
+    """Seed: another one distributes the weak facets differently."""
 
 
 class Brittle(Model):
-    """What breaks facets between tets: tensile strength, Pa, and fracture energy G_c, J/m^2, of the crack. Without
-    ``strength`` the material breaks in tension alone and bears any compression."""
+    """Fracture of facets between tets. Without ``strength`` (a law of plastic flow) in the same material it can
+    break in tension only, and resists any compression."""
 
     strength: Annotated[Stress, Positive]
-    """Tensile strength: the traction at which a facet breaks."""
+    """Tensile strength: normal traction at which a facet breaks."""
     energy: Annotated[FractureEnergy, Positive]
-    """Fracture energy G_c of the crack, per area of the crack."""
+    """Fracture energy G_c per area of crack."""
     scatter: Scatter | None = None
-    """Scatter of the strength from facet to facet; none by default."""
+    """Scatter of the strength between facets. Default: none."""
 
 
 class Material(Model):
-    """Density, kg/m^3; elasticity; strength (none: elastic); equation of state (none: linear, from the elasticity);
-    brittle (none: a part of it cannot fracture)."""
+    """A material: elasticity, and optionally strength (default: elastic only), equation of state (default: linear)
+    and fracture (default: cannot fracture)."""
 
     density: Annotated[Density, Positive]
-    """At the start."""
+    """Density at the start."""
     elastic: Elastic
     """Young's modulus and Poisson's ratio."""
     strength: Strength | None = None
-    """Where it stops being elastic; without it it never does. ``model`` says which law."""
+    """Law of the flow stress; ``model`` selects which. Default: none, the material stays elastic."""
     eos: MieGruneisen | None = None
-    """Pressure of compression and heat; without it linear, from the elasticity."""
+    """Equation of state. Default: pressure linear in the volume strain, with the bulk modulus of ``elastic``. Use it
+    above pressures of some percent of the bulk modulus. Not with ``johnson_holmquist``, which has its own."""
     spall: Annotated[Stress, Positive] | None = None
-    """Tension cut-off: no pressure is below minus this. Beyond it pores open, which take up the work, and they close
-    without resistance before anything is compressed again; without it tension of the pressure has no limit."""
+    """Spall strength: largest tensile pressure. Beyond it pores open, which absorb the work; they close again
+    without resistance before the material is compressed. Default: no limit. Not with ``johnson_holmquist``, which
+    has its own."""
     brittle: Brittle | None = None
-    """What breaks facets; without it a part of this material cannot fracture."""
+    """Fracture of facets; needed by parts with ``fracture``. Default: the material cannot fracture."""
     description: str = ""
-    """For people, with the sources of the constants."""
+    """Description of the material, with the sources of its constants."""
 
     @property
     def bulk(self) -> float:
-        """Bulk modulus at rest, Pa: density c0^2 where there is an equation of state."""
+        """Bulk modulus at rest, Pa: density c0^2 with an equation of state."""
         return self.elastic.bulk if self.eos is None else self.density * self.eos.c0**2

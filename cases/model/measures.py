@@ -1,4 +1,4 @@
-"""What is measured of a run: probes, columns of history.csv; references, numbers that it is compared with."""
+"""The models of measurements: probes (columns of history.csv), and references (values with which a run is compared)."""
 
 from typing import Annotated, Literal
 
@@ -22,89 +22,91 @@ FRAGMENTS = ("fragment_velocity", "fragment_mass")
 BEYOND = ("residual_velocity", "residual_mass", *FRAGMENTS)
 """Fields of what lies beyond a plane."""
 SHAPES = ("penetration", "hole_diameter", "hole_width", "cone_angle")
-"""Fields that are lengths and angles of a body, round or along a line."""
+"""Fields that are lengths and angles of a body, around or along a line."""
 PUSHES = ("contact_force", "contact_impulse", "wall_force", "wall_impulse")
-"""Fields of what pushes a part, without their components."""
+"""Fields of forces and impulses on a part, without their components."""
 
 
 def kind(field: str) -> str:
-    """A field without its component: ``momentum`` of ``momentum_x``."""
+    """The field without its component: ``momentum`` of ``momentum_x``."""
     bare = field[:-2] if field[-2:] in ("_x", "_y", "_z") else field
     return bare if bare in (*SUMS, *PUSHES, "velocity") else field
 
 
 class Beyond(Model):
-    """One side of a plane that stands still, ``axis = at``."""
+    """One side of a fixed plane ``axis = at``."""
 
     axis: Axis
-    """The normal of the plane."""
+    """Normal of the plane."""
     at: Length = 0.0
-    """Where the plane cuts the axis."""
+    """Coordinate of the plane along ``axis``."""
     side: Literal["above", "below"] = "above"
-    """Which side: that of larger or of smaller coordinates."""
+    """Side of the plane: ``above`` for larger, ``below`` for smaller coordinates."""
 
 
 class Probe(Model):
-    """A column of history.csv: what ``field`` says of a part, or of what of it starts in a box.
+    """A probe: a column of history.csv with one field of a part, over the whole part or over the region in which its
+    nodes or tets start (box, set).
 
-    Means: Stresses, ``pressure``, ``mises``, ``plastic_strain``, ``damage``, ``temperature``, ``density``,
-    ``internal_energy`` (per mass, J/kg) and ``velocity`` are mass-weighted means over the tets of the part whose centre
-    starts in the box, or no further outside of it than a hundredth of the shortest edge of the part. Stresses are
-    positive in tension, pressure in compression.
+    **Means**, mass-weighted over the tets whose centre starts in the region: ``stress_*`` (tension positive),
+    ``pressure`` (compression positive), ``mises``, ``plastic_strain``, ``damage``, ``temperature``, ``density``,
+    ``internal_energy`` (J/kg), ``velocity_*``. Tets and nodes up to a hundredth of the shortest edge of the part
+    outside the box count as inside.
 
-    Pushes: ``contact_force`` is what other bodies push the whole part with, N, normal forces and friction, as a mean
-    since the line before; of one other part, ``by``, where that is given. ``wall_force`` is what a wall, or all walls,
-    push it with. ``contact_impulse`` and ``wall_impulse``, N s, are the same since the start. All hold the whole last
-    step of a run, of which its last velocities hold half.
+    **Forces** on the whole part: ``contact_force_*``, of all other bodies or of the part ``by``, normal forces and
+    friction, N, as a mean since the previous line; ``wall_force_*``, the same of walls. ``contact_impulse_*`` and
+    ``wall_impulse_*``, N s, are the integrals since the start. They include the whole last time step, of which the
+    velocities include half.
 
-    Sums over the nodes of the part that start in the box and are in the set ``on``, with the velocities of the line's
-    time: ``mass``, ``momentum``, ``kinetic_energy`` (the ledger's has products of two steps, and differs by the order
-    of the step squared), ``centre`` and ``centre_velocity``, position and velocity of the centre of mass. With
-    ``beyond`` only of nodes that are on that side of a plane at that time. Nodes without tets count until they
-    leave. Of a rigid part as a whole they are those of the body, with the inertia and the centre that it has; of some
-    of its nodes sums over these.
+    **Sums** over the nodes that start in the region, with ``beyond`` only those that are at present on that side of a
+    plane: ``mass``, ``momentum_*``, ``kinetic_energy`` (from the velocities at the time of the line; the energy ledger
+    uses products of two steps, which differ by the square of the time step), ``centre_*`` and ``centre_velocity_*``
+    (centre of mass). Free nodes count until they are deleted. Of a whole rigid part they are those of the body, with
+    its mass, centre and inertia.
 
-    Behind a target: ``residual_mass`` is the mass of the part ``beyond`` a plane, ``residual_velocity`` its mass-mean
-    velocity along the axis of the plane, positive away from it, and 0 where nothing is there. ``fragment_mass`` and
-    ``fragment_velocity`` are those of the heaviest fragment of the part whose centre is there: what holds together by
+    **Behind a target**: ``residual_mass`` is the mass of the part ``beyond`` a plane, ``residual_velocity`` its
+    mass-weighted mean velocity along the normal, positive away from the plane, 0 without mass. ``fragment_mass`` and
+    ``fragment_velocity`` are those of the heaviest fragment whose centre is beyond the plane; a fragment is joined by
     faces.
 
-    Shapes: ``penetration`` is as the reference of that name (below), along ``axis``. ``hole_width`` and
-    ``hole_diameter``, of the free opening of the part in the plane ``axis = at`` round the line through ``centre``:
-    twice the smallest distance from the line to matter, and the diameter of the circle that has the area which is seen
-    from the line; by 360 rays, those that met no matter at the start (behind planes of symmetry) left out; both are
-    wrong by about a tet, 0 while the line is in matter, and not a number where the opening reaches the edge of the
-    body. ``cone_angle``: the full angle of the cone that is broken out of a plate, without unit: 2 arctan((R - r) /
-    thickness). R and r are the radii of circles with the area that is damaged (more than half) or not joined to the
-    heaviest fragment of the part any more, at its face at the high and at the low end of ``axis``, as the plate
-    started; it is below zero where the wide end is the low one, and holds for one cone a plate.
+    **Shapes**: ``penetration``: depth along ``axis``, defined as the reference of that name (below). ``hole_width``
+    and ``hole_diameter``: free opening of the part in the plane ``axis = at`` around the line through ``centre``:
+    twice the smallest distance from the line to material, and the diameter of a circle with the area visible from
+    the line. Both use 360 rays, without those that met no material at the start (behind planes of symmetry); their
+    error is about a tet; 0 while material is on the line, not a number where the opening reaches the edge of the
+    body. ``cone_angle``: full angle of the cone broken out of a plate, 2 arctan((R - r) / thickness) in radians, R
+    and r the radii of circles with the area, at the faces of the plate at the high and the low end of ``axis``, that
+    is damaged by more than half or separated from the heaviest fragment; negative where the wide end is at the low
+    one; for one cone per plate.
     """
 
     name: Name
-    """Of the column, and for references; no column of every run, such as ``kinetic`` or ``dt``, has it."""
+    """Name of the column. Columns that every run has (such as ``kinetic`` or ``dt``) cannot be used."""
     part: Name
-    """What is measured."""
+    """Name of the part that is measured."""
     field: ProbeField
-    """What is measured of it."""
+    """The measured field; the groups of fields are described above."""
     wall: Name | None = None
-    """Of ``wall_force`` and ``wall_impulse``: the name of the wall; all walls when absent."""
+    """With ``wall_force_*`` and ``wall_impulse_*``: name of the wall; all walls when absent."""
     by: Name | None = None
-    """Of ``contact_force`` and ``contact_impulse``: the part that pushes; all other bodies when absent."""
+    """With ``contact_force_*`` and ``contact_impulse_*``: name of the part that pushes; all other bodies when
+    absent."""
     low: Point | None = None
-    """Lowest corner of the box; with ``high``. Of means and sums; without it, the whole part."""
+    """With means and sums: corner of the box with the lowest coordinates; together with ``high``. The whole part
+    when absent."""
     high: Point | None = None
-    """Highest corner of the box; with ``low``."""
+    """With means and sums: corner of the box with the highest coordinates; together with ``low``."""
     on: SetName | None = None
-    """Of means and sums: a set of nodes or a surface of the mesh file of the part, by name (docs/howto/meshes.md): of
-    means the tets that have a node of it, of sums its nodes. With a box those that are in both."""
+    """With means and sums: name of a node set or a surface in the mesh file of the part (docs/howto/meshes.md).
+    Means use the tets that have a node in it, sums use its nodes. With a box: what is in both."""
     beyond: Beyond | None = None
-    """Of sums and of what is behind a target: the side of a plane, ``{ axis = "z", at = "8 mm" }``."""
+    """With sums and fields behind a target: side of a plane, such as ``{ axis = "z", at = "8 mm" }``."""
     axis: Axis | None = None
-    """Of shapes: along which axis."""
+    """With shapes: direction of the line."""
     at: Length | None = None
-    """Of ``hole_width`` and ``hole_diameter``: where the plane across the axis cuts it."""
+    """With ``hole_width`` and ``hole_diameter``: coordinate along ``axis`` of the plane of the hole."""
     centre: Point | None = None
-    """Of ``hole_width``, ``hole_diameter`` and ``cone_angle``: any point of the line; the origin when absent."""
+    """With ``hole_width``, ``hole_diameter`` and ``cone_angle``: any point of the line; the origin when absent."""
 
 
 Quantity = Literal[
@@ -115,38 +117,40 @@ Quantity = Literal[
 
 
 class Reference(Model):
-    """A published or derived number that the finished run is compared with.
+    """A published or derived value with which the finished run is compared. ``conoid run --check`` fails where the
+    difference exceeds ``tolerance``.
 
-    ``extent``: largest minus smallest coordinate of a part along ``axis``, m. ``radius``: largest distance of a part's
-    nodes from the line through the origin along ``axis``, m. ``plastic_strain_max``, ``temperature_max`` (K),
-    ``stress_max`` (largest |stress component|, Pa) over a part. ``speed_mean``: mass-mean velocity of a part along
-    ``axis``, m/s. ``probe_*``: of a history column between ``since`` and ``until``; ``probe_last`` is its last value.
-    ``contact_time``: last time at which a wall or another body pushes, s. ``contact_loss``: energy lost by contact over
-    the initial energy. ``penetration``: how much of the thickness of all other parts along ``axis`` lies in front of
-    the end of the hole that a part has made in them round the axis through the origin, m; cavities ahead of the hole do
-    not count. Nodes without tets do not count for ``extent`` and ``radius``. ``worst_residual``: of the energy ledger.
+    ``extent``: largest minus smallest coordinate of a part along ``axis``, m. ``radius``: largest distance of a node
+    of the part from the line through the origin along ``axis``, m. ``plastic_strain_max``, ``temperature_max`` (K),
+    ``stress_max`` (largest |stress component|, Pa): over the part. ``speed_mean``: mass-weighted mean velocity of a
+    part along ``axis``, m/s. ``probe_mean``, ``probe_max``, ``probe_min``, ``probe_last``: time mean, largest,
+    smallest and last value of a probe between ``since`` and ``until``. ``contact_time``: last time at which a wall
+    or another body pushes, s. ``contact_loss``: energy dissipated by contact over the initial energy.
+    ``penetration``: thickness of all other parts along ``axis`` in front of the end of the hole that the part has
+    made around the axis through the origin, m; cavities ahead of the hole do not count. ``worst_residual``: largest
+    residual of the energy ledger. Free nodes do not count for ``extent`` and ``radius``.
     """
 
     quantity: Quantity
-    """What is measured of the run."""
+    """The measured quantity."""
     value: Annotated[float, Written(QUANTITY)]
-    """What it should be; its unit is that of the quantity."""
+    """Expected value, in the unit of the quantity."""
     tolerance: Annotated[float, Written(QUANTITY), Positive]
-    """Absolute, in SI as ``value``."""
+    """Largest allowed difference from ``value``, absolute, in the same unit."""
     source: str
-    """Where the number comes from."""
+    """Source of the value: publication, derivation or measurement."""
     part: Name | None = None
-    """Of which part, for quantities of a part."""
+    """With quantities of a part: name of the part."""
     probe: Name | None = None
-    """Of which probe, for ``probe_mean``, ``probe_max``, ``probe_min`` and ``probe_last``."""
+    """With ``probe_mean``, ``probe_max``, ``probe_min`` and ``probe_last``: name of the probe."""
     axis: Axis | None = None
-    """Along or round which axis, for ``extent``, ``radius``, ``speed_mean`` and ``penetration``."""
+    """With ``extent``, ``radius``, ``speed_mean`` and ``penetration``: direction."""
     since: Time = 0.0
-    """Begin of the window of ``probe_*``."""
+    """With ``probe_*``: start of the time window."""
     until: Time | None = None
-    """End of the window of ``probe_*``; the end of the run when absent."""
+    """With ``probe_*``: end of the time window; the end of the run when absent."""
 
     @property
     def title(self) -> str:
-        """What reports call it."""
+        """Title of the reference in reports."""
         return " ".join(word for word in (self.quantity, self.part, self.probe, self.axis) if word)

@@ -1,33 +1,34 @@
-"""How a body moves and stands at the start."""
+"""Orientation and motion of a body at the start."""
 
 from ..units import Angle, AngularSpeed, Rate
 from .tables import Axis, Model, Point
 
 
 class Spin(Model):
-    """Rigid rotation about a line through ``centre``; ``rate`` is the rotation vector, rad/s."""
+    """Rigid rotation about a line through ``centre``."""
 
     centre: Point
-    """A point of the line that the body turns about."""
+    """Point of the axis of rotation."""
     rate: tuple[AngularSpeed, AngularSpeed, AngularSpeed]
-    """Rotation vector: its direction is the axis, right-handed, its length the rate."""
+    """Rotation vector: its direction is the axis (right-handed), its length the angular velocity."""
 
 
 class Stretch(Model):
-    """Uniform stretching: ``rate`` times the distance from ``centre`` is the velocity along each of x, y, z; 1/s."""
+    """Uniform stretching: the velocity along each of x, y, z is ``rate`` times the distance from ``centre``."""
 
     centre: Point = (0.0, 0.0, 0.0)
-    """The point that stays where it is."""
+    """Point without velocity."""
     rate: tuple[Rate, Rate, Rate]
-    """Along each of x, y, z: positive stretches, negative shortens."""
+    """Stretching rate along x, y, z: positive values lengthen, negative values shorten."""
 
 
 class Turn(Model):
-    """A body is turned about the line along ``axis`` through ``centre`` before anything else, right-handed."""
+    """Rotation of a body about the line along ``axis`` through ``centre``, right-handed. It is applied to the mesh
+    before all else: velocities and boundaries refer to the turned body."""
 
     axis: Axis
-    """Direction of the line."""
+    """Direction of the axis of rotation."""
     angle: Angle
-    """Right-handed: ``"45 deg"``."""
+    """Angle of rotation, such as ``"45 deg"``."""
     centre: Point = (0.0, 0.0, 0.0)
-    """A point of the line."""
+    """Point of the axis of rotation."""

@@ -1,4 +1,4 @@
-"""What a combination is made of: forms that are placed and turned, solids of CAD files, and combinations of these."""
+"""Operands of a combination: shapes that are placed and turned, solids of CAD files, and combinations of these."""
 
 from collections.abc import Iterator
 from typing import Annotated, Literal
@@ -26,53 +26,53 @@ class CadForm(Model):
     """Solids of a STEP or BREP file."""
 
     shape: Literal["cad"]
-    """The kind of body."""
+    """Selects a CAD file."""
     path: str
-    """Of the file, STEP (ISO 10303-21) or BREP (OpenCASCADE); a relative one begins in the folder of the case."""
+    """Path of the file, STEP (ISO 10303-21) or BREP (OpenCASCADE), relative to the folder of the case."""
     unit: Annotated[Length, Positive] | None = None
-    """Length of 1 in the file: ``"1 mm"``. A STEP file says it itself: the key may be absent, and a file that says
-    otherwise is refused. A BREP file does not, and needs the key."""
+    """Length unit of the coordinates in the file, such as ``"1 mm"``. A BREP file requires it. A STEP file contains
+    its unit: the key may be absent, and another value than that of the file is refused."""
     solids: tuple[str | Annotated[Count, Field(ge=1)], ...] = ()
-    """Which solids, by their names in the file or their numbers from 1 in its order; all when empty. Several are one
-    body: their meshes have nodes in common where the solids touch."""
+    """Solids to use, by their names in the file or by their numbers from 1 in its order; all when empty. Several
+    solids are one body: their meshes have common nodes where the solids touch."""
     heal: bool = False
-    """Whether OpenCASCADE mends the file first: short edges, small faces, gaps between faces."""
+    """Whether OpenCASCADE repairs the file first: short edges, small faces, gaps between faces."""
     sha256: Sha256 | None = None
-    """Of the file, 64 hexadecimal digits; a file with another one is refused. Not checked when absent."""
+    """SHA-256 hash of the file, 64 hexadecimal digits. A file with another hash is refused. Default: not checked."""
 
 
 class UnionForm(Model):
-    """Everything that lies in at least one of the bodies."""
+    """The union of bodies: all that lies in at least one of them."""
 
     shape: Literal["union"]
-    """The kind of body."""
+    """Selects this shape."""
     of: Annotated[tuple["Operand", ...], Field(min_length=2, max_length=100)]
     """The bodies."""
 
 
 class DifferenceForm(Model):
-    """What lies in the first of the bodies and in none of the others."""
+    """The first body without the others."""
 
     shape: Literal["difference"]
-    """The kind of body."""
+    """Selects this shape."""
     of: Annotated[tuple["Operand", ...], Field(min_length=2, max_length=100)]
-    """The body, and those that are cut out of it."""
+    """The body, followed by the bodies that are removed from it."""
 
 
 class IntersectionForm(Model):
-    """What lies in all of the bodies."""
+    """The intersection of bodies: all that lies in every one of them."""
 
     shape: Literal["intersection"]
-    """The kind of body."""
+    """Selects this shape."""
     of: Annotated[tuple["Operand", ...], Field(min_length=2, max_length=100)]
     """The bodies."""
 
 
 class Turned(Model):
-    """What all operands have in common."""
+    """Keys of all operands."""
 
     turn: Turn | None = None
-    """How it is turned before it is combined."""
+    """Rotation of this body before it is combined with the others."""
 
 
 class BoxOperand(BoxForm, Turned):
@@ -80,7 +80,7 @@ class BoxOperand(BoxForm, Turned):
 
 
 class PlateOperand(PlateForm, Turned):
-    """A rectangular plate: ``thickness`` along ``axis``, ``width`` x ``height`` across it, centred on its axis."""
+    """A rectangular plate: ``thickness`` along ``axis``, ``width`` and ``height`` across it."""
 
 
 class CylinderOperand(CylinderForm, Turned):
@@ -92,27 +92,27 @@ class TubeOperand(TubeForm, Turned):
 
 
 class SphereOperand(SphereForm, Turned):
-    """A ball."""
+    """A solid sphere."""
 
 
 class ConeOperand(ConeForm, Turned):
-    """A cone or a frustum of one."""
+    """A cone or a truncated cone."""
 
 
 class OgiveOperand(OgiveForm, Turned):
-    """A shank with an ogive on it."""
+    """A projectile: a cylindrical shank with an ogival nose."""
 
 
 class HemisphereOperand(HemisphereForm, Turned):
-    """Half of a ball."""
+    """Half of a sphere."""
 
 
 class SphericalCapOperand(SphericalCapForm, Turned):
-    """What a plane cuts off a ball."""
+    """A segment of a sphere, cut off by a plane."""
 
 
 class RingSectorOperand(RingSectorForm, Turned):
-    """A piece of a tube between two half-planes through its axis."""
+    """A segment of a tube between two half-planes through its axis."""
 
 
 class CadOperand(CadForm, Turned):
@@ -120,15 +120,15 @@ class CadOperand(CadForm, Turned):
 
 
 class UnionOperand(UnionForm, Turned):
-    """Everything that lies in at least one of the bodies."""
+    """The union of bodies: all that lies in at least one of them."""
 
 
 class DifferenceOperand(DifferenceForm, Turned):
-    """What lies in the first of the bodies and in none of the others."""
+    """The first body without the others."""
 
 
 class IntersectionOperand(IntersectionForm, Turned):
-    """What lies in all of the bodies."""
+    """The intersection of bodies: all that lies in every one of them."""
 
 
 Operand = Annotated[
@@ -157,7 +157,7 @@ Place = tuple[int | str, ...]
 
 
 def leaves(form: CombinedForm, place: Place = (), depth: int = 1) -> Iterator[tuple[Place, int, Operand]]:
-    """All operands that are no combinations themselves: where each stands below ``place``, how deep, and what it is."""
+    """Yields all operands that are not combinations: the place of each below ``place``, its depth, and the operand."""
     for n, each in enumerate(form.of):
         if isinstance(each, CombinedForm):
             yield from leaves(each, (*place, "of", n), depth + 1)

@@ -1,4 +1,4 @@
-"""A rigid part: what it weighs, and how its inertia is checked."""
+"""The model of a rigid part: mass, centre of mass, inertia, and the check of the inertia."""
 
 from collections.abc import Iterator
 from itertools import combinations
@@ -13,43 +13,44 @@ from .tables import Model, Point
 Tensor = tuple[Inertia, Inertia, Inertia, Inertia, Inertia, Inertia]
 """Components xx, yy, zz, yz, zx, xy."""
 _ROUNDING = 1e-9
-"""Of the trace: a plate has one moment that is the sum of the other two, and text has rounded numbers."""
+"""Tolerance over the trace: a plate has one moment equal to the sum of the other two, and numbers in text are
+rounded."""
 
 
 class Rigid(Model):
-    """What a rigid part weighs, where that is not what its mesh and the density of its material give."""
+    """Mass properties of a rigid part, where they differ from those of its mesh and density."""
 
     mass: Annotated[Mass, Field(gt=0)] | None = None
-    """Of what is modelled of the body, a sector of it as well. Without it that of the mesh. Alone it scales the inertia
-    of the mesh."""
+    """Mass of the modelled part of the body (with a sector: of the sector). Default: that of the mesh. Without
+    ``inertia`` it scales the inertia of the mesh."""
     centre: Point | None = None
-    """Centre of mass at the start, in the coordinates of the case; with ``inertia``. Without it that of the mesh."""
+    """Centre of mass at the start, in the coordinates of the case; together with ``inertia``. Default: that of the
+    mesh."""
     inertia: Tensor | None = None
-    """Moments of inertia about the centre of mass along the axes of the case at the start: xx, yy, zz, yz, zx, xy, the
-    integrals of density times y^2 + z^2, z^2 + x^2, x^2 + y^2, -yz, -zx, -xy. Positive definite, and no principal
-    moment above the sum of the other two. Without it the sum over the nodes of the mesh, each with a quarter of the
-    mass of its tets: above that of the smooth body by a share of the order of the square of the size of a tet over that
-    of the body."""
+    """Moments of inertia about the centre of mass, along the axes of the case, at the start: xx, yy, zz, yz, zx, xy,
+    the integrals of density times y^2 + z^2, z^2 + x^2, x^2 + y^2, -yz, -zx, -xy. Positive definite, and no
+    principal moment above the sum of the other two. Default: the sum over the nodes of the mesh, each with a quarter
+    of the mass of its tets; it exceeds that of the smooth body by a share of the order of (tet size / body size)^2."""
 
 
 class Flag:
-    """In the JSON schema of a key: ``true`` and ``false`` are allowed as well."""
+    """Addition to the JSON schema of a key: ``true`` and ``false`` are allowed as well."""
 
     def __get_pydantic_json_schema__(self, core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        """What pydantic asks an annotation for."""
+        """The JSON schema with the addition; pydantic calls this method."""
         schema = handler(core)
         return {**schema, "anyOf": [*schema["anyOf"], {"type": "boolean"}]}
 
 
 def read_rigid(value: Any) -> Any:
-    """``true`` is a table without keys, ``false`` none."""
+    """``true`` as a table without keys, ``false`` as absent."""
     if isinstance(value, bool):
         return {} if value else None
     return value
 
 
 def tensor_problems(inertia: Tensor) -> Iterator[str]:
-    """Why no body has these moments of inertia."""
+    """Yields the reasons why no body can have these moments of inertia."""
     xx, yy, zz, yz, zx, xy = inertia
     if not _minors_above((xx, yy, zz, yz, zx, xy), 0.0):
         yield "must be positive definite: every principal moment above 0"
@@ -61,7 +62,7 @@ def tensor_problems(inertia: Tensor) -> Iterator[str]:
 
 
 def _minors_above(tensor: tuple[float, ...], least: float) -> bool:
-    """Whether all principal minors of a symmetric matrix are above ``least``: it is positive definite then."""
+    """Whether all principal minors of a symmetric matrix are above ``least``; above 0 means positive definite."""
     xx, yy, zz, yz, zx, xy = tensor
     diagonal, off = (xx, yy, zz), {(1, 2): yz, (0, 2): zx, (0, 1): xy}
     pairs = (diagonal[i] * diagonal[j] - off[i, j] ** 2 for i, j in combinations(range(3), 2))

@@ -1,7 +1,7 @@
-"""What a case is. Frozen models, unknown keys forbidden, every quantity in SI once read.
+"""The models of a case: frozen, without unknown keys, every quantity in SI units once read.
 
-``parse_case`` in ``cases/load.py`` is the way in: it reads TOML or JSON and reports every error at once. Beside
-it: ``bodies`` (bodies and their meshes), ``motion``, ``materials``, ``boundaries``, ``bonds``, ``failure`` and
+``parse_case`` in ``cases/load.py`` reads TOML or JSON and reports every error at once. Beside this module:
+``bodies`` (bodies and their meshes), ``motion``, ``materials``, ``boundaries``, ``bonds``, ``failure`` and
 ``measures`` (probes and references).
 """
 
@@ -34,129 +34,138 @@ def _off(value: Any) -> Any:
 
 
 class Part(Model):
-    """A body: where it is, what it is made of, how it moves at the start."""
+    """A body: its material, its mesh, its motion at the start, and how it fails."""
 
     name: Name
-    """For messages, results and the keys that name parts; each part has its own."""
+    """Name of the part in messages, results and other keys of the case. No two parts have the same name."""
     material: Name
-    """A name from ``[materials]`` of the case or from the library."""
+    """Name of a material: one of ``[materials]`` of the case, or one of the library (``conoid materials`` lists
+    them)."""
     mesh: Mesh
-    """The body, where it lies and how fine it is; ``shape`` says which kind."""
+    """Shape, place and element size of the body. ``shape`` selects one of the tables ``parts[].mesh`` below."""
     turn: Turn | None = None
-    """How the body is turned out of the axes.
-    Only whole bodies can be turned, no sectors."""
+    """Rotation of the mesh before the run starts, for bodies that are inclined to the axes. Only with ``sector =
+    "full"``."""
     velocity: Velocity = (0.0, 0.0, 0.0)
-    """Of the whole body at the start, along x, y, z."""
+    """Initial velocity of the whole body along x, y, z."""
     spin: Spin | None = None
-    """A rotation at the start, besides ``velocity``."""
+    """Initial rigid rotation, added to ``velocity``."""
     stretch: Stretch | None = None
-    """A stretching at the start, besides ``velocity``."""
+    """Initial uniform stretching, added to ``velocity``."""
     jitter: Annotated[Speed, Field(ge=0)] = 0.0
-    """Each node starts with a random velocity besides, each component between minus and plus this: the same in every
-    run."""
+    """Amplitude of a random initial velocity, added to ``velocity``: each component of each node is uniform between
+    minus and plus this value. Every run has the same values. For tests of energy conservation."""
     temperature: Annotated[Temperature, Field(ge=0)] = 293.15
-    """At the start; of meaning for Johnson-Cook's law."""
+    """Initial temperature. Used by ``strength`` with ``model = "johnson_cook"`` only."""
     erosion: Erosion | None = None
-    """With this table the part's own tets leave where they are worn out; without it none of its tets ever does."""
+    """Criteria for the deletion of tets. Without this table no tet of the part is deleted. Not together with
+    ``fracture``."""
     fracture: Fracture | None = None
-    """With this table the part breaks; its material must be ``brittle``."""
+    """Criteria for the fracture of facets between tets. Without this table the part does not fracture. Needs
+    ``brittle`` in its material; not together with ``erosion``."""
     rigid: Annotated[Rigid | None, BeforeValidator(read_rigid), Flag()] = None
-    """``true``, or a table of mass, centre and inertia: the part has six degrees of freedom and no stress. It costs
-    what its surface costs in contact, and does not limit the time step. Gravity acts on it; planes of symmetry on
-    which it has nodes, and boundaries that drive all of its nodes, leave it the motions that they allow: with one
-    component given it may turn about that axis, with more it does not turn. A plane of symmetry beside which it starts
-    is a wall without friction for it, with the ``restitution`` of contact."""
+    """Whether the part is rigid: ``true``, or a table with its mass, centre of mass and inertia. A rigid part has
+    six degrees of freedom and no stress; it costs only the contact of its surface and does not limit the time step.
+    Gravity acts on it. A plane of symmetry on which it has nodes, and a boundary that drives all of its nodes, leave
+    it the motions that they allow: with one velocity component prescribed it can still rotate about that axis, with
+    two or three it cannot rotate. A plane of symmetry that it does not touch at the start acts on it as a wall
+    without friction, with ``contact.restitution``."""
 
 
 class ContactPair(Model):
-    """Two parts whose friction differs from that of the others."""
+    """A pair of parts with a coefficient of friction of its own."""
 
     parts: tuple[Name, Name]
-    """The names of the two."""
+    """Names of the two parts."""
     friction: Annotated[Ratio, Field(ge=0)]
-    """Coulomb's coefficient between them."""
+    """Coulomb's coefficient of friction between the two parts."""
 
 
 class Contact(Model):
-    """Bodies push each other where they meet: nodes on faces, sharp edges on edges; by impulses, no stiffness."""
+    """Contact between bodies: nodes with faces, and sharp edges with edges. Contact acts by impulses; there is no
+    penalty stiffness to choose."""
 
     parts: tuple[Name, ...] = ()
-    """Parts that meet each other; all when empty."""
+    """Names of the parts that can be in contact; all parts when empty."""
     self_contact: tuple[Name, ...] | None = None
-    """Parts whose surface can meet itself; by default those that erode, whose nodes without tets would else pass
-    through the part that they come from. A list takes the place of this default: ``[]`` for none. Those that fracture
-    always can."""
+    """Names of the parts whose surface can be in contact with itself. Default: the parts that have ``erosion``,
+    because their free nodes would otherwise pass through the part that they come from. A list replaces this default;
+    ``[]`` means none. Parts that have ``fracture`` always have self-contact."""
     friction: Annotated[Ratio, Field(ge=0)] = 0.0
-    """Coulomb's coefficient."""
+    """Coulomb's coefficient of friction between all bodies, except the ``pairs``."""
     pairs: tuple[ContactPair, ...] = ()
-    """Pairs of parts with a friction of their own."""
+    """Pairs of parts with another coefficient of friction, in TOML one ``[[contact.pairs]]`` each."""
     restitution: Annotated[Ratio, Field(ge=0, le=1)] = 0.0
-    """Share of the speed of approach with which nodes part from faces, and edges from edges, that they run into: at 0
-    an impact of nodes is perfectly plastic; at 1 it takes no energy but what ``sweeps`` leave undone, mostly below 0.1
-    %. In the impact of two bodies it is their first nodes that pay, and what they pay falls with the size of the tets;
-    where erosion lays bare ever new nodes, or a cloud of debris arrives, all of them do, whatever their size: 8 to 9 %
-    in a penetration at constant speed. Bodies rebound by their elasticity whatever it is. Above 0 ``sweeps`` and
-    ``numerics.dt_growth`` have other defaults, and what parts falls back: next to 0 is not 0. At a high speed unequal
-    time steps may take or make more than it gives back: the outcome says when it is above 1 %. Walls are not concerned:
-    there it is always 0."""
+    """Coefficient of restitution of single nodes and edges: their speed of separation over their speed of approach.
+    Keep 0 unless a verification needs more: elastic bodies rebound by their elasticity with any value. At 0 the
+    impact of a node is perfectly plastic. In the impact of two bodies only the first nodes lose energy, and less of
+    it the smaller the tets are; where erosion exposes new nodes all the time, or a cloud of debris arrives, all of
+    them do, at any size: 8 to 9 % in a penetration at constant speed. At 1 the impacts of nodes lose only what the
+    ``sweeps`` leave, mostly below 0.1 %. Any value above 0 changes the defaults of ``sweeps`` and
+    ``numerics.dt_growth``. At high speed, time steps of unequal length can remove or add more energy than the
+    restitution saves; the outcome contains a note above 1 %. Contact with walls always has 0."""
     edges: bool = True
-    """Whether sharp edges meet edges."""
+    """Whether sharp edges are in contact with edges. ``false`` is cheaper, and edges can then pass through each
+    other."""
     overlap: Literal["refuse", "push"] = "refuse"
-    """What becomes of bodies that overlap at the start: ``refuse`` ends with an error, ``push`` moves them apart
-    without a stress, and ends with an error where they overlap too deeply for their tets. A body overlaps another where
-    their primitives reach into each other, or where a node of its surface lies inside the mesh of the other, deeper
-    than a millionth of the size of a face: bodies that touch do not.
-    Parts that do not meet each other may overlap."""
+    """Treatment of bodies that overlap at the start. ``refuse``: the run ends with an error. ``push``: the bodies
+    are moved apart without stress; an error where they overlap too deeply for their tets. Two bodies overlap where
+    their primitives intersect, or where a surface node of one lies inside the mesh of the other deeper than a
+    millionth of a face's size; bodies that touch do not overlap. Parts that are not in contact with each other may
+    overlap."""
     sweeps: Annotated[Count, Field(ge=1, le=1000)] | None = None
-    """Jacobi sweeps over the active contacts of a step, with momentum. By default as many as are needed, from 5 to 80:
-    more where the last one of the step before has changed the impulses by more than 0.15 %, as it does in rubble under
-    pressure, fewer where it was less than half of that. At least 10 where parts meet at more than a fifth of the speed
-    of waves in one of them; at least 40 with ``restitution``, where what they leave undone is energy, and where parts
-    fracture and a motion or a traction drives something that may press them. With too few what has broken is too soft
-    under pressure, and shatters into more pieces than it should, or fewer."""
+    """Number of Jacobi sweeps, with momentum, over the active contacts of a time step. Default: adaptive, 5 to 80.
+    The number increases where the last sweep of the previous step changed the impulses by more than 0.15 %, as in
+    rubble under pressure, and decreases below half of that. The adaptive number is at least 10 where parts meet at
+    more than a fifth of the wave speed of one of them; at least 40 with ``restitution``, and where parts that
+    fracture may be pressed by a prescribed motion or a traction. With too few sweeps broken material is too soft
+    under pressure, and the number of fragments is wrong. Cost grows with the number."""
     skin: Annotated[Ratio, Positive] = 0.3
-    """Of the (harmonic) mean face size: twice how far a node may depart from its extrapolated motion before its
-    candidate pairs are searched again. Changes the cost, not the answer."""
+    """Skin of the broad phase over the harmonic mean of the face size: twice the distance by which a node may depart
+    from its extrapolated motion before its candidate pairs are searched again. Changes the cost, not the answer."""
     domain: Literal["arbitrary", "box"] = "arbitrary"
-    """How a rank selects the faces that others receive as ghosts: by occupied cells, or by bounding boxes. Changes the
-    cost, not the answer."""
+    """Method by which a rank selects the faces that other ranks receive as ghosts: by occupied cells
+    (``arbitrary``), or by bounding boxes (``box``). Changes the cost, not the answer."""
 
 
 class Viscosity(Model):
-    """Bulk viscosity q = density * u * ((linear + shock * S) * c + quadratic * u), u = l * |rate|, in compression.
+    """Bulk viscosity ``q = density * u * ((linear + shock * S) * c + quadratic * u)``, ``u = l * |rate|``, in
+    compression only.
 
-    S = u / (u + c / 100) is next to nothing in elastic waves and next to one in shocks.
-    l is V^(1/3) for a regular tet and follows the altitude of a flat one: 1.2009 / sqrt(sum |grad N|^2). The rate is
-    that which the pressure sees: with ``nodal`` and ``split`` the mean of its nodes.
+    c is the wave speed. ``S = u / (u + c / 100)`` is close to 0 in elastic waves and close to 1 in shocks. ``l =
+    1.2009 / sqrt(sum |grad N|^2)`` is V^(1/3) for a regular tet and follows the altitude of a flat one. The rate is
+    the volumetric strain rate that the pressure uses: with ``nodal`` and ``split`` the mean over the nodes of the
+    tet.
     """
 
     linear: Annotated[Ratio, Field(ge=0)] = 0.06
-    """Coefficient of the linear term: damps ringing, that of elastic waves too. A jump of some m/s rings at 0.06: in
-    the spall plane of a flyer the tension is a third too high, at 0.3 a sixth."""
+    """Coefficient of the linear term, which damps numerical ringing behind a wave front, and elastic waves too. A
+    velocity jump of some m/s rings at 0.06: the tension in the spall plane of a flyer plate is then a third too
+    high, at 0.3 a sixth."""
     shock: Annotated[Ratio, Field(ge=0)] = 0.4
-    """By how much the linear coefficient is larger in shocks: spreads them over some tets, so that they do not
-    overshoot."""
+    """Increase of the linear coefficient in shocks: the front is spread over some tets and does not overshoot."""
     quadratic: Annotated[Ratio, Field(ge=0)] = 1.5
-    """Coefficient of the quadratic term: spreads strong shocks."""
+    """Coefficient of the quadratic term, which spreads strong shocks over some tets."""
 
 
 class Numerics(Model):
-    """How the equations are solved."""
+    """Numerical method: pressure, bulk viscosity and time step."""
 
     pressure: Literal["standard", "nodal", "split"] = "nodal"
-    """``standard``: pressure from each tet (locks in plastic flow). ``nodal``: averaged nodal pressure. ``split``: the
-    operator split, stabilised by pressure-gradient projection, which damps elastic motion: a free ball of 6,400 tets
-    that breathes loses 15 % of its energy in ten periods, and none with the others. Tets whose smallest altitude is
-    below a tenth of their longest edge at the start keep a pressure of their own in both."""
+    """Pressure form of the tets. ``nodal``: average nodal pressure, for plastic flow and in general. ``standard``:
+    one pressure for each tet; cheaper, but it locks (is too stiff) in plastic flow. ``split``: operator split,
+    stabilised by pressure-gradient projection; it damps elastic motion (a free ball of 6,400 tets that vibrates
+    radially loses 15 % of its energy in ten periods, and none with the others). Tets whose smallest altitude at the
+    start is below a tenth of their longest edge keep a pressure of their own with ``nodal`` and ``split``."""
     viscosity: Annotated[Viscosity | None, BeforeValidator(_off), Switch()] = Viscosity()
-    """``viscosity = "none"`` switches it off."""
+    """Bulk viscosity; ``"none"`` switches it off."""
     dt_safety: Annotated[Ratio, Field(gt=0, le=1)] = 0.9
-    """Share of the rigorous element bound 1 / (c sqrt(sum |grad N|^2)). Bodies that shatter end with some 15 % less
-    energy of fracture at 0.9, and with fewer fragments, than at 0.6 and below; where cohesive zones are not resolved,
-    which a warning says, it may as well be more."""
+    """Time step over the rigorous stability limit of the tets, ``1 / (c sqrt(sum |grad N|^2))``. Bodies that shatter
+    absorb about 15 % less fracture energy at 0.9 than at 0.6 and below, and make fewer fragments; more where the
+    cohesive zone is not resolved, which a warning reports."""
     dt_growth: Annotated[Ratio, Field(gt=1, le=2)] | None = None
-    """Largest growth of the time step in one step: 1.05 by default, and 1.002 with ``contact.restitution``, since steps
-    that rise and fall with the impacts give energy that nothing takes then."""
+    """Largest ratio of one time step to the one before. Default: 1.05; with ``contact.restitution`` 1.002, because
+    time steps that change with the impacts add energy that nothing dissipates then."""
 
 
 Scale = Annotated[Ratio, Field(gt=0)]
@@ -165,151 +174,154 @@ Scale = Annotated[Ratio, Field(gt=0)]
 FrameField = Literal["density", "strain", "strain_rate", "contact_pressure"]
 
 MOST_RANKS, MOST_THREADS, MOST_PARTS = 4096, 256, 256
-"""Of a run, of a case. Chosen: far beyond what has been run."""
+"""Largest numbers of ranks, threads and parts. Chosen: far above what has been run."""
 
 
 class Run(Model):
-    """How long, on how many ranks, and what is written."""
+    """Duration of the run, cores, output, and limits at which it stops."""
 
     end_time: Annotated[Time, Positive]
-    """Simulated time at which the run ends; it begins at 0."""
+    """Simulated time at which the run ends. It starts at 0."""
     ranks: Annotated[Count, Field(ge=1, le=MOST_RANKS)] = 1
-    """MPI processes that share the work. The answer does not depend on it."""
+    """Number of MPI processes. The answer does not depend on it."""
     threads: Annotated[Count, Field(ge=1, le=MOST_THREADS)] = 1
-    """Threads of each MPI process that share its work. The answer does not depend on it. A run takes ``ranks`` times
-    ``threads`` cores; more threads than cores make it slower."""
+    """Number of threads of each MPI process. The answer does not depend on it. A run uses ``ranks`` times
+    ``threads`` cores; more of them than the machine has cores make it slower."""
     profile: Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]{0,32}$")] = ""
-    """Where a batch system runs it: a profile of the site (docs/howto/cluster.md). The submitter's choice comes before
-    it."""
+    """Profile of the site under which a batch system executes the run (docs/howto/cluster.md). The profile that is
+    given at submission has priority."""
     cut_scale: tuple[Scale, Scale, Scale] = (1.0, 1.0, 1.0)
-    """Positions are multiplied by this before the mesh is cut for the ranks: no cut is made across a direction that is
-    short then. Small along the way of an impact, every rank gets a share of where it happens. The answer does not
-    depend on it."""
+    """Factors of the coordinates for the domain decomposition: cuts across a direction with a small factor are
+    avoided. With a small factor along the direction of impact every rank receives a part of the impact zone. Changes
+    the cost, not the answer."""
     frames: Annotated[Count, Field(ge=0, le=100_000)] = 20
-    """Number of frames, evenly spaced to the end; the initial state is frame 0 (0: none are written). A step ends at
-    each, so another number makes other steps: what shatters then breaks otherwise, as by another ``dt_safety``."""
+    """Number of frames (complete fields, VTKHDF), evenly spaced up to the end; frame 0 is the initial state. 0: no
+    frames. A time step ends at each frame, so another number changes the time steps, and with them the fracture
+    pattern of bodies that shatter, as another ``dt_safety`` does."""
     fields: tuple[FrameField, ...] = ()
-    """Fields of frames besides those that every frame has. ``density``: of the tets as they are. ``strain``: the
-    logarithmic strain ln V (Hencky) between the start and the present shape of each tet, six components, and
-    ``effective_strain``, sqrt(2/3 e' : e') of its deviator; where the axes of the strain do not turn, that is the
-    integral of the rate that other explicit codes store, with shear components of tensors. ``strain_rate``:
-    sqrt(2/3 d' : d') of the rate of deformation d, of the velocities in the frame. ``contact_pressure`` of nodes: what
-    contact and walls have given a node since the frame before, along the normal of its share of the surface that is
-    pushed (a third of each face that is met at less than 60 degrees), over that area and time; 0 in the first frame.
-    What walls give to rigid parts is not in it: a probe of the force of a wall on a part has it."""
+    """Additional fields of the frames. ``density``: current density of the tets. ``strain``: logarithmic (Hencky)
+    strain ln V of each tet, six components, and ``effective_strain``, sqrt(2/3 e' : e') of its deviator; where the
+    principal axes do not rotate, this is the integral of the strain rate that other explicit codes store, with
+    tensor shear components. ``strain_rate``: sqrt(2/3 d' : d') of the rate of deformation d. ``contact_pressure``:
+    impulse of contact and walls on a node since the previous frame, along the normal of its share of the loaded
+    surface (a third of each face that is hit at less than 60 degrees), over that area and time; 0 in the first
+    frame. Walls that push rigid parts are not included: use a probe of ``wall_force``."""
     samples: Annotated[Count, Field(ge=1, le=1_000_000)] = 500
-    """Number of lines of history.csv, evenly spaced."""
+    """Number of lines of history.csv, evenly spaced up to the end."""
     snapshots: Annotated[Count, Field(ge=0, le=100_000)] = 100
-    """Number of snapshots of the surface of the fragments, for looking on: evenly spaced to the end, and one of the
-    initial state (0: none but those asked for). At most one a second of wall time, and fewer where they would take more
-    than 1/200 of it; the first and the last are always made."""
+    """Number of snapshots of the fragments' surface for the live view, evenly spaced up to the end, and one of the
+    initial state. 0: only snapshots on request. At most one per second of wall time, and fewer where they would use
+    more than 1/200 of it; the first and the last are always made."""
     max_steps: Annotated[Count, Field(ge=1)] = 100_000_000
-    """The run stops, with a checkpoint, when it needs more: state ``timed_out``, cause ``steps``. A restart with a
-    larger number goes on (``conoid restart RUN --max-steps NUMBER``)."""
+    """Largest number of time steps. A run that reaches it writes a checkpoint and stops with state ``timed_out``,
+    cause ``steps``. ``conoid restart RUN --max-steps NUMBER`` continues it."""
     max_wall_time: Annotated[Time, Positive] | None = None
-    """The run stops, with a checkpoint, when it has taken longer.
-    Counted from the first step."""
+    """Largest wall time, counted from the first time step. A run that reaches it writes a checkpoint and stops.
+    Default: no limit."""
     checkpoint_every: Annotated[Annotated[Time, Positive] | None, BeforeValidator(_off), Switch()] = 600.0
-    """Wall time between checkpoints; one is also written when somebody asks for it, and when a run is stopped on
-    request or by ``max_wall_time``. ``"none"``: only then."""
+    """Wall time between checkpoints. A checkpoint is also written on request, when a user stops the run, and at
+    ``max_wall_time``; with ``"none"`` only then."""
     residual_limit: Annotated[Ratio, Positive] = 0.05
-    """The run fails with cause ``energy`` when the energy residual, or what moves beyond all energy that has come in,
-    passes this share of the largest energy so far."""
+    """Largest energy residual over the largest energy so far; beyond it the run fails with cause ``energy``. The
+    same limit holds for kinetic energy that exceeds all energy that has entered."""
     made_limit: Annotated[Ratio, Positive] = 0.02
-    """The run fails with cause ``energy`` when a line of the ledger has made more than this share of the largest energy
-    so far: one that takes for good has fallen (``plastic``, ``viscous``, ``friction``, ``fracture``), one that gives
-    back what it has taken is below zero (``contact``, ``averaging``, ``eroded``, ``cohesive``), or unequal time steps
-    have made or taken it (``stepping``). Two hundredths of an energy are one of a speed."""
+    """Largest energy that a single line of the energy ledger may create, over the largest energy so far; beyond it
+    the run fails with cause ``energy``. It is exceeded where a dissipation decreases (``plastic``, ``viscous``,
+    ``friction``, ``fracture``), where a store releases more than it has absorbed (``contact``, ``averaging``,
+    ``eroded``, ``cohesive``), or where time steps of unequal length create or remove energy (``stepping``). 2 % of
+    an energy are 1 % of a speed."""
 
     @property
     def cores(self) -> int:
-        """That it takes."""
+        """The number of cores of the run."""
         return self.ranks * self.threads
 
 
 class Balance(Model):
-    """When tets move to other ranks so that all have the same to do, and what counts. No answer depends on it."""
+    """Load balance: when tets are redistributed over the ranks, and by which weight. No answer depends on it."""
 
     policy: Literal["measured", "outside", "every", "never"] = "measured"
-    """``measured``: when the time lost to imbalance since the last cut exceeds what a cut costs. ``outside``: when a
-    rank has more than ``alpha`` times the outside nodes that it had at the last cut (Moon, Kim and Lee's trigger).
-    ``every``: each so many steps."""
+    """Criterion for a new decomposition of the mesh. ``measured``: the time lost by imbalance since the last
+    decomposition exceeds the cost of a new one. ``outside``: when the outside nodes of a rank have grown by the
+    factor ``alpha`` (criterion of Moon, Kim and Lee). ``every``: after a fixed number of time steps. ``never``: not
+    at all."""
     alpha: Annotated[Ratio, Field(gt=1)] = 1.2
-    """Of ``policy = "outside"``: growth that a rank may have before it is cut anew."""
+    """With ``policy = "outside"``: growth factor of the outside nodes of a rank that triggers a decomposition."""
     every: Annotated[Count, Field(ge=1)] = 1000
-    """Of ``policy = "every"``: steps between two cuts."""
+    """With ``policy = "every"``: time steps between two decompositions."""
     weights: Literal["measured", "outside", "tets"] = "measured"
-    """What is divided evenly: CPU time as measured, outside nodes, or tets."""
+    """Quantity that is divided evenly among the ranks: measured CPU time, outside nodes, or tets."""
 
 
 Kind = TypeVar("Kind", Symmetry, Wall, Prescribed, Rotation, Gravity, Traction)
 
 
 class Case(Model):
-    """A whole case."""
+    """The top level of the file."""
 
     name: Name
-    """Of the case and of its runs."""
+    """Name of the case and of its runs."""
     title: Annotated[str, Field(max_length=200)] = ""
-    """One line for people."""
+    """Title: one line about the case."""
     description: Annotated[str, Field(max_length=20_000)] = ""
-    """What the case shows, for people."""
+    """Description of the case, as long as needed."""
     materials: dict[Name, Material] = Field(default_factory=dict)
-    """Materials of the case's own, each under its name; they win over those of the library."""
+    """Materials of this case, each a table ``[materials.NAME]``. A name that the library also has replaces the
+    material of the library."""
     parts: Annotated[tuple[Part, ...], Field(min_length=1, max_length=MOST_PARTS)]
     """The bodies, in TOML one ``[[parts]]`` each."""
     boundaries: tuple[Boundary, ...] = ()
-    """What holds or drives nodes, in TOML one ``[[boundaries]]`` each; ``kind`` says which."""
+    """Planes of symmetry, walls, prescribed motions, gravity and loads, in TOML one ``[[boundaries]]`` each;
+    ``kind`` selects which."""
     bond: tuple[Bond, ...] = ()
-    """Parts that hold together, in TOML one ``[[bond]]`` each; ``kind`` says how their meshes are joined. Parts without
-    a bond are bodies of their own, also where their surfaces coincide."""
+    """Bonds between parts, in TOML one ``[[bond]]`` each; ``kind`` selects how the meshes are joined. Parts without
+    a bond are separate bodies, also where their surfaces coincide."""
     contact: Annotated[Contact | None, BeforeValidator(_off), Switch()] = Contact()
-    """How bodies meet; they do by default. ``contact = "none"`` lets them pass through each other. A single part meets
-    only itself, if it may."""
+    """Contact between bodies, on by default. ``"none"`` switches it off: bodies then pass through each other."""
     probes: tuple[Probe, ...] = ()
-    """Columns of history.csv, in TOML one ``[[probes]]`` each."""
+    """Probes, in TOML one ``[[probes]]`` each: additional columns of history.csv."""
     numerics: Numerics = Numerics()
-    """Pressure form, viscosity, time step."""
+    """Numerical method: pressure, bulk viscosity, time step."""
     run: Run
-    """The end, the ranks, what is written, when to stop."""
+    """End time, cores, output and limits of the run."""
     balance: Balance = Balance()
-    """When tets move to other ranks."""
+    """Load balance between the ranks."""
     reference: tuple[Reference, ...] = ()
-    """Numbers that the run is compared with, in TOML one ``[[reference]]`` each."""
+    """Values with which the finished run is compared, in TOML one ``[[reference]]`` each."""
 
     def boundaries_of(self, kind: type[Kind]) -> list[tuple[int, Kind]]:
-        """The boundaries of one kind, each with its place in ``boundaries``."""
+        """The boundaries of one kind, each with its index in ``boundaries``."""
         return [(index, spec) for index, spec in enumerate(self.boundaries) if isinstance(spec, kind)]
 
     @property
     def erodes(self) -> bool:
-        """Whether tets may leave."""
+        """Whether a part has ``erosion``."""
         return any(part.erosion is not None for part in self.parts)
 
     @property
     def fractures(self) -> bool:
-        """Whether facets may break."""
+        """Whether facets of a part or of a bond can break."""
         return any(breakable(self))
 
     @property
     def rigid(self) -> list[int]:
-        """The numbers of the rigid parts."""
+        """Indices of the rigid parts."""
         return [index for index, part in enumerate(self.parts) if part.rigid is not None]
 
     @property
     def dt_growth(self) -> float:
-        """Largest growth of the time step in one step."""
+        """Largest ratio of one time step to the one before."""
         rebounds = self.contact is not None and self.contact.restitution > 0.0
         return self.numerics.dt_growth or (1.002 if rebounds else 1.05)
 
     @property
     def in_contact(self) -> bool:
-        """Whether anything of the scene can meet anything."""
+        """Whether contact is possible in the scene."""
         return self.contact is not None and (len(set(bodies(self))) > 1 or any(meeting(self)))
 
     @property
     def self_contact(self) -> tuple[str, ...]:
-        """The names of the parts whose surface can meet itself, in the order of the parts."""
+        """Names of the parts with self-contact, in the order of the parts."""
         if self.contact is None:
             return ()
         named, meet = self.contact.self_contact, self.contact.parts

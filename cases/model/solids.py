@@ -1,4 +1,4 @@
-"""Bodies of which only a mesh tells the sizes: combinations of shapes, and files with surfaces of bodies."""
+"""Bodies whose dimensions are measured on their mesh: combinations of shapes, CAD files and surface files."""
 
 from typing import Annotated, Literal
 
@@ -11,46 +11,47 @@ from .tables import Axis, Model, Point, Positive, Sha256
 
 
 class Measured(Model):
-    """A body whose sizes are measured on its mesh."""
+    """A body whose dimensions are measured on its mesh."""
 
 
 class Meshed(Measured):
-    """One whose mesh gmsh makes."""
+    """A body that gmsh meshes."""
 
     element_size: Annotated[Length, Positive]
-    """Edge of a tet, about. Edges and faces of the body that are smaller have smaller tets, which hold the time step
-    down: ``conoid validate`` names them."""
+    """Edge length of the tets, approximately. Edges and faces of the body that are shorter have smaller tets, which
+    reduce the time step; ``conoid validate`` lists them."""
     grading: Grading | None = None
-    """Coarser tets away from a place."""
+    """Coarser tets away from a region of interest."""
 
     @property
     def generator(self) -> Literal["gmsh"]:
-        """What makes its mesh."""
+        """The mesh generator."""
         return "gmsh"
 
 
 class Solid(Meshed):
-    """One that OpenCASCADE draws."""
+    """A body whose geometry OpenCASCADE makes."""
 
     sector: Literal["full", "half", "quarter"] = "full"
-    """Which part of the body is modelled: the positive side of ``centre`` in the first, or both, of the two directions
-    across ``axis`` (in cyclic order: x, y for z; y, z for x; z, x for y)."""
+    """Modelled part of the body, for scenes with planes of symmetry. ``half``: the positive side of ``centre`` in
+    the first direction across ``axis``; ``quarter``: in both. The directions across ``axis`` in cyclic order are x,
+    y for z; y, z for x; z, x for y. Each plane also needs a boundary ``symmetry``."""
     centre: Point = (0.0, 0.0, 0.0)
-    """A point of the planes at which a sector is cut."""
+    """Point through which the planes of a sector pass."""
     axis: Axis = "z"
-    """The direction across which a sector is cut."""
+    """Direction across which a sector is cut."""
 
 
 class Union(UnionForm, Solid):
-    """Everything that lies in at least one of several bodies."""
+    """The union of several bodies: all that lies in at least one of them."""
 
 
 class Difference(DifferenceForm, Solid):
-    """What lies in the first of several bodies and in none of the others: a jacket round a core, a plate with holes."""
+    """The first of several bodies without the others: a plate with holes, a jacket around a core."""
 
 
 class Intersection(IntersectionForm, Solid):
-    """What lies in all of several bodies."""
+    """The intersection of several bodies: all that lies in every one of them."""
 
 
 class Cad(CadForm, Solid):
@@ -58,18 +59,18 @@ class Cad(CadForm, Solid):
 
 
 class Stl(Meshed):
-    """The inside of a closed surface of triangles. It is meshed anew with the element size, on the triangles."""
+    """The interior of a closed surface of triangles (STL). The surface is meshed again with ``element_size``."""
 
     shape: Literal["stl"]
-    """The kind of body."""
+    """Selects this shape."""
     path: str
-    """Of the file, text or binary; a relative one begins in the folder of the case."""
+    """Path of the file, text or binary, relative to the folder of the case."""
     unit: Annotated[Length, Positive]
-    """Length of 1 in the file: ``"1 mm"``."""
+    """Length unit of the coordinates in the file, such as ``"1 mm"``."""
     edge_angle: Annotated[Angle, Field(gt=0, lt=3.1)] = 0.6981317007977318
-    """Edges at which two triangles meet at a larger angle are edges of the body, 40 degrees; others are smooth."""
+    """Largest angle between neighbouring triangles of a smooth surface; a larger angle is an edge of the body."""
     sha256: Sha256 | None = None
-    """Of the file, 64 hexadecimal digits; a file with another one is refused. Not checked when absent."""
+    """SHA-256 hash of the file, 64 hexadecimal digits. A file with another hash is refused. Default: not checked."""
 
 
 Combination = Union | Difference | Intersection

@@ -1,4 +1,4 @@
-"""What the tables of a case are made of: the base of every model, names, places, counts."""
+"""Types that the models of a case have in common: base class, names, points, counts."""
 
 from typing import Annotated, Any, Literal
 
@@ -11,7 +11,7 @@ from ..units import Length, Speed, usable
 Axis = Literal["x", "y", "z"]
 Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]{0,63}$")]
 SetName = Annotated[str, Field(min_length=1, max_length=200)]
-"""Of a set in a mesh file, which may have blanks and any letters."""
+"""Name of a set in a mesh file; blanks and all letters are allowed."""
 Point = tuple[Length, Length, Length]
 Velocity = tuple[Speed, Speed, Speed]
 Positive = Field(gt=0)
@@ -39,19 +39,19 @@ def _hash(value: str) -> str:
 
 
 Sha256 = Annotated[str, AfterValidator(_hash), Field(json_schema_extra={"pattern": "^[0-9a-fA-F]{64}$"})]
-"""Of a file that a case names, in lower case."""
+"""SHA-256 hash of a file that a case names, in lower case."""
 
 
 class Switch:
-    """In the JSON schema of a key: ``"none"`` is allowed as well."""
+    """Addition to the JSON schema of a key: ``"none"`` is allowed as well."""
 
     def __get_pydantic_json_schema__(self, core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        """What pydantic asks an annotation for."""
+        """The JSON schema with the addition; pydantic calls this method."""
         schema = handler(core)
         return {**schema, "anyOf": [*schema["anyOf"], {"const": "none"}]}
 
 
 class Model(BaseModel):
-    """Base of everything in a case."""
+    """Base class of all models of a case."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, use_attribute_docstrings=True)

@@ -1,183 +1,183 @@
-"""The keys of a case for people: docs/reference/case.md, made from the JSON schema, one table of keys a table of the
-case."""
+"""The reference of the keys of a case (docs/reference/case.md), made from the JSON schema: one section per table."""
 
-import json
+import re
 import textwrap
-from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Iterable, Iterator
 
-from ..units import KINDS, QUANTITY, UNITS, parse_unit
-from .json_schema import Schema, definition, json_schema, variants
+from ..units import UNITS
+from .cells import Cells, link
+from .examples import EXAMPLES, SMALLEST
+from .json_schema import Schema, json_schema
+from .tables import Table, tables
 
-_TAGS = ("shape", "kind", "model")
-_HEAD = """# The keys of a case
+_HEAD = """# Keys of a case
 
-A case is one TOML (or JSON) file. `make reference` makes this page from the texts of the models in `cases/`; `conoid
-schema` prints the same as JSON schema, and `conoid validate CASE` tells everything that is wrong with a case at once.
-A first case, step by step: [first_case.md](../tutorial/first_case.md).
+A case is one TOML or JSON file. This page lists its tables and keys. `conoid validate CASE` reports all errors of a
+case at once, with warnings and the cost of the run; `conoid schema` prints the same reference as JSON schema for
+editors. The tutorial [A first case](../tutorial/first_case.md) builds a case step by step. `make reference` makes this
+page from the texts of the models in `cases/`.
 
-**Quantities** are text with a unit, such as `"210 m/s"` or `"7850 kg/m^3"`. A bare number is taken in the SI unit that
-stands with the key; `conoid validate` warns of each that is not 0. In SI units all lie between 1e-30 and 1e30, or are
-0; which unit was written changes no bit of a run. Units, to be combined with `*`, `/` and `^`:
+The smallest complete case has parts and an end time:
+
+```toml
+{smallest}```
+
+**Quantities** are text with a unit, such as `"210 m/s"` or `"7850 kg/m^3"`. A number without a unit is taken in the SI
+unit given with the key; `conoid validate` warns of each one that is not 0. Allowed are 0 and values from 1e-30 to 1e30
+in SI units. The choice of the unit changes no bit of the answer. Units can be combined with `*`, `/` and `^`:
 {units}.
 
-**Places** are coordinates in one frame for all bodies. Stress is positive in tension, pressure in compression.
+**Coordinates** refer to one Cartesian frame for all bodies. Stress is positive in tension, pressure in compression.
+Angles are right-handed.
 
-A key with a default may be absent: – means that nothing stands in for it. A name begins with a letter and has up to 64
-letters, digits, `_` and `-`.
+**Names** begin with a letter and have up to 64 letters, digits, `_` and `-`.
+
+**Tables**: `parts[]` is a list of tables, in TOML one `[[parts]]` each; `parts[].mesh` is a table of a part, in TOML
+`[parts.mesh]` below it. A key with a default may be absent; `–` is no default value: the text of the key states what
+holds without it. Unknown keys are errors.
+
+## Contents
+
+{contents}
 """
+_CHAPTERS = {
+    "The case": ("",),
+    "Parts": ("parts[]",),
+    "Meshes": ("parts[].mesh",),
+    "Materials": ("materials",),
+    "Boundaries": ("boundaries[]",),
+    "Bonds": ("bond[]",),
+    "Contact": ("contact",),
+    "Measurements": ("probes[]", "reference[]"),
+    "Numerical method": ("numerics",),
+    "Run": ("run", "balance"),
+}
+"""Chapters of the page, and the tables that begin them; a table belongs to the chapter with the longest beginning."""
 
-
-@dataclass(frozen=True)
-class Table:
-    """A table of the case: where it stands, as ``parts[].mesh``, and its schema. ``tag``: ``shape = "box"``."""
-
-    path: str
-    tag: str
-    schema: Schema
-
-    @property
-    def title(self) -> str:
-        """The heading of its section."""
-        name = f"`{self.path}`" if self.path else "The case"
-        return f"{name} with `{self.tag}`" if self.tag else name
+_SEVERAL = 4
+"""Chosen: a key that so many variants of a table have stands before them."""
 
 
 def page() -> str:
     """The whole page."""
-    return _Page(json_schema()).text()
+    text = "\n".join([_head(), *_Page(json_schema()).chapters()])
+    return re.sub(r"docs/([a-z]+/[a-z_]+\.md)", r"[\1](../\1)", text)
 
 
-def tables(whole: Schema) -> list[Table]:
-    """Every table of a case in the order of the keys, each at its first place."""
-    found: dict[int, Table] = {}
-    _collect(found, Table("", "", whole), whole)
-    return list(found.values())
+def _head() -> str:
+    units = textwrap.fill(", ".join(f"`{unit}`" for unit in UNITS if unit != "1"), 118)
+    contents = "\n".join(f"- [{title}](#{title.lower().replace(' ', '-')})" for title in _CHAPTERS)
+    return _HEAD.format(units=units, contents=contents, smallest=SMALLEST)
 
 
-def _collect(found: dict[int, Table], table: Table, whole: Schema) -> None:
-    """Adds a table and those below it; what combinations are made of may be combinations again."""
-    if (known := found.get(id(table.schema))) is not None:
-        found[id(table.schema)] = min(known, table, key=lambda each: len(each.path))
-        return
-    found[id(table.schema)] = table
-    for key, schema in table.schema["properties"].items():
-        for path, inner in _tables_in(f"{table.path}.{key}".removeprefix("."), schema, whole):
-            _collect(found, Table(path, _tag(inner), inner), whole)
+def _chapter(path: str) -> str:
+    """The chapter of a table."""
+    begun = [(len(start), title) for title, starts in _CHAPTERS.items() for start in starts if _below(path, start)]
+    return max(begun)[1]
 
 
-def _tables_in(path: str, schema: Schema, whole: Schema) -> Iterator[tuple[str, Schema]]:
-    """The tables that the value of a key is or holds, with their paths."""
-    for variant in variants(schema):
-        meant = definition(variant, whole)
-        if "properties" in meant:
-            yield path, meant
-        if "items" in meant:
-            yield from _tables_in(f"{path}[]", meant["items"], whole)
-        for inner in meant.get("patternProperties", {}).values():
-            yield from _tables_in(f"{path}.NAME", inner, whole)
-
-
-def _tag(schema: Schema) -> str:
-    """``shape = "box"`` of a table that is one of several kinds."""
-    consts = ((key, schema["properties"].get(key, {}).get("const")) for key in _TAGS)
-    return next((f'{key} = "{const}"' for key, const in consts if const is not None), "")
+def _below(path: str, start: str) -> bool:
+    return path == start or (start != "" and path.startswith((f"{start}.", f"{start}[")))
 
 
 class _Page:
-    """The page of one schema."""
+    """The chapters of the page of one schema."""
 
     def __init__(self, whole: Schema) -> None:
-        self._whole = whole
         self._tables = tables(whole)
-        self._paths = {id(table.schema): table.path for table in self._tables}
+        self._cells = Cells(whole, {id(table.schema): table.path for table in self._tables})
 
-    def text(self) -> str:
-        """All of it."""
-        units = textwrap.fill(", ".join(f"`{unit}`" for unit in UNITS if unit != "1"), 118)
-        return "\n".join([_HEAD.format(units=units), *map(self._section, self._tables)])
+    def chapters(self) -> Iterator[str]:
+        """Each chapter with its sections."""
+        groups: dict[str, list[Table]] = {}
+        for table in self._tables:
+            groups.setdefault(table.path, []).append(table)
+        for title in _CHAPTERS:
+            yield f"## {title}\n"
+            for path, group in groups.items():
+                if _chapter(path) == title:
+                    yield from self._variants(group) if group[0].key else self._section(group[0])
 
-    def _section(self, table: Table) -> str:
-        head = f"## {table.title}\n\n{table.schema['description']}\n"
-        rows = "\n".join(self._row(table, key, schema) for key, schema in table.schema["properties"].items())
-        return f"{head}\n| key | value | default | meaning |\n|---|---|---|---|\n{rows}\n"
+    def _section(self, table: Table) -> Iterator[str]:
+        """The section of a table without variants."""
+        if table.path:
+            yield f"### {table.title}\n"
+        yield from _text(table)
+        yield _grid(self._rows(table).values())
 
-    def _row(self, table: Table, key: str, schema: Schema) -> str:
-        default = "required" if key in table.schema.get("required", ()) else _default(schema)
-        meaning = " ".join(schema["description"].split())
-        cells = (f"`{key}`", self._value(schema), default, meaning)
-        return f"| {' | '.join(cell.replace('|', BAR) for cell in cells)} |"
+    def _variants(self, group: list[Table]) -> Iterator[str]:
+        """The sections of a table with variants: first the keys of several, then each with the keys of its own."""
+        key = group[0].key
+        yield f"### `{group[0].path}`\n"
+        yield f"`{key}` selects one of these tables: {', '.join(f'`{each.value}`' for each in group)}.\n"
+        common = _common([self._own(table) for table in group])
+        if common:
+            yield f"Keys of {'all' if len(group) < _SEVERAL else 'several'} of them:\n\n{self._shared(group, common)}"
+        known = []
+        for table in group:
+            own = {name: line for name, line in self._own(table).items() if line not in common}
+            if same := self._same(table, own):
+                known.append(f"| `{table.value}` | {', '.join(f'`{name}`' for name in own)} | {link(same.path)} |")
+            else:
+                yield from self._variant(table, own)
+        if known:
+            yield "\n".join([f"| {key} | keys of its own | described at |", "|---|---|---|", *known, ""])
 
-    def _value(self, schema: Schema) -> str:
-        """What a key takes, in words."""
-        return " or ".join(dict.fromkeys(self._one(variant) for variant in variants(schema))) or "nothing"
+    def _shared(self, group: list[Table], common: list[str]) -> str:
+        """The grid of common rows, with a column of the variants that have them."""
+        lines = []
+        for line in common:
+            values = [each.value for each in group if line in self._own(each).values()]
+            lines.append(f"{line} {_which(values, [each.value for each in group])} |")
+        return _grid(lines, f"with {group[0].key}")
 
-    def _one(self, schema: Schema) -> str:
-        meant = definition(schema, self._whole)
-        if "properties" in meant:
-            return f"table `{self._paths[id(meant)]}`"
-        if "const" in meant:
-            return f"`{_written(meant['const'])}`"
-        if "enum" in meant:
-            return ", ".join(f"`{_written(each)}`" for each in meant["enum"])
-        if "prefixItems" in meant:
-            return _fixed([self._value(each) for each in meant["prefixItems"]])
-        if "items" in meant:
-            most = f" at most {meant['maxItems']}" if "maxItems" in meant else ""
-            return f"list of{most}: {self._value(meant['items'])}"
-        if "patternProperties" in meant:
-            return f"for each name: {self._value(next(iter(meant['patternProperties'].values())))}"
-        return _scalar(meant)
+    def _variant(self, table: Table, own: dict[str, str]) -> Iterator[str]:
+        """The section of a variant, with the keys of its own."""
+        yield f"#### {table.title}\n"
+        yield from _text(table)
+        if own:
+            yield _grid(own.values())
 
+    def _same(self, table: Table, own: dict[str, str]) -> Table | None:
+        """The table of the same shape, kind or model nearer to the top of the case, if it has all of these rows."""
+        for each in self._tables:
+            same = (each.key, each.value) == (table.key, table.value) and len(each.path) < len(table.path)
+            if same and own.items() <= self._rows(each).items():
+                return each
+        return None
 
-BAR = r"\|"
-"""A bar inside a cell."""
+    def _own(self, table: Table) -> dict[str, str]:
+        """The rows of a variant, without that of the key that selects it."""
+        return {name: line for name, line in self._rows(table).items() if name != table.key}
 
-
-def _default(schema: Schema) -> str:
-    value = schema.get("default")
-    if value is None:
-        return "–"
-    if isinstance(value, dict):
-        return "its defaults"
-    return f"`{_written(value, next((each.get('unit', '') for each in variants(schema)), ''))}`"
-
-
-def _written(value: Any, unit: str = "") -> str:
-    if isinstance(value, list):
-        return f"[{', '.join(map(_written, value))}]"
-    if isinstance(value, bool | str):
-        return json.dumps(value)
-    return f"{value:g} {unit}".strip() if isinstance(value, float) else str(value)
-
-
-def _fixed(words: list[str]) -> str:
-    return f"{len(words)} of: {words[0]}" if len(set(words)) == 1 else f"list of: {'; '.join(words)}"
-
-
-def _scalar(schema: Schema) -> str:
-    if "unit" in schema:
-        return _noun(schema["unit"]) + _range(schema)
-    if schema.get("type") == "string":
-        most = f", at most {schema['maxLength']} characters" if "maxLength" in schema else ""
-        if "pattern" in schema:
-            return "64 hexadecimal digits" if "{64}" in schema["pattern"] else "a name"
-        return f"text{most}"
-    nouns = {"integer": "a whole number", "number": "a number", "boolean": "`true` or `false`"}
-    return nouns[schema["type"]] + _range(schema)
+    def _rows(self, table: Table) -> dict[str, str]:
+        """The row of each key."""
+        required = table.schema.get("required", ())
+        return {key: self._cells.row(key, each, key in required) for key, each in table.schema["properties"].items()}
 
 
-def _noun(unit: str) -> str:
-    if unit == "":
-        return "a number"
-    if unit == QUANTITY:
-        return f"a number, or text in {unit} unit"
-    noun = "an angle" if unit == "rad" else KINDS[parse_unit(unit)[1]]
-    return f"{noun}, {unit}"
+def _common(variants: list[dict[str, str]]) -> list[str]:
+    """Rows that all variants have in common, or several of them."""
+    lines = [line for rows in variants for line in rows.values()]
+    return [line for line in dict.fromkeys(lines) if lines.count(line) >= max(2, min(_SEVERAL, len(variants)))]
 
 
-def _range(schema: Schema) -> str:
-    words = {"exclusiveMinimum": "above", "minimum": "at least", "exclusiveMaximum": "below", "maximum": "at most"}
-    said = [f"{word} {schema[key]}" for key, word in words.items() if key in schema]
-    return f", {' and '.join(said)}" if said else ""
+def _which(values: list[str], every: list[str]) -> str:
+    """Names of variants, in few words."""
+    others = [value for value in every if value not in values]
+    if not others:
+        return "all"
+    return f"all except {', '.join(others)}" if len(others) < len(values) else ", ".join(values)
+
+
+def _text(table: Table) -> Iterator[str]:
+    """Description and example of a table."""
+    yield f"{table.schema['description']}\n"
+    if table.title in EXAMPLES:
+        yield f"```toml\n{EXAMPLES[table.title]}```\n"
+
+
+def _grid(rows: Iterable[str], last: str = "") -> str:
+    """A Markdown table of keys; ``last``: title of a fifth column."""
+    titles = ["key", "value", "default", "meaning", *([last] if last else [])]
+    return "\n".join([f"| {' | '.join(titles)} |", f"|{'---|' * len(titles)}", *rows, ""])

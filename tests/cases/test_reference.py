@@ -1,6 +1,7 @@
 """The reference of the keys: complete, as the models have it, and true of what the reader accepts."""
 
 import json
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -8,9 +9,11 @@ from typing import Any
 import jsonschema
 import pytest
 
-from conoid.cases.load import read_data, shipped
+from conoid.cases.load import parse_case, read_data, shipped, toml_data
 from conoid.cases.reference import json_schema, page
+from conoid.cases.reference.examples import EXAMPLES, SMALLEST
 from conoid.cases.reference.json_schema import FILE, LINE, definition
+from conoid.cases.reference.tables import tables
 
 from .scenes import problems, rod
 
@@ -40,38 +43,76 @@ def test_every_key_has_a_text(name: str) -> None:
     assert "``" not in text
 
 
-def test_every_table_has_a_text_and_its_keys_on_the_page() -> None:
+def test_every_table_and_key_stands_on_the_page() -> None:
+    """Below the heading of the table, or in the list of variants whose keys another table has, too."""
     text = page.page()
-    for table in page.tables(SCHEMA):
-        section = text.partition(f"## {table.title}\n")[2].partition("\n## ")[0]
-        assert table.schema["description"] in section
+    for table in tables(SCHEMA):
+        chapter = text.partition(f"### `{table.path}`\n" if table.path else "## The case\n")[2].partition("\n### ")[0]
+        heading = f"#### {table.title}\n"
+        assert table.schema["description"].partition("docs/")[0] in chapter or f"| `{table.value}` | " in chapter
+        assert not table.key or heading in chapter or f"| `{table.value}` | " in chapter
         for key in table.schema["properties"]:
-            assert f"| `{key}` |" in section, f"{table.title}: {key}"
-    assert {id(table.schema) for table in page.tables(SCHEMA)} >= {id(each) for each in SCHEMA["$defs"].values()}
+            assert f"`{key}`" in chapter, f"{table.title}: {key}"
+    assert {id(table.schema) for table in tables(SCHEMA)} >= {id(each) for each in SCHEMA["$defs"].values()}
+
+
+def test_every_link_of_the_page_has_its_heading() -> None:
+    text = page.page()
+    headings = re.findall(r"^#+ (.*)$", text, re.MULTILINE)
+    anchors = {re.sub(r"[^a-z0-9_ -]", "", heading.lower()).replace(" ", "-") for heading in headings}
+    assert set(re.findall(r"\]\(#(.*?)\)", text)) <= anchors
 
 
 @pytest.mark.parametrize(
     ("section", "row"),
     [
+        ("### `run`", "| `end_time` | a time, s, above 0 | required | Simulated time at which the run ends."),
         (
-            "`run`",
-            "| `end_time` | a time, s, above 0 | required | Simulated time at which the run ends; it begins at 0. |",
+            '#### `parts[].mesh` with `shape = "cylinder"`',
+            "| `base` | 3 values: a length, m | `[0, 0, 0]` | Centre of the",
         ),
         (
-            '`parts[].mesh` with `shape = "cylinder"`',
-            "| `base` | 3 of: a length, m | `[0, 0, 0]` | Centre of the",
-        ),
-        (
-            "`parts[].erosion`",
+            "### `parts[].erosion`",
             "| `volume` | list of: a number, above 0 and below 1; a number, above 1 | `[0.1, 10]` |",
         ),
-        ("`contact`", "A body overlaps another where their primitives reach into each other"),
-        ("`numerics`", '| `viscosity` | table `numerics.viscosity` or `"none"` | its defaults |'),
-        ('`boundaries[]` with `kind = "rotation"`', "| `spin` | table `parts[].spin` | required |"),
+        ("### `contact`", "Two bodies overlap where their primitives intersect"),
+        (
+            "### `numerics`",
+            '| `viscosity` | table [`numerics.viscosity`](#numericsviscosity) or `"none"` | its defaults |',
+        ),
+        ('#### `boundaries[]` with `kind = "rotation"`', "| `spin` | table [`parts[].spin`](#partsspin) | required |"),
+        (
+            "### `bond[]`",
+            "| Tensile strength: normal traction at which the interface breaks. Default: it never breaks. | all |",
+        ),
+        ("### `parts[].mesh`", "| all except two_tets, shards"),
+        ("### `parts[].mesh.of[]`", "| `box` | `low`, `high` | [`parts[].mesh`](#partsmesh) |"),
     ],
 )
 def test_a_row_has_unit_range_default_and_meaning(section: str, row: str) -> None:
-    assert row in page.page().partition(f"## {section}\n")[2].partition("\n## ")[0]
+    assert row in page.page().partition(f"{section}\n")[2].partition("\n## ")[0]
+
+
+def with_example(example: str) -> dict[str, Any]:
+    """The smallest case with an example: keys of a part that it has are replaced, entries of other lists are added."""
+    data, piece = toml_data(SMALLEST), toml_data(example)
+    parts = {part["name"]: part for part in data["parts"]}
+    for part in piece.pop("parts", []):
+        mesh = (
+            {"mesh": parts[part["name"]]["mesh"] | part.get("mesh", {})} if "shape" not in part.get("mesh", {}) else {}
+        )
+        parts[part["name"]].update(part | mesh)
+    for key, value in piece.items():
+        data[key] = data.get(key, {}) | value if isinstance(value, dict) else [*data.get(key, []), *value]
+    return data
+
+
+@pytest.mark.parametrize("title", ["smallest", *EXAMPLES])
+def test_an_example_is_a_valid_case_and_changes_it(title: str) -> None:
+    data = with_example(EXAMPLES.get(title, ""))
+    parse_case(data)
+    assert title in {"smallest", *(table.title for table in tables(SCHEMA))}
+    assert (data == toml_data(SMALLEST)) == (title == "smallest")
 
 
 @pytest.mark.parametrize("name", sorted(shipped()))

@@ -22,7 +22,7 @@ from conoid.worker.parallel.comm import SerialComm
 from conoid.worker.run import main
 
 BELOW = """
-from conoid.worker.jit import njit
+from conoid.worker.kernels.jit import njit
 
 from .numbers import FACTOR
 
@@ -32,7 +32,7 @@ def scaled(x):
     return FACTOR * x
 """
 ABOVE = """
-from conoid.worker.jit import njit
+from conoid.worker.kernels.jit import njit
 
 from .below import scaled
 
@@ -320,7 +320,7 @@ def test_numba_is_not_imported_before_its_cache_has_a_name() -> None:
 
 def test_no_two_processes_call_a_function_the_same() -> None:
     """What numba compiles for a kernel has a name of its own in every process: objects of several are loaded."""
-    ask = "from conoid.worker import jit; from numba.core.bytecode import FunctionIdentity as F; "
+    ask = "from conoid.worker.kernels import jit; from numba.core.bytecode import FunctionIdentity as F; "
     ask += "print(next(F._unique_ids))"
     told = [subprocess.run([sys.executable, "-c", ask], capture_output=True, text=True, check=True) for _ in range(2)]
     one, other = (int(each.stdout) for each in told)
