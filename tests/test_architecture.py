@@ -134,45 +134,6 @@ def test_a_numeric_constant_says_where_it_comes_from() -> None:
                 assert told, f"{name_of(path)}:{node.lineno}: {ast.unparse(node)}"
 
 
-SMALL = ("worker/contact", "worker/fracture")
-"""Folders of the worker in which no file, class or function grows."""
-LONGEST_FILE, MOST_ATTRIBUTES, MOST_PARAMETERS = 300, 12, 12
-"""Chosen: a file that is read at one sitting, an object and a call that are taken in at a glance."""
-LARGE = {
-    "worker/contact/scene/scene.py: Scene": 13,
-    "worker/contact/stage.py: Contact": 14,
-}
-"""Classes that have more attributes than they should, and how many: these numbers may fall and not rise."""
-SMALL_SOURCES = [path for path in SOURCES if name_of(path).startswith(SMALL)]
-
-
-def attributes(cls: ast.ClassDef) -> set[str]:
-    """Fields that a class declares, and attributes that its methods set."""
-    declared = {n.target.id for n in cls.body if isinstance(n, ast.AnnAssign) and isinstance(n.target, ast.Name)}
-    stored = (n for n in ast.walk(cls) if isinstance(n, ast.Attribute) and isinstance(n.ctx, ast.Store))
-    return declared | {n.attr for n in stored if isinstance(n.value, ast.Name) and n.value.id == "self"}
-
-
-@pytest.mark.parametrize("path", SMALL_SOURCES, ids=name_of)
-def test_files_classes_and_calls_of_contact_and_fracture_stay_small(path: Path) -> None:
-    assert len(path.read_text(encoding="utf-8").splitlines()) <= LONGEST_FILE
-    for node in ast.walk(tree(path)):
-        if isinstance(node, ast.ClassDef):
-            name = f"{name_of(path)}: {node.name}"
-            assert len(attributes(node)) <= LARGE.get(name, MOST_ATTRIBUTES), f"{name}: {sorted(attributes(node))}"
-        elif isinstance(node, ast.FunctionDef):
-            given = [*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs]
-            named = [each for each in given if each.arg not in ("self", "cls")]
-            assert len(named) <= MOST_PARAMETERS, f"{name_of(path)}:{node.lineno}: {node.name}"
-
-
-@pytest.mark.parametrize("name", LARGE)
-def test_limits_of_large_classes_are_what_they_have(name: str) -> None:
-    place, _, known = name.partition(": ")
-    (found,) = [n for n in ast.walk(tree(ROOT / place)) if isinstance(n, ast.ClassDef) and n.name == known]
-    assert MOST_ATTRIBUTES < len(attributes(found)) == LARGE[name]
-
-
 PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md")])
 KNOWN = [f"/{name_of(path)}" for path in [*SOURCES, *TESTS]]
 MODULE_IN_PROSE = re.compile(rf"`((?:{'|'.join(HOUSES)}|tests)(?:/\w+)+)`")
