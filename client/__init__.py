@@ -7,6 +7,7 @@ and gives its result; a result is viewed.
 from conoid.cases.reading.problems import CaseError, ConoidError
 
 from .errors import ClientError, NotFoundError, ServiceError, UnfinishedError, UnreachableError, ViewError
+from .local.local import LocalServer
 from .remote.run_info import RunInfo
 from .remote.session import Session, connect
 from .result import Result
@@ -15,6 +16,6 @@ from .sweeps.adaptive_result import Found
 from .sweeps.sweep import Sweep
 
 __all__ = [
-    "CaseError", "ClientError", "ConoidError", "Found", "NotFoundError", "Result", "Run", "RunInfo", "ServiceError",
-    "Session", "Sweep", "UnfinishedError", "UnreachableError", "ViewError", "connect",
+    "CaseError", "ClientError", "ConoidError", "Found", "LocalServer", "NotFoundError", "Result", "Run", "RunInfo",
+    "ServiceError", "Session", "Sweep", "UnfinishedError", "UnreachableError", "ViewError", "connect",
 ]  # fmt: skip

@@ -174,6 +174,18 @@ def run_case(
     raise typer.Exit(run_once(case, chosen, out, picture, field, plain=plain, check=check, as_json=as_json))
 
 
+@app.command(short_help="Run the demonstration: a steel bar breaks a glass bar.")
+def demo(
+    out: Annotated[Path, typer.Option("--out", help="Picture of the last frame.")] = Path("demo.png"),
+    ranks: Ranks = None,
+) -> None:
+    """Run the case glass_steel_demo on this machine, check its reference numbers and draw its last frame.
+
+    Takes some ten seconds and nothing but this installation; the run is kept below runs/local.
+    """
+    raise typer.Exit(run_once("glass_steel_demo", on_cores(ranks, None), Path("runs/local"), out, check=True))
+
+
 app.add_typer(shipped.cases, name="cases")
 app.command(short_help="Print the keys of a case, for editors or people.")(shipped.schema)
 app.command(short_help="List the material library, or one material.")(shipped.materials)

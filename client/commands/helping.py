@@ -5,7 +5,7 @@ from typer.core import TyperCommand, TyperGroup
 
 GROUPS: dict[str, tuple[str, ...]] = {
     "Cases and meshes": ("cases", "validate", "import", "schema", "materials"),
-    "Run": ("run", "submit", "batch", "restart"),
+    "Run": ("demo", "run", "submit", "batch", "restart"),
     "Follow and steer": ("runs", "ls", "show", "watch", "cancel", "checkpoint", "snapshot"),
     "Look at results": ("view", "figures", "report", "get", "replay-balance"),
     "Compare": ("compare", "sweep", "sweep-table", "sweep-plot", "sweep-cancel", "converge"),
@@ -19,6 +19,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "import": ("conoid import bar.k", "conoid import model.inp --units mm,t,s --out case"),
     "schema": ("conoid schema --out case.schema.json", "conoid schema --page --out keys.md"),
     "materials": ("conoid materials", "conoid materials alumina"),
+    "demo": ("conoid demo", "conoid demo --ranks 2 --out glass.png"),
     "run": ("conoid run demo --ranks 2 --view bar.png", "conoid run my_case.toml --set run.end_time='20 us' --check"),
     "submit": ("conoid submit my_case.toml --label batch=first", "conoid submit demo --ranks 4 --threads 2"),
     "batch": ("conoid batch my_case.toml --ranks 16",),
