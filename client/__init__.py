@@ -7,7 +7,7 @@ and gives its result; a result is viewed.
 from conoid.cases.reading.problems import CaseError, ConoidError
 
 from .errors import ClientError, NotFoundError, ServiceError, UnfinishedError, UnreachableError, ViewError
-from .local.local import LocalServer
+from .local.own_server import LocalServer
 from .remote.run_info import RunInfo
 from .remote.session import Session, connect
 from .result import Result
