@@ -1,4 +1,5 @@
-"""What contact has taken from the bodies, and so what it may give back by taking back penetrations."""
+"""Account of the energy that contact took from the bodies: the limit of the energy that it may give back when it
+corrects penetrations."""
 
 import numpy as np
 
@@ -6,20 +7,20 @@ from ..model.state import Ints
 from ..parallel.fixed_point import Tally
 
 _AHEAD = 2.0
-"""How many times what one step has given back at most, so far, must be left for the next one."""
+"""Safety factor: the balance must exceed this many times the largest energy given back in one step so far."""
 
 
 class Account:
-    """Sums over all meetings, steps and ranks, as integers: no order and no cut changes a decision."""
+    """Sums over all contacts, steps and ranks, as integers: independent of the order and of the cut."""
 
     def __init__(self, energy: float) -> None:
-        """``energy``: the order of magnitude of what one meeting takes in a step, J."""
+        """``energy``: order of magnitude of the energy that one contact takes in a step, J."""
         self._tally = Tally(np.full(2, energy))
         self._taken, self._early, self._most = 0.0, 0.0, 0.0
 
     @property
     def words(self) -> Ints:
-        """(2, 2) limbs of the sums of this rank; see booking.cost."""
+        """(2, 2) limbs of the sums of this rank; see impulse_work.cost."""
         return self._tally.words
 
     @property
@@ -32,10 +33,11 @@ class Account:
         self._tally.carry()
 
     def settle(self, words: Ints) -> bool:
-        """Whether contact may take penetrations back in the step ahead; ``words`` (2, 2): the sum of those of all
+        """Returns whether contact may correct penetrations in the step ahead; ``words`` (2, 2): sum of the words of all
         ranks.
 
-        It may while it has taken from the bodies what two steps can give back, each as much as any step so far.
+        It may while the energy taken from the bodies is at least ``_AHEAD`` times the largest energy given back in
+        one step.
         """
         taken, early = (float(v) for v in self._tally.valued(words))
         self._most = max(self._most, self._taken - taken, early - self._early)
@@ -43,10 +45,10 @@ class Account:
         return taken >= _AHEAD * self._most
 
     def known(self) -> tuple[float, float, float, float]:
-        """What it remembers besides the words, equal on all ranks."""
+        """Values besides the words, for a parcel; equal on all ranks."""
         return self.scale, self._taken, self._early, self._most
 
     def resume(self, words: Ints, known: tuple[float, float, float, float]) -> None:
-        """Takes it back."""
+        """Restores the state of ``keep`` from a parcel."""
         scale, self._taken, self._early, self._most = known
         self._tally.words, self._tally.scale = words, np.full(2, scale)

@@ -1,4 +1,4 @@
-"""What contact has done to the nodes and parts of a rank: energies and impulses, booked as they come."""
+"""Energies and impulses of contact, summed by node and by part on one rank."""
 
 import numpy as np
 
@@ -16,34 +16,37 @@ from .scene.scene import Scene
 
 
 class Books:
-    """One half of the work of an impulse is booked in the step that gives it, the other in the next one."""
+    """Sums of the energies and impulses. One half of the work of an impulse is booked in the step that applies it,
+    with v(n+1/2), and the other half in the next one, with v(n-1/2)."""
 
     def __init__(self, nodes: int, case: Case, impulse: float, energy: float, team: Team) -> None:
-        """The most that may be on one node in a step: ``impulse``, N s, and ``energy``, J."""
+        """``impulse``, N s, and ``energy``, J: upper bounds at one node in one step."""
         self._book = Pass(team, tasks.book, *tasks.BOOK, size=tasks.SLOTS_OF_A_TASK)
         self.contact_loss = np.zeros(nodes)
         """(nodes,) energy lost by impact and friction, J."""
         self.external_work = np.zeros(nodes)
-        """(nodes,) work that what holds nodes does against contact, J."""
+        """(nodes,) work of the supports of held nodes against contact, J."""
         self.scale = fixed_point.scale_for(impulse)
         """Quanta per N s."""
         self.friction = fixed_point.Tally(np.full(2, energy))
-        """Work of friction so far, J, and the second half of that of the last step until it is due."""
+        """Work of friction so far, J, and the part of the last step that is not yet in the ledger."""
         self.account = Account(energy)
         self.agreed = self.account.words
-        """What contact has taken on all ranks, when they last agreed (account.py)."""
+        """Sum over all ranks of the words of the account, from the last reduction (account.py)."""
         parts, asked = len(case.parts), any(probe.by is not None for probe in case.probes)
         self.parts = np.zeros((parts, 3), np.int64)
-        """(parts, 3) impulses so far, quanta."""
+        """(parts, 3) impulses on each part so far, quanta."""
         self.pairs = np.zeros((parts, parts, 3) if asked else (0, 0, 3), np.int64)
-        """(parts, parts, 3) impulses so far that each has got from each, quanta; (0, 0, 3) where nobody asks."""
+        """(parts, parts, 3) impulses so far on each part (first index) from each other part, quanta; (0, 0, 3) if no
+        probe has the key ``by``."""
         self.pressed = np.zeros((nodes if "contact_pressure" in case.run.fields else 0, 3), np.int64)
-        """(nodes, 3) impulses since the frame before, quanta; (0, 3) where nobody asks."""
+        """(nodes, 3) impulses since the last frame, quanta; (0, 3) if the field ``contact_pressure`` is not written."""
         self.open: Ints = np.zeros((0, 3), np.int64)
-        """(nodes, 3) impulses of the last step, quanta, of a run that goes on here; (0, 3) once they are booked."""
+        """(nodes, 3) impulses of the last step before a restart or a cut, quanta; (0, 3) once they are booked."""
 
     def keep(self, parcel: Parcel, scene: Scene | None) -> None:
-        """Adds everything; the impulses of the last step are with the ``scene``, if there is one."""
+        """Adds all sums to the ``parcel``; the impulses of the last step are read from the ``scene``, if there is
+        one."""
         parcel.nodes["contact.contact_loss"] = self.contact_loss
         parcel.nodes["contact.external_work"] = self.external_work
         parcel.sums["contact.parts"], parcel.sums["contact.friction"] = self.parts, self.friction.words
@@ -56,7 +59,7 @@ class Books:
         parcel.nodes["contact.total"] = total
 
     def resume(self, parcel: Parcel, known: tuple[float, float, float, float]) -> None:
-        """Takes it back; ``known``: of the account."""
+        """Restores the sums from the ``parcel``; ``known``: values of the account."""
         self.contact_loss = np.array(parcel.nodes["contact.contact_loss"])
         self.external_work = np.array(parcel.nodes["contact.external_work"])
         self.account.resume(parcel.sums["contact.account"], known)
@@ -66,7 +69,7 @@ class Books:
         self.pairs, self.open = parcel.sums["contact.pairs"], parcel.nodes["contact.total"]
 
     def grow(self, copies: int) -> None:
-        """Takes up copies of nodes; what has been booked stays with their parents."""
+        """Extends the arrays by ``copies`` nodes; booked energies stay with the parents."""
         self.contact_loss = extended(self.contact_loss, np.zeros(copies))
         self.external_work = extended(self.external_work, np.zeros(copies))
         if len(self.pressed):
@@ -74,27 +77,27 @@ class Books:
 
     @staticmethod
     def friction_work(friction: Floats) -> float:
-        """Heat of friction so far of the contacts of all ranks, J, that of the last step as far as ``contact_loss`` has
-        it; by the sums of ``friction`` over them.
+        """Heat of friction of all ranks at time n, J, without the half of the last step that ``contact_loss`` does
+        not have yet; ``friction``: sums over all ranks.
         """
         work, later = friction
         return float(work - later)
 
     def impulses(self, comm: Comm) -> Floats:
-        """(parts, 3) what contact has given each part so far, N s; all ranks take part."""
+        """(parts, 3) impulses of contact on each part so far, N s. Collective."""
         return np.asarray(comm.sum(self.parts) / self.scale)
 
     def between(self, comm: Comm) -> Floats:
-        """(parts, parts, 3) what each part has got from each by contact so far, N s; all ranks take part."""
+        """(parts, parts, 3) impulses of contact on each part from each other part so far, N s. Collective."""
         return np.asarray(comm.sum(self.pairs) / self.scale)
 
     def due(self) -> None:
-        """The second half of the work of the last impulses is due: friction's as well."""
+        """Clears the outstanding half of the work of friction: the next booking includes it."""
         self.friction.words[:, 1] = 0
 
     def book(self, scene: Scene, places: Indices, *, fresh: bool = False) -> None:
-        """Half of the work of the last impulses, at the ``places`` of the scene, with the velocities in ``before``.
-        Those that are ``fresh`` go to the impulses since the frame before, where somebody asks for these.
+        """Books half of the work of the last impulses at the ``places`` of the scene, with the velocities
+        ``before``. ``fresh`` impulses are also added to the impulses since the last frame, if these are written.
         """
         if fresh and len(self.pressed):
             self.pressed[scene.own.local] += scene.slots.total[scene.own.slots]
@@ -104,7 +107,8 @@ class Books:
         )  # fmt: skip
 
     def book_resumed(self, nodes: Nodes, mobility: Floats) -> None:
-        """The second half of the work of impulses from before a run went on here; ``mobility`` (nodes, 3), 1/kg."""
+        """Books the second half of the work of impulses from before a restart or a cut; ``mobility`` (nodes, 3),
+        1/kg."""
         if len(self.open):
             some = np.flatnonzero(self.open.any(axis=1)).astype(np.int32)
             every = np.arange(len(self.open), dtype=np.int32)

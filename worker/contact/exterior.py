@@ -1,4 +1,4 @@
-"""The surface of a rank, its cracks, and the mean normals of its nodes: kept by what happens to them."""
+"""Surface, cracks and node normals of a rank, and their updates."""
 
 import numpy as np
 
@@ -17,31 +17,31 @@ from .surface import exposure, normals, surface
 from .surface.families import Corners
 
 _WORDS = 9 + 2 * normals.SHARE
-"""Of the row of a crack that opens (Exterior.widened)."""
+"""Width of the row of a crack that opens (Exterior.widened)."""
 
 
 class Exterior:
-    """What of a rank's bodies may meet others."""
+    """Surface of the bodies of one rank: faces, edges, cracks and mean normals."""
 
     def __init__(
         self, model: Model, neighbours: list[Neighbour], bounds: list[Boundary], edges: bool, comm: Comm
     ) -> None:
-        """``edges``: whether sharp edges meet each other; all ranks take part."""
+        """``edges``: whether edge-edge contact is on. Collective."""
         self._model, self._neighbours, self._comm, self._edges = model, neighbours, comm, edges
         self._bounds = bounds
         self.cracks = Cracks.none(model.nodes.id)
         self._tiring: Ints | None = None
-        """Ids, ascending, of the tets here that the last search has expected to leave; None before any tet has left."""
+        """Ids, ascending, of the local tets that the last search expected to erode; None before any tet has eroded."""
         self.surface = self._build(np.zeros(model.nodes.n, bool), np.zeros(0, np.int64))
         self.size = typical(self.surface.faces.size, comm)
-        """Of the faces of all ranks at the start, m."""
+        """Typical size of the faces of all ranks at the start, m."""
         self.motion = SurfaceMotion(self.surface, model.nodes, mobilities(model.nodes, bounds), self.size, comm)
         self._moments = np.zeros((model.nodes.n, normals.COLUMNS), np.int64)
         self._broken = False
-        """Whether facets of any rank have broken: cracks may be open."""
+        """Whether facets of any rank have broken, so that cracks may open."""
 
     def keep(self, parcel: Parcel) -> None:
-        """Adds cracks, edges that have become sharp, nodes of the surface and moments of normals."""
+        """Adds cracks, edges that became sharp, surface nodes and moments of normals to the ``parcel``."""
         parcel.rows["contact.cracks"] = self.cracks.keep(parcel.nodes["id"])
         parcel.nodes["family"] = self.cracks.families.root
         parcel.rows["contact.turned"] = {"tet": self.surface.turned >> 34, "name": self.surface.turned}
@@ -49,11 +49,11 @@ class Exterior:
         parcel.nodes["contact.loose"] = self.motion.loose
 
     def resume(self, parcel: Parcel, size: float, broken: bool) -> None:
-        """Takes them back; all ranks take part."""
+        """Restores the state of ``keep``. Collective."""
         self.size, self._broken = size, broken
         turned = np.sort(parcel.rows["contact.turned"]["name"])
         self.surface.sharpen(turned)
-        self.surface.turned = turned  # those at cracks, too, which the next search brings to the surface
+        self.surface.turned = turned  # includes edges at cracks, which the next search adds to the surface
         self.surface.flags = np.array(parcel.nodes["contact.flags"])
         self._moments = np.array(parcel.nodes["contact.moments"])
         nodes = self._model.nodes
@@ -63,8 +63,8 @@ class Exterior:
         self.cracks = Cracks.resume(parcel.rows["contact.cracks"], root, self._model.blocks, nodes)
 
     def require_faces(self, allowed: Flags) -> None:
-        """Raises InputError, on every rank alike, when a part that may meet any, ``allowed`` (parts, parts), has no
-        face to meet with.
+        """Raises InputError on all ranks when a part that may be in contact, by ``allowed`` (parts, parts), has no
+        exposed face.
         """
         model = self._model
         first = np.searchsorted(model.nodes.id, self.surface.faces.nodes[:, 0])
@@ -77,12 +77,13 @@ class Exterior:
 
     @property
     def owned(self) -> Flags:
-        """(nodes,) nodes of the surface that this rank owns."""
+        """(nodes,) surface nodes that this rank owns."""
         return self.surface.flags & self._model.nodes.owned
 
     def _build(self, flags: Flags, turned: Ints) -> surface.Surface:
-        """The surface, with sides of cracks that may open and faces that tiring tets cover; nodes that have been on it,
-        ``flags`` (n,), still are, and edges that have become sharp, ``turned``, stay so. All ranks take part.
+        """Returns the surface, with the sides of cracks that may open and the faces behind tets near erosion. Nodes
+        once on the surface, ``flags`` (n,), stay on it, and edges that became sharp, ``turned``, stay sharp.
+        Collective.
         """
         model, neighbours, comm = self._model, self._neighbours, self._comm
         sides, covered = self.cracks.foresee(), np.zeros((0, 3), np.int32)
@@ -94,15 +95,15 @@ class Exterior:
         return found
 
     def sharpen(self, scene: Scene, least: Floats) -> None:
-        """Which edges have become sharp, their faces' normals at a cosine below that of their part, ``least``."""
+        """Marks the edges whose faces' normals have a cosine below ``least`` (parts,) as sharp, for good."""
         turned = scene.sharpen(least)[: self.surface.edges.n]
         if turned.any():
             self.surface.sharpen(np.union1d(self.surface.turned, self.surface.edges.names[turned]))
 
     def uncover(self, gone: Ints, loose: Flags, removed: Flags, scene: Scene | None) -> bool:
-        """Mean normals, nodes of the surface and the ``scene`` after tets ``gone`` (k, exposure.WORDS) of this rank
-        have left; ``loose`` (nodes,): nodes without tets that fly on, ``removed``: those that have left. Returns
-        whether a search has to take up what has been laid bare; all ranks take part.
+        """Updates mean normals, surface nodes and the ``scene`` after erosion of the tets ``gone`` (k,
+        exposure.WORDS) of this rank. ``loose`` (nodes,): nodes without tets that stay in the model; ``removed``
+        (nodes,): nodes that leave it. Returns whether a search must add faces that the scene lacks. Collective.
         """
         if self._tiring is None:
             self._tiring = np.zeros(0, np.int64)
@@ -127,24 +128,24 @@ class Exterior:
         return False
 
     def _loosen(self, loose: Flags) -> None:
-        """Nodes without tets move as what still holds them lets them."""
+        """Updates the mobility of nodes that have lost their last tet: only their own boundaries hold them."""
         if (loose & ~self.motion.loose).any():
             self.motion.loose, self.motion.mobility = loose, mobilities(self._model.nodes, self._bounds)
 
     def crack(self, tets: Ints, nodes: Indices, sides: Indices) -> None:
-        """Takes up broken facets; see ``Cracks.add``."""
+        """Adds broken facets; see ``Cracks.add``."""
         self.cracks.add(tets, nodes, sides, self._model.blocks)
 
     def take_up(self) -> None:
-        """The surface anew, with what may become part of it before the next search; all ranks take part."""
+        """Builds the surface with everything that may become surface before the next search. Collective."""
         if self._tiring is not None:
             self._tiring = exposure.tiring(self._model.blocks)
         if self._broken or self._tiring is not None:
             self.surface = self._build(self.surface.flags, self.surface.turned)
 
     def age(self) -> bool:
-        """Edges of all cracks that are there may meet others from now on, where edges do; whether a search has to take
-        them up. All ranks take part.
+        """Admits the edges of all present cracks to edge-edge contact, if that is on; returns whether a search must
+        add them. Collective.
         """
         return self._edges and self.cracks.age(self._comm.sum(self.cracks.ages))
 
@@ -153,12 +154,12 @@ class Exterior:
         return symmetry_planes(self._model.nodes.n, self._bounds)
 
     def turn(self) -> None:
-        """Mean normals of all nodes anew; all ranks take part."""
+        """Recomputes the mean normals of all nodes. Collective."""
         self._moments = normals.moments(self._model, self._planes, self.size, self._neighbours, self._comm)
 
     def show(self, scene: Scene, local: "np.ndarray") -> "np.ndarray":
-        """Gives the scene the mean normals of some nodes of this rank, and whether they are on the surface; returns
-        their places.
+        """Writes the mean normals of the nodes ``local`` of this rank, and whether they are on the surface, to the
+        scene; returns their slots.
         """
         place = scene.own.place[local]
         local, place = local[place >= 0], place[place >= 0]
@@ -167,8 +168,8 @@ class Exterior:
         return np.asarray(place)
 
     def refresh(self, course: Floats, t: float) -> None:
-        """The flight from time ``t`` on, with the velocities ``course`` (nodes, 3), of the surface as it is; all ranks
-        take part.
+        """Sets the positions at time ``t`` and the extrapolated velocities ``course`` (nodes, 3) of the current
+        surface. Collective.
         """
         nodes = self._model.nodes
         self.motion.begin(nodes, course, t)
@@ -178,8 +179,9 @@ class Exterior:
             self.motion.refresh(nodes)
 
     def widened(self, rows: Ints) -> Ints:
-        """(k, _WORDS) of the cracks ``rows`` (k,): whether the last search has taken them up; ids of both sides; of the
-        nodes of either, outward; and what each side adds to the moments of its nodes.
+        """(k, _WORDS) messages of the cracks ``rows`` (k,): whether the last search included them; ids of both
+        sides; ids of the nodes of either side, counter-clockwise seen from outside; and their contributions to the
+        moments of the nodes.
         """
         if not len(rows):
             return np.zeros((0, _WORDS), np.int64)
@@ -189,7 +191,8 @@ class Exterior:
         return np.column_stack([cracks.foreseen[rows], cracks.faces[rows], nodes.id[sides], shares])
 
     def open(self, told: Ints, scene: Scene | None) -> bool:
-        """Makes surface of the cracks (``widened``) that ranks have told each other of; whether the scene lacks any."""
+        """Makes surface of the cracks of all ranks, rows of ``widened``; returns whether the scene lacks any of
+        them."""
         told = told.reshape(-1, _WORDS)
         nodes, sides = self._model.nodes, told[:, 3:9].reshape(-1, 3)
         local = nodes.places(sides)
@@ -205,12 +208,12 @@ class Exterior:
         return bool((told[:, 0] == 0).any())
 
     def narrow(self) -> list[tuple[Block, Corners]]:
-        """Blocks that have broken, and the corners of their narrow sides; see corner_contact.py."""
+        """Blocks with broken facets, and the corners of their narrow sides; see corner_contact.py."""
         some = enumerate(self._model.blocks) if len(self.cracks.faces) else ()
         return [(block, self.cracks.corners(b)) for b, block in some if len(block.bond)]
 
     def separate(self, split: Split) -> None:
-        """Follows nodes as they separate on any rank."""
+        """Follows the separation of nodes on any rank."""
         self._broken |= bool(split.touched.any())
         if split.copies.n:
             parents = split.copies.parents
@@ -219,7 +222,7 @@ class Exterior:
             self._moments = extended(self._moments, self._moments[parents])
 
     def grow(self, split: Split) -> None:
-        """Takes up the copies of nodes."""
+        """Extends the mobility by the copies of nodes, with their new masses."""
         parents, motion = split.copies.parents, self.motion
         motion.mobility = extended(motion.mobility, motion.mobility[parents])
         for some in (parents, split.first + np.arange(split.copies.n)):
@@ -228,7 +231,7 @@ class Exterior:
 
 
 def mobilities(nodes: Nodes, bounds: list[Boundary]) -> Floats:
-    """(nodes, 3) one over the mass, 1/kg, zero where a velocity is held."""
+    """(nodes, 3) inverse of the mass, 1/kg; zero in held directions."""
     mobility = np.repeat(1.0 / nodes.mass[:, None], 3, axis=1)
     for bound in bounds:
         mobility[bound.nodes] = np.where(bound.held_components() == FREE, mobility[bound.nodes], 0.0)
@@ -236,7 +239,8 @@ def mobilities(nodes: Nodes, bounds: list[Boundary]) -> Floats:
 
 
 def symmetry_planes(n: int, bounds: list[Boundary]) -> Flags:
-    """(nodes, planes) which of ``n`` nodes lie on which symmetry plane; two planes across one axis are two columns."""
+    """(nodes, planes) membership of ``n`` nodes in symmetry planes; two planes normal to the same axis are two
+    columns."""
     mirrors = [bound for bound in bounds if bound.mirrors]
     planes = np.zeros((n, len(mirrors)), bool)
     for k, bound in enumerate(mirrors):

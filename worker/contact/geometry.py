@@ -1,5 +1,5 @@
-"""Points, faces and edges in kernels. A vector is three numbers, which stay in registers: no kernel makes an array for
-one.
+"""Points, faces and edges in kernels. A vector is a tuple of three floats, which stays in registers; no kernel
+allocates an array for one.
 """
 
 import numpy as np
@@ -7,9 +7,9 @@ import numpy as np
 from ..kernels.jit import njit
 
 MARGIN = 1e-3
-"""Of the area coordinates: how far outside of a face the foot of a node may lie."""
+"""Tolerance of the area coordinates: how far outside of a face the foot of a node may lie."""
 VECTOR = "UniTuple(float64, 3)"
-"""In numba's notation."""
+"""Type of a vector in numba's notation."""
 
 
 @njit(f"{VECTOR}(float64[:, :], int64)", cache=True)
@@ -63,7 +63,7 @@ def distance(a, b):  # type: ignore[no-untyped-def]
 
 @njit(f"Tuple((float64, {VECTOR}))({VECTOR}, {VECTOR}, {VECTOR}, {VECTOR})", cache=True, error_model="numpy")
 def height(s, i, j, k):  # type: ignore[no-untyped-def]
-    """Height of the point s over the face i, j, k, m, and the unit normal; NaN for a face of no area."""
+    """Height of the point s above the face i, j, k, m, and the unit normal of the face; NaN for a face of zero area."""
     n = cross(minus(j, i), minus(k, i))
     r = 1.0 / np.sqrt(dot(n, n))
     return dot(n, minus(s, i)) * r, (n[0] * r, n[1] * r, n[2] * r)
@@ -71,8 +71,8 @@ def height(s, i, j, k):  # type: ignore[no-untyped-def]
 
 @njit(f"Tuple((boolean, {VECTOR}))({VECTOR}, {VECTOR}, {VECTOR})", cache=True, error_model="numpy")
 def foot(r, e, f):  # type: ignore[no-untyped-def]
-    """Whether the foot of a point lies on the face of sides e and f, and its area coordinates; ``r``: the point, from
-    the corner of both.
+    """Whether the foot of a point lies on the face of edges e and f, and its area coordinates; ``r``: the point
+    minus the common corner of e and f.
     """
     ee, ff, ef, er, fr = dot(e, e), dot(f, f), dot(e, f), dot(e, r), dot(f, r)
     area = ee * ff - ef * ef
@@ -96,7 +96,8 @@ def off(s, a, b):  # type: ignore[no-untyped-def]
 
 @njit(f"float64({VECTOR}, {VECTOR}, {VECTOR}, {VECTOR})", cache=True, error_model="numpy")
 def segments(a, b, c, d):  # type: ignore[no-untyped-def]
-    """Distance of the segments ab and cd, m: where their lines are nearest, or from an end."""
+    """Distance of the segments ab and cd, m: between the nearest points of their lines if both lie within, else the
+    least from an end."""
     u, w, r = minus(b, a), minus(d, c), minus(c, a)
     uu, uw, ww, ur, wr = dot(u, u), dot(u, w), dot(w, w), dot(u, r), dot(w, r)
     area = uu * ww - uw * uw
@@ -109,7 +110,7 @@ def segments(a, b, c, d):  # type: ignore[no-untyped-def]
 
 @njit(f"{VECTOR}({VECTOR}, {VECTOR}, {VECTOR}, {VECTOR})", cache=True, error_model="numpy")
 def nearest(a, b, c, d):  # type: ignore[no-untyped-def]
-    """From the point of the segment ab that is nearest to cd to the nearest point of that; Ericson (2005), 5.1.9."""
+    """Vector from the point of the segment ab nearest to cd to the nearest point of cd; Ericson (2005), 5.1.9."""
     u, w, r = minus(b, a), minus(d, c), minus(c, a)
     uu, uw, ww, ur, wr = dot(u, u), dot(u, w), dot(w, w), dot(u, r), dot(w, r)
     area = uu * ww - uw * uw
@@ -123,7 +124,7 @@ def nearest(a, b, c, d):  # type: ignore[no-untyped-def]
 
 @njit("float64(float64[:, :], int64, int64, int64, int64)", cache=True, error_model="numpy")
 def lowest_height(x, a, b, c, d):  # type: ignore[no-untyped-def]
-    """Of the tet abcd, m."""
+    """Least height of the tet abcd, m."""
     u, to, fro = minus(at(x, b), at(x, a)), minus(at(x, c), at(x, a)), minus(at(x, d), at(x, a))
     one, two, three, four = cross(u, to), cross(u, fro), cross(to, fro), cross(minus(to, u), minus(fro, u))
     largest = max(max(dot(one, one), dot(two, two)), max(dot(three, three), dot(four, four)))

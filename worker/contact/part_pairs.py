@@ -1,4 +1,4 @@
-"""Which parts meet, with what friction, and what the lighter of two that meet weighs."""
+"""Pairs of parts: whether they may be in contact, their friction, and the mass that bounds their impulses."""
 
 import numpy as np
 
@@ -11,8 +11,8 @@ from ..rigid.stage import Rigid
 
 
 def friction(case: Case) -> Floats:
-    """(parts, parts) Coulomb's coefficient, NaN where two parts do not meet: parts of one body that cannot come apart
-    do not.
+    """(parts, parts) Coulomb's coefficient; NaN where two parts may not be in contact, as parts of one body that
+    cannot separate.
     """
     assert case.contact is not None
     spec, names = case.contact, [part.name for part in case.parts]
@@ -31,19 +31,19 @@ def friction(case: Case) -> Floats:
 
 
 def itself(case: Case, mu: Floats) -> Flags:
-    """(parts,) whether the body of each part may meet itself: the part, or another one of the body; ``mu`` as
-    ``friction`` gives it.
+    """(parts,) whether each part may be in contact with itself or with another part of its body; ``mu``: result of
+    ``friction``.
     """
     body = np.array(bodies(case))
     return np.asarray((~np.isnan(mu) & (body[:, None] == body)).any(axis=1))
 
 
 def lighter(mu: Floats, nodes: Nodes, mobility: Floats, comm: Comm, rigid: Rigid | None = None) -> float:
-    """The heaviest node, kg, of the lighter of two parts that meet, over all that do; of ``rigid`` bodies their whole
-    mass. All ranks take part.
+    """Returns the mass, kg, of the heaviest node of the lighter of two parts, maximum over all pairs in contact; for
+    ``rigid`` bodies the whole mass; 0 without pairs. Collective.
 
-    No impulse is more than it times a speed: the lighter body cannot give more. What is held along some direction,
-    ``mobility`` (nodes, 3) 0, gives as much as it gets. 0 where no parts meet.
+    No impulse exceeds this mass times a speed, because the lighter part has no more momentum. A part with a held
+    direction, ``mobility`` (nodes, 3) 0, can transmit any impulse, so the other part of the pair counts.
     """
     mass, held = np.zeros(len(mu)), np.zeros(len(mu))
     np.maximum.at(mass, nodes.part, nodes.mass)

@@ -1,8 +1,8 @@
-"""Contact in the time step: search when it is due, find who meets, push them apart, book what it cost.
+"""Contact in the time step: search if scheduled, detect active contacts, apply impulses, book their work.
 
-Every contact is computed by one rank, the one that owns its node or has its first edge; ghosts of other ranks'
-surfaces make that possible. The impulses on a node are completed over all ranks that push or hold it, so that
-everybody ends with the same velocity, to the bit.
+Every contact is computed by one rank: the owner of its node, or the rank of its first edge. Ghosts of other ranks'
+surfaces provide the data. Impulses on a node are summed over all ranks that hold the node or have a contact of it,
+so that all copies get the same velocity, to the bit.
 """
 
 from dataclasses import dataclass
@@ -36,22 +36,22 @@ from .solver.sweep_count import SweepCount
 from .surface import normals, sharp
 
 _SURFACE, _LISTED, _TESTED, _ACTIVE = 9.0, 0.1, 3.0, 4.0
-"""What a step costs for a node of the surface (searches and registrations, shared out), for a pair that is listed, for
-one that is tested, as a crack is, and for an active contact: 450, 3, 150 and 200 ns by the profile of the shattering
-bar to 40 us on one rank."""
+"""Cost of a step for a surface node (searches and registrations, averaged), a listed pair, a tested pair or crack,
+and an active contact: 450, 3, 150 and 200 ns, from the profile of the shattering bar to 40 us on one rank, in units
+of 50 ns."""
 _FORESIGHT = 8
-"""Steps between two looks at how wide the cracks are."""
+"""Steps between two checks of the crack widths."""
 
 
 @dataclass(frozen=True)
 class _Scheme:
-    """What the scene asks of contact, the same in all steps."""
+    """Settings of contact, constant over the run."""
 
     restitution: float
     looks: int
-    """Steps between two looks at which edges have become sharp."""
+    """Steps between two searches for edges that became sharp."""
     sharp: Floats
-    """(parts,) cosine of the angle from which on they are."""
+    """(parts,) cosine of the angle from which on an edge is sharp."""
 
     @classmethod
     def of(cls, case: Case) -> "_Scheme":
@@ -62,13 +62,13 @@ class _Scheme:
 
 
 class Contact:
-    """The contact of a case on one rank."""
+    """Contact of a case on one rank."""
 
     def __init__(
         self, case: Case, model: Model, neighbours: list[Neighbour], bounds: list[Boundary],
         comm: Comm, clock: Clock, timers: Timers, team: Team, extremes: tuple[float, float], rigid: Rigid | None = None,
     ) -> None:  # fmt: skip
-        """``extremes``: largest nodal mass, kg, and speed, m/s, of the scene; ``rigid``: its rigid bodies."""
+        """``extremes``: largest nodal mass, kg, and speed, m/s, of the scene; ``rigid``: the rigid bodies."""
         assert case.contact is not None
         self._fractures, self._comm, self._clock, self._timers = case.fractures, comm, clock, timers
         self.exterior = Exterior(model, neighbours, bounds, case.contact.edges, comm)
@@ -80,14 +80,14 @@ class Contact:
         self._scheme, self.sweep_count = _Scheme.of(case), SweepCount(sweeps(case))
         self.detection = Detection(team)
         self.limit = 0.0
-        """One over the step in which no node of any rank passes more than half of a tet that it meets, 1/s."""
+        """Inverse of the step in which no node of any rank passes more than half of a tet in contact with it, 1/s."""
         self.last_push = 0.0
-        """Last time at which nodes of this rank were pushed, s."""
+        """Last time with an impulse on a node of this rank, s."""
         self._mean_dt = 0.0
-        """Of the last step with a scene, s."""
+        """Mean step at the last step with a scene, s."""
 
     def keep(self, parcel: Parcel) -> None:
-        """Adds all but what was found of candidates: a search finds it again."""
+        """Adds everything except the candidate pairs to the ``parcel``: a search finds these again."""
         books = self.books
         parcel.known["contact"] = (
             books.scale, books.friction.scale, self.limit, self.searches.many, self._mean_dt, self.exterior.size,
@@ -98,7 +98,7 @@ class Contact:
         self.searches.keep(parcel)
 
     def resume(self, parcel: Parcel) -> None:
-        """Takes it back; all ranks take part."""
+        """Restores the state of ``keep``. Collective."""
         books = self.books
         (
             books.scale, books.friction.scale, self.limit, self.searches.many, self._mean_dt, size,
@@ -112,21 +112,22 @@ class Contact:
         self.searches.resume(parcel)
 
     def require_faces(self) -> None:
-        """Raises InputError, on every rank alike, when a part that may meet has no face to meet with."""
+        """Raises InputError on all ranks when a part that may be in contact has no exposed face."""
         self.exterior.require_faces(~np.isnan(self.searches.mu))
 
     @property
     def outside(self) -> int:
-        """Nodes of the surface that this rank owns."""
+        """Number of surface nodes that this rank owns."""
         return int(self.on_surface.sum())
 
     @property
     def on_surface(self) -> Flags:
-        """(nodes,) which they are."""
+        """(nodes,) surface nodes that this rank owns."""
         return self.exterior.owned
 
     def effort(self) -> Floats:
-        """(nodes, 2) what contact does here for each node, in units of 50 ns: to search, and to push in every step."""
+        """(nodes, 2) cost of contact by node on this rank, in units of 50 ns: of searches, and of the narrow phase
+        and solver."""
         n = len(self.on_surface)
         search, push = _SURFACE * self.on_surface, np.zeros(n)
         if (now := self.searches.scene) is not None:
@@ -143,29 +144,29 @@ class Contact:
         return np.column_stack([search, push])
 
     def impulses(self) -> Floats:
-        """(parts, 3) what contact has given each part so far, N s; all ranks take part."""
+        """(parts, 3) impulses of contact on each part so far, N s. Collective."""
         return self.books.impulses(self._comm)
 
     def uncover(self, gone: Ints, loose: Flags, removed: Flags) -> None:
-        """The surface after tets ``gone`` (k, exposure.WORDS) of this rank have left; ``loose`` (nodes,): nodes without
-        tets that fly on, ``removed``: those that have left. All ranks take part.
+        """Updates the surface after erosion of the tets ``gone`` (k, exposure.WORDS) of this rank; ``loose``
+        (nodes,): nodes without tets that stay in the model; ``removed`` (nodes,): nodes that leave it. Collective.
         """
         with self._timers.phase("contact"):
             self.searches.due |= self.exterior.uncover(gone, loose, removed, self.searches.scene)
 
     def crack(self, tets: Ints, nodes: Indices, sides: Indices) -> None:
-        """Takes up broken facets that have a side here, with the local ``nodes`` (m, 3) that the sides have in common;
-        see ``Cracks`` for ``tets`` and ``sides``.
+        """Adds broken facets with a side on this rank and the local ``nodes`` (m, 3) of the sides; see ``Cracks``
+        for ``tets`` and ``sides``.
         """
         self.exterior.crack(tets, nodes, sides)
 
     @property
     def costs(self) -> Ints:
-        """(4,) words of this rank of what contact has taken from the bodies so far."""
+        """(4,) words of the account of this rank."""
         return self.books.account.words.reshape(-1)
 
     def agree(self, all_ranks: StepReduction) -> None:
-        """Takes what all ranks have found in the step; all ranks take part."""
+        """Reads the results of the reduction of the step. Collective."""
         self.sweep_count.agree(all_ranks.unsettled)
         self.books.agreed = all_ranks.costs.reshape(2, 2)
         self.searches.due |= all_ranks.search
@@ -176,43 +177,45 @@ class Contact:
 
     @property
     def found(self) -> Detected:
-        """What the last step has found here."""
+        """Result of the last detection on this rank."""
         return self.detection.found
 
     @property
     def approach(self) -> float:
-        """One over the step in which no node of this rank's contacts passes more than half of a tet, 1/s."""
+        """Inverse of the step in which no node in contact on this rank passes more than half of a tet, 1/s."""
         return self.found.approach
 
     @property
     def stray(self) -> bool:
-        """Whether a slot will have strayed so far in the next step that it is registered anew."""
+        """Whether a slot will depart so far from its reference motion in the next step that it must be registered
+        again."""
         return self.found.stray
 
     @property
     def opening(self) -> bool:
-        """Whether a crack has become so wide in the last step that it opens."""
+        """Whether a crack became wide enough in the last step to open."""
         return len(self.found.opening) > 0
 
     def open_cracks(self) -> None:
-        """Makes surface of the cracks that have become wide; all ranks take part."""
+        """Makes surface of the cracks that became wide. Collective."""
         with self._timers.phase("contact"):
             told = self._comm.join(self.exterior.widened(self.found.opening))
             self.found.opening = self.found.opening[:0]
             self.searches.due |= self.exterior.open(told, self.searches.scene)
 
     def separate(self, split: Split) -> None:
-        """Follows nodes as they separate; called on all ranks, see topology_updates.py for those that take part."""
+        """Follows the separation of nodes; called on all ranks, see topology_updates.py for those that exchange
+        messages."""
         self.exterior.separate(split)
         self.searches.separate(split)
 
     def grow(self, split: Split, ids: Ints) -> None:
-        """Takes up the copies of nodes; what has been booked stays with their parents."""
+        """Extends the arrays by the copies of nodes; booked energies stay with the parents."""
         self.books.grow(split.copies.n)
         self.exterior.grow(split)
 
     def note(self, state: Nodes) -> None:
-        """Before the kick: keeps v(n-1/2), and books the second half of the last impulses' work."""
+        """Before the kick: stores v(n-1/2), and books the second half of the work of the last impulses."""
         now = self.searches.scene
         self.books.due()
         self.sweep_count.unsettled[:] = 0
@@ -225,17 +228,17 @@ class Contact:
             now.slots.total[:] = 0
 
     def search_if_due(self, state: Nodes) -> None:
-        """Finds the candidate pairs of the next steps, when that is due; all ranks take part."""
+        """Finds the candidate pairs of the next steps, if a search is scheduled. Collective."""
         with self._timers.phase("contact"):
             self.searches.begin(state)
 
     def spent(self, state: Nodes) -> bool:
-        """Whether a node of the surface will leave, in a step more, what the last search has allowed for."""
+        """Whether a surface node will depart in one step more than the last search allows."""
         with self._timers.phase("contact"):
             return self.searches.spent(state)
 
     def look_ahead(self, state: Nodes) -> bool:
-        """Before the first step: bounds it by what comes near; whether anything does. All ranks take part."""
+        """Bounds the first step by the pairs that approach each other; returns whether there are any. Collective."""
         if (now := self.searches.scene) is None:
             return False
         with self._timers.phase("contact"):
@@ -246,7 +249,7 @@ class Contact:
         return self.limit > 0.0
 
     def solve(self, state: Nodes, dt: float, t: float) -> None:
-        """After the kick: the impulses of active contacts correct v(n+1/2) at time ``t``, s; all ranks take part."""
+        """After the kick: corrects v(n+1/2) by the impulses of active contacts at time ``t``, s. Collective."""
         if (now := self.searches.scene) is not None:
             with self._timers.phase("contact"):
                 self._push(now, state, dt, t)
@@ -276,8 +279,8 @@ class Contact:
         active.press(books.pressed)
 
     def _resume(self, give: float) -> float:
-        """The step over the one before: what impulses of the same pairs are worth now. Without restitution none while
-        there is no energy to ``give``, which too much of them would make.
+        """Ratio of this step to the last one: the factor of stored impulses. Without restitution it is 0 while there
+        is no energy to ``give`` back, because a stored impulse that is too large adds energy.
         """
         mean_dt = self._clock.mean_dt
         ratio = mean_dt / self._mean_dt if self._mean_dt > 0.0 else 0.0
@@ -285,7 +288,8 @@ class Contact:
         return ratio if give > 0.0 or self._scheme.restitution > 0.0 else 0.0
 
     def _meet(self, now: Scene, give: float, dt: float) -> None:
-        """Finds the active contacts of the step; ``give``: of penetrations, taken back (tables.PUSH_OUT)."""
+        """Detects the active contacts of the step; ``give``: share of a penetration that is corrected
+        (tables.PUSH_OUT)."""
         step = self._clock.step
         if step % _FORESIGHT == 0:
             self.searches.foresee()
@@ -296,5 +300,5 @@ class Contact:
         self.detection.detect(now, self.exterior, self.searches.mu, give, ahead, redraw, self.found.stray)
 
     def free(self) -> None:
-        """Gives the messages back to MPI."""
+        """Releases the messages of MPI."""
         self.searches.free()

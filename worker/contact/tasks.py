@@ -1,6 +1,6 @@
-"""The passes over candidates, faces and contacts as tasks of a team (parallel/team.py).
+"""Tasks of the passes over candidates, faces and contacts (parallel/team.py).
 
-Each task puts its rows behind each other from a place of its own on, and into ``counts`` how many they are.
+Each task writes its rows from an offset of its own on, and their number into ``counts``.
 """
 
 from ..kernels.jit import njit, types
@@ -14,12 +14,12 @@ from .solver.active import CONTACTS, KEPT, LOADED, NODES
 from .surface.families import CORNERS
 
 PAIRS_OF_A_TASK = 1024
-"""Chosen: some 20 us of work, of which a region of threads costs 2."""
+"""Chosen: some 20 us of work, against 2 us that a region of threads costs."""
 CRACKS_OF_A_TASK = 512
 FAMILIES_OF_A_TASK = 128
 CONTACTS_OF_A_TASK = 1024
 SLOTS_OF_A_TASK = 2048
-"""Chosen likewise."""
+"""Chosen in the same way."""
 _F, _I = types.float64, types.int64
 _F1, _F2, _I1, _I2 = types.float64[::1], types.float64[:, ::1], types.int64[::1], types.int64[:, ::1]
 _N1, _N2, _U1 = types.int32[::1], types.int32[:, ::1], types.uint8[::1]
@@ -58,7 +58,7 @@ def due_faces(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def node_face_pairs(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``node_face.node_face`` of those that are due."""
+    """``node_face.node_face`` of the pairs to be tested."""
     out, depth, base, pairs, slots, faces, step, end, due, counts, coming = _node_face(table)
     k = first // PAIRS_OF_A_TASK
     counts[k], coming[k] = node_face.node_face(out, depth, base, pairs, slots, faces, step, end, first, first + due[k])
@@ -82,21 +82,21 @@ def across_cracks(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def entering_nodes(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``entering.entering``."""
+    """``corner_contact.entering``."""
     out, base, each, narrow, of, step, counts = _entering(table)
     counts[first // FAMILIES_OF_A_TASK] = corner_contact.entering(out, base, each, narrow, of, step, first, stop)
 
 
 @njit(TASK, cache=True)
 def approach(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``closing_rate.approach``."""
+    """``closing_speed.approach``."""
     out, found, pairs, faces, step, most = _approach(table)
     most[first // CONTACTS_OF_A_TASK] = closing_speed.approach(out, found, pairs, faces, step, first, stop)
 
 
 @njit(TASK, cache=True)
 def rebound(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``restitution.rebound`` where there is a share, and ``hold_back`` where that is asked for."""
+    """``restitution.rebound`` with a share above 0, and ``hold_back`` if ``back``."""
     out, found, v, before, share, back = _rebound(table)
     if share > 0.0:
         restitution.rebound(out, found, v, before, share, first, stop)
@@ -106,14 +106,14 @@ def rebound(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def mark(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``held.mark``."""
+    """``slot_numbers.mark``."""
     touched, set_of, nodes, found, zone, shared, many = _mark(table)
     slot_numbers.mark(touched, set_of, nodes, found, zone, shared, many, first // CONTACTS_OF_A_TASK, first, stop)
 
 
 @njit(TASK, cache=True)
 def sort(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``held.sort``."""
+    """``slot_numbers.sort``."""
     row, slots, reach, begins, set_of, found, nodes, slot = _sort(table)
     task = first // CONTACTS_OF_A_TASK
     slot_numbers.sort(row, slots, reach, begins, set_of, found, nodes, slot, task, first, stop)
@@ -121,14 +121,14 @@ def sort(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def load(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``held.load``."""
+    """``slot_numbers.load``."""
     active, places, v, mobility, fastest = _load(table)
     fastest[first // SLOTS_OF_A_TASK] = slot_numbers.load(active, places, v, mobility, first, stop)
 
 
 @njit(TASK, cache=True)
 def weigh(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``sweeps.add_row_weights`` of some sets of contacts."""
+    """``sweeps.add_row_weights`` of a range of sets of contacts."""
     active, contacts, loaded = _weigh(table)
     for k in range(first, stop):
         sweeps.add_row_weights(active, contacts, loaded, k)
@@ -136,7 +136,7 @@ def weigh(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def resume(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``loading.load_kept`` and ``sweeps.resume`` of some sets of contacts."""
+    """``loading.load_kept`` and ``sweeps.resume`` of a range of sets of contacts."""
     active, contacts, loaded, kept, ratio, scale = _resume(table)
     for k in range(first, stop):
         loading.load_kept(loaded, contacts, active, kept, k)
@@ -145,7 +145,7 @@ def resume(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def sweep(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``loading.load`` and ``sweeps.sweep`` of some sets of contacts."""
+    """``loading.load`` and ``sweeps.sweep`` of a range of sets of contacts."""
     active, contacts, loaded, fastest, ahead, scale = _sweep(table)
     for k in range(first, stop):
         loading.load(loaded, contacts, active, fastest, k)
@@ -161,7 +161,7 @@ def give(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def store(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``sweeps.store`` of some sets of contacts."""
+    """``sweeps.store`` of a range of sets of contacts."""
     kept, loaded, pair = _store(table)
     for k in range(first, stop):
         sweeps.store(kept, loaded, pair, k)
@@ -169,7 +169,7 @@ def store(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def cost(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``booking.cost`` of some sets of contacts, or ``booking.heat`` where they rub; with words for each."""
+    """``impulse_work.cost`` of a range of sets of contacts, or ``impulse_work.heat`` if ``rubs``; sums by set."""
     words, loaded, active, before, places, joule, rubs = _cost(table)
     for k in range(first, stop):
         if rubs:
@@ -180,7 +180,7 @@ def cost(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def leave(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``held.leave``, with sums of each task."""
+    """``slot_numbers.leave``, sums by task."""
     node_v, parts, unsettled, total, active, places, index, part, owned = _leave(table)
     k = first // SLOTS_OF_A_TASK
     slot_numbers.leave(node_v, parts[k], unsettled[k], total, active, places, index, part, owned, first, stop)
@@ -188,22 +188,22 @@ def leave(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def book(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``booking.book``."""
+    """``impulse_work.book``."""
     loss, external, places, index, before, total, mobility, scale = _book(table)
     impulse_work.book(loss, external, places, index, before, total, mobility, scale, first, stop)
 
 
 @njit(TASK, cache=True)
 def take(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``held.take``."""
+    """``slot_numbers.take``."""
     x, v, slots, node_x, node_v, local = _take(table)
     slot_numbers.take(x, v, slots, node_x, node_v, local, first, stop)
 
 
 @njit("int64(int32[::1], int64, int64[::1], int64[::1])", cache=True)
 def collected(found, n, begins, counts):  # type: ignore[no-untyped-def]
-    """Numbers of the rows of tasks, ``counts`` from each of ``begins`` on: in ``found`` from ``n`` on; returns how many
-    there are with them.
+    """Writes the row numbers of tasks, ``counts`` from each of ``begins`` on, into ``found`` from ``n`` on; returns
+    the new length.
     """
     for k in range(len(counts)):
         for row in range(begins[k], begins[k] + counts[k]):

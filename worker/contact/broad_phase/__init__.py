@@ -1,1 +1,1 @@
-"""Candidate pairs: search by cells, swept filter, reference motions, and when the next search is due."""
+"""Candidate pairs: search by cells, swept filter, reference motions, and the schedule of searches."""

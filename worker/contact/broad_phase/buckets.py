@@ -1,8 +1,9 @@
-"""Bucket sort with position codes (Oldenburg and Nilsson 1994): what lies near a box, without a grid in memory.
+"""Bucket sort with position codes (Oldenburg and Nilsson 1994): boxes near a box, without a grid in memory.
 
-The code of a cell is ix + nx (iy + ny iz) (the paper's eq. 10). Every box is entered under the codes of the cells that
-it touches, and the entries are sorted by a hash of their codes: a box asks for the codes of its own cells, each a short
-range of entries. Memory follows the number of boxes, however far they fly.
+The code of a cell is ix + nx (iy + ny iz) (the paper's eq. 10). Every box is entered under the codes of the cells
+that it touches, and the entries are sorted by a hash of their codes. The boxes near a given box are found under the
+codes of its own cells, each a short range of entries. Memory is proportional to the number of boxes, for any
+distance between them.
 """
 
 from typing import NamedTuple
@@ -13,13 +14,13 @@ from ...kernels.jit import njit, types
 from ...model.state import Floats, Indices, Ints
 
 _MOST = 2.0**20
-"""Cells along an axis: codes of three stay far below 2^63."""
+"""Largest number of cells along an axis: codes of three axes stay far below 2^63."""
 _WIDE = 512
-"""Cells of a box that is not entered: everybody asks it."""
+"""Largest number of cells of a box with entries; larger boxes are tested against all others."""
 _CURVE_BITS = 12
-"""Of a coordinate on the curve."""
+"""Bits of a coordinate on the curve."""
 _LEAST_BITS = 6
-"""Of the hash."""
+"""Least number of bits of the hash."""
 
 
 class Table(NamedTuple):
@@ -27,19 +28,19 @@ class Table(NamedTuple):
 
     origin: Floats
     inverse: float
-    """One over the edge of a cell, 1/m."""
+    """Inverse of the edge of a cell, 1/m."""
     shape: Ints
     """(3,) cells along each axis."""
     bits: int
-    """Of the hash."""
+    """Bits of the hash."""
     start: Ints
-    """(2^bits + 1,) where the entries of each hash begin, and the end."""
+    """(2^bits + 1,) offset of the entries of each hash, and the end."""
     thing: Indices
-    """(m,) which box an entry is of."""
+    """(m,) box of each entry."""
     code: Ints
-    """(m,) and under which code."""
+    """(m,) code of each entry."""
     wide: Indices
-    """(w,) boxes that touch too many cells."""
+    """(w,) boxes without entries, which touch too many cells."""
 
 
 TABLE = types.NamedTuple(
@@ -51,8 +52,8 @@ TABLE = types.NamedTuple(
 
 
 def sort(low: Floats, high: Floats, edge: float) -> Table:
-    """Enters the boxes ``low``, ``high`` (n, 3) into cells of edge ``edge``, m, or larger where the space is too wide
-    for it.
+    """Enters the boxes ``low``, ``high`` (n, 3) into cells of edge ``edge``, m, or larger if the boxes are too far
+    apart for the codes.
     """
     least, most = low.min(axis=0), high.max(axis=0)
     edge = max(edge, float((most - least).max()) / _MOST)
@@ -74,8 +75,8 @@ def bucket_of(x, origin, inverse, n):  # type: ignore[no-untyped-def]
 
 
 def curve(x: Floats, edge: float) -> Ints:
-    """(n,) place of each point (n, 3) on a curve that fills space (Morton 1966), by cells of ``edge``, m: neighbours on
-    it are neighbours in space.
+    """(n,) position of each point (n, 3) on a space-filling curve (Morton 1966), by cells of ``edge``, m: neighbours
+    on the curve are neighbours in space.
     """
     if not len(x):
         return np.zeros(0, np.int64)
@@ -101,7 +102,7 @@ def bucket_at(code, bits):  # type: ignore[no-untyped-def]
 
 @njit("int64(int64[:, ::1], float64[:, ::1], float64[:, ::1], int64, float64[::1], float64, int64[::1])", cache=True)
 def _cells(span, low, high, j, origin, inverse, shape):  # type: ignore[no-untyped-def]
-    """How many cells box j touches, from ``span[0]`` to ``span[1]`` (2, 3)."""
+    """Number of cells that box j touches, from ``span[0]`` to ``span[1]`` (2, 3)."""
     cells = 1
     for i in range(3):
         span[0, i] = bucket_of(low[j, i], origin[i], inverse, shape[i])
@@ -117,7 +118,7 @@ def _cells(span, low, high, j, origin, inverse, shape):  # type: ignore[no-untyp
     cache=True,
 )
 def _count(low, high, origin, inverse, shape):  # type: ignore[no-untyped-def]
-    """How many entries there will be, and the boxes that get none."""
+    """Number of entries, and the boxes without entries."""
     span, wide, n, total = np.empty((2, 3), np.int64), np.empty(len(low), np.int32), 0, 0
     for j in range(len(low)):
         cells = _cells(span, low, high, j, origin, inverse, shape)
@@ -131,7 +132,7 @@ def _count(low, high, origin, inverse, shape):  # type: ignore[no-untyped-def]
 
 @njit(types.void(TABLE, types.float64[:, ::1], types.float64[:, ::1]), cache=True)
 def _enter(table, low, high):  # type: ignore[no-untyped-def]
-    """Fills the entries by counting: once to see where each hash begins, once to put them there."""
+    """Fills the entries by counting sort: the first pass counts the entries of each hash, the second writes them."""
     start, shape, bits = table.start, table.shape, table.bits
     span = np.empty((2, 3), np.int64)
     for write in range(2):

@@ -1,9 +1,9 @@
-"""The contact domain: which faces and edges of this rank another rank must see.
+"""Contact domain: the faces and edges of this rank that other ranks need as ghosts.
 
-``box`` compares bounding boxes (Paik et al.): a thing goes to every rank whose box of nodes and edges it touches.
-``arbitrary`` asks once more (the paper's eqs 5 to 16, in three dimensions): the other rank names the cells that its
-nodes and edges lie in, and gets what touches one of them. Since only nodes of the surface are entered, every
-occupied cell is an outside cell already, and the paper's test of a cell's neighbours has nothing left to do.
+``box`` compares bounding boxes (Paik et al.): a face or edge is sent to every rank whose box of nodes and edges it
+touches. ``arbitrary`` adds a second exchange (the paper's eqs 5 to 16, in three dimensions): the other rank sends
+the cells of its nodes and edges, and gets only what touches one of them. Since only surface nodes are entered, every
+occupied cell is an outside cell, and the paper's test of a cell's neighbours is not needed.
 """
 
 import numpy as np
@@ -18,9 +18,9 @@ _NONE = np.zeros(0, np.int64)
 
 
 def choose(kind: str, askers: Boxes, things: list[Boxes], edge: float, comm: Comm) -> dict[int, list[Flags]]:
-    """For every other rank that needs some: which of each list of this rank's ``things`` go there.
+    """Returns flags of each list of this rank's ``things``, for every other rank that needs some.
 
-    ``askers`` are the boxes of this rank's nodes and edges; ``edge`` that of a cell, m, equal on all ranks.
+    ``askers``: boxes of this rank's nodes and edges; ``edge`` of a cell, m, equal on all ranks.
     """
     mine = np.concatenate([askers.hull, np.minimum.reduce([t.hull for t in things])])
     hulls = comm.join(mine.view(np.int64)).view(np.float64).reshape(comm.size, 2, 6)
@@ -33,7 +33,7 @@ def choose(kind: str, askers: Boxes, things: list[Boxes], edge: float, comm: Com
 
 
 def _touching(hull: Floats, hulls: Floats, comm: Comm) -> list[int]:
-    """The other ranks whose ``hulls`` (ranks, 6) touch this one."""
+    """Other ranks whose ``hulls`` (ranks, 6) touch this one."""
     touch = np.all((hulls[:, :3] <= -hull[3:]) & (-hulls[:, 3:] >= hull[:3]), axis=1)
     touch[comm.rank] = False
     found: list[int] = np.flatnonzero(touch).tolist()
@@ -43,7 +43,7 @@ def _touching(hull: Floats, hulls: Floats, comm: Comm) -> list[int]:
 def _in_cells(
     near: dict[int, list[Flags]], askers: Boxes, asked: dict[int, Flags], things: list[Boxes], edge: float, comm: Comm
 ) -> dict[int, list[Flags]]:
-    """Keeps what touches a cell that the other rank has named; ``asked``: which boxes ask which rank."""
+    """Keeps the boxes that touch a cell of the other rank's list; ``asked``: boxes of this rank near each rank."""
     cells = comm.swap({
         rank: np.sort(_cells(askers.low, askers.high, some, edge)) for rank, some in asked.items() if some.any()
     })  # fmt: skip
@@ -56,21 +56,21 @@ def _in_cells(
 
 @njit("int64(float64, float64)", cache=True)
 def _cell(x, edge):  # type: ignore[no-untyped-def]
-    """Index along an axis of the cell that a coordinate lies in."""
+    """Index along an axis of the cell that contains a coordinate."""
     return np.int64(np.floor(x / edge))
 
 
 @njit("int64(int64, int64, int64)", cache=True)
 def _code(ix, iy, iz):  # type: ignore[no-untyped-def]
-    """A cell as one number. Two have the same only if they are 2^20 cells apart: then a thing is sent that is not
-    needed.
+    """Cell as one number. Two cells have the same only if they are 2^20 cells apart; then a ghost is sent that is
+    not needed.
     """
     return (ix << 42) + (iy << 21) + iz
 
 
 @njit("int64[::1](float64[:, ::1], float64[:, ::1], boolean[::1], float64)", cache=True)
 def _cells(low, high, some, edge):  # type: ignore[no-untyped-def]
-    """The code of every cell that ``some`` of the boxes touch, each once."""
+    """Codes of all cells that ``some`` of the boxes touch, each once."""
     bits, n = 6, 0
     codes, used, found = np.empty(1 << bits, np.int64), np.zeros(1 << bits, np.bool_), np.empty(1 << bits, np.int64)
     for j in range(len(low)):
@@ -97,7 +97,8 @@ def _cells(low, high, some, edge):  # type: ignore[no-untyped-def]
 
 @njit("int64(int64[::1], boolean[::1], int64, int64)", cache=True)
 def _place(codes, used, code, bits):  # type: ignore[no-untyped-def]
-    """Where a code stands in a table of 2^bits places, or would: its hash, or the next place behind it that is free."""
+    """Position of a code in a table of 2^bits entries, or of the free entry for it: at its hash, or the next one
+    behind."""
     at = bucket_at(code, bits)
     while used[at] and codes[at] != code:
         at = (at + 1) % len(codes)
@@ -106,7 +107,7 @@ def _place(codes, used, code, bits):  # type: ignore[no-untyped-def]
 
 @njit("boolean[::1](boolean[::1], float64[:, ::1], float64[:, ::1], int64[::1], float64)", cache=True)
 def _named(flags, low, high, cells, edge):  # type: ignore[no-untyped-def]
-    """Which of the flagged boxes touch one of ``cells``, codes in ascending order."""
+    """Flagged boxes that touch one of the ``cells``, ascending codes."""
     kept = np.zeros(len(flags), np.bool_)
     if len(cells) == 0:
         return kept

@@ -1,9 +1,9 @@
-"""The velocities with which a search has the nodes fly on.
+"""Velocities with which a search extrapolates the nodes.
 
-A node of a metal flies on as it flies. In a body that breaks a node rings: a free tet has a period of some ten steps,
-and the release of 1 GPa in glass sets it ringing with 75 m/s, sigma / (rho c). Carried on until the next search that
-velocity leads away from where the node stays. So such a node flies on as a rigid body would that has the momentum and
-the angular momentum of its tets.
+A node of a metal is extrapolated with its own velocity. Nodes of a body that breaks vibrate: a free tet has a period
+of some ten steps, and the release of 1 GPa in glass makes it vibrate with sigma / (rho c) = 75 m/s. Extrapolated to
+the next search, this velocity would lead away from where the node stays. So such a node gets the velocity of a rigid
+body with the momentum and the angular momentum of its tets.
 """
 
 import numpy as np
@@ -15,13 +15,14 @@ from ...parallel.ownership import Neighbour, complete
 from ...parallel.tags import Tag
 
 _QUANTA = 2.0**16
-"""A m/s: room for 1e14 m/s."""
+"""Quanta per m/s: sums up to 1e14 m/s do not overflow."""
 _THIN = 1e-9
-"""Smallest determinant of a tet's inertia, of the cube of its trace, with which it turns."""
+"""Smallest determinant of the inertia of a tet, over the cube of its trace, for which its rotation is computed."""
 
 
 def courses(blocks: list[Block], nodes: Nodes, neighbours: list[Neighbour], comm: Comm) -> Floats:
-    """(nodes, 3) m/s: of nodes of tets that may break, the mean of their tets' rigid motions; all ranks take part."""
+    """(nodes, 3) extrapolated velocities, m/s: at nodes of tets that may break, the mean of the rigid motions of
+    their tets. Collective."""
     sums = np.zeros((nodes.n, 4), np.int64)
     for block in blocks:
         if len(block.bond):
@@ -39,9 +40,9 @@ def _det(a, b, c):  # type: ignore[no-untyped-def]
 
 @njit("void(int64[:, ::1], uint32[:, ::1], float64[:, ::1], float64[:, ::1], float64)", cache=True, error_model="numpy")
 def _add_rigid(sums, tets, x, v, quanta):  # type: ignore[no-untyped-def]
-    """Adds the rigid motion of each of ``tets`` (n, 4) at its corners, and one, to the ``sums`` (nodes, 4).
+    """Adds the rigid motion of each of ``tets`` (n, 4) at its corners, and the count one, to the ``sums`` (nodes, 4).
 
-    The motion is that of four equal masses: u + omega x r with I omega = sum(r x v), omega by Cramer's rule.
+    The motion is that of four equal masses: u + omega x r with I omega = sum(r x v), solved by Cramer's rule.
     """
     r, u = np.empty((4, 3)), np.empty(3)
     inertia, spin, turn = np.empty((3, 3)), np.empty(3), np.empty(3)

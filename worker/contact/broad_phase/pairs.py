@@ -1,17 +1,18 @@
-"""Tables of candidate pairs, and when a pair need not be tested.
+"""Tables of candidate pairs, and the condition under which a pair is not tested.
 
-A list of candidates serves many steps, and in most of them most of its pairs are far apart. Every slot has a reference
-motion, on a straight line; ``left`` is how far the slot has left it in the step ahead, the larger of the distances at
-its beginning and its end without contact. When a pair is tested and is ``slack`` further apart than it could meet at,
-it is left alone as long as
+A list of candidates serves many steps, and in most steps most of its pairs are far apart. Every slot has a reference
+motion, on a straight line; ``left`` is its distance from that line in the step ahead, the larger of the distances at
+the beginning and at the end without contact. A pair that is tested and is ``slack`` further apart than the distance of
+contact is not tested again as long as
 
-    slack > U t + left_1 + left_2, now, + left_1 + left_2, when it was tested,
+    slack > U t + left_1 + left_2 (now) + left_1 + left_2 (when it was tested),
 
-with U the relative speed of the two reference motions and t the time since; of a face or an edge, ``left`` is that of
-its farthest corner. So a pair keeps one number and its U. It is exact: a pair that is left alone would not have met. No
-bit of the answer depends on it, and ranks need not agree.
+with U the relative speed of the two reference motions and t the time since the test; for a face or an edge, ``left`` is
+that of its farthest corner. So a pair stores one number and U. The condition is exact: a skipped pair could not be
+active. No bit of the answer depends on it, and it may differ between ranks.
 
-A pair whose node does not face the face is left alone until the face may have turned to it (node_face.py).
+A pair whose face is turned away from the node is not tested until the face may have turned towards it
+(node_face.py).
 """
 
 from dataclasses import dataclass, field
@@ -25,20 +26,20 @@ from ..narrow_phase.node_face import chain
 from ..narrow_phase.tables import Pairs
 
 _FRESH = {"until": -np.inf, "speed": np.nan, "turned": False, "kept": 0.0, "next": -1}
-"""What a pair begins with: it is tested in the next step."""
+"""Initial values of a pair: tested in the next step."""
 
 
 @dataclass
 class PairTable:
-    """A growing table of candidate pairs; see tables.Pairs."""
+    """Growing table of candidate pairs; see tables.Pairs."""
 
     rows: Indices = field(default_factory=lambda: np.zeros((0, 2), np.int32))
     until: Floats = field(default_factory=lambda: np.zeros(0))
     speed: Floats = field(default_factory=lambda: np.zeros(0))
     turned: Flags = field(default_factory=lambda: np.zeros(0, bool))
     kept: Floats = field(default_factory=lambda: np.zeros((0, 4)))
-    """(p, 4) the pair's impulse of the last step times its row norm, zero where it was not active: along the normal,
-    and across, m/s."""
+    """(p, 4) stored impulse of the pair in the last step times its row norm, zero if it was not active: along the
+    normal, and across, m/s."""
     next: Indices = field(default_factory=lambda: np.zeros(0, np.int32))
     _active: Indices = field(default_factory=lambda: np.zeros(0, np.int32), init=False, repr=False)
     _tested: tuple[Indices, Ints, Ints] | None = field(default=None, init=False, repr=False)
@@ -49,28 +50,28 @@ class PairTable:
         return len(self.rows)
 
     def add(self, rows: Indices) -> None:
-        """Takes up more pairs, to be tested in the next step."""
+        """Adds pairs, to be tested in the next step."""
         if len(rows):
             self._rooms.append(self, len(rows), rows=rows, **_FRESH)
 
     def take_tested(self, active: Indices, begins: Ints, counts: Ints) -> None:
-        """The pairs that tasks have tested: of ``active``, ``counts`` from each of ``begins`` on."""
+        """Stores which pairs the tasks have tested: those of ``active``, ``counts`` from each of ``begins`` on."""
         self._tested = active, begins, counts
 
     @property
     def tested(self) -> Indices:
-        """(k,) pairs that the narrow phase of the last step has tested."""
+        """(k,) pairs tested by the narrow phase of the last step."""
         if self._tested is None:
             return np.zeros(0, np.int32)
         active, begins, counts = self._tested
         return np.concatenate([active[:0], *(active[b : b + n] for b, n in zip(begins, counts, strict=True))])
 
     def hang(self, first: Indices, begin: int) -> None:
-        """Hangs the pairs from row ``begin`` on into the chains of their nodes, ``first`` (slots,)."""
+        """Adds the pairs from row ``begin`` on to the linked lists of their nodes, ``first`` (slots,)."""
         chain(first, self.next, self.rows, begin)
 
     def drop(self, one: Flags, two: Flags) -> None:
-        """Takes out the pairs whose first thing is among ``one`` or whose second thing is among ``two``."""
+        """Removes the pairs whose first member is in ``one`` or whose second member is in ``two``."""
         n = _drop(self.rows, self.until, self.speed, self.turned, self.kept, one, two)
         for name in ("rows", "until", "speed", "turned", "kept", "next"):
             setattr(self, name, getattr(self, name)[:n])
@@ -78,18 +79,18 @@ class PairTable:
 
     @property
     def pushed(self) -> Ints:
-        """(k,) which pairs have had impulses in the last step."""
+        """(k,) pairs with impulses in the last step."""
         return np.flatnonzero(self.kept.any(axis=1))
 
     def recall(self, first: Indices, rows: Indices, kept: Floats) -> None:
-        """Pairs of nodes and faces that are among ``rows`` (k, 2) have what these have ``kept``, (k, 4); ``first``: see
-        ``hang``.
+        """Sets the stored impulses of the pairs ``rows`` (k, 2), of nodes and faces, to ``kept`` (k, 4); pairs that
+        are not in the table are ignored; ``first``: see ``hang``.
         """
         _recall(self.kept, first, self.next, self.rows, rows, kept)
 
     def carried(self, one: Indices, two: Indices) -> "PairTable":
-        """The pairs whose things have new numbers ``one`` and ``two``, -1 for those that have gone; in the order of the
-        first things, so that what a kernel takes for one pair is at hand for the next.
+        """Returns the pairs with new numbers ``one`` and ``two`` of their members, -1 for those that are gone,
+        ordered by the first member, so that successive pairs of a kernel share data.
         """
         some, rows = _renumbered(self.rows, one, two, int(one.max(initial=-1)) + 1)
         return PairTable(
@@ -97,12 +98,12 @@ class PairTable:
         )
 
     def wake(self) -> None:
-        """Every pair has to be tested: short lines and mean normals are others."""
+        """Schedules all pairs for a test, after a change of the short lines and mean normals."""
         some = ~np.isposinf(self.until)
         self.until[some], self.speed[some] = -np.inf, np.nan
 
     def arrays(self) -> Pairs:
-        """As kernels take it."""
+        """Returns the table as a record for kernels."""
         if len(self._active) < len(self.rows):
             self._active = np.empty(2 * len(self.rows), np.int32)
         return Pairs(self.rows, self.until, self.speed, self.turned, self.next, self._active)
@@ -121,8 +122,8 @@ def _recall(kept, first, following, pairs, rows, values):  # type: ignore[no-unt
 
 @njit("Tuple((int64[::1], int32[:, ::1]))(int32[:, ::1], int32[::1], int32[::1], int64)", cache=True)
 def _renumbered(pairs, one, two, n):  # type: ignore[no-untyped-def]
-    """Which ``pairs`` (p, 2) both ``one`` and ``two`` have numbers for, by ascending number of the first thing, which
-    is less than ``n``; and their numbers.
+    """Rows of ``pairs`` (p, 2) with numbers in both ``one`` and ``two``, by ascending number of the first member,
+    which is below ``n``; and their numbers.
     """
     begin = np.zeros(n + 1, np.int64)
     for p in range(len(pairs)):

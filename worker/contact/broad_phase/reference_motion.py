@@ -1,11 +1,11 @@
-"""Reference motions: how slots are taken to move, and how far they have left that.
+"""Reference motions: the straight lines along which slots are extrapolated, and the distances of the slots from them.
 
-A search takes every slot to go on along a straight line. What it leaves out would meet only if slots left these lines
-by half the skin. A slot that does so gets another line, from where it is, with the mean velocity that it has had on the
-old one, and it is searched for anew (registration.py).
+A search extrapolates every slot along a straight line. Pairs that it excludes can be active only if slots depart from
+their lines by half the skin. A slot that does so gets a new line from its position on, with its mean velocity since the
+last line, and is registered again (registration.py).
 
-How long a pair may be left alone is measured from other lines, which are drawn anew every few steps for all: with the
-mean velocities of these steps they are much closer to the slots, and nobody has to be searched for (pairs.py).
+The time for which a pair is not tested is measured from other, short lines, renewed every few steps for all slots:
+with the mean velocities of these steps they are much closer to the slots, and need no registration (pairs.py).
 """
 
 import numpy as np
@@ -18,28 +18,29 @@ _V1, _V2, _N2 = "float64[::1]", "float64[:, ::1]", "int32[:, ::1]"
 
 
 class Lines:
-    """A straight line for every slot."""
+    """Straight line of every slot."""
 
     def __init__(self, x: Floats, course: Floats) -> None:
         """``x``, ``course`` (slots, 3): positions, m, and velocities, m/s, at time 0."""
         self.x, self.course = x.copy(), course.copy()
         self.since = np.zeros(len(x))
-        """(slots,) when each line began, s."""
+        """(slots,) time at which each line began, s."""
         self.left = np.zeros(len(x))
-        """(slots,) how far each slot leaves its line in the step ahead, the larger of beginning and end, m."""
+        """(slots,) distance of each slot from its line in the step ahead, the larger of beginning and end, m."""
         self._rooms = Rooms("x", "course", "since", "left")
 
     def add(self, x: Floats, course: Floats, t: float) -> None:
-        """Takes up more slots, as they are at time ``t``, (n, 3) each."""
+        """Adds slots with their positions and velocities at time ``t``, (n, 3) each."""
         self._rooms.append(self, len(x), x=x - t * course, course=course, since=t, left=0.0)
 
     def inherit(self, heirs: Indices, parents: Indices) -> None:
-        """The copies of slots are on the lines of their parents."""
+        """Copies the lines of ``parents`` to their copies ``heirs``."""
         for column in (self.x, self.course, self.since, self.left):
             column[heirs] = column[parents]
 
     def take_over(self, slots: Indices, old: "Lines", t: float) -> None:
-        """At time ``t``: the lines of ``old``, whose slots have the new numbers ``slots``, -1 for none any more."""
+        """Copies the lines of ``old`` at time ``t``; ``slots``: new number of each of its slots, -1 for those that
+        are gone."""
         self.x -= t * self.course
         self.since[:] = t
         there, here = np.flatnonzero(slots >= 0), slots[slots >= 0]
@@ -47,60 +48,60 @@ class Lines:
             getattr(self, name)[here] = getattr(old, name)[there]
 
     def measure(self, x: Floats, v: Floats, t: float, dt: float) -> None:
-        """How far the slots leave their lines in a step ``dt`` from ``t`` on: positions ``x`` and velocities ``v``
-        before contact, (slots, 3) each.
+        """Computes the distances of the slots from their lines in a step ``dt`` from ``t`` on: positions ``x`` and
+        velocities ``v`` before contact, (slots, 3) each.
         """
         _leave(self.left, self.x, self.course, x, v, t, dt)
 
     def begin_anew(self, some: "np.ndarray", x: Floats, t: float) -> None:
-        """New lines for ``some`` (slots,), from ``x`` (slots, 3) at time ``t`` on."""
+        """Begins new lines for ``some`` (slots,), from ``x`` (slots, 3) at time ``t`` on."""
         _begin_anew(some, self.x, self.course, self.since, x, t)
 
 
 class ReferenceMotion:
-    """The reference motions of the slots of a scene."""
+    """Reference motions of the slots of a scene."""
 
     def __init__(self, x: Floats, course: Floats, faces: int, edges: int, drift: Floats, until: float) -> None:
         """``x``, ``course`` (slots, 3): positions, m, and velocities, m/s, at the time of the search."""
         self.drift = drift
         """(3,) mean velocity, m/s."""
         self.until = until
-        """What is searched is searched for until then, s after the search."""
+        """Time up to which the candidates are complete, s after the search."""
         self.searched, self.short = Lines(x, course), Lines(x, course)
-        """Along which slots have been searched, and from which pairs are measured."""
+        """Lines of the search, and short lines from which the distances of pairs are measured."""
         self.faces, self.edges = np.zeros(faces), np.zeros(edges)
-        """(f,) and (e,) the largest of what their corners leave the short lines, m."""
+        """(f,) and (e,) largest distance of a corner from its short line, m."""
         self.t = 0.0
-        """Of the step's beginning, s after the search."""
+        """Beginning of the step, s after the search."""
         self.end = 0.0
-        """Of its end."""
+        """End of the step, s after the search."""
         self.beyond = 0.0
-        """How long after that lines are measured, s."""
+        """Time beyond the end of the step for which distances are measured too, s."""
         self.strayed = 0.0
-        """How far any slot that is watched leaves the line that is searched in the step, m."""
+        """Largest distance of a tracked slot from its line of the search in the step, m."""
 
     def add(self, x: Floats, course: Floats) -> None:
-        """Takes up more slots, as they are, (n, 3) each."""
+        """Adds slots with their present positions and velocities, (n, 3) each."""
         self.searched.add(x, course, self.end)
         self.short.add(x, course, self.end)
 
     def inherit(self, heirs: Indices, parents: Indices) -> None:
-        """The copies of slots move as their parents do."""
+        """Copies the lines of ``parents`` to their copies ``heirs``."""
         self.searched.inherit(heirs, parents)
         self.short.inherit(heirs, parents)
 
     def take_over(self, slots: Indices, old: "ReferenceMotion") -> None:
-        """The lines of ``old``, whose slots have the new numbers ``slots``, -1 for those that have gone."""
+        """Copies the lines of ``old``; ``slots``: new number of each of its slots, -1 for those that are gone."""
         self.t = self.end = old.end
         self.searched.take_over(slots, old.searched, self.t)
         self.short.take_over(slots, old.short, self.t)
 
     def advance(self, dt: float, beyond: float = 0.0) -> None:
-        """A step ``dt`` begins; what slots leave is measured ``beyond`` its end, s."""
+        """Begins a step ``dt``; distances are measured to ``beyond`` its end, s."""
         self.t, self.end, self.beyond = self.end, self.end + dt, beyond
 
     def measure(self, x: Floats, v: Floats, faces: Indices, edges: Indices) -> None:
-        """How far everything leaves its lines in the step and ``beyond``: see Lines."""
+        """Computes the distances from the lines in the step and ``beyond``: see Lines."""
         dt = self.end - self.t + self.beyond
         self.searched.measure(x, v, self.t, dt)
         self.short.measure(x, v, self.t, dt)
@@ -108,24 +109,25 @@ class ReferenceMotion:
         _largest(self.edges, edges, 2, self.short.left)
 
     def farthest(self, some: Flags) -> float:
-        """How far any of ``some`` (slots,) leaves the line that is searched in the step, m."""
+        """Largest distance of ``some`` (slots,) from their lines of the search in the step, m."""
         return float(self.searched.left[some].max(initial=0.0))
 
     def begin_anew(self, some: "np.ndarray", x: Floats) -> None:
-        """New lines to search along for ``some`` (slots,), from ``x`` (slots, 3) on."""
+        """Begins new lines of the search for ``some`` (slots,), from ``x`` (slots, 3) on."""
         self.searched.begin_anew(some, x, self.t)
 
     def aim(self, some: "np.ndarray", x: Floats, v: Floats) -> None:
-        """Lines to search along for ``some`` (slots,) that have been knocked: from ``x`` on, with velocities ``v``."""
+        """Begins lines of the search for ``some`` (slots,) whose velocity jumped: from ``x`` on, with velocities
+        ``v``."""
         lines = self.searched
         lines.course[some], lines.x[some], lines.since[some] = v[some], (x - self.t * v)[some], self.t
 
     def shorten(self, x: Floats) -> None:
-        """New short lines for all, from ``x`` (slots, 3) on."""
+        """Begins new short lines for all slots, from ``x`` (slots, 3) on."""
         self.short.begin_anew(np.ones(len(x), bool), x, self.t)
 
     def positions(self) -> Floats:
-        """(slots, 3) on the lines that are searched, at the beginning of the step, m."""
+        """(slots, 3) positions on the lines of the search at the beginning of the step, m."""
         return np.asarray(self.searched.x + self.t * self.searched.course)
 
 

@@ -1,8 +1,9 @@
-"""Candidate pairs of what has changed: found anew, each once, on this rank alone.
+"""Registration: candidate pairs of changed nodes, faces and edges, each once, without other ranks.
 
-The pairs of a changed node, face or edge are dropped, and found again among everything that is searched. What has
-changed is what has left its line (reference_motion.py) and what has come to the surface. A search from nothing is the
-same with everything changed. No bit of the answer depends on what is found beyond what meets.
+The pairs of a changed node, face or edge are removed and searched again among everything in the broad phase. Changed
+are those that have departed from their lines (reference_motion.py) and those that are new on the surface. A search
+from nothing is the same with everything changed. No bit of the answer depends on candidates that do not become
+active.
 """
 
 from dataclasses import dataclass
@@ -17,37 +18,37 @@ from . import search, swept_filter
 from .search import Primitives
 
 _PARTLY = 0.5
-"""Of the half skin by which one slot may leave its line: others that have left theirs as far get new ones with it."""
+"""Share of half the skin: slots beyond it get new lines together with a slot that has departed by half the skin."""
 
 
 @dataclass
 class _Flight:
-    """The lines of a scene from the beginning of the step on."""
+    """Lines of a scene from the beginning of the step on."""
 
     x: Floats
-    """(slots, 3) m."""
+    """(slots, 3) positions, m."""
     course: Floats
-    """(slots, 3) less what all drift with, m/s."""
+    """(slots, 3) velocities less the mean, m/s."""
     part: Indices
-    """(slots,)."""
+    """(slots,) part of each slot."""
     horizon: float
-    """s."""
+    """Time to the end of the candidate list, s."""
 
     def find(self, small: Primitives, large: Primitives, allowed: Flags, rank: Ints | None) -> Indices:
-        """search.find of what is on these lines."""
+        """search.find on these lines."""
         return search.find(small, large, self.x, self.course, self.part, allowed, self.horizon, rank)
 
 
 def register_new(scene: Scene) -> None:
-    """Registers what is new, before a step begins."""
+    """Registers everything new, before a step begins."""
     scene.reference.begin_anew(scene.settle_live(), scene.surface_nodes.x)
     _register(scene)
 
 
 def renew(scene: Scene, x: Floats, v: Floats, strayed: bool) -> None:
-    """Registers what is new and, with ``strayed``, gives new lines to what has left its own.
+    """Registers everything new and, with ``strayed``, begins new lines for the slots that have departed from theirs.
 
-    ``x``, ``v`` (slots, 3): as the step begins, v before contact.
+    ``x``, ``v`` (slots, 3): at the beginning of the step, v before contact.
     """
     off = scene.settle_live()
     if strayed:
@@ -65,9 +66,9 @@ def renew(scene: Scene, x: Floats, v: Floats, strayed: bool) -> None:
 
 
 def carry(now: Scene, old: Scene) -> None:
-    """What ``old`` knows of the surface stays good on the one of ``now``, which is not connected yet: lines, what is
-    searched and what has to be registered, and the pairs of what is still there. The pairs of a copy were with the rank
-    of its parent, and are with that of its own owner from now on.
+    """Copies the state of the scene ``old`` to ``now``, which is not connected yet: lines, broad-phase flags, and
+    the pairs that still exist. The pairs of a copied node were on the rank of its parent, and are on the rank of its
+    own owner from now on.
     """
     slots, faces = _numbers(now.surface_nodes.id, old.surface_nodes.id), _numbers(now.faces.id, old.faces.id)
     edges = _numbers(now.edges.names, old.edges.names)
@@ -91,7 +92,7 @@ def carry(now: Scene, old: Scene) -> None:
 
 
 def _numbers(now: Ints, old: Ints) -> Indices:
-    """Where the names ``old`` stand among ``now``, -1 where they do not."""
+    """Rows of the names ``old`` in ``now``, -1 for those that are missing."""
     order = np.argsort(now, kind="stable")
     at = places(now[order], old)
     return np.where(at >= 0, order[at], -1).astype(np.int32) if len(order) else at

@@ -1,8 +1,9 @@
-"""Candidates: nodes and faces, edges and edges, that may meet before the next search.
+"""Candidate pairs: nodes and faces, edges and edges, that may be in contact before the next search.
 
-Everything is taken to fly on for a while, the horizon, and two things are candidates when their paths come closer than
-their reach. A candidate list stays good until the horizon has passed or something has strayed from its path by half the
-skin; so a body in free flight spends no skin, however fast it is. The list may hold more than is needed, never less.
+All nodes are extrapolated over a time, the horizon, and two primitives are candidates when their paths come closer
+than their reach. A candidate list is valid until the horizon has passed or a node has departed from its path by half
+the skin; so a body in free flight uses no skin, for any speed. The list may contain pairs that are not needed, but
+misses none.
 """
 
 from dataclasses import dataclass
@@ -16,40 +17,41 @@ from . import buckets
 from .buckets import TABLE, bucket_at, bucket_of
 
 _FEW, _SAMPLE = 8, 256
-"""How many large things to a small one are worth larger cells; how many boxes are measured for the size of cells."""
+"""Ratio of the numbers of large and small primitives from which on larger cells are faster; number of boxes of which
+the size of cells is computed."""
 
 
 @dataclass
 class Primitives:
-    """What is searched: points, edges or faces as corners of nodes; all the same number of corners."""
+    """Points, edges or faces, given by nodes; all with the same number of corners."""
 
     corners: Indices
-    """(n, k) places of nodes."""
+    """(n, k) rows of their nodes."""
     reach: Floats
-    """(n,) how far from its corners' hull a thing must be seen, m."""
+    """(n,) distance from the hull of the corners within which others are found, m."""
     some: Indices | None = None
-    """(m,) which of them are searched; all when it is missing."""
+    """(m,) rows to be searched; None for all."""
 
     @property
     def searched(self) -> Indices:
-        """(m,) which are."""
+        """(m,) rows to be searched."""
         return np.arange(len(self.corners), dtype=np.int32) if self.some is None else self.some
 
 
 @dataclass
 class Boxes:
-    """(n, 3) lowest and highest corner of the space that each thing may need before the next search."""
+    """(n, 3) lowest and highest corner of the swept volume of each primitive."""
 
     low: Floats
     high: Floats
 
     @property
     def hull(self) -> Floats:
-        """(6,) lowest corner and minus the highest of them all; infinities when there is none."""
+        """(6,) lowest corner and minus the highest of them all; infinities without boxes."""
         return np.asarray(_hull(self.low, self.high))
 
     def touching(self, hull: Floats) -> Flags:
-        """(n,) which boxes touch a hull."""
+        """(n,) boxes that touch a hull."""
         return np.asarray(_in_hull(self.low, self.high, hull))
 
 
@@ -74,7 +76,7 @@ def _in_hull(low, high, hull):  # type: ignore[no-untyped-def]
 
 
 def swept(things: Primitives, x: Floats, v: Floats, horizon: float) -> Boxes:
-    """The boxes that the things that are searched fly through, reach included; ``x`` and ``v`` are (nodes, 3)."""
+    """Bounding boxes of the searched primitives over the horizon, reach included; ``x`` and ``v`` (nodes, 3)."""
     none = np.zeros(len(x), np.int32)
     boxed = _boxed(things.corners, things.reach, things.searched, x, v, horizon, none, _ALLOWED, _EVERYWHERE)
     return Boxes(boxed[0], boxed[1])
@@ -82,7 +84,7 @@ def swept(things: Primitives, x: Floats, v: Floats, horizon: float) -> Boxes:
 
 _ALLOWED = np.ones((1, 1), bool)
 _EVERYWHERE = np.full((1, 2, 3), (((-np.inf,) * 3, (np.inf,) * 3)))
-"""A hull that everything touches."""
+"""Hull that every box touches."""
 
 
 @njit(
@@ -91,8 +93,8 @@ _EVERYWHERE = np.full((1, 2, 3), (((-np.inf,) * 3, (np.inf,) * 3)))
     cache=True,
 )
 def _boxed(corners, reach, some, x, v, horizon, part, allowed, hull):  # type: ignore[no-untyped-def]
-    """Lowest and highest corner of the boxes of ``some`` of the things, of those that touch the ``hull`` (parts, 2, 3)
-    of a part that theirs meets; which they are; and the hull of theirs.
+    """Lowest and highest corner of the boxes of ``some`` primitives that touch the ``hull`` (parts, 2, 3) of a part
+    with which theirs may be in contact; their rows; and the hulls of their own parts.
     """
     low, high, rows, n = np.empty((len(some), 3)), np.empty((len(some), 3)), np.empty(len(some), np.int32), 0
     own = np.empty(hull.shape)
@@ -124,11 +126,12 @@ def find(
     small: Primitives, large: Primitives, x: Floats, v: Floats, part: Indices, allowed: Flags, horizon: float,
     rank: Ints | None,
 ) -> Indices:  # fmt: skip
-    """(pairs, 2) candidates: index of a small thing and of a large one.
+    """(pairs, 2) candidates: row of a small primitive and of a large one.
 
-    ``x``, ``v`` (nodes, 3), less what all drift with, and ``part`` (nodes,) belong to the places that corners name;
-    ``allowed`` (parts, parts) says which parts meet. Primitives with a corner in common are no candidates. ``rank``
-    (large,): the small things are the first of the large ones, and only the one of lower rank finds a pair.
+    ``x``, ``v`` (nodes, 3), less the mean velocity, and ``part`` (nodes,) of the nodes of corners; ``allowed``
+    (parts, parts): parts that may be in contact. Primitives with a common corner are no candidates. ``rank``
+    (large,): the small primitives are the first of the large ones, and a pair is found only from the one of lower
+    rank.
     """
     order = np.zeros(0, np.int64) if rank is None else rank
     first, second = (small, allowed), (large, allowed.T.copy())
@@ -149,14 +152,15 @@ def find(
 def _touching(
     of: tuple[Primitives, Flags], lines: tuple[Floats, Floats, float, Indices], hull: Floats, rank: Ints
 ) -> "tuple[Sought, Floats]":  # fmt: skip
-    """Those of the things that touch the ``hull`` (parts, 2, 3) of a part that theirs meets, and their own."""
+    """Primitives that touch the ``hull`` (parts, 2, 3) of a part with which theirs may be in contact, and their own
+    hulls."""
     things, allowed = of
     low, high, rows, own = _boxed(things.corners, things.reach, things.searched, *lines, allowed, hull)
     return Sought(low, high, things.corners, rows, rank), own
 
 
 def _extent(things: "Sought") -> float:
-    """The median of the longest sides of boxes, of a sample of them, m."""
+    """Median of the longest sides of a sample of the boxes, m."""
     step = max(len(things.some) // _SAMPLE, 1)
     sides = (things.high[::step] - things.low[::step]).max(axis=1)
     return float(np.partition(sides, len(sides) // 2)[len(sides) // 2])
@@ -180,14 +184,14 @@ class Sought(NamedTuple):
     """Primitives of one search, with their boxes."""
 
     low: Floats
-    """(m, 3) of their boxes."""
+    """(m, 3) lowest corners of their boxes."""
     high: Floats
     corners: Indices
-    """(n, k) slots of all things."""
+    """(n, k) slots of all primitives."""
     some: Indices
-    """(m,) which of them."""
+    """(m,) rows of the searched ones."""
     rank: Ints
-    """(n,) of two things that are found, the small one has the lower rank; (0,): no matter."""
+    """(n,) rank: in a pair the small primitive has the lower rank; (0,) for any order."""
 
 
 SOUGHT = types.NamedTuple(
@@ -197,7 +201,7 @@ SOUGHT = types.NamedTuple(
 
 @njit("boolean(int32[:, ::1], int32[:, ::1], int64, int64)", cache=True)
 def _meet(small, large, i, j):  # type: ignore[no-untyped-def]
-    """Whether two things have a corner in common."""
+    """Whether two primitives have a common corner."""
     for a in range(small.shape[1]):
         for b in range(large.shape[1]):
             if small[i, a] == large[j, b]:
@@ -212,9 +216,11 @@ def _meet(small, large, i, j):  # type: ignore[no-untyped-def]
     cache=True,
 )
 def _ask(out, n, asked, table, small, large, part, allowed):  # type: ignore[no-untyped-def]
-    """Each large thing asks the buckets that its box touches; a pair is found in the bucket where the boxes begin to
-    overlap, and so once. ``n`` pairs are in ``out`` and ``asked`` large things have asked already; returns both anew,
-    when all have or the room is full.
+    """Finds the small primitives near each large one in the buckets that its box touches.
+
+    A pair counts only in the cell that contains the lowest corner of the intersection of its two boxes, and so once.
+    On entry ``out`` has ``n`` pairs, and ``asked`` large primitives are finished; returns both anew, when all are
+    finished or ``out`` is full.
     """
     few_low, few_high, box_low, box_high = small.low, small.high, large.low, large.high
     few, many, rank, order = small.corners, large.corners, small.rank, large.rank

@@ -1,4 +1,4 @@
-"""Searches of all ranks: when one is due, how far ahead it looks, and the scene that it leaves."""
+"""Searches of all ranks: their schedule, their horizon, and the scene that they make."""
 
 import math
 from functools import cached_property
@@ -26,75 +26,75 @@ from . import registration
 from .extrapolation import courses
 
 _SHORTEST = 10.0
-"""Steps of free flight that a search looks ahead at least; at most twice what the last search was good for."""
+"""Least horizon of a search, in steps; at most twice the steps since the last search."""
 _LONGEST = 80.0
-"""The same at most where bodies break: with 300 steps the pairs between fragments cost a quarter more than the searches
-that they save (docs/performance/bench.md, the bar to 40 us).
+"""Largest horizon where bodies break, in steps: with 300 steps the pairs between fragments cost a quarter more than
+the searches that they save (docs/performance/bench.md, the bar to 40 us).
 """
 _AHEAD = 2.0
-"""Steps before the end of what a search looked ahead at which another one is due: the second is the one that
-narrow_phase looks ahead.
+"""Steps before the end of the horizon at which the next search is scheduled: the second is the one for which the
+narrow phase detects contacts ahead.
 """
 _LEAST = 3.0 + _AHEAD
-"""Steps that a search must be good for still, so that what has changed is added to it: with fewer the next one would
-be due at once. Chosen: one more than that, and one for a step that grows.
+"""Least remaining horizon, in steps, with which a search keeps the candidates of the last one: with less the next
+search would follow at once. Chosen: one more than that, and one for a step that grows.
 """
 
 
 class Searches:
-    """The scene of a rank, and the searches that renew it."""
+    """Scene of a rank, and the searches that renew it."""
 
     def __init__(
         self, case: Case, model: Model, neighbours: list[Neighbour], exterior: Exterior, comm: Comm, clock: Clock
     ) -> None:
-        """Nothing is searched yet."""
+        """Begins without a scene."""
         self._case, self._model, self._neighbours, self._exterior = case, model, neighbours, exterior
         self._comm, self._clock = comm, clock
         self.mu = part_pairs.friction(case)
-        """(parts, parts) Coulomb's coefficient, NaN where two parts do not meet."""
+        """(parts, parts) Coulomb's coefficient, NaN where two parts may not be in contact."""
         self.scene: Scene | None = None
         self.due = True
         """Whether the next step begins with a search."""
         self.many = 0
-        """Searches so far."""
+        """Number of searches so far."""
         self._last = -math.inf
-        """Step of the last one from nothing."""
+        """Step of the last search from nothing."""
         self._kept: tuple[Ints, Floats] = np.zeros((0, 2), np.int64), np.zeros((0, 4))
-        """Candidates, and what they have kept, that the next search takes over from elsewhere."""
+        """Pairs and their stored impulses, from before a cut or a restart, for the next search."""
 
     @cached_property
     def rubs(self) -> bool:
-        """Whether there is friction anywhere."""
+        """Whether any pair of parts has friction."""
         return bool(np.nanmax(self.mu, initial=0.0) > 0.0)
 
     @cached_property
     def _itself(self) -> Flags:
-        """(parts,) whether the body of each may meet itself."""
+        """(parts,) whether the body of each may be in contact with itself."""
         return part_pairs.itself(self._case, self.mu)
 
     @property
     def rules(self) -> Rules:
-        """How to search."""
+        """Parameters of the searches."""
         contact, size = self._case.contact, self._exterior.size
         assert contact is not None
         return Rules(contact.domain, ~np.isnan(self.mu), 2.0 * size, contact.skin * size, HALO * size, self._itself)
 
     def keep(self, parcel: Parcel) -> None:
-        """Adds what pairs have kept: the candidates themselves a search finds again."""
+        """Adds the stored impulses of pairs to the ``parcel``; the candidates are found again by a search."""
         keys, kept = self._kept if self.scene is None else self.scene.kept
         parcel.rows["contact.kept"] = {"node": keys[:, 0], "face": keys[:, 1], "kept": kept}
 
     def resume(self, parcel: Parcel) -> None:
-        """Takes it back."""
+        """Restores the stored impulses."""
         kept = parcel.rows["contact.kept"]
         self._kept = np.column_stack([kept["node"], kept["face"]]), kept["kept"]
 
     def spent(self, nodes: Nodes) -> bool:
-        """Whether a node of the surface will soon (_AHEAD) leave what the last search has allowed for."""
+        """Whether a surface node will depart, within _AHEAD steps, more than the last search allows."""
         return self._exterior.motion.spent(nodes, self._clock.t, _AHEAD * self._clock.dt)
 
     def begin(self, nodes: Nodes) -> None:
-        """Before a step: mean normals when it is their turn, a search when it is due; all ranks take part."""
+        """Before a step: recomputes mean normals every EVERY steps, and searches if scheduled. Collective."""
         if self._clock.step % normals.EVERY == 0:
             self._exterior.turn()
             if self.scene is not None:
@@ -105,7 +105,7 @@ class Searches:
             self._search(nodes)
 
     def _search(self, nodes: Nodes) -> None:
-        """The scene anew; all ranks take part."""
+        """Makes a new scene. Collective."""
         motion, old, exterior = self._exterior.motion, self.scene, self._exterior
         if old is not None:
             old.free()
@@ -126,8 +126,8 @@ class Searches:
         self.many += 1
 
     def _laid_out(self, nodes: Nodes, goes_on: bool) -> Scene:
-        """The surface as it is, without pairs: for what is left of the last search from nothing, if it ``goes_on``; all
-        ranks take part.
+        """Lays out the present surface, without pairs; with ``goes_on`` for the remaining horizon of the last search
+        from nothing, else for a new one. Collective.
         """
         clock, motion = self._clock, self._exterior.motion
         self._exterior.refresh(self._courses(nodes), clock.t)
@@ -139,21 +139,21 @@ class Searches:
         return layout.build(motion.sides, self.rules, motion.until - clock.t, drift, nodes, self._comm)
 
     def _courses(self, nodes: Nodes) -> Floats:
-        """(nodes, 3) how the nodes fly on; all ranks take part."""
+        """(nodes, 3) extrapolated velocities of the nodes. Collective."""
         if not self._case.fractures:
             return nodes.v
         return courses(self._model.blocks, nodes, self._neighbours, self._comm)
 
     def _connect(self, found: Scene, nodes: Nodes) -> None:
-        """Takes the cracks up into a new scene, and settles who shares what of it; all ranks take part."""
+        """Adds the cracks to a new scene, and exchanges the lists of shared nodes. Collective."""
         follower = SplitUpdate(found, self._exterior.motion.here(nodes), nodes)
         if self._case.fractures:
             follower.cracks(self._exterior.cracks, self._model.blocks)
         follower.settle(self._neighbours, self._comm)
 
     def foresee(self, *, anew: bool = False) -> None:
-        """The faces of cracks that may open soon are searched, by all ranks that have them; all take part. ``anew``:
-        after a search, when others have come near.
+        """Adds the faces of cracks that may open soon to the broad phase of all ranks that have them. ``anew``: also
+        those already in it, after a search. Collective.
         """
         now, cracks = self.scene, self._exterior.cracks
         if now is None or not self._case.fractures:
@@ -166,7 +166,8 @@ class Searches:
         now.enliven(sides[~now.faces.live[sides]])
 
     def separate(self, split: Split) -> None:
-        """Follows nodes as they separate; called on all ranks, see topology_updates.py for those that take part."""
+        """Follows the separation of nodes; called on all ranks, see topology_updates.py for those that exchange
+        messages."""
         if self.scene is None:
             return
         nodes, here = self._model.nodes, self._exterior.motion.here(self._model.nodes)
@@ -179,13 +180,13 @@ class Searches:
             follower.share(heard, self._neighbours)
 
     def pushed(self, nodes: Ints) -> Flags:
-        """(k,) which of these ``nodes`` (k,) of this rank contact has pushed in the last step."""
+        """(k,) which of the local ``nodes`` (k,) had an impulse of contact in the last step."""
         if (now := self.scene) is None:
             return np.zeros(len(nodes), bool)
         places = now.own.place[nodes]
         return np.asarray((places >= 0) & now.slots.total[places].any(axis=1))
 
     def free(self) -> None:
-        """Gives the messages back to MPI."""
+        """Releases the messages of MPI."""
         if self.scene is not None:
             self.scene.free()

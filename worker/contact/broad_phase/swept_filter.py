@@ -1,11 +1,11 @@
-"""Candidates sifted: of the pairs whose boxes touch, those that come near each other indeed.
+"""Swept filter: removes candidate pairs whose boxes touch but which stay apart over the horizon.
 
-A box round a face or an edge is much larger than what it encloses. Two edges go when one direction separates them all
-the time. The height of a node over a face and its place in the face's plane are followed through the free flight, at
-its beginning, middle and end. Each is nearly a parabola in time: what it may do between two of these moments is an
-eighth of its second difference, twice of which is allowed for. A pair goes only when one and the same measure excludes
-it all the time, by the skin and the depth at which contacts are active; so one that nothing excludes at the beginning
-stays.
+A box round a face or an edge is much larger than the primitive. A pair of edges is removed when one direction
+separates them all the time. For a node and a face, the height over the face and the distances from its sides are
+computed at the beginning, middle and end of the horizon. Each is nearly a parabola in time: between two of these
+moments it deviates by an eighth of its second difference, of which twice is allowed for. A pair is removed only when
+one and the same measure excludes it all the time, by the skin and the depth of contacts; so a pair that no measure
+excludes at the beginning stays.
 """
 
 import numpy as np
@@ -21,34 +21,35 @@ _V2, _N2 = "float64[:, ::1]", "int32[:, ::1]"
 def faces(
     pairs: Indices, places: Indices, size: Floats, x: Floats, v: Floats, part: Indices, skin: float, horizon: float
 ) -> Flags:  # fmt: skip
-    """(p,) which of ``pairs`` (p, 2), slot and face, may meet; ``places`` (f, 4); ``x``, ``v`` (slots, 3): lines."""
+    """(p,) pairs of slot and face, ``pairs`` (p, 2), that may be in contact; ``places`` (f, 4); ``x``, ``v`` (slots,
+    3): lines."""
     return np.asarray(_near_faces(pairs, places, size, x, v, part, skin, horizon))
 
 
 def edges(
     pairs: Indices, places: Indices, deep: Floats, x: Floats, v: Floats, skin: float, horizon: float
 ) -> Flags:  # fmt: skip
-    """(p,) which of ``pairs`` (p, 2), two edges, may meet; ``places`` (e, 6); ``deep`` (e,): how deep they hold, m;
-    ``x``, ``v`` (slots, 3): lines.
+    """(p,) pairs of edges, ``pairs`` (p, 2), that may be in contact; ``places`` (e, 6); ``deep`` (e,): greatest
+    depth of a contact, m; ``x``, ``v`` (slots, 3): lines.
     """
     return np.asarray(_near_edges(pairs, places, deep, x, v, skin, horizon))
 
 
 @njit("float64(float64, float64, float64)", cache=True)
 def _least(f, g, h):  # type: ignore[no-untyped-def]
-    """Lower bound of what is f, g and h at beginning, middle and end."""
+    """Lower bound of a function with the values f, g and h at beginning, middle and end."""
     return min(f, g, h) - 0.25 * abs(f - 2.0 * g + h)
 
 
 @njit(f"{VECTOR}({_V2}, {_V2}, int64, float64)", cache=True)
 def _then(x, v, s, t):  # type: ignore[no-untyped-def]
-    """Where slot s is at time t."""
+    """Position of slot s at time t."""
     return beyond(at(x, s), t, at(v, s))
 
 
 @njit(f"Tuple((float64, {VECTOR}))({VECTOR}, {VECTOR}, {VECTOR}, {VECTOR})", cache=True, error_model="numpy")
 def _over(s, i, j, k):  # type: ignore[no-untyped-def]
-    """Height of the point s over the face i, j, k, and how far it is outside of each of the sides, m."""
+    """Height of the point s over the face i, j, k, and its distance outside of each of the sides, m."""
     e, f, r = minus(j, i), minus(k, i), minus(s, i)
     g, q = minus(f, e), minus(r, e)
     n = cross(e, f)
@@ -94,8 +95,8 @@ def _beyond(axis, a, b, c, d, far):  # type: ignore[no-untyped-def]
 @njit(f"boolean({_V2}, {_V2}, int64, int64, int64, int64, float64, float64, float64)", cache=True)
 def _separated(x, v, a, b, c, d, begin, end, far):  # type: ignore[no-untyped-def]
     """Whether the segments ab and cd stay further apart than ``far`` from time ``begin`` to ``end``, along the
-    direction in which they are nearest in between: on straight lines their distance along a fixed direction is least at
-    either end.
+    direction in which they are nearest at the middle: on straight lines their distance along a fixed direction is
+    least at either end.
     """
     half = 0.5 * (begin + end)
     axis = nearest(_then(x, v, a, half), _then(x, v, b, half), _then(x, v, c, half), _then(x, v, d, half))

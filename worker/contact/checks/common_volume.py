@@ -1,10 +1,10 @@
-"""What contact has not held: tets that lie in tets of another body or fragment, by the volume that they have in common.
+"""Common volume of bodies: tets that overlap tets of another body or fragment, and by how much.
 
-Bodies may reach into each other without a node of one inside of the other (``inside``): by their edges, or face on
-face. Every tet that has a corner on the surface, or one that has separated, is cut by all tets that may meet it and
-have no node with it in common, but in a part that breaks those that hold together with it. What two tets have in common
-is their intersection, exact but for rounding. Tets of other ranks come along by the boxes of what they reach, so that
-no cut of the domain changes what is found.
+Bodies may overlap without a node of one inside of the other (``inside``): by their edges, or face on face. Every tet
+with a corner on the surface, or with a separated corner, is cut by all tets of parts that may be in contact with its
+own and that have no node in common with it; in a part that breaks, except those of the same fragment. The common
+volume of two tets is their intersection, exact except for rounding. Tets of other ranks are exchanged by bounding
+boxes, so that no cut of the domain changes the result.
 """
 
 from dataclasses import dataclass
@@ -23,35 +23,35 @@ from ..stage import Contact
 from .inside import outermost
 
 LARGE = 0.1
-"""Of the volume of a tet: a tet of which more lies in others is counted. Chosen: what bodies of facets that touch have
-in common is a hundredth."""
+"""Share of the volume of a tet: tets with more of it in others are counted. Chosen: curved bodies of flat facets
+that touch have a hundredth in common."""
 _TOLD, _MOST = 0.01, 0.5
-"""Of the volume of all these tets, as the lines of the ledger, and of one of them: what lies in others and is worth a
-warning. Chosen."""
+"""Limits of the warning: common volume over the volume of all these tets, like the lines of the ledger, and over
+that of one of them. Chosen."""
 _WORDS = 19
-"""Of what is told of a tet: its id, its fragment, its part, its nodes' ids and the words of their places."""
+"""Words of a tet in a message: its id, its fragment, its part, its nodes' ids and the words of their positions."""
 _QUANTUM = 2.0**-40
-"""Of the volume of a tet, in which its shares are added up, so that their sum does not depend on their order."""
+"""Quantum of the shares of a tet, of its volume: their sum does not depend on their order."""
 _PIECES = 81
-"""Most that four planes leave of a tet: of each piece at most three."""
+"""Largest number of pieces of a tet after four cuts by planes, each into at most three."""
 
 
 @dataclass(frozen=True)
 class CommonVolume:
-    """Equal on all ranks."""
+    """Result, equal on all ranks."""
 
     tets: int
-    """That were cut."""
+    """Number of tets that were cut."""
     large: int
-    """Those of them of which more than LARGE lies in others."""
+    """Number of those with more than LARGE of their volume in others."""
     largest: float
-    """Most of a tet that lies in others, of its volume."""
+    """Largest share of the volume of one tet in others."""
     share: float
-    """What lies in others, of the volume of all of them."""
+    """Share of the volume of all of them in others."""
 
     @property
     def warnings(self) -> list[str]:
-        """One line, if too much is common."""
+        """One line if the common volume is above the limits."""
         if self.share <= _TOLD and self.largest <= _MOST:
             return []
         return [
@@ -62,9 +62,9 @@ class CommonVolume:
 
 
 def measure(contact: Contact, model: Model, labels: list[Ints] | None, comm: Comm) -> CommonVolume:
-    """How much of the tets at the surface lies in others, at the positions as they are; all ranks take part.
+    """Measures the volume of tets at the surface inside of other tets, at the present positions. Collective.
 
-    ``labels``: for each block (n,) the fragment of each tet; without, every part is one.
+    ``labels``: for each block (n,) the fragment of each tet; None: every part is one fragment.
     """
     fragments = labels or [np.full(block.n, block.part, np.int64) for block in model.blocks]
     own = _at_surface(contact, model, fragments)
@@ -99,7 +99,7 @@ def measure(contact: Contact, model: Model, labels: list[Ints] | None, comm: Com
 
 
 def _at_surface(contact: Contact, model: Model, fragments: list[Ints]) -> Ints:
-    """(n, _WORDS) of the tets of this rank that have a corner on the surface, or one that has separated."""
+    """(n, _WORDS) words of this rank's tets with a corner on the surface, or with a separated corner."""
     outer, found = outermost(contact), [np.zeros((0, _WORDS), np.int64)]
     for block, fragment in zip(model.blocks, fragments, strict=True):
         some = np.flatnonzero(outer[block.tets].any(axis=1))
@@ -110,7 +110,7 @@ def _at_surface(contact: Contact, model: Model, fragments: list[Ints]) -> Ints:
 
 
 def _reaching(own: Ints, model: Model, comm: Comm) -> Ints:
-    """(n, _WORDS) of the tets at the surface of all ranks that touch the hull of this rank's nodes."""
+    """(n, _WORDS) words of the tets at the surface of all ranks that touch the bounding box of this rank's nodes."""
     hulls = comm.join(_hull(model.nodes.x[None]).view(np.int64)).view(np.float64).reshape(-1, 6)
     low, high = np.split(_hull(_corners(own)), 2, axis=1)
     touch = [((low <= hull[3:]) & (high >= hull[:3])).all(axis=1) for hull in hulls]
@@ -125,12 +125,12 @@ def _hull(points: Floats) -> Floats:
 
 
 def _corners(told: Ints) -> Floats:
-    """(n, 4, 3) corners of tets that are told of, m."""
+    """(n, 4, 3) corners of received tets, m."""
     return np.ascontiguousarray(told[:, 7:]).view(np.float64).reshape(-1, 4, 3)
 
 
 def _volumes(corners: Floats) -> Floats:
-    """(n,) volumes of tets (n, 4, 3), m^3; none of those that are inside out."""
+    """(n,) volumes of tets (n, 4, 3), m^3; 0 for inverted ones."""
     return np.asarray(np.maximum(np.linalg.det(corners[:, 1:] - corners[:, :1]) / 6.0, 0.0))
 
 
@@ -148,13 +148,13 @@ def _determinant(tet):  # type: ignore[no-untyped-def]
 
 @njit("float64(float64[:, :], int64, float64[:, :], int64)", cache=True)
 def _height(tet, face, other, k):  # type: ignore[no-untyped-def]
-    """``_triple`` of corner ``k`` of ``other`` and the face across from a corner; above 0 inside."""
+    """Returns ``_triple`` of corner ``k`` of ``other`` and the face opposite to a corner; above 0 inside."""
     return -_triple(tet, FACES[face, 0], FACES[face, 1], FACES[face, 2], other, k)
 
 
 @njit("boolean(float64[:, ::1], float64[:, ::1])", cache=True)
 def _apart(one, other):  # type: ignore[no-untyped-def]
-    """Whether a tet lies behind a face of another."""
+    """Whether a tet lies entirely behind a face of another."""
     for face in range(4):
         behind = True
         for k in range(4):
@@ -166,7 +166,7 @@ def _apart(one, other):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[:, ::1], float64[::1], int64, int64)", cache=True)
 def _meet(point, tet, height, a, b):  # type: ignore[no-untyped-def]
-    """Sets the ``point`` where the edge from corner a to b goes through the plane above which they have a height."""
+    """Sets ``point`` to the intersection of the edge from corner a to b with the plane of the heights."""
     share = height[a] / (height[a] - height[b])
     for i in range(3):
         point[i] = tet[a, i] + share * (tet[b, i] - tet[a, i])
@@ -177,9 +177,9 @@ def _meet(point, tet, height, a, b):  # type: ignore[no-untyped-def]
     cache=True, _nrt=True,
 )  # fmt: skip
 def _in_front(out, n, tet, height, wedge, order):  # type: ignore[no-untyped-def]
-    """What of a tet is before a plane, by the heights of its corners, as pieces from row ``n`` of ``out`` on; returns
-    their new number. With one, two or three corners behind it, it is a wedge or half of one, of three tets, or the tet
-    at the corner before it. ``wedge`` (6, 3), ``order`` (4,): room.
+    """Cuts a tet by a plane, given by the heights of its corners, and writes the pieces in front of it to ``out``
+    from row ``n`` on; returns their new number. With one corner in front the result is a tet; with two or three a
+    wedge, of three tets. ``wedge`` (6, 3), ``order`` (4,): working arrays.
     """
     before, end = 0, 4
     for k in range(4):
@@ -214,8 +214,8 @@ def _in_front(out, n, tet, height, wedge, order):  # type: ignore[no-untyped-def
 
 @njit("float64(float64[:, :, ::1], float64[:, :, ::1], float64[:, ::1], float64[:, ::1])", cache=True)
 def intersection(pieces, others, one, other):  # type: ignore[no-untyped-def]
-    """Six times the volume, m^3, that two tets (4, 3), neither inside out, have in common: the first is cut by the
-    planes of the second, one after the other. With room for pieces, twice (_PIECES, 4, 3).
+    """Six times the common volume, m^3, of two tets (4, 3), neither inverted: the first is cut by the face planes of
+    the second, one after the other. ``pieces``, ``others`` (_PIECES, 4, 3): working arrays.
     """
     n, height, wedge, order = 1, np.empty(4), np.empty((6, 3)), np.empty(4, np.int64)
     pieces[0] = one
@@ -238,8 +238,8 @@ def intersection(pieces, others, one, other):  # type: ignore[no-untyped-def]
     error_model="numpy",
 )
 def _cut(quanta, pairs, ids, ones, other_ids, others):  # type: ignore[no-untyped-def]
-    """Adds to ``quanta`` (n,) the shares of the tets ``ones`` (n, 4, 3) that they have in common with ``others``
-    (m, 4, 3), pair by pair (p, 2), where they have no node in common; ``ids`` (n, 4), (m, 4): of their nodes.
+    """Adds the shares of the tets ``ones`` (n, 4, 3) inside of ``others`` (m, 4, 3) to ``quanta`` (n,), pair by pair
+    (p, 2), for pairs without a common node; ``ids`` (n, 4), (m, 4): of their nodes.
     """
     pieces, next_pieces = np.empty((_PIECES, 4, 3)), np.empty((_PIECES, 4, 3))
     for p in range(len(pairs)):

@@ -1,14 +1,14 @@
-"""What contact has not held: nodes that are inside of another body or fragment, and nodes without tets inside of the
-part that they come from, whether that meets itself or not.
+"""Penetrated nodes: nodes inside of another body or fragment, and nodes without tets inside of the part that they come
+from, whether that part is in contact with itself or not.
 
-A node that lies in a tet which nothing holds together with its own has come through that body's surface. How deep it
-is below the surface the tet alone tells: below the nearest of its own open faces; and in one that has no open face but
-a corner on the surface, below the nearest of its faces at least; nowhere deeper than it is away from a corner of the
-tet on the surface. In a tet without one it is deeper than the outermost layer; but where that has been squeezed flat it
-may lie on the surface all the same, as the nearest open faces of the body tell. One on an edge between two corners on
-the surface is taken to touch it: a tet that has an edge there may have no open face beside it; what is on an edge that
-runs through a plate of one tet is so taken, too. Nodes of the surface and nodes that have separated are looked at,
-against the tets of all ranks, so that no cut changes what is found.
+A node in a tet of another fragment has passed through that body's surface. Its depth is computed from the tet alone:
+below the nearest exposed face of the tet; in a tet without exposed face but with a corner on the surface, below the
+nearest of all its faces; and at most the distance from such a corner. In a tet without a corner on the surface the
+node is deeper than the outermost layer, unless that layer has been compressed to nearly nothing: then the nearest
+exposed faces of the body decide. A node on an edge between two corners on the surface counts as touching, because a
+tet with an edge on the surface may have no exposed face there; this includes edges that run through a plate of one
+tet. Nodes of the surface and separated nodes are tested against the tets of all ranks, so that no cut changes the
+result.
 """
 
 from dataclasses import dataclass
@@ -26,34 +26,36 @@ from ..stage import Contact
 from .overlap import to_borders
 
 SLIGHT = 0.05
-"""Of the typical size of a face: depths below this are none. Chosen: what sweeps leave undone is less."""
+"""Share of the typical size of a face: smaller depths count as 0. Chosen: above the residual of the sweeps."""
 _WORDS = 5
-"""Of what is told of a node."""
+"""Words of a node in a message."""
 _ROUNDING = 1e-9
-"""Of the shares of a tet's corners: a node on a face between two tets is in both."""
+"""Tolerance of the volume coordinates: a node on a face between two tets is in both."""
 DEEP = 0.25
-"""The same: deeper than this is worth a warning. Chosen: half of the altitude of a regular tet, about."""
+"""Share of the typical size of a face: depth from which on there is a warning. Chosen: about half of the altitude of
+a regular tet."""
 
 
 @dataclass(frozen=True)
 class Inside:
-    """Equal on all ranks."""
+    """Result, equal on all ranks."""
 
     looked: int
-    """Nodes that were looked at."""
+    """Number of nodes tested."""
     nodes: int
-    """Those of them that are inside of another body or fragment, or without tets inside of their own part, deeper than
+    """Number of those inside of another body or fragment, or without tets and inside of their own part, deeper than
     SLIGHT."""
     own: int
-    """Those of these that are inside of their own part alone, and have no tets."""
+    """Number of these without tets that are inside of their own part only."""
     buried: int
-    """Those of these in tets without a corner on the surface, further than SLIGHT from any open face of their body."""
+    """Number of these in tets without a corner on the surface, further than SLIGHT from any exposed face of their
+    body."""
     deepest: float
-    """Of the others, in typical sizes of a face; 0 where no node is deeper than SLIGHT."""
+    """Largest depth of the others, in typical sizes of a face; 0 if no node is deeper than SLIGHT."""
 
     @property
     def warnings(self) -> list[str]:
-        """One line, if any is deeper than DEEP."""
+        """One line if a node is deeper than DEEP."""
         if not self.buried and self.deepest <= DEEP:
             return []
         how = [f"{self.own} of them, without tets, into the part that they come from"] if self.own else []
@@ -67,9 +69,9 @@ class Inside:
 
 
 def look(contact: Contact, model: Model, labels: list[Ints] | None, comm: Comm) -> Inside:
-    """Who is inside of what, at the positions as they are; all ranks take part.
+    """Finds the nodes inside of other bodies, at the present positions. Collective.
 
-    ``labels``: for each block (n,) the fragment of each tet; without, every part is one.
+    ``labels``: for each block (n,) the fragment of each tet; None: every part is one fragment.
     """
     fragments = labels or [np.full(block.n, block.part, np.int64) for block in model.blocks]
     outer, may = outermost(contact), _may(contact)
@@ -104,28 +106,29 @@ def look(contact: Contact, model: Model, labels: list[Ints] | None, comm: Comm) 
 
 
 def _may(contact: Contact) -> Flags:
-    """(parts, parts) which parts are asked about: those that meet, and of each of these its own nodes without tets."""
+    """(parts, parts) pairs of parts to be tested: those that may be in contact, and each of these with its own nodes
+    without tets."""
     meet = ~np.isnan(contact.searches.mu)
     return np.asarray(meet | (np.eye(len(meet), dtype=bool) & meet.any(axis=1)))
 
 
 class _Seen(NamedTuple):
-    """Nodes that are looked at; equal on all ranks."""
+    """Tested nodes; equal on all ranks."""
 
     part: Indices
     """(k,)."""
     fragment: Ints
-    """(k,) -1 for one that has lost its tets."""
+    """(k,) fragment, -1 for a node without tets."""
     x: Floats
-    """(k, 3) m."""
+    """(k, 3) position, m."""
 
 
 def _seen(outer: Flags, model: Model, fragments: list[Ints], comm: Comm) -> _Seen:
-    """The ``outer`` nodes (nodes,) of all ranks; all ranks take part."""
+    """Gathers the ``outer`` nodes (nodes,) of all ranks. Collective."""
     nodes = model.nodes
     some = nodes.owned & outer
     told = comm.join(np.column_stack([nodes.id, nodes.part, nodes.x.view(np.int64)])[some]).reshape(-1, _WORDS)
-    here = np.full(nodes.n + 1, -1, np.int64)  # the last one: of a node that is not here
+    here = np.full(nodes.n + 1, -1, np.int64)  # the last entry is for nodes that this rank does not hold
     for block, fragment in zip(model.blocks, fragments, strict=True):
         here[block.tets] = fragment[:, None]
     known = here[nodes.places(told[:, 0])].astype(np.float64)
@@ -134,7 +137,7 @@ def _seen(outer: Flags, model: Model, fragments: list[Ints], comm: Comm) -> _See
 
 
 def outermost(contact: Contact) -> Flags:
-    """(nodes,) of the surface, and those that have separated."""
+    """(nodes,) nodes of the surface, and nodes that have separated."""
     ring = contact.exterior.cracks.families.ring
     return np.asarray(contact.exterior.surface.flags | (ring != np.arange(len(ring))))
 
@@ -142,7 +145,7 @@ def outermost(contact: Contact) -> Flags:
 def _at_surface(
     x: Floats, parts: Indices, of: Ints, contact: Contact, model: Model, fragments: list[Ints]
 ) -> Ints:  # fmt: skip
-    """(p,) how many open faces of this rank, of the fragments ``of`` (p,), lie within SLIGHT of ``x`` (p, 3)."""
+    """(p,) number of open faces of this rank, of the fragments ``of`` (p,), within SLIGHT of ``x`` (p, 3)."""
     if not len(x):
         return np.zeros(0, np.int64)
     points, part = np.concatenate([model.nodes.x, x]), np.concatenate([model.nodes.part, parts])
@@ -161,7 +164,7 @@ def _at_surface(
 
 
 def _exposed(block: Block, contact: Contact) -> Flags:
-    """(n, 4) faces of tets that are exposed or broken, those in symmetry planes left out."""
+    """(n, 4) faces of tets that are exposed or broken, except those in symmetry planes."""
     faces = contact.exterior.surface.faces
     opened = np.isin(4 * block.id[:, None] + np.arange(4), faces.id[faces.exposed])
     if len(block.bond):
@@ -170,16 +173,17 @@ def _exposed(block: Block, contact: Contact) -> Flags:
 
 
 def _open(block: Block, contact: Contact, outer: Flags) -> Flags:
-    """(n, 4) faces of tets that are ``_exposed``; all faces of a tet that has none but a corner on the surface."""
+    """(n, 4) faces of tets that are ``_exposed``; all faces of a tet without such a face but with a corner on the
+    surface."""
     opened = _exposed(block, contact)
     touching = np.asarray(outer[block.tets].any(axis=1))
     return np.asarray(opened | (touching & ~opened.any(axis=1))[:, None])
 
 
 def _depths(points: Floats, corners: Floats, opened: Flags, outer: Flags) -> Floats:
-    """(p,) how deep points (p, 3) in tets (p, 4, 3) are below the nearest face that is ``opened`` (p, 4), or from the
-    nearest corner on the surface, ``outer`` (p, 4), m: infinite where none is, negative outside of the tet and in a tet
-    without volume.
+    """(p,) depth of points (p, 3) in tets (p, 4, 3), m: the distance from the nearest ``opened`` face (p, 4) or from
+    the nearest corner on the surface, ``outer`` (p, 4); infinite without either, negative outside of the tet and in
+    a tet without volume.
     """
     edges = corners[:, 1:] - corners[:, :1]
     solid = np.linalg.det(edges) > 0.0
@@ -193,7 +197,7 @@ def _depths(points: Floats, corners: Floats, opened: Flags, outer: Flags) -> Flo
 
 
 def _from_faces(points: Floats, corners: Floats) -> Floats:
-    """(p,) how far points (p, 3) are from triangles (p, 3, 3), m."""
+    """(p,) distance of points (p, 3) from triangles (p, 3, 3), m."""
     sides, arms = np.roll(corners, -1, axis=1) - corners, points[:, None] - corners
     normal = np.cross(sides[:, 0], sides[:, 1])
     length = np.linalg.norm(normal, axis=1)
@@ -203,8 +207,8 @@ def _from_faces(points: Floats, corners: Floats) -> Floats:
 
 
 def _from_edges(points: Floats, corners: Floats, outer: Flags) -> Floats:
-    """(p,) how far points (p, 3) are from the nearest edge of tets (p, 4, 3) between two corners on the surface,
-    ``outer`` (p, 4), m; infinite where there is none.
+    """(p,) distance of points (p, 3) from the nearest edge of tets (p, 4, 3) between two corners on the surface,
+    ``outer`` (p, 4), m; infinite without such an edge.
     """
     nearest = np.full(len(points), np.inf)
     for a, b in combinations(range(4), 2):

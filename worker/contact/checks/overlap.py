@@ -1,4 +1,5 @@
-"""Bodies that overlap before the first step: where and how deep; moving them apart, and when that has not helped."""
+"""Overlap of bodies before the first step: its place and depth, its removal by moving nodes, and the failure of
+that."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -12,19 +13,19 @@ from ..broad_phase.search import Primitives
 from ..narrow_phase.facing import FACING
 
 _INSIDE = 1e-9
-"""Smallest share of a tet's corners, negative, at which a node still counts as inside."""
+"""Tolerance of the volume coordinates of a node inside of a tet."""
 _ROUNDING = 1e-6
-"""Of the size of a face: depths below this are none."""
+"""Share of the size of a face: smaller depths count as 0."""
 _TRIES = 30
-"""Times overlapping bodies are moved apart before that is given up. Chosen."""
+"""Largest number of passes in which overlapping bodies are moved apart. Chosen."""
 
 
 _THROUGH = 0.1
-"""Of the size of a face: an edge whose ends lie further in front of it and behind it goes through it, if it does so at
-that share of its height from its sides. Less is what rims, and facets of two round bodies that fit, have in common.
-Chosen."""
+"""Share of the size of a face: an edge passes through a face if its ends are further in front of it and behind it
+than this, and the crossing point is further from the sides than this share of their heights. Rims, and facets of two
+round bodies that fit, overlap by less. Chosen."""
 _CRUSHED = 0.1
-"""Of its volume: a tet that is left with less has been pushed too far. Chosen."""
+"""Share of its volume: a tet that keeps less was compressed too much. Chosen."""
 
 
 @dataclass(frozen=True)
@@ -41,17 +42,18 @@ class Surface:
 
 @dataclass(frozen=True)
 class Overlaps:
-    """Nodes inside another part: their depth below its surface, m, and the unit way out."""
+    """Nodes inside another part: their depth below its surface, m, and the unit direction out of it."""
 
     nodes: Indices
     part: Indices
-    """(n,) the part that each is inside of."""
+    """(n,) part that contains each node."""
     depth: Floats
     way: Floats
 
 
 def find(points: Floats, tets: Indices, part: Indices, surface: Surface, allowed: Flags) -> Overlaps:
-    """Nodes (n, 3) of the surface that lie inside the tets (k, 4) of another part that theirs meets."""
+    """Finds surface nodes inside the tets (k, 4) of another part that may be in contact with theirs; ``points`` (n,
+    3), m."""
     others = allowed & ~np.eye(len(allowed), dtype=bool)
     nodes = np.unique(surface.faces).astype(np.int32)
     small = Primitives(nodes[:, None].copy(), np.zeros(len(nodes)))
@@ -79,8 +81,8 @@ def find(points: Floats, tets: Indices, part: Indices, surface: Surface, allowed
 def move_apart(
     points: Floats, tets: Indices, part: Indices, surface: Surface, allowed: Flags
 ) -> tuple[Floats, Indices]:
-    """Points with overlapping nodes moved to the surface that they are below, half the way at a time, in turns; and the
-    part that each has been moved out of last, -1 for none.
+    """Returns points with overlapping nodes moved to the surface above them, half the depth at a time, in turns; and
+    the part that each was moved out of last, -1 for none.
     """
     moved, out_of = points.copy(), np.full(len(points), -1, np.int32)
     for _ in range(_TRIES):
@@ -93,15 +95,16 @@ def move_apart(
 
 
 def crushed(before: Floats, after: Floats, tets: Indices) -> Indices:
-    """Tets that being moved apart has left with a tenth of their volume, or turned inside out."""
+    """Tets that have less than a tenth of their volume after the move, or are inverted."""
     had = _volumes(before[tets])
     return np.flatnonzero((had > 0.0) & (_volumes(after[tets]) < _CRUSHED * had)).astype(np.int32)
 
 
 def nested(points: Floats, tets: Indices, part: Indices, surface: Surface, allowed: Flags) -> Indices:
-    """(n, 2) tets of the surface whose centre lies inside a tet of another part that theirs meets, and those tets.
+    """(n, 2) tets of the surface whose centre lies inside a tet of another part that may be in contact with theirs, and
+    those tets.
 
-    Bodies whose surfaces coincide have no node inside each other: their nodes rest on each other's faces.
+    Bodies whose surfaces coincide have no node inside each other: their nodes lie on each other's faces.
     """
     others = allowed & ~np.eye(len(allowed), dtype=bool)
     outer = np.flatnonzero(surface.exposed.any(axis=1)).astype(np.int32)
@@ -115,8 +118,8 @@ def nested(points: Floats, tets: Indices, part: Indices, surface: Surface, allow
 
 
 def within(points: Floats, tets: Indices, body: Indices) -> tuple[Indices, Indices]:
-    """Nodes, and tets by their centres, that lie inside a tet of another body, their surfaces left out; ``body`` (n,)
-    of the nodes.
+    """Nodes, and tets by their centres, that lie inside a tet of another body, surfaces excluded; ``body`` (n,) of
+    the nodes.
     """
     every = np.concatenate([points, points[tets].mean(axis=1)])
     of = np.concatenate([body, body[tets[:, 0]]])
@@ -132,8 +135,8 @@ def within(points: Floats, tets: Indices, body: Indices) -> tuple[Indices, Indic
 
 
 def crossing(points: Floats, part: Indices, surface: Surface, allowed: Flags) -> Indices:
-    """(n, 2) nodes at one end of edges of the surface that go through a face of another part that theirs meets, and at
-    a corner of these faces: bodies that cross each other may have no node inside each other.
+    """(n, 2) nodes at one end of surface edges that pass through a face of another part that may be in contact with
+    theirs, and at a corner of these faces: bodies that cross each other may have no node inside each other.
     """
     others, faces = allowed & ~np.eye(len(allowed), dtype=bool), np.ascontiguousarray(surface.faces, np.int32)
     edges = np.unique(np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
@@ -167,31 +170,31 @@ def _shares(nodes: Floats, corners: Floats) -> Floats:
 
 
 def _faced(outward: Floats, inward: Floats) -> Flags:
-    """(p, 4) the faces, by their normals into tets (p, 4, 3), that look against the way out (p, 3) of a node.
+    """(p, 4) faces, by their normals into tets (p, 4, 3), on which a node with the outward direction (p, 3) may lie.
 
-    Where sides of two bodies lie in one plane, the rim of one that sinks into the other is on a face of it and does not
-    rest there.
+    Where sides of two bodies lie in one plane, a rim node of one that sinks into the other is on a face of it but
+    does not rest on that face.
     """
     return np.asarray((inward * outward[:, None]).sum(axis=2) >= -FACING)
 
 
 def _inward(corners: Floats) -> Floats:
-    """(p, 4, 3) unit normals, into tets (p, 4, 3), of the faces across from each corner."""
+    """(p, 4, 3) unit normals, into tets (p, 4, 3), of the faces opposite to each corner."""
     tail = np.swapaxes(np.linalg.inv(corners[:, 1:] - corners[:, :1]), 1, 2)
     inward = np.concatenate([-tail.sum(axis=1, keepdims=True), tail], axis=1)
     return np.asarray(inward / np.linalg.norm(inward, axis=2)[:, :, None])
 
 
 def _clear(normals: Floats, ways: Floats) -> Flags:
-    """(f,) of planes through a node with these unit ``normals`` (f, 3), whether none of its ``ways`` (w, 3) leads
-    behind them: then it rests there, whatever the mean of its normals. A corner on the rim of two slanted sides may
-    face neither.
+    """(f,) planes through a node with these unit ``normals`` (f, 3) behind which none of its ``ways`` (w, 3) leads:
+    then the node lies on the plane, for any mean of its normals. A corner at the rim of two slanted sides may face
+    neither.
     """
     return np.asarray((normals @ ways.T).min(axis=1) >= -_ROUNDING * np.linalg.norm(ways, axis=1).max())
 
 
 def _ways(points: Floats, tets: Indices, nodes: Indices) -> Iterator[Floats]:
-    """For each of the ``nodes`` (p,) the ways (w, 3), m, to the corners of its tets (k, 4)."""
+    """Vectors (w, 3), m, from each of the ``nodes`` (p,) to the corners of its tets (k, 4)."""
     rows, corner = np.nonzero(np.isin(tets, nodes))
     owner = tets[rows, corner]
     order = np.argsort(owner, kind="stable")
@@ -201,7 +204,7 @@ def _ways(points: Floats, tets: Indices, nodes: Indices) -> Iterator[Floats]:
 
 
 def _normals(points: Floats, faces: Indices) -> Floats:
-    """(n, 3) unit outward normals of the nodes, zero off the faces (f, 3)."""
+    """(n, 3) unit outward normals of the nodes, zero for nodes without faces (f, 3)."""
     normals, areas = np.zeros_like(points), face_normals(points, faces)
     for k in range(3):
         np.add.at(normals, faces[:, k], areas)
@@ -210,11 +213,12 @@ def _normals(points: Floats, faces: Indices) -> Floats:
 
 
 def _nearest(node: Floats, outward: Floats, ways: Floats, triangles: Floats) -> tuple[float, Floats]:
-    """Depth below the nearest of the triangles (f, 3, 3) that the node faces, m, and the unit normal there: by the mean
-    of its normals, or since none of its tets, whose corners are ``ways`` (w, 3) from it, reaches behind their plane.
+    """Depth below the nearest of the triangles (f, 3, 3) that the node faces, m, and the unit normal there. A node
+    faces a triangle by the mean of its normals, or because none of its tets, whose corners are ``ways`` (w, 3) from it,
+    reaches behind the plane.
 
-    The depth is zero for a node on the surface, and where no triangle that it faces has its foot. Where the surface is
-    dented the nearest one need not have it: a ridge of the dent may be nearest, and the foot lie on the far side.
+    The depth is zero for a node on the surface, and if no faced triangle has the foot of the node. In a dent of the
+    surface the nearest triangle need not have it: a ridge may be nearest, and the foot lie on the far side.
     """
     e, f, r = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0], node - triangles[:, 0]
     normals = np.cross(e, f)

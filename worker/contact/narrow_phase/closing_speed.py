@@ -1,4 +1,4 @@
-"""How fast active contacts close: what bounds the next step, so that no node passes too much of a tet in it."""
+"""Closing speed of active contacts: the bound of the next step, so that no node passes too much of a tet in it."""
 
 import numpy as np
 
@@ -10,7 +10,7 @@ _F = types.float64
 
 @njit("float64(float64[:, ::1])", cache=True)
 def spread(v):  # type: ignore[no-untyped-def]
-    """No two of the velocities ``v`` (n, 3) differ by more, m/s: the diagonal of their box."""
+    """Upper bound of the difference of any two of the velocities ``v`` (n, 3), m/s: the diagonal of their box."""
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
     for a in range(len(v)):
         for i in range(3):
@@ -20,7 +20,7 @@ def spread(v):  # type: ignore[no-untyped-def]
 
 @njit(_F(STEP, types.int32[:, ::1], types.int64, types.int64), cache=True)
 def fastest_of(step, corners, s, f):  # type: ignore[no-untyped-def]
-    """Square of the largest speed of node s against a corner of face f, m^2/s^2."""
+    """Square of the largest speed of node s relative to a corner of face f, m^2/s^2."""
     most = 0.0
     for m in range(3):
         speed = 0.0
@@ -32,8 +32,8 @@ def fastest_of(step, corners, s, f):  # type: ignore[no-untyped-def]
 
 @njit(_F(STEP, types.int32[:, ::1], types.int64, types.int64, _F), cache=True, error_model="numpy")
 def closing_rate(step, corners, s, f, fastest):  # type: ignore[no-untyped-def]
-    """Square of what contact may give to node s or to face f over the least altitude of a tet of theirs, 1/s^2, where
-    they come nearer by more than ``step.fast`` in a step; else 0. ``fastest``: of them (``fastest_of``).
+    """Square of the largest velocity change by contact of node s or face f over the least altitude of their tets,
+    1/s^2, if they approach by more than ``step.fast`` in a step; else 0. ``fastest``: result of ``fastest_of``.
     """
     if not fastest * step.beyond**2 > step.fast**2:
         return 0.0
@@ -48,8 +48,8 @@ def closing_rate(step, corners, s, f, fastest):  # type: ignore[no-untyped-def]
     error_model="numpy",
 )
 def approach(out, found, pairs, faces, step, first, stop):  # type: ignore[no-untyped-def]
-    """Square of the largest relative speed of a node over the altitude of its face's tet, 1/s^2, of the active contacts
-    ``found`` from ``first`` to ``stop``, rows of ``out``; or ``closing_rate``.
+    """Largest square of the relative speed of a node over the altitude of its face's tet, 1/s^2, of the active
+    contacts ``found`` from ``first`` to ``stop``, rows of ``out``; includes ``closing_rate``.
     """
     e, f, r = np.empty(3), np.empty(3), np.empty(3)
     x, most = step.x, 0.0

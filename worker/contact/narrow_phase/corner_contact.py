@@ -1,12 +1,14 @@
-"""Who comes in through a narrow side of a tet where it was one with a corner of it.
+"""Contact of separated nodes with the faces at their former corner.
 
-When a node separates into three pieces or more, a copy is the twin of another across a facet only where their pieces
-have that facet in common. With the other pieces it has an edge or the node alone, and at the moment of separation it
-lies on all their sides, at a gap of exactly zero. Which of them it would enter the end of the step tells: the nearest
-of those below which it would be then, with its foot on it (docs/theory/contact.md, "Contact" of fracture).
+When a node separates into three or more pieces, a copy has a twin across a facet only if their two pieces have that
+facet in common. With the other pieces it has an edge or the node alone in common, and at the moment of separation it
+lies on all their sides (faces of broken facets that are not surface yet), with a gap of zero. The position at the end
+of the step decides which side it would enter: the nearest one above it with its foot on the side
+(docs/theory/fracture.md, "Contact").
 
-The corners of narrow sides are taken family by family: what each member is to the corners of its family is found in
-loops over these, in rows of a few kilobytes that compilers make vectors of. Few of them are looked at on their own.
+The corners of such narrow sides are processed by family. The positions of each member relative to all corners of its
+family are computed in loops over rows of a few kilobytes, which the compiler vectorizes; few corners pass and are
+tested on their own.
 """
 
 from typing import NamedTuple
@@ -22,40 +24,40 @@ from ..surface.sharp import SHARP
 from .tables import CONTACT_ROWS, DEEP_SELF, STEP, needed
 
 _BENT = 1.0 - SHARP * SHARP
-"""Square of the sine of the angle by which two faces of one surface may be bent: that of edges that are not sharp."""
+"""Square of the sine of the angle between two faces of a smooth surface: the limit of sharp edges."""
 _MANY = 64
-"""Corners that are looked at together: their rows, 10 kB, stay in the first cache."""
+"""Number of corners in one block of rows: 10 kB, which stay in the first-level cache."""
 _WORD = 8
-"""Flags in a word, and numbers in the longest vectors there are."""
+"""Flags in a word, and numbers in the longest vector register."""
 _CORNER, _TO_F, _TO_G, _INWARD = (_MANY * row for row in (0, 3, 6, 9))
-"""Rows of three: the corner, from there the ends of the other two edges of the side, clockwise seen from outside; the
-normal of the side."""
+"""Rows of three components: the corner; from it to the ends of the other two edges of the side, clockwise seen from
+outside; the inward normal of the side."""
 _SQUARE, _FF, _GG, _FG, _TWIN = (_MANY * row for row in (12, 13, 14, 15, 16))
-"""Rows: dot products of the normal and of the two edges, and the number of the corner's twin among the members."""
+"""Rows: square of the normal, dot products of the two edges, and the number of the corner's twin among the members."""
 _ROWS = 17
 _SOON, _NEXT = 16, 8
-"""How many corners ahead is brought near where a corner is, and the nodes of its side."""
+"""Distances of the prefetches, in corners: of the numbers of the nodes of a side, and of their positions."""
 _LATER = np.array([0, 1, 2, 0, 1])
-"""Corners of a side, one after the other."""
+"""Corners of a side in cyclic order."""
 _I, _F, _F1, _F2 = types.int64, types.float64, types.float64[::1], types.float64[:, ::1]
 _N1, _N2, _N3 = types.int32[::1], types.int32[:, ::1], types.int32[:, :, ::1]
 
 
 class NarrowSides(NamedTuple):
-    """Cracks, and a block of tets beside them."""
+    """Cracks, and the block of tets at their sides."""
 
     cracks: Indices
     """(m, 6) local nodes of all cracks."""
     sides: Indices
-    """(m, 2, 3) see Cracks."""
+    """(m, 2, 3) block, tet and face of either side: see Cracks."""
     tets: Tets
-    """(n, 4), ``across`` (n, 4) and ``bond`` (n, 4): of the block."""
+    """(n, 4) nodes of the block's tets; ``across`` (n, 4) and ``bond`` (n, 4) likewise."""
     across: Indices
     bond: Bits
     ring: Indices
-    """(nodes,) see Families."""
+    """(nodes,) next node of the family: see Families."""
     place: Indices
-    """(nodes,) in the scene."""
+    """(nodes,) slots."""
 
 
 NARROW = record(NarrowSides, _N2, _N3, types.uint32[:, ::1], _N2, types.uint8[:, ::1], _N1, _N1)
@@ -63,7 +65,7 @@ NARROW = record(NarrowSides, _N2, _N3, types.uint32[:, ::1], _N2, types.uint8[:,
 
 @njit("int64(uint32[:, ::1], int32[:, ::1], uint8[:, ::1], int64, int64, int64)", cache=True, forceinline=True)
 def _opened(tets, across, bond, e, f, g):  # type: ignore[no-untyped-def]
-    """Which sides of tet ``e`` opposite to its nodes ``f``, 1, and ``g``, 2, are broken or exposed."""
+    """Bits of the sides of tet ``e`` that are broken or exposed: 1 for the one opposite to node ``f``, 2 for ``g``."""
     first, second = 0, 0
     for k in range(4):
         first += k * (tets[e, k] == f)
@@ -74,7 +76,7 @@ def _opened(tets, across, bond, e, f, g):  # type: ignore[no-untyped-def]
 
 @njit(types.void(_N1, _I, _N2, _N1, types.float64[:, :]), cache=True, forceinline=True)
 def _bring(corners, i, cracks, place, ahead):  # type: ignore[no-untyped-def]
-    """Has what corners behind the place ``i`` need brought near: it is apart in memory, and one leads to the other."""
+    """Prefetches the data of the corners after position ``i``: the nodes of a crack, and their positions."""
     last = len(corners) - 1
     prefetch(cracks, 6 * (corners[min(i + _SOON, last)] >> 3))
     m = corners[min(i + _NEXT, last)]
@@ -85,8 +87,8 @@ def _bring(corners, i, cracks, place, ahead):  # type: ignore[no-untyped-def]
 
 @njit(f"UniTuple(float64, 2)({VECTOR}, {VECTOR}, {VECTOR})", cache=True, forceinline=True)
 def _foot(r, e, f):  # type: ignore[no-untyped-def]
-    """Shares of the ends of e and f in the foot of a point on their plane, times the square of twice their area; ``r``:
-    the point, from where they begin.
+    """Area coordinates of the foot of a point at the ends of e and f, times the square of twice the area; ``r``: the
+    point relative to the common origin of e and f.
     """
     ee, ff, ef, er, fr = dot(e, e), dot(f, f), dot(e, f), dot(e, r), dot(f, r)
     return ff * er - ef * fr, ee * fr - ef * er
@@ -105,8 +107,8 @@ def _nearer(r, inward, e, f, depth):  # type: ignore[no-untyped-def]
 
 @njit(f"boolean({VECTOR}, {VECTOR}, {VECTOR}, {VECTOR}, {VECTOR}, int64)", cache=True, forceinline=True)
 def _beside(r, inward, e, f, g, opened):  # type: ignore[no-untyped-def]
-    """Whether the point ``r``, below the side of edges f and g of a corner of edges e, f, g, and of the normal
-    ``inward``, is above another side that is ``opened`` (_opened), or nearer to it.
+    """Whether the point ``r``, below the side of edges f and g of a corner of edges e, f, g, with the normal
+    ``inward``, is above another ``opened`` side (_opened), or nearer to it.
     """
     depth, k = dot(inward, r) / np.sqrt(dot(inward, inward)), 1
     while k < 3:
@@ -121,19 +123,20 @@ def _beside(r, inward, e, f, g, opened):  # type: ignore[no-untyped-def]
 
 @njit(f"{VECTOR}(float64[::1], int64, int64)", cache=True, forceinline=True)
 def _of(w, row, i):  # type: ignore[no-untyped-def]
-    """The vector of corner ``i``."""
+    """Returns the vector of corner ``i``."""
     return w[row + i], w[row + _MANY + i], w[row + 2 * _MANY + i]
 
 
 @njit(f"void(float64[::1], int64, int64, {VECTOR})", cache=True, forceinline=True)
 def _set(w, row, i, a):  # type: ignore[no-untyped-def]
-    """Makes ``a`` the vector of corner ``i``."""
+    """Sets the vector of corner ``i`` to ``a``."""
     w[row + i], w[row + _MANY + i], w[row + 2 * _MANY + i] = a
 
 
 @njit(types.void(_F1, _I), cache=True, error_model="numpy")
 def _measure(w, n):  # type: ignore[no-untyped-def]
-    """Edges and what follows from them, of the first ``n`` corners, whose edges are still positions of their ends."""
+    """Computes the edges, normals and dot products of the first ``n`` corners, whose edges are still positions of
+    their ends."""
     for row in (_TO_F, _TO_G):
         to, o = w[row:], w[_CORNER:]
         for i in range(n):
@@ -150,10 +153,10 @@ def _measure(w, n):  # type: ignore[no-untyped-def]
 
 @njit(types.void(types.uint8[::1], _F1, _I, _I, _F, _F, _F), cache=True, error_model="numpy")
 def _under(flags, w, n, member, x, y, z):  # type: ignore[no-untyped-def]
-    """Below the sides of which of the first ``n`` corners the ``member`` would be, at x, y, z, with its foot on them.
+    """Flags those of the first ``n`` corners whose side is above the ``member`` at x, y, z, with its foot on the side.
 
-    Outside of a side is a foot that is further beyond an edge than the next face, bent by less than a sharp edge is,
-    would reach over it, or behind the corner, where no face reaches.
+    A foot beyond an edge counts while a neighbouring face, bent by less than the angle of a sharp edge, would still
+    be above it; one behind the corner does not.
     """
     for i in range(n):
         r = x - w[_CORNER + i], y - w[_CORNER + _MANY + i], z - w[_CORNER + 2 * _MANY + i]
@@ -177,10 +180,10 @@ def _under(flags, w, n, member, x, y, z):  # type: ignore[no-untyped-def]
     error_model="numpy",
 )
 def _pushed_out(out, step, first, stop):  # type: ignore[no-untyped-def]
-    """Contacts of the nodes that come in, rows of ``out`` from ``first`` to ``stop``, in their place: so far these have
-    the slots of the node, of the corner and of the rest of the side, clockwise seen from outside, and the weights of
-    these three at its foot. Returns how many there are: without those that have been deeper than DEEP_SELF at the
-    beginning of the step.
+    """Completes the contacts of entering nodes in place: rows of ``out`` from ``first`` to ``stop`` that have the
+    slots of the node, of the corner and of the other two nodes of the side, clockwise seen from outside, and the
+    weights of these three at the foot. Returns their number, without those deeper than DEEP_SELF at the beginning of
+    the step.
     """
     x, v, ahead, n = step.x, step.v, step.ahead, first
     for r in range(first, stop):

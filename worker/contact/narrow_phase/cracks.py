@@ -1,11 +1,11 @@
 """Contact across cracks.
 
-The two sides of a facet that has broken lie on each other, and no search is needed to know that they meet: from the
-moment of separation the nodes across, which were one, push each other apart along the normal of their facet, from a gap
-of exactly zero. That holds as long as they are near. What else could reach the faces of a crack has to enter it, so
-they are no part of the surface until they are apart by a share of a facet's size. In the step in which they are, they
-open: they, their nodes and edges are surface like all other from the next step on. A search takes them up before, so
-that opening calls for none. However finely a body shatters, what has not moved costs no search.
+The two sides of a broken facet lie on each other, so no search is needed to find their contacts: from the moment of
+separation the nodes across, copies of one node, are in contact along the normal of the facet, from a gap of exactly
+zero. Anything else could reach the faces of a crack only by entering it, so they are not on the surface until they
+are a share of a facet's size apart. In the step in which they are, they open: faces, nodes and edges are on the
+surface from the next step on. The last search has included them, so that opening needs no search. However finely a
+body shatters, unmoved cracks cost no search.
 """
 
 from dataclasses import dataclass, field
@@ -24,54 +24,56 @@ from ..surface.records import CrackSides
 from .tables import CONTACT_ROWS, CRACK, DEEP_SELF, NEAR, STEP, needed
 
 _WIDE = 0.2
-"""Of the typical size of a face: two sides that have moved so far apart are surface from then on. At 0.1, 33 of 38
-searches in the first 500 steps of the glass bar are called by cracks that open within a search; at 0.2, 2 of 32.
+"""Share of the typical size of a face: width from which on the sides of a crack are surface. At 0.1, 33 of 38
+searches in the first 500 steps of the glass bar are caused by cracks that open without having been included in a
+search; at 0.2, 2 of 32.
 """
 _FORESEEN = 0.5
-"""Of that width: the faces of a crack as wide as this are searched, so that they have their pairs when it opens."""
+"""Share of that width from which on the faces of a crack are in the broad phase, so that they have their pairs when
+it opens."""
 AGE, _YOUNG = 16, 0.3
-"""Steps between two in which cracks may come of age, and the share of young ones from which on they do
+"""Steps between two checks whether cracks become aged, and the share of young cracks from which on all do
 (docs/theory/contact.md, "Edges at cracks")."""
 _KEPT = 12
-"""Columns of what a crack has kept."""
+"""Columns of the stored impulses of a crack."""
 _AHEAD = 8
-"""How many cracks ahead the nodes are brought near."""
+"""Distance of the prefetch of the nodes, in cracks."""
 
 
 @dataclass
 class Cracks:
-    """Facets that have broken and are not surface yet, with a side on this rank."""
+    """Broken facets that are not surface yet, with a side on this rank."""
 
     faces: Ints
-    """(m, 2) global ids of the sides, that of the smaller tet first."""
+    """(m, 2) global ids of the sides, that of the smaller tet id first."""
     nodes: Indices
-    """(m, 6) local nodes of the first side, counter-clockwise seen from outside of it, and those across."""
+    """(m, 6) local nodes of the first side, counter-clockwise seen from outside of its tet, and the nodes across."""
     sides: Indices
-    """(m, 2, 3) block, place and face of either side, -1 for one of another rank."""
+    """(m, 2, 3) block, tet and face of either side, -1 for a side of another rank."""
     foreseen: Flags
-    """(m,) whether the scene of the last search has the sides."""
+    """(m,) whether the scene of the last search includes the sides."""
     aged: Flags
-    """(m,) whether it was there when cracks came of age: edges between its sides and surface meet others since."""
+    """(m,) aged cracks: edges between their sides and the surface are in edge-edge contact."""
     places: Indices
-    """(m, 6) of the nodes, in the scene; all -1 for a crack without nodes that have separated, and for one that another
-    rank computes, that of the first side."""
+    """(m, 6) slots of the nodes; all -1 for a crack without separated nodes, and for one that another rank computes,
+    that of the first side."""
     kept: Floats
-    """(m, 12) of each of the three pairs of nodes across: impulse of the last step times its row norm, zero where it
-    was not active, along the normal and across (3), m/s; of one that another rank computes, nothing that counts."""
+    """(m, 12) stored impulse of each of the three pairs of nodes across, times its row norm, zero where it was not
+    active: along the normal (1) and across (3), m/s; undefined for a crack that another rank computes."""
     families: Families
-    """Of all nodes here."""
+    """Families of all local nodes."""
     _corners: dict[int, Corners] = field(default_factory=dict)
-    """By block; none after a change."""
+    """Corners by block, for reuse; empty after a change."""
 
     @classmethod
     def none(cls, ids: Ints) -> "Cracks":
-        """No facet; ``ids``: of the local nodes."""
+        """Returns a table without cracks; ``ids`` of the local nodes."""
         faces, sides = np.zeros((0, 2), np.int64), np.zeros((0, 2, 3), np.int32)
         families, none, flags = Families.of(ids), np.zeros((0, 6), np.int32), np.zeros(0, bool)
         return cls(faces, none, sides, flags, flags, none, np.zeros((0, _KEPT)), families)
 
     def add(self, tets: Ints, nodes: Indices, sides: Indices, blocks: list[Block]) -> None:
-        """Takes up facets of ``tets`` (m, 2) with their three ``nodes`` (m, 3)."""
+        """Adds broken facets between ``tets`` (m, 2) with their three ``nodes`` (m, 3)."""
         faces = 4 * tets + sides[:, :, 2]
         for b, block in enumerate(blocks):
             for k in (0, 1):
@@ -86,14 +88,14 @@ class Cracks:
         self._corners = {}
 
     def corners(self, block: int) -> Corners:
-        """Those of narrow sides of a block; see corner_contact.py."""
+        """Corners of the narrow sides of a block; see corner_contact.py."""
         if block not in self._corners:
             families = self.families
             self._corners[block] = by_family(self.nodes, self.sides, block, families.ring, families.leader)
         return self._corners[block]
 
     def follow(self, split: Split, ids: Ints) -> None:
-        """Takes up the copies of a split; ``ids``: of the local nodes."""
+        """Updates nodes and families after a split; ``ids`` of the local nodes."""
         parents = np.zeros(len(ids), bool)
         parents[split.copies.parents] = True
         rows = touching(self.nodes, parents)
@@ -102,7 +104,7 @@ class Cracks:
         self._corners = {}
 
     def keep(self, ids: Ints) -> Table:
-        """The facets as a table, a row a side; ``ids``: of the local nodes."""
+        """Returns the cracks as a table, one row a side; ``ids`` of the local nodes."""
         rows, k = np.nonzero(self.sides[:, :, 1] >= 0)
         faces = self.faces[rows]
         return {"tet": faces[range(len(rows)), k] // 4, "key": 2 * faces[:, 0] + k, "faces": faces,
@@ -110,9 +112,9 @@ class Cracks:
 
     @classmethod
     def resume(cls, table: Table, root: Ints, blocks: list[Block], nodes: Nodes) -> "Cracks":
-        """Facets from a table by ascending key. The row of the first side is taken where it is there: a rank that has
-        had the second one alone may have begun with another node, and the last bit of a normal depends on that; nor has
-        it computed the crack, and so kept anything of it.
+        """Builds cracks from a table by ascending key. The row of the first side is used if present: a rank that had
+        only the second side may have begun with another node, on which the last bit of a normal depends; and it has
+        not computed the crack, so it has no stored impulses.
         """
         table = once(table, table["faces"][:, 0])
         faces = np.array(table["faces"])
@@ -128,7 +130,7 @@ class Cracks:
         return cls(faces, nodes.places(table["with"]), sides, foreseen, aged, nowhere, kept, families)
 
     def foresee(self) -> CrackSides:
-        """All sides here, which a scene takes up."""
+        """Returns all local sides, for a scene that includes them."""
         self.foreseen[:] = True
         sides, aged = self.sides.reshape(-1, 3), np.repeat(self.aged, 2)
         here = sides[:, 1] >= 0
@@ -136,21 +138,21 @@ class Cracks:
 
     @property
     def ages(self) -> Ints:
-        """(2,) how many are young, and how many there are, each counted by the rank that has its first side."""
+        """(2,) numbers of young cracks and of all, each counted by the rank of its first side."""
         mine = self.sides[:, 0, 1] >= 0
         return np.array([int((mine & ~self.aged).sum()), int(mine.sum())])
 
     def age(self, ages: Ints) -> bool:
-        """All come of age if enough are young, by the ``ages`` of all ranks; whether they do. That is not left to the
-        searches that other things call for: no answer depends on when they happen.
+        """Makes all cracks aged if enough are young, by the ``ages`` of all ranks; returns whether it does. The
+        steps of searches have no influence: no answer depends on them.
         """
         if due := bool(ages[0] > _YOUNG * ages[1]):
             self.aged[:] = True
         return due
 
     def beside(self, rows: Ints, blocks: list[Block]) -> tuple[Flags, Flags]:
-        """(nodes,) which nodes the tets here at some of the cracks and the families at their corners have; and which
-        of these have separated.
+        """(nodes,) nodes of the local tets at the cracks ``rows`` and of the families at their corners; and those of
+        these that have separated.
         """
         families, near = self.families, np.zeros(len(self.families.ring), bool)
         nodes = self.nodes[rows]
@@ -162,15 +164,15 @@ class Cracks:
         return near, near & (families.ring != np.arange(len(near)))
 
     def arrange(self) -> None:
-        """By the places of their first nodes, as the scene has them: what is near in space is near in memory."""
+        """Sorts the cracks by the slots of their first nodes: neighbours in space become neighbours in memory."""
         order = np.argsort(self.places[:, 0], kind="stable")
         for column in self._columns().values():
             column[:] = column[order]
         self._corners = {}
 
     def open(self, faces: Ints, blocks: list[Block]) -> None:
-        """Makes surface of the cracks whose first sides are among ``faces``, ascending, and forgets them: the last ones
-        move into the holes.
+        """Makes surface of the cracks whose first sides are among ``faces``, ascending, and removes them from the
+        table: the last rows move into the gaps.
         """
         rows = named(self.faces[:, 0], faces)
         sides = self.sides[rows].reshape(-1, 3)
@@ -187,14 +189,14 @@ class Cracks:
         self._corners = {}
 
     def _columns(self) -> "dict[str, np.ndarray]":
-        """What has a row for each facet."""
+        """Arrays with a row for each crack."""
         return {name: column for name, column in vars(self).items() if name not in ("families", "_corners")}
 
 
 @njit("int64[::1](int32[:, ::1], float64[:, ::1], float64)", cache=True)
 def widening(cracks, x, typical):  # type: ignore[no-untyped-def]
-    """Rows of ``cracks`` (m, 6), slots, that are so wide at the positions ``x`` (slots, 3) that their faces have to be
-    searched; ``typical``: size of a face, m.
+    """Rows of the ``cracks`` (m, 6), slots, that are so wide at the positions ``x`` (slots, 3) that their faces must
+    enter the broad phase; ``typical``: size of a face, m.
     """
     rows, n = np.empty(len(cracks), np.int64), 0
     for c in range(len(cracks)):
@@ -214,7 +216,7 @@ def widening(cracks, x, typical):  # type: ignore[no-untyped-def]
 
 @njit("int64[::1](int64[:], int64[::1])", cache=True)
 def named(ids, wanted):  # type: ignore[no-untyped-def]
-    """Which of ``ids`` are among the ascending ``wanted``."""
+    """Rows of ``ids`` that are among the ascending ``wanted``."""
     rows, n = np.empty(len(ids), np.int64), 0
     for i in range(len(ids)):
         at = np.searchsorted(wanted, ids[i])
@@ -226,8 +228,8 @@ def named(ids, wanted):  # type: ignore[no-untyped-def]
 
 @njit("int64[::1](int64[::1], int32[:, ::1], int32[:, :, ::1])", cache=True)
 def computed(rows, nodes, sides):  # type: ignore[no-untyped-def]
-    """Those of some ``rows`` of the cracks that have nodes that have separated, and the first side here: this rank
-    computes them.
+    """Those of the cracks ``rows`` that this rank computes: with separated nodes, and with the first side on this
+    rank.
     """
     some, n = np.empty(len(rows), np.int64), 0
     for c in rows:

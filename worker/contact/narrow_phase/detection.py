@@ -1,4 +1,5 @@
-"""The active contacts of a step: pairs that are due are registered, then the narrow phase tests what may meet."""
+"""Detection of the active contacts of a step: registration of changed nodes, then the narrow phase of the candidate
+pairs."""
 
 from dataclasses import dataclass
 
@@ -21,62 +22,63 @@ from .tables import FAST, Step, StepRoom
 from .tied import Tied
 
 _KINEMATIC = 2.0
-"""One over the share of a tet's altitude that anything may pass in a step."""
+"""Inverse of the share of a tet's altitude that a node may pass in a step."""
 _FACES, _EDGES, _CRACKS = 0, 1, 2
-"""Kinds of contacts (rows.py): nodes and faces, edges, nodes across cracks; behind them those at corners."""
+"""Kinds of contacts (rows.py): node-face, edge-edge, across cracks; corner contacts have the kinds after these."""
 _JOIN = 0.6
-"""Of the distance at which a slot has to be registered anew: a rank whose slots have strayed so far does it when
-another one has to, so that ranks do not wait for one after the other. No bit of the answer depends on it."""
+"""Share of the distance at which a slot must be registered again: a rank registers slots beyond it when another rank
+has to register, so that ranks do not wait for each other in turn. No bit of the answer depends on it."""
 
 
 @dataclass
 class Detected:
-    """What a step has found; the active contacts themselves are rows of the scene."""
+    """Results of a detection; the active contacts are rows of the scene."""
 
     approach: float
-    """One over the step in which no node passes more than half of a tet that it meets, or will in the next step,
-    1/s."""
+    """Inverse of the step in which no node passes more than half of a tet with which it is in contact, or will be in
+    the next step, 1/s."""
     opening: Ints
-    """Rows of the cracks that have become so wide that they open."""
+    """Rows of the cracks that have become wide enough to open."""
     stray: bool
-    """Whether a slot will have strayed so far in the next step that it is registered anew; of any rank, once they have
-    agreed on the step."""
+    """Whether a slot will depart so far in the next step that it must be registered again; of any rank, after the
+    reduction of the step."""
 
     @classmethod
     def nothing(cls) -> "Detected":
-        """Before the first step."""
+        """Returns the results before the first step."""
         return cls(0.0, np.zeros(0, np.int64), False)
 
 
 @dataclass(frozen=True)
 class Ahead:
-    """How far ahead contacts are found."""
+    """Time for which contacts are detected ahead."""
 
     dt: float
-    """The step ahead, s."""
+    """Length of the step, s."""
     most: float
-    """The longest step that may follow it, s."""
+    """Longest step that may follow, s."""
     size: float
-    """The typical one of a face, m."""
+    """Typical size of a face, m."""
     rebound: float
     """See tables.Step."""
 
     def beyond(self, v: Floats) -> float:
-        """The step that follows if in it anything of ``v`` (slots, 3) may come nearer to anything by FAST of a face;
-        else 0. No such pair is bounded, so that a rank where nothing is so fast need not know of any.
+        """Returns the longest step that may follow if any of the velocities ``v`` (slots, 3) may close a distance of
+        FAST of a face in it; else 0. No slower pair bounds a step, so that ranks with slow nodes only need no data
+        of others.
         """
         fastest = spread(v)
         return self.most if fastest * self.most > FAST * self.size else 0.0
 
 
 class Detection:
-    """Finds the active contacts of a rank, by the threads of its ``team``."""
+    """Finds the active contacts of a rank, on the threads of its ``team``."""
 
     def __init__(self, team: Team) -> None:
         self.tied: Tied | None = None
-        """The bonds of the scene."""
+        """Bonds of the scene."""
         self.found = Detected.nothing()
-        """What the last step has found here."""
+        """Results of the last step on this rank."""
         pairs, some = PAIRS_OF_A_TASK, CONTACTS_OF_A_TASK
         self._take = Pass(team, tasks.take, *tasks.TAKE, size=SLOTS_OF_A_TASK)
         self._rebound = Pass(team, tasks.rebound, *tasks.REBOUND, size=some)
@@ -88,16 +90,16 @@ class Detection:
         self._entering = Pass(team, tasks.entering_nodes, *tasks.ENTERING, size=FAMILIES_OF_A_TASK)
         self._scratch = StepRoom()
         self._rows_of_corner = 1
-        """Rows that there is room for, for each corner of a narrow side in the mean of a task."""
+        """Rows for each corner of a narrow side, in the mean of a task."""
 
     def take(self, now: Scene, nodes: Nodes) -> None:
-        """Positions and velocities of the nodes of this rank, for the scene."""
+        """Copies positions and velocities of local nodes to the scene."""
         own, surface_nodes = now.own, now.surface_nodes
         self._take.run(len(own.slots), surface_nodes.x, surface_nodes.v, own.slots, nodes.x, nodes.v, own.local)
 
     def retarget(self, now: Scene, share: float, give: float) -> None:
-        """Target velocities of the active contacts: see restitution.rebound for a ``share``, and ``hold_back`` where
-        there is nothing to ``give`` of penetrations (tables.PUSH_OUT).
+        """Sets the target velocities of active contacts: see restitution.rebound for ``share``, and ``hold_back`` if
+        contact has no energy to ``give`` back (tables.PUSH_OUT).
         """
         if share > 0.0 or give == 0.0:
             rows = now.active
@@ -106,11 +108,11 @@ class Detection:
     def detect(
         self, now: Scene, surface: Exterior, mu: Floats, give: float, ahead: Ahead, redraw: bool, together: bool
     ) -> Detected:  # fmt: skip
-        """The active contacts of the step ahead, of the positions and velocities of the scene's nodes.
+        """Detects the active contacts of the step from positions and velocities of the scene's nodes.
 
-        ``surface``: of this rank; ``mu`` (parts, parts): friction, NaN where two parts do not meet; ``give``: see
-        tables.PUSH_OUT; ``redraw``: whether short lines are drawn anew (reference_motion.py); ``together``: whether
-        some rank registers what has strayed.
+        ``surface``: of this rank; ``mu`` (parts, parts): friction, NaN where two parts may not be in contact;
+        ``give``: see tables.PUSH_OUT; ``redraw``: whether short lines begin anew (reference_motion.py);
+        ``together``: whether any rank registers slots that have departed.
         """
         surface_nodes, reference = now.surface_nodes, now.reference
         beyond = ahead.beyond(surface_nodes.v)
@@ -136,7 +138,7 @@ class Detection:
         return self.found
 
     def _nodes_and_faces(self, now: Scene, step: Step) -> float:
-        """Adds contacts of nodes and faces; returns the largest speed over the altitude of a tet, 1/s."""
+        """Adds node-face contacts; returns the largest speed over the altitude of a tet, 1/s."""
         table, rows, slots, faces, end = (
             now.node_face,
             now.active,
@@ -163,7 +165,7 @@ class Detection:
         return float(np.sqrt(max(coming.max(initial=0.0), most.max(initial=0.0))))
 
     def _edges(self, now: Scene, step: Step) -> None:
-        """Adds contacts of edges."""
+        """Adds edge-edge contacts."""
         table, rows, reference = now.edge_edge, now.active, now.reference
         pairs, n = table.arrays(), len(table)
         many = self._edge_edge.many(n)
@@ -175,7 +177,7 @@ class Detection:
         rows.collect(_EDGES, begins, counts)
 
     def _cracks(self, now: Scene, size: float, step: Step) -> Ints:
-        """Adds contacts across cracks; returns which cracks open."""
+        """Adds contacts across cracks; returns the cracks that open."""
         rows, n = now.active, len(now.cracks)
         many, scratch = self._across.many(n), self._scratch
         counts, wide, opening = scratch.of("across", many), scratch.of("wide", many), scratch.of("opening", n)
@@ -185,7 +187,7 @@ class Detection:
         return np.concatenate([opening[:0], *(opening[k : k + m] for k, m in zip(begins, wide, strict=True) if m)])
 
     def _corners(self, now: Scene, block: Block, corners: Corners, cracks: Cracks, step: Step) -> None:
-        """Adds contacts of nodes that come in at ``corners`` of a block."""
+        """Adds contacts at the ``corners`` of a block."""
         n = len(corners.start) - 1
         begins = corners.start[:n:FAMILIES_OF_A_TASK].astype(np.int64)
         counts, spaces = np.zeros(len(begins), np.int64), np.diff(np.append(begins, corners.start[-1]))
@@ -203,7 +205,8 @@ class Detection:
 
 
 def _renewed(now: Scene, together: bool) -> bool:
-    """Registers what has to be; whether in the next step something will have strayed too far, if it goes on so."""
+    """Registers what has to be; returns whether a slot will depart too far in the next step, by linear
+    extrapolation."""
     reference, most, before = now.reference, 0.5 * now.rules.skin, now.reference.strayed
     reference.strayed = reference.farthest(now.slots.tracked)
     due = reference.strayed > (_JOIN if together else 1.0) * most

@@ -1,7 +1,7 @@
-"""Narrow phase of sharp edges: who passes whom in the step ahead, and who need not be tested for a while.
+"""Narrow phase of sharp edges: contacts of the step ahead, and deactivation of distant pairs.
 
-Edges meet where they cross, but for their ends, which are nodes and meet faces: the end of an edge that lies on another
-one slides along a surface.
+Edges are in contact where they cross, except at their ends: these are nodes, in contact with faces. The end of an
+edge that lies on another edge slides along a surface.
 """
 
 import numpy as np
@@ -12,26 +12,29 @@ from ..geometry import VECTOR, at, beyond, cross, distance, dot, lowest_height, 
 from .tables import CONTACT_ROWS, DEEP, DEEP_SELF, EDGES, NEAR, PAIRS, STEP, bonded, needed
 
 _PARALLEL = 1e-3
-"""Sine of the angle below which edges are left to nodes and faces. Ridges may pass each other through a gap that is as
-wide as this share of an edge; where edges cross is known to 1e-10 of them there."""
+"""Sine of the angle below which a pair of edges is left to nodes and faces. Ridges could pass each other through a
+gap as wide as this share of an edge; the crossing point of edges is accurate to 1e-10 of them at this angle."""
 _END = 1e-4
-"""Of the length of an edge: none meets nearer to its end, which is a node and meets faces. Chosen: a tenth of MARGIN,
-by which a node may be beside a face, so that what slides over a rim is held by the edge until the node is."""
+"""Share of the length of an edge at its ends without edge-edge contact: a node there is in contact with faces.
+Chosen: a tenth of MARGIN, by which the foot of a node may lie outside of a face, so that the edge holds what slides
+over a rim until the node does."""
 _FLUSH = 0.05
-"""Sine of the angle by which the normal of a contact may lie beyond that of a face: edges of faces that lie on each
-other cross there, a little to either side. Chosen by fragments that are pressed together (docs/theory/contact.md, "Face
-on face")."""
+"""Sine of the angle by which the normal of a contact may lie outside of the sector of the faces' normals: edges of
+faces that lie on each other cross there, a little to either side. Chosen with fragments that are pressed together
+(docs/theory/contact.md, "Face on face")."""
 _ROUND = 0.01
-"""Of the length of an edge: added to the distance at which a pair may meet."""
+"""Share of the length of an edge, added to the distance of contact for rounding."""
 _WORTH = 0.02
-"""The same: a pair with less to spare is tested in every step, which costs less than to measure it."""
+"""Share of the length of an edge: a pair with less slack is tested in every step, which is cheaper than to compute
+the slack."""
 _STRETCH = 0.1
-"""Largest motion of nodes against each other, of the lengths of two edges, that ``beyond_ends`` allows for."""
+"""Largest motion of ends relative to each other, over the lengths of two edges, for which the bounds of
+``beyond_ends`` hold."""
 _SPARE = 0.006
-"""Of the length of an edge: as _WORTH, of pairs that cross beyond an end. Chosen: ends of glass that shatters leave
-their short lines by a fifth of that."""
+"""Like _WORTH, for pairs that cross beyond an end. Chosen: ends of edges in shattering glass depart from their short
+lines by a fifth of that."""
 _SOON, _NEXT = 16, 8
-"""How many pairs ahead the edges and their ends are brought near."""
+"""Distances of the prefetches, in pairs: of the numbers of the ends, and of their positions."""
 _X2, _V2, _N2 = "float64[:, :]", "float64[:, ::1]", "int32[:, ::1]"
 _SECTOR = f"Tuple((float64, {VECTOR}, {VECTOR}))"
 _I = types.int64
@@ -39,8 +42,8 @@ _I = types.int64
 
 @njit(f"{_SECTOR}({VECTOR}, {_X2}, {_V2}, {_N2}, int64, float64)", cache=True, error_model="numpy")
 def _sector(u, x, v, edges, e, h):  # type: ignore[no-untyped-def]
-    """u times the normals of the two faces of edge e, along u, after a time ``h``; and before them the sense in which
-    the first normal turns to the second one, 0 where the edge is not convex.
+    """Cross products of u with the normals of the two faces of edge e, along u, after a time ``h``; and before them
+    the sense of rotation from the first normal to the second, 0 for an edge that is not convex.
     """
     a, c, d = edges[e, 0], edges[e, 2], edges[e, 3]
     to, fro = minus(at(x, c), at(x, a)), minus(at(x, d), at(x, a))
@@ -53,8 +56,8 @@ def _sector(u, x, v, edges, e, h):  # type: ignore[no-untyped-def]
 
 @njit(f"boolean({_SECTOR}, {VECTOR}, float64)", cache=True)
 def _points_out(sector, n, sign):  # type: ignore[no-untyped-def]
-    """Whether ``sign`` n, square to a convex edge, points out between the normals of its two faces (``_sector``), or
-    along one of them: edges of faces that lie on each other cross there.
+    """Whether ``sign`` n, perpendicular to a convex edge, lies between the normals of its two faces (``_sector``),
+    or within _FLUSH of one of them, as for edges of faces that lie on each other.
     """
     sense, one, two = sector
     along = sense * sign
@@ -68,7 +71,7 @@ def _points_out(sector, n, sign):  # type: ignore[no-untyped-def]
     error_model="numpy",
 )
 def _apart(m, x, v, a, b, c, d, s, t, h):  # type: ignore[no-untyped-def]
-    """How far point t of cd lies beyond point s of ab along m after a time ``h``, m."""
+    """Distance of point t of cd beyond point s of ab along m after a time ``h``, m."""
     gap = 0.0
     for k in range(3):
         near = (1.0 - s) * (x[a, k] + h * v[a, k]) + s * (x[b, k] + h * v[b, k])
@@ -78,7 +81,7 @@ def _apart(m, x, v, a, b, c, d, s, t, h):  # type: ignore[no-untyped-def]
 
 @njit(f"float64({VECTOR}, {VECTOR}, {VECTOR})", cache=True)
 def _volume(u, w, r):  # type: ignore[no-untyped-def]
-    """u x w . r: six times the volume, m^3, between two edges; it changes sign when their lines cross."""
+    """Returns u x w . r: six times the volume, m^3, between two edges; it changes sign when their lines cross."""
     return dot(cross(u, w), r)
 
 
@@ -91,13 +94,14 @@ def _fastest(course, a, b, c, d):  # type: ignore[no-untyped-def]
 
 @njit(f"float64({VECTOR}, {VECTOR}, {VECTOR}, float64, float64)", cache=True, error_model="numpy")
 def beyond_ends(u, w, r, s, t):  # type: ignore[no-untyped-def]
-    """How far the ends of edge u may move against those of edge w, m, while the edges cross beyond an end of one of
-    them: at ``s`` of u and ``t`` of w as they are, with ``r`` from the beginning of u to that of w. 0 if they do not.
+    """Bound of the motion of the ends of edge u relative to those of edge w, m, while the edges cross beyond an end of
+    one of them: at ``s`` of u and ``t`` of w now, with ``r`` from the beginning of u to that of w. 0 if they cross
+    within both.
 
-    Of the edge a beyond an end of which they cross, a share S of its length from there, with k from that end to one of
-    the other edge b and n = a x b: (k x b) . n = -S n . n, and they cross there while that is negative. If ends move by
-    h against each other, a and b change by 2 h and k by h, so n by no more than B h and k x b by no more than A h with
-    the bounds below, in which h is a small share (_STRETCH) of |a| and |b|.
+    Let the edges cross beyond an end of edge a, at a share S of its length from that end, k the vector from that end
+    to an end of the other edge b, and n = a x b. Then (k x b) . n = -S n . n, and they cross there while this is
+    negative. If ends move by h relative to each other, a and b change by 2 h and k by h, so n by at most B h and k x
+    b by at most A h with the bounds below, if h is a small share (_STRETCH) of |a| and |b|.
     """
     past_s, past_t, uu, ww = max(-s, s - 1.0), max(-t, t - 1.0), dot(u, u), dot(w, w)
     share, a, b, k = past_s, u, w, r if s < 0.0 else minus(r, u)
@@ -117,7 +121,7 @@ def beyond_ends(u, w, r, s, t):  # type: ignore[no-untyped-def]
 
 @njit(types.float64(types.float64[:, :], EDGES, types.int64), cache=True, error_model="numpy")
 def _deep(x, edges, e):  # type: ignore[no-untyped-def]
-    """How deep edge e holds, m: no deeper than DEEP of the lowest height of the tets of its faces."""
+    """Greatest depth of a contact of edge e, m: at most DEEP of the lowest height of the tets of its faces."""
     least = DEEP_SELF * edges.size[e]
     if not edges.deep[e] > least:
         return edges.deep[e]
@@ -128,7 +132,7 @@ def _deep(x, edges, e):  # type: ignore[no-untyped-def]
 
 @njit(f"boolean({_N2}, int64, int64)", cache=True)
 def _opposite(edges, one, two):  # type: ignore[no-untyped-def]
-    """Whether an edge joins the nodes that the faces of the other one have besides it: both are of one tet, alone."""
+    """Whether an edge joins the third nodes of the other's faces: then both are opposite edges of one tet."""
     a, b, c, d = edges[one, 2], edges[one, 3], edges[two, 0], edges[two, 1]
     return (a == c and b == d) or (a == d and b == c)
 

@@ -1,4 +1,5 @@
-"""On which side of a body a node is: what faces what, and who is beside an edge, in front of another face there."""
+"""Side of a body on which a node is: orientation of nodes to faces, and nodes beside a convex edge or in front of
+another face there (docs/theory/contact.md, "Which point" and "Beside a free edge")."""
 
 import numpy as np
 
@@ -7,34 +8,38 @@ from ..geometry import MARGIN, VECTOR, at, dot, foot, height, minus, off
 from .tables import DEEP, DEEP_SELF, FACES, NEAR, PAIRS, STEP
 
 TOUCHING = 1e-3
-"""Of the size of a face: deeper than this, a node is held by the nearest face of that part only."""
+"""Share of the size of a face: a node deeper than this has contact with the nearest face of that part only."""
 FACING = 0.1
-"""A node faces a face when the cosines of the face's normal and those of its own faces have a mean less deviation below
-minus this, and a mean below it; or when its own faces rise from it, by the sine of the mean slope, by more than this.
-So does a corner of a flake that is the lowest of its tet, whatever the mean of its three normals."""
+"""A node faces a face when the cosines between the face's normal and those of the node's own faces have a mean minus
+deviation below -FACING, and a mean below FACING; or when its own faces rise from it by a mean slope whose sine
+exceeds FACING. So a corner of a flake that is the lowest of its tet faces the plane below, for any mean of its three
+normals."""
 _SOME = 0.25
-"""A node of another part that passes a face from outside meets it when the mean less deviation is below minus this:
-then some face of its faces it. Of cosines none of which is negative it is (1 - sqrt(2)) / 2 = -0.207 at least."""
+"""A node of another part that passes a face from outside has contact with it when the mean minus deviation is below
+-_SOME: then one of its faces certainly faces it. Without a negative cosine this is at least (1 - sqrt(2)) / 2 =
+-0.207."""
 RIM = 0.01
-"""Of the size of a face: a node that faces both faces of a convex edge, and slides along one no deeper below it, is
-beside the edge. Chosen: twice what a sharp edge that slides along another was seen to sink in as its end comes there,
-1e-3 to 4e-3, for edges do not meet at their ends."""
+"""Share of the size of a face: a node that faces both faces of a convex edge and slides along one, no deeper below
+it than this, is beside the edge. Chosen: twice the depth to which a sharp edge that slides along another sinks when
+its end comes there, 1e-3 to 4e-3, because edges have no contact at their ends."""
 _SLIDES = 2e-3
-"""Of the size of a face: what slides along it comes no nearer in a step. What is faster cuts the corner: it passes
-beside the edge up to TOUCHING only, or a shot is seen a step late (H15). Chosen: twice the fastest seen to slide."""
+"""Share of the size of a face: a node that slides along a face approaches it by less in a step. A faster one cuts
+the corner: it is beside the edge only up to TOUCHING, else a shot is found a step late (test_hard_contact). Chosen:
+twice the fastest observed in sliding."""
 _BEHIND = 0.1
-"""Of the size of a face: the sum of the depths of its corners behind another face, from which on the edge between them
-is convex. Chosen: less for a face that is bent by 25 degrees than that has, more than rounding."""
+"""Share of the size of a face: sum of the depths of its corners behind another face, from which on the edge between
+them is convex. Chosen: below the value of a bend of 25 degrees, above rounding."""
 _OVER = 0.1
-"""What the mean direction from a node to its faces' middles, of unit vectors, has along a face at least when it reaches
-over it: less is that of a blunt edge, whatever it is. Chosen: a third of what the corner of a cube has."""
+"""Least component along a face of the mean direction from a node to its faces' midpoints, for faces that reach over
+that face: those of a blunt edge have less. Chosen: a third of the value for the corner of a cube."""
 _F, _VECTOR = types.float64, types.UniTuple(types.float64, 3)  # type: ignore[no-untyped-call]
 
 
 @njit(f"UniTuple(float64, 2)(float64[:, ::1], int64, {VECTOR})", cache=True)
 def facing(normals, s, m):  # type: ignore[no-untyped-def]
-    """By how much m has to turn until node s faces a face of this normal (FACING), and until it does or one of its own
-    faces does (_SOME); none, or less, when it does, and -1 for a node without faces, which faces any.
+    """Returns the angle measures, as differences of cosines, by which m must turn until node s faces a face of this
+    normal (FACING), and until it does or one of its own faces does (_SOME); at most 0 if it does already, and -1 for
+    a node without faces, which faces any face.
     """
     mean, square, length, rise = 0.0, 0.0, 0.0, 0.0
     for a in range(3):
@@ -52,11 +57,12 @@ def facing(normals, s, m):  # type: ignore[no-untyped-def]
 
 @njit(f"boolean(float64[:, ::1], int64, {VECTOR}, {VECTOR}, {VECTOR}, float64)", cache=True, error_model="numpy")
 def reaches_over(normals, s, b, e, f, size):  # type: ignore[no-untyped-def]
-    """Whether the faces of node s, whose foot on the face of sides ``e`` and ``f`` has the area coordinates ``b``,
-    reach from there over the face, by their mean direction, and not away from it.
+    """Whether the faces of node s reach over a face, by their mean direction, from the node's foot on its border;
+    ``b``: area coordinates of the foot on the face of edges ``e`` and ``f``.
 
-    Then its body comes onto the face and not beside it: of two bodies that meet with equal faces all nodes do so on
-    the border, and none is ever inside of the other body if their tets grow narrower behind it.
+    Then the body of the node comes onto the face and not beside it: if two bodies collide with equal faces, all
+    nodes have their feet on the border, and none is ever inside of the other body if their tets become narrower
+    behind it.
     """
     way = normals[s, 9], normals[s, 10], normals[s, 11]
     ee, ff, ef, er, fr = dot(e, e), dot(f, f), dot(e, f), dot(e, way), dot(f, way)
@@ -71,7 +77,7 @@ def reaches_over(normals, s, b, e, f, size):  # type: ignore[no-untyped-def]
 
 @njit(_VECTOR(FACES, types.float64[:, :], types.int64), cache=True, error_model="numpy", forceinline=True)
 def plane(faces, ahead, f):  # type: ignore[no-untyped-def]
-    """Unit normal of face ``f`` at the end of the step; ``ahead``: where slots are then."""
+    """Unit normal of face ``f`` at the end of the step; ``ahead``: positions of the slots then."""
     i, j, k = faces.corners[f, 0], faces.corners[f, 1], faces.corners[f, 2]
     _, m = height(at(ahead, i), at(ahead, i), at(ahead, j), at(ahead, k))
     return m
@@ -79,7 +85,7 @@ def plane(faces, ahead, f):  # type: ignore[no-untyped-def]
 
 @njit(types.boolean(PAIRS, FACES, types.int32[::1], types.int64, types.int64, _F, _F), cache=True, forceinline=True)
 def _asked(pairs, faces, part, q, body, strayed, end):  # type: ignore[no-untyped-def]
-    """Whether the face of pair ``q`` is exposed, of a part ``body``, and not left alone; see outside."""
+    """Whether the face of pair ``q`` is exposed, of the part ``body``, and near enough for a test; see outside."""
     f = pairs.rows[q, 1]
     far = pairs.until[q] > strayed + faces.left[f] + pairs.speed[q] * end and not pairs.turned[q]
     return (faces.fresh[f] or not far) and faces.exposed[f] and part[faces.corners[f, 0]] == body
@@ -94,11 +100,11 @@ def _asked(pairs, faces, part, q, body, strayed, end):  # type: ignore[no-untype
 def outside(pairs, first, faces, x, part, p, depth, strayed, end):  # type: ignore[no-untyped-def]
     """Whether the node of pair ``p``, ``depth`` below its face, is nearer to the front of another face of that part.
 
-    Then it is beside an acute edge and not in the body: the nearest face decides on which side a node is. Only faces
-    within the share of their size that every list of candidates has are asked, and of these none that its pair is left
-    alone for: it is further away. ``strayed``: how far the node leaves its line, infinite when pairs are not known;
-    ``end``: of the step, with the length of the step once more, for a pair may just have been measured at its end, by
-    another thread.
+    Then it is beside an acute edge and not inside the body: the nearest face decides on which side a node is. Only
+    faces within the share of their size that every candidate list covers are tested, and of these none whose pair is
+    deactivated: it is further away. ``strayed``: distance of the node from its line, infinite if the pairs have no
+    valid bounds; ``end``: of the step plus one more step, because another thread may have just measured a pair at
+    its end.
     """
     rows, corners, size = pairs.rows, faces.corners, faces.size
     s, body = rows[p, 0], part[corners[rows[p, 1], 0]]
@@ -131,10 +137,8 @@ def in_front(pairs, first, faces, step, normals, p, gap0, gap1, strayed, end):  
     """Whether the node of pair ``p``, whose foot is on the border (RIM) of its face, is beside it, in front of another
     face of that part which it faces.
 
-    That is nearer at the end of the step, and the node no deeper below it than TOUCHING; or the node slides along it,
-    rather than along its own, and is no deeper than RIM. The edge between them is convex: they have a corner in common,
-    and its own lies behind the other. ``gap0``, ``gap1``: height over its own at the beginning and end of the step;
-    ``strayed``, ``end``: see outside.
+    ``gap0``, ``gap1``: height over its own face at the beginning and end of the step; ``strayed``, ``end``: see
+    outside.
     """
     rows, corners, size, ahead, part = pairs.rows, faces.corners, faces.size, step.ahead, step.part
     s, g = rows[p, 0], rows[p, 1]

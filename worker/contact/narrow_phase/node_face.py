@@ -1,7 +1,7 @@
-"""Narrow phase of nodes and faces: who passes whom in the step ahead, and who need not be tested for a while.
+"""Narrow phase of nodes and faces: contacts of the step ahead, and deactivation of distant pairs.
 
-The point of the face is the one where the node passes its plane, so that a node that slides from facet to facet is
-handed over.
+The contact point on the face is the one where the node passes its plane, so that a node that slides from facet to
+facet changes its face at the edge.
 """
 
 import numpy as np
@@ -14,14 +14,16 @@ from .facing import RIM, TOUCHING, facing, in_front, outside, plane, reaches_ove
 from .tables import CONTACT_ROWS, DEEP, DEEP_SELF, FACES, NEAR, PAIRS, SLOTS, STEP, bonded, needed
 
 _ROUND = 0.01
-"""Of the size of a face: added to the distance at which a pair may meet."""
+"""Share of the size of a face, added to the distance of contact for rounding."""
 _WORTH = 0.02
-"""Of the size of a face: a pair with less to spare is tested in every step, which costs less than to measure it."""
+"""Share of the size of a face: a pair with less slack is tested in every step, which is cheaper than to compute the
+slack."""
 _BEND = 0.1
-"""Largest motion of two corners of a face against each other, of the face's two sides, that is allowed for."""
+"""Largest motion of two corners of a face relative to each other, over its two edges, for which the bound of
+``_bent`` holds."""
 
 _SOON, _NEXT = 8, 4
-"""How many pairs ahead a node and a face, and the corners of a face, are brought near."""
+"""Distances of the prefetches, in pairs: of a node and a face, and of the corners of a face."""
 _X2, _V2, _N2 = "float64[:, :]", "float64[:, ::1]", "int32[:, ::1]"
 _F, _I, _N1 = types.float64, types.int64, types.int32[::1]
 _VECTOR = types.UniTuple(types.float64, 3)  # type: ignore[no-untyped-call]
@@ -29,8 +31,8 @@ _VECTOR = types.UniTuple(types.float64, 3)  # type: ignore[no-untyped-call]
 
 @njit("void(int32[::1], int32[::1], int32[:, ::1], int64)", cache=True)
 def chain(first, following, pairs, begin):  # type: ignore[no-untyped-def]
-    """Hangs the pairs of node and face from row ``begin`` on into the chains of their nodes: ``first`` (slots,), and
-    ``following`` (p,) the pair after each, -1 for none.
+    """Adds the pairs of node and face from row ``begin`` on to the linked lists of their nodes: ``first`` (slots,),
+    and ``following`` (p,) the next pair of the same node, -1 for none.
     """
     for p in range(begin, len(pairs)):
         following[p], first[pairs[p, 0]] = first[pairs[p, 0]], p
@@ -38,7 +40,7 @@ def chain(first, following, pairs, begin):  # type: ignore[no-untyped-def]
 
 @njit(f"float64({_X2}, int64, int64, int64, int64)", cache=True, error_model="numpy")
 def _distance(x, s, i, j, k):  # type: ignore[no-untyped-def]
-    """Of node s from the face i, j, k, m."""
+    """Distance of node s from the face i, j, k, m."""
     p, o, a, b = at(x, s), at(x, i), at(x, j), at(x, k)
     on, _ = foot(minus(p, o), minus(a, o), minus(b, o))
     if on:
@@ -49,10 +51,10 @@ def _distance(x, s, i, j, k):  # type: ignore[no-untyped-def]
 
 @njit(f"float64(float64, {_X2}, int64, int64, int64)", cache=True, error_model="numpy")
 def _bent(turn, x, i, j, k):  # type: ignore[no-untyped-def]
-    """Half of the D, m, that a face has to spare until its normal has changed by ``turn``.
+    """Half of the motion D, m, that turns the normal of a face by less than ``turn``.
 
-    The normal of a face of sides e, f and area A changes by less than D (|e| + |f| + D) / A while no two of its corners
-    have moved by D against each other.
+    The normal of a face of edges e, f and area A changes by less than D (|e| + |f| + D) / A while no two of its
+    corners have moved by D relative to each other.
     """
     e, f = minus(at(x, j), at(x, i)), minus(at(x, k), at(x, i))
     ee, ff, ef = dot(e, e), dot(f, f), dot(e, f)
@@ -66,8 +68,8 @@ def _bent(turn, x, i, j, k):  # type: ignore[no-untyped-def]
     error_model="numpy",
 )
 def _passes(x, ahead, corners, s, f, m, gap0, gap1, most):  # type: ignore[no-untyped-def]
-    """Whether node s, at height ``gap0`` over face f of normal ``m`` and ``gap1`` at the end of the step, passes it, no
-    deeper than ``most``; and where, in area coordinates.
+    """Whether node s, at height ``gap0`` over face f of normal ``m`` and ``gap1`` at the end of the step, passes it,
+    no deeper than ``most``; and the area coordinates of its foot at that moment.
     """
     i, j, k, d = corners[f, 0], corners[f, 1], corners[f, 2], corners[f, 3]
     deep = not gap0 >= -most
@@ -94,8 +96,8 @@ def _passes(x, ahead, corners, s, f, m, gap0, gap1, most):  # type: ignore[no-un
     error_model="numpy",
 )
 def _coming(step, normals, faces, s, f, m, gap):  # type: ignore[no-untyped-def]
-    """``closing_rate`` of node s and face f if they will meet in a step of ``step.beyond`` after this one; else 0.
-    ``m``, ``gap``: normal of the face, and height over it, m, at the end of this one.
+    """Returns ``closing_rate`` of node s and face f if they will be in contact in a step of ``step.beyond`` after
+    this one; else 0. ``m``, ``gap``: normal of the face, and height over it, m, at the end of this step.
     """
     v, ahead, corners = step.v, step.ahead, faces.corners
     i, j, k = corners[f, 0], corners[f, 1], corners[f, 2]
@@ -117,12 +119,12 @@ def _coming(step, normals, faces, s, f, m, gap):  # type: ignore[no-untyped-def]
 
 @njit(_I(PAIRS, SLOTS, FACES, _F, _I, _I), cache=True, error_model="numpy")
 def due(pairs, slots, faces, end, first, stop):  # type: ignore[no-untyped-def]
-    """Which of the pairs from ``first`` to ``stop`` are to be tested: ``pairs.active`` from ``first`` on; returns how
-    many. ``end``: of the step and what is looked ahead, s after the search.
+    """Selects the pairs from ``first`` to ``stop`` to be tested: ``pairs.active`` from ``first`` on; returns their
+    number. ``end``: end of the step and of the time tested ahead, s after the search.
 
-    Nothing is known of them from now on, but that some are too close to be left alone, so that a thread that asks for
-    one (facing.py) while another measures it takes it as one to be asked. Those that are no surface are left alone
-    until they are.
+    The bounds of a selected pair become invalid, except that it is too close to be deactivated: a thread that reads
+    it (facing.py) while another thread tests it treats it as near. Pairs without exposed face or surface node are
+    deactivated until that changes.
     """
     rows, until, speed, turned = pairs.rows[first:], pairs.until[first:], pairs.speed[first:], pairs.turned[first:]
     active, exposed, on_surface = pairs.active[first:], faces.exposed, slots.on_surface

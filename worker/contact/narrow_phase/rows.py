@@ -1,4 +1,4 @@
-"""The rows of the active contacts of a step: where the passes that find contacts put them, and which there are."""
+"""Rows of the active contacts of a step: the ranges in which passes write them, and the numbers of the active ones."""
 
 from dataclasses import dataclass, field
 
@@ -9,42 +9,40 @@ from ..tasks import collected
 from .tables import ContactRows
 
 _SPARE = 2
-"""Times the rows that are needed, room is made for."""
+"""Factor of the room over the needed rows."""
 
 
 @dataclass
 class ActiveRows:
-    """Every kind of candidate has a range of the ``room``, and every task a part of that; rows stay where they are, and
-    the first ``n`` of ``found`` are the numbers of those that are active.
+    """Rows of active contacts: every kind has a range of the ``room``, and every task a part of that. Rows are not
+    moved; the first ``n`` entries of ``found`` are the numbers of the active ones.
     """
 
     room: ContactRows = field(default_factory=lambda: ContactRows.room(0))
     found: Indices = field(default_factory=lambda: np.zeros(0, np.int32))
     depth: Floats = field(default_factory=lambda: np.zeros(0))
-    """(room,) of a node that is inside of a face, m; see node_face."""
+    """(room,) depth of a node inside of a face, m; see node_face."""
     n: int = 0
     _ends: list[int] = field(default_factory=lambda: [0], init=False)
     _holder: Indices = field(default_factory=lambda: np.zeros(0, np.int32), init=False)
 
     def begin(self, *many: int) -> None:
-        """A step begins, with no contact, and room for so ``many`` rows of each kind."""
+        """Begins a step, without contacts, with room for ``many`` rows of each kind."""
         self._ends, self.n = [0, *np.cumsum(many).tolist()], 0
         self._reserve(self._ends[-1])
 
     def more(self, many: int) -> int:
-        """Room for ``many`` rows of one kind more; returns its number."""
+        """Reserves ``many`` rows for one more kind; returns its number."""
         self._ends.append(self._ends[-1] + many)
         self._reserve(self._ends[-1])
         return len(self._ends) - 2
 
     def begins(self, kind: int) -> int:
-        """The first row of the range of a ``kind``."""
+        """First row of the range of a ``kind``."""
         return self._ends[kind]
 
     def collect(self, kind: int, begins: Ints, counts: Ints) -> None:
-        """Takes up the rows that tasks have found, ``counts`` from each of ``begins`` on in the range of their
-        ``kind``.
-        """
+        """Adds the rows that tasks have found, ``counts`` from each of ``begins`` on in the range of their ``kind``."""
         self.n = int(collected(self.found, self.n, self._ends[kind] + begins, counts))
 
     @property
@@ -53,7 +51,7 @@ class ActiveRows:
         return np.asarray(self.room.nodes[self.found[: self.n]])
 
     def holder(self, slots: int) -> Indices:
-        """(slots,) room for a number of each slot, -1 now; whoever uses it leaves it so."""
+        """(slots,) working array of a number for each slot, all -1; its user restores that."""
         if len(self._holder) < slots:
             self._holder = np.full(_SPARE * slots, -1, np.int32)
         return self._holder[:slots]

@@ -1,8 +1,9 @@
-"""What the narrow phase takes, and what it makes: one row an active contact, of four nodes, their weights and a normal.
+"""Records of the narrow phase: its input, and its output, one row for each active contact, of four nodes, their weights
+and a normal.
 
-The gap is that of the end of the step as it would come without contact, positive outside; it is a linear function of
-the velocities, dt n . sum(w_k v_k) plus a constant, with the weights w of ``weights``: 1 for the node and minus the
-area coordinates of the point of the face (the defence node, Zhong 1993), or the two ends of two edges.
+The gap is that of the end of the step without contact, positive outside. It is linear in the velocities: gap = dt n
+. sum(w_k v_k) plus a constant, with the weights w of ``weights``: 1 for the node and minus the area coordinates of
+the point of the face (the defence node, Zhong 1993), or those of the ends of two edges.
 """
 
 from typing import NamedTuple
@@ -17,55 +18,55 @@ from ..geometry import at, cross, dot, minus
 from .tied import NOTHING
 
 NEAR = 0.02
-"""Of the size of a face: a gap that is watched although it does not close by itself."""
+"""Share of the size of a face: largest gap at the end of the step with an active contact."""
 DEEP = 0.25
-"""Of the size of a face, and of the length of an edge and the height of its tets: deepest penetration that is still
-taken for one, not for the back of a thin body."""
+"""Share of the size of a face, and of the length of an edge and the height of its tets: largest depth of a
+penetration; anything deeper is the back of a thin body."""
 DEEP_SELF = 0.05
-"""The same of faces of one part, whose nodes lie behind its own faces anyway; as deep at least edges hold, however flat
-their tets."""
+"""The same for faces of the same part, whose nodes lie behind its own faces; also the least depth to which edges
+have contact, for tets of any height."""
 FAST = 0.1
-"""Of the typical size of a face: pairs that come nearer by less in a step bound no step before they are active. A tet
-of that size is several times as high."""
+"""Share of the typical size of a face: pairs that close less distance in a step do not bound it before they are
+active. The altitude of a tet of that size is several times larger."""
 PUSH_OUT = 0.1
-"""Largest share of a penetration that is taken back in a step, and of the speed of closing that is given back for it;
-nothing while contact has no energy to give back (``account.Account``)."""
+"""Largest share of a penetration that is corrected in a step, and of the closing speed that is returned for it; 0
+while contact has no energy to give back (``account.Account``)."""
 CRACK = -2
-"""The first number that stands for a pair of nodes across a crack, others are below."""
+"""First number of a pair of nodes across a crack; others are below."""
 _FEWEST = 2
-"""Rows of a table that is more than one line: numba takes a part of a single one for an array of its own."""
+"""Least rows of a table of cache lines: numba treats a slice of a single row as contiguous, another type."""
 
 
 _NONE = np.empty(0)
 
 
 class ContactRows(NamedTuple):
-    """Room for active contacts."""
+    """Arrays of active contacts."""
 
     nodes: Indices
     """(room, 4) slots."""
     weights: Floats
     """(room, 4)."""
     normals: Floats
-    """(room, 3) unit, out of the face or out of the first edge's body."""
+    """(room, 3) unit normals, outward from the face or from the body of the first edge."""
     wanted: Floats
-    """(room,) n . sum(w_k v_k) must not be below this, m/s."""
+    """(room,) target: n . sum(w_k v_k) must not be below it, m/s."""
     friction: Floats
     """(room,) Coulomb's coefficient."""
     pair: Indices
-    """(room,) which candidate pair of a node and a face it was; CRACK - (3 c + k) for the pair of nodes k across crack
-    c; -1 for others."""
+    """(room,) row of the candidate pair of node and face; CRACK - (3 c + k) for the pair of nodes k across crack c;
+    -1 for others."""
 
     @classmethod
     def room(cls, n: int) -> "ContactRows":
-        """Room for ``n`` active contacts."""
+        """Allocates room for ``n`` active contacts."""
         rows, numbers = np.empty((n, 4), np.int32), np.empty(n, np.int32)
         return cls(rows, np.empty((n, 4)), np.empty((n, 3)), np.empty(n), np.empty(n), numbers)
 
 
 class StepRoom(Scratch):
-    """Room for the step ahead, and for what is found in it. Kept for many steps, it saves the system clearing its
-    pages; tables of arguments stay as they are while there are as many slots.
+    """Working arrays of a step. They are kept for many steps, because the system clears new pages of memory; tables
+    of arguments stay valid while the number of slots does not change.
     """
 
     def __init__(self) -> None:
@@ -73,7 +74,7 @@ class StepRoom(Scratch):
         self._room = self._places = cache_lines(0)
 
     def lines(self, slots: int) -> tuple[Floats, Floats, Floats]:
-        """Lines of so many slots, and their parts for positions at the beginning of the step and at its end."""
+        """Cache lines of the slots, and views of them for positions at the beginning of the step and at its end."""
         n = max(slots, _FEWEST)
         if n != len(self._places):
             if n > len(self._room):
@@ -83,17 +84,17 @@ class StepRoom(Scratch):
         return self._places, *self._halves
 
     def least(self, slots: int) -> Floats:
-        """(slots,) infinite: see Step.least."""
+        """(slots,) filled with infinity: see Step.least."""
         least: Floats = self.of("least", slots, np.float64)
         least.fill(np.inf)
         return least
 
 
 class Step(NamedTuple):
-    """The slots in the step ahead."""
+    """State of the slots in the step ahead."""
 
     x: Floats
-    """(slots, 3) positions at its beginning, m; with those ``ahead`` in one cache line a slot."""
+    """(slots, 3) positions at its beginning, m; in one cache line with ``ahead``."""
     v: Floats
     """(slots, 3) velocities without contact, m/s."""
     ahead: Floats
@@ -101,34 +102,36 @@ class Step(NamedTuple):
     part: Indices
     """(slots,)."""
     mu: Floats
-    """(parts, parts) Coulomb's coefficient, NaN where two parts do not meet."""
+    """(parts, parts) Coulomb's coefficient, NaN where two parts may not be in contact."""
     give: float
-    """Of a penetration, taken back in the step (PUSH_OUT)."""
+    """Share of a penetration that is corrected in the step (PUSH_OUT)."""
     dt: float
     """s."""
     beyond: float
-    """The longest step that may follow, s, of which pairs that will be active are to be found; 0 if none need."""
+    """Longest step that may follow, s, for which closing pairs are detected; 0 if nothing is fast enough."""
     fast: float
-    """m; pairs that come nearer by less in that step do not count."""
+    """Distance, m; pairs that close less in that step are ignored."""
     rebound: float
-    """Largest change of a speed by contact over the speed of closing: 1 + restitution."""
+    """Largest velocity change by contact over the closing speed: 1 + restitution."""
     least: Floats
-    """(slots,) square of the least altitude of a node in the tets of its exposed faces, m^2; (0,) without ``beyond``.
+    """(slots,) square of the least altitude of a node in the tets of its exposed faces, m^2; (0,) without
+    ``beyond``.
     """
     tied: Ints
-    """(slots,) the bonds that tie each, as bits: nodes that one ties do not meet; (0,) without bonds (tied.py)."""
+    """(slots,) bonds of each slot, as bits: nodes with a common bond are not in contact; (0,) without bonds
+    (tied.py)."""
 
     @classmethod
     def of(
         cls, x: Floats, v: Floats, part: Indices, mu: Floats, give: float, dt: float, room: StepRoom | None = None
     ) -> "Step":  # fmt: skip
-        """A step ``dt`` from ``x`` on."""
+        """Returns the record of a step ``dt`` from ``x`` on."""
         places, begin, end = (room or StepRoom()).lines(len(x))
         _place(places, x, v, dt)
         return cls(begin, v, end, part, mu, give, dt, 0.0, 0.0, 1.0, _NONE, NOTHING)
 
     def followed(self, beyond: float, fast: float, rebound: float, faces: "FaceTable", room: StepRoom) -> "Step":
-        """And a step of up to ``beyond`` that may follow, see there."""
+        """Returns the record with a step of up to ``beyond`` that may follow."""
         least = _NONE
         if beyond > 0.0:
             least = room.least(len(self.x))
@@ -137,71 +140,71 @@ class Step(NamedTuple):
 
 
 class Pairs(NamedTuple):
-    """Candidate pairs of one kind, and how long each may be left alone (pairs.py)."""
+    """Candidate pairs of one kind, and the bounds until which each is deactivated (pairs.py)."""
 
     rows: Indices
-    """(p, 2) a node's slot and a face, or two edges."""
+    """(p, 2) slot of a node and face, or two edges."""
     until: Floats
-    """(p,) m; minus infinity when it is not known, NaN for a pair that is too close to be deactivated."""
+    """(p,) bound, m; minus infinity if unknown, NaN for a pair that is too close to be deactivated."""
     speed: Floats
-    """(p,) relative speed of the reference motions, m/s; NaN when it is not known."""
+    """(p,) relative speed of the reference motions, m/s; NaN if unknown."""
     turned: Flags
     """(p,) whether a pair is deactivated because its node does not face the face, by the mean normals of the node."""
     next: Indices
-    """(p,) of pairs of nodes and faces: the next pair of the same node, -1 for none; (0,) of edges."""
+    """(p,) next node-face pair of the same node, -1 for none; (0,) for edges."""
     active: Indices
-    """(p,) room for the numbers of those that the narrow phase has tested."""
+    """(p,) working array: numbers of the tested pairs."""
 
 
 class SlotTable(NamedTuple):
-    """The slots, as nodes that meet faces."""
+    """Slots, as nodes in contact with faces."""
 
     normals: Floats
-    """(slots, 12) means over a node's faces of their normal n, of n n (xx, yy, zz, yz, zx, xy) and of the unit vector
-    to the middle of the other side; zero without."""
+    """(slots, 12) means over a node's faces of their normal n, of n n (xx, yy, zz, yz, zx, xy) and of the unit
+    vector to the midpoint of the opposite edge; zero without faces."""
     on_surface: Flags
-    """(slots,) only these meet faces."""
+    """(slots,) nodes on the surface; no others are in contact with faces."""
     first: Indices
-    """(slots,) the first pair with a face, -1 for none."""
+    """(slots,) first pair with a face, -1 for none."""
     left: Floats
-    """(slots,) how far each has left its reference motion, m."""
+    """(slots,) distance of each from its reference motion, m."""
     course: Floats
     """(slots, 3) velocities of the reference motions, m/s."""
     fresh: Flags
-    """(slots,) whose mean normals have changed."""
+    """(slots,) whether its mean normals changed."""
 
 
 class FaceTable(NamedTuple):
-    """The faces."""
+    """Faces."""
 
     corners: Indices
-    """(f, 4) slots, counter-clockwise seen from outside, the node opposite last."""
+    """(f, 4) slots, counter-clockwise seen from outside, the opposite node last."""
     size: Floats
     """(f,) square root of twice the initial area, m."""
     id: Ints
     exposed: Flags
-    """(f,) only exposed faces are met."""
+    """(f,) exposed faces; no others have contacts."""
     left: Floats
-    """(f,) the largest of its corners, m."""
+    """(f,) largest distance of a corner from its reference motion, m."""
     fresh: Flags
-    """(f,) with new corners, or exposed since the last step."""
+    """(f,) faces with new corners, or exposed since the last step."""
 
 
 class EdgeTable(NamedTuple):
-    """The edges; pairs are of sharp ones."""
+    """Edges; pairs are of sharp ones."""
 
     corners: Indices
     """(e, 6) slots: records.Edges."""
     size: Floats
     """(e,) initial length, m."""
     deep: Floats
-    """(e,) depth beyond which it holds nothing, m: records.Edges."""
+    """(e,) greatest depth of a contact, m: records.Edges."""
     meets: Flags
-    """(e,) whether its faces allow that others meet it: records.Edges."""
+    """(e,) whether the states of both faces admit edge-edge contact: records.Edges."""
     left: Floats
-    """(e,) the larger of its ends, m."""
+    """(e,) larger distance of an end from its reference motion, m."""
     fresh: Flags
-    """(e,) with new corners, or a face exposed since the last step."""
+    """(e,) edges with new corners, or a face exposed since the last step."""
 
 
 _N1, _N2, _I1, _B1, _B2 = (
@@ -218,8 +221,8 @@ EDGES = record(EdgeTable, _N2, _F1, _F1, _B1, _F1, _B1)
 
 @njit("float64(float64, float64, float64, float64, float64)", cache=True, error_model="numpy")
 def needed(gap0, gap1, speed, give, dt):  # type: ignore[no-untyped-def]
-    """By how much the normal speed must rise, m/s: not to pass, and when that has happened already, not deeper; a
-    share ``give`` of the penetration is taken back (PUSH_OUT).
+    """Least change of the normal speed, m/s, so that the node does not pass, or, inside already, goes no deeper:
+    (min(gap0, 0) - gap1) / dt, plus the correction of a share ``give`` of the penetration (PUSH_OUT).
     """
     back = give * min(max(-gap0, 0.0) / dt, max(-speed, 0.0))
     return (min(gap0, 0.0) - gap1) / dt + back
@@ -234,7 +237,7 @@ def bonded(step, a, b, c, d):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[:, ::1], float64[:, ::1], float64[:, ::1], float64)", cache=True)
 def _place(places, x, v, dt):  # type: ignore[no-untyped-def]
-    """Positions now and after ``dt``, side by side."""
+    """Writes positions now and after ``dt``, side by side."""
     for a in range(len(x)):
         for i in range(3):
             places[a, i], places[a, 3 + i] = x[a, i], x[a, i] + dt * v[a, i]
@@ -250,7 +253,7 @@ def altitude(x, a, i, j, k):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[:, :], int32[:, ::1], boolean[::1])", cache=True)
 def least_altitudes(least, x, corners, exposed):  # type: ignore[no-untyped-def]
-    """See Step.least."""
+    """Updates Step.least from all exposed faces."""
     for f in range(len(corners)):
         if exposed[f]:
             a, b, c, d = corners[f, 0], corners[f, 1], corners[f, 2], corners[f, 3]

@@ -1,4 +1,4 @@
-"""Which slots bonds tie (worker/bonds): contact sees no pair whose nodes are all tied by one bond."""
+"""Bonds of the slots (worker/bonds): pairs whose nodes are all tied by one bond have no contact."""
 
 from typing import Protocol
 
@@ -8,26 +8,26 @@ from ...model.state import Ints
 from ..surface.records import SurfaceNodes
 
 NOTHING: Ints = np.zeros(0, np.int64)
-"""Of a scene without bonds."""
+"""Value for a scene without bonds."""
 
 
 class Ties(Protocol):
-    """What contact asks of the bonds."""
+    """Interface of the bonds."""
 
     version: int
 
     def bits(self, ids: Ints) -> Ints:
-        """(k,) the bonds that tie each node, as bits."""
+        """(k,) bonds of each node, as bits."""
 
 
 class Tied:
-    """The bonds of the slots of a scene, found anew where either has changed."""
+    """Bonds of the slots of a scene, updated when either changes."""
 
     def __init__(self, bonds: Ties) -> None:
         self._bonds, self._ids, self._version, self._found = bonds, NOTHING, -1, NOTHING
 
     def bits(self, surface_nodes: SurfaceNodes) -> Ints:
-        """(slots,) see Ties.bits."""
+        """(slots,) bonds of each slot: see Ties.bits."""
         if self._ids is not surface_nodes.id or self._version != self._bonds.version:
             self._ids, self._version = surface_nodes.id, self._bonds.version
             self._found = self._bonds.bits(surface_nodes.id)

@@ -1,4 +1,4 @@
-"""What a scene knows of its slots, faces and edges: a column each, by their rows."""
+"""Tables of a scene: columns of its slots, faces and edges."""
 
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -14,36 +14,36 @@ _FRESH = {
     **dict.fromkeys(("owned", "pushes", "live", "new", "fresh", "tracked", "on_surface"), False),
     "first": -1, "normals": 0.0, "total": 0,
 }  # fmt: skip
-"""What a slot begins with."""
+"""Initial values of a slot."""
 
 
 @dataclass
 class OwnSlots:
-    """Which nodes have which slots: those that this rank holds, and others."""
+    """Slots of the nodes that this rank holds, and of others."""
 
     slots: Indices
-    """(h,) which they are."""
+    """(h,) slots of local nodes."""
     local: Indices
-    """(h,) indices of their nodes on this rank."""
+    """(h,) local indices of these nodes."""
     place: Indices
-    """(nodes,) slot of each node of this rank, -1 for those that have none."""
+    """(nodes,) slot of each local node, -1 for a node without slot."""
     far: Indices
     """(k,) slots of nodes that this rank does not hold."""
     far_ids: Ints
-    """(k,) global ids of these, ascending."""
+    """(k,) their global ids, ascending."""
     _rooms: Rooms = field(default_factory=lambda: Rooms("slots", "local"), init=False, repr=False)
     _by_node: Rooms = field(default_factory=lambda: Rooms("place"), init=False, repr=False)
 
     @classmethod
     def of(cls, surface_nodes: SurfaceNodes, nodes: int) -> "OwnSlots":
-        """Of all slots, for so many ``nodes`` of this rank."""
+        """Maps all slots to the local nodes, ``nodes`` in number."""
         slots, none = np.zeros(0, np.int32), np.zeros(0, np.int64)
         own = cls(slots, slots, np.full(nodes, -1, np.int32), slots, none)
         own.add(0, surface_nodes)
         return own
 
     def add(self, first: int, rows: SurfaceNodes) -> None:
-        """Takes up more slots, from ``first`` on."""
+        """Adds the slots of ``rows``, from ``first`` on."""
         held = np.flatnonzero(rows.local >= 0)
         slots, local = (first + held).astype(np.int32), rows.local[held]
         self._rooms.append(self, len(held), slots=slots, local=local)
@@ -56,31 +56,31 @@ class OwnSlots:
             self.far_ids = ids[order]
 
     def grow(self, nodes: int) -> None:
-        """Up to so many ``nodes`` of this rank; the new ones have no slots yet."""
+        """Extends the map to ``nodes`` local nodes; the new ones have no slots yet."""
         if nodes > len(self.place):
             self._by_node.append(self, nodes - len(self.place), place=-1)
 
 
 @dataclass
 class SceneSlots:
-    """The slots."""
+    """Columns of the slots."""
 
     owned: Flags
-    """(slots,) the nodes whose contacts with faces this rank computes."""
+    """(slots,) owned surface nodes: this rank computes their contacts with faces."""
     pushes: Flags
-    """(slots,) which nodes a contact of this rank may push."""
+    """(slots,) nodes to which a contact of this rank may apply an impulse."""
     live: Flags
-    """(slots,) the owned that are searched."""
+    """(slots,) owned nodes that are in the broad phase."""
     new: Flags
-    """(slots,) which have to be registered."""
+    """(slots,) nodes to be registered."""
     fresh: Flags
-    """(slots,) whose pairs have to be tested, for they have other mean normals."""
+    """(slots,) nodes whose pairs must be tested because their mean normals changed."""
     tracked: Flags
-    """(slots,) nodes of what is searched."""
+    """(slots,) nodes of anything in the broad phase, whose motion is measured."""
     on_surface: Flags
-    """(slots,) of nodes that are held here: only those on the surface meet faces."""
+    """(slots,) local nodes on the surface: only these are in contact with faces."""
     first: Indices
-    """(slots,) the first pair with a face, -1 for none."""
+    """(slots,) first pair with a face, -1 for none."""
     normals: Floats
     """(slots, COLUMNS) mean normals; see tables.SlotTable."""
     total: Ints
@@ -91,7 +91,7 @@ class SceneSlots:
 
     @classmethod
     def at_rest(cls, owned: Flags, pushes: Flags) -> "SceneSlots":
-        """Nothing is searched yet."""
+        """Returns the columns with nothing in the broad phase yet."""
         n = len(owned)
         live, new, fresh, tracked, on_surface = np.zeros((5, n), bool)
         first, normals, total, before = (
@@ -100,74 +100,74 @@ class SceneSlots:
         return cls(owned, pushes, live, new, fresh, tracked, on_surface, first, normals, total, before)
 
     def add(self, rows: SurfaceNodes) -> None:
-        """Takes up more slots."""
+        """Adds the slots of ``rows``."""
         self._rooms.append(self, rows.n, before=rows.v, **_FRESH)
 
     def inherit(self, copies: Indices, parents: Indices) -> None:
-        """Copies have the normals of their parents, are searched as they are, and pushed by the same ranks."""
+        """Copies normals, broad-phase flags and ranks of parents to their copies."""
         for column in (self.normals, self.owned, self.on_surface, self.pushes, self.live, self.new, self.tracked):
             column[copies] = column[parents]
 
 
 @dataclass
 class SceneFaces:
-    """The faces."""
+    """Columns of the faces."""
 
     corners: Indices
-    """(f, 4) slots."""
+    """(f, 4) slots; the opposite node last."""
     id: Ints
-    """(f,) ascending."""
+    """(f,) global ids, ascending."""
     size: Floats
     exposed: Flags
-    """(f,) only exposed faces are met."""
+    """(f,) exposed faces; no others have contacts."""
     live: Flags
-    """(f,) which are searched: what is exposed, and what may be soon."""
+    """(f,) faces in the broad phase: exposed ones, and those that may be exposed soon."""
     new: Flags
-    """(f,) which have to be registered."""
+    """(f,) faces to be registered."""
     fresh: Flags
-    """(f,) whose pairs have to be tested: new corners, newly exposed."""
+    """(f,) faces whose pairs must be tested: new corners, or newly exposed."""
 
     @classmethod
     def at_rest(cls, corners: Indices, ids: Ints, size: Floats, exposed: Flags) -> "SceneFaces":
-        """Nothing is searched yet."""
+        """Returns the columns with nothing in the broad phase yet."""
         return cls(corners, ids, size, exposed, *np.zeros((3, len(corners)), bool))
 
 
 @dataclass
 class SceneEdges:
-    """The edges; only sharp ones are searched."""
+    """Columns of the edges; only sharp edges are in the broad phase."""
 
     corners: Indices
     """(e, 6) slots: see records.Edges."""
     sides: Ints
     """(e, 2) ids of their faces."""
     faces: Indices
-    """(e, 2) rows of these, -1 for a face that is not here."""
+    """(e, 2) rows of their faces, -1 for a face that this rank does not have."""
     lengths: Floats
     """(2, e) ``size`` and ``deep`` of records.Edges, m."""
     opened: Bits
-    """(e, 2) how far either face is open: see records.Edges."""
+    """(e, 2) states of their faces: see records.Edges."""
     meets: Flags
-    """(e,) whether its faces allow that others meet it: see records.Edges."""
+    """(e,) whether the states of both faces admit edge-edge contact: see records.Edges."""
     sharp: Flags
-    """(e,) whether it is, or has been (sharp.py)."""
+    """(e,) edges that are or have been sharp (sharp.py)."""
     own: Flags
-    """(e,) whose face of smaller id is of this rank."""
+    """(e,) edges whose face of smaller id is this rank's."""
     rank: Ints
-    """(e,) of two edges, that of lower rank has the pair."""
+    """(e,) order of the edges: a pair belongs to the edge of lower rank."""
     live: Flags
-    """(e,) which are searched."""
+    """(e,) edges in the broad phase."""
     new: Flags
-    """(e,) which have to be registered."""
+    """(e,) edges to be registered."""
     fresh: Flags
-    """(e,) whose pairs have to be tested."""
+    """(e,) edges whose pairs must be tested."""
 
     @classmethod
     def at_rest(
         cls, corners: Indices, sides: Ints, faces: Indices, lengths: Floats, opened: Bits, sharp: Flags, own: Flags,
         rank: Ints,
     ) -> "SceneEdges":  # fmt: skip
-        """Nothing is searched yet."""
+        """Returns the columns with nothing in the broad phase yet."""
         meets = np.asarray((opened.min(axis=1, initial=OPEN) >= AGED) & (opened.max(axis=1, initial=0) == OPEN))
         return cls(
             corners, sides, faces, lengths, opened, meets, sharp, own, rank, *np.zeros((3, len(corners)), bool)
@@ -180,15 +180,15 @@ class SceneEdges:
 
     @cached_property
     def deep(self) -> Floats:
-        """(e,) depth beyond which it holds nothing, m."""
+        """(e,) greatest depth of a contact, m."""
         return np.asarray(self.lengths[1])
 
     @cached_property
     def far(self) -> Ints:
-        """Rows of edges with a face that is not here."""
+        """Rows of edges with a face that this rank does not have."""
         return np.flatnonzero((self.faces < 0).any(axis=1))
 
     @property
     def names(self) -> Ints:
-        """(e,) the two faces of each edge as one number: two faces have one edge in common."""
+        """(e,) ids of the two faces of each edge as one number: two faces have at most one edge in common."""
         return (self.sides[:, 0] << 32) + self.sides[:, 1]

@@ -1,4 +1,5 @@
-"""Nodes that several ranks push: who they are, copies of their state, and the lists for completing sums over them."""
+"""Ghosts: copies of other ranks' surface nodes, their state in every step, and the lists of shared nodes with
+impulses."""
 
 from itertools import pairwise
 
@@ -14,11 +15,11 @@ from ..surface.records import Edges, Faces, SurfaceNodes
 _CROWD_WORDS = 15
 """Words of a node in a message (``pack``)."""
 _ROOM = 32
-"""Rows by which the message of a rank grows, so that few nodes that separate need no new one. Chosen: 2 kB."""
+"""Rows by which the message of a rank grows, so that separated nodes seldom need new messages. Chosen: 2 kB."""
 
 
 def pack(faces: Faces, edges: Edges, surface_nodes: SurfaceNodes) -> Ints:
-    """One flat message of things and their nodes; floats travel as their bits."""
+    """Packs faces, edges and their nodes into one flat message; floats by their bits."""
     return np.concatenate([
         np.array([faces.n, edges.n], np.int64),
         faces.id, faces.nodes.reshape(-1), faces.size.view(np.int64), faces.exposed,
@@ -29,7 +30,7 @@ def pack(faces: Faces, edges: Edges, surface_nodes: SurfaceNodes) -> Ints:
 
 
 def unpack(words: Ints) -> tuple[Faces, Edges, SurfaceNodes]:
-    """What ``pack`` made one message of."""
+    """Unpacks a message of ``pack``."""
     f, e = int(words[0]), int(words[1])
     ends = np.cumsum([2, f, 4 * f, f, f, 6 * e, 2 * e, e, e, 2 * e, e])
     pieces = [words[a:b] for a, b in pairwise(ends)]
@@ -40,7 +41,7 @@ def unpack(words: Ints) -> tuple[Faces, Edges, SurfaceNodes]:
 
 
 def pack_nodes(surface_nodes: SurfaceNodes) -> Ints:
-    """(n, 15) rows of nodes."""
+    """(n, 15) words of the nodes."""
     floats = np.concatenate([surface_nodes.mobility, surface_nodes.x, surface_nodes.v, surface_nodes.course], axis=1)
     return np.column_stack(
         [surface_nodes.id, surface_nodes.owner, surface_nodes.part, np.ascontiguousarray(floats).view(np.int64)]
@@ -48,7 +49,7 @@ def pack_nodes(surface_nodes: SurfaceNodes) -> Ints:
 
 
 def unpack_nodes(words: Ints) -> SurfaceNodes:
-    """The nodes of ``pack_nodes``, as copies."""
+    """Returns the nodes of ``pack_nodes``, as ghosts."""
     rows = words.reshape(-1, _CROWD_WORDS)
     floats = np.ascontiguousarray(rows[:, 3:]).view(np.float64)
     return SurfaceNodes(
@@ -58,17 +59,18 @@ def unpack_nodes(words: Ints) -> SurfaceNodes:
 
 
 def fetch(ids: Ints, owners: Indices, held: SurfaceNodes, comm: Comm) -> SurfaceNodes:
-    """Copies of nodes (ids, owners) that this rank does not hold; all ranks take part. ``held``: every own node."""
+    """Fetches nodes, by their ids and owners, that this rank does not hold; ``held``: all local nodes. Collective."""
     asked = comm.swap({rank: ids[owners == rank] for rank in ranks(owners)})
     answers = comm.swap({rank: pack_nodes(held.take(held.places(want))) for rank, want in asked.items()})
     return unpack_nodes(np.concatenate([np.zeros(0, np.int64), *answers.values()]))
 
 
 def members(used: Ints, owners: Indices, holders: list[Neighbour], nodes: Nodes, comm: Comm) -> dict[int, Ints]:
-    """For every other rank: the ids, ascending, of the nodes that it and this rank both hold or push.
+    """Returns for every other rank the ids, ascending, of the nodes for which both ranks need the sum of impulses.
 
-    ``used`` (k,) ids of the nodes that this rank pushes and ``owners`` (k,) who owns each; ``holders``: shared nodes.
-    The owner of a node hears of everybody who pushes it and tells all of them, and all who hold it.
+    ``used`` (k,): ids of the nodes to which contacts of this rank may apply impulses; ``owners`` (k,): their owners;
+    ``holders``: shared nodes. The owner of a node collects the ranks with such contacts and sends the list to all of
+    them, and to all ranks that hold the node.
     """
     pushed, rows = np.zeros(nodes.n, bool), [used[:0]]
     pushed[nodes.places(used[owners == comm.rank])] = True
@@ -92,18 +94,18 @@ def members(used: Ints, owners: Indices, holders: list[Neighbour], nodes: Nodes,
 
 
 def _begins(values: Ints) -> Flags:
-    """(n,) which of the ascending values is the first of its kind."""
+    """(n,) first occurrence of each of the ascending values."""
     return np.concatenate([np.ones(min(len(values), 1), bool), values[1:] != values[:-1]])
 
 
 def _rows(ids: Ints, rank: int, comm: Comm) -> Ints:
-    """Node and rank as one number."""
+    """Returns node and rank as one number."""
     return ids * comm.size + rank
 
 
 def _company(node: Ints, holder: Ints, group: Ints, member: int) -> Ints:
-    """Rows (node, holder) of the nodes that ``member`` is a member of, its own rows left out; ``group`` (n,): rows of
-    one node.
+    """Rows (node, holder) of the nodes of ``member``, without its own; ``group`` (n,): number of the node of each
+    row.
     """
     held = np.zeros(group[-1] + 1, bool)
     held[group[holder == member]] = True
@@ -112,16 +114,16 @@ def _company(node: Ints, holder: Ints, group: Ints, member: int) -> Ints:
 
 
 class Copies:
-    """Positions and velocities of nodes, before and after the kick, sent in every step by a rank that holds them."""
+    """Persistent messages of the ghosts' state: positions and velocities, before and after the kick, in every step."""
 
     def __init__(self, sends: list[Neighbour], receives: list[Neighbour], comm: Comm, tag: Tag) -> None:
-        """``sends``: local nodes, ``receives``: places in the surface_nodes."""
+        """``sends``: local nodes; ``receives``: slots of the ghosts."""
         self._comm, self._tag = comm, tag
         self._rows: tuple[list[int], list[int]] | None = None
         self.take(sends, receives)
 
     def take(self, sends: list[Neighbour], receives: list[Neighbour]) -> None:
-        """Other nodes. Messages that have room for them stay."""
+        """Replaces the nodes. Messages that are large enough are reused."""
         self.sends, self.receives = sends, receives
         rows = _rooms(sends), _rooms(receives)
         self._from, self._to = _padded(sends, rows[0]), _padded(receives, rows[1])
@@ -135,7 +137,7 @@ class Copies:
         self._exchange = self._comm.exchange(_slices(self._out, sends, rows[0]), into, self._tag)
 
     def note(self, nodes: Nodes) -> None:
-        """Keeps v(n-1/2) for the others."""
+        """Stores v(n-1/2) for the next message."""
         _pack(self._out, 6, nodes.v, self._from)
 
     def begin(self, nodes: Nodes) -> None:
@@ -145,12 +147,12 @@ class Copies:
         self._exchange.begin()
 
     def finish(self, x: Floats, v: Floats, before: Floats) -> None:
-        """Fills the copies' rows of ``x``, of ``v`` and of v(n-1/2), (surface_nodes, 3) each."""
+        """Receives the ghosts' rows of ``x``, ``v`` and v(n-1/2), (surface_nodes, 3) each."""
         self._exchange.finish()
         _unpack(x, v, before, self._to, self._in)
 
     def free(self) -> None:
-        """Gives the messages back to MPI."""
+        """Releases the messages of MPI."""
         self._exchange.free()
 
 
@@ -171,12 +173,12 @@ def _unpack(x, v, before, rows, got):  # type: ignore[no-untyped-def]
 
 
 def _rooms(others: list[Neighbour]) -> list[int]:
-    """Rows of each rank's message."""
+    """Number of rows of each rank's message."""
     return [_ROOM * (1 + len(other.nodes) // _ROOM) for other in others]
 
 
 def _padded(others: list[Neighbour], rooms: list[int]) -> Indices:
-    """The nodes of each rank in turn, -1 behind them up to its ``rooms``."""
+    """Nodes of each rank in turn, filled with -1 up to its number of rows, ``rooms``."""
     rows, begin = np.full(sum(rooms), -1, np.int32), 0
     for other, room in zip(others, rooms, strict=True):
         rows[begin : begin + len(other.nodes)] = other.nodes
@@ -185,14 +187,14 @@ def _padded(others: list[Neighbour], rooms: list[int]) -> Indices:
 
 
 def _slices(buffer: Floats, others: list[Neighbour], rooms: list[int]) -> list[tuple[int, Ints]]:
-    """The words of each rank in turn."""
+    """Slices of the buffer by rank."""
     words, ends = buffer.view(np.int64), np.cumsum(rooms).tolist()
     return [(other.rank, words[end - room : end]) for other, room, end in zip(others, rooms, ends, strict=True)]
 
 
 def copies(surface_nodes: SurfaceNodes, nodes: Nodes, comm: Comm, tag: Tag) -> Copies:
-    """The standing order for the state of the nodes of ``surface_nodes`` that are not held here, with their owners; all
-    ranks take part.
+    """Sets up the persistent ghost exchange of the ``surface_nodes`` that this rank does not hold, with their
+    owners. Collective.
     """
     far = np.flatnonzero(surface_nodes.local < 0)
     owners = surface_nodes.owner[far]

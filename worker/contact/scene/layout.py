@@ -1,4 +1,4 @@
-"""The surface laid out as a scene: slots, faces and edges, without pairs."""
+"""Construction of a scene: slots, faces and edges, without pairs."""
 
 import numpy as np
 
@@ -13,10 +13,10 @@ from .scene import Scene
 
 
 def build(sides: NearSurface, rules: Rules, horizon: float, drift: Floats, nodes: Nodes, comm: Comm) -> Scene:
-    """The scene of ``sides``, which flies on for ``horizon``, s, without pairs; all ranks take part and know of the
-    same ``drift`` (3,), m/s.
+    """Returns the scene of ``sides`` for the next ``horizon``, s, without pairs; ``drift`` (3,), m/s, is equal on all
+    ranks. Collective.
 
-    Who shares which node is settled by a SplitUpdate.
+    A SplitUpdate adds the lists of shared nodes.
     """
     seen = with_ghosts(sides, rules, horizon, drift, comm) if comm.size > 1 else sides
     order = np.argsort(buckets.curve(seen.surface_nodes.x, rules.cell))
@@ -33,8 +33,10 @@ def build(sides: NearSurface, rules: Rules, horizon: float, drift: Floats, nodes
         rank[np.lexsort((edges.sides[:, 1], edges.sides[:, 0]))] = np.arange(edges.n)
     own = np.arange(edges.n) < sides.edges.n
     return Scene(
-        surface_nodes=surface_nodes, own=OwnSlots.of(surface_nodes, nodes.n), slots=SceneSlots.at_rest(owned, pushes |
-        owned), faces=SceneFaces.at_rest(corners, faces.id, faces.size, faces.exposed.copy()), edges=SceneEdges.at_rest(
+        surface_nodes=surface_nodes, own=OwnSlots.of(surface_nodes, nodes.n),
+        slots=SceneSlots.at_rest(owned, pushes | owned),
+        faces=SceneFaces.at_rest(corners, faces.id, faces.size, faces.exposed.copy()),
+        edges=SceneEdges.at_rest(
             ends, edges.sides, places(faces.id, edges.sides), np.stack([edges.size, edges.deep]), edges.opened.copy(),
             edges.sharp.copy(), own, rank,
         ),

@@ -1,4 +1,4 @@
-"""The surface near a rank: its own, and what other ranks have near it."""
+"""Surface near one rank: its own, and ghosts of other ranks' surfaces."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -14,51 +14,53 @@ from ..surface.records import Edges, Faces, SurfaceNodes, merged
 from . import ghosts
 
 HALO = 1.0
-"""Of the typical size of a face: two slots of different ranks that leave their lines by half of this, each, may meet
-unseen; a search of all ranks comes before."""
+"""Width of the halo over the typical size of a face: slots of different ranks are guaranteed to be candidates only
+while each departs from its reference motion by less than half of it; a search of all ranks comes before."""
 
 
 @dataclass(frozen=True)
 class Rules:
-    """How to search; equal on all ranks."""
+    """Parameters of the searches, equal on all ranks."""
 
     domain: str
     allowed: Flags
-    """(parts, parts) which parts meet."""
+    """(parts, parts) pairs of parts that may be in contact."""
     cell: float
     """Edge of a cell of the contact domain, m."""
     skin: float
-    """Two slots that leave their lines by half of this, each, may meet without being candidates, m."""
+    """Skin, m: two slots that both depart from their reference motions by less than half of it cannot be in contact
+    without being candidates."""
     halo: float
-    """The same of slots of different ranks, m."""
+    """Skin for slots of different ranks, m."""
     itself: Flags
-    """(parts,) whether the body of each may meet itself."""
+    """(parts,) whether the body of each part may be in contact with itself."""
 
 
 @dataclass
 class NearSurface:
-    """A share of the surface, with its nodes."""
+    """Part of the surface, with its nodes."""
 
     faces: Faces
-    """By ascending id."""
+    """Faces by ascending id."""
     edges: Edges
     surface_nodes: SurfaceNodes
-    """Every node of the faces and edges, and every node of the surface that is held here."""
+    """All nodes of the faces and edges, and all local surface nodes."""
     owned: Ints
     """Ids of the owned nodes of the surface, and of cracks that may open."""
 
     @cached_property
     def face_places(self) -> Indices:
-        """(f, 4)."""
+        """(f, 4) rows of the nodes of the faces."""
         return self.surface_nodes.places(self.faces.nodes)
 
     @cached_property
     def edge_places(self) -> Indices:
-        """(e, 4)."""
+        """(e, 6) rows of the nodes of the edges."""
         return self.surface_nodes.places(self.edges.nodes)
 
     def boxes(self, horizon: float, drift: Floats, margin: float) -> list[Boxes]:
-        """Of the owned, the faces and the edges, with ``margin``, m, on all sides."""
+        """Bounding boxes of owned nodes, faces and edges, swept over ``horizon``, s, with ``margin``, m, on all
+        sides."""
         x, course = self.surface_nodes.x, self.surface_nodes.course - drift
         owned = Primitives(self.surface_nodes.places(self.owned[:, None]), np.full(len(self.owned), margin))
         faces = Primitives(np.ascontiguousarray(self.face_places[:, :3]), margin + DEEP * self.faces.size)
@@ -67,7 +69,7 @@ class NearSurface:
 
 
 def with_ghosts(sides: NearSurface, rules: Rules, horizon: float, drift: Floats, comm: Comm) -> NearSurface:
-    """The sides with what other ranks' surfaces have near this one's, own edges first."""
+    """Returns ``sides`` with the ghosts near this rank's surface, own edges first."""
     nodes, faces, edges = sides.boxes(horizon, drift, 0.5 * rules.halo)
     askers = Boxes(np.concatenate([nodes.low, edges.low]), np.concatenate([nodes.high, edges.high]))
     chosen = domain.choose(rules.domain, askers, [faces, edges], rules.cell, comm)
@@ -77,7 +79,7 @@ def with_ghosts(sides: NearSurface, rules: Rules, horizon: float, drift: Floats,
 
 
 def _some_of(sides: NearSurface, faces: Flags, edges: Flags) -> tuple[Faces, Edges, SurfaceNodes]:
-    """Some of the faces and of the edges, and the nodes of these."""
+    """Selects faces and edges, with their nodes."""
     nodes = np.zeros(sides.surface_nodes.n, bool)
     nodes[sides.face_places[faces]] = nodes[sides.edge_places[edges]] = True
     return sides.faces.take(faces), sides.edges.take(edges), sides.surface_nodes.take(nodes)

@@ -1,4 +1,4 @@
-"""A scene: the surface near this rank, the candidate pairs on it, and the room to work in."""
+"""Scene: the surface near this rank, its candidate pairs, and their working arrays."""
 
 from dataclasses import dataclass, field
 
@@ -28,22 +28,22 @@ from .near_surface import Rules
 
 @dataclass
 class Messages:
-    """Between ranks, in every step."""
+    """Persistent messages between ranks, in every step."""
 
     company: SharedSums
-    """Sums over the nodes that several ranks push."""
+    """Sums over the nodes with impulses of several ranks."""
     copies: Copies
-    """Positions and velocities of what is not held here."""
+    """Positions and velocities of the ghosts."""
 
     def free(self) -> None:
-        """Gives them back to MPI."""
+        """Releases the messages of MPI."""
         self.company.free()
         self.copies.free()
 
 
 @dataclass
 class Scene:
-    """What a search of all ranks left, and what has been found since."""
+    """Result of the last search of all ranks, with the updates since."""
 
     surface_nodes: SurfaceNodes
     own: OwnSlots
@@ -53,25 +53,23 @@ class Scene:
     rules: Rules
     reference: ReferenceMotion
     cracks: Indices
-    """(m, 6) slots of the nodes on either side of the cracks, -1 where they do not count
-    (contact/narrow_phase/cracks.py).
+    """(m, 6) slots of the nodes on either side of the cracks, -1 for a crack that this rank does not compute
+    (narrow_phase/cracks.py).
     """
     node_face: PairTable = field(default_factory=PairTable)
-    """Of a slot and a face."""
+    """Node-face pairs: slot and face."""
     edge_edge: PairTable = field(default_factory=PairTable)
     active: ActiveRows = field(default_factory=ActiveRows)
-    """Of the last step."""
+    """Active contacts of the last step."""
     messages: Messages = field(init=False)
     _stored: Kept | None = field(default=None, init=False)
 
     def connect(self, company: list[Neighbour], nodes: Nodes, comm: Comm) -> None:
-        """Sets up the messages: sums over the nodes of the company, copies of what is not held here; all ranks take
-        part.
-        """
+        """Sets up the messages: sums over the shared nodes ``company``, and copies of the ghosts. Collective."""
         self.messages = Messages(SharedSums(company, comm), ghosts.copies(self.surface_nodes, nodes, comm, Tag.GHOST))
 
     def extend(self, company: list[Neighbour], sends: list[Neighbour], receives: list[Neighbour]) -> None:
-        """The messages with more nodes, of which this rank knows as the others do; what has not grown stays."""
+        """Extends the messages after a split; messages with unchanged lists are reused."""
         messages = self.messages
         if not same(messages.company.neighbours, company):
             messages.company.take(company)
@@ -79,12 +77,13 @@ class Scene:
             messages.copies.take(sends, receives)
 
     def look(self, nodes: Nodes) -> None:
-        """Takes v(n-1/2), before the kick."""
+        """Stores v(n-1/2), before the kick."""
         slot_numbers.gather(self.slots.before, nodes.v, self.own.slots, self.own.local)
         self.messages.copies.note(nodes)
 
     def stored(self, cracks: Floats) -> Kept:
-        """Where pairs, and ``cracks`` (m, 12), keep their impulses: the same object while that is the same memory."""
+        """Stored impulses of the pairs and of the ``cracks`` (m, 12); the same object while these are the same
+        memory."""
         before, pairs, rows = self._stored, self.node_face.kept, cracks.reshape(-1, 4)
         if before is None or before.pairs is not pairs or not same_memory(before.cracks, rows):
             self._stored = before = Kept(pairs, rows)
@@ -92,16 +91,16 @@ class Scene:
 
     @property
     def kept(self) -> tuple[Ints, Floats]:
-        """(k, 2) ids of node and face of the pairs with impulses in the last step, and (k, 4) what they have kept."""
+        """(k, 2) ids of node and face of the pairs with impulses in the last step, and (k, 4) their stored impulses."""
         table = self.node_face
         some = table.pushed
         node, face = table.rows[some].T
         return np.column_stack([self.surface_nodes.id[node], self.faces.id[face]]), table.kept[some]
 
     def remember(self, keys: Ints, kept: Floats, nodes: Nodes, comm: Comm) -> None:
-        """Takes over what pairs of another search, with their ``keys``, have ``kept``; all ranks take part.
+        """Copies the stored impulses ``kept`` of the pairs ``keys`` from the scene of the last search. Collective.
 
-        The pairs of a copy were with the rank of its parent's, and are with its own from now on.
+        The pairs of a copied node were on the rank of its parent, and are on its own rank from now on.
         """
         rows = np.column_stack([keys, kept.view(np.int64)])
         if comm.size > 1:
@@ -115,12 +114,12 @@ class Scene:
         self.node_face.recall(self.slots.first, pairs, np.ascontiguousarray(rows[here, 2:]).view(np.float64))
 
     def rows_of(self, faces: Ints) -> Indices:
-        """(k,) rows of those of the ``faces``, ids, that are here."""
+        """(k,) rows of those of the ``faces``, ids, that this rank has."""
         rows = places(self.faces.id, faces)
         return rows[rows >= 0]
 
     def expose(self, faces: Ints) -> None:
-        """Faces of these ids become surface."""
+        """Adds the faces of these ids to the surface."""
         rows = self.rows_of(faces)
         self.faces.exposed[rows] = self.faces.fresh[rows] = True
         edges = self.edges
@@ -132,8 +131,8 @@ class Scene:
         self.enliven(rows)
 
     def uncover(self, gone: Ints, bare: Ints, removed: Indices) -> None:
-        """Faces ``gone`` leave the surface, the faces ``bare`` come to it, ids, ascending; ``removed``: slots of nodes
-        that have left, -1 for those that have none.
+        """Removes the faces ``gone`` from the surface and adds the faces ``bare``; ids, ascending; ``removed``:
+        slots of the nodes that left the model, -1 for those without slot.
         """
         rows, removed = self.rows_of(gone), removed[removed >= 0]
         self.faces.exposed[rows] = self.faces.live[rows] = False
@@ -142,7 +141,7 @@ class Scene:
         self.expose(bare)
 
     def enliven(self, rows: Indices) -> None:
-        """Faces, with their nodes and edges, are searched from now on."""
+        """Adds faces, with their nodes, to the broad phase."""
         self.faces.new[rows] |= ~self.faces.live[rows]
         self.faces.live[rows] = True
         corners = np.unique(self.faces.corners[rows, :3])
@@ -150,8 +149,8 @@ class Scene:
         self.slots.live[corners] = self.slots.new[corners] = True
 
     def settle_live(self) -> Flags:
-        """Which nodes and edges are searched, and which slots belong to what is searched; (slots,) those that did not
-        before, which nobody has watched.
+        """Updates the nodes and edges in the broad phase, and the slots whose motion is measured; returns (slots,)
+        the new ones among these.
         """
         before = self.slots.tracked.copy()
         nodes = self.slots.owned & self.slots.on_surface & ~self.slots.live
@@ -170,7 +169,7 @@ class Scene:
         return bool(self.faces.new.any() or self.slots.new.any() or self.edges.new.any())
 
     def sharpen(self, least: Floats) -> Flags:
-        """Which edges (e,) are sharp now and were not, by the cosines ``least`` (parts,); searched from now on."""
+        """(e,) edges that became sharp, by the cosines ``least`` (parts,); adds them to the broad phase."""
         edges, surface_nodes = self.edges, self.surface_nodes
         turned: Flags = sharp.turned(
             edges.sharp, edges.corners, edges.meets, surface_nodes.x, surface_nodes.part, least
@@ -180,33 +179,34 @@ class Scene:
         return turned
 
     def chain(self) -> None:
-        """The chains of the pairs of each node, anew."""
+        """Rebuilds the linked lists of the pairs of each node."""
         self.slots.first[:] = -1
         self.node_face.hang(self.slots.first, 0)
 
     def slot_table(self) -> SlotTable:
-        """The slots as kernels take them."""
+        """Slots as a record for kernels."""
         slots, lines = self.slots, self.reference.short
         return SlotTable(slots.normals, slots.on_surface, slots.first, lines.left, lines.course, slots.fresh)
 
     def face_table(self) -> FaceTable:
-        """The faces."""
+        """Faces as a record for kernels."""
         faces = self.faces
         return FaceTable(faces.corners, faces.size, faces.id, faces.exposed, self.reference.faces, faces.fresh)
 
     def edge_table(self) -> EdgeTable:
-        """The edges."""
+        """Edges as a record for kernels."""
         edges = self.edges
         return EdgeTable(edges.corners, edges.size, edges.deep, edges.meets, self.reference.edges, edges.fresh)
 
     def free(self) -> None:
-        """Gives its messages back to MPI."""
+        """Releases the messages of MPI."""
         self.messages.free()
 
 
 @njit("void(uint8[:, ::1], boolean[::1], boolean[::1], int32[:, ::1], boolean[::1])", cache=True)
 def _expose(opened, meets, fresh, faces, shown):  # type: ignore[no-untyped-def]
-    """Edges whose ``faces`` (e, 2) are ``shown`` (f,), and which meet others since; see SceneEdges."""
+    """Opens the edges whose ``faces`` (e, 2) are exposed, ``shown`` (f,), and updates whether they are in edge-edge
+    contact, ``meets``; see SceneEdges."""
     for e in range(len(opened)):
         for k in range(2):
             if faces[e, k] >= 0 and shown[faces[e, k]] and opened[e, k] < OPEN:
@@ -219,8 +219,9 @@ def _expose(opened, meets, fresh, faces, shown):  # type: ignore[no-untyped-def]
     cache=True,
 )
 def _enliven(live, new, edges, faces, opened, sharp, searched):  # type: ignore[no-untyped-def]
-    """Edges that are ``sharp``, one of whose ``faces`` (e, 2) is ``searched`` (f,), and the other one too if it is not
-    ``opened`` (e, 2) at all. Of a face that is not here nobody says when it is exposed: it is taken to be searched.
+    """Adds ``sharp`` edges to the broad phase: one of the ``faces`` (e, 2) is ``searched`` (f,), and the other one
+    too unless it is ``opened`` (e, 2). A face that this rank does not have is treated as searched, because its
+    exposure is unknown.
     """
     for e in range(len(live)):
         one, both = False, sharp[e] and edges[e, 0] != edges[e, 1]

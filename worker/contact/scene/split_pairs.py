@@ -1,5 +1,5 @@
-"""What a split makes of faces, edges and candidates: whose copies are whose, what corners have become, and the new
-candidates: what a copy has from its parent, and what had nodes in common until it separated.
+"""Faces, edges and candidate pairs after a split: copies by parent, new corners, and new pairs: those that a copy
+inherits from its parent, and those that shared a node before.
 """
 
 from typing import NamedTuple
@@ -16,22 +16,22 @@ _I, _I1, _I2, _N1, _N2, _B1 = (
 
 
 class Family(NamedTuple):
-    """Nodes that separate, and what comes out of them."""
+    """Separated nodes and their copies."""
 
     first: Indices
-    """(surface_nodes,) row of ``member`` where the copies of a node begin, -1 for one that has none."""
+    """(surface_nodes,) row of ``member`` of the first copy of a node, -1 for a node without copies."""
     member: Indices
-    """(c, 2) place of each copy, and whether it is its parent's last."""
+    """(c, 2) slot of each copy, and whether it is the last of its parent."""
     most: int
     """Largest number of copies of a node."""
     pairs: Indices
-    """(c, 2) places of the parent and of the copy."""
+    """(c, 2) slots of parent and copy."""
 
 
 @njit(several(_N1, _N2, _I, _N2)(_N2, _I), cache=True)
 def families(places, n):  # type: ignore[no-untyped-def]
-    """``Family`` of the parents and copies at ``places`` (c, 2), those of a parent one after the other, in a
-    surface_nodes of ``n``; -1 for what is not there.
+    """Returns the ``Family`` of the parents and copies at the slots ``places`` (c, 2), ordered by parent, among
+    ``n`` surface nodes; -1 for a node without slot.
     """
     first, k = np.full(n, np.int32(-1), np.int32), 0
     member, pairs = np.empty_like(places), np.empty_like(places)
@@ -54,7 +54,7 @@ def families(places, n):  # type: ignore[no-untyped-def]
 
 @njit(types.int32(_I1, _I1, _N1, types.int32, _I), cache=True)
 def _become(ids, key, became, node, tet):  # type: ignore[no-untyped-def]
-    """What the ``node`` of a tet (global id) has become; ``ids``: of the nodes; ``key`` and ``became``:
+    """Returns the node that replaces ``node`` in a tet (global id); ``ids`` of the nodes; ``key`` and ``became``:
     TopologyUpdate.
     """
     wanted = ids[node] * KEY + tet
@@ -77,9 +77,9 @@ def _torn(corners, first):  # type: ignore[no-untyped-def]
 
 @njit(several(_I1, _N2)(_N2, _B1, _I1, _N1, _I1, _I1, _N1), cache=True)
 def follow_faces(corners, fresh, faces, first, ids, key, became):  # type: ignore[no-untyped-def]
-    """Gives faces of the ids ``faces`` (f,) the copies of their ``corners`` (f, 4); ``first``: see Family, ``ids``: of
-    the nodes, ``key`` and ``became``: see TopologyUpdate, as places. Returns the rows of those that have lost a node,
-    and their corners until then.
+    """Replaces the ``corners`` (f, 4) of faces, of the ids ``faces`` (f,), by their copies; ``first``: see Family;
+    ``ids`` of the nodes; ``key`` and ``became``: see TopologyUpdate, as slots. Returns the rows of the changed
+    faces, and their corners before.
     """
     rows = _torn(corners, first)
     old = np.empty((len(rows), 4), np.int32)
@@ -95,8 +95,8 @@ def follow_faces(corners, fresh, faces, first, ids, key, became):  # type: ignor
 
 @njit(several(_I1, _N2, _B1)(_N2, _B1, _I2, _N1, _I1, _I1, _N1), cache=True)
 def follow_edges(corners, fresh, sides, first, ids, key, became):  # type: ignore[no-untyped-def]
-    """The same for edges between ``sides`` (e, 2), ids of faces; and which of them are gone, whose faces have separated
-    there.
+    """Does the same for edges between ``sides`` (e, 2), ids of faces; also returns which edges vanish because their
+    faces have separated there.
     """
     rows = _torn(corners, first)
     old, gone = np.empty((len(rows), 6), np.int32), np.zeros(len(rows), np.bool_)
@@ -120,8 +120,8 @@ def follow_edges(corners, fresh, sides, first, ids, key, became):  # type: ignor
 
 @njit("int32[:, ::1](int32[:, ::1], int32[::1], int32[::1], int32[:, ::1])", cache=True)
 def inherited(family, first, following, pairs):  # type: ignore[no-untyped-def]
-    """(p, 2) candidates, node and face, of the copies of a ``family`` (c, 2), places of parents and copies: those of
-    their parents. ``first`` (nodes,), ``following`` and ``pairs``: see node_face.chain.
+    """(p, 2) candidate pairs, node and face, of the copies of a ``family`` (c, 2), slots of parents and copies:
+    those of their parents. ``first`` (nodes,), ``following`` and ``pairs``: see node_face.chain.
     """
     n = 0
     for write in range(2):
@@ -144,9 +144,9 @@ def inherited(family, first, following, pairs):  # type: ignore[no-untyped-def]
     cache=True,
 )
 def apart_from_faces(pairs, rows, old, now, first, member, owned, meets):  # type: ignore[no-untyped-def]
-    """Pairs of nodes and faces, of ``rows``, that had a corner in common before the split, and have none now.
+    """Writes the pairs of nodes and faces ``rows`` that had a corner in common before the split and have none now.
 
-    ``old`` and ``now`` (r, 4): their corners; ``first`` and ``member``: Family; returns how many there are.
+    ``old`` and ``now`` (r, 4): corners before and after; ``first`` and ``member``: Family; returns their number.
     """
     n = 0
     for r in range(len(rows)):
@@ -168,10 +168,10 @@ def apart_from_faces(pairs, rows, old, now, first, member, owned, meets):  # typ
 
 @njit(_I2(_N2, _N2, _N1, _B1), cache=True)
 def apart_from_edges(old, now, first, own):  # type: ignore[no-untyped-def]
-    """(p, 2) pairs of edges, by ascending faces, that had an end in common before the split and have none now, where
-    the one of smaller faces, the first, is this rank's own.
+    """(p, 2) pairs of edges, by ascending faces, with a common end before the split and none now, where the first, of
+    smaller faces, is this rank's.
 
-    ``old`` and ``now`` (e, 6): their nodes; ``first``: see Family.
+    ``old`` and ``now`` (e, 6): nodes before and after; ``first``: see Family.
     """
     ends, m = np.empty(2 * len(old), np.int32), 0
     at = np.empty(2 * len(old), np.int64)
@@ -211,7 +211,7 @@ def apart_from_edges(old, now, first, own):  # type: ignore[no-untyped-def]
 
 @njit("int64[::1](int32[:, ::1], boolean[::1])", cache=True)
 def touching(table, flags):  # type: ignore[no-untyped-def]
-    """Rows of ``table`` (n, k) with an entry that is flagged."""
+    """Rows of ``table`` (n, k) with a flagged entry."""
     rows = np.empty(len(table), np.int64)
     n = 0
     for i in range(len(table)):

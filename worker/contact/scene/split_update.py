@@ -1,7 +1,7 @@
-"""A scene that follows nodes as they separate, until the next search.
+"""Update of a scene after a split, without a search.
 
-What the last search has found stays good while nodes separate: faces take up the copies of their corners, and a copy
-has the candidates of the node that it was part of, with the rank that computes that one's.
+The result of the last search stays valid while nodes separate: faces get the copies of their corners, and a copy
+inherits the candidate pairs of its parent, on the same rank.
 """
 
 import numpy as np
@@ -19,22 +19,22 @@ from .topology_updates import TopologyUpdate, meets
 
 
 class SplitUpdate:
-    """Brings one scene up to date with a split."""
+    """Update of one scene by a split."""
 
     def __init__(self, scene: Scene, here: SurfaceNodes, nodes: Nodes) -> None:
-        """``here``: every node of this rank, by local index."""
+        """``here``: all nodes of this rank, by local index."""
         self._scene, self._here = scene, here
         self._nodes = nodes
         scene.own.grow(nodes.n)
 
     def places(self, ids: Ints) -> Indices:
-        """Where ids stand in the surface_nodes, in their shape, -1 where they do not."""
+        """Slots of global ids, in their shape, -1 for a node without slot."""
         own = self._scene.own
         found = _located(ids.ravel(), self._nodes.id, own.place, own.far_ids, own.far)
         return np.asarray(found.reshape(ids.shape))
 
     def follow(self, heard: TopologyUpdate, cracks: Cracks, blocks: list[Block], neighbours: list[Neighbour]) -> None:
-        """Faces, edges and candidates after the split, and the places of the cracks."""
+        """Updates faces, edges, candidate pairs, and the slots of the cracks."""
         rows = split_pairs.touching(cracks.nodes, _flagged(self._nodes.id, heard.rows.id))
         near, apart = cracks.beside(rows, blocks)
         rows = computed(rows, cracks.nodes, cracks.sides)
@@ -48,8 +48,8 @@ class SplitUpdate:
         self._across(cracks, rows, apart)
 
     def _join(self, heard: TopologyUpdate, neighbours: list[Neighbour]) -> None:
-        """Takes the families of the surface_nodes's nodes and of those that other ranks hold into the surface_nodes;
-        and the masses of all that have separated.
+        """Adds the families of the scene's nodes and of nodes that other ranks hold to the scene, and updates the
+        mobilities of all separated nodes.
         """
         local, have = self._nodes.places(heard.family[:, 0]), self.places(heard.family[:, 0]) >= 0
         for other in neighbours:
@@ -60,7 +60,7 @@ class SplitUpdate:
         self._scene.surface_nodes.mobility[at[at >= 0]] = rows.mobility[at >= 0]
 
     def cracks(self, cracks: Cracks, blocks: list[Block]) -> None:
-        """The places of all cracks that this rank computes."""
+        """Finds the slots of all cracks that this rank computes."""
         every = np.arange(len(cracks.nodes))
         rows, (near, apart) = computed(every, cracks.nodes, cracks.sides), cracks.beside(every, blocks)
         cracks.places[:] = -1
@@ -69,8 +69,8 @@ class SplitUpdate:
         cracks.arrange()
 
     def _across(self, cracks: Cracks, rows: Ints, apart: Flags) -> None:
-        """Places some of the cracks. Their nodes that have separated, and those that are ``apart`` (nodes,) of the
-        tets, may be pushed.
+        """Finds the slots of some cracks. Their separated nodes, and the nodes that are ``apart`` (nodes,) from the
+        tets, may get impulses.
         """
         scene = self._scene
         _place(cracks.places, scene.slots.pushes, rows, cracks.nodes, scene.own.place)
@@ -78,7 +78,7 @@ class SplitUpdate:
         scene.cracks = cracks.places
 
     def settle(self, neighbours: list[Neighbour], comm: Comm) -> None:
-        """Asks all ranks who shares which node; all take part."""
+        """Exchanges the lists of shared nodes with all ranks. Collective."""
         scene, nodes = self._scene, self._nodes
         if comm.size == 1:
             scene.connect([], nodes, comm)
@@ -91,9 +91,9 @@ class SplitUpdate:
         scene.connect([Neighbour(rank, self.places(ids)) for rank, ids in sorted(shared.items())], nodes, comm)
 
     def share(self, heard: TopologyUpdate, neighbours: list[Neighbour]) -> None:
-        """Follows who shares which node. Nobody has to be asked: who shares a node shares its copies, since they are
-        held, pushed and sent by the same ranks as it; and a node that separates is shared by all that hold it, since it
-        may be pushed across the crack.
+        """Updates the lists of shared nodes without a message. A copy is shared by the ranks that share its parent,
+        since the same ranks hold it, send it and have contacts of it; and a separated node is shared by all ranks
+        that hold it, since it may get impulses across the crack.
         """
         messages, surface_nodes, nodes = self._scene.messages, self._scene.surface_nodes, self._nodes
         family = heard.family[np.argsort(heard.family[:, 1])]
@@ -112,7 +112,7 @@ class SplitUpdate:
         )
 
     def _hold(self, local: Indices) -> None:
-        """Adds nodes of this rank, which the surface_nodes lacks."""
+        """Adds local nodes that the scene lacks."""
         if len(local):
             self._add(self._here.take(local))
 
@@ -127,7 +127,7 @@ class SplitUpdate:
         scene.own.add(first, rows)
 
     def _faces(self, heard: TopologyUpdate, became: Indices, family: Family) -> None:
-        """Faces take up the copies of their corners; a node meets those that have just left it, too."""
+        """Replaces the corners of faces by their copies, and adds pairs with the nodes that left a face."""
         faces, slots, surface_nodes = self._scene.faces, self._scene.slots, self._scene.surface_nodes
         rows, old = split_pairs.follow_faces(
             faces.corners, faces.fresh, faces.id, family.first, surface_nodes.id, heard.key, became
@@ -142,7 +142,7 @@ class SplitUpdate:
         self._add_pairs(pairs[:n])
 
     def _edges(self, heard: TopologyUpdate, became: Indices, family: Family) -> None:
-        """An edge goes when its two faces have separated there; it meets those that have left its ends."""
+        """Removes edges whose faces have separated, and adds pairs with the edges that left their ends."""
         edges, surface_nodes = self._scene.edges, self._scene.surface_nodes
         rows, old, gone = split_pairs.follow_edges(
             edges.corners, edges.fresh, edges.sides, family.first, surface_nodes.id, heard.key, became
@@ -156,11 +156,11 @@ class SplitUpdate:
             self._scene.edge_edge.add(rows[found].astype(np.int32))
 
     def _meets(self, places: Indices) -> Flags:
-        """(n,) whether the bodies of nodes at ``places`` meet themselves."""
+        """(n,) whether the bodies of the nodes ``places`` may be in contact with themselves."""
         return np.asarray(self._scene.rules.itself[self._scene.surface_nodes.part[places]])
 
     def _candidates(self, family: Family) -> None:
-        """A copy has the candidates and the normals of its parent, and is pushed by the ranks that push that one."""
+        """Copies candidate pairs, normals and flags of parents to their copies."""
         scene, (parent, copy) = self._scene, family.pairs.T
         scene.slots.inherit(copy, parent)
         scene.reference.inherit(copy, parent)
@@ -169,7 +169,7 @@ class SplitUpdate:
         )
 
     def _add_pairs(self, pairs: Indices) -> None:
-        """More candidates of nodes and faces."""
+        """Adds node-face pairs."""
         if len(pairs):
             scene, n = self._scene, len(self._scene.node_face)
             scene.node_face.add(pairs)
@@ -177,8 +177,8 @@ class SplitUpdate:
 
 
 def _heirs(some: Neighbour, family: Indices, flags: Flags) -> Neighbour:
-    """Nodes shared with a rank, and behind them their copies: ``family`` (c, 2) parents and copies, -1 for none here;
-    ``flags``: room, all false.
+    """Appends the copies of the nodes shared with a rank to them; ``family`` (c, 2): parents and copies, -1 for a
+    node that is not present; ``flags``: working array, all false.
     """
     heirs = family[meets(flags, some.nodes, family), 1]
     return Neighbour(some.rank, extended(some.nodes, heirs)) if len(heirs) else some
@@ -186,7 +186,7 @@ def _heirs(some: Neighbour, family: Indices, flags: Flags) -> Neighbour:
 
 @njit("boolean[::1](int64[::1], int64[::1])", cache=True)
 def _flagged(ids, wanted):  # type: ignore[no-untyped-def]
-    """(n + 1,) which of the ascending ``ids`` are ``wanted``; the last stands for what is not there, -1."""
+    """(n + 1,) which of the ascending ``ids`` are ``wanted``; the last entry, for the index -1, is false."""
     flags = np.zeros(len(ids) + 1, np.bool_)
     for i in range(len(wanted)):
         at = np.searchsorted(ids, wanted[i])
@@ -206,7 +206,7 @@ def _mark(flags, some, others):  # type: ignore[no-untyped-def]
 
 @njit("int64[::1](int64[::1], int32[::1], int64[:, ::1], boolean[::1])", cache=True)
 def _joining(ids, places, family, have):  # type: ignore[no-untyped-def]
-    """Which of ``ids`` have no place yet and are of a ``family`` (c, 2) that the scene shall ``have``."""
+    """Rows of ``ids`` without a slot that belong to a ``family`` (c, 2) that the scene shall ``have``."""
     wanted = np.sort(family[have].reshape(-1))
     rows, n = np.empty(len(ids), np.int64), 0
     for i in range(len(ids)):
@@ -219,7 +219,7 @@ def _joining(ids, places, family, have):  # type: ignore[no-untyped-def]
 
 @njit("int32[::1](boolean[::1], int64[::1], int32[:, ::1], int32[::1])", cache=True)
 def _lacking(near, rows, nodes, place):  # type: ignore[no-untyped-def]
-    """Which nodes of the ``rows`` of cracks, and of those ``near`` (nodes,), ascending, have no place yet."""
+    """Nodes, ascending, of the ``rows`` of cracks and of ``near`` (nodes,) that have no slot yet."""
     flags, n = near.copy(), 0
     for c in rows:
         for k in range(6):
@@ -234,7 +234,7 @@ def _lacking(near, rows, nodes, place):  # type: ignore[no-untyped-def]
 
 @njit("void(int32[:, ::1], boolean[::1], int64[::1], int32[:, ::1], int32[::1])", cache=True)
 def _place(places, pushes, rows, nodes, place):  # type: ignore[no-untyped-def]
-    """Slots of the nodes of some ``rows`` of cracks; those that have separated may be pushed."""
+    """Finds the slots of the nodes of the cracks ``rows``, and flags separated ones in ``pushes``."""
     for c in rows:
         for k in range(6):
             places[c, k] = place[nodes[c, k]]
@@ -244,8 +244,8 @@ def _place(places, pushes, rows, nodes, place):  # type: ignore[no-untyped-def]
 
 @njit("int32[::1](int64[:], int32[:], int32[:], int32[::1], int32[::1], boolean[::1])", cache=True)
 def _newly_shared(ids, local, places, holds, shares, flags):  # type: ignore[no-untyped-def]
-    """Places, by ascending id and each once, of parents that a rank ``holds`` and that are not among those that it
-    ``shares`` yet; ``flags``: room, all false. ``ids``, ``local`` and ``places``: of the parents.
+    """Slots, by ascending id and each once, of the parents that a rank ``holds`` and that are not among those that
+    it ``shares`` yet; ``flags``: working array, all false. ``ids``, ``local`` and ``places``: of the parents.
     """
     some, n = np.empty(len(ids), np.int64), 0
     for i in range(len(ids)):
@@ -276,7 +276,7 @@ def _newly_shared(ids, local, places, holds, shares, flags):  # type: ignore[no-
 
 @njit("int32[::1](int64[::1], int64[::1], int32[::1], int64[::1], int32[::1])", cache=True)
 def _located(wanted, ids, place, far_ids, far):  # type: ignore[no-untyped-def]
-    """(n,) the ``place`` of those that are among the ``ids`` of this rank, ``far`` of the others, -1 for no place."""
+    """(n,) the ``place`` of those that are among the ``ids`` of this rank, ``far`` of the others, -1 for no slot."""
     found = np.empty(len(wanted), np.int32)
     for i in range(len(wanted)):
         found[i] = -1

@@ -1,4 +1,4 @@
-"""The surface between two searches: where it is, and whether it still flies as it did."""
+"""Positions and velocities of the surface between two searches, and the validity of the candidate list."""
 
 import numpy as np
 
@@ -13,46 +13,46 @@ from . import ghosts
 from .near_surface import HALO, NearSurface
 
 _LOOKS = np.array([10.0, 20.0, 40.0, 80.0, 160.0, 300.0])
-"""Steps of free flight that a search may look ahead."""
+"""Horizons of a search, in steps."""
 _SWEPT = 8.0
-"""How many cells a node may sweep in the mean: two along each axis."""
+"""Largest mean number of cells that a node may sweep: two along each axis."""
 _SPENT = 0.4
-"""Of the halo: a node that strays further than this from its path calls for a search of all ranks."""
+"""Share of the halo: a node that departs further from its extrapolated position needs a search of all ranks."""
 
 
 class SurfaceMotion:
-    """The surface of one rank in motion."""
+    """Motion of the surface of one rank since the last search."""
 
     def __init__(self, found: Surface, nodes: Nodes, mobility: Floats, size: float, comm: Comm) -> None:
-        """``mobility`` (nodes, 3): see records.SurfaceNodes; ``size``: the typical one of a face, m."""
+        """``mobility`` (nodes, 3): see records.SurfaceNodes; ``size``: typical size of a face, m."""
         self._comm, self._size = comm, size
         self.until = 0.0
-        """Time to which the last search is good if nothing strays, s."""
+        """Time up to which the last search is valid, s, if no node departs too far."""
         self.mobility = mobility
         self.loose = np.zeros(nodes.n, bool)
-        """(nodes,) those without tets."""
+        """(nodes,) nodes without tets."""
         self.begin(nodes, nodes.v, 0.0)
         self.follow(found, nodes)
 
     def follow(self, found: Surface, nodes: Nodes) -> None:
-        """Takes a new surface; all ranks take part."""
+        """Replaces the surface. Collective."""
         self.found = found
-        """The surface."""
+        """Surface of this rank."""
         self._watched = found.flags | found.waiting
         self.sides = self._whole(nodes, located(nodes.id, found.faces.nodes))
-        """What this rank has of the surface."""
+        """Faces, edges and nodes of it."""
 
     def forget(self, removed: Flags) -> None:
-        """Nodes that are ``removed`` (nodes,) do not fly any more."""
+        """Ignores ``removed`` (nodes,) nodes from now on."""
         self._watched &= ~removed
 
     def begin(self, nodes: Nodes, course: Floats, t: float) -> None:
-        """Free flight with the velocities ``course`` (nodes, 3) from time ``t`` on."""
+        """Stores the positions at time ``t`` and the extrapolated velocities ``course`` (nodes, 3)."""
         self._x, self._course, self._t = nodes.x.copy(), course.copy(), t
 
     def spent(self, nodes: Nodes, t: float, dt: float) -> bool:
-        """Whether the flight is over, or a node strays so far, a step ``dt`` after ``t``, that another rank may not
-        know of it.
+        """Returns whether the candidate list will be invalid a step ``dt`` after ``t``: its time is over, or a node
+        departs so far that another rank may lack its ghost.
         """
         if t + dt > self.until:
             return True
@@ -62,7 +62,7 @@ class SurfaceMotion:
         return bool(far > (_SPENT * HALO * self._size) ** 2)
 
     def grow(self, parents: Ints) -> None:
-        """Takes up copies of nodes: they fly as their parents do."""
+        """Extends the arrays by copies of nodes, with the values of their parents."""
         found = self.found
         found.flags = extended(found.flags, found.flags[parents])
         self._watched = extended(self._watched, self._watched[parents])
@@ -70,13 +70,13 @@ class SurfaceMotion:
         self._x, self._course = extended(self._x, self._x[parents]), extended(self._course, self._course[parents])
 
     def here(self, nodes: Nodes) -> SurfaceNodes:
-        """Every node of this rank, by local index."""
+        """All nodes of this rank, by local index."""
         every = np.arange(nodes.n, dtype=np.int32)
         return SurfaceNodes(nodes.id, every, nodes.owner, nodes.part, self.mobility, nodes.x, nodes.v, self._course)
 
     def _whole(self, nodes: Nodes, local: Indices) -> NearSurface:
-        """``local`` (f, 4): nodes of the faces. The tet of an edge may be another rank's, and its opposite node held
-        here.
+        """Returns the faces, edges and nodes of the surface; ``local`` (f, 4): nodes of the faces. The tet of an
+        edge may be another rank's, and its opposite node a local one.
         """
         found, here = self.found, self.here(nodes)
         used, opposite = self._watched.copy(), nodes.places(found.edges.nodes[:, 4:])
@@ -86,7 +86,7 @@ class SurfaceMotion:
         return NearSurface(found.faces, found.edges, merged([here.take(used), far]), owned)
 
     def refresh(self, nodes: Nodes) -> None:
-        """Positions and velocities of the surface as they are."""
+        """Updates positions and velocities of the surface."""
         surface_nodes, found = self.sides.surface_nodes, self.found
         held = surface_nodes.local >= 0
         local = surface_nodes.local[held]
@@ -100,10 +100,10 @@ class SurfaceMotion:
         surface_nodes.x[places], surface_nodes.v[places], surface_nodes.course[places] = far.x, far.v, far.course
 
     def foresight(self, dt: float) -> tuple[float, Floats]:
-        """How many steps ``dt`` a search may look ahead, and the mean velocity (3,), m/s; all ranks take part.
+        """Returns the horizon of a search in steps ``dt``, and the mean velocity (3,), m/s. Collective.
 
-        As many as leave the space that nodes sweep, in cells of a face's size, a few times what they need at rest:
-        about a face's length for all, much more for the few that are fast.
+        The largest horizon with which the mean volume swept by a node is below ``_SWEPT`` cells of a face's size:
+        about a face's length if all nodes move, much more if few are fast.
         """
         surface_nodes, owned = self.sides.surface_nodes, self.sides.owned
         v = surface_nodes.course[surface_nodes.places(owned)]
@@ -122,7 +122,7 @@ class SurfaceMotion:
     cache=True,
 )
 def _strayed(x, v, x_then, v_then, flags, dt, ahead):  # type: ignore[no-untyped-def]
-    """Largest squared distance, m^2, of a flagged node a step ahead from where free flight would have taken it."""
+    """Largest squared distance, m^2, of a flagged node from its extrapolated position, one step ahead."""
     most = 0.0
     for a in range(len(x)):
         if flags[a]:
@@ -135,6 +135,6 @@ def _strayed(x, v, x_then, v_then, flags, dt, ahead):  # type: ignore[no-untyped
 
 
 def typical(sizes: Floats, comm: Comm) -> float:
-    """Harmonic mean of the sizes of all faces, m: near the small ones where a mesh is graded; 0 without faces."""
+    """Harmonic mean of the sizes of all faces, m: dominated by the small ones of a graded mesh; 0 without faces."""
     total, count = exact_sums(comm, np.column_stack([1.0 / sizes, np.ones(len(sizes))]))
     return float(count / total) if count > 0.0 else 0.0

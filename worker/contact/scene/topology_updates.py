@@ -1,4 +1,4 @@
-"""Topology changes of a split near one rank: those of its own nodes, and of ghosts, exchanged between ranks."""
+"""Topology changes of a split near one rank: those of its own nodes, and those of ghosts, received from other ranks."""
 
 from dataclasses import dataclass
 
@@ -15,21 +15,21 @@ from .scene import Scene
 
 @dataclass
 class TopologyUpdate:
-    """What a rank knows of a split: round every node that it holds or has a copy of."""
+    """Topology change of one step: new node of each tet, for all nodes that a rank holds or has a ghost of."""
 
     key: Ints
     """(r,) ids of a node and of a tet as one number, ascending."""
     became: Ints
-    """(r,) id of the copy that the node of that tet has become."""
+    """(r,) id of the copy that replaces the node in that tet."""
     family: Ints
-    """(c, 2) ids of the parents of all copies, ascending, and of the copies."""
+    """(c, 2) ids of parents, ascending, and of their copies."""
     rows: SurfaceNodes
     """Parents and copies."""
 
 
 def gather(split: Split, scene: Scene, here: SurfaceNodes, comm: Comm) -> TopologyUpdate | None:
-    """None where there is none. ``here``: every node of this rank, by local index. Of nodes that it does not hold, a
-    rank hears from the one that sends it their state; such ranks take part.
+    """Returns None if no node split. ``here``: all nodes of this rank, by local index. Splits of ghosts arrive from
+    the rank that sends their state; only ranks with such messages take part.
     """
     sources = [other.rank for other in scene.messages.copies.receives if split.touched[other.rank]]
     if not (sources or split.touched[comm.rank]):
@@ -53,8 +53,8 @@ def gather(split: Split, scene: Scene, here: SurfaceNodes, comm: Comm) -> Topolo
 
 
 def _told(split: Split, scene: Scene, here: SurfaceNodes, table: Ints, local: Indices) -> dict[int, Ints]:
-    """What other ranks must hear: rows of ``table`` (TopologyUpdate.key and became) and families, and their nodes;
-    ``local`` (c, 2): the families of this rank.
+    """Messages by rank: rows of ``table`` (TopologyUpdate.key and became), families, and their nodes; ``local`` (c,
+    2): families of this rank.
     """
     told, flags = {}, np.zeros(here.n, bool)
     for other in scene.messages.copies.sends:
@@ -74,7 +74,7 @@ def _told(split: Split, scene: Scene, here: SurfaceNodes, table: Ints, local: In
 
 @njit("int64[::1](boolean[::1], int32[::1], int32[:, ::1])", cache=True)
 def meets(flags, nodes, family):  # type: ignore[no-untyped-def]
-    """Rows of a ``family`` (c, 2) whose parents are among the ``nodes``; ``flags``: room, all false."""
+    """Rows of a ``family`` (c, 2) whose parents are among the ``nodes``; ``flags``: working array, all false."""
     rows, n = np.empty(len(family), np.int64), 0
     for a in nodes:
         flags[a] = True

@@ -1,7 +1,7 @@
-"""Records of the impulse solver: active contacts, their nodes, and the contacts that carry an impulse.
+"""Records of the solver: active contacts, their nodes, and the contacts with an impulse.
 
-The nodes of the active set are numbered densely: a **slot** each. All that a sweep needs of a node lies in one cache
-line, floats and integers side by side.
+The nodes of active contacts are numbered densely: a **slot** each. All data of a node that a sweep needs lie in one
+cache line, floats and integers side by side.
 """
 
 from typing import NamedTuple
@@ -13,28 +13,28 @@ from ...model.cache_lines import LINE, cache_lines
 from ...model.state import Floats, Indices, Ints
 
 V, IMPULSE = 0, 3
-"""First word of a slot's velocity, m/s, and of its impulse of the sweep, quanta, in ``ActiveNodes.moving``."""
+"""First word of the velocity of a slot, m/s, and of its impulse of the sweep, quanta, in ``ActiveNodes.moving``."""
 MOBILITY, TOTAL, CHANGED = 0, 3, 6
-"""First word of its mobility, 1/kg, and of its impulse of the step, quanta, in ``ActiveNodes.fixed``, and the l1 norm
-of what the last sweep has added to that, quanta."""
+"""First word of the mobility of a slot, 1/kg, and of its impulse of the step, quanta, in ``ActiveNodes.fixed``, and
+the l1 norm of the change of that impulse by the last sweep, quanta."""
 WANTED, ROW_NORM, PUSH, MU, LAST = 3, 4, 5, 6, 7
-"""Of ``Loaded.normal``, behind the unit normal."""
+"""Columns of ``Loaded.normal`` after the unit normal."""
 ROW_NORM_T, PUSH_T = 4, 5
-"""Of ``Loaded.tangent``, behind the weights."""
+"""Columns of ``Loaded.tangent`` after the weights."""
 
 
 class ActiveContacts(NamedTuple):
-    """The active contacts in the order of their sets (zones.py), and the rows that the narrow phase has made of them:
-    see tables.ContactRows.
+    """Active contacts in the order of their sets (zones.py), and the rows of the narrow phase: see
+    tables.ContactRows.
     """
 
     row: Indices
-    """(contacts,) which row each has."""
+    """(contacts,) row of each."""
     slots: Indices
-    """(contacts, 4) the third is -1 in a row of two nodes, of weights 1 and -1."""
+    """(contacts, 4) slots of the nodes; the third is -1 in a contact of two nodes, of weights 1 and -1."""
     reach: Floats
-    """(contacts,) the sum of the paths of its nodes up to which an idle contact stays idle, m/s; infinite for a loaded
-    one."""
+    """(contacts,) bound of the sum of the paths of its nodes, m/s, below which an idle contact stays idle; infinite
+    for a loaded one."""
     weights: Floats
     """(room, 4)."""
     normals: Floats
@@ -48,58 +48,59 @@ class ActiveContacts(NamedTuple):
 
 
 class Kept(NamedTuple):
-    """Impulses of a step times their row norms, zero where there were none: along the normal and across (3), m/s."""
+    """Stored impulses of the last step times their row norms, for the warm start; zero where there were none: along
+    the normal (1) and across (3), m/s."""
 
     pairs: Floats
-    """(candidates, 4) of nodes and faces."""
+    """(candidates, 4) of node-face pairs."""
     cracks: Floats
-    """(3 cracks, 4) of nodes across cracks."""
+    """(3 cracks, 4) of node pairs across cracks."""
 
 
 class ActiveNodes(NamedTuple):
-    """The slots; floats and integers of a line are the same memory."""
+    """Data of the slots; floats and integers of a line share their memory."""
 
     moving: Floats
-    """(slots, 8) what a sweep reads and adds to, a cache line each."""
+    """(slots, 8) velocities and impulses, read and written by a sweep; a cache line each."""
     moving_words: Ints
     fixed: Floats
-    """(slots, 8) what turns it into velocities."""
+    """(slots, 8) mobilities and impulses of the step."""
     fixed_words: Ints
     row_weights: Ints
     """(slots, 4) sums of |w| |n_i| and of |w| over the contacts of all ranks, in quanta."""
     path: Floats
-    """(slots,) sum of the l1 norms of the changes of velocity in the step, m/s."""
+    """(slots,) sum of the l1 norms of the velocity changes in the step, m/s."""
 
     @classmethod
     def of(cls, n: int) -> "ActiveNodes":
-        """Room for as many slots, from the beginning of a cache line on."""
+        """Allocates room for ``n`` slots, aligned to cache lines."""
         moving, fixed = cache_lines(2 * n).reshape(2, n, LINE)
         sums, path = np.empty((n, 4), np.int64), np.empty(n)
         return cls(moving, moving.view(np.int64), fixed, fixed.view(np.int64), sums, path)
 
 
 class Loaded(NamedTuple):
-    """Contacts that have asked for an impulse in the step, in the order of their sets (zones.py): those of set k stand
-    from ``begin[k]`` on.
+    """Contacts with an impulse in the step, in the order of their sets (zones.py): those of set k from ``begin[k]``
+    on.
     """
 
     normal: Floats
     """(contacts, 8) unit normal, target velocity, row norm along it, 1/kg, impulse along it, N s, Coulomb's
-    coefficient, impulse before momentum took it ahead."""
+    coefficient, impulse without momentum."""
     tangent: Floats
     """(contacts, 8) weights, row norm across, 1/kg, impulse of friction (3), N s."""
     slots: Indices
-    """(contacts, 4) the third is -1 in a row of two nodes, of weights 1 and -1."""
+    """(contacts, 4) slots of the nodes; the third is -1 in a contact of two nodes, of weights 1 and -1."""
     row: Indices
-    """(contacts,) row of each that is loaded."""
+    """(contacts,) row of each."""
     begin: Ints
-    """(sets + 1,) which of all active contacts are those of each set."""
+    """(sets + 1,) offsets of the sets among all active contacts."""
     many: Ints
-    """(sets,) how many of these are loaded."""
+    """(sets,) number of loaded contacts of each set."""
 
     @classmethod
     def of(cls, room: int, sets: int) -> "Loaded":
-        """Room for as many."""
+        """Allocates room for ``room`` contacts and ``sets`` sets."""
         lines, slots, row = np.empty((2, room, 8)), np.empty((room, 4), np.int32), np.empty(room, np.int32)
         return cls(lines[0], lines[1], slots, row, np.zeros(sets + 1, np.int64), np.zeros(sets, np.int64))
 

@@ -1,4 +1,4 @@
-"""What the impulses of a step cost, and whom: work along the normals, heat of friction, work of what holds nodes."""
+"""Work of the impulses of a step: along the normals, by friction, and of the supports of held nodes."""
 
 import numpy as np
 
@@ -11,8 +11,8 @@ _F1, _F2, _F, _I = types.float64[::1], types.float64[:, ::1], types.float64, typ
 
 @njit(types.void(_I2, LOADED, NODES, _F2, _N1, _F, _I), cache=True)
 def cost(words, loaded, active, before, places, joule, k):  # type: ignore[no-untyped-def]
-    """Adds what the impulses along the normals of set ``k`` take from the bodies, and what they have given back by the
-    middle of their work, to two limbs (rows of ``words``) of quanta of 1 / ``joule`` J.
+    """Adds the energy that the impulses along the normals of set ``k`` take from the bodies, and the energy that their
+    first half gives back, to two limbs (rows of ``words``) of quanta of 1 / ``joule`` J.
 
     An impulse J between the speeds u(n-1/2), of ``before`` (surface_nodes, 3) at the ``places`` of the slots, and
     u(n+1/2) takes -J (u(n-1/2) + u(n+1/2)) / 2; the ledger at time n has the first half of that.
@@ -62,9 +62,9 @@ def heat(words, loaded, active, before, places, joule, k):  # type: ignore[no-un
 
 @njit(types.void(types.int64[:, :, ::1], LOADED, _N1, _N1, _F, _I), cache=True)
 def between(words, loaded, places, part, scale, k):  # type: ignore[no-untyped-def]
-    """Adds what the contacts of set ``k`` give to a part from another one, along the normals and across, to ``words``
-    (parts, parts, 3) in quanta of 1 / ``scale`` N s, and the opposite to those of the other. ``part`` (surface_nodes,)
-    of the nodes at the ``places`` of the slots.
+    """Adds the impulses of the contacts of set ``k`` between two parts, along the normals and across, to ``words``
+    (parts, parts, 3) in quanta of 1 / ``scale`` N s, with opposite signs for the two parts. ``part``
+    (surface_nodes,) of the nodes at the ``places`` of the slots.
     """
     normal, tangent, slots = loaded.normal, loaded.tangent, loaded.slots
     for q in range(loaded.begin[k], loaded.begin[k] + loaded.many[k]):
@@ -86,8 +86,8 @@ def between(words, loaded, places, part, scale, k):  # type: ignore[no-untyped-d
 
 @njit(types.void(_F1, _F1, _N1, _N1, _F2, _I2, _F2, _F, _I, _I), cache=True)
 def book(loss, external, places, index, before, total, mobility, scale, first, stop):  # type: ignore[no-untyped-def]
-    """Half of the impulse times velocity at the ``places`` from ``first`` to ``stop``: lost by contact; where a
-    velocity is held, taken in from outside. ``index``: see slot_numbers.py.
+    """Adds half of impulse times velocity at the ``places`` from ``first`` to ``stop`` to the energy lost by
+    contact, and where a velocity is held to the external work. ``index``: see slot_numbers.py.
     """
     for s in range(first, stop):
         a = places[s]

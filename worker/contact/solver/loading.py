@@ -1,7 +1,8 @@
-"""Which contacts are swept: those that have asked for an impulse in the step are loaded, the others are idle.
+"""Selection of the contacts that are swept: contacts that asked for an impulse in the step are loaded, the others idle.
 
-A contact that has had no impulse in the step and closes no faster than it may changes nothing until sweeps have moved
-its nodes by as much as it has left, its reach. The loaded ones have an infinite reach, and their data lie together.
+An idle contact closes at less than its allowed speed. It needs no new test until sweeps have changed the velocities
+of its nodes by more than its margin, the reach. The reach of loaded contacts is infinite, and their data are
+contiguous.
 """
 
 import numpy as np
@@ -13,18 +14,18 @@ from .active import CONTACTS, KEPT, LAST, LOADED, MOBILITY, MU, NODES, PUSH, PUS
 SHARES = float(2**30)
 """Quanta per unit of weight."""
 _ACROSS = (1.0, -1.0, 0.0, 0.0)
-"""Weights of the nodes on either side of a crack."""
+"""Weights of the two nodes of a contact across a crack."""
 _ROUNDING = 2.0**-40
-"""Of the velocities: far more than what a contact's speed, a sum of twelve products, may be off by."""
+"""Rounding allowance relative to the velocities: far above the error of a contact's speed, a sum of twelve products."""
 _ROWS, _F1, _F, _I = types.int32[::1], types.float64[::1], types.float64, types.int64
 
 
 @njit(types.void(LOADED, CONTACTS, NODES, _I, _I), cache=True, error_model="numpy")
 def fill(loaded, contacts, active, first, end):  # type: ignore[no-untyped-def]
-    """The data of the loaded contacts from ``first`` to ``end``, without impulses; ``loaded.row`` has their numbers,
-    then their rows.
+    """Writes the data of the loaded contacts from ``first`` to ``end``, with zero impulses; on entry ``loaded.row`` has
+    their numbers, on return their rows.
 
-    Row norms are bounds of l1 norms along the normal and across, 1/kg; infinite where nothing moves.
+    Row norms are bounds of the l1 norms along the normal and across, 1/kg; infinite where all nodes are held.
     """
     slots, weights, normals, fixed, sums = (
         contacts.slots, contacts.weights, contacts.normals, active.fixed, active.row_weights,
@@ -53,8 +54,9 @@ def fill(loaded, contacts, active, first, end):  # type: ignore[no-untyped-def]
 
 @njit(_I(_ROWS, CONTACTS, _F1, _I, _I), cache=True)
 def _due(due, contacts, path, first, end):  # type: ignore[no-untyped-def]
-    """Which of the contacts from ``first`` to ``end`` have nodes of ``path`` (slots,) that may have used up their
-    reach; returns how many. Few have, and every sweep asks: one takes 1 ns, and 2 if numbers of slots may be negative.
+    """Finds the contacts from ``first`` to ``end`` whose nodes have changed, by ``path`` (slots,), as much as their
+    reach; returns their number. Every sweep tests all contacts and few pass: a test takes 1 ns, and 2 ns with signed
+    slot numbers.
     """
     slots, reach, n = contacts.slots, contacts.reach, 0
     for q in range(first, end):
@@ -69,11 +71,11 @@ def _due(due, contacts, path, first, end):  # type: ignore[no-untyped-def]
 
 @njit(types.void(LOADED, CONTACTS, NODES, _F, _I), cache=True, error_model="numpy")
 def load(loaded, contacts, active, fastest, k):  # type: ignore[no-untyped-def]
-    """Takes those of the idle contacts of set ``k`` among the loaded that close faster than they may.
+    """Adds the idle contacts of set ``k`` that close faster than allowed to the loaded ones.
 
-    The speed of a contact changes by no more than the paths of its nodes times the largest of its weights; an idle one
-    is computed anew when they may have used up what it had left. ``fastest``: bound of the l1 norm of any velocity at
-    the beginning of the step, m/s.
+    The speed of a contact changes by at most the paths of its nodes times its largest weight w, so its reach is
+    (speed - wanted) / max |w|, less rounding. ``fastest``: bound of the l1 norm of any velocity at the start of the
+    step, m/s.
     """
     slots, weights, normals, wanted = contacts.slots, contacts.weights, contacts.normals, contacts.wanted
     moving, path, reach, first, end = active.moving, active.path, contacts.reach, loaded.begin[k], loaded.begin[k + 1]
@@ -107,8 +109,8 @@ def load(loaded, contacts, active, fastest, k):  # type: ignore[no-untyped-def]
 
 @njit(types.void(LOADED, CONTACTS, NODES, KEPT, _I), cache=True)
 def load_kept(loaded, contacts, active, kept, k):  # type: ignore[no-untyped-def]
-    """Takes those of the contacts of set ``k``, all idle, among the loaded that have ``kept`` an impulse of the step
-    before.
+    """Adds the contacts of set ``k``, all idle, that have a stored impulse of the last step, ``kept``, to the loaded
+    ones.
     """
     pair, pairs, cracks, first = contacts.pair, kept.pairs, kept.cracks, loaded.begin[k]
     n = first

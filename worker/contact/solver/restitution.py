@@ -1,9 +1,10 @@
-"""What comes back from an impact: active contacts that close are asked to part with a share of the speed of approach.
+"""Restitution: target velocity of contacts that close, from their speed of approach.
 
-With the normal velocity u- before the step and u+ after it an impulse J takes -J (u- + u+) / 2 from the bodies. A
-contact that closes is asked for u+ = -e u- (Newton's law, by contact), so that this is -J u- (1 - e) / 2: for e = 1
-nothing, however many contacts share nodes, since those without an impulse take nothing anyway. That is the reflection
-in the metric of the masses of Cirak and West (2005), Decomposition contact response, Int. J. Numer. Meth. Engng 64.
+With the normal velocity u- before the step and u+ after it an impulse J takes the energy -J (u- + u+) / 2 from the
+bodies. The target of a contact that closes is u+ = -e u- (Newton's law for each contact), so that this energy is -J
+u- (1 - e) / 2: zero for e = 1, for any number of contacts that share nodes, since contacts without an impulse take
+no energy. This is the reflection in the metric of the masses of Cirak and West (2005), Decomposition contact
+response, Int. J. Numer. Meth. Engng 64.
 """
 
 from ...kernels.jit import njit, types
@@ -14,9 +15,9 @@ _V, _N1, _I = types.float64[:, ::1], types.int32[::1], types.int64
 
 @njit(types.void(CONTACT_ROWS, _N1, _V, _V, types.float64, _I, _I), cache=True)
 def rebound(rows, found, v, before, share, first, stop):  # type: ignore[no-untyped-def]
-    """Raises the target velocity of those of the contacts ``found``, from ``first`` to ``stop``, that ask for an
-    impulse to ``share`` of the speed at which they approached; ``v``, ``before`` (slots, 3): velocities without contact
-    and v(n-1/2), m/s.
+    """Raises the target velocity of the contacts ``found``, from ``first`` to ``stop``, that need an impulse, to
+    ``share`` times their speed of approach; ``v``, ``before`` (slots, 3): velocities without contact and v(n-1/2),
+    m/s.
     """
     for q in range(first, stop):
         p = found[q]
@@ -32,8 +33,8 @@ def rebound(rows, found, v, before, share, first, stop):  # type: ignore[no-unty
 
 @njit(types.void(CONTACT_ROWS, _N1, _V, _I, _I), cache=True)
 def hold_back(rows, found, before, first, stop):  # type: ignore[no-untyped-def]
-    """Lowers the target velocity of those of the contacts ``found``, from ``first`` to ``stop``, that were parting, at
-    u- of ``before`` (slots, 3), v(n-1/2), to -u-: less closing than that is energy that was not taken before.
+    """Lowers the target velocity of the contacts ``found``, from ``first`` to ``stop``, that separated at u- > 0 of
+    ``before`` (slots, 3), v(n-1/2), to at most -u-: a higher target would return energy that contact did not take.
     """
     for q in range(first, stop):
         p = found[q]

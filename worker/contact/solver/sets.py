@@ -1,4 +1,4 @@
-"""The work of the solver as the threads of a rank share it: by sets of contacts (zones.py), and by slots."""
+"""Passes of the solver, shared among the threads of a rank: by sets of contacts (zones.py), and by slots."""
 
 from ...kernels.jit import Kernel
 from ...model.state import Ints
@@ -12,10 +12,10 @@ from .shared_sums import ActiveSum
 
 
 class Sets:
-    """Kernels over the sets of the active contacts, each with its table of arguments."""
+    """Kernels over the sets of active contacts, each with its table of arguments."""
 
     def __init__(self, team: Team, many: int) -> None:
-        """``many`` zones."""
+        """``many``: number of zones."""
         self._team = team
         self._border, self._inner = zones.tasks(many)
         self.weigh, self.resume = Arguments(*tasks.WEIGH), Arguments(*tasks.RESUME)
@@ -24,17 +24,17 @@ class Sets:
 
     @property
     def alone(self) -> bool:
-        """Whether there is one thread."""
+        """Whether the rank has one thread."""
         return self._team.threads == 1
 
     def run(self, kernel: Kernel, table: int) -> None:
-        """The work of all contacts; ``table``: of the arguments."""
+        """Runs ``kernel`` over all contacts; ``table``: its arguments."""
         self._team.run(kernel, table, *self._border)
         self._team.run(kernel, table, *self._inner)
 
     def complete(self, kernel: Kernel, table: int, shared: ActiveSum, words: Ints, first: int, columns: int) -> None:
-        """The same, and completes these columns of the ``words`` of ``shared`` slots; contacts without shared slots are
-        worked on while the sums of the others travel.
+        """Runs ``kernel`` over all contacts and completes ``columns`` columns of ``words`` over the ranks. Contacts
+        without shared slots are computed while the sums of the others are in transit.
         """
         if not len(shared.shared):
             self._team.run(kernel, table, *self._inner)

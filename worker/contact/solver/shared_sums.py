@@ -1,9 +1,9 @@
-"""Nodes that several ranks push or hold, and their sums over these ranks.
+"""Sums over the ranks that share a node with an impulse.
 
-Most of the nodes that a rank shares with another are pushed by neither in a step. So ranks first tell each other, by
-two bits a node, which nodes their active contacts have, and of which they want to hear: those and the ones that they
-hold. Only what one pushes and the other wants to hear of is sent in that step. Sums are of integers: what is left out
-is zero.
+Most nodes that a rank shares with another get no impulse from either in a step. So the ranks first exchange two bits
+a node: whether the rank has an active contact of the node, and whether it needs the sum, because it has such a
+contact or holds the node. Only the sums that one rank has and the other needs are sent in the step. Sums are
+integers, and those left out are zero.
 """
 
 import numpy as np
@@ -16,18 +16,18 @@ from ...parallel.tags import Tag
 from ..narrow_phase.rows import ActiveRows
 
 _WORD = 63
-"""Bits of a word that are used."""
+"""Used bits of a word."""
 _ROOM = 4
-"""Words by which the messages of a rank grow. Chosen: some 250 nodes that separate need no new messages."""
+"""Words by which the messages of a rank grow. Chosen: up to some 250 separated nodes fit without new messages."""
 _COLUMNS = 4
-"""The most that are summed at once (active.ActiveNodes.row_weights)."""
+"""Largest number of columns summed at once (active.ActiveNodes.row_weights)."""
 
 
 class SharedSums:
-    """Other ranks, and the slots that either pushes or holds and any rank pushes."""
+    """Flags of the shared slots of every other rank, and the messages that exchange them."""
 
     def __init__(self, neighbours: list[Neighbour], comm: Comm) -> None:
-        """``neighbours``: the slots in the same order on both ranks."""
+        """``neighbours``: shared slots, in the same order on both ranks."""
         self._comm = comm
         self._words = np.zeros(0, np.int64)
         self._exchange: Exchange | None = None
@@ -36,7 +36,7 @@ class SharedSums:
         self.take(neighbours)
 
     def take(self, neighbours: list[Neighbour]) -> None:
-        """Other slots. Messages that have room for them stay."""
+        """Replaces the shared slots. Messages that are large enough are reused."""
         self.neighbours = neighbours
         self._every = np.concatenate([np.zeros(0, np.int32), *(some.nodes for some in neighbours)])
         self._ends = np.cumsum([0, *(len(some.nodes) for some in neighbours)])
@@ -53,7 +53,8 @@ class SharedSums:
         return [(o.rank, words[a:b]) for o, a, b in zip(self.neighbours, begins, ends, strict=True)]
 
     def agree(self, contacts: ActiveRows, local: Indices) -> "ActiveSum":
-        """The sums of a step with active ``contacts``; ``local`` (surface_nodes,): -1 for what is not held."""
+        """Returns the sums of a step with active ``contacts``; ``local`` (surface_nodes,): -1 for nodes that this
+        rank does not hold."""
         if not self.neighbours:
             return self._nothing
         assert self._exchange is not None
@@ -65,46 +66,44 @@ class SharedSums:
         return ActiveSum(ranks, sends, receives, counts, self._comm)
 
     def free(self) -> None:
-        """Gives its messages back to MPI."""
+        """Releases the messages of MPI."""
         if self._exchange is not None:
             self._exchange.free()
 
 
 class ActiveSum:
-    """Completes sums of a step at nodes that are pushed."""
+    """Completion of sums over the ranks at the nodes with an impulse, in one step."""
 
     def __init__(self, ranks: list[int], sends: Indices, receives: Indices, counts: Ints, comm: Comm) -> None:
-        """``sends`` and ``receives``: slots of the surface_nodes, rank after rank; ``counts`` (ranks, 2): how many of
-        each.
-        """
+        """``sends`` and ``receives``: slots, rank after rank; ``counts`` (ranks, 2): number of each by rank."""
         self._sends, self._receives = sends, receives
         self.shared: Indices = np.concatenate([sends, receives])
-        """Slots of the surface_nodes that are sent or received; some stand there several times."""
+        """Slots that are sent or received, some of them several times."""
         self._out, self._in = (np.zeros((len(some), _COLUMNS), np.int64) for some in (sends, receives))
         out, into = (_parts(words, ranks, many) for words, many in zip((self._out, self._in), counts.T, strict=True))
         self._exchange = comm.exchange(out, into, Tag.CONTACT)
 
     def number(self, slots: Indices) -> None:
-        """From now on ``slots`` (surface_nodes,) are the rows of what is summed."""
+        """Replaces slots by their rows of the summed arrays, ``slots`` (surface_nodes,)."""
         self._sends, self._receives = slots[self._sends], slots[self._receives]
 
     def begin(self, words: Ints, first: int, columns: int) -> None:
-        """Sends the sums of this rank: some columns of ``words`` (rows, k)."""
+        """Sends ``columns`` columns of ``words`` (rows, k) from ``first`` on: the sums of this rank."""
         _pack(self._out, self._sends, words, first, columns)
         self._exchange.begin()
 
     def finish(self, words: Ints, first: int, columns: int) -> None:
-        """Adds those of the others."""
+        """Adds the sums of the other ranks."""
         self._exchange.finish()
         _add(words, first, self._receives, self._in, columns)
 
     def free(self) -> None:
-        """Gives its messages back to MPI."""
+        """Releases the messages of MPI."""
         self._exchange.free()
 
 
 def _parts(words: Ints, ranks: list[int], counts: Ints) -> list[tuple[int, Ints]]:
-    """The rows of each rank that has any."""
+    """Rows of each rank that has any."""
     parts, end = [], 0
     for rank, many in zip(ranks, counts.tolist(), strict=True):
         end += many
@@ -115,7 +114,8 @@ def _parts(words: Ints, ranks: list[int], counts: Ints) -> list[tuple[int, Ints]
 
 @njit("void(int64[::1], int32[::1], int64[::1], int64[::1], int32[:, ::1], int32[::1])", cache=True)
 def _tell(out, nodes, ends, words, contacts, local):  # type: ignore[no-untyped-def]
-    """Bits of the nodes of each rank in ``out``: which this rank pushes; and, behind them, pushes or holds."""
+    """Writes bits of the shared nodes of each rank into ``out``: first whether this rank has an active contact of
+    the node, then whether it needs the sum."""
     pushed = np.zeros(len(local), np.bool_)
     for p in range(len(contacts)):
         for k in range(4):
@@ -137,7 +137,7 @@ def _tell(out, nodes, ends, words, contacts, local):  # type: ignore[no-untyped-
     cache=True,
 )
 def _agreed(mine, theirs, nodes, ends, words):  # type: ignore[no-untyped-def]
-    """Nodes to send and nodes to receive, rank after rank, and (ranks, 2) how many of each."""
+    """Nodes to send and nodes to receive, rank after rank, and (ranks, 2) the number of each."""
     sends, receives = np.empty(len(nodes), np.int32), np.empty(len(nodes), np.int32)
     counts = np.zeros((len(ends) - 1, 2), np.int64)
     n, m = 0, 0

@@ -1,8 +1,9 @@
-"""Between the nodes of a rank, those of the surface_nodes, and the slots of the active set.
+"""Numbering of the nodes of active contacts: copies between local nodes, surface nodes of the scene and slots of the
+solver.
 
-``held`` (h,) places in the surface_nodes and ``local`` (h,) indices on the rank of the same nodes. ``places`` (slots,)
-where the nodes of the active set stand in the surface_nodes, and ``index`` (surface_nodes,) what each of the
-surface_nodes is on the rank, -1 for a copy.
+``held`` (h,) are rows of surface nodes and ``local`` (h,) the local indices of the same nodes. ``places`` (slots,)
+are the rows of the nodes of active contacts, and ``index`` (surface_nodes,) the local index of each surface node, -1
+for a copy of another rank's.
 """
 
 import numpy as np
@@ -11,10 +12,10 @@ from ...kernels.jit import njit, prefetch, types
 from .active import CHANGED, IMPULSE, MOBILITY, NODES, TOTAL, V
 
 _SMALL = 16
-"""Bits of an impulse that do not count in what is unsettled: 2^-30 of the largest (fixed_point.py), so that the sum
-over 2^28 nodes fits."""
+"""Low bits of an impulse that the residual ignores: 2^-30 of the largest (fixed_point.py), so that the sum over 2^28
+nodes does not overflow."""
 _AHEAD = 16
-"""How many nodes ahead is brought near what is gathered from the rank's own."""
+"""Distance of the prefetch of node data, in nodes."""
 _I2, _N1, _N2, _U1 = types.int64[:, ::1], types.int32[::1], types.int32[:, ::1], types.uint8[::1]
 _F1, _F2, _F, _I, _I1, _B1 = (
     types.float64[::1], types.float64[:, ::1], types.float64, types.int64, types.int64[::1], types.boolean[::1],
@@ -23,7 +24,7 @@ _F1, _F2, _F, _I, _I1, _B1 = (
 
 @njit(types.void(_F2, _F2, _N1, _N1), cache=True)
 def gather(out, v, held, local):  # type: ignore[no-untyped-def]
-    """Velocities of the held nodes."""
+    """Copies the velocities of the held nodes."""
     for h in range(len(local)):
         prefetch(v, 3 * local[min(h + _AHEAD, len(local) - 1)])
         for i in range(3):
@@ -32,7 +33,7 @@ def gather(out, v, held, local):  # type: ignore[no-untyped-def]
 
 @njit(types.void(_F2, _F2, _N1, _F2, _F2, _N1, _I, _I), cache=True)
 def take(x, v, held, node_x, node_v, local, first, stop):  # type: ignore[no-untyped-def]
-    """Positions and velocities of the held nodes from ``first`` to ``stop``."""
+    """Copies positions and velocities of the held nodes from ``first`` to ``stop``."""
     for h in range(first, stop):
         near = 3 * local[min(h + _AHEAD, len(held) - 1)]
         prefetch(node_x, near)
@@ -43,11 +44,12 @@ def take(x, v, held, node_x, node_v, local, first, stop):  # type: ignore[no-unt
 
 @njit(types.void(_U1, _N1, _N2, _N1, _N1, _U1, _I2, _I, _I, _I), cache=True)
 def mark(touched, set_of, nodes, found, zone, shared, many, task, first, stop):  # type: ignore[no-untyped-def]
-    """Sets of the contacts ``found`` from ``first`` to ``stop``, and how ``many`` of each (tasks, sets) this task has.
+    """Writes the set of each contact ``found`` from ``first`` to ``stop``, and the number ``many`` (tasks, sets) of
+    this task in each set.
 
-    Contacts of nodes of one ``zone`` (surface_nodes,) are the set of that, the others the last one; before these come
-    as many sets of contacts with a ``shared`` (surface_nodes,) node. ``nodes`` (room, 4); ``touched`` (surface_nodes,):
-    all their nodes.
+    Contacts with all nodes in one ``zone`` (surface_nodes,) form the set of that zone, all others the last set. The
+    sets come twice: first those of contacts with a ``shared`` (surface_nodes,) node, then those of contacts without.
+    ``nodes`` (room, 4); ``touched`` (surface_nodes,): set to 1 for all nodes of the contacts.
     """
     sets = many.shape[1] // 2
     for q in range(first, stop):
@@ -64,8 +66,8 @@ def mark(touched, set_of, nodes, found, zone, shared, many, task, first, stop): 
 
 @njit(_I(_N1, _N1, _U1), cache=True)
 def number(places, slot, touched):  # type: ignore[no-untyped-def]
-    """Numbers what is ``touched`` of a surface_nodes, in its order; returns how many slots there are. ``slot``
-    (surface_nodes,) is the inverse of ``places``. None is touched any more.
+    """Numbers the ``touched`` surface nodes in their order and clears the flags; returns the number of slots.
+    ``slot`` (surface_nodes,) is the inverse of ``places``.
     """
     n = 0
     for a in range(len(touched)):
@@ -77,9 +79,9 @@ def number(places, slot, touched):  # type: ignore[no-untyped-def]
 
 @njit(types.void(_N1, _N2, _F1, _I2, _N1, _N1, _N2, _N1, _I, _I, _I), cache=True)
 def sort(row, slots, reach, begins, set_of, found, nodes, slot, task, first, stop):  # type: ignore[no-untyped-def]
-    """Puts the contacts ``found`` from ``first`` to ``stop`` into the order of their sets, all idle: their rows, slots,
-    and ``reach``, -1, for none is known to stay so. ``begins`` (tasks, sets): where those of this task begin, and after
-    it where they end; ``slot`` (surface_nodes,): see ``number``.
+    """Orders the contacts ``found`` from ``first`` to ``stop`` by their sets, all idle: their rows, slots and
+    ``reach``, -1, which has them computed at once. ``begins`` (tasks, sets): offset of this task in each set,
+    advanced to its end; ``slot`` (surface_nodes,): see ``number``.
     """
     for q in range(first, stop):
         p, kind = found[q], set_of[q]
@@ -94,8 +96,8 @@ def sort(row, slots, reach, begins, set_of, found, nodes, slot, task, first, sto
 
 @njit(_F(NODES, _N1, _F2, _F2, _I, _I), cache=True)
 def load(active, places, v, mobility, first, stop):  # type: ignore[no-untyped-def]
-    """Takes velocities and mobilities (surface_nodes, 3) to the slots from ``first`` to ``stop``, all without an
-    impulse. Returns the largest l1 norm of a velocity, m/s.
+    """Copies velocities and mobilities (surface_nodes, 3) to the slots from ``first`` to ``stop`` and clears their
+    impulses. Returns the largest l1 norm of a velocity, m/s.
     """
     moving, words, fixed, total, sums = (
         active.moving, active.moving_words, active.fixed, active.fixed_words, active.row_weights,
@@ -113,9 +115,10 @@ def load(active, places, v, mobility, first, stop):  # type: ignore[no-untyped-d
 
 @njit(types.void(_F2, _I2, _I1, _I2, NODES, _N1, _N1, _N1, _B1, _I, _I), cache=True)
 def leave(node_v, parts, unsettled, total, active, places, index, part, owned, first, stop):  # type: ignore[no-untyped-def]
-    """Velocities of the slots from ``first`` to ``stop`` to the nodes that this rank holds, impulses of the step to
-    ``total`` (surface_nodes, 3), and those of owned nodes to the sums of their parts and to what is ``unsettled`` (3,):
-    see sweep_count.py, and how many held nodes were pushed.
+    """Copies the velocities of the slots from ``first`` to ``stop`` to the local nodes, and the impulses of the step
+    to ``total`` (surface_nodes, 3). Adds the impulses of owned nodes to the sums of their parts and to the residual
+    ``unsettled`` (3,): its first two words as in sweep_count.py, the third the number of local nodes with an
+    impulse.
     """
     moving, words = active.moving, active.fixed_words
     for s in range(first, stop):

@@ -1,4 +1,4 @@
-"""The impulses of a step: from the active contacts that the narrow phase has found to the velocities v(n+1/2)."""
+"""Impulses of a step: from the active contacts of the narrow phase to the velocities v(n+1/2)."""
 
 from typing import Protocol
 
@@ -22,56 +22,57 @@ from .zones import Zones
 _ROW_WEIGHTS = 4
 """Columns of ``ActiveNodes.row_weights``."""
 _SPARE = 1.25
-"""Times the nodes and contacts there are, room is made for: while a body breaks they become more in nearly every step,
-and the system clears every page of memory that is new. Chosen: a bar of glass has a quarter more after 400 steps."""
+"""Factor of the room over the present number of nodes and contacts: these grow in nearly every step while a body
+breaks, and the system clears every new page of memory. Chosen: a bar of glass has a quarter more after 400 steps."""
 
 
 class Bodies(Protocol):
-    """Rigid bodies, of which a slot is a node (rigid/rows.py)."""
+    """Interface of rigid bodies, whose nodes are slots (rigid/rows.py)."""
 
     active: bool
-    """Whether any rank has an active contact with one."""
+    """Whether any rank has an active contact with a rigid body."""
 
     def take_up(self, places: Indices, surface_nodes: SurfaceNodes, scale: float) -> None:
-        """Which slots are theirs."""
+        """Finds the slots of rigid bodies."""
 
     def weigh(self, active: ActiveNodes) -> None:
-        """Row weights of these, once all contacts have added theirs; all ranks take part."""
+        """Sets the row weights of these slots, once all contacts have added theirs. Collective."""
 
     def give(self, active: ActiveNodes) -> None:
-        """Takes their impulses, and gives them the velocities that the bodies have with these; all ranks take part."""
+        """Takes the impulses on these slots, moves the bodies, and sets the velocities of the slots. Collective."""
 
     def unsettled(self) -> Ints:
-        """See sweep_count.py."""
+        """Residual of the sweeps, see sweep_count.py."""
 
     def of_contact(self, parts: Ints) -> None:
-        """Adds the impulses of the step to those of the ``parts`` (parts, 3), quanta."""
+        """Adds the impulses of the step to the sums ``parts`` (parts, 3), quanta."""
 
     def add_pressed(self, pressed: Ints) -> None:
-        """Adds them to those of this rank's nodes, ``pressed`` (nodes, 3), quanta."""
+        """Adds the impulses of the step to those of this rank's nodes, ``pressed`` (nodes, 3), quanta."""
 
 
 class ActiveSet:
-    """The active contacts of a rank in a step, and the slots of their nodes."""
+    """Active contacts of a rank in a step, and the slots of their nodes."""
 
     def __init__(self, scale: float, near: Stops, team: Team, bodies: Bodies | None = None) -> None:
-        """``scale``: quanta per N s, a power of two; ``near``: walls and planes of symmetry; ``bodies``: rigid ones."""
+        """``scale``: quanta per N s, a power of two; ``near``: walls and planes of symmetry; ``bodies``: rigid
+        bodies."""
         self.scale, self.stops, self._bodies = scale, near, bodies
         self.places: Indices = np.zeros(0, np.int32)
-        """(slots,) where the nodes of the last step stand in the surface_nodes."""
+        """(slots,) rows of the scene of the nodes of the last step."""
         self._zones, self._passes = Zones(team.threads), Slots(team)
         self._sets, self._room = Sets(team, self._zones.many), _Room(0, 0, 0, self._zones.many)
         self._scratch = Scratch()
 
     def go_on(self, scale: float, sides: Floats) -> None:
-        """Of a run that goes on; ``sides`` as of its stops."""
+        """Sets the scale, and the ``sides`` of the stops, after a restart or a cut."""
         self.scale, self.stops = scale, self.stops._replace(sides=sides.reshape(self.stops.sides.shape))
 
     def begin(
         self, rows: ActiveRows, surface_nodes: SurfaceNodes, loose: Flags, shared: ActiveSum, size: float, dt: float
     ) -> None:  # fmt: skip
-        """Takes up the contacts that were found in a step ``dt``, s, and the nodes whose sums are ``shared``; ``loose``
-        (nodes,): those without tets; ``size``: of a face, m.
+        """Numbers the contacts ``rows`` of a step ``dt``, s, and their nodes; ``shared``: sums over ranks; ``loose``
+        (nodes,): nodes without tets; ``size`` of a face, m.
         """
         self._sum, found = shared, rows.room
         if rows.n > len(self._room.row) or surface_nodes.n > len(self._room.touched):
@@ -101,7 +102,7 @@ class ActiveSet:
         )  # fmt: skip
 
     def _number(self, rows: ActiveRows, zone: Indices) -> None:
-        """The contacts by sets, all idle, and the slots of their nodes and of shared ones."""
+        """Orders the contacts by sets, all idle, and numbers their nodes and the shared ones."""
         room, n, shared, nodes = self._room, rows.n, self._sum.shared, rows.room.nodes
         many = self._scratch.zeros("many", self._passes.mark.many(n), len(room.loaded.many))
         room.touched[shared] = room.shared[shared] = 1
@@ -130,7 +131,7 @@ class ActiveSet:
         return float(fastest.max(initial=0.0))
 
     def weigh(self) -> None:
-        """Row weights, completed over the ranks."""
+        """Computes the row weights, completed over the ranks."""
         room = self._room
         table = self._sets.weigh.set(room.active, self._contacts, room.loaded)
         self._sets.complete(tasks.weigh, table, self._sum, room.active.row_weights, 0, _ROW_WEIGHTS)
@@ -138,7 +139,7 @@ class ActiveSet:
             self._bodies.weigh(room.active)
 
     def resume(self, kept: Kept, ratio: float) -> None:
-        """Begins with ``ratio`` times what contacts have ``kept`` of the step before."""
+        """Warm start with ``ratio`` times the stored impulses ``kept``."""
         room = self._room
         table = self._sets.resume.set(room.active, self._contacts, room.loaded, kept, ratio, self.scale)
         self._sets.complete(tasks.resume, table, self._sum, room.active.moving_words, IMPULSE, 3)
@@ -148,7 +149,7 @@ class ActiveSet:
         stops.stop(room.active, room.braced)
 
     def sweep(self, many: int) -> None:
-        """So many sweeps."""
+        """Runs ``many`` sweeps."""
         room, scale, bodies = self._room, self.scale, self._bodies
         if self._sets.alone and not len(self._sum.shared) and (bodies is None or not bodies.active):
             sweeps.sweep_all(
@@ -165,8 +166,8 @@ class ActiveSet:
             stops.stop(room.active, room.braced)
 
     def cost(self, books: Books, before: Floats, part: Indices) -> None:
-        """Books what the impulses take from the bodies, and what parts give each other where that is asked for;
-        ``before`` (surface_nodes, 3): v(n-1/2), ``part`` (surface_nodes,).
+        """Books the energy that the impulses take from the bodies, and the impulses between parts if a probe needs
+        them; ``before`` (surface_nodes, 3): v(n-1/2), ``part`` (surface_nodes,).
         """
         self._add(books.account.words, before, books.account.scale, rubs=False)
         books.account.carry()
@@ -186,13 +187,13 @@ class ActiveSet:
         words += each.sum(axis=0)
 
     def store(self, kept: Kept) -> None:
-        """What contacts have ``kept`` of this step."""
+        """Stores the impulses of this step in ``kept``."""
         kept.pairs[:], kept.cracks[:] = 0.0, 0.0
         self._sets.run(tasks.store, self._sets.store.set(kept, self._room.loaded, self._contacts.pair))
 
     def leave(self, surface_nodes: SurfaceNodes, total: Ints, state: Nodes, parts: Ints, unsettled: Ints) -> bool:
-        """Gives velocities to the nodes that are held here, and impulses to ``total`` (surface_nodes, 3), to the sums
-        of the ``parts`` (parts, 3) and to what is ``unsettled`` (2,); whether any was pushed.
+        """Copies velocities to the local nodes, and adds impulses to ``total`` (surface_nodes, 3), to the sums of
+        the ``parts`` (parts, 3) and to the residual ``unsettled`` (2,); returns whether there was any impulse.
         """
         room, n = self._room, len(self.places)
         stops.let_go(room.active, room.braced)
@@ -208,12 +209,12 @@ class ActiveSet:
         return bool(left[:, 2].any())
 
     def press(self, pressed: Ints) -> None:
-        """Adds the impulses of rigid bodies in the step to ``pressed`` (nodes, 3), quanta, where somebody asks."""
+        """Adds the impulses of rigid bodies in the step to ``pressed`` (nodes, 3), quanta, if it has rows."""
         if self._bodies is not None and len(pressed):
             self._bodies.add_pressed(pressed)
 
     def pushes(self) -> tuple[Indices, Floats]:
-        """Which contacts have asked for an impulse in the step, and (k, 4) their impulses along the normal, and of
+        """Rows of the contacts with an impulse in the step, and (k, 4) their impulses along the normal, and of
         friction, N s.
         """
         loaded = self._room.loaded
@@ -223,7 +224,7 @@ class ActiveSet:
 
 
 class _Room:
-    """Arrays for as many contacts, nodes of the surface_nodes, stops, and zones."""
+    """Arrays with room for ``contacts``, ``nodes`` of the surface, ``many`` stops, and ``of`` zones."""
 
     def __init__(self, contacts: int, nodes: int, many: int, of: int) -> None:
         self.row, self.set_of = np.empty((2, contacts), np.int32)

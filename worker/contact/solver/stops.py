@@ -1,11 +1,10 @@
-"""Walls, and planes of symmetry beside nodes, within the sweeps: what presses on a node there moves it no further.
+"""Walls and planes of symmetry within the sweeps: a node at a plane is stopped there after every sweep.
 
-Walls and mirror images act after contact (walls.py, mirrors.py), node by node. If contact knew nothing of them, a node
-between a body and a wall would give way in every sweep as if it were free, and the wall would take that back when the
-impulses are made. So after every sweep each node that would end the step behind one is stopped there, by an impulse
-that may become smaller in a later sweep, but never pulls, and by friction across it. At the end these impulses are
-taken off again: the boundary gives them to the node anew, and books them. Every rank that has a copy of a node stops it
-alike.
+Walls and mirror images act after contact (walls.py, mirrors.py), node by node. Without stops a node between a body
+and a wall would yield in every sweep as if it were free, and the wall would then undo the result of the sweeps. So
+each node that would end the step behind a plane gets an impulse that stops it there, which later sweeps may reduce
+but not below zero, and friction across. After the last sweep these impulses are removed: the boundary applies and
+books them. Every rank with a copy of a node computes the same stop.
 """
 
 from typing import NamedTuple
@@ -24,29 +23,28 @@ from ...scene.selection import named
 from .active import MOBILITY, NODES, V
 
 _NEAR = 0.25
-"""Of the typical size of a face: what is further from a plane is not looked at. Chosen: no step takes a node so far
-(clock.py), and if one did, the boundary would stop it all the same."""
+"""Share of the typical size of a face: nodes further from a plane are ignored. Chosen: no step moves a node so far
+(clock.py), and if one did, the boundary would still stop it."""
 
 
 class Stops(NamedTuple):
-    """Half spaces."""
+    """Half spaces of the plain walls and planes of symmetry."""
 
     points: Floats
     """(k, 3), m."""
     normals: Floats
-    """(k, 3) unit, to the inside."""
+    """(k, 3) unit normals to the free side."""
     sides: Floats
-    """(k, parts) 1 where a part stays in front, -1 behind, 0 where it is not held."""
+    """(k, parts) 1 for a part in front, -1 behind, 0 for a part that the plane does not hold."""
     friction: Floats
     """(k,) Coulomb's coefficient."""
     mirrors: Flags
-    """(k,) which are planes of symmetry: they let nodes without tets pass."""
+    """(k,) planes of symmetry: nodes without tets pass these."""
 
     @classmethod
     def of(cls, case: Case, model: Model, comm: Comm) -> "Stops":
-        """Of the walls and planes of symmetry of a case. A part with nodes on both sides of a plane is left to the
-        boundary alone, and so should be what has a prescribed motion, but here only what is held counts. All ranks
-        take part.
+        """Returns the walls and planes of symmetry of a case. A part with nodes on both sides of a plane is left to
+        the boundary alone. Prescribed motions are not considered, only held components. Collective.
         """
         walls, planes = case.boundaries_of(schema.Wall), case.boundaries_of(schema.Symmetry)
         axes = [np.eye(3)[AXES[plane.axis]] for _, plane in planes]
@@ -59,7 +57,7 @@ class Stops(NamedTuple):
             held[k] = named(wall, model.parts)
         for k, (_, plane) in enumerate(planes, len(walls)):
             held[k] = part_sides(plane, model, comm)
-        held[:, case.rigid] = 0.0  # rigid bodies have their own (rigid/stops.py)
+        held[:, case.rigid] = 0.0  # rigid bodies have stops of their own (rigid/stops.py)
         normals /= np.linalg.norm(normals, axis=1)[:, None]
         friction = np.array([*(wall.friction for _, wall in walls), *(0.0 for _ in planes)])
         mirrors = np.arange(len(points)) >= len(walls)
@@ -67,26 +65,26 @@ class Stops(NamedTuple):
 
 
 class Braced(NamedTuple):
-    """Slots near stops, one row for each of both."""
+    """Slots near stops, one row for each pair of both."""
 
     rows: Indices
     """(room, 2) slot and stop."""
     normal: Floats
-    """(room, 3) of the stop to the side of the node, without held components."""
+    """(room, 3) unit normal of the stop towards the side of the node, zero in held components."""
     least: Floats
-    """(room,) the speed along it that takes the node there in the step, m/s."""
+    """(room,) normal speed that takes the node onto the plane in the step, m/s."""
     push: Floats
-    """(room,) change of that speed by the stop so far, m/s."""
+    """(room,) change of the normal speed by the stop so far, m/s."""
     rub: Floats
-    """(room, 3) change of the velocity across the normal by its friction so far, m/s."""
+    """(room, 3) change of the velocity across the normal by friction at the stop so far, m/s."""
     mu: Floats
-    """(room,) its coefficient of friction."""
+    """(room,) coefficient of friction."""
     many: Ints
-    """(1,) how many rows."""
+    """(1,) number of rows."""
 
     @classmethod
     def room(cls, n: int) -> "Braced":
-        """For as many."""
+        """Allocates room for ``n`` rows."""
         return cls(
             np.empty((n, 2), np.int32), np.empty((n, 3)), np.empty(n), np.empty(n), np.empty((n, 3)), np.empty(n),
             np.zeros(1, np.int64),
@@ -101,8 +99,8 @@ BRACED = record(Braced, _N2, _F2, _F1, _F1, _F2, _F1, types.int64[::1])
 
 @njit(types.void(BRACED, NODES, STOPS, _N1, _F2, _N1, _N1, _B1, types.float64, types.float64), cache=True)
 def find(braced, active, stops, places, x, part, local, loose, size, dt):  # type: ignore[no-untyped-def]
-    """The slots near a stop in a step ``dt``, s; ``x``, ``part`` and ``local`` of the surface_nodes; ``loose``
-    (nodes,): those of this rank without tets, which are nobody else's; ``size`` of a face, m.
+    """Finds the slots near a stop in a step ``dt``, s; ``x``, ``part`` and ``local`` of the surface nodes; ``loose``
+    (nodes,): nodes of this rank without tets, which no other rank has; ``size`` of a face, m.
     """
     fixed, n = active.fixed, 0
     for k in range(len(stops.points)):
@@ -129,7 +127,9 @@ def find(braced, active, stops, places, x, part, local, loose, size, dt):  # typ
 
 @njit(types.void(NODES, BRACED), cache=True)
 def stop(active, braced):  # type: ignore[no-untyped-def]
-    """Stops the nodes that would end the step behind, lets go what would not."""
+    """Stops the nodes that would end the step behind a plane, and reduces the impulse of those that would not.
+
+    push = max(0, push + (least - n.v) / n.n), and friction limited to mu push."""
     v, path, slide = active.moving, active.path, np.empty(3)
     for r in range(braced.many[0]):
         s, speed, along = braced.rows[r, 0], 0.0, 0.0
@@ -162,7 +162,7 @@ def stop(active, braced):  # type: ignore[no-untyped-def]
 
 @njit(types.void(NODES, BRACED), cache=True)
 def let_go(active, braced):  # type: ignore[no-untyped-def]
-    """Takes their impulses off again."""
+    """Removes the impulses of all stops."""
     for r in range(braced.many[0]):
         for i in range(3):
             active.moving[braced.rows[r, 0], V + i] -= braced.push[r] * braced.normal[r, i] + braced.rub[r, i]

@@ -1,4 +1,4 @@
-"""How many sweeps the contacts of a step get: as many as those of the step before needed."""
+"""Adaptive sweep count: from the residual of the previous step."""
 
 import numpy as np
 
@@ -7,41 +7,41 @@ from conoid.cases.estimates.impact import Sweeps
 from ...model.state import Ints
 
 _SETTLED = 0.0015
-"""Of the impulses of a step, the most that its last sweep may have changed them by. Chosen by rubble between a ram and
-walls, which is as stiff then as with many more sweeps (docs/theory/contact.md, "Sweeps by need"); metals have less
-with the fewest."""
+"""Target residual: change by the last sweep of a step over the impulses of the step. Chosen with rubble between a
+ram and walls, which is then as stiff as with many more sweeps (docs/theory/contact.md, "Sweeps by need"); metals are
+below it with the fewest sweeps."""
 _ENOUGH = 0.5
-"""Of that: with less, a sweep fewer does."""
+"""Share of the target below which the count falls by one."""
 _MORE = 4
-"""One over the share by which sweeps grow in a step."""
+"""Inverse of the share by which the count grows in a step."""
 _TOLD = 2.0
-"""Times _SETTLED, what was left of all impulses of the run, from which on there is a warning. Chosen."""
+"""Multiple of _SETTLED for the residual of the whole run from which on there is a warning. Chosen."""
 
 
 class SweepCount:
-    """Decided by sums over all nodes as integers, so alike on any number of ranks."""
+    """Number of sweeps, decided by integer sums over all nodes: equal on any number of ranks."""
 
     def __init__(self, bounds: Sweeps) -> None:
         self._bounds = bounds
         self.sweeps = bounds.least
-        """Of the step ahead."""
+        """Sweeps of the next step."""
         self.unsettled: Ints = np.zeros(2, np.int64)
-        """(2,) l1 norms over the nodes that this rank owns of what the last sweep of the step has changed, and of the
+        """(2,) l1 norms over the nodes that this rank owns: of the changes by the last sweep of the step, and of the
         impulses of the step; in units of 2^16 quanta.
         """
         self._changed, self._impulse = 0, 0
 
     def known(self) -> tuple[int, int, int]:
-        """All of it, equal on all ranks."""
+        """State, equal on all ranks."""
         return self.sweeps, self._changed, self._impulse
 
     def resume(self, known: tuple[int, int, int]) -> None:
-        """Takes it back."""
+        """Restores the state."""
         self.sweeps, self._changed, self._impulse = known
 
     @property
     def warnings(self) -> list[str]:
-        """One line, if sweeps have left too much."""
+        """One line if the residual of the run is above the limit."""
         if not self._changed > _TOLD * _SETTLED * self._impulse:
             return []
         left, limit = 100.0 * self._changed / self._impulse, 100.0 * _TOLD * _SETTLED
@@ -56,7 +56,7 @@ class SweepCount:
         return self._bounds.least == self._bounds.most
 
     def agree(self, unsettled: Ints) -> None:
-        """Takes what is ``unsettled`` on all ranks, the sum."""
+        """Adapts the count to the residual; ``unsettled`` (2,): sum over all ranks."""
         changed, impulse = (int(word) for word in unsettled)
         self._changed, self._impulse = self._changed + changed, self._impulse + impulse
         if changed > _SETTLED * impulse:

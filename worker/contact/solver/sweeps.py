@@ -1,18 +1,18 @@
-"""Impulses that keep active contacts from passing: projected Jacobi sweeps whose order does not matter.
+"""Impulses of active contacts: projected Jacobi sweeps, independent of the order of contacts (docs/theory/contact.md).
 
-Every contact asks for a normal velocity of at least ``wanted``. A sweep corrects each by its own want over a bound of
-the l1 norm of its row of the contact matrix (Baker, Falgout, Kolev and Yang 2011): the sum over its nodes k and axes i
-of |w_k| |n_i| S_ki / m_k, with S_ki the sum of |w| |n_i| over all contacts at the node. That is exact for one contact
-alone and for any number along one normal, and never an overshoot however many share a node. That bound is far from
-the diagonal where many share a node, and plain sweeps crawl: so every impulse along a normal goes on as it has changed,
-by a share that grows with the sweeps (``momentum``). Impulses never pull; friction is Coulomb's, on the sum over the
-sweeps. Impulses are integers: a contact's add up to zero, and no order of contacts or ranks changes a bit. A pair of a
-node and a face, and nodes across a crack, begin with their impulses of the step before: what sticks does not creep, and
-what is under pressure does not sink in, however few the sweeps are.
+Every contact has a target for its normal velocity: u >= ``wanted``. A sweep corrects its impulse by (wanted - u) over a
+bound of the l1 norm of its row of the contact matrix (Baker, Falgout, Kolev and Yang 2011): the sum over its nodes k
+and axes i of |w_k| |n_i| S_ki / m_k, where S_ki is the sum of |w| |n_i| over all contacts at the node. This is exact
+for one contact alone and for any number along one normal, and never overshoots when contacts share nodes. The bound is
+far above the diagonal where many contacts share a node, and plain sweeps converge slowly there: so normal impulses are
+extrapolated by Nesterov's ``momentum``. Normal impulses are never negative; friction is Coulomb's, on the sum over the
+sweeps. Impulses are integers: those of a contact add up to zero, and no order of contacts or ranks changes a bit.
+Node-face pairs and node pairs across a crack start from their impulses of the last step (warm start): sticking contacts
+do not creep and compressed ones do not sink in, however few sweeps there are.
 
-Only contacts that have asked for an impulse in the step are swept (loading.py).
+Only contacts that asked for an impulse in the step are swept (loading.py).
 
-Kernels call no kernel within a loop over contacts: records of arrays are counted as references at each call.
+Kernels call no kernel within a loop over contacts: numba counts a reference for each array of a record at each call.
 """
 
 import numpy as np
@@ -41,8 +41,8 @@ from .loading import SHARES, load
 from .stops import BRACED, stop
 
 _PAIR, _CRACK = 0.8, 1.0
-"""Share of the last push along the normal that a node and a face begin with, for all of it would lag behind and make
-energy; and nodes across a crack, of which so many press on each other that sweeps cannot make up for any of it
+"""Share of the stored normal impulse in the warm start. Node-face pairs: the whole of it lags behind and adds
+energy. Node pairs across a crack: so many press on each other that sweeps could not restore any missing part
 (docs/theory/contact.md, "Dust under pressure")."""
 
 _ROWS, _F, _I = types.int32[::1], types.float64, types.int64
@@ -63,9 +63,9 @@ def add_row_weights(active, contacts, loaded, k):  # type: ignore[no-untyped-def
 
 @njit(types.void(NODES, LOADED, KEPT, _ROWS, _F, _F, _I), cache=True)
 def resume(active, loaded, kept, pair, ratio, scale, k):  # type: ignore[no-untyped-def]
-    """The loaded contacts of set ``k`` begin with ``ratio`` times what they have ``kept``, along and across the normal
-    as it is now: over the row norms as they are now, so that a node that has separated, and is lighter, or that shares
-    its load with others begins with less.
+    """Warm start of the loaded contacts of set ``k``: ``ratio`` times their stored impulses ``kept``, along the
+    present normal and across, divided by the present row norms, so that a node that separated and lost mass, or that
+    shares its load with new contacts, starts with less.
     """
     words, normal, tangent, slots, row = active.moving_words, loaded.normal, loaded.tangent, loaded.slots, loaded.row
     pairs, cracks, last = kept.pairs, kept.cracks, np.empty(4)
@@ -89,16 +89,19 @@ def resume(active, loaded, kept, pair, ratio, scale, k):  # type: ignore[no-unty
 
 @njit(types.float64(_I, _I), cache=True)
 def momentum(k, many):  # type: ignore[no-untyped-def]
-    """How far impulses go on in sweep ``k`` of ``many`` as they have changed (Nesterov 1983; Mazhar, Heyn, Negrut and
-    Tasora 2015 for contact); not at all in the last, which ends with impulses that a plain sweep has made.
+    """Nesterov's factor of sweep ``k`` of ``many`` (Nesterov 1983; Mazhar, Heyn, Negrut and Tasora 2015 for
+    contact); 0 in the last sweep, so that the result is that of a plain sweep.
     """
     return k / (k + 3.0) if k + 1 < many else 0.0
 
 
 @njit(types.void(NODES, LOADED, _F, _F, _I), cache=True, error_model="numpy")
 def sweep(active, loaded, ahead, scale, k):  # type: ignore[no-untyped-def]
-    """Adds the corrections of the loaded contacts of set ``k`` to the impulses of their nodes; they add up to zero.
-    ``ahead``: of what an impulse along the normal has changed by since the last sweep, how much it goes on.
+    """Adds the corrections of the loaded contacts of set ``k`` to the impulses of their nodes; those of one contact add
+    up to zero. ``ahead``: Nesterov's factor.
+
+    Normal: p = max(0, p_old + (wanted - u) / R), extrapolated by ahead (p - p_last). Friction: the tangential
+    impulse t - u_t / R_t, scaled back to |t| <= mu p.
     """
     values, words = active.moving, active.moving_words
     first = loaded.begin[k]
@@ -150,8 +153,8 @@ def sweep(active, loaded, ahead, scale, k):  # type: ignore[no-untyped-def]
 
 @njit(types.void(NODES, _F, types.boolean, _I, _I), cache=True)
 def give(active, scale, last, first, stop):  # type: ignore[no-untyped-def]
-    """Turns the completed impulses of a sweep at the slots from ``first`` to ``stop`` into velocities, adds them to
-    those of the step and clears them; keeps how much they are in the ``last`` sweep of a step.
+    """Turns the completed impulses of a sweep at the slots from ``first`` to ``stop`` into velocities, dv = j / m,
+    adds them to those of the step and clears them; in the ``last`` sweep of a step stores their l1 norm.
     """
     v, words, path = active.moving[first:stop], active.moving_words[first:stop], active.path[first:stop]
     mobility, total, a_quantum = active.fixed[first:stop], active.fixed_words[first:stop], 1.0 / scale
@@ -173,7 +176,8 @@ def give(active, scale, last, first, stop):  # type: ignore[no-untyped-def]
 
 @njit(types.void(NODES, LOADED, CONTACTS, BRACED, _I, _F, _F, _I), cache=True)
 def sweep_all(active, loaded, contacts, braced, n, fastest, scale, many):  # type: ignore[no-untyped-def]
-    """``many`` sweeps (``load``, ``sweep``, ``give``, ``stop``) of all sets and ``n`` slots, none of them shared."""
+    """Runs ``many`` sweeps (``load``, ``sweep``, ``give``, ``stop``) of all sets and ``n`` slots, none of them
+    shared."""
     for k in range(many):
         for each in range(len(loaded.many)):
             load(loaded, contacts, active, fastest, each)
@@ -184,7 +188,7 @@ def sweep_all(active, loaded, contacts, braced, n, fastest, scale, many):  # typ
 
 @njit(types.void(KEPT, LOADED, _ROWS, _I), cache=True)
 def store(kept, loaded, pair, k):  # type: ignore[no-untyped-def]
-    """What the loaded contacts of set ``k`` have ``kept``: their impulses times their row norms."""
+    """Stores the impulses of the loaded contacts of set ``k`` in ``kept``, times their row norms."""
     pairs, cracks, normal, tangent, row = kept.pairs, kept.cracks, loaded.normal, loaded.tangent, loaded.row
     last = np.empty(4)
     for q in range(loaded.begin[k], loaded.begin[k] + loaded.many[k]):

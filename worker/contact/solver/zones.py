@@ -1,9 +1,8 @@
-"""Zones: parts of a scene whose contacts threads sweep side by side.
+"""Zones: boxes in space whose contacts different threads sweep at the same time.
 
-Every node of a surface_nodes is of a zone, a box in space, by where it is when it comes into the scene. Contacts all of
-whose nodes are of one zone are a set: two such sets have no node in common. All others, those across the borders of
-zones, are one set more, which is swept after these. With one thread there is one zone. No bit of the answer depends on
-zones.
+Every surface node belongs to the zone in which it enters the scene. Contacts with all nodes in one zone are a set;
+sets of two zones have no node in common. All other contacts, across the borders of zones, are one more set, which is
+swept after the others. With one thread there is one zone. No bit of the answer depends on zones.
 """
 
 import numpy as np
@@ -12,22 +11,24 @@ from ...model.state import Floats, Indices, Ints
 from ..surface.records import SurfaceNodes
 
 _PER_THREAD = 4
-"""Zones of a thread: contacts are not spread evenly, and a thread that has done with its own takes another's. Chosen.
+"""Zones per thread: contacts are not spread evenly, and a thread that has finished its zones takes one of another
+thread. Chosen.
 """
 
 
 class Zones:
-    """Halves of halves of a surface_nodes, each across its longest side; nodes that come later are of the box they are
-    in.
+    """Recursive bisection of the surface nodes, each box across its longest side; later nodes belong to the box that
+    contains them.
     """
 
     def __init__(self, threads: int) -> None:
-        """A power of two, by the ``threads``."""
+        """The number of zones is a power of two, from the number of ``threads``."""
         self.many = 1 if threads == 1 else 1 << (_PER_THREAD * threads - 1).bit_length()
-        """How many."""
+        """Number of zones."""
         self._surface_nodes: SurfaceNodes | None = None
         self._axis, self._at = np.zeros(self.many - 1, np.int64), np.zeros(self.many - 1)
-        """(many - 1,) across which axis, and where, each part is halved; part k becomes the parts 2 k + 1 and 2 k + 2.
+        """(many - 1,) axis and position of the cut of each part; part k is divided into the parts 2 k + 1 and 2 k +
+        2.
         """
         self._zone: Indices = np.zeros(0, np.int32)
 
@@ -59,8 +60,8 @@ class Zones:
 
 
 def tasks(zones: int) -> tuple[tuple[Ints, Ints], tuple[Ints, Ints]]:
-    """Tasks and starts, as a team takes them, of the sets of contacts with a node that other ranks share, and of the
-    sets of those without: every zone, and then what lies across.
+    """Tasks and starts, for a team, of the sets of contacts with a node that other ranks share, and of the sets
+    without: every zone, and then the contacts across zones.
     """
     first = np.arange(zones + 1)
     border, starts = np.column_stack([first, first + 1]), np.array([0, zones, zones + 1])

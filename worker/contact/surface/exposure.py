@@ -1,9 +1,9 @@
-"""What erosion lays bare comes to the surface without a search.
+"""Exposure of the faces behind tets that erode, without a search.
 
-A tet that has strained by a share of what it lives through is tiring. A search takes up the faces of other tets that it
-covers, as it takes up the sides of cracks: with their nodes, for all ranks near them, but they meet nothing. When the
-tet leaves they are exposed in the same step. Only a tet that was not tiring at the last search, such as one that turns
-inside out early, calls for a search of all ranks.
+A tet is near erosion when its strain or damage is above a share of its limit. A search includes the faces behind
+such tets, as it includes the sides of cracks: with their nodes, on all ranks near them, but without candidate pairs.
+When the tet erodes its neighbours' faces are exposed in the same step. Only the erosion of a tet that was not near
+it at the last search, for example by early inversion, needs a search of all ranks.
 """
 
 from typing import NamedTuple
@@ -19,25 +19,25 @@ from ...parallel.comm import Comm
 from ...parallel.ownership import Neighbour
 
 TIRING = 0.5
-"""Of the plastic strain or the damage at which a tet leaves. Of the tets that left in the long rod to 20 us, 1.6 to
-5.7 % had not reached it 50 to 200 steps before (counted by hand)."""
+"""Share of the plastic strain or damage at erosion. Of the tets eroded in the case long_rod to 20 us, 1.6 to 5.7 %
+were below it 50 to 200 steps before (counts of one run)."""
 WORDS = 9
-"""Of a tet that leaves: its id, what was across its faces (state.Block.across), and its nodes."""
+"""Words of a tet that erodes: its id, the faces across (state.Block.across), and its nodes."""
 
 
 class Exposure(NamedTuple):
-    """What tets of all ranks leave behind; ids, ascending."""
+    """Faces exposed by the erosion of tets of all ranks; ids, ascending."""
 
     gone: Ints
-    """Of their faces."""
+    """Ids of the faces of the eroded tets."""
     bare: Ints
-    """Of the faces behind them."""
+    """Ids of the faces behind them."""
     nodes: Ints
-    """Of these."""
+    """Ids of the nodes of the faces behind them."""
 
 
 def tiring(blocks: list[Block]) -> Ints:
-    """Ids, ascending, of the tets here that may leave soon."""
+    """Ids, ascending, of the local tets near erosion."""
     found = [np.zeros(0, np.int64)]
     for block in blocks:
         tired = np.zeros(block.n, bool)
@@ -49,8 +49,8 @@ def tiring(blocks: list[Block]) -> Ints:
 
 
 def covered(blocks: list[Block], tired: Ints, neighbours: list[Neighbour], comm: Comm) -> Indices:
-    """(k, 3) block, place and face of those of this rank's tets that ``tired`` ones, here or at the neighbours, cover;
-    all ranks take part.
+    """(k, 3) block, row and face of this rank's tets behind tets near erosion, ``tired``, of this rank and its
+    neighbours. Collective.
     """
     told = comm.swap({other.rank: tired for other in neighbours})
     every = np.unique(np.concatenate([tired, *told.values()]))
@@ -62,12 +62,12 @@ def covered(blocks: list[Block], tired: Ints, neighbours: list[Neighbour], comm:
 
 
 def leaving(block: Block, worn: Ints, ids: Ints) -> Ints:
-    """(k, WORDS) rows of the tets at ``worn`` (k,); ``ids``: of the local nodes."""
+    """(k, WORDS) words of the tets in the rows ``worn`` (k,); ``ids``: global ids of the local nodes."""
     return np.column_stack([block.id[worn], block.across[worn], ids[block.tets[worn]]])
 
 
 def laid(rows: Ints) -> Exposure:
-    """What the tets of all ``rows`` (k, WORDS) leave behind."""
+    """Returns the faces exposed by the erosion of the tets of ``rows`` (k, WORDS), of all ranks."""
     gone = np.sort((4 * rows[:, :1] + np.arange(4)).reshape(-1))
     behind, nodes = rows[:, 1:5], rows[:, 5:][:, FACES]
     bare: Flags = (behind >= 0) & ~among(gone, behind)
@@ -75,7 +75,7 @@ def laid(rows: Ints) -> Exposure:
 
 
 def lay(blocks: list[Block], bare: Ints) -> None:
-    """Those of the faces ``bare``, ids, ascending, that are here have nothing across any more."""
+    """Marks the local faces among ``bare``, ids, ascending, as exposed by erosion."""
     tets = np.unique(bare // 4)
     for block in blocks:
         rows = np.flatnonzero(among(tets, block.id))

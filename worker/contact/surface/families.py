@@ -1,4 +1,5 @@
-"""Families: nodes that were one. Whoever has a tet at a node holds all of its family."""
+"""Families: all nodes that one node of the start has separated into. A rank with a tet at a node holds all of its
+family."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -14,18 +15,18 @@ _N1, _N2 = types.int32[::1], types.int32[:, ::1]
 
 @dataclass
 class Families:
-    """By local node."""
+    """Families of the local nodes."""
 
     root: Ints
-    """(nodes,) global id of the node that each was part of at the start."""
+    """(nodes,) global id of the node of the start."""
     ring: Indices
-    """(nodes,) the next one of its family here, itself where it is alone."""
+    """(nodes,) next local node of the family, cyclic; the node itself where it is alone."""
     leader: Indices
-    """(nodes,) the one here that stands for its family."""
+    """(nodes,) local node that represents the family."""
 
     @classmethod
     def of(cls, root: Ints) -> "Families":
-        """The nodes of each ``root`` (nodes,) as a ring."""
+        """Links the nodes of each ``root`` (nodes,) in a ring."""
         (ring, leader), order = np.empty((2, len(root)), np.int32), np.argsort(root, kind="stable")
         first = np.flatnonzero(np.append(True, np.diff(root[order]) != 0)[: len(root)])
         following, ends = np.roll(order, -1), np.append(first, len(root))[1:]
@@ -34,7 +35,7 @@ class Families:
         return cls(root, ring, leader)
 
     def grow(self, split: Split) -> None:
-        """Takes up the copies of a split."""
+        """Adds the copies of a split."""
         parents = split.copies.parents
         self.root = extended(self.root, self.root[parents])
         self.ring = extended(self.ring, np.zeros(len(parents), np.int32))
@@ -42,13 +43,13 @@ class Families:
         _insert(self.ring, parents, split.first)
 
     def members(self, nodes: Ints) -> Flags:
-        """(nodes,) who is of the family of one of the ``nodes`` (k,)."""
+        """(nodes,) nodes in the family of one of the ``nodes`` (k,)."""
         return np.asarray(_members(self.ring, nodes))
 
 
 @njit("void(int32[::1], int64[::1], int64)", cache=True)
 def _insert(ring, parents, first):  # type: ignore[no-untyped-def]
-    """Copies, from ``first`` on, come behind their parents."""
+    """Inserts copies, numbered from ``first`` on, behind their parents."""
     for c in range(len(parents)):
         ring[first + c], ring[parents[c]] = ring[parents[c]], first + c
 
@@ -65,18 +66,18 @@ def _members(ring, nodes):  # type: ignore[no-untyped-def]
 
 
 class Corners(NamedTuple):
-    """Corners of narrow sides whose node has separated into three pieces or more, by families."""
+    """Corners of narrow sides at nodes that have separated into three pieces or more, by family."""
 
     members: Indices
     """Nodes of the families, one family after the other."""
     begin: Indices
-    """(families + 1,) where those of each begin."""
+    """(families + 1,) offsets of the members of each."""
     among: Indices
-    """(nodes,) where a node of a family is among the ``members``."""
+    """(nodes,) position of a node of a family in ``members``."""
     corners: Indices
-    """8 crack + 4 side + corner (0 to 2), one family after the other."""
+    """Codes 8 crack + 4 side + corner (0 to 2), one family after the other."""
     start: Indices
-    """(families + 1,) where those of each begin."""
+    """(families + 1,) offsets of the corners of each."""
 
 
 CORNERS = record(Corners, _N1, _N1, _N1, _N1, _N1)
@@ -84,7 +85,7 @@ CORNERS = record(Corners, _N1, _N1, _N1, _N1, _N1)
 
 @njit(CORNERS(_N2, types.int32[:, :, ::1], types.int64, _N1, _N1), cache=True)
 def by_family(cracks, sides, block, ring, leader):  # type: ignore[no-untyped-def]
-    """``Corners`` of a ``block``.
+    """Returns the ``Corners`` of a ``block``.
 
     ``cracks`` (m, 6) nodes of all cracks and ``sides`` (m, 2, 3): see Cracks; ``ring`` and ``leader``: see Families.
     """

@@ -1,7 +1,8 @@
-"""Mean normals of the nodes of the surface, and where their faces lie: which faces a node may meet (node_face.facing).
+"""Mean normals of surface nodes and mean directions of their faces: they decide which faces a node may contact
+(facing.facing).
 
-They are taken anew at every ``EVERY``-th step and when erosion has changed the surface; a face that a crack exposes in
-between adds its share to its nodes. So they depend on the steps alone, not on when candidates were searched.
+They are recomputed at every ``EVERY``-th step and after erosion; a face that a crack exposes in between adds its
+contribution to its nodes. So they depend on the step number alone, not on the steps of searches.
 """
 
 import numpy as np
@@ -15,17 +16,18 @@ from ...parallel.tags import Tag
 from ..solver.loading import SHARES
 
 EVERY = 16
-"""Steps. A fragment that turns at 1e5 rad/s (100 m/s over 1 mm) turns by 3 degrees meanwhile."""
+"""Steps between two computations. A fragment that rotates at 1e5 rad/s (100 m/s over 1 mm) turns by 3 degrees in
+between."""
 COLUMNS, SHARE = 12, 18
-"""Sums of a node, and what a face adds to those of its three."""
+"""Sums of a node, and words that a face adds to those of its three nodes."""
 _NOTHING = 1e-300
-"""m^2: keeps a face of no area from a division by zero."""
+"""Least area, m^2: prevents a division by zero for a degenerate face."""
 
 
 def moments(model: Model, planes: Flags, size: float, neighbours: list[Neighbour], comm: Comm) -> Ints:
-    """(nodes, COLUMNS) sums over the exposed faces of all ranks at each node: area times n, times n n (xx, yy, zz, yz,
-    zx, xy), and times the unit vector from the node to the middle of the face's other side, in quanta of ``size``^2 /
-    SHARES m^2; all ranks take part. ``planes``: see surface.build.
+    """(nodes, COLUMNS) sums over the exposed faces of all ranks at each node, in quanta of ``size``^2 / SHARES m^2:
+    area times n, area times n n (xx, yy, zz, yz, zx, xy), and area times the unit vector from the node to the
+    midpoint of the opposite edge. ``planes``: see surface.build. Collective.
     """
     sums = np.zeros((model.nodes.n, COLUMNS), np.int64)
     for block in model.blocks:
@@ -35,14 +37,14 @@ def moments(model: Model, planes: Flags, size: float, neighbours: list[Neighbour
 
 
 def means(sums: Ints) -> Floats:
-    """(n, COLUMNS) means by area of n, n n and the ways to the faces; zero where there is no face."""
+    """(n, COLUMNS) area-weighted means of n, n n and the directions to the faces; zero for a node without faces."""
     area = sums[:, 3:6].sum(axis=1)
     return np.asarray(sums / np.where(area > 0, area, 1)[:, None])
 
 
 def shares(x: Floats, faces: Indices, size: float) -> Ints:
-    """(f, SHARE) what each of the ``faces`` (f, 3) adds to the ``moments`` of its nodes: 9 words to those of all, and 3
-    more to those of each.
+    """(f, SHARE) contributions of the ``faces`` (f, 3) to the ``moments`` of their nodes: 9 words for all three
+    nodes, and 3 more for each.
     """
     out = np.empty((len(faces), SHARE), np.int64)
     for f in range(len(faces)):
@@ -72,7 +74,7 @@ def _share(out, x, a, b, c, scale):  # type: ignore[no-untyped-def]
 
 @njit("void(int64[:, ::1], int64, int64[::1], int64)", cache=True)
 def _add(sums, node, share, corner):  # type: ignore[no-untyped-def]
-    """The ``share`` of a face to the sums of the node that is its ``corner``."""
+    """Adds the ``share`` of a face to the sums of the node that is its ``corner``."""
     for i in range(9):
         sums[node, i] += share[i]
     for i in range(3):

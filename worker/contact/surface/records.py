@@ -1,8 +1,8 @@
-"""What contact knows of a surface: faces and edges as rows of global node ids, nodes with their state.
+"""Tables of a surface: faces and edges as rows of global node ids, nodes with their state.
 
-A face is three nodes, counter-clockwise seen from outside, and the node of its tet that lies opposite. An edge is its
-two nodes and, of each of the two faces that meet there, the third one and the one opposite. Rows travel between ranks
-as they are.
+A face has three nodes, counter-clockwise seen from outside, and the opposite node of its tet. An edge has its two
+nodes and, for each of its two faces, the third node and the opposite node of the tet. Ranks exchange these rows
+unchanged.
 """
 
 from collections.abc import Sequence
@@ -17,12 +17,12 @@ from ...model.ids import located
 from ...model.state import Bits, Flags, Floats, Indices, Ints
 
 AGED, OPEN = 1, 2
-"""How far a face of an edge is open."""
+"""States of a face of an edge (Edges.opened)."""
 
 
 @dataclass
 class Rows:
-    """Columns of equal length."""
+    """Table of columns of equal length."""
 
     @property
     def n(self) -> int:
@@ -31,26 +31,26 @@ class Rows:
 
     @cached_property
     def _rooms(self) -> Rooms:
-        """Of a table that grows."""
+        """Spare room of a table that grows."""
         return Rooms(*vars(self))
 
     def columns(self) -> list["np.ndarray"]:
-        """The columns, in the order of their names here."""
+        """Columns, in the order of their declaration."""
         return [column for name, column in vars(self).items() if name != "_rooms"]
 
     def append(self, rows: Self) -> None:
-        """Takes up more rows, behind these."""
+        """Appends ``rows``."""
         columns = dict(vars(rows))
         columns.pop("_rooms", None)
         self._rooms.append(self, rows.n, **columns)
 
     def take(self, chosen: "np.ndarray") -> Self:
-        """Some of the rows."""
+        """Returns the ``chosen`` rows."""
         return type(self)(*(column[chosen] for column in self.columns()))
 
     @classmethod
     def joined(cls, tables: Sequence[Self]) -> Self:
-        """All rows of all tables, in turn."""
+        """Concatenates ``tables``."""
         return cls(*map(np.concatenate, zip(*(table.columns() for table in tables), strict=True)))
 
 
@@ -65,13 +65,13 @@ class Faces(Rows):
     size: Floats
     """(n,) square root of twice the initial area, m."""
     exposed: Flags
-    """(n,) False for a side of a crack that has not opened yet."""
+    """(n,) False for a side of a crack that is not open yet."""
 
 
 @dataclass
 class Edges(Rows):
-    """Edges; a row (a, b, c, d, e, f): edge ab between face abc of tet abce and face bad of tet badf, that of the
-    smaller id first. Where more than two faces meet in an edge, every two of them that may enclose a body make a row.
+    """Edges; a row (a, b, c, d, e, f): edge ab between face abc of tet abce and face bad of tet badf, the face of
+    smaller id first. If more than two faces share an edge, every two of them that may enclose material make a row.
     """
 
     nodes: Ints
@@ -81,32 +81,32 @@ class Edges(Rows):
     size: Floats
     """(n,) initial length, m."""
     deep: Floats
-    """(n,) depth, m, beyond which it holds nothing, however its tets deform; see sharp.depths."""
+    """(n,) depth, m, beyond which the edge has no contact, for any deformation of its tets; see sharp.depths."""
     opened: Bits
-    """(n, 2) how far either face is open: OPEN where it is exposed, AGED for the side of a crack that has come of age
-    (cracks.AGE), else 0. The edge meets others when it is sharp, both faces are open at all and one is exposed."""
+    """(n, 2) state of either face: OPEN if it is exposed, AGED for a side of a crack older than cracks.AGE, else 0.
+    The edge is in edge-edge contact when it is sharp, neither state is 0 and one is OPEN."""
     sharp: Flags
     """(n,) see sharp.py."""
 
     @property
     def names(self) -> Ints:
-        """(n,) the two faces of each edge as one number: two faces have one edge in common."""
+        """(n,) ids of the two faces of each edge as one number: two faces have at most one edge in common."""
         return (self.sides[:, 0] << 32) + self.sides[:, 1]
 
 
 @dataclass(frozen=True)
 class CrackSides:
-    """Sides of cracks on a rank: block, place and face."""
+    """Sides of cracks on a rank: rows of block, tet and face."""
 
     young: Indices
-    """(k, 3) whose edges meet none yet."""
+    """(k, 3) sides whose edges are not in contact yet."""
     aged: Indices
-    """(m, 3) whose edges do."""
+    """(m, 3) sides whose edges are in contact."""
 
 
 @dataclass
 class SurfaceNodes(Rows):
-    """Nodes by ascending global id, those of this rank and copies of others'."""
+    """Nodes by ascending global id: those of this rank and copies of other ranks' nodes."""
 
     id: Ints
     """(n,) global ids."""
@@ -117,20 +117,20 @@ class SurfaceNodes(Rows):
     part: Indices
     """(n,) index of the part."""
     mobility: Floats
-    """(n, 3) one over the mass, 1/kg; zero where a component of the velocity is held."""
+    """(n, 3) inverse of the mass, 1/kg; zero where a component of the velocity is held."""
     x: Floats
     """(n, 3) position, m."""
     v: Floats
     """(n, 3) velocity, m/s."""
     course: Floats
-    """(n, 3) velocity with which it flies on for a search, m/s; see extrapolation.py."""
+    """(n, 3) extrapolated velocity for a search, m/s; see extrapolation.py."""
 
     def places(self, ids: Ints) -> Indices:
-        """Where these global ids stand, in the shape of ``ids``; all must be here."""
+        """Returns the rows of the global ids, in the shape of ``ids``; all must be present."""
         return located(self.id, ids)
 
 
 def merged(groups: list[SurfaceNodes]) -> SurfaceNodes:
-    """All nodes once, by ascending id; the first surface_nodes that has a node gives its row."""
+    """Returns all nodes once, by ascending id; a node in several groups has the row of the first."""
     every = SurfaceNodes.joined(groups)
     return every.take(np.unique(every.id, return_index=True)[1])

@@ -1,9 +1,9 @@
-"""Edges: where two faces of the surface meet; those that are sharp, at an angle, can meet other edges.
+"""Edges between two faces of the surface, and which of them are sharp: sharp edges are in edge-edge contact.
 
-A half edge is an edge as one face sees it, (a, b) of the face abc. Every two half edges that run against each other
-between the same nodes make an edge, but those of the two sides of one facet. An edge is sharp when its faces meet at an
-angle at the start, or have done so, and bulge, when all are looked at: every normals.EVERY steps, or every
-PRESSED: flow makes edges, too. So it depends on the steps alone, not on when candidates were searched.
+A half edge is an edge of one face, (a, b) of the face abc. Two half edges of opposite direction between the same
+nodes make an edge, except the two sides of one facet. An edge is sharp when its faces enclose an angle at the start,
+or when they do so and the edge is convex at a later check: every normals.EVERY steps, or every PRESSED steps, since
+flow makes edges too. So sharpness depends on the step number alone, not on the steps of searches.
 """
 
 import math
@@ -21,22 +21,22 @@ from ..narrow_phase.tables import DEEP, DEEP_SELF
 from .records import Edges, Faces
 
 SHARP = sine_and_cosine(math.radians(25.0))[1]
-"""Edges between faces whose normals differ by more than this can meet other edges."""
+"""Cosine of the angle between the normals of two faces from which on their edge is sharp. Chosen."""
 BENT, PRESSED = sine_and_cosine(math.radians(5.0))[1], 4
-"""The same of parts that are pressed together beyond their strength (cases/estimates/impact.py), and after how many
-steps edges are looked at there: ridges of surfaces that were flat cross without a node inside, and what overlaps has no
-pressure. Chosen by flyer plates of copper at 1 to 2.4 km/s (docs/theory/contact.md, "Ridges under pressure")."""
+"""The same for parts that are pressed together beyond their strength (cases/estimates/impact.py), and the steps
+between two checks there: ridges of surfaces that were flat cross without a node inside, and overlapping matter has
+no pressure. Chosen with flyer plates of copper at 1 to 2.4 km/s (docs/theory/contact.md, "Ridges under pressure")."""
 
 _A, _B, _C, _D, _OWNER, _TOP, _FACE, _OPEN, _LENGTH, _LOW, _NORMAL = range(11)
-"""Columns of a half edge that travels: its nodes, the third node of its face and the one opposite, the owners of these
-two, the face, how far that is open, initial length, m, the lowest initial height of its tet, m, and the unit normal of
-the face; floats as their bits."""
+"""Columns of a half edge that is sent: its nodes, the third node of its face and the opposite one, the owners of
+these two, the face, its state, initial length, m, lowest initial height of its tet, m, and the unit normal of the
+face; floats by their bits."""
 _HALF, _ROW = 13, 17
-"""Columns of a half edge, and of an edge (``_matched``)."""
+"""Number of columns of a half edge, and of an edge (``_matched``)."""
 
 
 def none() -> tuple[Edges, Ints, Indices]:
-    """No edge (``find``)."""
+    """Returns the result of ``find`` without edges."""
     nothing = np.zeros((0, 6), np.int64)
     lengths = np.zeros(0), np.zeros(0)
     edges = Edges(nothing, nothing[:, :2], *lengths, np.zeros((0, 2), np.uint8), np.zeros(0, bool))
@@ -53,11 +53,12 @@ def find(
     neighbours: list[Neighbour],
     comm: Comm,
 ) -> tuple[Edges, Ints, Indices]:
-    """The edges by the ids of their faces, and ids of the nodes of theirs that are not held here, with their owners.
+    """Returns the edges by the ids of their faces, and ids and owners of those of their nodes that this rank does not
+    hold.
 
-    Of ``some`` (f,) of the faces, with the ``local`` nodes (f, 4) and unit normals (f, 3); ``opened`` (f,): see Edges.
-    Where other ranks may hold faces of an edge, the owner of the lower node brings them together, and the rank of the
-    face of smaller id has the edge.
+    Of ``some`` (f,) of the faces, with the ``local`` nodes (f, 4) and unit normals (f, 3); ``opened`` (f,): see
+    Edges. Where other ranks may hold faces of an edge, the owner of the lower node matches them, and the rank of the
+    face of smaller id gets the edge.
     """
     half = np.repeat(some[:, None], 3, axis=1)
     away = half & _common(local, model.nodes.n, neighbours) if neighbours else np.zeros_like(half)
@@ -81,12 +82,13 @@ def find(
 
 
 def depths(size: Floats, low: Floats) -> Floats:
-    """(e,) how deep edges of the initial length ``size`` hold, m, whose tets are as ``low`` at the start."""
+    """(e,) greatest depth of a contact, m, of edges of the initial length ``size`` whose tets have the initial
+    height ``low``."""
     return np.maximum(DEEP * np.minimum(size, low), DEEP_SELF * size)
 
 
 def _common(local: Indices, n: int, neighbours: list[Neighbour]) -> Flags:
-    """(f, 3) which half edges have two of the ``n`` nodes that other ranks hold, too."""
+    """(f, 3) half edges with two of the ``n`` nodes that other ranks hold too."""
     shared = np.zeros(n, bool)
     for other in neighbours:
         shared[other.nodes] = True
@@ -97,8 +99,8 @@ def _common(local: Indices, n: int, neighbours: list[Neighbour]) -> Flags:
 def _elsewhere(
     model: Model, faces: Faces, local: Indices, units: Floats, heights: Floats, away: Flags, opened: Bits, comm: Comm
 ) -> Ints:
-    """Rows (``_matched``) of this rank's edges among the half edges ``away`` (f, 3); ``heights`` (f,): lowest of
-    their tets, m; all ranks take part.
+    """Rows (``_matched``) of this rank's edges among the half edges ``away`` (f, 3); ``heights`` (f,): lowest
+    heights of their tets, m. Collective.
     """
     nodes, (f, k) = model.nodes, np.nonzero(away)
     a, b, c, d = (*(local[f, (k + i) % 3] for i in range(3)), local[f, 3])
@@ -114,9 +116,8 @@ def _elsewhere(
 
 
 def _matched(halves: Ints, sender: Ints) -> tuple[Ints, Ints]:
-    """Rows (nodes of records.Edges, owners of the last four, face abc, face bad, length, lowest height of either tet,
-    how far either face is open, whether it is sharp) of the edges of ``halves``, and the sender of the first face of
-    each.
+    """Rows (nodes of records.Edges, owners of the last four, face abc, face bad, length, lowest height of either
+    tet, states of either face, sharpness) of the edges of ``halves``, and the sender of the first face of each.
     """
     order = np.argsort(halves[:, _FACE], kind="stable")
     halves, sender = halves[order], sender[order]
@@ -135,11 +136,11 @@ def _matched(halves: Ints, sender: Ints) -> tuple[Ints, Ints]:
 
 @njit("int32[:, ::1](int32[:, ::1], boolean[:, ::1], float64[:, ::1], int64, float64)", cache=True)
 def _pairs(corners, half, units, nodes, sharp):  # type: ignore[no-untyped-def]
-    """(p, 5) edges: a face, which of its half edges, the same of the other face, and whether it is sharp; by face, then
-    by face.
+    """(p, 5) edges: a face, the number of its half edge, the same of the other face, and sharpness; by face, then by
+    other face.
 
-    ``corners`` (f, 3 or more) of faces by ascending id, fewer than ``nodes``; ``half`` (f, 3): which of their half
-    edges, k from corner k to the next, count; ``sharp``: cosine of the least angle between their ``units``.
+    ``corners`` (f, 3 or more) of faces by ascending id, below ``nodes``; ``half`` (f, 3): half edges to be matched,
+    k from corner k to the next; ``sharp``: cosine of the least angle between their ``units``.
     """
     begin = _by_lower_node(corners, half, nodes)
     at, higher, which = begin[:-1].copy(), np.empty(begin[nodes], np.int32), np.empty(begin[nodes], np.int32)
@@ -179,7 +180,7 @@ def _pairs(corners, half, units, nodes, sharp):  # type: ignore[no-untyped-def]
 
 @njit("int64[::1](int32[:, ::1], boolean[:, ::1], int64)", cache=True)
 def _by_lower_node(corners, half, nodes):  # type: ignore[no-untyped-def]
-    """(nodes + 1,) where the half edges of each lower node begin."""
+    """(nodes + 1,) offsets of the half edges by their lower node."""
     begin = np.zeros(nodes + 1, np.int64)
     for f in range(len(corners)):
         for k in range(3):
@@ -196,7 +197,7 @@ def _by_lower_node(corners, half, nodes):  # type: ignore[no-untyped-def]
     cache=True,
 )
 def _fill(nodes, sides, size, low, opened, pairs, local, face_nodes, face_id, face_opened, x, heights):  # type: ignore[no-untyped-def]
-    """The columns of the edges that are ``pairs``, with the ``low`` height of their tets of the ``heights`` (f,)."""
+    """Writes the columns of the edges ``pairs``; ``low``: the lower of the ``heights`` (f,) of their tets."""
     for p in range(len(pairs)):
         f, k, g, m = pairs[p, 0], pairs[p, 1], pairs[p, 2], pairs[p, 3]
         for i in range(3):
@@ -223,9 +224,9 @@ def _heights(local, x):  # type: ignore[no-untyped-def]
     cache=True,
 )
 def turned(sharp, corners, meets, x, part, least):  # type: ignore[no-untyped-def]
-    """(e,) which edges whose faces allow that others meet them, ``meets``, are not ``sharp`` yet, bulge at the
-    positions ``x`` (slots, 3), m, and have faces whose normals have a cosine below the ``least`` (parts,) of their
-    ``part`` (slots,); ``corners`` (e, 6): see records.Edges.
+    """(e,) edges that become sharp: both faces allow contact, ``meets``, the edge is not ``sharp`` yet, is convex at
+    the positions ``x`` (slots, 3), m, and the cosine between its faces' normals is below the ``least`` (parts,) of
+    its ``part`` (slots,); ``corners`` (e, 6): see records.Edges.
     """
     found = np.zeros(len(sharp), np.bool_)
     for e in range(len(sharp)):

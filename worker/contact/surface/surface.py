@@ -1,4 +1,4 @@
-"""The surface of the bodies on one rank: exposed faces, the edges between them, and the nodes on either."""
+"""Surface of the bodies on one rank: exposed faces, their edges and nodes."""
 
 from dataclasses import dataclass, field
 
@@ -15,31 +15,31 @@ from . import sharp
 from .records import CrackSides, Edges, Faces
 
 _UNSEEN, _COVERED, _YOUNG, _AGED, _EXPOSED, _BARE = range(6)
-"""Kinds of faces: none of the surface; one that erosion may lay bare; side of a crack that may open, whose edges
-do not meet others yet, or do; exposed; exposed by erosion."""
+"""Kinds of faces: not on the surface; exposed if a tet erodes; side of a crack that may open, without or with
+edge-edge contact; exposed; exposed by erosion."""
 
 
 @dataclass
 class Surface:
-    """What one rank has of it."""
+    """Share of one rank of the surface."""
 
     faces: Faces
-    """Of this rank's tets."""
+    """Faces of this rank's tets."""
     edges: Edges
-    """Those whose face of smaller id is of this rank's tets, sharp or not."""
+    """Edges whose face of smaller id is of this rank's tets, sharp or not."""
     flags: Flags
-    """(nodes,) which nodes of this rank are on the surface, by a face of any rank; or were, and have lost it."""
+    """(nodes,) local nodes that are or have been on the surface, by a face of any rank."""
     waiting: Flags
-    """(nodes,) which nodes of this rank are on what may become surface before the next search, by any rank's face."""
+    """(nodes,) local nodes of faces of any rank that may become surface before the next search."""
     far: Ints
     """(k,) ids of nodes of ``edges`` that this rank does not hold."""
     far_owner: Indices
     """(k,) their owners."""
     turned: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
-    """(t,) names of those of ``edges`` that flow has made sharp, ascending."""
+    """(t,) names of the ``edges`` that became sharp during the run, ascending."""
 
     def sharpen(self, names: Ints) -> None:
-        """Those of the edges that have such ``names``, ascending, have become sharp."""
+        """Marks the edges with these ``names``, ascending, as sharp."""
         if len(names):
             own = self.edges.names
             self.turned, self.edges.sharp[among(names, own)] = np.intersect1d(own, names), True
@@ -54,12 +54,12 @@ def build(
     cracks: CrackSides,
     covered: Indices,
 ) -> Surface:
-    """The surface; all ranks take part.
+    """Builds the surface. Collective.
 
-    ``planes`` (nodes, planes) says which nodes lie on which symmetry plane. A face with all three nodes on the same
-    plane is no surface; a face of a body one tet thick, with nodes on two parallel planes, is part of it. ``cracks``:
-    those that may open before the next search; ``covered`` (m, 3): block, place and face of what erosion may lay bare.
-    What it has laid bare meets nodes; edges there meet no edges: they would be as many as the faces, and all sharp.
+    ``planes`` (nodes, planes): membership of nodes in symmetry planes. A face with all three nodes on one plane is
+    not on the surface; a face of a body one tet thick, with nodes on two parallel planes, is. ``cracks``: sides that
+    may open before the next search; ``covered`` (m, 3): block, row and face of faces that erosion may expose. Faces
+    exposed by erosion are in contact with nodes; their edges are in no edge-edge contact: nearly all would be sharp.
     """
     local, ids, kind = _faces(model, planes, cracks, covered)
     nodes, n = model.nodes, len(ids)
@@ -74,8 +74,8 @@ def build(
 
 
 def _faces(model: Model, planes: Flags, cracks: CrackSides, covered: Indices) -> tuple[Indices, Ints, Bits]:
-    """(f, 4) local nodes of the exposed faces, the ``cracks`` and those that are ``covered``, the opposite one last;
-    their ids, ascending; and kinds.
+    """(f, 4) local nodes of the exposed faces, the sides of ``cracks`` and the ``covered`` faces, the opposite node
+    last; their ids, ascending; and their kinds.
     """
     kinds, counts = [np.zeros((block.n, 4), np.uint8) for block in model.blocks], []
     for b, (block, kind) in enumerate(zip(model.blocks, kinds, strict=True)):
@@ -93,8 +93,8 @@ def _faces(model: Model, planes: Flags, cracks: CrackSides, covered: Indices) ->
 
 @njit("int64(uint8[:, ::1], uint32[:, ::1], int32[:, ::1], uint8[:, ::1], boolean[:, ::1])", cache=True)
 def _sort_out(kind, tets, across, bond, planes):  # type: ignore[no-untyped-def]
-    """The kinds of the faces of a block, in ``kind`` (n, 4), which has those that may become surface; returns how many
-    are, or may.
+    """Completes the kinds ``kind`` (n, 4) of the faces of a block, which has those that may become surface; returns
+    the number of faces that are on the surface or may be.
     """
     n = 0
     for e in range(len(tets)):
@@ -115,7 +115,7 @@ def _sort_out(kind, tets, across, bond, planes):  # type: ignore[no-untyped-def]
 
 @njit("void(int32[:, ::1], int64[::1], uint8[::1], uint8[:, ::1], uint32[:, ::1], int64[::1])", cache=True)
 def _list(local, ids, kept, kind, tets, tet_id):  # type: ignore[no-untyped-def]
-    """The faces of a block that are not unseen."""
+    """Lists the faces of a block that are on the surface or may be."""
     n = 0
     for e in range(len(tets)):
         for k in range(4):
@@ -134,8 +134,8 @@ def _list(local, ids, kept, kind, tets, tet_id):  # type: ignore[no-untyped-def]
     error_model="numpy",
 )
 def _measure(nodes, size, units, counts, local, exposed, ids, x):  # type: ignore[no-untyped-def]
-    """Global ``nodes`` (f, 4), sizes, m, and unit normals (f, 3) of faces with the ``local`` nodes; and in ``counts``
-    (nodes, 2) a one for the nodes of those that are ``exposed``, and of those that are not.
+    """Computes the global ``nodes`` (f, 4), sizes, m, and unit normals (f, 3) of faces with the ``local`` nodes, and
+    sets ``counts`` (nodes, 2) to one for the nodes of ``exposed`` faces, and of others.
     """
     e, g = np.empty(3), np.empty(3)
     for f in range(len(local)):
