@@ -18,6 +18,7 @@ from .database import identity
 from .database.store import Store
 from .intake import reader
 from .intake.receiving import Receiver
+from .intake.searches import Searches
 from .intake.submission import Desk
 from .intake.sweeps import Sweeps
 from .intake.uploads import Uploads
@@ -120,6 +121,7 @@ def opened(settings: Settings) -> Iterator[Service]:
             surveyors=reader.surveyors(),
             sweepers=reader.pool(reader.SWEEP),
             sweeps=sweeps,
+            searches=Searches(sweeps.plans, store),
             uploads=uploads,
             receiver=Receiver(uploads, pool),
             removal=removal,

@@ -10,6 +10,7 @@ from .answers.download import Downloads
 from .answers.history import Histories
 from .database.store import Store
 from .intake.receiving import Receiver
+from .intake.searches import Searches
 from .intake.submission import Desk
 from .intake.sweeps import Sweeps
 from .intake.uploads import Uploads
@@ -49,6 +50,7 @@ class Service:
     sweepers: ThreadPool
     """For sweeps, each of which is read for seconds: nobody who hands in a run waits for them."""
     sweeps: Sweeps
+    searches: Searches
     uploads: Uploads
     receiver: Receiver
     removal: Removal

@@ -2,7 +2,7 @@
 
 import hashlib
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
@@ -23,6 +23,7 @@ from . import ballistic
 from .adaptive_result import Book, Found, Tried
 from .bracket import Bracket, Sample, between, bracket, widest
 from .goal import Goal, Span, changes, goal_of, tolerance_of
+from .reporting import Reported, Reporter, in_si
 
 MOST = 40
 """Runs, at most, where no other number is given. Chosen: a bisection takes 20 to a millionth."""
@@ -49,6 +50,9 @@ class Server(Protocol):
         """As of a Session."""
 
     def runs(self, states: Sequence[str] = (), limit: int = 50) -> Sequence[RunInfo]:
+        """As of a Session."""
+
+    def put(self, kind: type[Reported], path: str, body: bytes, headers: Mapping[str, str]) -> Reported:
         """As of a Session."""
 
 
@@ -91,12 +95,19 @@ def found_by(
         at_once=at_once, most=most, since=max((run.id for run in session.runs(limit=1)), default=""),
     )  # fmt: skip
     book = Book(out, ready, wish, [span.key for span in spans])
-    return book.close(search(session, wanted, book, say, at))
+    return book.close(search(session, wanted, book, _reporter(session, wanted), say, at))
 
 
-def search(session: Server, wanted: Search, book: Book, say: Say, at: Say) -> Found:
+def _reporter(session: Server, wanted: Search) -> Reporter:
+    keys = [span.key for span in wanted.spans]
+    name = _hash(metadata.version("conoid"), wanted.goal.result, wanted.goal.threshold, keys, wanted.case)
+    case = str(wanted.case.get("name", ""))
+    return Reporter(session.put, name, case, wanted.goal, wanted.spans, wanted.tolerance)
+
+
+def search(session: Server, wanted: Search, book: Book, told: Reporter, say: Say, at: Say) -> Found:
     """Runs points until the bracket is as narrow as the tolerance, or no point is left that would help. ``say`` hears
-    of each run that has ended, ``at`` what goes on.
+    of each run that has ended, ``at`` what goes on; ``told`` reports to the server.
 
     Points of the ``book`` that have succeeded are not run again; what is new is written into it at once. Raises
     CaseError for ends that make no valid case, ClientError.
@@ -104,17 +115,33 @@ def search(session: Server, wanted: Search, book: Book, say: Say, at: Say) -> Fo
     for x in wanted.ends:
         parse_case(apply_overrides(wanted.case, changes(wanted.spans, x)))
     fresh: list[Tried] = []
+    _report(wanted, told, _counted(wanted, book, fresh))
     many = wanted.at_once or _free(session, wanted.case)
     while True:
-        tried = [each for each in (*book.good(), *fresh) if wanted.ends[0] <= each.x <= wanted.ends[1]]
-        following, why = _next(wanted, tried, len(fresh), many)
+        tried = _counted(wanted, book, fresh)
+        following, why = ([], _CANCELLED) if told.stop else _next(wanted, tried, len(fresh), many)
         if not following:
-            return _found(wanted, list({each.x: each for each in tried}.values()), why, len(fresh))
+            found = _found(wanted, list({each.x: each for each in tried}.values()), why, len(fresh))
+            _report(wanted, told, tried, over=True, why=found.unsettled)
+            return found
         at(f"{counted(len(following), 'run')} at {', '.join(map(number, following))} {wanted.spans[0].unit}".strip())
-        for each in _round(session, wanted, following):
+        for each, open_ones in _round(session, wanted, told, tried, following):
             fresh.append(each)
             book.add(each)
+            _report(wanted, told, [*_counted(wanted, book, fresh), *open_ones])
             say(f"{_at(wanted, each.x)}: {_told(wanted, each)}; {_state(wanted, [*tried, *fresh])}")
+
+
+def _counted(wanted: Search, book: Book, fresh: Sequence[Tried]) -> list[Tried]:
+    """The points within the range, of earlier commands and of this one."""
+    return [each for each in (*book.good(), *fresh) if wanted.ends[0] <= each.x <= wanted.ends[1]]
+
+
+def _report(wanted: Search, told: Reporter, tried: Sequence[Tried], *, over: bool = False, why: str = "") -> None:
+    ended = [each for each in tried if each.value is not None]
+    made = bracket(_samples(ended))
+    fit = None if made is None else _fit(wanted, ended, made)
+    told.tell(list({each.x: each for each in tried}.values()), made, fit, over=over, why=why)
 
 
 def _next(wanted: Search, tried: Sequence[Tried], spent: int, many: int) -> tuple[list[float], str]:
@@ -142,23 +169,29 @@ def _next(wanted: Search, tried: Sequence[Tried], spent: int, many: int) -> tupl
 
 
 _USED_UP = "as many runs as are allowed have been made"
+_CANCELLED = "it was cancelled on the server; the same command goes on with it"
 
 
 def _samples(tried: Sequence[Tried]) -> list[Sample]:
     return [Sample(each.x, each.f) for each in tried]
 
 
-def _round(session: Server, wanted: Search, at: Sequence[float]) -> "list[Tried]":
-    """Runs points at the same time; in their order."""
-    runs = [(x, _submitted(session, wanted, x)) for x in at]
-    return [_ended(wanted, x, run) for x, run in runs]
+def _round(
+    session: Server, wanted: Search, told: Reporter, tried: Sequence[Tried], at: Sequence[float]
+) -> Iterator[tuple[Tried, list[Tried]]]:
+    """Runs points at the same time; each in their order when it has ended, with those that are still open."""
+    runs = [(x, _submitted(session, wanted, told, x)) for x in at]
+    started = [Tried(x=x, values=changes(wanted.spans, x), run=run.id, state="") for x, run in runs]
+    _report(wanted, told, [*tried, *started])
+    for n, (x, run) in enumerate(runs):
+        yield _ended(wanted, x, run), started[n + 1 :]
 
 
-def _submitted(session: Server, wanted: Search, x: float) -> Run:
+def _submitted(session: Server, wanted: Search, told: Reporter, x: float) -> Run:
     """The run of a point. One of an earlier search is taken where it has succeeded or goes on, else it is repeated."""
     case = apply_overrides(wanted.case, changes(wanted.spans, x))
-    name = f"adaptive-{_hash(wanted.goal.result, [span.key for span in wanted.spans], case)[:12]}"
-    labels = {"sweep": f"adaptive {wanted.goal.result}"[:200], "point": _at(wanted, x)[:200]}
+    name = f"adaptive-{_hash(wanted.goal.result, [span.key for span in wanted.spans], case, told.id)[:12]}"
+    labels = {"sweep": told.id or f"adaptive {wanted.goal.result}"[:200], "point": _at(wanted, x)[:200]}
     for attempt in range(_ATTEMPTS):
         key = f"{name}-{_hash(metadata.version('conoid'), case)}-{attempt}"
         try:
@@ -224,7 +257,7 @@ def _fit(wanted: Search, tried: Sequence[Tried], made: Bracket) -> ballistic.Fit
     samples = _samples(tried)
     speeds = wanted.spans[0].unit.endswith("/s") and wanted.goal.unit == "m/s"
     if speeds and ballistic.stops(samples, made, wanted.goal.threshold):
-        return ballistic.residual_velocity(samples, made, wanted.goal.threshold)
+        return ballistic.residual_velocity(samples, made, wanted.goal.threshold, in_si(wanted.spans[0])[0])
     known = [sample.f for sample in samples if sample.f is not None]
     return ballistic.line(samples, made) if min(known) < 0.0 < max(known) and made.changes == 1 else None
 

@@ -79,6 +79,11 @@ class Found(msgspec.Struct, kw_only=True, frozen=True):
         """Whether the bracket is as narrow as was asked for."""
         return self.limit is not None and not self.why
 
+    @property
+    def unsettled(self) -> str:
+        """Why it is not as close as was asked for; empty where it is."""
+        return self.why or ("" if self.limit is not None else "the threshold is not passed in the range")
+
     def lines(self) -> list[str]:
         """For people."""
         told = [self._first(), *self._passes()]

@@ -15,6 +15,8 @@ _NEAREST = 4
 """Points through which a line is drawn. Chosen: so near to the root that the curve between them is one."""
 _EXPONENT = 1.0, 6.0
 """Bounds of p. Chosen: energies that add up make 2, long rods at high speed have up to 5 (Lambert and Jonas 1976)."""
+_COURSE = 60
+"""Places along a curve that is drawn. Chosen: a chart has some hundred pixels."""
 _STOPPED = 0.2
 """Of the largest residual velocity: what is left before the limit is less. Chosen: a rebound has a few per cent."""
 
@@ -31,6 +33,10 @@ class Fit(msgspec.Struct, kw_only=True, frozen=True):
     """a of the law, or the slope of the line."""
     exponent: float | None = None
     """p of the law."""
+    scale: float = 1.0
+    """The unit of x in that of the result, for a law of velocities."""
+    covariance: tuple[tuple[float, ...], ...] = ()
+    """Of ``limit``, ``factor`` and, where it is fitted, ``exponent``; empty without an ``error``."""
 
 
 def stops(samples: Sequence[Sample], found: Bracket, threshold: float) -> bool:
@@ -39,14 +45,27 @@ def stops(samples: Sequence[Sample], found: Bracket, threshold: float) -> bool:
     return found.changes == 1 and max(y for _, y in before) <= _STOPPED * max(y for _, y in beyond)
 
 
-def residual_velocity(samples: Sequence[Sample], found: Bracket, threshold: float) -> Fit | None:
+def residual_velocity(samples: Sequence[Sample], found: Bracket, threshold: float, scale: float = 1.0) -> Fit | None:
     """v_r = a (v^p - v_bl^p)^(1/p) through the points beyond the limit (Lambert and Jonas, BRL R-1828, 1976; with
     p = 2 Recht and Ipson, J. Appl. Mech. 30, 1963, where a is the share of the masses).
 
-    Velocities may count below zero: magnitudes are fitted. None for too few points, or without scipy.
+    Velocities may count below zero: magnitudes are fitted. ``scale`` is the unit of x in that of the result. None for
+    too few points, or without scipy.
     """
     x, y = zip(*_sides(samples, found, threshold)[1], strict=True)
-    return None if len(x) < _FIXED else _lambert_jonas(x, y) if len(x) >= _FREE else _recht_ipson(x, y)
+    if len(x) < _FIXED:
+        return None
+    made = (_lambert_jonas if len(x) >= _FREE else _recht_ipson)([scale * v for v in x], y)
+    return made and _in_unit(made, scale)
+
+
+def _in_unit(fit: Fit, scale: float) -> Fit:
+    """With the limit in the unit of x; a has none."""
+    worth = [1.0 / scale, 1.0, 1.0]
+    spread = tuple(tuple(v * worth[n] * worth[k] for k, v in enumerate(row)) for n, row in enumerate(fit.covariance))
+    return msgspec.structs.replace(
+        fit, scale=scale, limit=fit.limit / scale, error=fit.error and fit.error / scale, covariance=spread
+    )
 
 
 def _sides(
@@ -59,26 +78,20 @@ def _sides(
 
 
 def _lambert_jonas(x: Sequence[float], y: Sequence[float]) -> Fit | None:
-    def curve(v: Any, limit: float, a: float, p: float) -> Any:
-        return a * (v**p - limit**p).clip(0.0) ** (1.0 / p)
-
     bounds = [0.0, 0.1, _EXPONENT[0]], [x[1], 2.0, _EXPONENT[1]]
-    made = _fitted(curve, x, y, [0.98 * x[0], 1.0, 2.0], bounds)
-    if made is None:
-        return None
-    (limit, a, p), errors = made
-    return Fit(law="Lambert and Jonas", limit=limit, error=errors[0], points=len(x), factor=a, exponent=p)
+    return _fitted("Lambert and Jonas", _left, x, y, [0.98 * x[0], 1.0, 2.0], bounds)
 
 
 def _recht_ipson(x: Sequence[float], y: Sequence[float]) -> Fit | None:
-    def curve(v: Any, limit: float, a: float) -> Any:
-        return a * (v**2 - limit**2).clip(0.0) ** 0.5
+    return _fitted("Recht and Ipson", _left, x, y, [0.98 * x[0], 1.0], ([0.0, 0.1], [x[1], 2.0]), 2.0)
 
-    made = _fitted(curve, x, y, [0.98 * x[0], 1.0], ([0.0, 0.1], [x[1], 2.0]))
-    if made is None:
-        return None
-    (limit, a), errors = made
-    return Fit(law="Recht and Ipson", limit=limit, error=errors[0], points=len(x), factor=a, exponent=2.0)
+
+def _left(v: Any, limit: float, a: float, p: float = 2.0) -> Any:
+    return a * (v**p - limit**p).clip(0.0) ** (1.0 / p)
+
+
+def _straight(v: Any, root: float, a: float) -> Any:
+    return a * (v - root)
 
 
 def line(samples: Sequence[Sample], found: Bracket) -> Fit | None:
@@ -89,18 +102,41 @@ def line(samples: Sequence[Sample], found: Bracket) -> Fit | None:
     assert found.low.f is not None
     assert found.high.f is not None
     slope = (found.high.f - found.low.f) / found.width
-    made = _fitted(lambda v, root, a: a * (v - root), x, y, [centre, slope])
-    if made is None:
-        return None
-    (root, a), errors = made
-    return Fit(law="line", limit=root, error=errors[0], points=len(x), factor=a)
+    return _fitted("line", _straight, x, y, [centre, slope])
+
+
+def course(fit: Fit, low: float, high: float) -> list[tuple[float, float, float | None]]:
+    """x, value and its standard error along the curve, from ``low`` to ``high``: magnitudes for velocities, distances
+    from the threshold for a line. The error follows from the covariance by the derivatives at the constants; None
+    next to the limit, where a law of velocities is so steep that the error is larger than the value.
+    """
+    import numpy as np
+
+    x = np.unique(np.append(np.linspace(low, high, _COURSE), fit.limit))
+    x = x[x >= fit.limit] if fit.law != "line" else x
+    curve = _straight if fit.law == "line" else _left
+    constants = [fit.limit, fit.factor, *([fit.exponent] if fit.exponent is not None else [])]
+    y = fit.scale * curve(x, *constants)
+    if not fit.covariance:
+        return [(float(a), float(b), None) for a, b in zip(x, y, strict=True)]
+    slopes = np.array([_slope(curve, x, constants, n) for n in range(len(fit.covariance))])
+    error = fit.scale * np.sqrt(np.clip(np.sum(slopes * (np.array(fit.covariance) @ slopes), axis=0), 0.0, None))
+    known = [None if fit.law != "line" and c >= b else float(c) for b, c in zip(y, error, strict=True)]
+    return [(float(a), float(b), c) for a, b, c in zip(x, y, known, strict=True)]
+
+
+def _slope(curve: Callable[..., Any], x: Any, constants: Sequence[float], n: int) -> Any:
+    """The derivative of a curve by its constant ``n``."""
+    step = 1e-6 * (abs(constants[n]) or 1.0)
+    up, down = ([c + (k == n) * way * step for k, c in enumerate(constants)] for way in (1, -1))
+    return (curve(x, *up) - curve(x, *down)) / (2.0 * step)
 
 
 def _fitted(
-    curve: Callable[..., Any], x: Sequence[float], y: Sequence[float], start: Sequence[float],
-    bounds: tuple[Sequence[float], Sequence[float]] | None = None,
-) -> tuple[list[float], list[float | None]] | None:  # fmt: skip
-    """Constants and their standard errors by least squares; None where that does not converge."""
+    law: str, curve: Callable[..., Any], x: Sequence[float], y: Sequence[float], start: Sequence[float],
+    bounds: tuple[Sequence[float], Sequence[float]] | None = None, exponent: float | None = None,
+) -> Fit | None:  # fmt: skip
+    """The constants by least squares, ``exponent`` where it is not one of them; None where that does not converge."""
     try:
         import numpy as np
         from scipy.optimize import OptimizeWarning, curve_fit
@@ -115,6 +151,9 @@ def _fitted(
             values, covariance = curve_fit(curve, np.array(x), np.array(y), p0=start, maxfev=20_000, **limits)
     except (RuntimeError, ValueError):
         return None
-    spread = [math.sqrt(abs(v)) for v in np.diag(covariance)]
-    enough = len(x) > len(values)
-    return [float(v) for v in values], [s if enough and math.isfinite(s) else None for s in spread]
+    known = len(x) > len(values) and bool(np.isfinite(covariance).all())
+    limit, factor, *more = map(float, values)
+    return Fit(
+        law=law, limit=limit, error=math.sqrt(abs(covariance[0][0])) if known else None, points=len(x), factor=factor,
+        exponent=more[0] if more else exponent, covariance=tuple(map(tuple, covariance.tolist())) if known else (),
+    )  # fmt: skip

@@ -2,7 +2,7 @@
 
 import { Problem, call, refused } from "./api.js";
 import { columnsOf } from "./columns.js";
-import { count, counted, h } from "./figures.js";
+import { count, counted, exact, h, vector } from "./figures.js";
 import { Grid } from "./grid.js";
 import { FINAL } from "./live.js";
 import { grouped, matcher, sorted } from "./sorting.js";
@@ -198,6 +198,7 @@ export class RunsPage {
     const done = rows.filter(({ state }) => FINAL.has(state)).length;
     const brief = shorts(this.sweeps.keys()).get(key) ?? key;
     const failed = rows.filter(({ state }) => FINAL.has(state) && state !== "succeeded").length;
+    if (sweep?.search) return { title: `${sweep.name}, adaptive`, brief, href: `#/sweeps/${encodeURIComponent(key)}`, note: soughtFor(sweep.search) };
     const told = `${done} of ${count(sweep?.total ?? rows.length)} done${failed ? `, ${count(failed)} without a result` : ""}`;
     return { title: sweep?.name ?? rows[0].name, brief, href: `#/sweeps/${encodeURIComponent(key)}`, note: told };
   }
@@ -259,6 +260,12 @@ export class RunsPage {
     const shown = this.rows.filter(({ id }) => kept.marked.has(id)).map(({ id }) => id);
     return [...shown, ...[...kept.marked].filter((id) => !shown.includes(id))];
   }
+}
+
+// What an adaptive sweep looks for, and where it is.
+function soughtFor({ key, result, threshold, result_unit: up, bracket, unit }) {
+  const found = bracket ? vector([(bracket[0] + bracket[1]) / 2, (bracket[1] - bracket[0]) / 2], unit, 4, " ± ") : "not bracketed";
+  return `${result} = ${exact(threshold, up)} at ${key} ${found}`;
 }
 
 // What was changed within a group: "velocity[2] 60 to 300 m/s".

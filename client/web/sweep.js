@@ -9,11 +9,13 @@ import { Grid } from "./grid.js";
 import { FINAL } from "./live.js";
 import { sorted } from "./sorting.js";
 import { recall, remember } from "./storage.js";
+import { Answer, goesOn } from "./search.js";
 import { curves, matrix, telling, together } from "./response.js";
 import { RunTable, shorts } from "./runtable.js";
 import { fill } from "./toolbar.js";
 
 const AGAIN = 2000; // ms until a sweep that goes on is read again.
+const LATER = 10000; // ms likewise of an adaptive sweep whose command may go on with it.
 const TALL = 320;
 const PAGE = 500;
 const BRIEF = 9; // Letters of the id that are shown.
@@ -32,6 +34,7 @@ export class SweepPage {
     this.abort.abort();
     clearTimeout(this.timer);
     this.chart.close();
+    this.answer.close();
     this.grid.close();
   }
 
@@ -55,8 +58,9 @@ export class SweepPage {
       this.chart.element);
     this.map = h("section.card", { hidden: "" }, h("div.card-head", {}, h("h2", {}, "Matrix"), this.mapNote = h("span.note")), this.squares);
     this.grid = new Grid("points", { sort: (column) => this.sortBy(column), mark: (row, on) => this.mark([row], on), markAll: (rows, on) => this.mark(rows, on), toggle() {} });
+    this.answer = new Answer();
     this.seen = h("div.seen", {}, this.response, this.map);
-    this.element = h("div.sweep", {}, h("div.page-head", {}, this.title, this.brief, this.how, this.bar, h("span.grow"), this.tools), this.problem, this.failed, this.seen, this.grid.region);
+    this.element = h("div.sweep", {}, h("div.page-head", {}, this.title, this.brief, this.how, this.bar, h("span.grow"), this.tools), this.problem, this.answer.element, this.failed, this.seen, this.grid.region);
     this.grid.region.hidden = true;
   }
 
@@ -67,7 +71,7 @@ export class SweepPage {
     const { signal } = this.abort;
     try {
       this.info = await call(this.path, { signal });
-      let query = { limit: PAGE, label: `sweep=${this.id}` };
+      let query = { limit: PAGE, sweep: this.id };
       let pending = 0;
       for (;;) {
         const answer = await call(`v1/table?${new URLSearchParams(query)}`, { signal });
@@ -85,6 +89,7 @@ export class SweepPage {
       if (refused(error)) return;
     }
     if (!this.finished || this.pending) this.timer = setTimeout(() => this.read(), this.pending ? 300 : AGAIN);
+    else if (this.info.search && !this.info.search.over) this.timer = setTimeout(() => this.read(), LATER);
   }
 
   fail(words) {
@@ -95,7 +100,10 @@ export class SweepPage {
   // Points whose run has ended, or has been removed after that.
   get ended() { return Object.entries(this.info.states).reduce((sum, [state, n]) => sum + (FINAL.has(state) ? n : 0), this.info.removed); }
 
-  get finished() { return Boolean(this.info) && this.ended === this.info.total; }
+  get finished() {
+    if (!this.info) return false;
+    return this.info.search ? !goesOn(this.info) : this.ended === this.info.total;
+  }
 
   draw() {
     const { info, told } = this;
@@ -110,6 +118,7 @@ export class SweepPage {
     const point = { id: "run", title: "point", value: (row) => this.place.get(row.id), text: (row) => String(1 + this.place.get(row.id)), width: 16 };
     this.columns = [point, ...this.keys, ...others.filter(({ shown }) => shown)];
     this.drawHead();
+    if (this.info.search) this.answer.draw(this.info);
     this.drawFailed();
     this.drawGrid();
     this.choices();
@@ -119,10 +128,10 @@ export class SweepPage {
   drawHead() {
     const { info, ended } = this;
     document.title = `${info.name} · sweep · Conoid`;
-    this.title.textContent = `Sweep of ${info.name}`;
+    this.title.textContent = `${info.search ? "Adaptive sweep" : "Sweep"} of ${info.name}`;
     const states = Object.entries(info.states).sort(([a], [b]) => (b === "succeeded") - (a === "succeeded")).map(([state, n]) => `${n} ${words(state)}`);
-    this.how.textContent = `${ended} of ${counted(info.total, "point")} done: ${[...states, ...(info.removed ? [`${info.removed} removed`] : [])].join(", ")}`;
-    this.bar.replaceChildren(this.finished ? "" : meter("running", ended / info.total));
+    this.how.textContent = `${info.search ? counted(info.total, "point") : `${ended} of ${counted(info.total, "point")} done`}: ${[...states, ...(info.removed ? [`${info.removed} removed`] : [])].join(", ")}`;
+    this.bar.replaceChildren(this.finished || info.search ? "" : meter("running", ended / info.total));
     this.tools.hidden = false;
     this.stop.hidden = this.finished;
     this.fail("");

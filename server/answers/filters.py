@@ -31,6 +31,8 @@ class Chosen:
     """Submitted then, or later."""
     until: float | None = None
     """Submitted before."""
+    runs: Sequence[str] | None = None
+    """One of these; None: of all."""
     changed: float | None = None
     """Open, or submitted or ended then, or later."""
 
@@ -50,6 +52,8 @@ class Chosen:
             yield runs.submitted >= self.since
         if self.until is not None:
             yield runs.submitted < self.until
+        if self.runs is not None:
+            yield runs.id.in_(self.runs)
         if self.changed is not None:
             yield sa.or_(runs.state.in_(OPEN), runs.finished >= self.changed, runs.submitted >= self.changed)
 

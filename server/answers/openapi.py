@@ -31,6 +31,13 @@ SWEEP_BODY: dict[str, Any] = {
     }
 }
 """Body of the route that takes a sweep."""
+SEARCH_BODY: dict[str, Any] = {
+    "requestBody": {
+        "required": True,
+        "content": {"application/json": {"schema": {"$ref": "#/components/schemas/Search"}}},
+    }
+}
+"""Body of the route that takes the report of an adaptive sweep."""
 FILE_BODY: dict[str, Any] = {
     "parameters": [
         {
@@ -79,6 +86,7 @@ ANSWERS: dict[tuple[str, str], dict[int, tuple[str, str]]] = {
     ("put", "/v1/files/{sha256}"): {200: (_JSON, "SentFile"), 201: (_JSON, "SentFile")},
     ("delete", "/v1/files/{sha256}"): {204: ("", "")},
     ("post", "/v1/sweeps"): {202: (_JSON, "Sweep")},
+    ("put", "/v1/sweeps/adaptive/{name}"): {200: (_JSON, "Reported")},
     ("get", "/v1/sweeps"): {200: (_JSON, "SweepPage")},
     ("get", "/v1/sweeps/{sweep_id}"): {200: (_JSON, "Sweep")},
     ("get", "/v1/sweeps/{sweep_id}/table"): {200: ("text/csv", "")},

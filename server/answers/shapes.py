@@ -6,6 +6,7 @@ import msgspec
 
 from conoid.cases.messages import Progress, Snapshot
 from conoid.cases.outcome import Outcome
+from conoid.cases.output.search import Search
 from conoid.cases.run import Cause, State
 
 MOST_POINTS = 1000
@@ -281,6 +282,18 @@ class SweepLine(msgspec.Struct, kw_only=True):
     states: dict[str, int]
     removed: int
     url: str
+    search: Search | None
+    """The last report of an adaptive sweep."""
+    reported: float | None
+    """When it came, Unix s."""
+
+
+class Reported(msgspec.Struct, kw_only=True):
+    """What the client of an adaptive sweep is told: the sweep, and whether it is to hand in no further point."""
+
+    id: str
+    url: str
+    stop: bool
 
 
 class SweepPage(msgspec.Struct, kw_only=True):
@@ -341,5 +354,5 @@ class Health(msgspec.Struct, kw_only=True):
 ALL = (
     Problem, Receipt, RunPage, RunStatus, Table, Validation, Gallery, EventPage, Files, SentFile, Uploads,
     Snapshots, FragmentCourse, History, Me, Health, Wish,
-    SweepPage, Sweep,
+    SweepPage, Sweep, Search, Reported,
 )  # fmt: skip

@@ -12,25 +12,22 @@ import re
 import threading
 import time
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
 
 import msgspec
 
 from conoid.cases.figures import size
 from conoid.cases.load import CaseError
-from conoid.cases.reading import whole
 
-from .. import durable
 from ..errors import ServiceError
 from ..queue.scheduling import Need
 from ..runs import folder
 from ..settings import Settings
+from .plans import Plan, Plans
 from .reading import Reading
 from .submission import Desk, Wishes
 from .sweep_request import Wish, at_point, changed, wish_of
 
 _log = logging.getLogger("conoid.server")
-FOLDER = "sweeps"
 _AGAIN = 2.0
 """s after which a sweep that could not be completed is tried again. Chosen."""
 _MOST_BYTES = 16 << 20
@@ -39,68 +36,24 @@ _JSON = "application/json"
 _HASHES = re.compile(r"[0-9a-f]{64}")
 
 
-class Plan(msgspec.Struct, kw_only=True, frozen=True):
-    """A sweep as it is kept; ``runs`` is empty until all of them are accepted. ``submitted`` in Unix s."""
-
-    id: str
-    owner: str
-    name: str
-    submitted: float
-    key: str | None
-    digest: str
-    at_once: int | None
-    """Runs of the sweep that run at a time; None: as many as there are slots."""
-    points: list[dict[str, Any]]
-    runs: list[str] = []
-    case: dict[str, Any] | None = None
-    """What is changed at each point, until all runs are accepted."""
-    tries: list[int] = []
-    """How often each point was run again; empty: none was."""
-    repeated: list[int] = []
-    """Points that are run again, until all of these runs are accepted; ``earlier`` has the runs of before."""
-    earlier: list[str] = []
-
-    @property
-    def whole(self) -> bool:
-        """Whether all of its runs are accepted."""
-        return len(self.runs) == len(self.points) and not self.repeated
-
-    @property
-    def keys(self) -> list[str]:
-        """The idempotency keys of its runs."""
-        tries = self.tries or [0] * len(self.points)
-        return [f"sweep-{self.id}-{n}" + (f"-{again}" if again else "") for n, again in enumerate(tries)]
-
-    @property
-    def wanted(self) -> list[int]:
-        """The points that get a run when it is filled."""
-        return self.repeated or list(range(len(self.points)))
-
-
 class Sweeps:
     """May be used from any thread."""
 
     def __init__(self, settings: Settings, desk: Desk) -> None:
-        """Reads what is there; a file that cannot be read is left alone."""
-        self._folder, self._desk = settings.runs / FOLDER, desk
+        """Reads what is there."""
+        self.plans, self._desk = Plans(settings), desk
         self._locks: dict[str, threading.Lock] = {}
         """By owner: who hands in many points does not hold up others."""
-        self._plans: dict[str, Plan] = {}
         self._filling: set[str] = set()
         self._cancelled: set[str] = set()
-        for path in sorted(self._folder.glob("*.json")):
-            try:
-                self._keep(msgspec.json.decode(whole.read(path), type=Plan))
-            except (OSError, msgspec.MsgspecError):
-                continue
-        self._left = [plan for plan in self._plans.values() if not plan.whole]
+        self._left = [plan for plan in self.plans if not plan.whole]
         self._filling |= {plan.id for plan in self._left}
 
     def complete(self) -> None:
         """Goes on with the sweeps that an earlier server was killed in, in a thread; their runs wait meanwhile."""
         for plan in self._left:
             runs = plan.earlier or self._desk.runs_of(plan.owner, plan.keys)
-            self._plans[plan.id] = msgspec.structs.replace(plan, runs=runs)
+            self.plans.put(msgspec.structs.replace(plan, runs=runs))
         self._complete_later(self._left)
 
     def _complete_later(self, plans: Sequence[Plan]) -> None:
@@ -117,7 +70,8 @@ class Sweeps:
         key: whoever has handed it in got no answer, and hands in another one.
         """
         with self._locks.setdefault(plan.owner, threading.Lock()):
-            if self._plans.get(plan.id, plan).whole or plan.id not in self._plans:
+            there = self.plans.get(plan.id)
+            if there is None or there.whole:
                 return True
             try:
                 if plan.case is None or plan.key is None:
@@ -139,16 +93,12 @@ class Sweeps:
         """The runs that are there; of a sweep that is being handed in no other one follows."""
         if not plan.whole:
             self._cancelled.add(plan.id)
-        return self._plans.get(plan.id, plan).runs
+        return (self.plans.get(plan.id) or plan).runs
 
     def get(self, sweep_id: str, owner: str) -> Plan | None:
         """The sweep, when it belongs to the owner."""
-        plan = self._plans.get(sweep_id)
+        plan = self.plans.get(sweep_id)
         return plan if plan is not None and plan.owner == owner else None
-
-    def of(self, owner: str) -> list[Plan]:
-        """The sweeps of an owner, newest first."""
-        return sorted((p for p in tuple(self._plans.values()) if p.owner == owner), key=lambda p: p.id, reverse=True)
 
     def submit(self, owner: str, body: bytes, key: str | None) -> Plan:
         """Accepts all runs of a sweep, or none. Raises ServiceError. The same key and body give the same sweep."""
@@ -165,7 +115,7 @@ class Sweeps:
         is that of the sweep. Raises ServiceError; then the sweep is as it was.
         """
         with self._locks.setdefault(plan.owner, threading.Lock()):
-            plan = self._plans.get(plan.id, plan)
+            plan = self.plans.get(plan.id) or plan
             if hashlib.sha256(body).hexdigest() != plan.digest:
                 raise ServiceError(422, "key_reused", f"this is another case, or it has other points, than {plan.id}")
             repeated = [n for n, run in failed.items() if plan.whole and plan.runs[n] == run]
@@ -182,7 +132,7 @@ class Sweeps:
         """The plan with the runs that it lacks, all of them or none. Raises ServiceError."""
         cases = self._cases(plan)
         self._desk.check_room(plan.owner, [plan.keys[n] for n in plan.wanted])
-        self._write(plan)
+        self.plans.write(plan)
         self._filling.add(plan.id)
         try:
             filled = self._fill(plan, cases)
@@ -212,13 +162,13 @@ class Sweeps:
 
     def needed(self) -> set[str]:
         """The hashes that stand in sweeps which are being handed in: what may be the files of runs to come."""
-        plans = [plan for plan in tuple(self._plans.values()) if not plan.whole]
+        plans = [plan for plan in self.plans if not plan.whole]
         return {
             word for plan in plans for word in _HASHES.findall(msgspec.json.encode([plan.case, plan.points]).decode())
         }
 
     def _earlier(self, owner: str, key: str | None, digest: str) -> Plan | None:
-        found = [plan for plan in self.of(owner) if key is not None and plan.key == key]
+        found = [p for p in self.plans.of(owner) if key is not None and p.key == key and p.search is None]
         if found and found[0].digest != digest:
             detail = f"Idempotency-Key {key!r} was used for another sweep"
             raise ServiceError(422, "key_reused", detail, pointer="Idempotency-Key", hint="use a new key")
@@ -253,9 +203,9 @@ class Sweeps:
             receipt = self._desk.submit(plan.owner, body, _JSON, keys[n], wishes, reading)
             runs[n : n + 1] = [receipt["id"]]
             plan = msgspec.structs.replace(plan, runs=list(runs))
-            self._plans[plan.id] = plan
+            self.plans.put(plan)
         plan = msgspec.structs.replace(plan, case=None, repeated=[], earlier=[])
-        self._write(plan)
+        self.plans.write(plan)
         return plan
 
     def _take_back(self, plan: Plan) -> None:
@@ -267,18 +217,6 @@ class Sweeps:
         self._cancelled.discard(plan.id)
         self._filling.discard(plan.id)
         if plan.repeated:
-            self._write(msgspec.structs.replace(plan, case=None, runs=plan.earlier, repeated=[], earlier=[]))
+            self.plans.write(msgspec.structs.replace(plan, case=None, runs=plan.earlier, repeated=[], earlier=[]))
             return
-        del self._plans[plan.id]
-        (self._folder / f"{plan.id}.json").unlink(missing_ok=True)
-
-    def _keep(self, plan: Plan) -> None:
-        self._plans[plan.id] = plan
-
-    def _write(self, plan: Plan) -> None:
-        try:
-            self._folder.mkdir(0o700, exist_ok=True)
-            durable.write(self._folder / f"{plan.id}.json", msgspec.json.encode(plan))
-        except OSError as error:
-            raise ServiceError(507, "storage", f"the sweep cannot be kept: {error.strerror}", retryable=True) from error
-        self._keep(plan)
+        self.plans.remove(plan)

@@ -4,6 +4,7 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import Annotated, Any
 
+import msgspec
 from fastapi import APIRouter, Depends, Header, Query, Response
 from fastapi.responses import JSONResponse
 
@@ -12,8 +13,8 @@ from conoid.cases.output.points import table as points_table
 from conoid.cases.run import State
 
 from ..answers import openapi, view
-from ..errors import not_found
-from ..intake.sweeps import Plan
+from ..errors import ServiceError, not_found
+from ..intake.plans import Plan
 from ..requests.auth import Identity, Reader, Submitter
 from ..requests.limits import read_body
 from ..requests.thread_pool import blocking
@@ -35,6 +36,18 @@ async def submit(
     return JSONResponse(shown, 202, {"Location": f"/v1/sweeps/{plan.id}"})
 
 
+@router.put("/v1/sweeps/adaptive/{name}", openapi_extra=openapi.SEARCH_BODY)
+async def report(service: ServiceOf, identity: Submitter, name: str, body: Body) -> dict[str, Any]:
+    """Keeps the report of an adaptive sweep, whose client decides the points and hands them in as runs; the first
+    report of a ``name`` (16 to 64 hexadecimal digits) makes the sweep. Runs of others are left out of it. The newest
+    100 adaptive sweeps of a user are kept. ``stop``: the sweep was cancelled here, and the command that ``began`` then
+    is to hand in no further point.
+    """
+    plan = await service.pool.run(service.searches.report, identity.owner, name, body)
+    stop = plan.search is not None and plan.cancelled == plan.search.began
+    return {"id": plan.id, "url": f"/v1/sweeps/{plan.id}", "stop": stop}
+
+
 @router.get("/v1/sweeps")
 @blocking
 def page(
@@ -44,7 +57,7 @@ def page(
     limit: Annotated[int, Query(ge=1, le=500)] = 50,
 ) -> dict[str, Any]:
     """Own sweeps, newest first; ``next`` is the ``before`` of the following page, null on the last."""
-    plans = [plan for plan in service.sweeps.of(identity.owner) if not before or plan.id < before]
+    plans = [plan for plan in service.sweeps.plans.of(identity.owner) if not before or plan.id < before]
     following = plans[limit - 1].id if len(plans) > limit else None
     return {"sweeps": [_brief(service, plan) for plan in plans[:limit]], "next": following}
 
@@ -53,14 +66,14 @@ def page(
 @blocking
 def show(service: ServiceOf, identity: Reader, sweep_id: str) -> dict[str, Any]:
     """The sweep: how many of its runs are in each state, and each point with its run."""
-    return _shown(service, _find(service, identity, sweep_id))
+    return _shown(service, find(service, identity, sweep_id))
 
 
 @router.get("/v1/sweeps/{sweep_id}/table")
 @blocking
 def table(service: ServiceOf, identity: Reader, sweep_id: str) -> Response:
     """A line a point as CSV: what was changed, the state of the run, and its results as far as it has any."""
-    plan = _find(service, identity, sweep_id)
+    plan = find(service, identity, sweep_id)
     points = [_point(service, values, run) for values, run in _pairs(service, plan)]
     return Response(to_csv(points_table(points)), media_type="text/csv; charset=utf-8")
 
@@ -76,7 +89,9 @@ async def again(service: ServiceOf, identity: Submitter, sweep_id: str, body: Bo
     """Runs the points again whose runs have ended without success, or were removed. The request is that with which the
     sweep was handed in. Asking again changes nothing while these runs go on.
     """
-    plan = await service.pool.run(_find, service, identity, sweep_id)
+    plan = await service.pool.run(find, service, identity, sweep_id)
+    if plan.search is not None:
+        raise ServiceError(409, "adaptive", "the points of an adaptive sweep are decided by the command that began it")
     failed = await service.pool.run(_failed, service, plan)
     plan = await service.sweepers.run(service.sweeps.again, plan, body, failed)
     return JSONResponse(await service.pool.run(_shown, service, plan), 202)
@@ -89,14 +104,17 @@ def _failed(service: Service, plan: Plan) -> dict[int, str]:
 
 
 def _cancelled(service: Service, identity: Identity, sweep_id: str) -> dict[str, Any]:
-    plan = _find(service, identity, sweep_id)
+    plan = find(service, identity, sweep_id)
+    if plan.search is not None:
+        service.searches.cancel(plan)
     for run_id in service.sweeps.cancel(plan):
         if service.supervisor.is_open(run_id):
             ask_to_stop(service, run_id)
     return _shown(service, plan)
 
 
-def _find(service: Service, identity: Identity, sweep_id: str) -> Plan:
+def find(service: Service, identity: Identity, sweep_id: str) -> Plan:
+    """The sweep, when it belongs to who asks. Raises ServiceError 404."""
     plan = service.sweeps.get(sweep_id, identity.owner)
     if plan is None:
         raise not_found(f"sweep {sweep_id[:40]!r}")
@@ -121,6 +139,7 @@ def _headed(plan: Plan, pairs: Sequence[tuple[dict[str, Any], Run]]) -> dict[str
         "id": plan.id, "owner": plan.owner, "name": plan.name, "submitted": plan.submitted, "at_once": plan.at_once,
         "total": len(plan.points), "states": dict(states), "removed": len(plan.runs) - len(pairs),
         "url": f"/v1/sweeps/{plan.id}",
+        "search": plan.search and msgspec.to_builtins(plan.search), "reported": plan.reported or None,
     }  # fmt: skip
 
 

@@ -13,6 +13,7 @@ from ..requests.thread_pool import blocking
 from ..service import ServiceOf
 from .list_query import ChosenOf
 from .runs import Cursor, listed
+from .sweeps import find
 
 router = APIRouter()
 
@@ -28,6 +29,7 @@ def table(
     changed: Annotated[
         float | None, Query(allow_inf_nan=False, description="open, or submitted or ended then or later, Unix s")
     ] = None,
+    sweep: Annotated[str, Query(description="id of a sweep: the runs of its points")] = "",
     if_none_match: Annotated[str, Header(alias="If-None-Match")] = "",
 ) -> Response:
     """Own runs, newest first, with title, progress, the values of their cases and their results.
@@ -37,7 +39,7 @@ def table(
     case; null before its end, and while they are not read yet (``pending`` runs of this page: ask again). ``next`` is
     the cursor of the following page, null on the last. An answer has at most 500 runs and about 4 MB.
     """
-    asked = replace(chosen, changed=changed)
+    asked = replace(chosen, changed=changed, runs=find(service, identity, sweep).runs if sweep else None)
     runs = listed(service, identity.owner, asked, cursor, limit + 1)
     cards, made = service.cards.of(runs[:limit]), Table()
     lines = view.briefs(service, runs[:limit])

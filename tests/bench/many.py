@@ -20,7 +20,7 @@ from typing import Any
 import msgspec
 
 from conoid.cases import load
-from conoid.server.intake.sweeps import FOLDER, Plan
+from conoid.server.intake.plans import FOLDER, Plan
 from conoid.server.runs import folder
 from tests.server.visitor import OWNER
 

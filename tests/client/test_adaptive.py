@@ -3,6 +3,7 @@
 import json
 import math
 import random
+import statistics
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -12,15 +13,17 @@ import pytest
 
 from conoid.cases.load import CaseError
 from conoid.cases.outcome import Measured, Outcome, to_json
+from conoid.cases.output.search import Search
 from conoid.cases.run import State
 from conoid.client.errors import ClientError, MissingError, UsageError
 from conoid.client.remote.http import Me
 from conoid.client.remote.run_info import RunInfo
 from conoid.client.sweeps.adaptive import found_by
 from conoid.client.sweeps.adaptive_result import Found, read, table
-from conoid.client.sweeps.ballistic import Fit
-from conoid.client.sweeps.bracket import Sample, between, bracket, widest
+from conoid.client.sweeps.ballistic import Fit, course, residual_velocity
+from conoid.client.sweeps.bracket import Bracket, Sample, between, bracket, widest
 from conoid.client.sweeps.goal import Goal, span_of, spans_of, tolerance_of
+from conoid.client.sweeps.reporting import Reported
 
 KEY = "parts[0].velocity[2]"
 CASE = {
@@ -44,12 +47,19 @@ class Firing:
     def __init__(self, curve: Callable[[float], float | str], slots: int = 1) -> None:
         self.curve, self.slots = curve, slots
         self.made: dict[str, RunInfo] = {}
+        self.told: list[Search] = []
+        self.stop = False
         self.outbox: Any = self
         self.fired: list[float] = []
         self.most_at_once = self.open = 0
 
     def me(self) -> Me:
         return Me(owner="ann", slots={"total": self.slots, "used": 0})
+
+    def put(self, kind: type[Reported], path: str, body: bytes, headers: Mapping[str, str]) -> Reported:
+        assert path.startswith("/v1/sweeps/adaptive/")
+        self.told.append(msgspec.json.decode(body, type=Search))
+        return Reported(id="s1", stop=self.stop)
 
     def runs(self, states: Sequence[str] = (), limit: int = 50) -> list[RunInfo]:
         return list(self.made.values())[-limit:]
@@ -116,6 +126,66 @@ def test_a_ballistic_limit_is_bracketed_and_fitted(slots: int, sign: float) -> N
         assert (found.fit.law, round(found.fit.factor, 3)) == ("Lambert and Jonas", 0.92)
         assert found.fit.limit == pytest.approx(413.7, abs=1e-3)
     assert found.cpu == 2.0 * found.points
+
+
+def test_the_server_is_told_of_each_point_and_of_what_was_found() -> None:
+    law = lambert_jonas(413.7, 0.92, 2.6)
+    at = Firing(lambda v: -law(1000.0 * v), 4)
+    found = find(at, ("-0.2 km/s", "-0.8 km/s"), tolerance=0.005)
+    first, *_, last = at.told
+    assert (first.points, first.over, first.low, first.high, first.tolerance) == ([], False, -800.0, -200.0, 5.0)
+    assert sum(point.value is None for point in at.told[1].points) == 4, "of a round, before any has ended"
+    assert last.over
+    assert (last.why, len(last.points), last.unit) == ("", found.points, "m/s")
+    assert found.limit is not None
+    assert last.bracket is not None
+    assert sum(last.bracket) / 2 == pytest.approx(1000.0 * found.limit)
+    assert last.curve is not None
+    assert last.curve.limit == pytest.approx(-413.7, abs=1e-3)
+    assert found.fit is not None
+    assert found.fit.limit == pytest.approx(0.4137, abs=1e-6)
+    assert last.curve.factor == pytest.approx(0.92, abs=1e-6)
+    for x, y, _ in last.curve.course:
+        assert y == pytest.approx(-law(x), abs=1e-3)
+    assert min(x for x, *_ in last.curve.course) == -800.0
+
+
+def test_the_error_along_a_curve_is_what_refits_of_scattered_points_give() -> None:
+    chance, law = random.Random(2), lambert_jonas(400.0, 0.9, 2.0)
+    x = [420.0, 480.0, 550.0, 620.0, 700.0, 800.0]
+    made = Bracket(Sample(390.0, 0.0), Sample(420.0, 1.0))
+
+    def scattered() -> Fit:
+        shots = [Sample(390.0, 0.0), *(Sample(v, law(v) + chance.gauss(0.0, 3.0)) for v in x)]
+        fit = residual_velocity(shots, made, 0.0)
+        assert fit is not None
+        return fit
+
+    fits = [scattered() for _ in range(300)]
+    at = [course(fit, 600.0, 700.0) for fit in fits]
+    told, values = [line[1][2] for line in at], [line[1][1] for line in at]
+    assert statistics.fmean(error for error in told if error is not None) == pytest.approx(
+        statistics.stdev(values), rel=0.2
+    )
+
+
+def test_a_cancel_on_the_server_ends_it_and_the_next_command_goes_on(tmp_path: Path) -> None:
+    at, out = Firing(lambert_jonas(413.7, 0.92, 2.6)), tmp_path / "shot.json"
+    at.stop = True
+    found = find(at, out=out)
+    assert (found.fresh, found.reached, found.why.split(";")[0]) == (0, False, "it was cancelled on the server")
+    at.stop = False
+    assert find(at, out=out).reached
+
+
+def test_a_server_that_keeps_no_adaptive_sweeps_is_asked_for_runs_all_the_same() -> None:
+    at = Firing(lambert_jonas(413.7, 0.92, 2.6))
+
+    def put(*_: Any) -> Any:
+        raise MissingError(404, {"detail": "no such route"})
+
+    at.put = put  # type: ignore[assignment,method-assign]
+    assert find(at).reached
 
 
 def test_any_limit_of_any_curve_lies_in_its_bracket() -> None:

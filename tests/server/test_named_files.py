@@ -202,9 +202,9 @@ def test_points_of_a_sweep_have_files_of_their_own(server: Running, quick: list[
 
 def test_a_sweep_that_is_being_handed_in_needs_its_files(server: Running, quick: list[Path]) -> None:
     plan = server.service.sweeps._new("ann", submission_wish(), None, "")
-    server.service.sweeps._keep(plan)
+    server.service.sweeps.plans.put(plan)
     assert server.service.sweeps.needed() == {HASH, "0" * 64}
-    server.service.sweeps._plans.clear()
+    server.service.sweeps.plans._all.clear()
 
 
 def submission_wish() -> Any:

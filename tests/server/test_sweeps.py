@@ -140,7 +140,7 @@ def test_a_damaged_file_harms_no_other_sweep(server: Running) -> None:
     sweep = handed_in(server.ann, wish())
     (server.service.settings.runs / "sweeps" / f"{folder.new_id()[0]}.json").write_text("{")
     again = Sweeps(server.service.settings, server.service.desk)
-    assert [plan.id for plan in again.of("ann")] == [sweep["id"]]
+    assert [plan.id for plan in again.plans.of("ann")] == [sweep["id"]]
 
 
 def test_the_same_from_python(server: Running, tmp_path: Path) -> None:

@@ -54,7 +54,7 @@ def test_only_what_has_not_succeeded_is_run_again(server: Running, tmp_path: Pat
         assert server.ann.wait_for(run)["state"] == "succeeded"
     assert [server.ann.show(run)["labels"]["point"] for run in now] == ["0", "1", "2", "3"]
     assert [p["run"]["id"] for p in again(server.ann, sweep, body)["points"]] == now, "nothing is left to do"
-    kept = Sweeps(server.service.settings, server.service.desk).of("ann")
+    kept = Sweeps(server.service.settings, server.service.desk).plans.of("ann")
     assert [(plan.runs, plan.whole) for plan in kept] == [(now, True)]
     assert [p["run"]["id"] for p in handed_in(server.ann, body, "k")["points"]] == now, "the key is still its own"
 

@@ -52,10 +52,10 @@ class Site:
             time.sleep(0.1)
         self.url = json.loads(address.read_text())["url"] + "/"
 
-    def submit(self, text: str) -> str:
+    def submit(self, text: str, query: str = "") -> str:
         """The id of a new run."""
         headers = {"Authorization": f"Bearer {self.token}", "Content-Type": "application/toml"}
-        answer = httpx2.post(f"{self.url}v1/runs", content=text, headers=headers, timeout=60)
+        answer = httpx2.post(f"{self.url}v1/runs?{query}", content=text, headers=headers, timeout=60)
         assert answer.status_code == 202, answer.text
         return str(answer.json()["id"])
 

@@ -1,0 +1,129 @@
+// What an adaptive sweep looks for and what it has found: the answer with its uncertainty; a chart of points, bracket, curve.
+
+import { axis, colour, common, series } from "./axes.js";
+import { Chart } from "./charts.js";
+import { counted, exact, h, moment, si, vector } from "./figures.js";
+
+const TALL = 340;
+const SILENT = 120; // s without a report and without an open run after which the command is taken to have ended.
+const CROSS = "path://M2 0L5 3L8 0L10 2L7 5L10 8L8 10L5 7L2 10L0 8L3 5L0 2Z";
+
+// A run may take longer than SILENT: the command reports when it ends.
+export const goesOn = ({ search, reported, states }, now = Date.now() / 1000) =>
+  !search.over && (now - reported < SILENT || Object.keys(states).some((state) => OPEN.has(state)));
+const OPEN = new Set(["accepted", "queued", "starting", "running", "stopping"]);
+
+export class Answer {
+  constructor() {
+    this.chart = new Chart(TALL, "the result at each point, with bracket and curve", () => this.option(), {
+      alone: true, name: () => `${this.info.name}-adaptive`, table: () => this.table(), onClick: ({ data }) => { if (data?.[2]) location.hash = `#/runs/${data[2]}`; },
+    });
+    this.found = h("p.threshold-found", { role: "status" });
+    this.sought = h("p.threshold-sought");
+    this.facts = h("dl.facts");
+    this.notes = h("div");
+    this.element = h("section.card.threshold", { hidden: "", "aria-label": "what was found" },
+      h("div.card-head", {}, h("h2", {}, "Threshold"), this.chart.tools, this.state = h("span.note")),
+      h("div.threshold-parts", {}, h("div", {}, this.found, this.sought, this.facts, this.notes), this.chart.element));
+  }
+
+  close() { this.chart.close(); }
+
+  // `info`: the sweep as the server has it.
+  draw(info) {
+    this.info = info;
+    const { search } = info;
+    this.element.hidden = false;
+    const x = (values, between = " and ") => vector(values, search.unit, 4, between);
+    const y = (value) => exact(value, search.result_unit, 4);
+    const told = new Map(search.points.map((point) => [point.x, point.value]));
+    const { bracket, curve } = search;
+    this.state.textContent = search.over ? "" : goesOn(info) ? "goes on" : `no report since ${moment(info.reported)}: the command that decides the points has ended, or is away; the same command goes on`;
+    this.found.textContent = bracket ? x([(bracket[0] + bracket[1]) / 2, (bracket[1] - bracket[0]) / 2], " ± ") : search.over ? "not found" : "not bracketed yet";
+    this.sought.textContent = `${search.key}${search.more.length ? ` and ${counted(search.more.length, "key")} with it` : ""}, where ${search.result} = ${y(search.threshold)}`;
+    const without = search.points.filter(({ problem }) => problem).length;
+    const ends = (bracket ?? [search.low, search.high]).filter((end) => typeof told.get(end) === "number");
+    const facts = [
+      [bracket ? "bracket" : "range", x(bracket ?? [search.low, search.high], " to ")],
+      ["result there", ends.length ? vector(ends.map((end) => told.get(end)), search.result_unit, 4, " to ") : ""],
+      ["asked for", `bracket of ${exact(search.tolerance, search.unit, 4)}`],
+      ["curve", curve ? `${curve.law}: ${curve.error === null ? exact(curve.limit, search.unit, 4) : x([curve.limit, curve.error], " ± ")}` : ""],
+      ["constants", curve ? constants(curve) : ""],
+      ["runs", `${search.points.length}${without ? `, ${without} without a result` : ""}`],
+    ];
+    this.facts.replaceChildren(...facts.filter(([, text]) => text).map(([name, text]) => h("div", {}, h("dt", {}, name), h("dd", {}, text))));
+    this.notes.replaceChildren(...remarks(search, x).map((text) => h("p.hint", {}, text)));
+    this.chart.draw(true);
+  }
+
+  option() {
+    const { search } = this.info;
+    const { points, curve, bracket, threshold, unit, result_unit: up } = search;
+    const known = points.filter(({ value }) => value !== null);
+    const size = (list) => Math.max(0, ...list.map(Math.abs));
+    const scatter = (name, tone, list, more = {}) => ({ type: "scatter", name, data: list, symbolSize: 9, color: colour(tone), cursor: "pointer", z: 5, ...more });
+    const across = axis(unit, size([search.low, search.high]), { scale: true, splitLine: { show: false } });
+    const along = axis(up, size([...known.map(({ value }) => value), threshold]), { scale: true });
+    const list = [
+      ...(curve ? drawn(curve, up) : []),
+      { ...scatter("runs", "line-0", known.map(({ x, value, run }) => [x, value, run])), ...marks(bracket, threshold) },
+      scatter("run goes on", "soft", points.filter(({ value, problem }) => value === null && !problem).map(({ x, run }) => [x, threshold, run]), { symbol: "emptyCircle" }),
+      scatter("no result", "bad", points.filter(({ problem }) => problem).map(({ x, run, problem }) => [x, threshold, run, problem]), { symbol: CROSS, symbolSize: 11 }),
+      ...(curve ? interval(curve, threshold) : []),
+    ].filter(({ data }) => data.length);
+    return {
+      grid: { left: 72, right: 22, top: 58, bottom: 46 },
+      legend: { ...common(true).legend, data: list.filter(({ name }) => name).map(({ name }) => name) },
+      xAxis: { ...across, name: named(search.key, across.name), nameLocation: "middle", nameGap: 28, nameTextStyle: { ...across.nameTextStyle, align: "center" } },
+      yAxis: { ...along, name: named(search.result, along.name), nameTextStyle: { ...along.nameTextStyle, align: "left" } },
+      series: list, xName: `${search.key}${unit ? ` [${unit}]` : ""}`,
+      tooltip: { trigger: "item", formatter: ({ value: [at, result, , problem], seriesName }) => `${exact(at, unit, 5)}\n${problem ?? (seriesName === "run goes on" ? seriesName : si(result, up, 4))}` },
+    };
+  }
+
+  // SI units, as the other tables that are saved.
+  table() {
+    const { search: { points, key, unit, result, result_unit: up } } = this.info;
+    const head = (name, si_unit) => (si_unit ? `${name} [${si_unit}]` : name);
+    return { head: [head(key, unit), head(result, up), "run", "problem"], rows: points.map(({ x, value, run, problem }) => [x, value, run, problem]) };
+  }
+}
+
+const named = (name, unit) => (unit ? `${name}, ${unit}` : name);
+
+function constants({ factor, exponent }) {
+  return exponent === null ? `slope ${si(factor, "", 4)}` : `a = ${si(factor, "", 4)}, p = ${si(exponent, "", 4)}`;
+}
+
+// What there is to know besides.
+function remarks({ why, mixed, curve, bracket }, x) {
+  const beyond = curve && bracket && (curve.limit < bracket[0] || curve.limit > bracket[1]);
+  return [
+    why && `Ended early: ${why}.`,
+    mixed && `The threshold is passed more than once between ${x(mixed)}: the result is not monotonic, or scatters. The first passage is given.`,
+    beyond && "The limit of the curve is outside of the bracket: near it the results do not follow the law.",
+  ].filter(Boolean);
+}
+
+// The threshold across, the bracket down.
+function marks(bracket, threshold) {
+  const quiet = { silent: true, animation: false, label: { show: false } };
+  return {
+    markLine: { ...quiet, symbol: "none", lineStyle: { color: colour("soft"), type: "dashed", width: 1.2 }, data: [{ yAxis: threshold }] },
+    ...(bracket ? { markArea: { ...quiet, itemStyle: { color: colour("accent"), opacity: 0.16 }, data: [[{ xAxis: bracket[0] }, { xAxis: bracket[1] }]] } } : {}),
+  };
+}
+
+// The curve in the band of its standard error.
+function drawn({ law, course }, unit) {
+  const line = series({ name: law, unit, colour: "line-1", data: course.map(([x, y]) => [x, y]), width: 1.6 });
+  const banded = course.filter(([, , error]) => error !== null);
+  const edge = (data) => ({ type: "line", data, stack: "band", stackStrategy: "all", symbol: "none", silent: true, lineStyle: { width: 0 }, tooltip: { show: false } });
+  return [...(banded.length ? [edge(banded.map(([x, y, error]) => [x, y - error])), { ...edge(banded.map(([x, , error]) => [x, 2 * error])), areaStyle: { color: colour("line-1"), opacity: 0.2 } }] : []), line];
+}
+
+// Where the curve has its limit, with the standard error.
+function interval({ limit, error }, threshold) {
+  const bar = { ...series({ name: "", colour: "line-1", data: [[limit - error, threshold], [limit + error, threshold]], width: 5 }), silent: true, z: 6, lineStyle: { width: 6, opacity: 0.55, cap: "round" } };
+  return [...(error === null ? [] : [bar]), { type: "scatter", name: "limit of the curve", data: [[limit, threshold]], symbol: "diamond", symbolSize: 12, color: colour("line-1"), z: 7 }];
+}
