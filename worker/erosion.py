@@ -34,7 +34,7 @@ GATHERED = 10
 """Number of steps in which worn tets are collected. Chosen: each removal requires new mean normals and tests of all
 candidate pairs."""
 UNDECIDED = 0.25
-"""Share of ``erosion.damage`` from which a warning says that no tet was removed. Chosen: a punch
+"""Share of ``erosion.damage`` from which a warning reports that no tet was removed. Chosen: a punch
 (docs/theory/erosion.md, Erosion) leaves damage of 0.42 in a plate, and with smaller tets cuts a plug out of it."""
 
 
@@ -73,7 +73,8 @@ class Erosion:
 
     def begin(self, limit: float) -> None:
         """Sets the limits of the stable step, as shares of the first one; ``limit``: the largest
-        one-over-stable-step at the start, 1/s."""
+        one-over-stable-step at the start, 1/s.
+        """
         self._limit = limit
         for block in self._model.blocks:
             spec = self._specs[block.part]
@@ -131,7 +132,8 @@ class Erosion:
 
     def decide(self, found: int) -> None:
         """Decides whether the next step removes tets or nodes; ``found``: the maximum over all ranks of what was
-        found (elements/wear.py)."""
+        found (elements/wear.py).
+        """
         self.due = found == BROKEN or (found > SOUND and self._clock.step % GATHERED == 0)
 
     def warnings(self, eroded: int) -> list[str]:
@@ -175,7 +177,8 @@ class Erosion:
 
     def stop_removed(self, state: Nodes) -> None:
         """After the kick: books the nodes that are removed in this step; sets the velocities of all removed nodes to
-        zero."""
+        zero.
+        """
         leaving = self._leaving
         if len(leaving):
             owned = leaving[state.owned[leaving]]

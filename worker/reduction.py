@@ -77,7 +77,7 @@ class Offer(Fields):
     """Contribution of a rank to a reduction."""
 
     def __init__(self, ranks: int) -> None:
-        """For this number of ``ranks``."""
+        """``ranks``: number of ranks of the run."""
         super().__init__()
         self.touched: Ints = np.zeros(ranks, np.int64)
         """(ranks,) non-zero for the ranks that have a node of the facets that break (fracture/separation.py)."""
@@ -92,7 +92,7 @@ class StepReduction(Fields):
     """Result of the last reduction, equal on all ranks; ``own``: the contribution of this rank to the next one."""
 
     def __init__(self, ranks: int = 1, *, fractures: bool = True, contact: bool = True) -> None:
-        """For this number of ``ranks``; ``fractures``, ``contact``: whether the case has them."""
+        """``ranks``: number of ranks; ``fractures``, ``contact``: whether the case has them."""
         super().__init__()
         self.own = Offer(ranks)
         self._alone, self._contact = ranks == 1, contact

@@ -1,5 +1,6 @@
 """The simulation of one rank: model, pressure form, boundaries, contact, fracture and accounts, built once; the time
-step (step.py) uses it."""
+step (step.py) uses it.
+"""
 
 import math
 from dataclasses import dataclass
@@ -329,7 +330,8 @@ def resume(case: Case, arrived: Arrived, comm: Comm, timers: Timers) -> Simulati
 
 def _extremes(model: Model, comm: Comm) -> tuple[float, float, float]:
     """Largest nodal mass, kg, largest of wave speed and velocity, m/s, and largest distance from the origin, m, of
-    all ranks."""
+    all ranks.
+    """
     speeds = [float(np.linalg.norm(model.nodes.v, axis=1).max(initial=0.0))]
     for block in model.blocks:
         p = block.params

@@ -117,7 +117,7 @@ def measure(case: Case) -> Pressed:
     assert sim.record is not None
     assert sim.contact is not None
     cpu = time.process_time() - began
-    sim.record.look()
+    sim.record.update()
     common = common_volume.measure(sim.contact, sim.model, sim.record.labels, sim.comm)
     lost = 0.5 * float(mass @ (start**2 - before[ram] ** 2).sum(axis=1))
     speed = -float(mass @ before[ram, 2]) / float(mass.sum())

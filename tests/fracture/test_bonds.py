@@ -58,7 +58,7 @@ def _run(sim: Simulation, between: Any) -> Ended:
         step.second_half(sim)
     assert sim.record is not None
     assert sim.fracture is not None
-    sim.record.look()
+    sim.record.update()
     known = digest.digest(sim.model, sim.comm, sim.elements.nodal)
     return Ended(
         (energy.fracture + energy.cohesive) / AREA, sim.fracture.broken, residual, known, sim.record.count,

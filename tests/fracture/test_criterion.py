@@ -115,7 +115,7 @@ def loaded_sim(sim: Simulation) -> Simulation:
     for body in sim.fracture.initiation.bodies:
         body.facets.strength[:] = 0.0
     interface = sim.fracture.initiation.interface
-    interface.hear(interface.words(hot=True))
+    interface.receive(interface.words(hot=True))
     return sim
 
 

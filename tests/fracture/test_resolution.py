@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from conoid.cases.model import materials, schema
-from conoid.worker.fracture.resolution import told_once, warnings
+from conoid.worker.fracture.resolution import merged, warnings
 from conoid.worker.fracture.strength import toughness
 
 from ..worker.kernels import DUMMY
@@ -63,6 +63,6 @@ def test_what_is_drawn_apart_opens_by_that_besides() -> None:
 
 def test_a_line_names_all_parts_that_it_is_told_of_or_the_first_few() -> None:
     bricks = [f"brick{k}" for k in range(8)]
-    assert told_once({"long": ["a", "b"], "wide": ["a"]}) == ["a, b: long", "a: wide"]
-    assert told_once({"long": bricks}) == ["brick0, brick1, brick2, brick3, brick4 and 3 more: long"]
-    assert told_once({}) == []
+    assert merged({"long": ["a", "b"], "wide": ["a"]}) == ["a, b: long", "a: wide"]
+    assert merged({"long": bricks}) == ["brick0, brick1, brick2, brick3, brick4 and 3 more: long"]
+    assert merged({}) == []

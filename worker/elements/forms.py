@@ -35,7 +35,7 @@ class Bridges(Protocol):
         """Adds the forces in quanta of 1 / ``scale`` N; returns the bits of the largest."""
 
 
-class Herald(Protocol):
+class FlagExchange(Protocol):
     """Has a word for each neighbour that goes with the forces of shared nodes."""
 
     def words(self, hot: bool) -> Ints:
@@ -43,7 +43,7 @@ class Herald(Protocol):
         overstressed.
         """
 
-    def hear(self, words: Ints) -> None:
+    def receive(self, words: Ints) -> None:
         """Takes those of the neighbours."""
 
 
@@ -65,7 +65,7 @@ class Elements:
         self._coloured: dict[tuple[int, int], tuple[int, Coloured]] = {}
         """By part and first chunk, with how many tets had left the block then."""
         self._comm, self._neighbours = comm, neighbours
-        self._herald: Herald | None = None
+        self._flags: FlagExchange | None = None
         self._connect()
         self.cohesion: Bridges | None = None
         """What pulls besides the tets."""
@@ -150,17 +150,17 @@ class Elements:
         """Takes it back."""
         self.peaks[[records.LARGEST_LIMIT, records.LIMITING_TET]] = parcel.known["peaks"]
 
-    def employ(self, herald: Herald) -> None:
+    def attach(self, flags: FlagExchange) -> None:
         """From now on a word for each neighbour goes with the forces; neighbours take part."""
         self.free()
-        self._herald = herald
+        self._flags = flags
         self._connect()
 
     def finish(self) -> None:
         """Returns when the forces of shared nodes are complete."""
         self.shared_forces.finish(self.model.nodes.force)
-        if self._herald is not None:
-            self._herald.hear(self.shared_forces.received)
+        if self._flags is not None:
+            self._flags.receive(self.shared_forces.received)
 
     def free(self) -> None:
         """Gives the messages of the exchanges back to MPI."""
@@ -171,11 +171,11 @@ class Elements:
         return [self.shared_forces]
 
     def _connect(self) -> None:
-        headed = self._herald is not None
+        headed = self._flags is not None
         self.shared_forces = SharedSum(self._comm, self._neighbours, 3, Tag.FORCE, headed=headed)
 
     def _send(self) -> None:
-        words = None if self._herald is None else self._herald.words(self.hot)
+        words = None if self._flags is None else self._flags.words(self.hot)
         self.shared_forces.begin(self.model.nodes.force, words)
 
     def _over(self, work: BlockPass, means: Values, numbers: Values, send: Callable[[], None]) -> None:

@@ -1,1 +1,1 @@
-"""Fracture: facets between tets break, nodes separate, fragments come into being."""
+"""Fracture: breaking of facets between tets, separation of nodes, cohesive tractions, fragments."""

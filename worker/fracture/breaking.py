@@ -21,23 +21,23 @@ class Breaking:
 
     @property
     def rows(self) -> Ints:
-        """(m, 2) place and face of each in the table of the body."""
+        """(m, 2) place of the tet and local face of each, as in the table of the body."""
         one, two = self.facets.sides[:, 0, 1:], self.facets.sides[:, 1, 1:]
         return np.where(one[:, :1] >= 0, one, two).astype(np.int64)
 
     @property
     def load(self) -> Floats:
-        """(m,) effective traction over strength."""
+        """(m,) effective traction over the strength of the facet."""
         place, face = self.rows.T
         return np.asarray(self.facets.traction[:, 3] / self.body.facets.strength[place, face])
 
     def take(self, chosen: Flags) -> "Breaking":
-        """Some of the facets."""
+        """Returns the chosen facets."""
         return Breaking(self.body, self.facets.take(chosen))
 
 
 def gathered(body: Body, found: Candidates, shared: InterfaceFacets) -> Breaking | None:
-    """The candidates with all that is known of them; None for none."""
+    """Collects the data of the facets ``found``; None if no facet breaks."""
     facets: BreakingFacets = _gather(found, shared, body.mesh, body.index)
     return Breaking(body, facets) if len(facets.mass) else None
 
@@ -49,7 +49,7 @@ def _mass(mesh, e):  # type: ignore[no-untyped-def]
 
 @njit(types.void(BREAKING, types.int64, types.int64, CANDIDATES, INTERFACE, MESH, types.int64), cache=True)
 def _fill(out, m, i, found, shared, mesh, block):  # type: ignore[no-untyped-def]
-    """Row ``m`` from candidate ``i``."""
+    """Fills row ``m`` of ``out`` from candidate ``i``."""
     place, face, row = found.place[i], found.face[i], found.shared[i]
     behind, mass = mesh.across[place, face], _mass(mesh, place)
     first = row < 0 or shared.first[row]
@@ -73,8 +73,8 @@ def _fill(out, m, i, found, shared, mesh, block):  # type: ignore[no-untyped-def
 
 @njit(BREAKING(CANDIDATES, INTERFACE, MESH, types.int64), cache=True)
 def _gather(found, shared, mesh, block):  # type: ignore[no-untyped-def]
-    """See ``gathered``; ``block``: index of the body's. A facet between two blocks of this rank is among those of the
-    first side's.
+    """See ``gathered``; ``block``: index of the block of the body. A facet between two blocks of this rank is
+    collected once, with the block of its first side.
     """
     n = len(found.place)
     out = BreakingFacets(

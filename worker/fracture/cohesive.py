@@ -6,24 +6,35 @@ r"""Cohesive facets: a traction that falls linearly with the opening, irreversib
       |\                                     D = sqrt(<d_n>^2 + b^2 |d_t|^2),  b^2 = 1 / shear weight
       | \                                    T = s(D_max) / D_max (<d_n> n + b^2 d_t)
       |  \                                   s = strength (1 - (D_max - e) / critical)
-      | / \                              critical = 2 energy / strength; the way back is the secant
+      | / \                              critical = 2 energy / strength; unloading is along the secant
       |/   \
       +--+--+----> D                     The opening starts from an offset of size e along the traction at insertion:
          e   e + critical                x+ = x- is D = e, T = that traction.
 
-With e = 0 this is the usual law, whose stiffness is without bound when a facet has just been inserted: the first
-rounding error decides on the direction of the traction, and the way back needs a step of no length. The offset gives
-the traction at insertion back in size and direction, keeps the area under the curve, and bounds the stiffness by
-strength / e; e is the smallest that leaves the time step as it is. Each facet has three points, its pairs of nodes, so
-that no way of opening is without stiffness. Under pressure only d_t counts: the rest is for contact.
+            5 ________ 4
+             /\      /                   A facet has two sides, nodes 0, 1, 2 of the first and 3, 4, 5 of the second:
+            /  \    /   second side      three pairs (0, 3), (1, 4), (2, 5), each with an opening, a traction and a
+           /    \  /                     third of the area. n and the first edge e are those of the triangle in the
+          /______\/                      middle between the sides, along which d is measured:
+         2 .... 3 . 1
+           \     /      first side           d_n = n . d,  d_t = (e . d, (n x e) . d)
+            \   /
+             \ /
+              0
 
-The spring comes taut into the world, with an energy of strength e / 2 that nobody has paid: it is lent, and D = e is as
-far as the way back may lead. A pair that would go further back lets go, of as much of its traction as keeps it from
-that, or of all: its offset is shortened, and from then on its traction begins where it stands. Its stiffness stays,
-and the strength and critical opening become what leaves the area under the law, from there on, at what is left of the
-energy (law.py; when, in release.py).
+With e = 0 this is the usual law, whose stiffness is unbounded just after insertion: rounding would determine the
+direction of the traction, and unloading would require a time step of zero. The offset reproduces the traction at
+insertion in size and direction, leaves the area under the curve unchanged, and bounds the stiffness by strength / e;
+e is the smallest size that leaves the stable time step unchanged. With three pairs every mode of opening has a
+stiffness. Under pressure only d_t counts; contact resists the closing.
 
-A facet whose nodes have not separated holds by itself: its pairs are one node, on which its tractions cancel.
+At insertion the spring is under tension: it stores strength e / 2 per area, for which no work was done. That energy is
+lent: while D >= e (column ``lent``), the pair has absorbed at least what it releases by closing. A pair that would
+close further is unloaded, partly or completely: its offset is shortened, so that it follows the law again from its
+present position. Its stiffness stays; strength and critical opening are set so that the area under the remaining law
+is the remaining energy (formulas in law.py; when, in unloading.py).
+
+A facet whose nodes have not separated has no opening: the two nodes of a pair are one, on which its tractions cancel.
 """
 
 import numpy as np
@@ -37,21 +48,21 @@ from .columns import FacetConstants, Facets, PairState, Softening
 
 
 class Cohesion:
-    """Opens the cohesive facets of one rank and adds up their work."""
+    """Cohesive facets of one rank: updates their openings and tractions, and sums their work."""
 
     def __init__(self, energy: float) -> None:
-        """``energy``: order of magnitude of the work on a facet, J."""
+        """``energy``: order of magnitude of the work on a facet, J; it sets the quantum of the sums."""
         self.facets = Facets.none()
         self.gone = Tally(np.array([energy, energy]))
-        """Work on the facets that have failed, J, and what they should have taken."""
+        """Sums over the facets that have failed: work done on them, J, and their fracture energy, J."""
 
     def insert(self, new: Facets) -> None:
-        """Takes up facets that have just broken."""
+        """Adds facets that have just broken."""
         self.facets = self.facets.and_more(new)
 
     def follow(self, split: Split, ids: Ints) -> Ints:
-        """Takes up the copies of a split; ``ids``: of the local nodes. Returns the rows of facets that hang on a parent
-        or a copy.
+        """Replaces the nodes of facets by their copies; ``ids``: global ids of the local nodes. Returns the rows of
+        the facets with a node that separated.
         """
         f = self.facets
         moved: Ints = law.touching(f.nodes, split.copies.parents, len(ids))
@@ -59,7 +70,9 @@ class Cohesion:
         return moved
 
     def open(self, x: Floats) -> None:
-        """Openings, tractions and work at the positions ``x`` (nodes, 3); what has failed is let go."""
+        """Computes openings, tractions and work at the positions ``x`` (nodes, 3); removes the facets that have
+        failed.
+        """
         f, tiny = self.facets, np.finfo(float).tiny
         if not len(f.tets):
             return
@@ -69,14 +82,14 @@ class Cohesion:
             self.gone.add(np.column_stack([f.state.work.sum(axis=1), _whole(f)])[~kept])
             self.facets = f.take(kept)
 
-    def let_go(self, change: Ints, nodes: Nodes, steps: Floats, whole: bool) -> None:
-        """Lowers tractions that would give what nobody has paid in the step ahead, and adds what that changes of the
-        nodal forces to ``change`` (nodes, 3); see law.let_go.
+    def unload(self, change: Ints, nodes: Nodes, steps: Floats, whole: bool) -> None:
+        """Lowers the tractions of pairs that would release more than they absorbed in the next step; adds the change
+        of the nodal forces, quanta, to ``change`` (nodes, 3). See law.unload.
         """
-        law.let_go(change, self.facets, nodes.x, nodes.v, nodes.force, nodes.mass, steps, nodes.scale, whole)
+        law.unload(change, self.facets, nodes.x, nodes.v, nodes.force, nodes.mass, steps, nodes.scale, whole)
 
     def foresee(self, nodes: Nodes, mean_dt: float) -> None:
-        """Notes how pairs will open in the step ahead if nothing but forces acts."""
+        """Stores the opening velocities of the next step that follow from the present nodal forces alone."""
         law.foresee(self.facets, nodes.v, nodes.force, nodes.mass, mean_dt / nodes.scale)
 
     def keep(self, parcel: Parcel) -> None:
@@ -87,17 +100,21 @@ class Cohesion:
         parcel.sums["cohesive.gone"], parcel.known["cohesive"] = self.gone.words, self.gone.scale
 
     def resume(self, parcel: Parcel, nodes: Nodes) -> None:
-        """Takes them back."""
+        """Restores the facets from a parcel."""
         table = parcel.rows["cohesive"]
         self.facets = Facets.of({**table, "nodes": nodes.places(table["with"])})
         self.gone.words, self.gone.scale = parcel.sums["cohesive.gone"], parcel.known["cohesive"]
 
     def scatter(self, force: Ints, scale: float) -> int:
-        """Adds the forces in quanta of 1 / ``scale`` N to the nodal sums; returns the bits of the largest."""
+        """Adds the cohesive forces, in quanta of 1 / ``scale`` N, to the nodal sums; returns the bits of the
+        largest.
+        """
         return int(law.scatter(force, self.facets.nodes, self.facets.state.pull, scale))
 
     def columns(self) -> Floats:
-        """(m, 3) work on each facet, what its closing would give back, and what it takes in the end, J."""
+        """(m, 3) of each facet, J: work done on it, recoverable energy (released if it closes), and its fracture
+        energy.
+        """
         f, s = self.facets.softening, self.facets.state
         beyond = np.maximum(s.top - f.knee, 0.0)
         share = np.divide(beyond, f.critical, out=(beyond > 0.0).astype(float), where=f.critical > 0.0)
@@ -107,8 +124,8 @@ class Cohesion:
 
     @staticmethod
     def energies(sums: Floats, gone: Floats) -> tuple[float, float, float]:
-        """Energy, J, that is lost for good, that the closing of facets would give back, and that all facets take which
-        have ever been inserted, when they have failed; by the sums of ``columns`` and of ``gone`` over all ranks.
+        """Energies, J: dissipated, recoverable by closing, and the fracture energy of all facets ever inserted; from
+        the sums of ``columns`` and of ``gone`` over all ranks.
         """
         work, reversible, whole = sums
         gone_work, gone_whole = gone
@@ -116,17 +133,17 @@ class Cohesion:
 
 
 def _whole(facets: Facets) -> Floats:
-    """(m,) energy, J, that each of the facets takes in the end."""
+    """(m,) fracture energy of each facet, J."""
     return facets.constants.energy * facets.constants.area
 
 
 def sizes(offset: Floats, shear: Floats) -> Floats:
-    """(m,) sizes of offsets (m, 3)."""
+    """(m,) sizes D of offsets (m, 3), m."""
     return np.asarray(np.sqrt(offset[:, 0] ** 2 + shear * (offset[:, 1] ** 2 + offset[:, 2] ** 2)))
 
 
 def frames(x: Floats, nodes: Indices) -> Floats:
-    """(m, 3, 3) unit normal, first edge and the third direction, as rows, of facets ``nodes`` (m, 6)."""
+    """(m, 3, 3) of facets ``nodes`` (m, 6): unit normal n, unit vector e of the first edge, and n x e, as rows."""
     out = np.empty((len(nodes), 3, 3))
     for m in range(len(nodes)):
         law.turn(out[m], x, nodes[m])
@@ -137,7 +154,9 @@ def fresh(
     tets: Ints, nodes: Indices, strength: Floats, energy: Floats, area: Floats, shear: Floats, offset: Floats,
     force: Floats,
 ) -> Facets:  # fmt: skip
-    """Facets whose three pairs are alike: ``offset`` and ``force`` are (m, 3), the others (m,) as in ``Facets``."""
+    """Returns facets whose three pairs have the same state: ``offset`` and ``force`` are (m, 3), the others (m,) as
+    in ``Facets``.
+    """
     e, strength, critical = sizes(offset, shear), strength[:, None], (2.0 * energy / strength)[:, None]
     thrice, offset, force = np.ones((1, 3)), offset[:, None, :], force[:, None, :]
     zero = np.zeros((len(area), 3, 3))

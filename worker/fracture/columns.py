@@ -1,4 +1,4 @@
-"""The columns of cohesive facets, by what changes them, and their numba types."""
+"""Columns of the cohesive facets, grouped by what changes them, and their numba types."""
 
 from collections.abc import Mapping
 from typing import Any, NamedTuple
@@ -10,7 +10,7 @@ from ..model.state import Flags, Floats, Indices, Ints, extended
 
 
 class FacetConstants(NamedTuple):
-    """What a facet keeps from its insertion on. SI."""
+    """Constants of a facet since its insertion, SI."""
 
     energy: Floats
     """(m,) J/m^2."""
@@ -21,51 +21,53 @@ class FacetConstants(NamedTuple):
 
 
 class Softening(NamedTuple):
-    """The law of each pair of nodes; letting go changes it (law.py)."""
+    """Traction-separation law of each pair of nodes; only unloading changes it (law.py)."""
 
     strength: Floats
-    """(m, 3) where the traction begins to fall."""
+    """(m, 3) traction at which softening begins, Pa."""
     critical: Floats
-    """(m, 3) from there to where nothing is left."""
+    """(m, 3) opening from there to zero traction, m."""
     knee: Floats
-    """(m, 3) size of the opening at which the traction begins to fall."""
+    """(m, 3) size D of the opening at which softening begins, m."""
     lent: Floats
-    """(m, 3) that down to which it gives back what it has taken: e, less or 0 once it has let go."""
+    """(m, 3) size D at insertion, e, m: a pair that closes below it would release more than it absorbed. Smaller, or
+    0, once the pair has been unloaded."""
     offset: Floats
-    """(m, 3, 3) along the normal, along the first edge, and across both."""
+    """(m, 3, 3) offset of the opening, m: along the normal, along the first edge, and across both."""
 
 
 class PairState(NamedTuple):
-    """How far each pair has opened; every step changes it."""
+    """Present state of each pair; every step changes it."""
 
     top: Floats
-    """(m, 3) largest size of the opening so far, offset included, and the knee at least."""
+    """(m, 3) largest size D so far, with the offset, m; at least the knee."""
     size: Floats
-    """(m, 3) the present one."""
+    """(m, 3) present size D, m."""
     opening: Floats
-    """(m, 3, 3) how far the nodes are apart."""
+    """(m, 3, 3) position of the node of the second side relative to that of the first, m."""
     pull: Floats
     """(m, 3, 3) force on the node of the first side, N."""
     work: Floats
-    """(m, 3) done on the pair so far, J."""
+    """(m, 3) work done on the pair so far, J."""
     foreseen: Floats
-    """(m, 3, 3) velocity of opening, m/s, that the forces of the last step would have led to by themselves."""
+    """(m, 3, 3) opening velocity, m/s, that the nodal forces of the last step alone would have caused."""
 
 
 class Facets(NamedTuple):
-    """The cohesive facets of one rank: those whose side of smaller tet id is its own."""
+    """Cohesive facets of one rank: those whose tet of smaller id is on this rank."""
 
     tets: Ints
-    """(m, 2) global ids of the tets of either side."""
+    """(m, 2) global ids of the tets of the two sides."""
     nodes: Indices
-    """(m, 6) local nodes of the first side, counter-clockwise seen from outside of it, and those across."""
+    """(m, 6) local nodes of the first side, counter-clockwise seen from outside of it, and those opposite on the
+    second side."""
     constants: FacetConstants
     softening: Softening
     state: PairState
 
     @classmethod
     def of(cls, columns: Mapping[str, Any]) -> "Facets":
-        """From all columns by name."""
+        """Builds the records from all columns by name."""
         constants = FacetConstants(*(columns[name] for name in FacetConstants._fields))
         softening = Softening(*(columns[name] for name in Softening._fields))
         state = PairState(*(columns[name] for name in PairState._fields))
@@ -73,7 +75,7 @@ class Facets(NamedTuple):
 
     @classmethod
     def none(cls) -> "Facets":
-        """No facets."""
+        """Returns a table without rows."""
         one, three, nine = np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3, 3))
         return cls(
             np.zeros((0, 2), np.int64), np.zeros((0, 6), np.int32), FacetConstants(one, one, one),
@@ -81,17 +83,17 @@ class Facets(NamedTuple):
         )  # fmt: skip
 
     def columns(self) -> dict[str, Any]:
-        """All columns by name."""
+        """Returns all columns by name."""
         records = (self.constants, self.softening, self.state)
         columns = {name: column for each in records for name, column in each._asdict().items()}
         return {"tets": self.tets, "nodes": self.nodes, **columns}
 
     def take(self, chosen: Flags) -> "Facets":
-        """Some of them."""
+        """Returns the chosen facets."""
         return Facets.of({name: column[chosen] for name, column in self.columns().items()})
 
     def and_more(self, new: "Facets") -> "Facets":
-        """These and then the ``new`` ones."""
+        """Returns these facets followed by the ``new`` ones."""
         rows = new.columns()
         return Facets.of({name: extended(column, rows[name]) for name, column in self.columns().items()})
 

@@ -1,7 +1,7 @@
-"""Which tets hold together: connected pieces of a rank, joined with those of the others to fragments.
+"""Connected components of tets: pieces on each rank, joined across ranks to fragments.
 
-Two trees of tets are joined in Rem's way, in which every tet hangs onto one of a smaller id and the paths of two tets
-to their roots are laid into one (Patwary, Blair and Manne, Experiments on union-find algorithms, 2010).
+Union-find by Rem's algorithm: each tet points to one of a smaller id, and the paths of two tets to their roots are
+merged while they are walked (Patwary, Blair and Manne, Experiments on union-find algorithms, 2010).
 """
 
 import numpy as np
@@ -12,14 +12,14 @@ from ..model.state import Block, Indices, Ints, Model
 from ..parallel.comm import Comm
 
 _PART = 1 << 62
-"""Added to the number of a part: the name of what joins its tets, above all tet ids."""
+"""Added to the number of a part; above all tet ids. Such a name joins all tets of a part that has no facets."""
 
 
 def labels(model: Model, held: Ints, comm: Comm) -> list[Ints]:
-    """For each block (n,) the smallest global id of the tets that hold together with each tet; all ranks take part.
+    """Labels of fragments, (n,) for each block, a label for each tet: the smallest global id of its tets. Collective.
 
-    Tets hold together through faces whose bond is whole, and through ``held``, (m, 2) global ids of pairs that a facet
-    still joins; a pair is given on a rank that has one of the two. Without ``across`` a part is one piece.
+    Tets are connected through faces whose bond is intact, and through ``held``, (m, 2) global ids of tets of
+    cohesive facets; a pair is given on a rank that has one of the two. A block without ``across`` is one piece.
     """
     ids = np.concatenate([np.zeros(0, np.int64), *(block.id for block in model.blocks)])
     where, root, first = _Where(ids), np.arange(len(ids), dtype=np.int32), 0
@@ -34,13 +34,15 @@ def labels(model: Model, held: Ints, comm: Comm) -> list[Ints]:
 
 
 def count(model: Model, labels: list[Ints], comm: Comm) -> int:
-    """How many fragments there are by these labels: one tet of each has its name; all ranks take part."""
+    """Returns the number of fragments with these labels: exactly one tet of each has the label as its id.
+    Collective.
+    """
     named = sum(int((block.id == of).sum()) for block, of in zip(model.blocks, labels, strict=True))
     return int(comm.sum(np.array([named]))[0])
 
 
 def components(n: int, edges: Ints | Indices) -> Ints:
-    """(n,) the smallest number that each of n things is connected with by ``edges``, (m, 2)."""
+    """(n,) the smallest number in the connected component of each of the numbers 0 to n - 1; ``edges`` (m, 2)."""
     root = np.arange(n, dtype=np.int32)
     _bind(root, np.ascontiguousarray(edges, np.int64), np.arange(n))
     _settle(root)
@@ -48,20 +50,22 @@ def components(n: int, edges: Ints | Indices) -> Ints:
 
 
 class _Where:
-    """Where the tets of a rank stand, by their global ids (n,)."""
+    """Places of the tets of a rank by their global ids (n,)."""
 
     def __init__(self, ids: Ints) -> None:
         self._order = np.argsort(ids, kind="stable").astype(np.int32)
         self._known = ids[self._order]
 
     def of(self, wanted: Ints | Indices) -> Indices:
-        """Places of tets, in their shape; -1 where they are not here."""
+        """Returns the places of tets, in the shape of ``wanted``; -1 for a tet that is not on this rank."""
         at = places(self._known, wanted)
         return np.where(at >= 0, self._order[at], -1) if len(self._order) else at
 
 
 def _bind_held(root: Indices, ids: Ints, where: _Where, pairs: Ints) -> Ints:
-    """Joins pairs of tets (m, 2); (k, 2) places of tets and what they hold together with on other ranks."""
+    """Joins pairs of tets (m, 2); returns (k, 2) the place of the tet here and the id of the other, for pairs across
+    ranks.
+    """
     at = where.of(pairs)
     here = at >= 0
     _bind(root, at[here.all(axis=1)].astype(np.int64), ids)
@@ -71,7 +75,9 @@ def _bind_held(root: Indices, ids: Ints, where: _Where, pairs: Ints) -> Ints:
 
 
 def _bind_block(root: Indices, ids: Ints, where: _Where, block: Block, first: int) -> Ints:
-    """The same of the tets of a block, which stand from ``first`` on, and of what is behind their whole faces."""
+    """Joins the tets of a block, whose places begin at ``first``, through their intact faces; returns (k, 2) as
+    ``_bind_held``.
+    """
     if not block.n:
         return np.zeros((0, 2), np.int64)
     if not len(block.across):
@@ -86,9 +92,10 @@ def _bind_block(root: Indices, ids: Ints, where: _Where, block: Block, first: in
 
 
 def _joined(border: Ints, root: Indices, ids: Ints, where: _Where, comm: Comm) -> Ints:
-    """(n,) the names of the pieces of all tets, when those that meet at borders have become one.
+    """(n,) labels of all tets, after the pieces of all ranks have been joined.
 
-    ``border`` (k, 2): pieces of this rank, and the tets of others that they hold together with.
+    ``border`` (k, 2): labels of pieces of this rank, and ids of the tets of other ranks that they are connected
+    with. Collective.
     """
     asking, asked = comm.join(border).reshape(-1, 2).T
     at = where.of(asked)
@@ -127,8 +134,8 @@ def _bind(root, pairs, ids):  # type: ignore[no-untyped-def]
 
 @njit("UniTuple(int64, 2)(int64[:, ::1], int64[::1], int32[:, ::1], int32[:, ::1], uint8[:, ::1], int64)", cache=True)
 def _across_faces(pairs, outer, behind, across, bond, first):  # type: ignore[no-untyped-def]
-    """Sets the first of ``pairs`` to the places of the tets of a block and of those ``behind`` their whole faces, and
-    the first of ``outer`` to the faces, 4 * tet + face, behind which is none of this rank; how many there are of both.
+    """Fills ``pairs`` with the places of tets of a block and of the tets ``behind`` their intact faces, and
+    ``outer`` with the faces, 4 * tet + face, whose other tet is on another rank; returns both numbers.
     """
     inner, rest = 0, 0
     for tet in range(len(behind)):
@@ -146,7 +153,7 @@ def _across_faces(pairs, outer, behind, across, bond, first):  # type: ignore[no
 
 @njit("void(int32[::1])", cache=True)
 def _settle(root):  # type: ignore[no-untyped-def]
-    """Hangs every tet onto its root."""
+    """Points every tet directly at its root."""
     for a in range(len(root)):
         b = root[a]
         while root[b] != b:

@@ -1,9 +1,16 @@
-"""Which facets pass the criterion: the traction on a facet, from the stress of the tets on either side.
+"""Fracture criterion: the traction on a facet, the mean of those of its two tets, against its strength.
 
-A facet breaks by sqrt(<t_n>^2 + w t_s^2), with the Macaulay bracket that the paper's eq. (1) lacks, and under pressure
-by sqrt(w) <t_s - mu |t_n|> (Camacho and Ortiz 1996). Both are bounded by the first form, which is convex: the mean of
-two tractions passes only where one of them does. So the pass over the elements marks each tet's own overstressed faces
-(elements/hot.py), and only their facets are looked at: those whose mean traction reaches their strength are candidates.
+A facet breaks where sqrt(<t_n>^2 + w t_s^2) reaches the strength, with the Macaulay bracket that the paper's eq. (1)
+lacks; under pressure where sqrt(w) <t_s - mu |t_n|> does (Camacho and Ortiz 1996). ::
+
+                  n                              t = (stress_1 + stress_2) / 2 n
+          tet 2   ^    t                         t_n = t . n, positive in tension
+        +---------|--/------+  facet             t_s = |t - t_n n|
+          tet 1   | /                            n: outward normal of the tet of smaller id, tet 1
+
+The first form bounds the second and is convex: the mean of two tractions passes only if one of them does. So the pass
+over the elements marks the overstressed faces of each tet (elements/hot.py), and only the facets of these are
+computed: those whose mean traction reaches the strength are candidates.
 """
 
 import numpy as np
@@ -19,13 +26,13 @@ _SXX, _SYY, _SZZ = S_XX * CHUNK, S_YY * CHUNK, S_ZZ * CHUNK
 _SYZ, _SZX, _SXY = S_YZ * CHUNK, S_ZX * CHUNK, S_XY * CHUNK
 _P = PRESSURE * CHUNK
 _TOGETHER = 64
-"""Facets whose stresses are read together."""
+"""Number of facets whose stresses are read together."""
 _I1, _F1 = types.int64[::1], types.float64[::1]
 
 
 @njit(types.void(_F1, MESH, types.int64), cache=True)
 def _stress(s, mesh, e):  # type: ignore[no-untyped-def]
-    """``s`` (6,): stress xx, yy, zz, yz, zx, xy of tet ``e`` without the viscous part, Pa."""
+    """Sets ``s`` (6,): stress xx, yy, zz, yz, zx, xy of tet ``e`` without the viscous part, Pa."""
     state, at = mesh.state, (e // CHUNK) * mesh.columns * CHUNK + e % CHUNK
     p = state[at + _P]
     s[0], s[1], s[2] = state[at + _SXX] - p, state[at + _SYY] - p, state[at + _SZZ] - p
@@ -34,7 +41,7 @@ def _stress(s, mesh, e):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], float64[::1])", cache=True)
 def _traction(t, s, normal):  # type: ignore[no-untyped-def]
-    """``t`` (3,): stress ``s`` (6,) times ``normal``, Pa."""
+    """Sets ``t`` (3,): stress ``s`` (6,) times ``normal``, Pa."""
     nx, ny, nz = normal[0], normal[1], normal[2]
     t[0] = s[0] * nx + s[5] * ny + s[4] * nz
     t[1] = s[5] * nx + s[1] * ny + s[3] * nz
@@ -43,9 +50,9 @@ def _traction(t, s, normal):  # type: ignore[no-untyped-def]
 
 @njit("float64(float64[::1], float64[:, ::1], uint32[::1], int64)", cache=True, error_model="numpy")
 def outward(normal, x, tet, face):  # type: ignore[no-untyped-def]
-    """Unit normal of a face of a tet, out of it, at the positions ``x``; returns the area, m^2.
+    """Sets the unit outward ``normal`` of a face of a tet at the positions ``x``; returns the area, m^2.
 
-    Computed in the order of the nodes' ids, so that the two sides have the same bits with opposite signs.
+    Computed in the order of the ids of the nodes, so that the two sides have the same bits with opposite signs.
     """
     a, b, c = tet[FACES[face, 0]], tet[FACES[face, 1]], tet[FACES[face, 2]]
     sign = 1.0
@@ -66,7 +73,7 @@ def outward(normal, x, tet, face):  # type: ignore[no-untyped-def]
 
 @njit(types.float64[::1](types.uint32[:, ::1], _I1, _I1, POINTS), cache=True, error_model="numpy")
 def areas(tets, places, faces, x):  # type: ignore[no-untyped-def]
-    """(m,) areas of faces, m^2: the same bits from either side."""
+    """(m,) areas of faces, m^2; the same bits from either side."""
     out, normal = np.empty(len(places)), np.empty(3)
     for m in range(len(places)):
         out[m] = outward(normal, x, tets[places[m]], faces[m])
@@ -75,7 +82,7 @@ def areas(tets, places, faces, x):  # type: ignore[no-untyped-def]
 
 @njit("float64(float64[::1], float64[::1], float64, float64)", cache=True)
 def effective(t, normal, weight, friction):  # type: ignore[no-untyped-def]
-    """The effective traction, Pa, of a traction ``t`` on a facet."""
+    """Returns the effective traction, Pa, of a traction ``t`` on a facet."""
     along = t[0] * normal[0] + t[1] * normal[1] + t[2] * normal[2]
     across = max(t[0] * t[0] + t[1] * t[1] + t[2] * t[2] - along * along, 0.0)
     if along >= 0.0:
@@ -85,8 +92,8 @@ def effective(t, normal, weight, friction):  # type: ignore[no-untyped-def]
 
 @njit(types.int64(CANDIDATES, types.int64, types.int64, types.uint8[::1], MESH), cache=True)
 def _of_tet(out, n, e, hot, mesh):  # type: ignore[no-untyped-def]
-    """Adds the overstressed facets of tet ``e`` to the ``n`` of ``out``, each by the first of its sides that is
-    overstressed, as long as there is room; returns the new number.
+    """Appends the overstressed facets of tet ``e`` to the ``n`` of ``out``, each from the first of its sides that is
+    overstressed, while there is room; returns the new number.
     """
     for k in range(4):
         if not (hot[e] & mesh.intact[e]) >> k & 1:
@@ -103,8 +110,8 @@ def _of_tet(out, n, e, hot, mesh):  # type: ignore[no-untyped-def]
 
 @njit(types.int64(CANDIDATES, types.uint8[::1], MESH), cache=True)
 def _overstressed(out, hot, mesh):  # type: ignore[no-untyped-def]
-    """Fills ``out`` with the overstressed facets within this rank; returns how many there are, be there room for them
-    or not. ``hot`` (tets,): bit k for an overstressed face k, read by eights.
+    """Fills ``out`` with the overstressed facets within this rank; returns their number, also if it is above the
+    room. ``hot`` (tets,): bit k for an overstressed face k, read eight tets at a time.
     """
     n, words = 0, len(hot) // 8
     one, two = hot[: 8 * words].view(np.uint64), mesh.intact[: 8 * words].view(np.uint64)
@@ -118,8 +125,8 @@ def _overstressed(out, hot, mesh):  # type: ignore[no-untyped-def]
 
 @njit(types.int64(CANDIDATES, types.int64, MESH, TABLE, POINTS, LAW), cache=True)
 def within(out, n, mesh, table, x, law):  # type: ignore[no-untyped-def]
-    """Moves the candidates among the ``n`` facets of ``out`` to the front; returns their number. The stresses of some
-    facets are read together: the memory then answers to many at a time.
+    """Moves the candidates among the ``n`` facets of ``out`` to the front; returns their number. The stresses of
+    some facets are read together, so that the memory serves many reads at once.
     """
     normal, one, two, m = np.empty(3), np.empty(3), np.empty(3), 0
     near, far = np.empty((_TOGETHER, 6)), np.empty((_TOGETHER, 6))
@@ -151,8 +158,8 @@ def within(out, n, mesh, table, x, law):  # type: ignore[no-untyped-def]
 
 @njit(types.void(INTERFACE, _I1, MESH, types.uint8[::1]), cache=True)
 def mark_shared(shared, chosen, mesh, hot):  # type: ignore[no-untyped-def]
-    """Marks the neighbours with which this rank shares an intact facet of the ``chosen`` ones, those of one body, that
-    is overstressed on this side; ``hot`` (tets,) as in ``search``.
+    """Marks the neighbours with which this rank shares an intact facet of the ``chosen`` ones, of one body, that is
+    overstressed on this side; ``hot`` (tets,) as in ``search``.
     """
     for m in chosen:
         e, face = shared.sides[m, 0], shared.sides[m, 1]
@@ -162,8 +169,8 @@ def mark_shared(shared, chosen, mesh, hot):  # type: ignore[no-untyped-def]
 
 @njit(types.void(INTERFACE, _I1, MESH, POINTS), cache=True)
 def own_tractions(shared, chosen, mesh, x):  # type: ignore[no-untyped-def]
-    """Tractions of this rank's tets on the intact ones of the ``chosen`` shared facets, those of one body, where some
-    are overstressed.
+    """Computes the tractions of this rank's tets on the intact ``chosen`` shared facets, of one body, for ranks with
+    which an overstressed facet is shared.
     """
     normal, stress = np.empty(3), np.empty(6)
     for m in chosen:
@@ -178,8 +185,8 @@ def own_tractions(shared, chosen, mesh, x):  # type: ignore[no-untyped-def]
 
 @njit(types.int64(CANDIDATES, types.int64, INTERFACE, _I1, MESH, TABLE, POINTS, LAW), cache=True)
 def across(out, n, shared, chosen, mesh, table, x, law):  # type: ignore[no-untyped-def]
-    """Adds the candidates among the ``chosen`` shared facets, those of one body, to the ``n`` of ``out``, by the mean
-    of both ranks' tractions. Returns the new number.
+    """Appends the candidates among the ``chosen`` shared facets, of one body, to the ``n`` of ``out``, by the mean
+    of the tractions of both ranks. Returns the new number.
     """
     normal, mean, bound = np.empty(3), np.empty(3), max(1.0, law.weight) * (1.0 + 1e-9)
     for m in chosen:
@@ -206,11 +213,11 @@ def across(out, n, shared, chosen, mesh, table, x, law):  # type: ignore[no-unty
 
 @njit(types.int64(CANDIDATES, types.int64, TABLE, LAW, types.int64, types.float64), cache=True, error_model="numpy")
 def clock(found, n, table, law, step, t):  # type: ignore[no-untyped-def]
-    """Sets the clocks of the ``n`` candidates, and moves those to the front that break by the delayed criterion;
+    """Updates the clocks of the ``n`` candidates, and moves those that break by the delayed criterion to the front;
     returns their number.
 
-    The clock of an overstressed facet goes on if the last step, of number ``step`` - 1, had started or kept it, else
-    starts at the time ``t``. With nodal tractions some candidates are not overstressed.
+    The clock of an overstressed facet continues if it ran in the last step, number ``step`` - 1; else it starts at
+    the time ``t``. With nodal tractions some candidates are not overstressed.
     """
     m = 0
     for i in range(n):
@@ -235,8 +242,8 @@ def clock(found, n, table, law, step, t):  # type: ignore[no-untyped-def]
     cache=True,
 )  # fmt: skip
 def search(out, hot, shared, chosen, mesh, table, x, law, step, t):  # type: ignore[no-untyped-def]
-    """The candidates of a body that may break by their clocks in the step of this number, 0: all candidates. Returns
-    how many they are, or the room that they need at most where there is too little.
+    """Finds the candidates of a body that break by their clocks in step number ``step``; all candidates if it is 0.
+    Returns their number, or, if there is too little room, a bound of the room that is needed.
     """
     n = _overstressed(out, hot, mesh)
     if n + len(chosen) <= len(out.place):

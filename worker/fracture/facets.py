@@ -1,4 +1,4 @@
-"""The facets of the parts that fracture, as one rank has them: a table over the faces of each body's tets."""
+"""Facets of the parts that fracture, on one rank: a table over the faces of the tets of each body."""
 
 from dataclasses import dataclass
 
@@ -15,9 +15,9 @@ from .records import FacetTable, Law, Mesh
 from .strength import Toughness
 
 _BATCH = 10_000
-"""Tets that are made ready together, so that it takes no memory to speak of."""
+"""Number of tets that are initialised together; it bounds the temporary memory."""
 ELSEWHERE = -2
-"""Place of a tet that another rank has; -1 where there is none."""
+"""Place of a tet that is on another rank; -1 for no tet."""
 
 
 @dataclass
@@ -25,38 +25,40 @@ class Body:
     """Facets of a block that break by one law: those between its own tets, or those to the tets of another part."""
 
     index: int
-    """Of the block among those of the rank."""
+    """Index of the block among those of the rank."""
     block: Block
     spec: Spec
     tough: Toughness
     behind: tuple[int, int]
-    """The tets behind the facets have ids from the first on and below the second."""
+    """Tets behind the facets have ids from the first number on and below the second."""
     mesh: Mesh
     facets: FacetTable
-    """Of the block: the bodies of one have it in common."""
+    """The tets of the block; all bodies of a block share it, and ``facets``."""
     law: Law
     own: bool = True
-    """Whether these are facets within the part."""
+    """True if the facets are within the part."""
 
     def has(self, across: Indices) -> Flags:
-        """Whether faces, by what is ``across`` them, are facets of the body."""
+        """Returns which faces are facets of the body, by the entries of ``across``."""
         return np.asarray((across >= 4 * self.behind[0]) & (across < 4 * self.behind[1]))
 
     @property
     def hot(self) -> Bits:
-        """(n,) see Block.hot, where facets are within the part; else (0,)."""
+        """(n,) see Block.hot, if the facets are within the part; else (0,)."""
         return self.block.hot if self.own else self.block.hot[:0]
 
     def set_strengths(self, places: Ints, x0: Floats) -> None:
-        """Of all its facets of the tets at ``places`` (k,), Pa; ``x0`` (nodes, 3): initial positions."""
+        """Sets the strengths, Pa, of all its facets of the tets at ``places`` (k,); ``x0`` (nodes, 3): initial
+        positions.
+        """
         here, face = np.nonzero(self.has(self.block.across[places]))
         place = places[here]
         area = criterion.areas(self.mesh.tets, place, np.ascontiguousarray(face), x0)
         self.facets.strength[place, face] = self.tough.strengths(facet_ids(self.block, place, face), area)
 
     def follow(self, split: Split, x0: Floats) -> None:
-        """Computes strengths anew that depend on areas, where nodes have become copies: the order of the nodes decides
-        on the last bit of an area, and a body that comes from a checkpoint knows the present nodes only.
+        """Recomputes strengths that depend on areas, at tets whose nodes separated: the order of the nodes changes
+        the last bit of an area, and a body from a checkpoint has the present nodes only.
         """
         scatter = self.tough.scatter
         if scatter is not None and scatter.area is not None:
@@ -64,12 +66,12 @@ class Body:
 
 
 Terms = tuple[Spec, Toughness, tuple[int, int]]
-"""What decides on facets: how they break, their constants, and between which ids the tets behind them are."""
+"""Fracture specification, constants, and the range of ids of the tets behind the facets."""
 
 
-def arm(index: int, block: Block, own: Terms, bonds: list[Terms], x0: Floats) -> list[Body]:
-    """Makes a block ready to fracture, or to go on: the bodies of its ``own`` facets and of those of its ``bonds``;
-    ``x0`` (nodes, 3): initial positions.
+def bodies_of(index: int, block: Block, own: Terms, bonds: list[Terms], x0: Floats) -> list[Body]:
+    """Adds the arrays for fracture to a block, if it has none yet; returns the bodies: its ``own`` facets, and those
+    of its ``bonds``. ``x0`` (nodes, 3): initial positions.
     """
     begins = not len(block.bond)
     if begins:
@@ -90,12 +92,12 @@ def arm(index: int, block: Block, own: Terms, bonds: list[Terms], x0: Floats) ->
 
 
 def shear_weight(spec: Spec) -> float:
-    """Of shear against normal traction: what is given, else 1 of cohesive facets and 0 of others."""
+    """Returns the weight of shear against normal traction: as given, else 1 for cohesive facets and 0 for others."""
     return spec.shear_weight if spec.shear_weight is not None else float(spec.model == "cohesive")
 
 
 def mesh_of(block: Block) -> Mesh:
-    """The tets of a block that has bonds, as kernels take them."""
+    """Returns the record of a block that kernels take."""
     beside, state = _beside(block), block.state.reshape(-1)
     intact = np.packbits((block.bond == INTACT) & (beside >= 0), axis=1, bitorder="little")[:, 0].copy()
     return Mesh(block.tets, block.id, block.across, beside, block.bond, intact, state, block.state.shape[1])
@@ -118,7 +120,9 @@ def facet_ids(block: Block, places: "np.ndarray", faces: "np.ndarray") -> Ints:
 
 
 def clocks(body: Body, step: int) -> Table:
-    """The clocks that go on after the step of number ``step``: a row a tet that is here, with the id of the facet."""
+    """Returns the clocks that ran in step number ``step``: one row for each tet on this rank, with the id of the
+    facet.
+    """
     place, face = np.nonzero(body.facets.seen == step)
     since, key, block = body.facets.since[place, face], facet_ids(body.block, place, face), body.block
     other, near = block.across[place, face] // 4, body.mesh.beside[place, face] >= 0
@@ -128,8 +132,8 @@ def clocks(body: Body, step: int) -> Table:
     }  # fmt: skip
 
 
-def wind(body: Body, table: Table, step: int) -> None:
-    """Sets the clocks as the step of number ``step`` left them; ``table``: of all bodies."""
+def set_clocks(body: Body, table: Table, step: int) -> None:
+    """Restores the clocks of step number ``step`` from the ``table`` of all bodies."""
     order = np.argsort(body.block.id)
     known = body.block.id[order]
     mine = among(known, table["tet"])

@@ -1,14 +1,15 @@
-"""Fragments: what whole faces and facets that still hold keep together, how it moves, and what has become of it.
+"""Fragments: tets connected through intact and cohesive facets; their mass, motion, energy and new surface.
 
-A fragment is called by the smallest global id of its tets. Every rank finds its own connected pieces; then all ranks
-resolve the small graph of the pieces that meet at borders, each in the same way.
+The label of a fragment is the smallest global id of its tets. Each rank finds its own connected pieces; then all ranks
+solve the small graph of the pieces that are connected across ranks, in the same way (connectivity.py).
 
-A tet gives a quarter of its mass to each of its nodes, at the node's place and velocity: so mass, momentum, angular
-momentum and energy of all fragments are those of the nodes. (The inertia is that of lumped masses, larger than that of
-a solid, five-fold for a lone tet.) Nodes that have lost all tets belong to no fragment. The values of a tet are summed
-by fragment as integers of a quantum of its own for every fragment, 2^-60 of its largest term: neither order nor ranks
-can change a bit, and dust keeps its digits beside a large body. Centre and velocity come first, and what is relative
-to them in a second pass: sums about the origin would lose the digits of r^2 / extent^2.
+A tet gives a quarter of its mass to each of its nodes, at the position and with the velocity of the node: so mass,
+momentum, angular momentum and energy of all fragments are those of the nodes. (The inertia is that of lumped masses:
+larger than that of the solid, five times as large for a single tet.) Nodes without tets belong to no fragment. The
+values of tets are summed by fragment as integers; the quantum of each fragment is 2^-60 of its largest term, so that
+the result is independent of order and ranks, and small fragments keep their digits beside a large one. Centre and
+velocity are summed first, and quantities relative to them in a second pass: sums about the origin would lose the
+digits of r^2 / extent^2.
 """
 
 import csv
@@ -28,11 +29,11 @@ from ..model.state import Block, Floats, Ints, Model
 from ..parallel.comm import Comm
 
 _NODE_BITS = 40
-"""A node's global id stays below 2^40."""
+"""Number of bits of a global node id."""
 _LIMB = 2.0**30
-"""As in parallel/fixed_point.py."""
+"""Quanta of a limb, see parallel/fixed_point.py."""
 _FLAT = 1e-10
-"""Share of the largest principal moment below which an axis is taken to have no inertia."""
+"""Share of the largest principal moment of inertia below which an axis counts as without inertia."""
 
 FRAGMENT = np.dtype([
     ("label", np.int64), ("part", np.int64), ("tets", np.int64), ("nodes", np.int64), ("mass", float),
@@ -40,27 +41,29 @@ FRAGMENT = np.dtype([
     ("translation", float), ("rotation", float), ("deformation", float), ("low", float, 3), ("high", float, 3),
     ("extent", float), ("new_surface", float),
 ])  # fmt: skip
-"""A row of the table; the columns are those of cases/output/fragments.py."""
+"""Row of the table; the columns are those of cases/output/fragments.py."""
 
 
 class Groups:
-    """The fragments of one rank's tets, and sums over them that know no order; all ranks take part in everything."""
+    """Fragments of the tets of one rank, and sums over them that are independent of order. All methods are
+    collective.
+    """
 
     def __init__(self, labels: Ints, comm: Comm) -> None:
-        """``labels`` (n,): the fragment of each tet."""
+        """``labels`` (n,): label of the fragment of each tet."""
         self._comm = comm
         self.label, self.of = np.unique(labels, return_inverse=True)
-        """(g,) fragments with a tet here, ascending; (n,) the place there of each tet's."""
+        """(g,) labels of the fragments with a tet on this rank, ascending; (n,) for each tet the place of its label."""
         self._order = np.argsort(self.of, kind="stable")
         self._starts = np.searchsorted(self.of[self._order], np.arange(len(self.label)))
         everywhere, ranks = np.unique(np.concatenate(comm.share(self.label)), return_counts=True)
         self.split = everywhere[ranks > 1]
-        """(s,) fragments of several ranks, the same on every rank."""
+        """(s,) labels of fragments with tets on several ranks, equal on every rank."""
         at = places(self.split, self.label)
         self._here, self._at = np.flatnonzero(at >= 0), at[at >= 0]
 
     def largest(self, values: Floats) -> Floats:
-        """(g, k) the largest of each column of ``values``, (n, k), in every fragment."""
+        """(g, k) maximum of each column of ``values``, (n, k), in every fragment."""
         found = np.maximum.reduceat(values[self._order], self._starts, axis=0)
         if len(self.split):
             parts = np.full((len(self.split), values.shape[1]), -np.inf)
@@ -73,7 +76,7 @@ class Groups:
         return self.complete(np.add.reduceat(words[self._order], self._starts, axis=0))
 
     def complete(self, found: Ints, elsewhere: Ints | None = None) -> Ints:
-        """``found`` (g, k) of this rank summed over ranks; ``elsewhere`` (s, k) is added to that of ``split``."""
+        """Sums ``found`` (g, k) over the ranks; ``elsewhere`` (s, k) is added to the fragments of several ranks."""
         if len(self.split):
             parts = np.zeros((len(self.split), found.shape[1]), np.int64) if elsewhere is None else elsewhere
             parts[self._at] += found[self._here]
@@ -81,7 +84,7 @@ class Groups:
         return found
 
     def sums(self, values: Floats) -> Floats:
-        """(g, k) sums of the columns of ``values``, (n, k), in every fragment: n quanta are the most they are off."""
+        """(g, k) sums of the columns of ``values``, (n, k), in every fragment; the error is at most n quanta."""
         exponent = np.maximum(np.frexp(self.largest(np.abs(values)))[1], -900)
         scaled = values * np.ldexp(1.0, 30 - exponent)[self.of]
         high = np.rint(scaled)
@@ -91,10 +94,11 @@ class Groups:
 
 
 def table(model: Model, labels: list[Ints], comm: Comm) -> "np.ndarray | None":
-    """(fragments,) of ``FRAGMENT``, by ascending label, on rank 0, elsewhere None; velocities are those of the nodes.
+    """(fragments,) of ``FRAGMENT``, by ascending label, on rank 0, elsewhere None; with the velocities of the nodes.
+    Collective.
 
-    The same bits on any number of ranks: the values of a tet are made by the same operations everywhere, sums over
-    tets are exact, and what follows from them is computed once.
+    The same bits for any number of ranks: the values of a tet result from the same operations everywhere, sums over
+    tets are exact, and quantities derived from them are computed once.
     """
     blocks, nodes = model.blocks, model.nodes
     tets = np.concatenate([np.zeros((0, 4), np.int64), *(block.tets for block in blocks)]).astype(np.int64)
@@ -117,7 +121,9 @@ def table(model: Model, labels: list[Ints], comm: Comm) -> "np.ndarray | None":
 
 
 def _move(rows: "np.ndarray", groups: Groups, tets: Ints, mass: Floats, x: Floats, v: Floats) -> None:
-    """Mass, centre, velocity, box; then, relative to them, angular momentum, inertia and kinetic energy."""
+    """Fills in mass, centre, velocity and box; then, relative to these, angular momentum, inertia and kinetic
+    energy.
+    """
     quarter, corners = mass / 4.0, tets.T
     moment, momentum = np.zeros((2, len(tets), 3))
     reach = np.full((len(tets), 6), -np.inf)
@@ -137,10 +143,10 @@ def _move(rows: "np.ndarray", groups: Groups, tets: Ints, mass: Floats, x: Float
 
 
 def _about(r: Floats, w: Floats) -> Floats:
-    """(n, 10) per mass at ``r``, m, with velocity ``w``, m/s: angular momentum, inertia and kinetic energy.
+    """(n, 10) angular momentum, inertia and kinetic energy per mass, at ``r``, m, with velocity ``w``, m/s.
 
-    Inertia in the order xx, yy, zz, yz, zx, xy. Written out, since the sums of a library of linear algebra may depend
-    on the length of the arrays.
+    Inertia in the order xx, yy, zz, yz, zx, xy. Written out, since the sums of a library of linear algebra may
+    depend on the length of the arrays.
     """
     x, y, z = r.T
     u, v, o = w.T
@@ -162,7 +168,7 @@ def _broken_area(block: Block, x0: Floats) -> Floats:
 
 
 def _node_counts(model: Model, tets: Ints, groups: Groups, comm: Comm) -> Ints:
-    """(g,) nodes of each fragment. Those of a fragment of several ranks are counted by the nodes' owners."""
+    """(g,) number of nodes of each fragment. The nodes of a fragment of several ranks are counted by their owners."""
     nodes = model.nodes
     group, node = np.divmod(np.unique(groups.of[:, None] * np.int64(nodes.n) + tets), max(nodes.n, 1))
     place = places(groups.split, groups.label).astype(np.int64)[group]
@@ -176,9 +182,9 @@ def _node_counts(model: Model, tets: Ints, groups: Groups, comm: Comm) -> Ints:
 
 
 def _finished(rows: "np.ndarray") -> "np.ndarray":
-    """Rows with what follows from sums: the energies, and the extent. Rotation is 1/2 L . I^-1 L.
+    """Fills in the quantities that follow from the sums: energies and extent. Rotation is 1/2 L . I^-1 L.
 
-    Axes without inertia have no angular momentum either and are left out. ``deformation`` comes in as the energy
+    Axes without inertia have no angular momentum and are left out. On entry ``deformation`` is the kinetic energy
     relative to the centre.
     """
     xx, yy, zz, yz, zx, xy = rows["inertia"].T
@@ -194,9 +200,9 @@ def _finished(rows: "np.ndarray") -> "np.ndarray":
 
 
 def write(folder: Path, index: int, t: float, parts: list[str], rows: "np.ndarray") -> str:
-    """Writes the table of frame ``index`` and returns its path relative to the run's folder; whole or not at all.
+    """Writes the table of frame ``index``, atomically, and returns its path relative to the run's folder.
 
-    Numbers read back to the same bits.
+    Numbers are written so that they read back to the same bits.
     """
     path = tables.path(folder, index)
     path.parent.mkdir(exist_ok=True)

@@ -1,4 +1,6 @@
-"""The forces of the present that tets and cohesive facets have given to a node go over to its copies, in integers."""
+"""Transfer of nodal forces from separated nodes to their copies, in integers: the forces of tets and cohesive
+facets.
+"""
 
 from typing import NamedTuple
 
@@ -18,12 +20,12 @@ from .records import MESH, POINTS, Mesh
 from .separation import common
 
 _ROWS = VISCOUS + 1
-"""Rows of the state that forces need."""
+"""Rows of the state that the forces depend on."""
 _I1, _I2, _N1 = types.int64[::1], types.int64[:, ::1], types.int32[::1]
 
 
 class Room(NamedTuple):
-    """Scratch for a chunk of tets (tet4.py)."""
+    """Scratch for a chunk of tets (elements/tet4.py)."""
 
     w: Floats
     """(SCRATCH,)."""
@@ -39,7 +41,7 @@ _ROOM = record(Room, types.float64[::1], _I1, types.float64[::1], types.uint32[:
 
 
 class Handover:
-    """Hands forces over on one rank."""
+    """Force transfer on one rank."""
 
     def __init__(self, model: Model, meshes: dict[int, Mesh], neighbours: list[Neighbour], comm: Comm) -> None:
         """``meshes``: of the parts that fracture, by index of the block."""
@@ -49,8 +51,10 @@ class Handover:
         )
 
     def hand_over(self, split: Split, cohesion: Cohesion | None, fresh: list[Facets]) -> None:
-        """From parents to their copies; ``fresh``: cohesive facets that begin to pull. Ranks that share copies take
-        part. What copies get, their parents lose: both sides of a facet hang on nodes that were one.
+        """Moves the forces of the tets and facets of each copy from its parent to it; ``fresh``: new cohesive facets.
+        Collective among the ranks that share copies.
+
+        A copy receives exactly what its parent loses: both nodes of a facet were one node before.
         """
         nodes, copies = self._model.nodes, split.copies
         change = np.zeros((copies.n, 3), np.int64)
@@ -69,17 +73,17 @@ class Handover:
         _apply(nodes.force, change, copies.parents, split.first)
 
     def _complete(self, change: Ints, parents: Ints) -> None:
-        """Adds the other ranks' changes to those of shared copies."""
+        """Adds the changes of other ranks to those of shared copies."""
         shared = {o.rank: at for o in self._neighbours if len(at := common(parents, o.nodes))}
         if shared:
-            told = self._comm.trade({rank: change[at] for rank, at in shared.items()}, shared)
+            received = self._comm.trade({rank: change[at] for rank, at in shared.items()}, shared)
             for rank, at in shared.items():
-                change[at] += told[rank].reshape(-1, 3)
+                change[at] += received[rank].reshape(-1, 3)
 
 
 @njit(types.void(_I2, _I2, _I1, types.int64), cache=True)
 def _apply(force, change, parents, first):  # type: ignore[no-untyped-def]
-    """Adds ``change`` (copies, 3) to the forces of copies and takes it from their ``parents``."""
+    """Adds ``change`` (copies, 3) to the forces of the copies and subtracts it from those of their ``parents``."""
     for c in range(len(parents)):
         for k in range(3):
             force[first + c, k] += change[c, k]
@@ -88,7 +92,9 @@ def _apply(force, change, parents, first):  # type: ignore[no-untyped-def]
 
 @njit(types.void(_ROOM, _N1, _I1, types.int64, MESH, POINTS, types.float64), cache=True, error_model="numpy")
 def _forces(room, place, chosen, n, mesh, x, scale):  # type: ignore[no-untyped-def]
-    """Forces of the present stress of the tets of ``n`` rows, on their nodes 1, 2, 3 (tet4.py), in ``room.forces``."""
+    """Computes the forces of the present stress of the tets of ``n`` rows, on their nodes 1, 2, 3
+    (elements/tet4.py), in ``room.forces``.
+    """
     for i in range(n):
         e = place[chosen[i]]
         at = e // CHUNK * mesh.columns * CHUNK + e % CHUNK
@@ -107,8 +113,8 @@ def _forces(room, place, chosen, n, mesh, x, scale):  # type: ignore[no-untyped-
     error_model="numpy",
 )
 def _of_tets(change, node, place, corner, blocks, block, first, mesh, x, room, scale):  # type: ignore[no-untyped-def]
-    """Adds the forces of the tets of one ``block`` whose ``node`` (r,) is now a copy to those of the copies; ``first``:
-    local index of the first copy.
+    """Adds the forces of the tets of one ``block`` whose ``node`` (r,) is now a copy to those of the copies;
+    ``first``: local index of the first copy.
     """
     chosen, n = np.empty(CHUNK, np.int64), 0
     for r in range(len(node)):

@@ -1,4 +1,4 @@
-"""Which facets break in a step: candidates by their tractions, the delayed criterion, and the order of breaking."""
+"""Fracture initiation: candidates by their tractions, the delayed criterion, and the order of breaking."""
 
 import numpy as np
 
@@ -21,20 +21,20 @@ from .stars import Stars
 
 
 class Initiation:
-    """Finds the facets that break on one rank, and keeps the clocks of the delayed criterion."""
+    """Facets that break on one rank, and the clocks of the delayed criterion."""
 
     def __init__(
         self, model: Model, bodies: list[Body], specs: dict[int, Fracture], stars: dict[int, Stars],
         neighbours: list[Neighbour], comm: Comm, clock: Clock,
     ) -> None:  # fmt: skip
-        """``specs``: of all parts that fracture, by number, here or not; ``stars``: by index of the block. All ranks
-        take part.
+        """``specs``: of all parts that fracture, by number, also of parts that have no tet on this rank; ``stars``:
+        by index of the block. Collective.
         """
         self._model, self._neighbours, self._comm, self._clock = model, neighbours, comm, clock
         self.bodies = bodies
         smooth = [part for part, spec in specs.items() if spec.traction == "nodes"]
         self._averaged = [[part] for part in smooth] if len(model.nodes.shares.rank) else [smooth]
-        """Parts with nodal tractions, together as far as none of them has a node in common with another."""
+        """Groups of parts with nodal tractions; no two parts of a group have a node in common."""
         self.one_by_one = any(spec.order == "local_maximum" for spec in specs.values())
         self._stars = stars
         self.interface = Interface(bodies, neighbours, comm)
@@ -42,24 +42,24 @@ class Initiation:
         for body in bodies:
             heaviest[body.block.part] = body.block.row(MASS).max(initial=0.0)
         self._heaviest = comm.maximum(heaviest)
-        """(parts,) mass of the heaviest tet of all ranks, kg; 0 where a part does not fracture."""
+        """(parts,) mass of the heaviest tet of all ranks, kg; 0 for a part that does not fracture."""
         self._rooms = [Candidates.of(1 + len(rows)) for rows in self.interface.of_body]
-        """Of each body; what a step finds lies there until the next."""
+        """Room for the candidates of each body; valid until the next step."""
         self._step = 1
-        """Number of the step; those of the clocks begin with 1."""
+        """Number of the step, as stored with the clocks; starts at 1."""
 
     @property
     def smooth(self) -> bool:
-        """Whether some part wants nodal tractions."""
+        """True if a part uses nodal tractions."""
         return any(self._averaged)
 
     def begin_step(self) -> None:
-        """The clock of a facet that is not overstressed in this step stops."""
+        """Starts a new step: clocks of facets that are not overstressed in it stop."""
         self._step += 1
 
     def breaking(self, hot: bool) -> list[Breaking]:
-        """The facets that break by the present stress, body by body; neighbours take part, and with nodal tractions all
-        ranks. ``hot``: some face of this rank is overstressed.
+        """Returns the facets that break by the present stress, by body; ``hot``: a face of this rank is
+        overstressed. Collective among neighbours, and with nodal tractions among all ranks.
         """
         if not (hot or self.interface.hot or self.smooth):
             return []
@@ -67,7 +67,9 @@ class Initiation:
         return [some for some in every if some is not None]
 
     def candidates(self) -> list[tuple[Body, Candidates]]:
-        """The bodies of which facets may break, with these; the same ranks take part. Once a step: clocks go on."""
+        """Returns the bodies with candidates, and these. Called once a step, since it advances the clocks;
+        collective as ``breaking``.
+        """
         self.interface.exchange(self._model.nodes.x)
         found = [(body, self._candidates(k, body)) for k, body in enumerate(self.bodies)]
         if self.smooth:
@@ -75,8 +77,8 @@ class Initiation:
         return [(body, some) for body, some in found if len(some.place)]
 
     def strongest(self, broken: list[Breaking]) -> list[Breaking]:
-        """Those with the largest traction over strength at all of their nodes, where the part asks for that; all ranks
-        take part.
+        """Returns the facets that have the largest traction over strength at all of their nodes, in parts with
+        ``order = "local_maximum"``, and all facets of other parts. Collective.
         """
         waiting = [b for b in broken if b.body.spec.order == "local_maximum"]
         none = np.zeros(0, np.int64)
@@ -91,7 +93,7 @@ class Initiation:
         return [b.take(next(left)) if b.body.spec.order == "local_maximum" else b for b in broken]
 
     def follow(self, split: Split) -> None:
-        """Takes up the copies of a split."""
+        """Updates the bodies after a split."""
         for body in self.bodies:
             body.follow(split, self._model.nodes.x0)
 
@@ -103,16 +105,16 @@ class Initiation:
         parcel.rows["fracture.since"] = every
 
     def resume(self, parcel: Parcel) -> None:
-        """Takes them back."""
+        """Restores the clocks from a parcel."""
         for body in (body for body in self.bodies if body.own):
-            facets.wind(body, parcel.rows["fracture.since"], self._step)
+            facets.set_clocks(body, parcel.rows["fracture.since"], self._step)
 
     def free(self) -> None:
-        """Gives the messages back to MPI."""
+        """Frees the persistent messages."""
         self.interface.free()
 
     def _candidates(self, k: int, body: Body) -> Candidates:
-        """With their clocks; those of a body with nodal tractions are clocked by these."""
+        """Returns the candidates of a body, after the delayed criterion; with nodal tractions that is applied later."""
         room, rows = self._rooms[k], self.interface.of_body[k]
         step = self._step if body.spec.traction == "tets" else 0
         where = body.hot, self.interface.facets, rows, body.mesh, body.facets, self._model.nodes.x, body.law
@@ -123,14 +125,14 @@ class Initiation:
         return room.first(n)
 
     def _smoothed(self, found: list[tuple[Body, Candidates]]) -> list[tuple[Body, Candidates]]:
-        """With tractions from nodal stress where the part asks for that; all ranks take part."""
+        """Replaces tractions by those from nodal stress, in parts that use these. Collective."""
         left = dict[int, Candidates]()
         for parts in self._averaged:
             left |= self._of_nodes([(body, each) for body, each in found if body.own and body.block.part in parts])
         return [(body, left.get(body.index, each) if body.own else each) for body, each in found]
 
     def _of_nodes(self, some: list[tuple[Body, Candidates]]) -> dict[int, Candidates]:
-        """By the block what is left of the candidates of bodies with nodal tractions."""
+        """Returns, by index of the block, the remaining candidates of bodies with nodal tractions. Collective."""
         nodes, left = self._model.nodes, dict[int, Candidates]()
         wanted = np.zeros(nodes.n, bool)
         for body, each in some:

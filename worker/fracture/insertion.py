@@ -1,4 +1,4 @@
-"""Cohesive facets as they are inserted: the traction that broke them, and the stiffness that the time step allows."""
+"""Insertion of cohesive facets: with the traction at which they broke, and the stiffness that the time step allows."""
 
 import numpy as np
 
@@ -10,22 +10,23 @@ from .cohesive import frames, fresh
 from .columns import Facets
 
 _LEAST = 0.05
-"""Of the square of the highest frequency that a step resolves: what cohesive facets may use at least."""
+"""Share of the square of the highest resolved frequency that cohesive facets may use at least."""
 _SHARES = 24.0
-"""A node has a quarter of its tet's mass, up to three of whose faces open there, between two nodes that move."""
+"""A node has a quarter of the mass of its tet, and up to three of the faces of the tet open there, between two nodes
+that both move."""
 
 
 class Insertion:
-    """Makes cohesive facets of one rank."""
+    """Makes the cohesive facets of one rank."""
 
     def __init__(self, safety: float) -> None:
-        """``safety``: of the time step."""
+        """``safety``: safety factor of the time step."""
         self._unused = max(1.0 - safety**2, _LEAST)
         self.longest = 0.0
         """Longest stable step so far in which a face was overstressed, s."""
 
     def facets(self, b: Breaking, nodes: Nodes, split: Split) -> Facets:
-        """Those that break and whose first side is here, at the present positions."""
+        """Returns the cohesive facets of ``b`` whose first side is on this rank, at the present positions."""
         f = b.facets
         before = np.concatenate([f.nodes, f.nodes], axis=1)
         after = split.followed_sides(before, nodes.id, f.tets)
@@ -43,8 +44,8 @@ class Insertion:
 
 
 def shear_share(along: Floats, traction: Floats, weight: float) -> Floats:
-    """(m,) of shear in the square of the effective traction: w t_s^2 / (<t_n>^2 + w t_s^2); ``along`` (m,) the
-    ``traction`` (m, 3) on the normal, Pa.
+    """(m,) share of shear in the square of the effective traction: w t_s^2 / (<t_n>^2 + w t_s^2); ``along`` (m,):
+    component of the ``traction`` (m, 3) along the normal, Pa.
     """
     shear = weight * np.maximum((traction * traction).sum(axis=1) - along * along, 0.0)
     whole = np.maximum(along, 0.0) ** 2 + shear
@@ -55,9 +56,9 @@ def inserted(
     nodes: Nodes, before: Indices, after: Indices, tets: Ints, traction: Floats, effective: Floats, energy: Floats,
     weight: Floats, stiffness: Floats, area: Floats,
 ) -> Facets:  # fmt: skip
-    """New facets at the present positions.
+    """Returns new facets at the present positions.
 
-    ``before`` and ``after`` (m, 6): nodes of the first side and across, before and after they have separated;
+    ``before`` and ``after`` (m, 6): nodes of the first side and those opposite, before and after separation;
     ``traction`` (m, 3) on the outward normal of the first side and its ``effective`` size (m,), Pa; ``weight`` of
     shear; ``stiffness`` (m,) that the time step allows, Pa/m.
     """
@@ -66,7 +67,7 @@ def inserted(
     along[:, 0] = np.maximum(along[:, 0], 0.0)
     shear = 1.0 / weight
     # T = strength / e (<d_n> n + b^2 d_t) is the traction where d_n = e t_n / strength, d_t = e t_t / (b^2 strength);
-    # under pressure the effective traction counts the shear that friction leaves.
+    # under pressure the effective traction contains only the shear beyond friction.
     e = np.maximum(1.0, shear) * effective / stiffness
     pressed = along[:, 0] == 0.0
     across = np.sqrt(along[:, 1] ** 2 + along[:, 2] ** 2)

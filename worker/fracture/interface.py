@@ -1,7 +1,7 @@
-"""Facets whose two tets are on different ranks, or in two blocks: both sides find the same mean of the two tractions.
+"""Shared facets: their two tets are on different ranks, or in two blocks; both sides compute the same mean traction.
 
-A facet breaks only where one of its tets would break it alone, so two ranks exchange tractions only in steps in which
-such a facet is among those they share. Whether there is one they tell each other with the forces of shared nodes.
+A facet breaks only if one of its tets alone would break it, so two ranks exchange tractions only in steps in which a
+facet that they share is overstressed. The flag for that is sent with the forces of shared nodes.
 """
 
 import numpy as np
@@ -17,13 +17,13 @@ from .records import InterfaceFacets
 
 
 class Interface:
-    """The facets that this rank shares with others, and the exchange of their tractions."""
+    """Facets that this rank shares with others, and the exchange of their tractions."""
 
     def __init__(self, bodies: list[Body], neighbours: list[Neighbour], comm: Comm) -> None:
-        """All ranks take part."""
+        """Collective."""
         mine = np.concatenate([np.zeros((0, 5), np.int64), *(_rows(b, body) for b, body in enumerate(bodies))])
-        told = comm.swap({other.rank: mine[:, [0, 2]] for other in neighbours}) if comm.size > 1 else {}
-        met = {rank: _met(mine, words.reshape(-1, 2)) for rank, words in told.items()}
+        received = comm.swap({other.rank: mine[:, [0, 2]] for other in neighbours}) if comm.size > 1 else {}
+        met = {rank: _met(mine, words.reshape(-1, 2)) for rank, words in received.items()}
         met[comm.rank] = _met(mine, mine[:, [0, 2]])
         table = np.concatenate([np.zeros((0, 6), np.int64), *met.values()])
         m, last = len(table), len(neighbours)
@@ -32,7 +32,7 @@ class Interface:
         self._inner: Ints = np.flatnonzero(of == last)
         """Rows of facets between two blocks of this rank."""
         self._partner = _partners(table[self._inner])
-        """Of each of these the row of its other side, among them."""
+        """Place of the other side of each of these, among them."""
         self.facets = InterfaceFacets(
             np.column_stack([table[:, 3], table[:, 0] % 4]).astype(np.int32), table[:, 0] < table[:, 1],
             np.ascontiguousarray(table[:, 5]).view(np.float64), np.zeros((m, 3)), np.zeros((m, 3)),
@@ -43,7 +43,7 @@ class Interface:
         self.facets.there[self._inner] = here[self._partner]
         self._bodies = bodies
         self.of_body: list[Ints] = [np.flatnonzero(table[:, 4] == b) for b in range(len(bodies))]
-        """For each body the rows of its facets."""
+        """Rows of the facets of each body."""
         self._outer = [rows[of[rows] != last] for rows in self.of_body]
         ends = np.cumsum([0, *map(len, met.values())])
         own, theirs = self.facets.own.view(np.int64), self.facets.theirs.view(np.int64)
@@ -51,12 +51,12 @@ class Interface:
             places[rank]: comm.exchange([(rank, own[a:b])], [(rank, theirs[a:b])], Tag.TRACTION)
             for rank, a, b in zip(met, ends[:-1], ends[1:], strict=True) if b > a and rank != comm.rank
         }  # fmt: skip
-        """By the place of the neighbour."""
+        """By the index of the neighbour."""
         self.hot = False
-        """Whether some shared facet is overstressed on either side."""
+        """True if a shared facet is overstressed on either side."""
 
     def words(self, hot: bool) -> Ints:
-        """(neighbours,) 1 for those with which this rank shares a facet that is overstressed on its side; ``hot``: a
+        """(neighbours,) flags to send: 1 if a facet shared with that rank is overstressed on this side; ``hot``: a
         tet of a shared node has an overstressed face.
         """
         self.facets.hot[:] = 0
@@ -65,14 +65,14 @@ class Interface:
                 criterion.mark_shared(self.facets, rows, body.mesh, body.block.hot)
         return self.facets.hot[:-1]
 
-    def hear(self, words: Ints) -> None:
-        """Takes what the neighbours have told."""
+    def receive(self, words: Ints) -> None:
+        """Merges the flags received from the neighbours."""
         np.maximum(self.facets.hot[:-1], words, out=self.facets.hot[:-1])
         self.hot = bool(self.facets.hot.any())
 
-    def look(self, hot: bool) -> None:
-        """When all tets of the rank are done: which facets between its blocks are overstressed, where some face is,
-        ``hot``.
+    def mark_inner(self, hot: bool) -> None:
+        """Marks the overstressed facets between two blocks of this rank, after all its tets; ``hot``: a face of the
+        rank is overstressed.
         """
         if len(self._inner):
             self.facets.hot[-1] = 0
@@ -83,8 +83,8 @@ class Interface:
             self.hot = bool(self.facets.hot.any())
 
     def exchange(self, x: Floats) -> None:
-        """Completes the tractions of both sides at the positions ``x`` (nodes, 3), where some facet is overstressed;
-        neighbours take part.
+        """Computes and exchanges the tractions of both sides at the positions ``x`` (nodes, 3), if a shared facet is
+        overstressed. Collective among neighbours.
         """
         if not self.hot:
             return
@@ -99,13 +99,15 @@ class Interface:
             exchange.finish()
 
     def free(self) -> None:
-        """Gives the messages back to MPI."""
+        """Frees the persistent messages."""
         for exchange in self._exchanges.values():
             exchange.free()
 
 
 def _rows(index: int, body: Body) -> Ints:
-    """(k, 5) own side, other side (4 * tet + face), bits of the mass, place and body of facets with a tet elsewhere."""
+    """(k, 5) own side, other side (4 * tet + face), bits of the mass of the tet, its place, and the body, of facets
+    whose other tet is not in the block.
+    """
     block = body.block
     place, face = np.nonzero((body.mesh.beside == ELSEWHERE) & body.has(block.across))
     own, mass = 4 * block.id[place] + face, block.row(MASS)[place].view(np.int64)
@@ -113,7 +115,9 @@ def _rows(index: int, body: Body) -> Ints:
 
 
 def _met(mine: Ints, theirs: Ints) -> Ints:
-    """(m, 6) those of ``mine`` that a rank which told ``theirs`` (k, 2) has, too, by id, with the bits of its mass."""
+    """(m, 6) rows of ``mine`` whose facet is among ``theirs`` (k, 2), which another rank sent, by id of the facet,
+    with the bits of the other mass.
+    """
     theirs = theirs[np.argsort(theirs[:, 0])]
     at = np.minimum(np.searchsorted(theirs[:, 0], mine[:, 1]), max(len(theirs) - 1, 0))
     met = theirs[at, 0] == mine[:, 1] if len(theirs) else np.zeros(len(mine), bool)
@@ -122,6 +126,6 @@ def _met(mine: Ints, theirs: Ints) -> Ints:
 
 
 def _partners(table: Ints) -> Ints:
-    """(m,) the row of the other side, of rows (m, 6) (``_met``) of facets both of whose sides are among them."""
+    """(m,) the row of the other side, for rows (m, 6) of ``_met`` that contain both sides of each facet."""
     order = np.argsort(table[:, 0])
     return np.asarray(order[np.searchsorted(table[order, 0], table[:, 1])])

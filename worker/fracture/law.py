@@ -1,14 +1,15 @@
-r"""Kernels of the law of cohesive facets; cohesive.py has the law.
+r"""Kernels of the traction-separation law of cohesive facets; cohesive.py draws the law.
 
-A pair is one of three of a facet: a node of its first side and the one across. T = k d of a pair has the stiffness
-k = T(top) / top, and k (D^2 - lent^2) / 2 is what it would give back. Where D falls below ``lent`` it would give what
-nobody has paid, so its offset is shortened first, to nothing if need be: with the share q of d that is kept
+A pair is a node of the first side of a facet and the node opposite; each facet has three. T = k d with the secant
+stiffness k = s(top) / top; by closing, a pair can release k (D^2 - lent^2) / 2 per area. Where D would fall below
+``lent``, it would release more than it absorbed. Then its offset is shortened first, by the factor q:
 
-    d -> q d,   lent^2 -> lent^2 - (1 - q^2) D^2,   k as it is,
+    d -> q d,   lent^2 -> max(lent^2 - (1 - q^2) D^2, 0),   k unchanged,
 
-what could be given back is the same, or nothing. What is left of the energy lies under the law from ``lent`` on:
+so that the recoverable energy k (D^2 - lent^2) / 2 stays the same (q = 0: nothing is recoverable). The remaining
+energy is the area under the law from ``lent`` on, a triangle up to the knee and one beyond it:
 
-    left = k (knee^2 - lent^2) / 2 + k knee critical / 2,   knee = top, or less where critical would be below 0.
+    left = k (knee^2 - lent^2) / 2 + k knee critical / 2,   knee = top, or less if critical would be below 0.
 """
 
 import numpy as np
@@ -18,9 +19,9 @@ from ..kernels.jit import njit, types
 from .columns import FACETS
 
 _SLACK = 1e-6
-"""Of the energy of a facet: what a pair may give unpaid. Above rounding, far below what anybody sees."""
+"""Share of the fracture energy that a pair may release beyond what it absorbed; above rounding. Chosen."""
 _EXHAUSTED = 1e-6
-"""Of the energy of a facet: what is left at least to one that lets go."""
+"""Least share of the fracture energy that is left to a pair after unloading. Chosen."""
 
 
 _F1, _F2, _F3 = types.float64[::1], types.float64[:, ::1], types.float64[:, :, ::1]
@@ -29,7 +30,7 @@ _I, _F, _I2 = types.int64, types.float64, types.int64[:, ::1]
 
 @njit(types.void(_F2, _F2, types.int32[::1]), cache=True, error_model="numpy")
 def turn(frame, x, nodes):  # type: ignore[no-untyped-def]
-    """Normal, first edge, and n x e, of the triangle in the middle between the two sides."""
+    """Sets ``frame`` to the normal n, first edge e, and n x e, of the triangle in the middle between the two sides."""
     for i in range(3):
         a = x[nodes[0], i] + x[nodes[3], i]
         frame[1, i] = x[nodes[1], i] + x[nodes[4], i] - a
@@ -50,7 +51,7 @@ def turn(frame, x, nodes):  # type: ignore[no-untyped-def]
 
 @njit(_F(FACETS, _I, _I), cache=True, error_model="numpy")
 def _share(f, m, p):  # type: ignore[no-untyped-def]
-    """Of the strength, that is left."""
+    """Returns the remaining share s / strength of the traction."""
     law, s = f.softening, f.state
     beyond = s.top[m, p] - law.knee[m, p]
     return 1.0 if beyond <= 0.0 else max(1.0 - beyond / law.critical[m, p], 0.0)
@@ -58,7 +59,7 @@ def _share(f, m, p):  # type: ignore[no-untyped-def]
 
 @njit(_F(_F1, _F2, _F1, _F1, _F), cache=True, error_model="numpy")
 def _opened(d, frame, apart, offset, shear):  # type: ignore[no-untyped-def]
-    """Size of the opening ``d``, which it fills in, of nodes that are ``apart`` (3,)."""
+    """Sets ``d`` to the opening of a pair whose nodes are ``apart`` (3,), and returns its size D."""
     for c in range(3):
         d[c] = offset[c] + frame[c, 0] * apart[0] + frame[c, 1] * apart[1] + frame[c, 2] * apart[2]
     d[0] = max(d[0], 0.0)
@@ -67,7 +68,7 @@ def _opened(d, frame, apart, offset, shear):  # type: ignore[no-untyped-def]
 
 @njit(types.void(FACETS, _I, _I, _F2, _F1, _F), cache=True, error_model="numpy")
 def _shorten(f, m, p, frame, d, kept):  # type: ignore[no-untyped-def]
-    """Keeps a share of the present opening ``d``: the offset goes along."""
+    """Multiplies the present opening ``d`` of a pair by ``kept``, by changing its offset; see the formulas above."""
     law, s = f.softening, f.state
     k = law.strength[m, p] * _share(f, m, p) / s.top[m, p]
     for c in range(3):
@@ -81,7 +82,9 @@ def _shorten(f, m, p, frame, d, kept):  # type: ignore[no-untyped-def]
     law.lent[m, p] = np.sqrt(max(lent, 0.0)) if kept > 0.0 else 0.0
     lent = law.lent[m, p] ** 2
     left = max(f.constants.energy[m] - 3.0 * s.work[m, p] / f.constants.area[m], _EXHAUSTED * f.constants.energy[m])
-    left = 2.0 / k * left + s.size[m, p] ** 2 - lent  # in squares of the opening, as the triangles below
+    left = (
+        2.0 / k * left + s.size[m, p] ** 2 - lent
+    )  # squares of the opening: twice the energy over k, as the triangles below
     knee = min(s.top[m, p], np.sqrt(lent + left))
     law.strength[m, p] = k * knee
     law.critical[m, p] = max(left - (knee * knee - lent), 0.0) / knee
@@ -90,7 +93,9 @@ def _shorten(f, m, p, frame, d, kept):  # type: ignore[no-untyped-def]
 
 @njit(types.boolean(FACETS, _F2), cache=True, error_model="numpy")
 def open_facets(f, x):  # type: ignore[no-untyped-def]
-    """Returns whether some facet has failed at all three pairs. The work is that of the mean of old and new force."""
+    """Computes openings, tractions and work of all facets at the positions ``x``; returns True if a facet has failed
+    at all three pairs. The work is that of the mean of the old and the new force.
+    """
     law, s = f.softening, f.state
     frame, d, moved = np.empty((3, 3)), np.empty(3), np.empty(3)
     failed = False
@@ -121,19 +126,19 @@ def open_facets(f, x):  # type: ignore[no-untyped-def]
 
 @njit(types.void(_F1, FACETS, _I, _I, _F2, _I2, _F1, _F), cache=True, error_model="numpy")
 def _foresee(ahead, f, m, p, v, force, mass, quantum):  # type: ignore[no-untyped-def]
-    """Velocity at n+1/2 with which a pair will open, by the forces of the present alone."""
+    """Sets ``ahead`` to the opening velocity of a pair at n+1/2 by the present nodal forces alone."""
     a, b = f.nodes[m, p], f.nodes[m, 3 + p]
     for i in range(3):
         ahead[i] = v[b, i] - v[a, i] + quantum * (force[b, i] / mass[b] - force[a, i] / mass[a])
 
 
 @njit(types.void(_I2, FACETS, _F2, _F2, _I2, _F1, _F1, _F, types.boolean), cache=True, error_model="numpy")
-def let_go(change, f, x, v, force, mass, steps, scale, whole):  # type: ignore[no-untyped-def]
-    """Shortens the offsets of pairs that would give what nobody has paid in the step ahead, by what keeps each from it
-    or wholly, and adds what that changes of the nodal forces to ``change`` (nodes, 3), quanta.
+def unload(change, f, x, v, force, mass, steps, scale, whole):  # type: ignore[no-untyped-def]
+    """Unloads pairs that would release more than they absorbed in the next step: lowers the traction of each as far as
+    needed, or to zero if ``whole``, and adds the change of the nodal forces to ``change`` (nodes, 3), quanta.
 
-    ``steps``: dt behind, their mean, dt ahead, s. What is not a force of the present, contact above all, is taken to
-    change the velocities as in the step before.
+    ``steps``: dt(n-1/2), their mean, dt(n+1/2), s. Velocity changes by other causes than nodal forces, mainly
+    contact, are extrapolated from the last step.
     """
     law, s = f.softening, f.state
     frame, d, ahead, apart, pull = np.empty((3, 3)), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
@@ -151,8 +156,8 @@ def let_go(change, f, x, v, force, mass, steps, scale, whole):  # type: ignore[n
             short = law.lent[m, p] - _opened(d, frame, apart, law.offset[m, p], f.constants.shear[m])
             if short <= _SLACK * f.constants.energy[m] / law.strength[m, p]:
                 continue
-            # A force less by dF along the traction opens the pair by dt^2 dF (1 / m_a + 1 / m_b) more, and its size by
-            # that times |T| / (k D).
+            # A traction lowered by dF opens the pair by dt^2 dF (1 / m_a + 1 / m_b) more along it, and increases its
+            # size D by that times |T| / (k D).
             size = _opened(d, frame, s.opening[m, p], law.offset[m, p], f.constants.shear[m])
             strength = np.sqrt(pull[0] ** 2 + pull[1] ** 2 + pull[2] ** 2)
             slope = 3.0 * strength / (f.constants.area[m] * law.strength[m, p] * share / s.top[m, p] * size)
@@ -170,7 +175,9 @@ def let_go(change, f, x, v, force, mass, steps, scale, whole):  # type: ignore[n
 
 @njit(types.void(FACETS, _F2, _I2, _F1, _F), cache=True, error_model="numpy")
 def foresee(f, v, force, mass, quantum):  # type: ignore[no-untyped-def]
-    """Notes with which velocities pairs would open by the forces of the present alone; ``quantum``: as ``kick``."""
+    """Stores the opening velocities of pairs by the present nodal forces alone; ``quantum``: mean time step over the
+    force scale, N s.
+    """
     law, s = f.softening, f.state
     for m in range(len(f.nodes)):
         for p in range(3):
@@ -195,7 +202,9 @@ def scatter(force, nodes, pull, scale):  # type: ignore[no-untyped-def]
 
 @njit("void(int64[:, ::1], int64, int32[:, ::1], float64[:, :, ::1], float64)", cache=True)
 def scatter_copies(change, first, nodes, pull, scale):  # type: ignore[no-untyped-def]
-    """Adds the forces ``pull`` on facets ``nodes`` (m, 6), in quanta, to the rows of nodes from ``first`` on."""
+    """Adds the forces ``pull`` on facets ``nodes`` (m, 6), in quanta, to the rows ``change`` of the nodes from
+    ``first`` on.
+    """
     for m in range(len(nodes)):
         for k in range(6):
             if nodes[m, k] >= first:
@@ -206,7 +215,7 @@ def scatter_copies(change, first, nodes, pull, scale):  # type: ignore[no-untype
 
 @njit("int64[::1](int32[:, ::1], int64[::1], int64)", cache=True)
 def touching(table, some, n):  # type: ignore[no-untyped-def]
-    """Rows of ``table`` (m, 6) with one of ``some`` of the ``n`` nodes."""
+    """Returns the rows of ``table`` (m, 6) that contain one of the nodes ``some``; ``n``: number of nodes."""
     flags, rows, found = np.zeros(n, np.bool_), np.empty(len(table), np.int64), 0
     for a in some:
         flags[a] = True

@@ -1,8 +1,8 @@
-"""Facet tractions from nodal stress: means over the stars of the three nodes, smoother than those of the two tets.
+"""Facet tractions from nodal stress: mean over the stars of the three nodes, smoother than the mean of the two tets.
 
-Each node has the mean stress of the tets that hang on it, weighted with their initial volumes; sums of integers, so
-that both sides of a facet, on whichever ranks, find the same traction. A facet must pass by its two tets as well: only
-such facets are candidates (criterion.py).
+The stress of a node is the mean over its tets, weighted with their initial volumes; sums of integers, so that both
+sides of a facet compute the same traction on any ranks. A facet must pass the criterion of its two tets as well:
+only such facets are candidates (criterion.py).
 """
 
 import numpy as np
@@ -20,7 +20,7 @@ from .records import CANDIDATES, INTERFACE, MESH, POINTS, Candidates, InterfaceF
 from .stars import Stars
 
 _QUANTA = 2.0**30
-"""Quanta to the strength, and to the mass of the heaviest tet."""
+"""Quanta per strength, and per mass of the heaviest tet."""
 _SXX, _SYY, _SZZ = S_XX * CHUNK, S_YY * CHUNK, S_ZZ * CHUNK
 _SYZ, _SZX, _SXY = S_YZ * CHUNK, S_ZX * CHUNK, S_XY * CHUNK
 _P, _MASS = PRESSURE * CHUNK, MASS * CHUNK
@@ -37,8 +37,8 @@ def stresses(
     """(nodes, 6) mean Cauchy stress xx, yy, zz, yz, zx, xy without the viscous part, Pa, of the ``wanted`` (nodes,) and
     the shared nodes of these bodies; zero at others.
 
-    ``heaviest`` (parts,): mass of the heaviest tet of each part on all ranks, kg. Sums are in quanta of that and of the
-    part's strength; so no two of the bodies have a node in common. All ranks take part.
+    ``heaviest`` (parts,): mass of the heaviest tet of each part on all ranks, kg. The quanta of the sums depend on
+    it and on the strength of the part; so no two of the bodies have a node in common. Collective.
     """
     sums, strength = np.zeros((nodes.n, 7), np.int64), np.zeros(nodes.n)
     for other in neighbours:
@@ -63,7 +63,7 @@ def stresses(
     error_model="numpy",
 )  # fmt: skip
 def _add(sums, nodes, first, count, pool, mesh, of_stress, of_mass):  # type: ignore[no-untyped-def]
-    """Adds the stresses of the stars of ``nodes`` times their masses, and the masses, to ``sums``."""
+    """Adds stress times mass of the tets of the stars of ``nodes``, and the masses, to ``sums``."""
     state, rows = mesh.state, mesh.columns
     for a in nodes:
         for e in pool[first[a] : first[a] + count[a]]:
@@ -80,8 +80,8 @@ def _add(sums, nodes, first, count, pool, mesh, of_stress, of_mass):  # type: ig
 
 
 def replace(found: Candidates, shared: InterfaceFacets, body: Body, stress: Floats, x: Floats) -> None:
-    """The tractions of candidates of ``body`` from the ``stress`` (nodes, 6) of their nodes, made as small as the
-    effective one of the two tets where they pass it; at the positions ``x`` (nodes, 3).
+    """Sets the tractions of candidates of ``body`` from the ``stress`` (nodes, 6) of their nodes, reduced to the
+    effective traction of the two tets if they exceed it; at the positions ``x`` (nodes, 3).
     """
     _replace(found, shared, body.mesh, stress, x, body.law.weight, body.spec.friction)
 

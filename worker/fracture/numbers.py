@@ -7,16 +7,16 @@ from ..model.state import Ints
 from ..parallel.comm import Comm
 
 UNKNOWN = -1
-"""The number of a tet that has none yet."""
+"""Number of a tet that has none yet."""
 
 
 def numbered(before: Ints, labels: Ints, first: int, comm: Comm) -> tuple[Ints, Ints]:
-    """(n,) the number of the fragment of each tet, and (k, 3) the number that it had, its number, and how many tets
-    they have in common, ascending; the rows are equal on all ranks, which all take part.
+    """(n,) the number of the fragment of each tet, and (k, 3) old number, new number, and number of tets with both,
+    ascending; the rows are equal on all ranks. Collective.
 
-    ``before`` (n,): the numbers that tets had, or UNKNOWN; ``labels`` (n,): any name of the fragment of each; new
-    numbers begin at ``first`` and have the order of the labels. Of pieces with equally many tets the one with the
-    smallest label keeps the number.
+    ``before`` (n,): the old numbers of tets, or UNKNOWN; ``labels`` (n,): label of the fragment of each; new numbers
+    start at ``first``, in the order of the labels. Of pieces with equally many tets the one with the smallest label
+    keeps the number.
     """
     rows = _in_common(before, labels, comm)
     names = np.unique(rows[:, 1])
@@ -32,7 +32,7 @@ def numbered(before: Ints, labels: Ints, first: int, comm: Comm) -> tuple[Ints, 
 
 
 def _in_common(before: Ints, labels: Ints, comm: Comm) -> Ints:
-    """(k, 3) numbers, labels and how many tets of all ranks have both."""
+    """(k, 3) old number, label, and number of tets of all ranks with both."""
     old, of_old = np.unique(before, return_inverse=True)
     new, of_new = np.unique(labels, return_inverse=True)
     both, tets = np.unique(of_old * len(new) + of_new, return_counts=True)

@@ -1,7 +1,7 @@
-"""Which of the facets that pass break in a step when only local maxima may.
+"""Order of breaking ``local_maximum``: a facet breaks only if no facet at its nodes is loaded more strongly.
 
-All facets of a uniform field pass at once, though the first to break would relieve its neighbours. With local maxima a
-facet waits for every one that shares a node with it and is loaded more strongly.
+In a uniform field all facets pass in the same step, although the first one to break would relieve its neighbours.
+With local maxima a facet waits for each facet that shares a node with it and is loaded more strongly.
 """
 
 import numpy as np
@@ -12,18 +12,18 @@ from ..parallel.ownership import Neighbour
 
 
 def strongest(facets: Ints, load: Floats, nodes: Indices, ids: Ints, neighbours: list[Neighbour], comm: Comm) -> Flags:
-    """(m,) which facets are loaded most strongly at all of their nodes; of equals that of the smaller id.
+    """(m,) which facets have the largest load at all of their nodes; of equal loads that of the smaller id.
 
-    ``facets`` (m,) their ids; ``load`` (m,) positive; ``nodes`` (m, 3) local; ``ids`` (nodes,) global ids. All ranks
-    take part.
+    ``facets`` (m,) their ids; ``load`` (m,) positive; ``nodes`` (m, 3) local; ``ids`` (nodes,) global ids.
+    Collective.
     """
     order = -np.ascontiguousarray(load).view(np.int64)
     mine = np.column_stack([ids[nodes].reshape(-1), np.repeat(order, 3), np.repeat(facets, 3)])
-    told = {}
+    sent = {}
     for other in neighbours:
-        told[other.rank] = mine[np.isin(mine[:, 0], ids[other.nodes])]
-    heard = comm.swap(told) if comm.size > 1 else {}
-    rows = np.concatenate([mine, *(words.reshape(-1, 3) for words in heard.values())])
+        sent[other.rank] = mine[np.isin(mine[:, 0], ids[other.nodes])]
+    received = comm.swap(sent) if comm.size > 1 else {}
+    rows = np.concatenate([mine, *(words.reshape(-1, 3) for words in received.values())])
     rows = rows[np.lexsort((rows[:, 2], rows[:, 1], rows[:, 0]))]
     known, first = np.unique(rows[:, 0], return_index=True)
     best = rows[first, 2]

@@ -1,4 +1,4 @@
-"""What a run keeps of its fragments: numbers that last, a table a frame, and from which each broke off."""
+"""Record of the fragments of a run: persistent numbers, one table a frame, and the genealogy."""
 
 import csv
 from pathlib import Path
@@ -17,21 +17,22 @@ from .stage import Fracture
 
 
 class Record:
-    """The fragments of a run, from frame to frame; all ranks take part in everything."""
+    """The fragments of a run, from frame to frame. All methods are collective."""
 
     def __init__(self, model: Model, fracture: Fracture, comm: Comm) -> None:
         self._model, self._fracture, self._comm = model, fracture, comm
         self.labels: list[Ints] = []
-        """For each block (n,) the fragment of each tet when they were last found, as ``connectivity`` calls it."""
+        """Label of the fragment of each tet (``connectivity``), (n,) for each block, of the last ``update``."""
         self.numbers: list[Ints] = []
-        """For each block (n,) the number of that fragment, of the last frame: the same for as long as it lasts."""
+        """Number of that fragment in the last frame, (n,) for each block; a fragment keeps its number while it
+        exists."""
         self._before: tuple[Ints, Ints] = np.zeros(0, np.int64), np.zeros(0, np.int64)
         """Ids of tets, ascending, and their numbers in the last frame."""
         self._family: Ints = np.zeros((0, 3), np.int64)
         self.count = 0
-        """Fragments when they were last found."""
+        """Number of fragments, of the last ``update``."""
         self.initial = self.next = 0
-        """Fragments at the start, whose numbers are the first ones, and the next number that is free."""
+        """Number of fragments at the start, which have the first numbers, and the next free number."""
 
     def keep(self, parcel: Parcel) -> None:
         """Adds the numbers of the last frame to a parcel."""
@@ -41,22 +42,22 @@ class Record:
                 table["fragment"] = self._last(table["id"])
 
     def resume(self, parcel: Parcel) -> None:
-        """Takes them back."""
+        """Restores them from a parcel."""
         self.count, self.initial, self.next = parcel.known["record"]
         if self.next:
             tables = [table for table in parcel.tets.values() if length(table)]
             self._remember(_flat([table["id"] for table in tables]), _flat([table["fragment"] for table in tables]))
 
-    def look(self) -> None:
-        """Finds the fragments as they are."""
+    def update(self) -> None:
+        """Finds the present fragments."""
         cohesion = self._fracture.cohesion
         held = cohesion.facets.tets if cohesion is not None else np.zeros((0, 2), np.int64)
         self.labels = connectivity.labels(self._model, held, self._comm)
         self.count = connectivity.count(self._model, self.labels, self._comm)
 
     def number(self) -> None:
-        """Numbers the fragments that were found last; at frames and at the start alone, which are the same in any run
-        of a case: a number is part of its answer.
+        """Numbers the fragments of the last ``update``. Called at the start and at frames only: these are the same
+        in every run of a case, so that the numbers are part of its answer.
         """
         ids = _flat([block.id for block in self._model.blocks])
         found, self._family = numbered(self._last(ids), _flat(self.labels), self.next, self._comm)
@@ -66,11 +67,11 @@ class Record:
         self.numbers = np.split(found, np.cumsum([block.n for block in self._model.blocks])[:-1])
 
     def of_frame(self) -> list[Ints]:
-        """For each block (n,) the numbers in the last frame of the fragments to which tets belonged."""
+        """Returns, (n,) for each block, the number of the fragment of each tet in the last frame."""
         return [self._last(block.id) for block in self._model.blocks]
 
     def write(self, folder: Path, index: int, t: float) -> None:
-        """Writes the table of frame ``index`` and adds to the genealogy."""
+        """Writes the table of frame ``index`` and appends to the genealogy."""
         rows = fragments.table(self._model, self.numbers, self._comm)
         if rows is not None:
             fragments.write(folder, index, t, self._model.parts, rows)

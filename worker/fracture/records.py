@@ -1,4 +1,4 @@
-"""What kernels of fracture take: records of arrays, and their numba types, which signatures name."""
+"""Records of arrays that the kernels of fracture take, and their numba types for signatures."""
 
 from typing import NamedTuple
 
@@ -16,33 +16,35 @@ class Mesh(NamedTuple):
     id: Ints
     """(n,) global ids."""
     across: Indices
-    """(n, 4) what was behind each face at the start, 4 * global tet id + local face, -1 for an exposed face."""
+    """(n, 4) the side behind each face at the start, 4 * global tet id + local face; -1 for an exposed face."""
     beside: Indices
-    """(n, 4) place of the tet behind each face, -1 where there is none, -2 where another rank has it."""
+    """(n, 4) place of the tet behind each face; -1 for no tet, -2 for one on another rank."""
     bond: Bits
     """(n, 4) INTACT, BROKEN or WIDE."""
     intact: Bits
-    """(n,) bit k: facet k is intact, and both of its tets are here."""
+    """(n,) bit k: facet k is intact, and both of its tets are in the block."""
     state: Floats
-    """All of the block, flat."""
+    """State of the whole block, flat."""
     columns: int
-    """Rows of the state in a chunk."""
+    """Number of state rows."""
 
 
 class FacetTable(NamedTuple):
-    """The facets of a body: a row each, by place and local face of the tet of smaller id, or of the one here."""
+    """Facets of a body, by place and local face of the tet of smaller id, or of the only one in the block."""
 
     strength: Floats
-    """(n, 4) Pa, on either side; infinite on the surface."""
+    """(n, 4) Pa, equal on both sides; infinite on the surface."""
     since: Floats
-    """(n, 4) when the clock of the delayed criterion started, s."""
+    """(n, 4) start time of the clock of the delayed criterion, s."""
     seen: Ints
-    """(n, 4) number of the last step in which the facet was overstressed: in the next step its clock goes on."""
+    """(n, 4) number of the last step in which the facet was overstressed: the clock continues if that was the step
+    before."""
 
 
 class InterfaceFacets(NamedTuple):
     """Facets whose other tet is on another rank, or in another block of this one, by rank and id of the facet; those
-    between blocks have a row for either side."""
+    between blocks have a row for each side.
+    """
 
     sides: Indices
     """(m, 2) place and face of this rank's tet."""
@@ -55,50 +57,50 @@ class InterfaceFacets(NamedTuple):
     theirs: Floats
     """(m, 3) that of the other tet."""
     of: Ints
-    """(m,) index of the other rank among the neighbours, and behind them for this one."""
+    """(m,) index of the other rank among the neighbours; the number of neighbours for this rank."""
     hot: Ints
-    """(neighbours + 1,) 1 where some facet shared with that rank is overstressed on either side, else 0; the last one:
-    of facets between two blocks of this rank."""
+    """(neighbours + 1,) 1 if a facet shared with that rank is overstressed on either side, else 0; the last entry is
+    for facets between two blocks of this rank."""
     there: Indices
     """(m, 3) block, place and face of the other tet of a facet between two blocks of this rank, else -1."""
 
 
 class Law(NamedTuple):
-    """The criterion of a body."""
+    """Constants of the criterion of a body."""
 
     weight: float
-    """Of shear."""
+    """Weight of shear."""
     friction: float
-    """Internal."""
+    """Coefficient of internal friction."""
     delay: float
     """t_c times the square of the strength, Pa^2 s."""
 
 
 class Candidates(NamedTuple):
-    """Intact facets whose traction reaches their strength in a step: those within the rank first, then shared ones."""
+    """Intact facets whose traction reaches their strength in a step: first those within the rank, then shared ones."""
 
     place: Ints
-    """(m,) of the tet of smaller id; of this rank's on a shared facet."""
+    """(m,) place of the tet of smaller id; of this rank's tet for a shared facet."""
     face: Ints
-    """(m,)."""
+    """(m,) local face of that tet."""
     shared: Ints
     """(m,) row of a shared facet, -1 for one within the rank."""
     traction: Floats
-    """(m, 4) on the outward normal of the tet of smaller id, and the effective one, Pa."""
+    """(m, 4) traction on the outward normal of the tet of smaller id, and the effective one, Pa."""
 
     @classmethod
     def of(cls, m: int) -> "Candidates":
-        """Room for as many."""
+        """Returns room for ``m`` facets."""
         places = np.empty((3, m), np.int64)
         return cls(places[0], places[1], places[2], np.empty((m, 4)))
 
     def first(self, n: int) -> "Candidates":
-        """The first ``n``."""
+        """Returns the first ``n`` rows."""
         return Candidates(self.place[:n], self.face[:n], self.shared[:n], self.traction[:n])
 
 
 class BreakingFacets(NamedTuple):
-    """Facets that break."""
+    """Facets that break in a step."""
 
     tets: Ints
     """(m, 2) global ids of the tets of either side, the smaller first."""
@@ -107,14 +109,14 @@ class BreakingFacets(NamedTuple):
     sides: Indices
     """(m, 2, 3) block, place and face of either side, -1 for one of another rank."""
     first: Flags
-    """(m,) whether the first side is here."""
+    """(m,) true if the first side is on this rank."""
     traction: Floats
-    """(m, 4) on the outward normal of the first side, and the effective one, Pa."""
+    """(m, 4) traction on the outward normal of the first side, and the effective one, Pa."""
     mass: Floats
     """(m,) of the lighter tet, kg."""
 
     def take(self, chosen: Flags) -> "BreakingFacets":
-        """Some of them."""
+        """Returns the chosen facets."""
         return BreakingFacets(
             self.tets[chosen], self.nodes[chosen], self.sides[chosen], self.first[chosen], self.traction[chosen],
             self.mass[chosen],
@@ -124,7 +126,7 @@ class BreakingFacets(NamedTuple):
 _I1, _I2, _N2, _N3 = types.int64[::1], types.int64[:, ::1], types.int32[:, ::1], types.int32[:, :, ::1]
 _F1, _F2, _B1 = types.float64[::1], types.float64[:, ::1], types.boolean[::1]
 POINTS = _F2
-"""Of positions; the others are those of the records."""
+"""Type of positions; those below are of the records."""
 MESH = record(Mesh, types.uint32[:, ::1], _I1, _N2, _N2, types.uint8[:, ::1], types.uint8[::1], _F1, types.int64)
 TABLE = record(FacetTable, _F2, _F2, _I2)
 INTERFACE = record(InterfaceFacets, _N2, _B1, _F1, _F2, _F2, _I1, _I1, _N2)

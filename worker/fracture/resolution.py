@@ -1,4 +1,4 @@
-"""Whether the mesh resolves what the fracture of a part needs: its cohesive zone, and its opening in time."""
+"""Resolution of fracture by the mesh: size of the tets against the cohesive zone, and opening in one time step."""
 
 import logging
 import math
@@ -9,33 +9,33 @@ from ..materials.elementary import power
 from .strength import Toughness
 
 _RESOLVED = 1.0 / 3.0
-"""Elements to a cohesive zone, at most, for its energy to be that of the law."""
+"""Largest size of an element over the cohesive zone at which the dissipated energy is that of the law."""
 _STEP = 1.0 / math.sqrt(6.0)
-"""Stable step of a regular tet times the speed of sound, over its edge."""
+"""Stable step of a regular tet times the wave speed, over its edge."""
 _REGULAR = 6.0 * math.sqrt(2.0)
 """Cube of the edge of a regular tet over its volume."""
 _ROUNDING = 1e-9
-"""Of a ratio: a strength that is lowered until so many elements fit meets their number to the last bits."""
+"""Relative tolerance of the ratio: a strength that was lowered for a given resolution meets it up to rounding."""
 _NAMED = 5
-"""Parts that a warning names. Chosen: a line long enough to find them by."""
+"""Most parts that a warning names. Chosen: enough to find them."""
 
 log = logging.getLogger("conoid.worker")
 
 
 def edge(volume: float) -> float:
-    """Of a regular tet of that ``volume``, m^3; m."""
+    """Returns the edge of a regular tet of this ``volume``, m^3; m."""
     return float(power(_REGULAR * volume, 1.0 / 3.0))
 
 
 def warnings(part: Part, tough: Toughness, size: float, safety: float) -> list[str]:
-    """What to know of a part that breaks, with tets of edge ``size``, m, before it runs; ``safety``: of the time step.
+    """Returns the warnings for a part with tets of edge ``size``, m; ``safety``: safety factor of the time step.
 
-    A facet opens as its stress is released, and as what it holds together is drawn apart at the start.
+    A facet opens when its stress is released, and by the initial stretch rate of the part.
     """
     spec = part.fracture
     assert spec is not None
     step = safety * _STEP * size / tough.speed
-    ratio, told = size / tough.zone, []
+    ratio, found = size / tough.zone, []
     log.info(
         "%s breaks at %.4g MPa with %.4g J/m^2: cohesive zone %.3g mm, elements %.3g mm, %.3g to 1",
         part.name, tough.strength * 1e-6, tough.energy, tough.zone * 1e3, size * 1e3, ratio,
@@ -43,20 +43,20 @@ def warnings(part: Part, tough: Toughness, size: float, safety: float) -> list[s
     if text := unresolved(tough, size):
         lower = "fracture.resolve = 'strength' keeps it and lowers the strength"
         more = f"fracture.resolution = {1.0 / _RESOLVED:.0f} keeps it and lowers the strength further"
-        told.append(f"{text}; {more if spec.resolve == 'strength' else lower}")
+        found.append(f"{text}; {more if spec.resolve == 'strength' else lower}")
     drawn = max(*part.stretch.rate, 0.0) if part.stretch is not None else 0.0
     opening = (tough.strength / tough.impedance + drawn * size) * step
     if spec.model == "cohesive" and opening > tough.critical:
-        told.append(
+        found.append(
             f"a facet that breaks would open by {opening * 1e6:.3g} um in a step of {step * 1e9:.3g} ns, and by "
             f"{tough.critical * 1e6:.3g} um altogether: no law can be followed; use fracture.model = 'instant', "
             f"fracture.resolve = 'strength', or numerics.dt_safety below {safety * tough.critical / opening:.2g}"
         )
-    return told
+    return found
 
 
 def unresolved(tough: Toughness, size: float) -> str:
-    """That elements of edge ``size``, m, do not resolve the cohesive zone; nothing where they do."""
+    """Returns a warning if elements of edge ``size``, m, do not resolve the cohesive zone, else an empty text."""
     ratio = size / tough.zone
     if ratio <= _RESOLVED * (1.0 + _ROUNDING):
         return ""
@@ -66,9 +66,9 @@ def unresolved(tough: Toughness, size: float) -> str:
     )
 
 
-def told_once(told: dict[str, list[str]]) -> list[str]:
-    """A line for each of the ``warnings``, with the parts that it is told of: of many the first few."""
-    return [f"{_listed(names)}: {text}" for text, names in told.items()]
+def merged(found: dict[str, list[str]]) -> list[str]:
+    """Returns one line for each warning, with the parts that it is for: the first few of many."""
+    return [f"{_listed(names)}: {text}" for text, names in found.items()]
 
 
 def _listed(names: list[str]) -> str:

@@ -1,13 +1,14 @@
-"""Fracture in the time step: which facets break, what separates, and what that changes everywhere else.
+"""Fracture in the time step: initiation, separation of nodes, and update of all tables that depend on the topology.
 
-At the end of a step, with the stress of n+1 at hand: facets that pass the criterion break; nodes whose star has come
-apart become copies; the forces that the tets of a copy have given to its parent are handed over, in integers; and every
-table by node takes up the copies. In ``cohesive`` parts a facet keeps its traction when it breaks and gives it up with
-the opening.
+At the end of a step, with the stress of n+1: facets that pass the criterion break; nodes whose star is no longer
+connected get copies; the forces of the tets of a copy are moved from its parent to it, in integers; and every table by
+node is extended by the copies. In ``cohesive`` parts a broken facet keeps its traction, which decreases with the
+opening.
 
-What breaks, and which ranks it concerns, rides in the reduction of the step: ``find`` comes before it, ``advance``
-after it. A rank near which nothing is overstressed finds that out from the words of its neighbours; one that has
-neither a node of what breaks nor a copy of the surface of a rank that has some goes on with the next step at once.
+The reduction of the step contains whether a facet breaks, and on which ranks: ``find`` precedes it, ``advance``
+follows it. A rank without overstressed facets learns from the flags of its neighbours whether a shared one is
+overstressed. A rank that has no node of what breaks, and no ghosts of the surface of a rank that has one, continues
+with the next step at once.
 """
 
 import numpy as np
@@ -30,25 +31,25 @@ from .facets import Body
 from .handover import Handover
 from .initiation import Initiation
 from .insertion import Insertion
-from .release import Release
 from .separation import Separation
 from .terms import Terms
+from .unloading import Unloading
 from .update import TopologyUpdate
 
 NOTHING, OVERSTRESSED, BREAKS = range(3)
-"""What the ranks agree on in a step by their maximum: no face is overstressed; some are; facets break, or may."""
+"""State of the facets in a step, reduced by maximum: no face is overstressed; some are; facets break, or may break."""
 
 
 class Fracture:
-    """The fracture of a case on one rank."""
+    """Fracture of a case on one rank."""
 
     def __init__(
         self, case: Case, model: Model, neighbours: list[Neighbour], elements: Elements, by_node: list[KeptByNode],
         contact: Contact | None, comm: Comm, clock: Clock,
     ) -> None:  # fmt: skip
-        """``by_node``: besides the elements, what has arrays by node. All ranks take part."""
+        """``by_node``: objects with arrays by node, except the elements. Collective."""
         self._model, self._elements, self._clock, self._comm = model, elements, clock, comm
-        bodies, work, self.warnings = self._armed(case)
+        bodies, work, self.warnings = self._bodies(case)
         meshes = {body.index: body.mesh for body in bodies}
         self.separation = Separation(model, neighbours, meshes, comm)
         specs = {i: part.fracture for i, part in enumerate(case.parts) if part.fracture is not None}
@@ -57,33 +58,32 @@ class Fracture:
         self._update = TopologyUpdate(model, elements, self.initiation, by_node, handover, contact)
         self._insertion = Insertion(case.numerics.dt_safety)
         if neighbours:
-            elements.employ(self.initiation.interface)
+            elements.attach(self.initiation.interface)
         self._found: list[Breaking] | None = None
-        """What breaks in this step; None before that is known."""
+        """Facets that break in this step; None while they are not known."""
         self.cohesion: Cohesion | None = None
         if cohesive(case):
             self.cohesion = elements.cohesion = Cohesion(work)
-            self._release = Release(self.cohesion, model.nodes, neighbours, comm)
+            self._unloading = Unloading(self.cohesion, model.nodes, neighbours, comm)
 
     @property
     def broken(self) -> int:
-        """Facets of all ranks that have broken."""
+        """Number of broken facets of all ranks."""
         return self.separation.broken
 
     def unload(self) -> None:
-        """Before the forces of the present act: cohesive facets give up what they would not be paid for; all ranks
-        take part.
-        """
+        """Before the kick: unloads cohesive facets that would release more than they absorbed. Collective."""
         if self.cohesion is not None and self.broken:
-            self._release.apply(self._clock)
+            self._unloading.apply(self._clock)
 
     def find(self, touched: Ints) -> int:
-        """What this rank has to say in the reduction of the step: with nodal tractions whether something may break,
-        else whether something does, and in ``touched`` (ranks,) whom that concerns. Neighbours take part.
+        """Returns the contribution of this rank to the reduction of the step: NOTHING, OVERSTRESSED or BREAKS; with
+        nodal tractions BREAKS if a facet may break. Sets ``touched`` (ranks,) for the ranks that have a node of what
+        breaks. Collective among neighbours.
         """
         self.initiation.begin_step()
         hot, self._found, touched[:] = self._elements.hot, None, 0
-        self.initiation.interface.look(hot)
+        self.initiation.interface.mark_inner(hot)
         if self.initiation.smooth:
             return BREAKS if hot else NOTHING
         self._found = self.initiation.breaking(hot)
@@ -94,9 +94,9 @@ class Fracture:
         return BREAKS
 
     def advance(self, agreed: int, touched: Ints) -> None:
-        """Breaks what the stress of the present has overcome; ``agreed``, ``touched``: the maximum of what the ranks
-        had to say. Called on all ranks: all take part where nodal tractions or the order ``local_maximum`` are asked
-        for, else those whom the break concerns.
+        """Breaks the facets; ``agreed``, ``touched``: the maxima of what ``find`` returned on the ranks. Called on
+        all ranks; collective among all with nodal tractions or ``order = "local_maximum"``, else among the touched
+        ranks.
         """
         if agreed >= OVERSTRESSED:
             self._insertion.longest = max(self._insertion.longest, self._clock.stable)
@@ -116,32 +116,32 @@ class Fracture:
         self.separation.survey([b.facets.sides for b in found], count, touched)
 
     def keep(self, parcel: Parcel) -> None:
-        """Adds what fracture must remember to a parcel."""
+        """Adds the state of fracture to a parcel."""
         parcel.known["fracture"] = self.broken, self._insertion.longest
         self.initiation.keep(parcel)
         if self.cohesion is not None:
             self.cohesion.keep(parcel)
 
     def resume(self, parcel: Parcel) -> None:
-        """Takes it back."""
+        """Restores the state from a parcel."""
         self.separation.broken, self._insertion.longest = parcel.known["fracture"]
         self.initiation.resume(parcel)
         if self.cohesion is not None:
             self.cohesion.resume(parcel, self._model.nodes)
 
     def free(self) -> None:
-        """Gives the messages back to MPI."""
+        """Frees the persistent messages."""
         self.initiation.free()
         if self.cohesion is not None:
-            self._release.free()
+            self._unloading.free()
 
-    def _armed(self, case: Case) -> tuple[list[Body], float, list[str]]:
-        """The bodies, the order of magnitude of the work on a facet, J, and what the user should know of the mesh."""
+    def _bodies(self, case: Case) -> tuple[list[Body], float, list[str]]:
+        """Returns the bodies, the order of magnitude of the work on a facet, J, and warnings about the mesh."""
         model, bodies, terms = self._model, list[Body](), Terms(case, self._model)
         for index, may in enumerate(breakable(case)):
             here = [(i, block) for i, block in enumerate(model.blocks) if may and block.part == index]
             for i, block in here:
-                bodies += facets.arm(i, block, terms.own(index), terms.bonds(index), model.nodes.x0)
+                bodies += facets.bodies_of(i, block, terms.own(index), terms.bonds(index), model.nodes.x0)
         return bodies, terms.work, terms.warnings()
 
     def _break(self, broken: list[Breaking], touched: Ints) -> None:

@@ -1,9 +1,20 @@
-"""The stars of nodes: the tets round each, and the pieces into which broken facets have cut them.
+r"""Stars of nodes: the tets round a node, and the pieces into which broken facets cut them.
 
-Two tets of a star belong together when a chain of tets leads from one to the other through intact facets that contain
-the node. What holds by an edge or by the node alone is a hinge, which carries no moment: it is let go. When a star is
-in more than one piece, the piece with the smallest tet id keeps the node and every other gets a copy of it. One broken
-facet inside a body separates nothing; a closed sheet of them round a node does.
+Two tets of a star are in one piece if a chain of tets leads from one to the other through intact facets that contain
+the node. A connection through an edge or through the node alone is a hinge; it carries no moment, and is separated.
+::
+
+          -------+-------             -------+-------
+        /  t5   /|  t1   \           /  t5   #|  t1   \       A star, seen along the z axis: tets t1 to t5 round
+       /       / |        \         /       # |        \      the node a. # are broken facets.
+      +-------a--+---------+       +#######a  +a'-------+
+       \  t4  |\    t2    /         \  t4  |\ #    t2  /      {t3, t4, t5} keep a; {t1, t2} get the copy a', whose
+        \     | \        /           \     | \ #      /       label is (id of a, t1) if t3 has the smallest id of all.
+         -----+--\------              -----+--\#-----
+              t3                          t3
+
+If a star has more than one piece, the piece with the smallest tet id keeps the node and each other piece gets a copy of
+it. One broken facet inside a body separates nothing; broken facets that form a closed surface round a node do.
 """
 
 import numpy as np
@@ -17,52 +28,54 @@ from ..model.topology import keys
 from .records import MESH
 
 NODE, TET, RANK, MASS, BEHIND = 0, 1, 2, 3, 4
-"""Columns of a row, one a node and tet of its star: global ids of the node and the tet, rank of the tet, bits of its
-mass, kg; and for the three faces that contain the node the id of the tet behind an intact one, -1 for others."""
+"""Columns of the table of stars, one row for each node and tet of its star: global ids of node and tet, rank of the
+tet, bits of its mass, kg; for each of the three faces that contain the node the id of the tet behind it, -1 if the
+face is not an intact facet."""
 COLUMNS = 7
 PLACE, CORNER, BLOCK = 0, 1, 2
-"""Columns of the place of a row's tet, all -1 for one of another rank: in its block, of the node, of the block."""
+"""Columns of the place of a row's tet: place in its block, corner that is the node, index of the block; all -1 for a
+tet of another rank."""
 _I1, _I2, _N1 = types.int64[::1], types.int64[:, ::1], types.int32[::1]
 
 
 class Stars:
-    """The tets of every node of one block: a pool in which each node's tets stand together.
+    """Stars of all nodes of one block: a pool of tets in which the tets of each node are contiguous.
 
-    When a node separates, its stretch of the pool is cut into those of its copies.
+    When a node separates, its range of the pool is divided among it and its copies.
     """
 
     def __init__(self, tets: Tets, nodes: int) -> None:
         """``tets`` (n, 4) over ``nodes`` local nodes."""
         corners = tets.reshape(-1)
         self.pool: Indices = (np.argsort(corners, kind="stable") // 4).astype(np.int32)
-        """Places of tets."""
+        """Places of tets, node after node."""
         self.count: Indices = np.bincount(corners, minlength=nodes).astype(np.int32)
-        """(nodes,)."""
+        """(nodes,) number of tets of each node."""
         self.first: Indices = (np.cumsum(self.count) - self.count).astype(np.int32)
-        """(nodes,) where the node's tets begin in the pool."""
+        """(nodes,) start of the range of each node in the pool."""
         self._rooms = Rooms("first", "count")
 
     def grow(self, copies: int) -> None:
-        """Takes up new nodes, which have no tets yet."""
+        """Appends new nodes without tets."""
         n = len(self.first)
         for room in self._rooms.of(self, copies):
             room[n : n + copies] = 0
         self._rooms.take(self, n + copies)
 
-    def retie(self, tets: Tets, nodes: Ints, rows: Ints, places: Ints, of: Ints, new: int, block: int) -> None:
-        """Gives tets (n, 4) of this block the nodes that theirs have become, and every node its star.
+    def reconnect(self, tets: Tets, nodes: Ints, rows: Ints, places: Ints, of: Ints, new: int, block: int) -> None:
+        """Sets the separated nodes in the tets (n, 4) of this block, and divides the ranges of the pool.
 
-        ``rows`` (r, COLUMNS) of the whole stars of the local ``nodes`` (k,), sorted, and their ``places`` (r, 3);
-        ``of`` (r,) the piece, -1 where the node stays itself: piece 0 has the local node ``new``; ``block``: index of
-        this one.
+        ``rows`` (r, COLUMNS) of the complete stars of the local ``nodes`` (k,), sorted, and their ``places`` (r, 3);
+        ``of`` (r,) the piece, -1 for the piece that keeps its node: piece 0 gets the local node ``new``; ``block``:
+        index of this block.
         """
-        _retie(self.pool, self.first, self.count, tets, nodes, rows, places, of, new, block)
+        _reconnect(self.pool, self.first, self.count, tets, nodes, rows, places, of, new, block)
 
 
 @njit(several(_I2, _I2, _I1)(_I1, _N1, _N1, _N1, _I1, MESH, types.int64, types.int64), cache=True)
 def describe(nodes, first, count, pool, ids, mesh, block, rank):  # type: ignore[no-untyped-def]
-    """Rows (r, COLUMNS) and places (r, 3) of the stars of ascending local ``nodes`` (k,) in one block, by node and tet,
-    and (k + 1,) where the rows of each begin; ``ids``: of all local nodes.
+    """Returns the rows (r, COLUMNS) and places (r, 3) of the stars of ascending local ``nodes`` (k,) in one block,
+    by node and tet, and (k + 1,) the start of the rows of each; ``ids``: global ids of all local nodes.
     """
     begin = np.zeros(len(nodes) + 1, np.int64)
     for i in range(len(nodes)):
@@ -72,7 +85,7 @@ def describe(nodes, first, count, pool, ids, mesh, block, rank):  # type: ignore
     for i in range(len(nodes)):
         a = nodes[i]
         star = pool[first[a] : first[a] + count[a]].copy()
-        for s in range(1, len(star)):  # by insertion: a star has some twenty tets
+        for s in range(1, len(star)):  # insertion sort: a star has about twenty tets
             e, r = star[s], s
             while r > 0 and mesh.id[star[r - 1]] > mesh.id[e]:
                 star[r] = star[r - 1]
@@ -95,7 +108,7 @@ def describe(nodes, first, count, pool, ids, mesh, block, rank):  # type: ignore
 
 
 def ordered(rows: Ints, places: Ints) -> tuple[Ints, Ints]:
-    """Rows by node and tet; ``places`` (p, 3) of the first p of them, -1 for the others."""
+    """Sorts rows by node and tet; ``places`` (p, 3) belong to the first p of them, -1 for the others."""
     order = np.argsort(keys(rows[:, NODE], rows[:, TET]))
     every = np.concatenate([places, np.full((len(rows) - len(places), 3), -1)])
     return rows[order], every[order]
@@ -111,12 +124,14 @@ def _root(parent, i):  # type: ignore[no-untyped-def]
 
 @njit("boolean(int64[::1], int64[:, ::1], int64[::1], int64, int64)", cache=True)
 def _join(parent, rows, tets, begin, end):  # type: ignore[no-untyped-def]
-    """Joins the rows of one star that hold together, each with its smallest as root; whether they are one piece."""
+    """Joins the rows of one star that are connected through intact facets; the root of each piece is its smallest
+    row. Returns True if the star is one piece.
+    """
     apart = end - begin - 1
     for i in range(begin, end):
         for m in range(BEHIND, COLUMNS):
             behind, j = rows[i, m], i + 1
-            if behind <= tets[i]:  # none, or one that has seen this one behind it
+            if behind <= tets[i]:  # no facet, or one that was joined from the other side
                 continue
             while j < end and tets[j] < behind:
                 j += 1
@@ -133,11 +148,11 @@ def _join(parent, rows, tets, begin, end):  # type: ignore[no-untyped-def]
 
 @njit(several(_I1, _I2, _I1, _N1, types.float64[::1])(_I2), cache=True)
 def pieces(rows):  # type: ignore[no-untyped-def]
-    """The pieces that leave their nodes, by node and smallest tet; ``rows`` by node and tet.
+    """Returns the pieces that separate from their nodes, by node and smallest tet; ``rows`` by node and tet.
 
-    Returns (r,) the piece of each row, -1 in the piece with the smallest tet of its node, which stays; and of each
-    piece the ids of the node and of the smallest tet, the place of the node among those of ``rows``, the rank of that
-    tet, and a quarter of the mass of the tets, kg.
+    (r,) the piece of each row, -1 in the piece with the smallest tet of its node, which keeps the node; and for each
+    piece: ids of the node and of its smallest tet, place of the node among those of ``rows``, rank of that tet, and
+    a quarter of the mass of its tets, kg.
     """
     n, i_node = len(rows), 0
     parent, of, first, mass = np.arange(n), np.full(n, -1), np.empty(n, np.int64), np.zeros(n)
@@ -166,8 +181,8 @@ def pieces(rows):  # type: ignore[no-untyped-def]
 
 
 @njit(types.void(_N1, _N1, _N1, types.uint32[:, ::1], _I1, _I2, _I2, _I1, types.int64, types.int64), cache=True)
-def _retie(pool, first, count, tets, nodes, rows, places, of, new, block):  # type: ignore[no-untyped-def]
-    """See Stars.retie. A node's stretch of the pool: its own tets, then those of each copy, by ascending id."""
+def _reconnect(pool, first, count, tets, nodes, rows, places, of, new, block):  # type: ignore[no-untyped-def]
+    """See Stars.reconnect. The range of a node in the pool: tets that keep the node, then those of each copy, by id."""
     begin, n, k = 0, len(rows), 0
     while begin < n:
         end = begin

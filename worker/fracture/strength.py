@@ -1,8 +1,8 @@
-"""How strong a facet is: its strength from the material, the mesh and a hash of its id, and the delayed criterion.
+"""Strength of facets, from material, mesh and a hash of the facet id; and the delayed criterion.
 
-The paper's eqs (2) to (4): an interface opens fully by the time t after it first passed the strength if the incident
-stress is strength * e^(t/t_c) / (e^(t/t_c) - 1). That follows from two half-spaces with a linearly falling traction,
-and with the energy as its area it gives t_c = density * c * energy / strength^2, twice the printed value.
+The paper's eqs (2) to (4): a facet is fully open at the time t after its traction first reached the strength if the
+incident stress is strength * e^(t/t_c) / (e^(t/t_c) - 1). This follows from two half-spaces with a linearly falling
+traction, and with the energy as the area under it t_c = density * c * energy / strength^2, twice the printed value.
 """
 
 import math
@@ -24,57 +24,57 @@ from ..model.state import Floats, Ints
 
 @dataclass(frozen=True)
 class Toughness:
-    """The constants of a part that fractures, SI."""
+    """Constants of a part that fractures, SI."""
 
     strength: float
     energy: float
     scatter: Scatter | None
     delay: float
-    """t_c times the square of the strength: t_c of a facet is this over the square of its own."""
+    """t_c times the square of the strength, Pa^2 s: t_c of a facet is this over the square of its own strength."""
     zone: float
     """Length of the cohesive zone, m, 9 pi / 32 E' G_c / strength^2 with E' = E / (1 - nu^2)."""
     speed: float
-    """Of plane waves, m/s."""
+    """Speed of plane waves, m/s."""
     density: float
     shear_energy: float | None = None
-    """J/m^2, of a bond in shear; None where it is ``energy``."""
+    """Fracture energy of a bond in shear, J/m^2; None if equal to ``energy``."""
 
     @property
     def impedance(self) -> float:
-        """Of plane waves, kg/m^2/s."""
+        """Impedance of plane waves, kg/m^2/s."""
         return self.density * self.speed
 
     @property
     def critical(self) -> float:
-        """Opening at which nothing is left, m."""
+        """Opening at zero traction, m."""
         return 2.0 * self.energy / self.strength
 
     def energies(self, share: Floats) -> Floats:
-        """(m,) J/m^2, of facets that break with a ``share`` (m,) of shear in the square of the effective traction.
+        """(m,) fracture energies, J/m^2, of facets that break with a ``share`` (m,) of shear in the square of the
+        effective traction.
 
-        On a straight way of opening that is the share of the work that shear does, and the two add up to what breaks
-        the facet by w_n / energy + w_s / shear_energy = 1 (Wu and Reuter 1965, exponent 1; docs/theory/bonds.md,
-        Bonds).
+        For a proportional opening it is the share of shear in the work, and facets break at w_n / energy + w_s /
+        shear_energy = 1 (Wu and Reuter 1965, exponent 1; docs/theory/bonds.md, Bonds).
         """
         if self.shear_energy is None:
             return np.full(len(share), self.energy)
         return np.asarray(1.0 / ((1.0 - share) / self.energy + share / self.shear_energy))
 
     def strengths(self, face: Ints, area: Floats) -> Floats:
-        """(n,) strengths, Pa, of facets with these ids and areas, m^2."""
+        """(n,) strengths, Pa, of facets with these ids ``face`` and areas, m^2."""
         scatter = self.scatter
         if scatter is None:
             return np.full(len(face), self.strength)
         share = np.ones(len(face)) if scatter.area is None else scatter.area / area
         drawn = _weibull(uniform(face, scatter.seed), share, scatter.modulus)
-        with np.errstate(over="ignore"):  # a modulus far below 1 draws infinite ones, which never break
+        with np.errstate(over="ignore"):  # a modulus far below 1 draws infinite strengths: such facets never break
             return np.asarray(scatter.minimum + (self.strength - scatter.minimum) * drawn)
 
 
 @njit("float64[::1](float64[::1], float64[::1], float64)", cache=True, error_model="numpy")
 def _weibull(random, share, modulus):  # type: ignore[no-untyped-def]
-    """(n,) Weibull's variable of scale 1 from ``random`` numbers in [0, 1); ``share``: the area of the scale over that
-    of each.
+    """(n,) Weibull variates of scale 1 from ``random`` numbers in [0, 1); ``share``: reference area of the scatter
+    over the area of each facet.
     """
     drawn = np.empty(len(random))
     for i in range(len(random)):
@@ -84,7 +84,9 @@ def _weibull(random, share, modulus):  # type: ignore[no-untyped-def]
 
 @njit("float64(float64, float64, float64)", cache=True, error_model="numpy")
 def required(strength, since, delay):  # type: ignore[no-untyped-def]
-    """Traction, Pa, that breaks a facet, t ``since`` it first passed its strength, s; ``delay``: see records.Law."""
+    """Returns the traction, Pa, that breaks a facet, at the time ``since`` it first reached its strength, s;
+    ``delay``: see records.Law.
+    """
     if delay <= 0.0:
         return strength
     grown = exp_less_one(-since * strength * strength / delay)
@@ -92,7 +94,7 @@ def required(strength, since, delay):  # type: ignore[no-untyped-def]
 
 
 def toughness(material: Material, spec: Fracture, size: float) -> Toughness:
-    """The constants of a part whose tets have the mean edge ``size``, m."""
+    """Returns the constants of a part whose tets have the mean edge ``size``, m."""
     brittle = material.brittle
     assert brittle is not None
     plane, strength = _plane(material), brittle.strength
@@ -106,11 +108,13 @@ def toughness(material: Material, spec: Fracture, size: float) -> Toughness:
 
 
 UNBREAKABLE = Toughness(math.inf, 0.0, None, 0.0, math.inf, 1.0, 1.0)
-"""Of facets that never break."""
+"""Constants of facets that never break."""
 
 
 def of_bond(bond: SharedBond, materials: Sequence[Material]) -> Toughness:
-    """The constants of a bond between parts of two ``materials``: the zone is that of the softer one."""
+    """Returns the constants of a bond between parts of two ``materials``; the cohesive zone is that of the softer
+    one.
+    """
     (strength, _), (energy, shear_energy) = bond.strengths, bond.energies
     soft = min(materials, key=_plane)
     return Toughness(
@@ -120,7 +124,9 @@ def of_bond(bond: SharedBond, materials: Sequence[Material]) -> Toughness:
 
 
 def terms(bond: SharedBond) -> Fracture:
-    """How the facets of a bond break: at once where they pass, by both strengths, with the energies that are given."""
+    """Returns the fracture specification of the facets of a bond: without delay, with both strengths and the given
+    energies.
+    """
     normal, shear = bond.strengths
     model: Literal["cohesive", "instant"] = "cohesive" if bond.cohesive else "instant"
     return Fracture(model=model, shear_weight=(normal / shear) ** 2, delay=0.0)
@@ -132,7 +138,7 @@ def _plane(material: Material) -> float:
 
 
 def _speed(material: Material) -> float:
-    """Of plane waves, m/s."""
+    """Returns the speed of plane waves, m/s."""
     elastic = material.elastic
     lame = elastic.young * (1.0 - elastic.poisson) / ((1.0 + elastic.poisson) * (1.0 - 2.0 * elastic.poisson))
     return math.sqrt(lame / material.density)
@@ -143,7 +149,7 @@ def _zone(plane: float, energy: float) -> float:
 
 
 def _scaled(brittle: Brittle, strength: float) -> Scatter | None:
-    """The scatter about a strength that the mesh has lowered."""
+    """Returns the scatter for a strength that was lowered for the mesh."""
     if brittle.scatter is None:
         return None
     lowest = brittle.scatter.minimum * strength / brittle.strength

@@ -1,4 +1,6 @@
-"""How the facets of a case break: those within each part, and those between parts that a bond holds together."""
+"""Fracture specifications and constants of a case: for the facets within each part, and for those of bonds between
+parts.
+"""
 
 from conoid.cases.model.joined import shared_bonds
 from conoid.cases.model.schema import Case, Fracture
@@ -10,27 +12,27 @@ from . import facets, resolution
 from .strength import UNBREAKABLE, Toughness, of_bond, terms, toughness
 
 _LAST = 2**28
-"""Above all ids of tets."""
+"""Upper bound of the ids of tets."""
 
 
 class Terms:
-    """The terms of one case, and what the user should know of its mesh."""
+    """Specifications and constants of one case, and warnings about its mesh."""
 
     def __init__(self, case: Case, model: Model) -> None:
         self._case, self._model = case, model
         self._made = [find_material(case, part.material) for part in case.parts]
-        self._told: dict[str, list[str]] = {}
+        self._found: dict[str, list[str]] = {}
         self.work = 0.0
         """Order of magnitude of the work on a facet, J."""
         self._own = [self._of_part(index) for index in range(len(case.parts))]
         self._bonds = [self._of_bond(number) for number in range(len(case.bond))]
 
     def own(self, index: int) -> facets.Terms:
-        """Of the facets within a part."""
+        """Returns those of the facets within a part."""
         return *self._own[index], self._ids(index)
 
     def bonds(self, index: int) -> list[facets.Terms]:
-        """Of the facets between a part and others, of bonds that break."""
+        """Returns those of the facets between a part and others, for bonds that break."""
         found = []
         for number, bond, i, j in shared_bonds(self._case):
             if bond.breaks and index in (i, j):
@@ -39,11 +41,11 @@ class Terms:
         return found
 
     def warnings(self) -> list[str]:
-        """A line each."""
-        return resolution.told_once(self._told)
+        """Returns one line for each warning."""
+        return resolution.merged(self._found)
 
     def _ids(self, index: int) -> tuple[int, int]:
-        """The tets of a part have ids from the first on and below the second."""
+        """Returns the range of ids of the tets of a part: first, and one past the last."""
         ends = [*self._model.part_starts.tolist(), _LAST]
         return ends[index], ends[index + 1]
 
@@ -56,7 +58,7 @@ class Terms:
         tough = toughness(self._made[index], part.fracture, size)
         self.work = max(self.work, tough.energy * power(volume, 2.0 / 3.0))
         for text in resolution.warnings(part, tough, size, safety):
-            self._told.setdefault(text, []).append(part.name)
+            self._found.setdefault(text, []).append(part.name)
         return part.fracture, tough
 
     def _of_bond(self, number: int) -> tuple[Fracture, Toughness]:
@@ -68,6 +70,6 @@ class Terms:
         tough, size = of_bond(bond, [self._made[i], self._made[j]]), resolution.edge(volume)
         self.work = max(self.work, max(bond.energies) * power(volume, 2.0 / 3.0))
         if bond.cohesive and (text := resolution.unresolved(tough, size)):
-            told = f"{text}; smaller elements, or a lower strength with the same energy, resolve it"
-            self._told.setdefault(told, []).append(f"bond[{number}]")
+            line = f"{text}; smaller elements, or a lower strength with the same energy, resolve it"
+            self._found.setdefault(line, []).append(f"bond[{number}]")
         return terms(bond), tough

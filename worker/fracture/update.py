@@ -1,4 +1,4 @@
-"""Applies what breaks in a step to the tables that it changes: by node, forces, cohesive facets, contact."""
+"""Update of all tables after facets broke: arrays by node, forces, cohesive facets, contact."""
 
 from ..contact.stage import Contact
 from ..elements.forms import Elements
@@ -12,21 +12,21 @@ from .initiation import Initiation
 
 
 class TopologyUpdate:
-    """The tables of one rank that follow nodes as they separate."""
+    """Tables of one rank that depend on the topology."""
 
     def __init__(
         self, model: Model, elements: Elements, initiation: Initiation, by_node: list[KeptByNode], handover: Handover,
         contact: Contact | None,
     ) -> None:  # fmt: skip
-        """``by_node``: besides the elements, what has arrays by node."""
+        """``by_node``: objects with arrays by node, except the elements."""
         self._model, self._elements, self._initiation, self._by_node = model, elements, initiation, by_node
         self._handover, self._contact = handover, contact
 
     def apply(
         self, broken: list[Breaking], split: Split, fresh: list[Facets], cohesion: Cohesion | None
     ) -> None:  # fmt: skip
-        """Takes up the ``broken`` facets, ``fresh`` cohesive ones among them, and the nodes that have separated. Ranks
-        that share copies, or have copies of their surface, take part.
+        """Applies the ``broken`` facets, the new cohesive facets ``fresh`` among them, and the separated nodes.
+        Collective among the ranks that share copies or have ghosts of their surface.
         """
         if split.copies.n:
             self._grow(split)

@@ -48,7 +48,7 @@ class Counter:
         if sim.record is None:
             return
         began, first = time.monotonic(), self._step < 0
-        sim.record.look()
+        sim.record.update()
         self._smallest, self._sizes = sizes(sim.model, sim.record.labels, sim.comm)
         self._found, self._step, ended = _state(sim), sim.clock.step, time.monotonic()
         self._again = ended if first else ended + (ended - began) / SHARE

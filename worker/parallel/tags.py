@@ -42,7 +42,7 @@ class Tag(IntEnum):
     """
     RELEASE = 20
     """Changes of the forces of unloaded cohesive facets, in every step once facets have broken
-    (fracture/release.py)."""
+    (fracture/unloading.py)."""
     LOAD = 21
     """Sums of the forces of a pressure that follows the surface, in every step (boundaries/surface_pressure.py)."""
     BOND = 22

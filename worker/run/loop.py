@@ -97,7 +97,7 @@ class Loop:
         """Number the fragments of the initial state if no frame does so."""
         record, run = self.sim.record, self.sim.case.run
         if record is not None and not run.frames:
-            record.look()
+            record.update()
             record.number()
 
     def _attend(self) -> None:

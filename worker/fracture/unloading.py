@@ -1,8 +1,9 @@
-"""Before a step moves anything: cohesive facets that would give what nobody has paid let go of some of their traction.
+"""Unloading of cohesive facets that would release more energy in the next step than they absorbed.
 
-The forces of the present are complete, so how a pair of nodes will open is known but for what contact does. A facet
-that lets go changes how those beside it open; so there are two passes over all, from the same forces each: in the
-first a pair gives up what alone would keep it from moving back, in the second those that still would give up all.
+Nodal forces are complete, so the opening of a pair of nodes in the next step is known, except what contact will add.
+Unloading of one facet changes the openings of the facets beside it. So there are two passes over all facets, each
+with the forces before it: the first lowers the traction of each pair as far as that pair alone requires, the second
+unloads the pairs that still close too far completely.
 """
 
 import numpy as np
@@ -15,19 +16,19 @@ from ..parallel.tags import Tag
 from .cohesive import Cohesion
 
 
-class Release:
-    """Asks the facets of one rank; forces of shared nodes are completed between the passes."""
+class Unloading:
+    """Unloading on one rank; the forces of shared nodes are completed after each pass."""
 
     def __init__(self, cohesion: Cohesion, nodes: Nodes, neighbours: list[Neighbour], comm: Comm) -> None:
         self._cohesion, self._nodes, self._neighbours, self._comm = cohesion, nodes, neighbours, comm
         self._shared: SharedSum | None = None
 
     def apply(self, clock: Clock) -> None:
-        """Corrects the forces of the present; all ranks take part."""
+        """Corrects the present nodal forces. Collective."""
         nodes, steps = self._nodes, np.array([clock.last_dt, clock.mean_dt, clock.dt])
         for whole in (False, True):
             change = np.zeros_like(nodes.force)
-            self._cohesion.let_go(change, nodes, steps, whole)
+            self._cohesion.unload(change, nodes, steps, whole)
             shared = self._exchange()
             shared.begin(change)
             shared.finish(change)
@@ -35,7 +36,7 @@ class Release:
         self._cohesion.foresee(nodes, clock.mean_dt)
 
     def free(self) -> None:
-        """Gives the messages back to MPI."""
+        """Frees the persistent messages."""
         if self._shared is not None:
             self._shared.free()
             self._shared = None
