@@ -1,9 +1,10 @@
-"""The means of the averaged pressure forms where bodies have several materials: one for each material of a node.
+"""Rows of the nodal means of the averaged pressure forms, if nodes have tets of several materials: one row for each
+material of a node.
 
-A mean over the tets round a node stands for the matter there. Where two materials meet their volume strains differ, as
-the stress across the interface is one: a mean over both would give each the strain of the other, and its pressure with
-it. So a node has a mean for each material of its tets, and a tet takes part in those of its own. Where no node has
-several materials the means are those of the nodes, and their rows are the nodes' rows.
+A mean over the tets round a node is a value of the material there. At an interface of two materials the stress is
+continuous, so that their volume strains differ: one mean over both would give each material the strain, and so the
+pressure, of the other. Hence a node has a mean for each material of its tets, and a tet contributes to those of its
+own material. If no node has several materials, the rows of the means are the nodes.
 """
 
 from collections.abc import Iterator, Sequence
@@ -20,32 +21,32 @@ from ..parallel.ownership import Neighbour
 
 
 def kinds(case: Case) -> Indices:
-    """(parts,) the first part of the same material."""
+    """(parts,) the first part that has the same material."""
     names = [part.material for part in case.parts]
     return np.array([names.index(name) for name in names], np.int32)
 
 
 class Averages:
-    """The rows of the means of one rank. Whoever holds a node holds all its means."""
+    """Rows of the means of one rank. A rank that has a node has all its means."""
 
     def __init__(self, model: Model, neighbours: list[Neighbour], kinds: Indices) -> None:
-        """``kinds`` (parts,): the part that stands for the material of each."""
+        """``kinds`` (parts,): for each part the part that represents its material."""
         self._model, self._of, self._kinds = model, neighbours, kinds
         nodes = model.nodes
         more = _more(nodes, kinds)
         self.node: Ints = np.concatenate([np.arange(nodes.n), more[:, 0]])
         """(rows,) local node."""
         self.kind: Indices = np.concatenate([kinds[nodes.part], more[:, 1].astype(np.int32)])
-        """(rows,) part that stands for the material."""
+        """(rows,) part that represents the material."""
         self._index()
         for block in model.blocks:
             block.own_averages = self._rows(block)
         self.neighbours = [Neighbour(other.rank, self._shared(other.nodes)) for other in neighbours]
-        """Other ranks, and the rows that this one shares with each."""
+        """Other ranks, and the rows that this rank shares with each."""
 
     @classmethod
     def of(cls, case: Case, model: Model, neighbours: list[Neighbour]) -> "Averages | None":
-        """Those of a case; None where no bond joins two materials, so that the means are those of the nodes."""
+        """Returns the rows of a case; None if no bond joins two materials, so that the rows are the nodes."""
         found = kinds(case)
         mixed = any(found[i] != found[j] for _, _, i, j in shared_bonds(case))
         return cls(model, neighbours, found) if mixed else None
@@ -57,18 +58,18 @@ class Averages:
 
     @property
     def further(self) -> Ints:
-        """Rows that are not the first of their nodes at the start."""
+        """Rows after the first one of each node, at the start."""
         return np.arange(self._model.nodes.n, self.n)
 
     def at(self, node: "np.ndarray", part: "np.ndarray | int") -> Ints:
-        """The rows of local nodes for the materials of parts; -1 where there is none."""
+        """Returns the rows of local nodes for the materials of parts; -1 if there is no such row."""
         wanted = np.asarray(node, np.int64) * MOST_PARTS + self._kinds[part]
         place = np.minimum(np.searchsorted(self._keys, wanted), len(self._keys) - 1)
         return np.where(self._keys[place] == wanted, self._order[place], -1)
 
     def grow(self, split: Split) -> Ints:
-        """Takes up the copies of a split, whose tets have them already; returns the rows that the new ones inherit
-        from.
+        """Adds the rows of the copies of a split, whose tets have their new nodes already; returns the parent row of
+        each new row.
         """
         nodes, first = self._model.nodes, split.first
         copies, (node, part) = split.copies, nodes.of_parts()
@@ -88,7 +89,7 @@ class Averages:
         return parents
 
     def layers(self) -> Iterator[Ints]:
-        """The rows, in groups of which none has a node twice."""
+        """Yields the rows in groups; in each group a node occurs at most once."""
         left = np.arange(self.n)
         while len(left):
             _, first = np.unique(self.node[left], return_index=True)
@@ -96,13 +97,15 @@ class Averages:
             left = np.delete(left, first)
 
     def of_nodes(self, columns: dict[str, "np.ndarray"]) -> dict[str, "np.ndarray"]:
-        """Those of ``columns`` (rows, ...) of the material of the part that each node stands for: (nodes, ...)."""
+        """Returns, (nodes, ...), the values of ``columns`` (rows, ...) for the material of the part that represents
+        each node.
+        """
         nodes = self._model.nodes
         rows = self.at(np.arange(nodes.n), nodes.part)
         return {name: column[rows] for name, column in columns.items()}
 
     def keep(self, columns: dict[str, "np.ndarray"]) -> Table:
-        """The rows of a parcel of the means of nodes of several materials: ``columns`` (rows, ...)."""
+        """Returns the table of a parcel for the means of nodes of several materials; ``columns`` (rows, ...)."""
         nodes = self._model.nodes
         node, part = nodes.of_parts()
         several = np.isin(node, nodes.shares.node)
@@ -112,7 +115,7 @@ class Averages:
         return {"of": of, "key": of * MOST_PARTS + pairs[:, 1], "kind": pairs[:, 1], **table}
 
     def resume(self, table: Table, columns: dict[str, "np.ndarray"]) -> dict[str, "np.ndarray"]:
-        """``columns`` (nodes, ...) of a parcel with the rows of ``table`` besides."""
+        """Returns ``columns`` (nodes, ...) of a parcel, extended by the rows of ``table``."""
         rows, found = self.at(self._model.nodes.places(table["of"]), table["kind"]), {}
         for name, values in columns.items():
             found[name] = np.concatenate([values, np.zeros((self.n - len(values), *values.shape[1:]), values.dtype)])
@@ -128,7 +131,7 @@ class Averages:
         return np.ascontiguousarray(self.at(block.tets, block.part), np.uint32)
 
     def _shared(self, nodes: Indices) -> Indices:
-        """The rows of ``nodes``, in the order of the nodes and then of the materials: the same on both ranks."""
+        """Rows of ``nodes``, by id of the node and then by material: the same order on both ranks."""
         mine = np.isin(self.node, nodes)
         rows = np.flatnonzero(mine)
         ids = self._model.nodes.id[self.node[rows]]
@@ -136,15 +139,15 @@ class Averages:
 
 
 def _more(nodes: Nodes, kinds: Indices) -> Ints:
-    """(k, 2) nodes and materials besides that of the part that a node stands for."""
+    """(k, 2) nodes and their materials other than that of the part that represents the node."""
     shares = nodes.shares
     pairs = np.column_stack([shares.node, kinds[shares.part]]).astype(np.int64)
     return np.unique(pairs[pairs[:, 1] != kinds[nodes.part[shares.node]]], axis=0)
 
 
 def volumes(averages: "Averages | None", nodes: Nodes, node_volume: Floats, density: Sequence[float]) -> Floats:
-    """(rows,) at the start, m^3: ``node_volume`` (nodes,), and of nodes of several materials that of each, by the
-    ``density`` of the parts, kg/m^3.
+    """(rows,) reference volumes at the start, m^3: ``node_volume`` (nodes,); for nodes of several materials that of
+    each, from the ``density`` of the parts, kg/m^3.
     """
     if averages is None:
         return node_volume

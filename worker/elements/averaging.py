@@ -1,4 +1,4 @@
-"""The pressure forms that average over nodes, ``nodal`` and ``split``, as the time step sees them."""
+"""Pressure forms that average over nodes, ``nodal`` and ``split``, as the time step calls them."""
 
 import numpy as np
 
@@ -21,17 +21,17 @@ from .passes import BlockPass, Values
 
 
 class AveragedElements(Elements):
-    """The ``nodal`` and ``split`` forms: two passes with the completed nodal volume sums between them."""
+    """Elements in the ``nodal`` or ``split`` form: two passes, with the completed nodal volume sums between them."""
 
     def __init__(
         self, model: Model, comm: Comm, neighbours: list[Neighbour], timers: Timers, team: Team,
         averages: Averages | None, weight: Floats, params: Floats, kinds: Ints, scene: list[Boundary], split: bool,
         more: bool,
     ) -> None:  # fmt: skip
-        """``averages``: the rows of the means, None where they are the nodes; ``weight`` (rows,): one over the
-        reference volume, 1/m^3; ``params`` (parts, SIZE): constants of each part; ``kinds`` (parts,): whose the
-        pressure is (matter.whose); ``scene``: its planes of symmetry have mirror images behind them; ``more``: whether
-        an equation of state of the case has means besides, of heat or bulking.
+        """``averages``: rows of the means, None if they are the nodes; ``weight`` (rows,): one over the reference
+        volume, 1/m^3; ``params`` (parts, SIZE): constants of each part; ``kinds`` (parts,): TETS or LINEAR
+        (matter.py); ``scene``: boundaries, among them planes of symmetry, which mirror means; ``more``: True if an
+        equation of state of the case averages heat or bulking as well.
         """
         self._averages = averages
         n = model.nodes.n if averages is None else averages.n
@@ -43,7 +43,7 @@ class AveragedElements(Elements):
         self._params, self._kinds = params, kinds
         self._bulk = params[self._kind, BULK]
         self._pressed = bool(kinds.any())
-        """Whether pressures are of nodes (matter.py)."""
+        """True if some pressures are computed at the nodes (matter.py)."""
         self._matter = matter.at_start(n if kinds.any() else 1)
         self._scene = scene
         self._volumes = np.zeros((n, self._columns), np.int64)
@@ -59,7 +59,7 @@ class AveragedElements(Elements):
 
     @property
     def _kind(self) -> Indices:
-        """(rows,) a part of the material of each."""
+        """(rows,) a part with the material of each row."""
         return self.model.nodes.part if self._averages is None else self._averages.kind
 
     def _connect(self) -> None:
@@ -137,7 +137,7 @@ class AveragedElements(Elements):
                 self._mirror(boundary)
 
     def _mirror(self, boundary: Boundary) -> None:
-        """Has the boundary act on the projected gradients of all means of its nodes."""
+        """Applies the boundary to the projected gradients of all rows of its nodes."""
         if self._averages is None:
             boundary.mirror(self._projected)
             return
@@ -154,5 +154,5 @@ class AveragedElements(Elements):
         )  # fmt: skip
 
     def _constants(self) -> Values:
-        """What ``nodal.complete`` takes besides means and volumes."""
+        """Arguments of ``nodal.complete`` except means and volumes."""
         return self._columns > 2, self._bulk, self._pressed, self._kind, self._kinds, self._params

@@ -1,12 +1,14 @@
-"""What keeps a tet of the averaged pressure forms from being squeezed to nothing.
+"""Barrier potential against the collapse of tets in the averaged pressure forms.
 
-The pressure of such a tet sees the mean volume strain of its nodes; against the change of its own volume stands its
-deviator alone, and once that yields a tet at an edge of a body, whose nodes have few others, may go to zero volume
-while theirs stays as it is. Below SQUEEZED of the initial volume a pressure of its own is added, of a potential:
+The pressure of such a tet depends on the mean volume strain of its nodes; only its deviatoric stress resists a change
+of its own volume. Once that yields, a tet at an edge of a body, whose nodes have few other tets, may go to zero volume
+while the mean stays constant. Below the share SQUEEZED of the initial volume a pressure of its own is added, with the
+potential
 
     b(J) = STIFF K (SQUEEZED / J - 1)^2,    J = V / V0 < SQUEEZED
 
-Its energy is elastic. Tets of parts that erode leave instead (docs/theory/elements.md, Pressure forms).
+Its energy is elastic. Parts that erode have no barrier: such tets are removed (docs/theory/elements.md, Pressure
+forms).
 """
 
 import numpy as np
@@ -18,18 +20,20 @@ from ..model.state import CHUNK
 from .tet4 import CHANGE, LIMIT, MODULUS, VOLUME
 
 SQUEEZED = 0.2
-"""Of the initial volume. Chosen: tets of Taylor bars keep 0.56, of a long rod without erosion 0.28."""
+"""Share of the initial volume below which the barrier acts. Chosen: tets of Taylor bars keep 0.56, of a long rod
+without erosion 0.28."""
 STIFF = 0.1
-"""Of the bulk modulus. Chosen: half of SQUEEZED takes 10 % of the bulk modulus, far more than metals yield at."""
+"""Stiffness of the barrier over the bulk modulus. Chosen: compression to half of SQUEEZED takes 10 % of the bulk
+modulus, far more than the yield stress of metals."""
 
 _ROUNDING = 1e-9
-"""Of a volume: far more than what two ways to compute a ratio differ by."""
+"""Relative tolerance of a volume: far above the difference between two ways of computing a ratio."""
 _Q, _MASS, _WORK, _WORK_VISCOUS = VISCOUS * CHUNK, MASS * CHUNK, WORK * CHUNK, WORK_VISCOUS * CHUNK
 
 
 @njit("UniTuple(float64, 2)(float64, float64)", cache=True, error_model="numpy")
 def _barrier(ratio, bulk):  # type: ignore[no-untyped-def]
-    """b and -J db/dJ, Pa; nothing for what has no volume, whose limit is not a number."""
+    """Returns b and -J db/dJ, Pa; zero for a volume that is not positive, as the limit of such a tet is NaN."""
     if not 0.0 < ratio < SQUEEZED:
         return 0.0, 0.0
     times = SQUEEZED / ratio
@@ -39,7 +43,9 @@ def _barrier(ratio, bulk):  # type: ignore[no-untyped-def]
 
 @njit("boolean(float64[::1], float64[::1], float64, int64)", cache=True, error_model="numpy")
 def _any_squeezed(w, s, density, n):  # type: ignore[no-untyped-def]
-    """Whether any tet has, or had before the step, less than SQUEEZED of its volume, or next to it: in vectors."""
+    """Returns True if a tet has, or had before the step, a volume below SQUEEZED or within rounding of it. The loop
+    uses vector instructions.
+    """
     per_mass, found = density / (SQUEEZED * (1.0 + _ROUNDING)), 0
     for i in range(n):
         volume, before, mass = w[VOLUME + i] * per_mass, (w[VOLUME + i] - w[CHANGE + i]) * per_mass, s[_MASS + i]
@@ -49,9 +55,11 @@ def _any_squeezed(w, s, density, n):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
 def resist(w, s, params, n):  # type: ignore[no-untyped-def]
-    """Adds the barrier to the row VISCOUS, which is made anew in every step, its work to WORK, its stiffness to LIMIT.
+    """Adds the barrier to the row VISCOUS, which is computed anew in every step, its work to WORK, and its stiffness to
+    LIMIT.
 
-    The viscosity has booked its half of the work of the old row VISCOUS: what of that was the barrier's is taken back.
+    The viscosity has booked half of the work of the old row VISCOUS; the part of that which the barrier did is taken
+    back.
     """
     if not _any_squeezed(w, s, params[DENSITY], n):
         return

@@ -1,6 +1,6 @@
-"""What the passes over the elements do with one chunk: rates and stress, pressure and limit, forces, marks and peaks.
+"""Steps of a pass over the elements for one chunk: rates and stress, pressure and limit, forces, marks and peaks.
 
-``t`` (n, 4) are the tets of the chunk, ``s`` is its state, ``w`` and ``wi`` are the scratch of records.py.
+``t`` (n, 4): tets of the chunk; ``s``: its state; ``w`` and ``wi``: scratch (records.py).
 """
 
 from ..kernels.jit import njit, types
@@ -29,30 +29,30 @@ from .records import HOT, LARGEST_FORCE, LARGEST_LIMIT, LIMITING_TET, WORN
 from .wear import SOUND, mark_worn
 
 _NO_TET = 2**62
-"""Larger than any global id of a tet."""
+"""Greater than any global id of a tet."""
 _F, _I, _B, _B1, _T2 = types.float64, types.int64, types.boolean, types.boolean[::1], types.uint32[:, ::1]
 _F1, _F2, _I1, _I2 = types.float64[::1], types.float64[:, ::1], types.int64[::1], types.int64[:, ::1]
 
 
 @njit(types.void(_F1, _F2, _T2, _I, _F), cache=True, error_model="numpy")
 def rates(w, v, t, n, dt):  # type: ignore[no-untyped-def]
-    """Rates of deformation, from the edges of a chunk and its nodes' velocities."""
+    """Computes rates of deformation from the edges of a chunk and the velocities of its nodes."""
     tet4.gather(w[tet4.RATE :], v, t, w[:0], n)
     tet4.kinematics(w, n, dt)
 
 
 @njit(types.void(_F1, _F2, _T2, _I), cache=True, error_model="numpy")
 def first_speeds(w, v, t, n):  # type: ignore[no-untyped-def]
-    """SPEED of tets that know no volume before the present one: by their nodes' velocities."""
+    """Sets SPEED of tets whose volume before the step is not stored, from the velocities of their nodes."""
     tet4.gather(w[tet4.RATE :], v, t, w[:0], n)
     tet4.speeds(w, n)
 
 
 @njit(types.void(_I, _F1, _F1, _F1, _I, _F), cache=True, error_model="numpy")
 def from_rates(strength, w, s, params, n, dt):  # type: ignore[no-untyped-def]
-    """The deviatoric stress of a chunk, and its work, by rotation, elastic trial and plastic return.
+    """Computes the deviatoric stress of a chunk and its work: rotation, elastic trial, plastic return.
 
-    With a law that acts after the pressure only the trial: ``return_at_pressure`` does the rest.
+    For a law that acts after the pressure only the trial stress; ``return_at_pressure`` completes it.
     """
     predict(w, s, n, params[SHEAR], dt)
     if params[ORDER] == BEFORE_PRESSURE:
@@ -62,7 +62,9 @@ def from_rates(strength, w, s, params, n, dt):  # type: ignore[no-untyped-def]
 
 @njit(types.void(_I, _F1, _F1, _F1, _I, _F), cache=True, error_model="numpy")
 def return_at_pressure(strength, w, s, params, n, dt):  # type: ignore[no-untyped-def]
-    """Plastic return of a chunk whose strength depends on the new pressure; books the work of the new deviator."""
+    """Returns the deviatoric stress of a chunk to a strength that depends on the new pressure; books the work of the
+    new stress.
+    """
     if params[ORDER] == AFTER_PRESSURE:
         strengthen(strength, w, s, params, n, dt)
         deviatoric_work(w, s, n, dt)
@@ -70,8 +72,8 @@ def return_at_pressure(strength, w, s, params, n, dt):  # type: ignore[no-untype
 
 @njit(types.void(_F1, _F1, _F1, _I, _F, _B), cache=True, error_model="numpy")
 def viscosity_and_limit(w, s, params, n, dt, averaged):  # type: ignore[no-untyped-def]
-    """Bulk viscosity and stable step of a chunk at its new pressure; ``averaged``: of the forms with means, where what
-    dilates sees its own volume all the same.
+    """Computes bulk viscosity and stable step of a chunk at its new pressure; ``averaged``: True in the averaged
+    pressure forms, in which the viscosity resists a mean rate, except for materials that dilate.
     """
     if params[ORDER] == FROM_SHAPE:
         stiffen(w, s, params, n)
@@ -87,7 +89,9 @@ def viscosity_and_limit(w, s, params, n, dt, averaged):  # type: ignore[no-untyp
 
 @njit(types.void(_I1, _I1, _I1, _I, _I), cache=True)
 def note_peaks(peaks, bits, ids, n, force):  # type: ignore[no-untyped-def]
-    """Raises the peaks by a chunk of tets with these global ids, whose largest force has the bits ``force``."""
+    """Raises the peaks by those of a chunk of tets with these global ids, whose largest force has the bits
+    ``force``.
+    """
     peaks[LARGEST_FORCE] = max(peaks[LARGEST_FORCE], force)
     limit = 0
     for i in range(n):
@@ -102,7 +106,7 @@ def note_peaks(peaks, bits, ids, n, force):  # type: ignore[no-untyped-def]
 
 @njit(types.void(_I2), cache=True)
 def gather_peaks(threads):  # type: ignore[no-untyped-def]
-    """Raises the peaks of the first of the ``threads`` (threads, 8) by those of the others."""
+    """Raises the peaks of the first of the ``threads`` (threads, 8) to the maximum over all."""
     peaks = threads[0]
     for t in range(1, len(threads)):
         mine = threads[t]
@@ -116,7 +120,7 @@ def gather_peaks(threads):  # type: ignore[no-untyped-def]
 
 @njit(_I(_I2, _F1, _I1, _I1, _I1, _T2, _F1, _I1, _I, _F), cache=True, error_model="numpy")
 def sum_forces(force, w, wi, bits, peaks, t, s, ids, n, scale):  # type: ignore[no-untyped-def]
-    """Adds the forces of a chunk of tets with these global ids; returns the largest."""
+    """Adds the forces of a chunk of tets with these global ids to the nodal sums; returns the bits of the largest."""
     largest = tet4.internal_forces(wi, w, s, n, scale)
     tet4.scatter_forces(force, wi, t, n)
     note_peaks(peaks, bits, ids, n, largest)
@@ -125,7 +129,9 @@ def sum_forces(force, w, wi, bits, peaks, t, s, ids, n, scale):  # type: ignore[
 
 @njit(_I(_I2, _F1, _F1, _I1, _I1, _B1, _T2, _I, _F), cache=True, error_model="numpy")
 def sum_fluxes(gradient, pressure, w, wi, peaks, flat, t, n, scale):  # type: ignore[no-untyped-def]
-    """Adds the share of a chunk of the pressure gradient, to which ``flat`` tets add nothing; returns the largest."""
+    """Adds the pressure gradient of a chunk to the nodal sums, without ``flat`` tets; returns the bits of the
+    largest.
+    """
     largest = averaged.pressure_fluxes(wi, w, pressure, t, n, scale)
     if len(flat) > 0:
         without_flux(wi, flat, n)
@@ -136,7 +142,7 @@ def sum_fluxes(gradient, pressure, w, wi, peaks, flat, t, n, scale):  # type: ig
 
 @njit(_B(_B1, _F1, types.uint8[::1], _F1, _F, _F1, _I1, _F1, _F1, _I, _I), cache=True, error_model="numpy")
 def mark(worn, life, hot, weakest, shear, w, peaks, s, params, rows, n):  # type: ignore[no-untyped-def]
-    """Marks the tets of a chunk that leave, ``worn``, and those that are ``hot``; whether there are any."""
+    """Marks the ``worn`` tets of a chunk and its ``hot`` faces; returns True if there are any."""
     found, some_hot = SOUND, False
     if len(worn) > 0:
         found = mark_worn(worn, w, s, params, life, rows, n)

@@ -1,8 +1,8 @@
-"""The tasks of a pass over a block: ranges of chunks, and their colours. Chunks of one colour share no node.
+"""Tasks of a pass over a block: ranges of chunks with colours. Chunks of one colour share no node.
 
-Colours are given greedily, chunk by chunk in the order of the block: each gets the first one that no chunk before it
-with a node of its own has. They hold until tets move from chunk to chunk; nodes that separate only take neighbours
-away.
+Greedy colouring in the order of the chunks: each chunk gets the first colour that none of the earlier chunks with a
+common node has. The colours stay valid until tets move from chunk to chunk; separation of nodes only removes
+neighbours.
 """
 
 from dataclasses import dataclass
@@ -13,22 +13,24 @@ from ..kernels.jit import njit
 from ..model.state import CHUNK, Block, Ints
 
 _BITS = 63
-"""Colours that a word has bits for; a chunk that finds none free has a colour for itself alone."""
+"""Number of colours in a word of bits; a chunk for which none is free gets a colour of its own."""
 
 
 @dataclass(frozen=True)
 class Coloured:
-    """Tasks in the order of their colours."""
+    """Tasks sorted by colour."""
 
     tasks: Ints
-    """(k, 2) first chunk and the one behind the last."""
+    """(k, 2) first chunk, and one past the last."""
     starts: Ints
-    """(colours + 1,) the first task of each colour, and the end."""
+    """(colours + 1,) first task of each colour, and the end."""
 
 
 @njit("void(uint32[:, ::1], int64, int64, int64[::1], int64[::1])", cache=True)
 def _give(tets, begin, end, used, colour):  # type: ignore[no-untyped-def]
-    """The ``colour`` (end - begin,) of each chunk; ``used`` (nodes,), zero before: the colours of a node's chunks."""
+    """Sets the ``colour`` (end - begin,) of each chunk; ``used`` (nodes,), zero on entry: bits of the colours of the
+    chunks of a node.
+    """
     single = _BITS
     for c in range(begin, end):
         taken = 0
@@ -49,7 +51,7 @@ def _give(tets, begin, end, used, colour):  # type: ignore[no-untyped-def]
 
 
 def coloured(block: Block, begin: int, end: int, nodes: int) -> Coloured:
-    """The chunks ``begin`` to ``end`` of a block on a rank with so many ``nodes``, one a task."""
+    """Returns the chunks ``begin`` to ``end`` of a block, one a task; ``nodes``: number of nodes of the rank."""
     colour = np.zeros(end - begin, np.int64)
     _give(block.tets[: block.n], begin, end, np.zeros(nodes, np.int64), colour)
     order = np.argsort(colour, kind="stable")
@@ -58,5 +60,5 @@ def coloured(block: Block, begin: int, end: int, nodes: int) -> Coloured:
 
 
 def whole(begin: int, end: int) -> Coloured:
-    """The chunks as one task."""
+    """Returns the chunks as one task."""
     return Coloured(np.array([[begin, end]]), np.array([0, 1]))

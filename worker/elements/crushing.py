@@ -1,10 +1,11 @@
-"""The compression that brittle matter without a law of compressive failure meets, in every step, beside Griffith's
-criterion (cases/warnings/compression.py).
+"""Largest compression of brittle materials without a law of compressive failure, in every step, over Griffith's
+criterion (cases/compression.py).
 
-Such matter breaks in tension alone and bears any compression. Each stress is compared with the criterion of Griffith
-(1924): (s1 - s3)^2 / (8 T (s1 + s3)) for the largest and the smallest pressure, s1 and s3, and the tensile strength T.
-Matter of this strength cracks at 1, and the number grows in proportion to the stress. Tension, s3 < 0, counts as none:
-it is for the law that the matter has. The stress is that of the tets at the end of a step, without its viscous part.
+Such a material breaks in tension only and bears any compression. Each stress is compared with the criterion of
+Griffith (1924): (s1 - s3)^2 / (8 T (s1 + s3)) for the largest and the smallest pressure, s1 and s3, and the tensile
+strength T. A material of this strength cracks at 1, and the ratio grows in proportion to the stress. Tension, s3 <
+0, counts as zero: the tensile criterion covers it. The stress is that of the tets at the end of a step, without its
+viscous part.
 """
 
 from dataclasses import astuple, dataclass, replace
@@ -30,13 +31,13 @@ _SXX, _SYY, _SZZ = S_XX * CHUNK, S_YY * CHUNK, S_ZZ * CHUNK
 _SYZ, _SZX, _SXY = S_YZ * CHUNK, S_ZX * CHUNK, S_XY * CHUNK
 _P = PRESSURE * CHUNK
 _MOST = 100
-"""Steps of Newton at most. Chosen: 6 do, and where two principal stresses are nearly equal each halves the distance, so
-that 30 reach what rounding leaves."""
+"""Most Newton steps. Chosen: 6 are enough in general; if two principal stresses are nearly equal, each step halves
+the distance, so that 30 reach rounding."""
 _ROUNDING = 1e-15
-"""Of the cube of the root: a few last bits of a float64. What is below it is noise; a double root is known to the root
-of that."""
+"""Relative residual, of the cube of the root, at which the iteration ends: a few last bits of a float64. A double
+root is then known to the square root of that."""
 CHUNKS_OF_A_TASK = 16
-"""Chosen: 10 us of work and more, against 2 us that a region of threads costs."""
+"""Chunks of a task. Chosen: at least 10 us of work, against 2 us for a region of threads."""
 _I, _F, _I1, _F1, _F3 = types.int64, types.float64, types.int64[::1], types.float64[::1], types.float64[:, :, ::1]
 _LOOK = _I1, _F1, _F3, _I1, _I, _F, _F
 _COUNT = _I1, _F3, _I, _F
@@ -45,8 +46,9 @@ _of_look, _of_count = reader(*_LOOK), reader(*_COUNT)
 
 @njit("float64(float64, float64)", cache=True, error_model="numpy")
 def _largest_root(j2, j3):  # type: ignore[no-untyped-def]
-    """The largest principal value of a deviator with these invariants: of x^3 - j2 x - j3 = 0, by Newton from above. It
-    is not below the root of j2 / 3, where the slope is zero: rounding must not take a step past it.
+    """Returns the largest principal value of a deviator with these invariants: the largest root of x^3 - j2 x - j3 =
+    0, by Newton's method from above. The root is at least sqrt(j2 / 3), where the slope is zero: rounding must not
+    take a step below it.
     """
     least = np.sqrt(j2 / 3.0)
     x = 2.0 * least
@@ -60,7 +62,7 @@ def _largest_root(j2, j3):  # type: ignore[no-untyped-def]
 
 @njit("UniTuple(float64, 2)(float64[::1], int64)", cache=True, error_model="numpy")
 def principal(s, i):  # type: ignore[no-untyped-def]
-    """The largest and the smallest pressure of tet ``i`` of a chunk, Pa."""
+    """Returns the largest and the smallest pressure of tet ``i`` of a chunk, Pa."""
     xx, yy, zz, yz, zx, xy = s[_SXX + i], s[_SYY + i], s[_SZZ + i], s[_SYZ + i], s[_SZX + i], s[_SXY + i]
     j2 = 0.5 * (xx * xx + yy * yy + zz * zz) + yz * yz + zx * zx + xy * xy
     j3 = xx * (yy * zz - yz * yz) - xy * (xy * zz - yz * zx) + zx * (xy * yz - yy * zx)
@@ -69,15 +71,16 @@ def principal(s, i):  # type: ignore[no-untyped-def]
 
 @njit("float64(float64, float64, float64)", cache=True, error_model="numpy")
 def _beyond(s1, s3, strength):  # type: ignore[no-untyped-def]
-    """How many times these pressures are those of the criterion."""
+    """Returns the ratio of these pressures to the criterion."""
     s3 = max(s3, 0.0)
     return (s1 - s3) ** 2 / (8.0 * strength * (s1 + s3)) if s1 > 0.0 else 0.0
 
 
 @njit("boolean(float64[::1], int64, float64)", cache=True, error_model="numpy", forceinline=True)
 def _below(s, i, least):  # type: ignore[no-untyped-def]
-    """Whether 8 T times the number of tet ``i`` of a chunk is below ``least``, Pa, by two bounds of the invariants. The
-    number is at most s1 / 8 T, and s1 <= p + 2 r, r = sqrt(J2 / 3). And s1 - s3 <= 2 sqrt(J2), s1 + s3 >= 2 p - r.
+    """Returns True if 8 T times the ratio of tet ``i`` of a chunk is below ``least``, Pa, by two bounds from the
+    invariants. The ratio is at most s1 / 8 T, and s1 <= p + 2 r, r = sqrt(J2 / 3). And s1 - s3 <= 2 sqrt(J2), s1 +
+    s3 >= 2 p - r.
     """
     xx, yy, zz, yz, zx, xy = s[_SXX + i], s[_SYY + i], s[_SZZ + i], s[_SYZ + i], s[_SZX + i], s[_SXY + i]
     j2 = 0.5 * (xx * xx + yy * yy + zz * zz) + yz * yz + zx * zx + xy * xy
@@ -87,8 +90,8 @@ def _below(s, i, least):  # type: ignore[no-untyped-def]
 
 @njit("boolean(float64[::1], int64, float64)", cache=True, error_model="numpy", forceinline=True)
 def _above(s, i, least):  # type: ignore[no-untyped-def]
-    """Whether it is above, by two bounds likewise: s1 - s3 >= sqrt(3 J2), s1 + s3 <= 2 p + r; and s1 >= p + r, where s3
-    may be tension, which is as none.
+    """Returns True if it is above, by two bounds: s1 - s3 >= sqrt(3 J2), s1 + s3 <= 2 p + r; and s1 >= p + r, also
+    if s3 is tension, which counts as zero.
     """
     xx, yy, zz, yz, zx, xy = s[_SXX + i], s[_SYY + i], s[_SZZ + i], s[_SYZ + i], s[_SZX + i], s[_SXY + i]
     j2 = 0.5 * (xx * xx + yy * yy + zz * zz) + yz * yz + zx * zx + xy * xy
@@ -98,7 +101,9 @@ def _above(s, i, least):  # type: ignore[no-untyped-def]
 
 @njit("int64(float64[::1], int64, float64)", cache=True, error_model="numpy")
 def _not_below(s, n, least):  # type: ignore[no-untyped-def]
-    """How many of the ``n`` tets of a chunk are not. The loop has no branch: it uses vector instructions."""
+    """Returns the number of the ``n`` tets of a chunk that are not below. The loop has no branch: it uses vector
+    instructions.
+    """
     some = 0
     for i in range(n):
         some += 0 if _below(s, i, least) else 1
@@ -108,11 +113,10 @@ def _not_below(s, n, least):  # type: ignore[no-untyped-def]
 @njit("Tuple((int64, float64))(float64[:, :, ::1], int64[::1], int64, float64, float64, int64, int64)", cache=True,
       error_model="numpy")  # fmt: skip
 def hardest(state, ids, n, strength, known, first, stop):  # type: ignore[no-untyped-def]
-    """The place of the tet that exceeds the criterion most, and by how many times, where that is more than ``known``;
-    -1 where none is. Of equal ones that with the smallest id. Of ``n`` tets those of the chunks from ``first`` to
-    ``stop``.
+    """Returns the place of the tet with the largest ratio, and the ratio, if it is above ``known``; else -1. Of equal
+    ones that with the smallest id. Checks those of the ``n`` tets that are in the chunks from ``first`` to ``stop``.
 
-    Most chunks, and most tets of the others, are passed over by a bound.
+    Bounds exclude most chunks, and most tets of the others.
     """
     place, best = -1, known
     for c in range(first, stop):
@@ -131,7 +135,9 @@ def hardest(state, ids, n, strength, known, first, stop):  # type: ignore[no-unt
 
 @njit("UniTuple(int64, 2)(float64[::1], int64, float64)", cache=True, error_model="numpy")
 def _decided(s, n, least):  # type: ignore[no-untyped-def]
-    """How many of the ``n`` tets of a chunk are ``_above``, and how many neither that nor ``_below``."""
+    """Returns the number of the ``n`` tets of a chunk that are ``_above``, and the number that are neither
+    ``_above`` nor ``_below``.
+    """
     above, open_ = 0, 0
     for i in range(n):
         yes, no = _above(s, i, least), _below(s, i, least)
@@ -142,8 +148,8 @@ def _decided(s, n, least):  # type: ignore[no-untyped-def]
 
 @njit("int64(float64[:, :, ::1], int64, float64, int64, int64)", cache=True, error_model="numpy")
 def crushed(state, n, strength, first, stop):  # type: ignore[no-untyped-def]
-    """How many tets are beyond the criterion; which ones as for ``hardest``. The principal pressures are found where
-    bounds do not decide.
+    """Returns the number of tets above the criterion, among the tets as for ``hardest``. Principal pressures are
+    computed only where the bounds do not decide.
     """
     found, least = 0, 8.0 * strength
     for c in range(first, stop):
@@ -159,7 +165,7 @@ def crushed(state, n, strength, first, stop):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def _look(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``hardest`` of the chunks of a task."""
+    """Task: ``hardest`` of its chunks."""
     places, times, state, ids, n, strength, known = _of_look(table)
     k = first // CHUNKS_OF_A_TASK
     places[k], times[k] = hardest(state, ids, n, strength, known, first, stop)
@@ -167,14 +173,14 @@ def _look(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def _count(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``crushed`` of the chunks of a task."""
+    """Task: ``crushed`` of its chunks."""
     counts, state, n, strength = _of_count(table)
     counts[first // CHUNKS_OF_A_TASK] = crushed(state, n, strength, first, stop)
 
 
 @dataclass(frozen=True)
 class Met:
-    """What a tet has met: how many times the criterion, pressures, Pa, its id, its centre, m, and the time, s."""
+    """Largest compression of a tet: ratio to the criterion, pressures, Pa, its id, its centre, m, and the time, s."""
 
     times: float = 0.0
     most: float = 0.0
@@ -185,20 +191,20 @@ class Met:
 
 
 class Crushing:
-    """The hardest that each part of such matter has met; on this rank until ranks compare."""
+    """Largest compression so far in each part of such a material; on this rank until the ranks compare."""
 
     def __init__(self, model: Model, strengths: Floats, comm: Comm, clock: Clock, team: Team) -> None:
-        """``strengths`` (parts,): of tension, Pa; 0 for other matter; ``team``: whose threads look."""
+        """``strengths`` (parts,): tensile strength, Pa; 0 for other materials; ``team``: threads of the rank."""
         self._model, self._strengths, self._comm, self._clock = model, strengths, comm, clock
         self._looking = Pass(team, _look, *_LOOK, size=CHUNKS_OF_A_TASK)
         self._counting = Pass(team, _count, *_COUNT, size=CHUNKS_OF_A_TASK)
         self._met = [Met() for _ in model.parts]
         self._most = np.zeros(len(model.parts), np.int64)
-        """(parts,) tets beyond the criterion at once, the most so far."""
+        """(parts,) largest number of tets above the criterion at one time so far."""
 
     @classmethod
     def of(cls, case: Case, model: Model, comm: Comm, clock: Clock, team: Team) -> "Crushing | None":
-        """None where no part is of such matter."""
+        """Returns None if no part has such a material."""
         made = [material(case, part.material) for part in case.parts]
         strengths = [
             each.brittle.strength if each.brittle and bears_all(each) and part.rigid is None else 0.0
@@ -207,18 +213,18 @@ class Crushing:
         return cls(model, np.array(strengths), comm, clock, team) if any(strengths) else None
 
     def update(self) -> None:
-        """The stresses as they are now."""
+        """Compares with the present stresses."""
         for block in self._blocks():
             place, times = self._hardest(block, self._met[block.part].times)
             if place >= 0:
                 self._met[block.part] = self._of(block, place, times)
 
     def _blocks(self) -> list[Block]:
-        """Those of such matter."""
+        """Blocks of such materials."""
         return [block for block in self._model.blocks if self._strengths[block.part] > 0.0]
 
     def _hardest(self, block: Block, known: float) -> tuple[int, float]:
-        """``hardest`` of all chunks of a block."""
+        """Returns ``hardest`` over all chunks of a block."""
         chunks, strength = block.chunks, float(self._strengths[block.part])
         places, times = np.empty(self._looking.many(chunks), np.int64), np.empty(self._looking.many(chunks))
         self._looking.run(chunks, places, times, block.state, block.id, block.n, strength, known)
@@ -229,7 +235,7 @@ class Crushing:
         return int(places[best]), float(times[best])
 
     def count(self) -> None:
-        """How many tets are beyond the criterion now; all ranks take part."""
+        """Counts the tets above the criterion at present. Collective."""
         found = np.zeros(len(self._most), np.int64)
         for block in self._blocks():
             counts = np.zeros(self._counting.many(block.chunks), np.int64)
@@ -245,21 +251,21 @@ class Crushing:
         return Met(times, most, least, int(block.id[place]), (x, y, z), self._clock.t)
 
     def _of_all(self) -> list[Met]:
-        """Of each part the hardest of all ranks, the earliest of equal ones; all ranks take part."""
+        """Returns the largest compression of each part over all ranks; of equal ones the earliest. Collective."""
         shared = self._comm.share(self._met)
         return [min(found, key=lambda met: (-met.times, met.time, met.tet)) for found in zip(*shared, strict=True)]
 
     def keep(self) -> tuple[list[tuple[Any, ...]], list[int]]:
-        """What has been met, equal on all ranks; all take part."""
+        """Returns the state, equal on all ranks. Collective."""
         return [astuple(met) for met in self._of_all()], self._most.tolist()
 
     def resume(self, known: tuple[list[tuple[Any, ...]], list[int]]) -> None:
-        """Takes it back."""
+        """Restores the state."""
         self._met = [replace(Met(*met), centre=tuple(met[4])) for met in known[0]]
         self._most = np.array(known[1], np.int64)
 
     def found(self) -> list[Compressed]:
-        """Of each part of such matter, the hardest first; all ranks take part."""
+        """Returns the results of each such part, the largest ratio first. Collective."""
         met = [
             Compressed(
                 part=name, times=each.times, most=each.most, least=each.least, tet=each.tet,

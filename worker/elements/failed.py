@@ -1,4 +1,4 @@
-"""Why a tet ends the run, by its state; the words are the same on all ranks."""
+"""Reason for which a tet ends the run, from its state; the text is the same on all ranks."""
 
 import numpy as np
 
@@ -10,7 +10,7 @@ from ..simulation import Simulation
 
 
 def why(sim: Simulation) -> str:
-    """What the limiting tet has come to, whose limit is not a number; all ranks take part."""
+    """Returns the reason for which the limit of the limiting tet is NaN. Collective."""
     tet = sim.limiting_id()
     compression, bound = sim.comm.maximum(np.max([_compression(block, tet) for block in sim.model.blocks], axis=0))
     if compression >= bound > 0.0:
@@ -19,7 +19,9 @@ def why(sim: Simulation) -> str:
 
 
 def _compression(block: Block, tet: int) -> Floats:
-    """(2,) compression that the equation of state of a tet sees, and its pole; -inf where a block has none of it."""
+    """(2,) compression in the equation of state of a tet, and the pole of that; -inf if the block does not have the
+    tet.
+    """
     places = np.flatnonzero(block.id == tet)
     if EQUATIONS[block.eos] is not GRUNEISEN or not len(places):
         return np.full(2, -np.inf)

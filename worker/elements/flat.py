@@ -1,8 +1,9 @@
-"""Flat tets in the averaged pressure forms: each sees its own volume strain and adds nothing to the means of nodes.
+"""Flat tets in the averaged pressure forms: their pressure depends on their own volume strain, and they do not
+contribute to the nodal means.
 
-The volume of a flat tet is nothing beside that of its neighbours, so that a mean over nodes does not notice how it
-changes: a motion of one altitude, which hardly strains the neighbours, closes it, and once it yields nothing resists
-that. With its own pressure it resists as in the ``standard`` form; the few of them lock nothing.
+The volume of a flat tet is small beside that of its neighbours, so that a nodal mean hardly changes with it: a
+motion along its altitude, which hardly strains the neighbours, closes it, and after yield no stress resists. With
+its own pressure it resists as in the ``standard`` form; flat tets are few, so that they cause no locking.
 """
 
 import numpy as np
@@ -19,14 +20,14 @@ from .pressure import STABILISE
 from .tet4 import CHANGE, MODULUS, SEEN, VOLUME, VOLUME_MID
 
 THINNEST = 0.1
-"""Smallest altitude over longest edge of a tet whose volume strain is averaged; 0.82 for a regular tet. Chosen: what
-strains its neighbours by a tenth closes it (docs/theory/elements.md)."""
+"""Smallest altitude over longest edge of a tet whose volume strain is averaged; 0.82 for a regular tet. Chosen: a
+motion that strains its neighbours by a tenth closes it (docs/theory/elements.md)."""
 
 _HEAT, _NODAL_WORK, _MASS, _GROWN = HEAT * CHUNK, NODAL_WORK * CHUNK, MASS * CHUNK, DILATION * CHUNK
 
 
 def flat_tets(block: Block, x0: Floats) -> Flags:
-    """(n,) which tets of a block are flat at the start; (0,) where none is."""
+    """(n,) which tets of a block are flat at the start; (0,) if none is."""
     tets = block.tets.astype(np.int64)
     x = x0[tets]
     edges = x[:, 1:] - x[:, :1]
@@ -39,7 +40,7 @@ def flat_tets(block: Block, x0: Floats) -> Flags:
 
 @njit("void(float64[::1], boolean[::1], int64)", cache=True)
 def keep_out(w, flat, n):  # type: ignore[no-untyped-def]
-    """Takes flat tets out of what is added up at the nodes: they have no volume there, and no stabilising fluxes."""
+    """Excludes flat tets from the nodal sums: sets their volume and their stabilising fluxes to zero."""
     for i in range(n):
         if flat[i]:
             w[VOLUME_MID + i] = 0.0
@@ -49,9 +50,9 @@ def keep_out(w, flat, n):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], float64[::1], boolean[::1], int64, int64)", cache=True, error_model="numpy")
 def see_own(w, s, params, flat, rows, n):  # type: ignore[no-untyped-def]
-    """SEEN, and HEAT where there is heat, of flat tets: their own.
+    """Sets SEEN of flat tets, and HEAT if they have heat, to their own values.
 
-    The change of volume over the volume at mid-step, which is the end's less half the change but for terms of the
+    The change of volume over the volume at mid-step, which is that of the end less half the change, up to terms of
     third order.
     """
     unit = params[DENSITY] / params[BULK]
@@ -59,7 +60,7 @@ def see_own(w, s, params, flat, rows, n):  # type: ignore[no-untyped-def]
         if flat[i]:
             w[SEEN + i] = w[CHANGE + i] / (w[VOLUME + i] - 0.5 * w[CHANGE + i])
             if params[DILATES] > 0.0:
-                w[SEEN + i] += s[_GROWN + i]  # what ``tell_dilation`` has taken back
+                w[SEEN + i] += s[_GROWN + i]  # the dilation that ``subtract_dilation`` has taken back
             if rows > NODAL_WORK + 1:
                 for k in range(4):
                     stretch_corner(w, s, i, k, w[SEEN + i])
@@ -73,8 +74,8 @@ def see_own(w, s, params, flat, rows, n):  # type: ignore[no-untyped-def]
     error_model="numpy",
 )
 def press_alone(eos, w, s, alone, params, flat, rows, n):  # type: ignore[no-untyped-def]
-    """Pressure, its work and MODULUS of flat tets, where those of others are of their nodes: ``alone`` is the state
-    before the pressure, and is used up.
+    """Computes pressure, its work and MODULUS of flat tets, if those of other tets are means of their nodes:
+    ``alone`` is the state before the pressure, and is overwritten.
     """
     modulus = w[MODULUS : MODULUS + CHUNK].copy()
     press(eos, w, alone, params, n)
@@ -89,7 +90,7 @@ def press_alone(eos, w, s, alone, params, flat, rows, n):  # type: ignore[no-unt
 
 @njit("void(int64[::1], boolean[::1], int64)", cache=True)
 def without_flux(wi, flat, n):  # type: ignore[no-untyped-def]
-    """Takes the pressure gradients of flat tets out of the sums at the nodes."""
+    """Excludes flat tets from the nodal sums of the pressure gradient."""
     for i in range(n):
         if flat[i]:
             wi[i] = wi[CHUNK + i] = wi[2 * CHUNK + i] = 0

@@ -1,7 +1,8 @@
-"""The ``standard`` pressure form as the time step sees it: advances the elements by a step and starts completing shared
-nodes; averaging.py has the forms that extend it.
+"""The ``standard`` pressure form as the time step calls it: advances the elements by a step, and starts the completion
+of shared nodes; averaging.py has the other forms.
 
-Border chunks come first: they hold every tet of a shared node, so the exchange runs while the interior is computed.
+Border chunks come first: they contain every tet of a shared node, so that the exchange runs during the pass over the
+interior chunks.
 """
 
 from collections.abc import Callable
@@ -26,29 +27,29 @@ from .records import Means, Scratches
 
 
 class Bridges(Protocol):
-    """Forces between nodes besides those of tets."""
+    """Forces between nodes other than those of tets: cohesive facets."""
 
     def open(self, x: Floats) -> None:
-        """Takes the positions of the end of the step."""
+        """Updates the forces at the positions of the end of the step."""
 
     def scatter(self, force: Ints, scale: float) -> int:
         """Adds the forces in quanta of 1 / ``scale`` N; returns the bits of the largest."""
 
 
 class FlagExchange(Protocol):
-    """Has a word for each neighbour that goes with the forces of shared nodes."""
+    """Flags for the neighbours that are sent with the forces of shared nodes."""
 
     def words(self, hot: bool) -> Ints:
-        """(neighbours,) to send, once the tets of shared nodes are done; ``hot``: some face of theirs is
+        """(neighbours,) flags to send, computed after the tets of shared nodes; ``hot``: one of their faces is
         overstressed.
         """
 
     def receive(self, words: Ints) -> None:
-        """Takes those of the neighbours."""
+        """Stores the flags of the neighbours."""
 
 
 class Elements:
-    """The elements of one rank in the ``standard`` pressure form; the averaged forms extend it."""
+    """Elements of one rank in the ``standard`` pressure form; the averaged forms extend it."""
 
     split = False
 
@@ -63,14 +64,14 @@ class Elements:
         self._standard = BlockPass(tasks.standard, tasks.STANDARD)
         self._again = BlockPass(tasks.again, tasks.AGAIN, marked=False)
         self._coloured: dict[tuple[int, int], tuple[int, Coloured]] = {}
-        """By part and first chunk, with how many tets had left the block then."""
+        """Tasks by part and first chunk, with the count of moved tets (``Block.moved``) for which they are valid."""
         self._comm, self._neighbours = comm, neighbours
         self._flags: FlagExchange | None = None
         self._connect()
         self.cohesion: Bridges | None = None
-        """What pulls besides the tets."""
+        """Cohesive facets, if there are any."""
         self.pressure = np.zeros(1)
-        """(nodes,) nodal pressure, Pa; kept by the ``split`` form only."""
+        """(nodes,) nodal pressure, Pa; only in the ``split`` form."""
 
     @property
     def limit_bits(self) -> int:
@@ -94,29 +95,29 @@ class Elements:
 
     @property
     def worn(self) -> int:
-        """What has been found of worn-out tets (elements/wear.py)."""
+        """State of the worn tets: SOUND, TIRED or BROKEN (elements/wear.py)."""
         return self._words[records.WORN]
 
     @property
     def hot(self) -> bool:
-        """Whether some face passes the strength by its tet's own stress."""
+        """True if a face is overstressed by the stress of its own tet."""
         return self._words[records.HOT] != 0
 
     @property
     def nodal(self) -> list[Floats]:
-        """What the nodes carry besides their motion, (nodes,) each, for the digest."""
+        """Nodal state of the form, (nodes,) each, for the digest."""
         return []
 
     def advance(self, dt: float, scale: float) -> None:
-        """Stress and forces at n+1, added to nodal forces that are zero; the completion of the shared ones is under way
-        when it returns.
+        """Computes stress and forces at n+1; adds the forces to nodal sums that are zero on entry. On return the
+        completion of shared nodes is in progress.
         """
         self._scratches.peaks[:] = 0
         self._bridge(scale, opens=True)
         self._over(self._standard, (), (dt, scale), self._send)
 
     def again(self, scale: float) -> None:
-        """The forces of the present stress in a coarser quantum."""
+        """Sums the forces of the present stress again, in a coarser quantum."""
         limit = self.peaks[[records.LARGEST_LIMIT, records.LIMITING_TET]]
         self._scratches.peaks[:] = 0
         self.model.nodes.force[:] = 0
@@ -125,7 +126,7 @@ class Elements:
         self.peaks[[records.LARGEST_LIMIT, records.LIMITING_TET]] = limit
 
     def _bridge(self, scale: float, *, opens: bool) -> None:
-        """Forces other than those of tets."""
+        """Adds the forces of cohesive facets."""
         if self.cohesion is None:
             return
         nodes = self.model.nodes
@@ -135,35 +136,37 @@ class Elements:
         self.peaks[records.LARGEST_FORCE] = max(int(self.peaks[records.LARGEST_FORCE]), largest)
 
     def grow(self, split: Split) -> None:
-        """Takes up the copies of nodes; they are shared already, and their tets have them."""
+        """Updates the exchange after a split; the copies are shared nodes already, and the tets have their new
+        nodes.
+        """
         if not self.shared_forces.serves(self._neighbours):
             self.free()
             self._connect()
 
     def keep(self, parcel: Parcel) -> None:
-        """Adds what the elements must remember besides their state to a parcel; all ranks take part."""
+        """Adds the state of the form, except that of the tets, to a parcel. Collective."""
         limit = fixed_point.bits_of(float(self._comm.maximum(np.array([self.limit]))[0]))
         mine = -float(self.limiting) if self.limit_bits == limit else -np.inf
         parcel.known["peaks"] = limit, -int(self._comm.maximum(np.array([mine]))[0])
 
     def resume(self, parcel: Parcel) -> None:
-        """Takes it back."""
+        """Restores the state from a parcel."""
         self.peaks[[records.LARGEST_LIMIT, records.LIMITING_TET]] = parcel.known["peaks"]
 
     def attach(self, flags: FlagExchange) -> None:
-        """From now on a word for each neighbour goes with the forces; neighbours take part."""
+        """Sends these flags with the forces from now on. Collective among neighbours."""
         self.free()
         self._flags = flags
         self._connect()
 
     def finish(self) -> None:
-        """Returns when the forces of shared nodes are complete."""
+        """Waits until the forces of shared nodes are complete."""
         self.shared_forces.finish(self.model.nodes.force)
         if self._flags is not None:
             self._flags.receive(self.shared_forces.received)
 
     def free(self) -> None:
-        """Gives the messages of the exchanges back to MPI."""
+        """Frees the persistent messages."""
         for shared in self._exchanges():
             shared.free()
 
@@ -179,7 +182,7 @@ class Elements:
         self.shared_forces.begin(self.model.nodes.force, words)
 
     def _over(self, work: BlockPass, means: Values, numbers: Values, send: Callable[[], None]) -> None:
-        """A pass over all tets; ``send``: what the neighbours want as soon as the border chunks are done."""
+        """Passes over all tets; calls ``send`` after the border chunks."""
         if self._neighbours:
             self._over_blocks(work, means, numbers, border=True)
             send()

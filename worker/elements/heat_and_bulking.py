@@ -1,7 +1,8 @@
-"""Heat and bulking in the averaged pressure forms: what nodes are told of besides the change of volume.
+"""Nodal means of heat and bulking in the averaged pressure forms.
 
-An equation of state with heat sees the energy averaged as the volume strain is: heat of a tet alone would drive it
-against its neighbours, and volumes of nodes would not resist. So would bulking of its own.
+An equation of state with heat uses energy averaged in the same way as the volume strain: the heat of a single tet
+would raise its pressure against its neighbours, and the volumes of its nodes would not resist. The same holds for
+bulking.
 """
 
 import numpy as np
@@ -17,14 +18,15 @@ _WORK, _WORK_VISCOUS, _TAKEN = WORK * CHUNK, WORK_VISCOUS * CHUNK, WORK_AVERAGED
 _MASS, _HEAT, _NODAL_WORK = MASS * CHUNK, HEAT * CHUNK, NODAL_WORK * CHUNK
 _BULKING, _BULKING_STEP, _CORNERS = BULKING * CHUNK, BULKING_STEP * CHUNK, CORNERS * CHUNK
 HEATED = NODAL_WORK + 1
-"""Rows of a tet with heat; one with bulking has more."""
+"""Number of state rows of a tet with heat; one with bulking has more."""
 
 
 @njit("void(float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy", forceinline=True)
 def take_bulking(s, params, i, more):  # type: ignore[no-untyped-def]
-    """Adds ``more`` to the bulking of tet ``i``, Pa, and what that stores, for the law has given what its own would
-    store to the nodes. As there (materials/johnson_holmquist.py) it is (K m + bulking)^2 / 2K of a volume, of a quarter
-    at each corner; none where the matter is wider than without stress.
+    """Adds ``more`` to the bulking of tet ``i``, Pa, and books the energy that this stores, since the law has booked
+    the energy that its own bulking would store at the nodes. As there (materials/johnson_holmquist.py) it is (K m +
+    bulking)^2 / 2K per volume, with a quarter of the volume at each corner; zero where the material is expanded
+    beyond zero stress.
     """
     bulk, stored = params[BULK], 0.0
     for k in range(4):
@@ -38,9 +40,9 @@ def take_bulking(s, params, i, more):  # type: ignore[no-untyped-def]
 
 @njit("void(int64[:, ::1], float64[::1], float64[::1], float64[::1], float64[::1], uint32[:, ::1], int64)", cache=True)
 def scatter_heat(sums, w, s, params, weight, tets, n):  # type: ignore[no-untyped-def]
-    """Adds a quarter of what each tet has got of work since the last time, over its mass, to the sums of its nodes.
+    """Adds a quarter of the work of each tet since the last step, over its mass, to the sums of its nodes.
 
-    By volume, as the volume changes, and in units of the bulk modulus over the density; ``sums`` (nodes, 3).
+    Weighted by volume, as the volume change is, in units of the bulk modulus over the density; ``sums`` (nodes, 3).
     """
     unit = params[DENSITY] / params[BULK]
     for i in range(n):
@@ -54,9 +56,10 @@ def scatter_heat(sums, w, s, params, weight, tets, n):  # type: ignore[no-untype
 
 @njit("void(int64[:, ::1], float64[::1], float64[::1], float64[::1], float64[::1], uint32[:, ::1], int64)", cache=True)
 def scatter_bulking(sums, w, s, params, weight, tets, n):  # type: ignore[no-untyped-def]
-    """Adds a quarter of the new bulking of each tet to the sums of its nodes, by volume as ``scatter_heat``.
+    """Adds a quarter of the new bulking of each tet to the sums of its nodes, weighted by volume as in
+    ``scatter_heat``.
 
-    In units of the bulk modulus. A flat tet, which has no volume here, keeps it for itself.
+    In units of the bulk modulus. A flat tet, whose volume is zero here, keeps its bulking itself.
     """
     per_bulk = 1.0 / params[BULK]
     for i in range(n):
@@ -74,7 +77,7 @@ def scatter_bulking(sums, w, s, params, weight, tets, n):  # type: ignore[no-unt
     cache=True,
 )
 def scatter_more(sums, w, s, params, weight, tets, rows, n):  # type: ignore[no-untyped-def]
-    """Heat, or bulking: what a tet with so many ``rows`` has."""
+    """Adds heat or bulking to the sums, depending on the number of state ``rows``."""
     if rows == HEATED:
         scatter_heat(sums, w, s, params, weight, tets, n)
     else:
@@ -83,14 +86,14 @@ def scatter_more(sums, w, s, params, weight, tets, rows, n):  # type: ignore[no-
 
 @njit("void(float64[::1], float64[::1], uint32[:, ::1], int64)", cache=True)
 def gather_heat(s, heat, tets, n):  # type: ignore[no-untyped-def]
-    """HEAT: what the pressure of each tet sees grows by the mean of the four nodes."""
+    """Adds the mean of the four nodes to HEAT, the heat in the pressure of each tet."""
     for i in range(n):
         s[_HEAT + i] += 0.25 * ((heat[tets[i, 0]] + heat[tets[i, 1]]) + (heat[tets[i, 2]] + heat[tets[i, 3]]))
 
 
 @njit("void(float64[::1], float64[::1], float64[::1], uint32[:, ::1], boolean[::1], int64)", cache=True)
 def gather_bulking(s, params, bulking, tets, flat, n):  # type: ignore[no-untyped-def]
-    """BULKING: that of each tet grows by the mean of the four nodes; ``flat`` (n,), or (0,), have their own."""
+    """Adds the mean of the four nodes to BULKING; tets that are ``flat``, (n,) or (0,), keep their own."""
     quarter = 0.25 * params[BULK]
     for i in range(n):
         if len(flat) == 0 or not flat[i]:
@@ -100,7 +103,7 @@ def gather_bulking(s, params, bulking, tets, flat, n):  # type: ignore[no-untype
 
 @njit("void(float64[::1], float64[::1], int64, int64, float64)", cache=True, error_model="numpy", forceinline=True)
 def stretch_corner(w, s, i, k, strain):  # type: ignore[no-untyped-def]
-    """The ratio of volumes at corner ``k`` of tet ``i`` after a volume strain; CORNER_CHANGE."""
+    """Updates the volume ratio at corner ``k`` of tet ``i`` by a volume strain; sets CORNER_CHANGE."""
     half, before = 0.5 * strain, s[_CORNERS + k * CHUNK + i]
     after = before * (1.0 + half) / (1.0 - half)
     s[_CORNERS + k * CHUNK + i], w[CORNER_CHANGE + k * CHUNK + i] = after, after - before
@@ -111,7 +114,7 @@ def stretch_corner(w, s, i, k, strain):  # type: ignore[no-untyped-def]
     cache=True,
 )
 def gather_corners(w, s, params, bulking, tets, strain, flat, n):  # type: ignore[no-untyped-def]
-    """Bulking as a mean over nodes, the ratio of volumes at each node, and CORNER_CHANGE, by how much it has changed.
+    """Updates bulking as a mean over nodes, the volume ratio at each node, and CORNER_CHANGE, the change of that ratio.
 
     Heat stays at the nodes (matter.py).
     """

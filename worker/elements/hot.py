@@ -1,4 +1,4 @@
-"""Which faces a tet would break by its own stress: the cheap test before the criterion (fracture/criterion.py)."""
+"""Overstressed faces of a tet by its own stress: the inexpensive test before the criterion (fracture/criterion.py)."""
 
 from ..kernels.jit import njit
 from ..model.rows import PRESSURE, S_XX, S_XY, S_YY, S_YZ, S_ZX, S_ZZ
@@ -13,7 +13,9 @@ _P = PRESSURE * CHUNK
 @njit("boolean(float64, float64, float64, float64, float64, float64, float64, float64, float64, float64, float64)",
       cache=True, error_model="numpy")  # fmt: skip
 def _passes(bx, by, bz, xx, yy, zz, yz, zx, xy, weight, square):  # type: ignore[no-untyped-def]
-    """Whether the traction on the area vector b has a ``square`` of the criterion's first form, Pa^2, or more."""
+    """Returns True if the traction on the area vector b has a ``square`` of the criterion's first form, Pa^2, or
+    more.
+    """
     tx, ty, tz = xx * bx + xy * by + zx * bz, xy * bx + yy * by + yz * bz, zx * bx + yz * by + zz * bz
     area = bx * bx + by * by + bz * bz
     normal = tx * bx + ty * by + tz * bz
@@ -23,7 +25,8 @@ def _passes(bx, by, bz, xx, yy, zz, yz, zx, xy, weight, square):  # type: ignore
 
 @njit("boolean(uint8[::1], float64[::1], float64[::1], float64[::1], float64, int64)", cache=True, error_model="numpy")
 def mark_hot(hot, w, s, weakest, weight, n):  # type: ignore[no-untyped-def]
-    """Sets bit k of ``hot`` where face k of a tet passes by its own stress, without the viscous part; whether any.
+    """Sets bit k of ``hot`` if face k of a tet passes by the stress of the tet without its viscous part; returns True
+    if any face does.
 
     ``w`` holds the area vectors b1, b2, b3 of a chunk (elements/tet4.py).
     """

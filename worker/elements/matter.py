@@ -1,14 +1,15 @@
-"""The matter at the nodes, in the averaged pressure forms: where the pressure is not linear in the volume strain.
+"""Material state at the nodes, in the averaged pressure forms: for pressures that are not linear in the volume strain.
 
-The volume strain of a node is a mean over its tets, so each node has a ratio of volumes and pores of its own, and a
-pressure of these. The pressure of a tet is the mean of its four nodes. Then the work of the forces on the own volumes
-of the tets is what the pressures of the nodes do on the volumes of the nodes:
+The volume strain of a node is a mean over its tets; so each node has a volume ratio and pores of its own, and a
+pressure that follows from these. The pressure of a tet is the mean of its four nodes. The work of the forces on the
+volumes of the tets is then that of the nodal pressures on the nodal volumes:
 
     sum_e V_e e_e mean_a(p_a) = sum_a p_a V_a e_a,    V_a e_a = sum_e V_e e_e / 4
 
-and no energy is made or lost by the mean (docs/theory/elements.md, "Matter at the nodes"). Nodes have the pressure of a
-linear material with a tension cut-off. A pressure that is linear in the strain is a mean of four by itself, and stays
-with the tet; so does the pressure of an equation of state with heat.
+so that the mean neither creates nor dissipates energy (docs/theory/elements.md, "Matter at the nodes"). Nodal
+pressures are used for a linear material with a tension cut-off. For a pressure that is linear in the strain, the
+mean of the strain is the mean of the pressure, which then stays with the tet; so does the pressure of an equation of
+state with heat.
 """
 
 import numpy as np
@@ -21,13 +22,13 @@ from ..model.state import CHUNK, Floats
 from .tet4 import CHANGE, MODULUS
 
 RATIO, PORES_AT, PRESSURE_AT, WORKED, TORN, OPENED, STIFF = range(7)
-"""Columns by node. Of the state: ratio of volumes; pores as in state.PORES; pressure, Pa. Of the step, each a volume at
-the start: work of the pressure, J/m^3; the part of it that is lost in pores, J/m^3; volume of new pores. Modulus of the
-wave speed, Pa."""
+"""Columns by node. State: volume ratio; pores as in state.PORES; pressure, Pa. Of the step, per initial volume: work
+of the pressure, J/m^3; the part of it dissipated in pores, J/m^3; volume of new pores. Modulus of the wave speed,
+Pa."""
 COLUMNS = 8
-"""The columns above and one that is not used: a row is a cache line."""
+"""Number of columns: one more than above, so that a row is a cache line."""
 TETS, LINEAR = range(2)
-"""Where the pressure is computed: in the tets; at the nodes, linear with a tension cut-off."""
+"""Place where the pressure is computed: in the tets; at the nodes, linear with a tension cut-off."""
 
 _P, _MASS, _WORK, _PORES = (row * CHUNK for row in (PRESSURE, MASS, WORK, PORES))
 _TAKEN, _PLASTIC = WORK_AVERAGED * CHUNK, WORK_PLASTIC * CHUNK
@@ -35,18 +36,18 @@ _TAKEN, _PLASTIC = WORK_AVERAGED * CHUNK, WORK_PLASTIC * CHUNK
 
 @njit("int64(int64, float64[::1])", cache=True)
 def whose(eos, params):  # type: ignore[no-untyped-def]
-    """TETS or LINEAR, by the number of the equation of state and the constants of a part.
+    """Returns TETS or LINEAR for the number of the equation of state and the constants of a part.
 
-    With heat it stays with the tets: a node at the surface of a strong shock is compressed further than the mean of
-    four (at 10 km/s beyond what the step follows). That of what dilates has a share of the tet's own flow.
+    With heat it is TETS: a node at the surface of a strong shock is compressed more than the mean of four (at 10
+    km/s more than a step resolves). With dilation too: the pressure then contains a share of the flow of the tet.
     """
     return LINEAR if eos == 0 and params[SPALL] < np.inf and params[DILATES] == 0.0 else TETS
 
 
 @njit("void(float64[::1], float64, float64, float64, float64, float64)", cache=True, error_model="numpy")
 def _book(at, params_bulk, old, before, after, opened):  # type: ignore[no-untyped-def]
-    """WORKED, TORN and OPENED of a node whose whole volume goes from ``before`` to ``after`` of that at the start, of
-    which ``opened`` are new pores.
+    """Sets WORKED, TORN and OPENED of a node whose volume ratio changes from ``before`` to ``after``; ``opened``:
+    volume of new pores.
     """
     new = at[PRESSURE_AT]
     mean = 0.5 * (old + new)
@@ -57,7 +58,9 @@ def _book(at, params_bulk, old, before, after, opened):  # type: ignore[no-untyp
 
 @njit("void(float64[::1], float64[::1], float64)", cache=True, error_model="numpy")
 def _linear(at, params, strain):  # type: ignore[no-untyped-def]
-    """p -= K d(volume strain), between minus the spall pressure and, while there are pores, zero."""
+    """p -= K d(volume strain), limited from below by minus the spall pressure and, while there are pores, from above
+    by zero.
+    """
     bulk, spall = params[BULK], params[SPALL]
     old, pores, before, half = at[PRESSURE_AT], at[PORES_AT], at[RATIO], 0.5 * strain
     p, opened = old - bulk * strain, 0.0
@@ -74,14 +77,14 @@ def _linear(at, params, strain):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64, int64, float64[::1])", cache=True, error_model="numpy")
 def press_node(at, strain, kind, params):  # type: ignore[no-untyped-def]
-    """The columns of n+1 of a node, ``at``, from the volume strain of the step; ``kind`` as ``whose`` has it."""
+    """Updates the columns ``at`` of a node to n+1, from the volume strain of the step; ``kind``: TETS or LINEAR."""
     if kind == LINEAR:
         _linear(at, params, strain)
 
 
 @njit("float64(float64[:, ::1], uint32[:, ::1], int64, int64)", cache=True, error_model="numpy", forceinline=True)
 def _mean(matter, tets, i, k):  # type: ignore[no-untyped-def]
-    """Of column ``k`` over the nodes of tet ``i``."""
+    """Returns the mean of column ``k`` over the nodes of tet ``i``."""
     return 0.25 * ((matter[tets[i, 0], k] + matter[tets[i, 1], k]) + (matter[tets[i, 2], k] + matter[tets[i, 3], k]))
 
 
@@ -91,8 +94,8 @@ def _mean(matter, tets, i, k):  # type: ignore[no-untyped-def]
     error_model="numpy",
 )
 def take_means(w, s, params, matter, tets, n):  # type: ignore[no-untyped-def]
-    """Pressure, its work and MODULUS of ``n`` tets from the matter at their nodes; WORK_AVERAGED: what it has done on
-    the own volume less what at the nodes.
+    """Sets pressure, its work and MODULUS of ``n`` tets from the state at their nodes; WORK_AVERAGED: work on the
+    own volume less the work at the nodes.
     """
     porous, shaped = params[SPALL] < np.inf, params[ORDER] == FROM_SHAPE
     for i in range(n):
@@ -111,7 +114,7 @@ def take_means(w, s, params, matter, tets, n):  # type: ignore[no-untyped-def]
 
 
 def at_start(nodes: int) -> Floats:
-    """(nodes, COLUMNS) of matter that is not strained."""
+    """(nodes, COLUMNS) unstrained state."""
     made = np.zeros((nodes, COLUMNS))
     made[:, RATIO] = 1.0
     return made

@@ -1,10 +1,10 @@
-"""What averaging the pressure takes: the forces work on a tet's own volume, its pressure on the mean that it sees.
+"""Energy account of the averaged pressure: work on the volume of a tet less work on the volume in its pressure.
 
-A tet's stress does -p dV on its own volume; the energy that an averaged pressure stores is -p dW, with W the volume by
-the strain that the pressure sees. Over all tets round a node the two agree where the pressure is uniform. The rest is
-booked tet by tet as WORK_AVERAGED: what differences of pressure within an average store, which comes back; what is
-lost for good, where neighbours yield, tear or leave at different times; and what the stabilising fluxes of ``split``
-dissipate (docs/theory/elements.md, What averaging takes).
+The stress of a tet does the work -p dV on its own volume; an averaged pressure stores -p dW, with W the volume that
+follows from the averaged strain. Summed over the tets round a node the two agree if the pressure is uniform. The
+difference is booked for each tet as WORK_AVERAGED: energy that pressure differences within a mean store, which is
+recoverable; energy dissipated where neighbours yield, tear or are removed at different times; and the dissipation of
+the stabilising fluxes of ``split`` (docs/theory/elements.md, What averaging takes).
 """
 
 from ..kernels.jit import njit
@@ -19,11 +19,12 @@ _P, _GROWN, _TAKEN = PRESSURE * CHUNK, DILATION * CHUNK, WORK_AVERAGED * CHUNK
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
 def keep_before(w, s, params, n):  # type: ignore[no-untyped-def]
-    """BEFORE: the pressure before the step; CHANGE_SEEN: how the seen volume changes; VOLUME_SEEN: at mid-step.
+    """Sets BEFORE: pressure before the step; CHANGE_SEEN: change of the averaged volume; VOLUME_SEEN: averaged volume
+    at mid-step.
 
-    Before the equation of state; VOLUME_SEEN is that of the step's beginning then. What dilates sees its own: its
-    pressure does not say a volume, and its flow adds up to the growth of all tets round its nodes. What
-    ``tell_dilation`` has taken back is of the step before.
+    Called before the equation of state; on entry VOLUME_SEEN is that of the start of the step. A material that
+    dilates uses its own volume: its pressure does not determine a volume, and its flow adds to the volume of all
+    tets round its nodes. The dilation that ``subtract_dilation`` has taken back is of the step before.
     """
     if params[DILATES] > 0.0:
         for i in range(n):
@@ -41,9 +42,11 @@ def keep_before(w, s, params, n):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
 def book_averaged(w, s, params, n):  # type: ignore[no-untyped-def]
-    """WORK_AVERAGED: what the mean pressure of the step has done on the own volume less what on the seen one.
+    """Adds the work of the mean pressure of the step on the own volume, less that on the averaged one, to
+    WORK_AVERAGED.
 
-    The stress of what dilates is that of its own volume: where that grows by the dilation of others, more is stored.
+    The stress of a material that dilates acts on its own volume: if the dilation of others increases that, more
+    energy is stored.
     """
     dilates = params[DILATES] > 0.0
     for i in range(n):

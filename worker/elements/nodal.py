@@ -1,4 +1,6 @@
-"""The nodes of the averaged pressure forms: what is done with their sums between the passes over the tets, as tasks."""
+"""Nodal part of the averaged pressure forms, as tasks: from the sums of the first pass over the tets to the means
+for the second.
+"""
 
 from ..kernels.jit import njit, types
 from ..parallel.arguments import reader
@@ -9,17 +11,17 @@ from .records import MEANS
 
 _FLAG, _F1 = types.boolean, types.float64[::1]
 COMPLETE = (MEANS, _F1, _FLAG, _F1, _FLAG, types.int32[::1], types.int64[::1], types.float64[:, ::1])
-"""Means, (nodes,) room for volumes, whether there are means of heat or bulking, (nodes,) bulk modulus, Pa, whether
-pressures are of nodes, (nodes,) part of each, (parts,) whose the pressure is and (parts, SIZE) constants."""
+"""Types of: means; (nodes,) room for volumes; whether heat or bulking is averaged; (nodes,) bulk modulus, Pa;
+whether there are nodal pressures; (nodes,) part of each node; (parts,) TETS or LINEAR; (parts, SIZE) constants."""
 PROJECT = (MEANS, _F1, types.float64)
-"""Means, those volumes and the quanta per newton of the sums."""
+"""Types of: means, those volumes, and the quanta per newton of the sums."""
 _complete, _project = reader(*COMPLETE), reader(*PROJECT)
 
 
 @njit(TASK, cache=True, error_model="numpy")
 def complete(table, begin, end, thread):  # type: ignore[no-untyped-def]
-    """Volume strain of the step, and heat or bulking, of nodes from their completed sums, zero at a node without tets;
-    the pressures of n+1 that are of nodes; their volumes, m^3, where ``project`` follows. All sums begin anew.
+    """Task: computes from completed sums the volume strain of the step, and heat or bulking, of nodes, zero for a
+    node without tets; nodal pressures of n+1; and nodal volumes, m^3, for ``project``. Sets the sums to zero.
     """
     means, volumes, more, bulk, pressed, part, kinds, params = _complete(table)
     sums, strain, told, split, matter = means.sums, means.strain, means.more, means.split, means.matter
@@ -42,7 +44,7 @@ def complete(table, begin, end, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True, error_model="numpy")
 def project(table, begin, end, thread):  # type: ignore[no-untyped-def]
-    """The projected gradient of the pressure of nodes from their completed sums."""
+    """Task: computes the projected pressure gradient of nodes from their completed sums."""
     means, volumes, scale = _project(table)
     gradient, projected = means.gradient, means.projected
     for a in range(begin, end):

@@ -1,4 +1,4 @@
-"""A pass over the tets as the threads get it: the kernel of its tasks, and a table of arguments for each block."""
+"""A pass over the tets for the threads: the kernel of its tasks, and a table of arguments for each block."""
 
 from typing import Any
 
@@ -11,18 +11,18 @@ Values = tuple[Any, ...]
 
 
 class BlockPass:
-    """Of a kernel with the arguments ``kinds``: Motion, Body, Marks where it is ``marked``, Scratches, Means where it
-    has some, and numbers.
+    """Pass of a kernel with the arguments ``kinds``: Motion, Body, Marks if ``marked``, Scratches, Means if it has
+    any, numbers.
     """
 
     def __init__(self, kernel: Kernel, kinds: tuple[object, ...], *, marked: bool = True) -> None:
         self.kernel = kernel
         self._kinds, self._marked = kinds, marked
         self._tables: dict[int, Arguments] = {}
-        """By part."""
+        """Tables by part."""
 
     def address(self, nodes: Nodes, block: Block, scratches: Scratches, means: Values, numbers: Values) -> int:
-        """Of the arguments for a block; ``means``: the fields of Means, or none."""
+        """Returns the address of the arguments for a block; ``means``: the fields of Means, or none."""
         table = self._tables.get(block.part)
         if table is None:
             table = self._tables[block.part] = Arguments(*self._kinds)

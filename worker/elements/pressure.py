@@ -1,15 +1,15 @@
-"""Averaged pressure forms: the volume strain that the pressure sees is averaged over the nodes of each tet.
+"""Averaged pressure forms: the volume strain in the pressure of a tet is averaged over its nodes.
 
 One-point tets with their own pressure lock in plastic flow. ``nodal`` replaces the volume strain of a tet by the mean
-of its nodes' values, each the volume-weighted mean over the tets round it (averaged nodal pressure, Bonet and Burton
-1998, in rate form; the pressure stays with the tet, so any equation of state works and a node that splits loses
-nothing). ``split`` adds to the nodal balance the projection form of the operator split for pressure gradients
-(Zienkiewicz et al. 1998): Oñate-Codina stabilisation that acts on the difference between a tet's pressure gradient and
-the mean of the projected gradients of its nodes, and vanishes where pressure is linear. Heat and bulking are averaged
-in the same way (heat_and_bulking.py).
+of the values of its nodes, each the volume-weighted mean over the tets round it (averaged nodal pressure, Bonet and
+Burton 1998, in rate form; the pressure is stored by tet, so that any equation of state works and the separation of a
+node changes no pressure). ``split`` adds the projection form of the operator split for pressure gradients to the nodal
+balance (Zienkiewicz et al. 1998): an Oñate-Codina stabilisation, proportional to the difference between the pressure
+gradient of a tet and the mean of the projected gradients of its nodes; it vanishes for a linear pressure. Heat and
+bulking are averaged in the same way (heat_and_bulking.py).
 
-Nodal sums are integers. Each contribution is taken relative to the node's reference volume and so lies near one,
-whatever the size of the tets: one fixed scale, QUANTA, serves every scene.
+Nodal sums are integers. Each contribution is relative to the reference volume of the node and so of order one, for
+any size of tets: one fixed scale, QUANTA, serves every case.
 """
 
 import numpy as np
@@ -38,26 +38,27 @@ QUANTA = float(2**52)
 _FLUX, _VOLUME, _MASS = VOLUME_FLUX * CHUNK, TET_VOLUME * CHUNK, MASS * CHUNK
 _WORK, _P, _GROWN = WORK * CHUNK, PRESSURE * CHUNK, DILATION * CHUNK
 STABILISE = NODAL
-"""Rows of the scratch: the four stabilising volume fluxes, m^3/s."""
+"""Scratch rows: the four stabilising volume fluxes, m^3/s."""
 _PROJECTED = NODAL + 4 * CHUNK
-"""Rows of the scratch: mean projected pressure gradient, Pa/m."""
+"""Scratch rows: mean projected pressure gradient, Pa/m."""
 _DIFFERENCE = NODAL + 7 * CHUNK
-"""Rows of the scratch: nodal pressure differences to node 0, Pa."""
+"""Scratch rows: nodal pressures less that of node 0, Pa."""
 
 
 @njit("void(float64[::1], float64[::1], int64)", cache=True)
 def keep_flux(w, s, n):  # type: ignore[no-untyped-def]
-    """Keeps the tet's own volume flux, m^3/s, for the second pass over the elements."""
+    """Stores the volume flux of each tet, m^3/s, for the second pass over the elements."""
     for i in range(n):
         s[_FLUX + i] = w[DILATATION + i] * w[VOLUME_MID + i]
 
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
 def tell_dilation(w, s, params, n, dt):  # type: ignore[no-untyped-def]
-    """Hands the dilation of the last step to the nodes: what they take from it is what the pressure sees, not the own.
+    """Subtracts the dilation of the last step from tets, so that the nodal mean of it enters their pressure in its
+    place.
 
-    The law has put its own share into the pressure at once, so that the stress is on the surface; that is taken back
-    here, with its work. DILATATION is from now on that of the elastic strain.
+    The law has added its own dilation to the pressure at once, so that the stress lies on the yield surface; this is
+    taken back here, with its work. DILATATION is from now on that of the elastic strain.
     """
     if dt <= 0.0:
         return
@@ -72,7 +73,7 @@ def tell_dilation(w, s, params, n, dt):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
 def recall_flux(w, s, n, dt):  # type: ignore[no-untyped-def]
-    """CHANGE: the tet's own change of volume in the step, m^3; SPEED: its rate over the volume of the end, 1/s."""
+    """Sets CHANGE: change of the tet's own volume in the step, m^3; SPEED: its rate over the volume at the end, 1/s."""
     for i in range(n):
         w[CHANGE + i] = s[_FLUX + i] * dt
         w[SPEED + i] = s[_FLUX + i] / w[VOLUME + i]
@@ -80,7 +81,7 @@ def recall_flux(w, s, n, dt):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
 def recall_growth(w, s, n, dt):  # type: ignore[no-untyped-def]
-    """As ``recall_flux``, of tets that know their volume before the step; from now on they know the present one."""
+    """Sets the same for tets that store their volume, and stores the present volume."""
     frequency = 1.0 / dt if dt > 0.0 else 0.0
     for i in range(n):
         volume = w[VOLUME + i]
@@ -94,7 +95,7 @@ def recall_growth(w, s, n, dt):  # type: ignore[no-untyped-def]
 def scatter_volumes(sums, w, weight, tets, n, dt):  # type: ignore[no-untyped-def]
     """Adds a quarter of each tet's volume change and of its volume to the sums of its nodes.
 
-    ``weight`` (nodes,) is one over the reference volume, 1/m^3; ``sums`` (nodes, 2).
+    ``weight`` (nodes,): one over the reference volume, 1/m^3; ``sums`` (nodes, 2).
     """
     for i in range(n):
         volume = 0.25 * w[VOLUME_MID + i]
@@ -108,7 +109,7 @@ def scatter_volumes(sums, w, weight, tets, n, dt):  # type: ignore[no-untyped-de
 
 @njit("void(int64[:, ::1], float64[::1], float64[::1], uint32[:, ::1], int64, float64)", cache=True)
 def scatter_stabilised(sums, w, weight, tets, n, dt):  # type: ignore[no-untyped-def]
-    """As ``scatter_volumes``, with the stabilising fluxes of ``stabilise`` added to the change of volume."""
+    """Adds the same, with the stabilising fluxes of ``stabilise`` in the volume change."""
     for i in range(n):
         volume = 0.25 * w[VOLUME_MID + i]
         flux = volume * w[DILATATION + i]
@@ -121,7 +122,7 @@ def scatter_stabilised(sums, w, weight, tets, n, dt):  # type: ignore[no-untyped
 
 @njit("void(float64[::1], float64[::1], float64[:, ::1], uint32[:, ::1], int64)", cache=True)
 def gather_projection(w, pressure, projected, tets, n):  # type: ignore[no-untyped-def]
-    """Nodal pressure differences and the mean projected gradient of ``n`` tets."""
+    """Sets the nodal pressure differences and the mean projected gradient of ``n`` tets."""
     for i in range(n):
         a, b, c, d = tets[i, 0], tets[i, 1], tets[i, 2], tets[i, 3]
         w[_DIFFERENCE + i] = pressure[b] - pressure[a]
@@ -135,10 +136,11 @@ def gather_projection(w, pressure, projected, tets, n):  # type: ignore[no-untyp
 
 @njit("void(float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
 def stabilise(w, s, n, dt):  # type: ignore[no-untyped-def]
-    """Stabilising volume fluxes dt/2 V / rho grad N_a . (grad p - mean projected grad p), from b at the step's end.
+    """Sets the stabilising volume fluxes dt/2 V / rho grad N_a . (grad p - mean projected grad p), with b at the end of
+    the step.
 
-    Half a step is the characteristic time of the split (Zienkiewicz and Codina 1995), and the most that keeps to the
-    stable step of the tets. The fluxes add to zero over the four nodes: the body's volume is not touched.
+    Half a step is the characteristic time of the split (Zienkiewicz and Codina 1995), and the largest that the
+    stable step of the tets allows. The four fluxes sum to zero: the volume of the body does not change.
     """
     for i in range(n):
         volume, mass = w[VOLUME + i], s[_MASS + i]
@@ -161,14 +163,14 @@ def stabilise(w, s, n, dt):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], uint32[:, ::1], int64)", cache=True)
 def gather_strains(w, strain, tets, n):  # type: ignore[no-untyped-def]
-    """SEEN: mean volume strain of the step of the four nodes."""
+    """Sets SEEN: mean volume strain of the step over the four nodes."""
     for i in range(n):
         w[SEEN + i] = 0.25 * ((strain[tets[i, 0]] + strain[tets[i, 1]]) + (strain[tets[i, 2]] + strain[tets[i, 3]]))
 
 
 @njit("void(float64[::1], int64, float64)", cache=True)
 def own_strains(w, n, dt):  # type: ignore[no-untyped-def]
-    """SEEN, VOLUME_SEEN, CHANGE and SPEED of the ``standard`` form: each tet sees its own volume strain."""
+    """Sets SEEN, VOLUME_SEEN, CHANGE and SPEED in the ``standard`` form: each tet uses its own volume strain."""
     for i in range(n):
         w[VOLUME_SEEN + i] = w[VOLUME_MID + i]
         w[SPEED + i] = w[DILATATION + i]
@@ -178,7 +180,7 @@ def own_strains(w, n, dt):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
 def own_growth(w, s, n, dt):  # type: ignore[no-untyped-def]
-    """As ``own_strains``, of tets that know their volume before the step; from now on they know the present one."""
+    """Sets the same for tets that store their volume, and stores the present volume."""
     frequency = 1.0 / dt if dt > 0.0 else 0.0
     for i in range(n):
         volume = w[VOLUME + i]
@@ -195,7 +197,7 @@ def own_growth(w, s, n, dt):  # type: ignore[no-untyped-def]
 
 @njit("int64(int64[::1], float64[::1], float64[::1], uint32[:, ::1], int64, float64)", cache=True)
 def pressure_fluxes(wi, w, pressure, tets, n, scale):  # type: ignore[no-untyped-def]
-    """Three rows of V grad p / 4 of the tet, N, in quanta of 1/scale; returns the bits of the largest."""
+    """Sets three rows of V grad p / 4 of the tet, N, in quanta of 1/scale; returns the bits of the largest."""
     b1, b2, b3 = w[EDGE:], w[EDGE + 3 * CHUNK :], w[EDGE + 6 * CHUNK :]
     peak = 0
     for i in range(n):
@@ -211,7 +213,7 @@ def pressure_fluxes(wi, w, pressure, tets, n, scale):  # type: ignore[no-untyped
 
 @njit("void(int64[:, ::1], int64[::1], uint32[:, ::1], int64)", cache=True)
 def scatter_fluxes(gradient, wi, tets, n):  # type: ignore[no-untyped-def]
-    """Adds the quantised V grad p / 4 to the four nodes of each tet."""
+    """Adds the quantised V grad p / 4 to the sums of the four nodes of each tet."""
     for i in range(n):
         a, b, c, d = tets[i, 0], tets[i, 1], tets[i, 2], tets[i, 3]
         for k in range(3):

@@ -1,4 +1,4 @@
-"""What the passes over the elements take: records of arrays, and their numba types, which signatures name."""
+"""Records of arrays that the passes over the elements take, and their numba types for signatures."""
 
 from operator import attrgetter
 from typing import NamedTuple
@@ -10,16 +10,16 @@ from ..model.state import CHUNK, Bits, Flags, Floats, Ints, Tets
 from . import tet4
 
 LARGEST_LIMIT, LIMITING_TET, LARGEST_FORCE, WORN, HOT = range(5)
-"""Places in ``Scratch.peaks``: bits of the largest one-over-stable-step, 1/s; smallest global id of the tets that have
-it; bits of the largest force, N; what is found of worn-out tets (wear.py); whether faces are hot (hot.py)."""
+"""Places in ``Scratch.peaks``: bits of the largest one-over-stable-step, 1/s; smallest global id of the tets that
+have it; bits of the largest force, N; state of the worn tets (wear.py); whether faces are overstressed (hot.py)."""
 PEAKS = 5
 """Number of these places."""
 _LINE = 8
-"""Numbers in a line of the cache."""
+"""Float64 numbers in a cache line."""
 
 
 class Motion(NamedTuple):
-    """The nodes of a rank, and the sums of the forces on them."""
+    """Nodes of a rank, and the sums of the forces on them."""
 
     x0: Floats
     """(nodes, 3) initial positions, m."""
@@ -28,43 +28,43 @@ class Motion(NamedTuple):
     v: Floats
     """(nodes, 3) velocities at n+1/2, m/s."""
     force: Ints
-    """(nodes, 3) quanta."""
+    """(nodes, 3) sums of forces, quanta."""
 
 
 class Body(NamedTuple):
-    """The elements of a block."""
+    """Elements of a block."""
 
     tets: Tets
     """(n, 4) local nodes."""
     id: Ints
     """(n,) global ids."""
     state: Floats
-    """All of the block, flat."""
+    """State of the whole block, flat."""
     rows: int
-    """Of the state, in a chunk."""
+    """Number of state rows."""
     params: Floats
     """Constants of the material."""
     strength: int
-    """Which strength model."""
+    """Number of the strength law (materials/models.py)."""
     eos: int
-    """Which equation of state."""
+    """Number of the equation of state."""
     quiet: Ints
     """(chunks, 3) see rest.py."""
     flat: Flags
-    """(n,) tets whose volume strain is not averaged; (0,) where there is none."""
+    """(n,) flat tets, whose volume strain is not averaged; (0,) if there is none."""
     averages: Tets
-    """(n, 4) rows of the Means of each corner."""
+    """(n, 4) for each corner the row of the Means."""
 
 
 class Marks(NamedTuple):
-    """What the passes look for in the tets of a block, and whom they mark."""
+    """Limits that the passes compare the tets of a block with, and the tets that they mark."""
 
     worn: Flags
-    """(n,) tets that are about to leave; (0,) where the part does not erode."""
+    """(n,) worn tets, which will be removed; (0,) if the part does not erode."""
     life: Floats
     """(5,) see wear.py."""
     hot: Bits
-    """(n,) see hot.py; (0,) where the part does not fracture."""
+    """(n,) see hot.py; (0,) if the part does not fracture."""
     weakest: Floats
     """(n,) smallest strength of the faces of each tet, Pa."""
     shear: float
@@ -72,14 +72,14 @@ class Marks(NamedTuple):
 
 
 class Scratch(NamedTuple):
-    """Room for one chunk, and what the step needs of all tets of a thread."""
+    """Scratch for one chunk, and the peaks over all tets of a thread."""
 
     w: Floats
-    """Rows of CHUNK numbers, see tet4.py."""
+    """Rows of CHUNK numbers, see scratch.py."""
     wi: Ints
     """Nine rows of forces, quanta."""
     bits: Ints
-    """``w`` once more, as integers."""
+    """Same memory as ``w``, as integers."""
     peaks: Ints
     """(5,) see LARGEST_LIMIT and the names beside it."""
 
@@ -92,13 +92,13 @@ class Scratches(NamedTuple):
     wi: Ints
     """(threads, 9 * CHUNK)."""
     bits: Ints
-    """``w`` once more, as integers."""
+    """Same memory as ``w``, as integers."""
     peaks: Ints
-    """(threads, 8) a line of the cache for each."""
+    """(threads, 8) a cache line for each thread."""
 
     @classmethod
     def of(cls, threads: int) -> "Scratches":
-        """Rows that begin on a cache line: the same speed wherever memory is given."""
+        """Returns rows that start on a cache line, so that the speed does not depend on the address."""
         room = np.zeros(threads * tet4.SCRATCH + _LINE)
         first = -(room.ctypes.data // room.itemsize) % _LINE
         w = room[first:][: threads * tet4.SCRATCH].reshape(threads, -1)
@@ -107,10 +107,11 @@ class Scratches(NamedTuple):
 
 class Means(NamedTuple):
     """Sums and means of the averaged pressure forms: a row for each node, and for each further material of a node
-    (elements/averages.py)."""
+    (elements/averages.py).
+    """
 
     sums: Ints
-    """(rows, 2 or 3) of volume change and volume, and of heat or bulking where there are such, quanta."""
+    """(rows, 2 or 3) sums of volume change and volume, and of heat or bulking if averaged, quanta."""
     weight: Floats
     """(rows,) one over the reference volume, 1/m^3."""
     strain: Floats
@@ -118,29 +119,29 @@ class Means(NamedTuple):
     more: Floats
     """(rows,) heat or bulking of the step."""
     split: bool
-    """Whether pressure gradients stabilise; the arrays below are of one row if not."""
+    """True if pressure gradients stabilise; else the arrays below have one row."""
     pressure: Floats
-    """(rows,) Pa."""
+    """(rows,) nodal pressure, Pa."""
     projected: Floats
     """(rows, 3) projected gradient of the pressure, Pa/m."""
     gradient: Ints
-    """(rows, 3) its sums, quanta."""
+    """(rows, 3) sums of the pressure gradient, quanta."""
     matter: Floats
-    """(rows, COLUMNS) see matter.py; of one row where no pressure is of the nodes."""
+    """(rows, COLUMNS) see matter.py; one row if there are no nodal pressures."""
 
     @classmethod
     def none(cls) -> "Means":
-        """Of the ``standard`` form."""
+        """Returns the means of the ``standard`` form."""
         row, lines = np.zeros(1), np.zeros((1, 3), np.int64)
         return cls(lines, row, row, row, False, row, np.zeros((1, 3)), lines, np.zeros((1, 8)))
 
 
 motion_of = attrgetter("x0", "x", "v", "force")
-"""A function of ``Nodes``: the fields of their Motion."""
+"""Function of ``Nodes``: the fields of their Motion."""
 body_of = attrgetter("tets", "id", "flat_state", "rows", "params", "kind", "eos", "quiet", "flat", "averages")
-"""A function of a block: the fields of its Body."""
+"""Function of a block: the fields of its Body."""
 marks_of = attrgetter("worn", "life", "hot", "weakest", "shear_weight")
-"""A function of a block: the fields of its Marks."""
+"""Function of a block: the fields of its Marks."""
 _F1, _F2, _I1, _I2 = types.float64[::1], types.float64[:, ::1], types.int64[::1], types.int64[:, ::1]
 _B1, _INT, _FLAG, _T2 = types.boolean[::1], types.int64, types.boolean, types.uint32[:, ::1]
 MOTION = record(Motion, _F2, _F2, _F2, _I2)

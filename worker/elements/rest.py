@@ -1,9 +1,10 @@
-"""Chunks that no wave has reached: a pass over them changes nothing, so it is left out, and no bit of a run differs.
+"""Chunks at rest, which no wave has reached yet: a pass over them changes nothing, so it is omitted, with identical
+results.
 
-A chunk is noted once a whole pass over it has found all its nodes at rest, has left every bit of its state as it was
-and has made no force. A pass is a function of that state, of the nodes' velocities, of their positions, which stay
-while they rest, and of the time step, which only ever meets zeros there: it would find the same again, and the same
-stable step.
+A chunk is noted as at rest after a complete pass that found zero velocity at all its nodes, left every bit of its
+state unchanged and made no force. A pass is a function of that state, the nodal velocities, the positions, which are
+constant at rest, and the time step, which is multiplied by zeros only: a further pass would have the same result,
+and the same stable step.
 """
 
 import numpy as np
@@ -12,13 +13,13 @@ from ..kernels.jit import njit
 from .tet4 import LIMIT, MAGNITUDE
 
 NOTED, TET, STEADY = range(3)
-"""Places of a chunk in ``Block.quiet``: bits of its largest one-over-stable-step, 1/s, 0 where it is not noted; the
-smallest global id of its tets that have it; whether the first of two passes has left its state as it was."""
+"""Places of a chunk in ``Block.quiet``: bits of its largest one-over-stable-step, 1/s, 0 if it is not noted; the
+smallest global id of its tets that have it; 1 if the first of two passes left its state unchanged."""
 
 
 @njit("boolean(float64[:, ::1], uint32[:, ::1], int64)", cache=True)
 def at_rest(v, tets, n):  # type: ignore[no-untyped-def]
-    """Whether all nodes of a chunk have the velocity zero, to the bit."""
+    """Returns True if all nodes of a chunk have zero velocity, to the bit."""
     for i in range(n):
         for j in range(4):
             a = tets[i, j]
@@ -30,7 +31,7 @@ def at_rest(v, tets, n):  # type: ignore[no-untyped-def]
 
 @njit("boolean(float64[::1], uint32[:, ::1], int64)", cache=True)
 def without(strain, tets, n):  # type: ignore[no-untyped-def]
-    """Whether all nodes of a chunk have no volume strain in the step."""
+    """Returns True if all nodes of a chunk have zero volume strain in the step."""
     for i in range(n):
         for j in range(4):
             if np.float64(strain[tets[i, j]]).view(np.int64) != 0:
@@ -40,7 +41,7 @@ def without(strain, tets, n):  # type: ignore[no-untyped-def]
 
 @njit("boolean(float64[::1], float64[::1])", cache=True)
 def same(before, after):  # type: ignore[no-untyped-def]
-    """Whether two states are equal, to the bit."""
+    """Returns True if two states are equal, to the bit."""
     differ = np.int64(0)
     for i in range(len(before)):
         differ |= np.float64(before[i]).view(np.int64) ^ np.float64(after[i]).view(np.int64)
@@ -49,7 +50,7 @@ def same(before, after):  # type: ignore[no-untyped-def]
 
 @njit("void(int64[::1], int64[::1], int64[::1], int64)", cache=True)
 def note(quiet, bits, ids, n):  # type: ignore[no-untyped-def]
-    """Notes a chunk, with the limit that its pass has left in the scratch and who has it."""
+    """Notes a chunk as at rest, with the limit from its pass and the smallest id that has it."""
     limit, first = 0, 0
     for i in range(n):
         own = bits[LIMIT + i] & MAGNITUDE
@@ -60,7 +61,9 @@ def note(quiet, bits, ids, n):  # type: ignore[no-untyped-def]
 
 @njit("void(int64[::1], int64[::1], int64, int64)", cache=True)
 def pass_over(peaks, quiet, place, tet):  # type: ignore[no-untyped-def]
-    """What a noted chunk adds to the ``peaks``: its limit at ``place``, and the smallest id that has it at ``tet``."""
+    """Raises the ``peaks`` by those of a noted chunk: its limit at ``place``, and the smallest id that has it at
+    ``tet``.
+    """
     if quiet[NOTED] > peaks[place]:
         peaks[place], peaks[tet] = quiet[NOTED], quiet[TET]
     elif quiet[NOTED] == peaks[place]:

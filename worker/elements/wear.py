@@ -1,8 +1,8 @@
-"""Which tets are worn out and leave the body: by plastic strain, by volume, by stable step (erosion).
+"""Worn tets, which erosion removes: by plastic strain, damage, volume or stable step.
 
-What flattens or turns inside out must leave before it collapses: its velocity gradient is measured by its altitude, and
-a single one that passes zero would throw its nodes away. Such a tet leaves at once; one that has only strained enough
-can wait for others (worker/erosion.py).
+A tet that becomes flat or inverted must be removed before it collapses: its velocity gradient is proportional to one
+over its altitude, and a single tet that passes zero would accelerate its nodes without bound. Such a tet is removed
+at once; one that exceeds only a strain or damage limit can wait for others (worker/erosion.py).
 """
 
 import math
@@ -32,17 +32,17 @@ from ..model.state import CHUNK, Floats
 from .tet4 import EDGE, LIMIT, VOLUME, VOLUME_MID
 
 STRAIN, LOW, HIGH, FREQUENCY, DAMAGED = range(5)
-"""Places in a block's ``life``: largest plastic strain, smallest and largest volume over the initial one, largest
+"""Places in ``life`` of a block: largest plastic strain, smallest and largest volume over the initial one, largest
 one-over-stable-step, 1/s, damage."""
 SOUND, TIRED, BROKEN = range(3)
-"""What is found: no tet that leaves; some that can wait; some that cannot."""
+"""Result of a check: no worn tet; worn tets that can wait; worn tets that cannot."""
 
 _SIXTH = 1.0 / 6.0
 _MASS, _STRAIN, _DAMAGE = MASS * CHUNK, PLASTIC_STRAIN * CHUNK, DAMAGE * CHUNK
 
 
 def life(erosion: Erosion | None) -> Floats:
-    """(5,) what a tet lives through; the frequency is known after the first step."""
+    """(5,) limits of the tets of a part; that of the stable step is set after the first step."""
     if erosion is None:
         return np.full(5, math.inf)
     strain = math.inf if erosion.plastic_strain is None else erosion.plastic_strain
@@ -52,7 +52,7 @@ def life(erosion: Erosion | None) -> Floats:
 
 @njit("boolean(float64[::1], int64)", cache=True, error_model="numpy")
 def _finite(s, i):  # type: ignore[no-untyped-def]
-    """Whether the stress of a tet, and its work, are numbers."""
+    """Returns True if stress and work of a tet are finite numbers."""
     total = abs(s[WORK * CHUNK + i]) + abs(s[WORK_VISCOUS * CHUNK + i])
     for row in range(S_XX, VISCOUS + 1):
         total += abs(s[row * CHUNK + i])
@@ -61,14 +61,16 @@ def _finite(s, i):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], int64)", cache=True, error_model="numpy")
 def _release(s, i):  # type: ignore[no-untyped-def]
-    """Takes the stress of a tet."""
+    """Sets the stress of a tet to zero."""
     for row in range(S_XX, VISCOUS + 1):
         s[row * CHUNK + i] = 0.0
 
 
 @njit("boolean(float64[::1], int64)", cache=True, error_model="numpy")
 def any_inside_out(w, n):  # type: ignore[no-untyped-def]
-    """VOLUME at the end of the step, as tet4.end_gradients has it; whether some tet of the chunk is inside out then."""
+    """Sets VOLUME at the end of the step, as tet4.end_gradients does; returns True if a tet of the chunk is
+    inverted.
+    """
     least = np.inf
     for i in range(n):
         e1x, e1y, e1z = w[EDGE + i], w[EDGE + CHUNK + i], w[EDGE + 2 * CHUNK + i]
@@ -84,7 +86,8 @@ def any_inside_out(w, n):  # type: ignore[no-untyped-def]
 
 @njit("UniTuple(float64, 2)(float64[::1], float64[:, ::1], float64[:, ::1], uint32[::1], int64, float64)", cache=True)
 def _half_of_last(s, x, v, tet, i, dt):  # type: ignore[no-untyped-def]
-    """Half of what the nodes of tet ``i`` do against its forces of n on their way to n+1, J: without and of viscosity.
+    """Half of the work of the nodes of tet ``i`` against its forces of n, from n to n+1, J: without viscosity, and of
+    viscosity.
 
     1/2 dt sum v_a . (stress b_a), b_a = V grad N_a at x(n) = x(n+1) - dt v.
     """
@@ -114,10 +117,10 @@ def _half_of_last(s, x, v, tet, i, dt):  # type: ignore[no-untyped-def]
     error_model="numpy",
 )
 def let_go(w, s, before, x, v, tets, rows, n, dt):  # type: ignore[no-untyped-def]
-    """Gives the tets of a chunk that have turned inside out the state that they had ``before``, without its stress.
+    """Resets inverted tets of a chunk to their state ``before`` the step, with zero stress.
 
-    The stress of the step's end never acts on a node; that of its beginning has done half of its work on the way of
-    ``dt``, which is booked here. They add nothing to the means of nodes.
+    The stress at the end of the step never acts on a node; that at its start has done half of its work in the step
+    ``dt``, which is booked here. They do not contribute to the nodal means.
     """
     for i in range(n):
         if w[VOLUME + i] <= 0.0:
@@ -136,10 +139,11 @@ def let_go(w, s, before, x, v, tets, rows, n, dt):  # type: ignore[no-untyped-de
     error_model="numpy",
 )
 def mark_worn(worn, w, s, params, life, rows, n):  # type: ignore[no-untyped-def]
-    """Marks the tets of a chunk that leave; one that leaves at once no longer limits the step. Returns what is found.
+    """Marks the worn tets of a chunk; one that cannot wait no longer limits the time step. Returns SOUND, TIRED or
+    BROKEN.
 
-    A tet that is inside out is relieved of its stress before it acts on a node. One whose stress is not a number does
-    not leave: its limit becomes NaN, which ends the run and names the tet.
+    The stress of an inverted tet is set to zero before it acts on a node. A tet whose stress is not a number is not
+    removed: its limit becomes NaN, which ends the run with an error that names the tet.
     """
     found = SOUND
     for i in range(n):

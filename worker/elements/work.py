@@ -1,4 +1,4 @@
-"""What the elements have taken and given, as columns of exact sums."""
+"""Work of the elements by part, as exact sums."""
 
 import numpy as np
 
@@ -9,7 +9,7 @@ from ..parallel.fixed_point import limbs, magnitude, most
 
 
 class ElementWork:
-    """The columns WORKS over all tets, grouped by part, J; read where they are."""
+    """Sums of the columns WORKS over all tets, by part, J, computed from the state."""
 
     def __init__(self, blocks: list[Block], parts: int) -> None:
         self._blocks, self._parts = blocks, parts
@@ -29,7 +29,7 @@ class ElementWork:
 
 @njit("void(float64[::1], float64[:, :, ::1], int64)", cache=True, error_model="numpy")
 def _largest_work(largest, state, n):  # type: ignore[no-untyped-def]
-    """Raises the ``largest`` (4,) magnitudes of WORKS of the ``n`` tets."""
+    """Raises ``largest`` (4,) to the magnitudes of WORKS of the ``n`` tets."""
     for j in range(len(WORKS)):
         found = 0
         for c in range((n + CHUNK - 1) // CHUNK if WORKS[j] < state.shape[1] else 0):
