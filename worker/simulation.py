@@ -27,7 +27,7 @@ from .elements.averages import Averages, volumes
 from .elements.averaging import AveragedElements
 from .elements.crushing import Crushing
 from .elements.forms import Elements
-from .elements.matter import whose
+from .elements.matter import pressure_place
 from .erosion import Erosion
 from .fracture.record import Record
 from .fracture.stage import Fracture
@@ -350,7 +350,7 @@ def _elements(
         return Elements(model, comm, neighbours, timers, threads)
     materials = [find_material(case, part.material) for part in case.parts]
     params = np.array([parameters(each, None) for each in materials])
-    kinds = np.array([whose(eos_of(each), own) for each, own in zip(materials, params, strict=True)])
+    kinds = np.array([pressure_place(eos_of(each), own) for each, own in zip(materials, params, strict=True)])
     more = any(equation_of(each).averaged for each in materials)
     averages, density = Averages.of(case, model, neighbours), [each.density for each in materials]
     weight = 1.0 / volumes(averages, model.nodes, node_volume, density)

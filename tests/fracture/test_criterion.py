@@ -9,7 +9,7 @@ from scipy import stats
 
 from conoid.cases.model import materials, schema
 from conoid.worker import step
-from conoid.worker.elements import hot, tet4
+from conoid.worker.elements import hot, scratch
 from conoid.worker.fracture import criterion
 from conoid.worker.fracture.facets import facet_ids
 from conoid.worker.fracture.strength import Toughness, toughness
@@ -55,8 +55,8 @@ def marks(corners: Floats, rows: Floats, weakest: Floats, weight: float) -> Ints
         m = some.stop - start
         e = corners[some, 1:] - corners[some, :1]
         vectors = np.stack([np.cross(e[:, (k + 1) % 3], e[:, (k + 2) % 3]) for k in range(3)], axis=1)
-        w, s, found = np.zeros(tet4.SCRATCH), np.zeros(20 * CHUNK), np.zeros(CHUNK, np.uint8)
-        w[tet4.EDGE : tet4.EDGE + 9 * CHUNK].reshape(9, CHUNK)[:, :m] = vectors.reshape(m, 9).T
+        w, s, found = np.zeros(scratch.SCRATCH), np.zeros(20 * CHUNK), np.zeros(CHUNK, np.uint8)
+        w[scratch.EDGE : scratch.EDGE + 9 * CHUNK].reshape(9, CHUNK)[:, :m] = vectors.reshape(m, 9).T
         s.reshape(20, CHUNK)[: PRESSURE + 1, :m] = rows[some].T
         s.reshape(20, CHUNK)[VISCOUS] = 1e12
         any_hot = hot.mark_hot(found, w, s, np.ascontiguousarray(weakest[some]), weight, m)

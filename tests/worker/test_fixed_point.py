@@ -6,7 +6,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from conoid.worker.elements.tet4 import quanta
+from conoid.worker.elements.forces import quanta
 from conoid.worker.model.rows import WORK
 from conoid.worker.parallel import fixed_point
 from conoid.worker.parallel.comm import SerialComm

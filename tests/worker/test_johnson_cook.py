@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import brentq
 
 from conoid.cases.model.materials import JohnsonCook
-from conoid.worker.elements.tet4 import TRIAL, VOLUME_MID
+from conoid.worker.elements.scratch import TRIAL, VOLUME_MID
 from conoid.worker.materials.johnson_cook import gather, increments, initial_yield
 from conoid.worker.mesh.model import TetMesh
 from conoid.worker.model.rows import FLOW, MASS, PLASTIC_STRAIN, TEMPERATURE, WORK_PLASTIC, YIELD

@@ -8,7 +8,7 @@ import pytest
 from conoid.cases.laws.law import Law as Constants
 from conoid.cases.model.materials import Material, MieGruneisen, Strength
 from conoid.cases.reading.library import library
-from conoid.worker.elements import tet4
+from conoid.worker.elements import scratch
 from conoid.worker.materials import law, models
 from conoid.worker.model import rows, state
 
@@ -27,7 +27,7 @@ def named(model: str) -> Material:
 def chunk(made: Material, seed: int) -> tuple["np.ndarray", "np.ndarray", "np.ndarray"]:
     """Scratch, state and constants of tets under large trial stresses: whatever law it is has something to do."""
     random = np.random.default_rng(seed)
-    w = random.uniform(0.5, 1.0, tet4.SCRATCH)
+    w = random.uniform(0.5, 1.0, scratch.SCRATCH)
     s = np.zeros((models.rows_of(made, "nodal"), state.CHUNK))
     for row, value in models.beginning(made, 300.0).items():
         s[row : row + 1] = value

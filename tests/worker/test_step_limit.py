@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from conoid.worker.elements.tet4 import LENGTH_FACTOR
+from conoid.worker.elements.limits import LENGTH_FACTOR
 from conoid.worker.materials.law import BREAKS
 from conoid.worker.mesh.model import TetMesh
 from conoid.worker.model.rows import PRESSURE, VISCOUS, WORK, WORK_VISCOUS

@@ -8,7 +8,7 @@ import pytest
 
 from conoid.cases.model import schema
 from conoid.worker import step
-from conoid.worker.elements import tet4, wear
+from conoid.worker.elements import scratch, wear
 from conoid.worker.model import rows
 from conoid.worker.model.state import CHUNK, Block
 from conoid.worker.parallel.comm import Comm, SerialComm
@@ -38,9 +38,9 @@ class Chunk:
     def __init__(self, count: int = rows.TEMPERATURE + 1) -> None:
         self.n, self.rows = 7, count
         random = np.random.default_rng(7)
-        self.w, self.s = random.normal(size=tet4.SCRATCH), random.normal(size=(count, CHUNK))
-        self.w[tet4.VOLUME : tet4.VOLUME + CHUNK] = VOLUME
-        self.w[tet4.LIMIT : tet4.LIMIT + CHUNK] = FREQUENCY
+        self.w, self.s = random.normal(size=scratch.SCRATCH), random.normal(size=(count, CHUNK))
+        self.w[scratch.VOLUME : scratch.VOLUME + CHUNK] = VOLUME
+        self.w[scratch.LIMIT : scratch.LIMIT + CHUNK] = FREQUENCY
         self.params = np.array([8000.0])
         self.s[rows.MASS] = 8000.0 * VOLUME
         if count > rows.PLASTIC_STRAIN:
@@ -62,7 +62,7 @@ class Chunk:
 def test_a_sound_chunk_is_left_alone() -> None:
     chunk = Chunk()
     chunk.s[rows.PLASTIC_STRAIN] = LIFE[wear.STRAIN]
-    chunk.w[tet4.LIMIT : tet4.LIMIT + CHUNK] = LIFE[wear.FREQUENCY]
+    chunk.w[scratch.LIMIT : scratch.LIMIT + CHUNK] = LIFE[wear.FREQUENCY]
     assert chunk.mark() == wear.SOUND
     assert not chunk.worn.any()
     assert chunk.changed() == ([], [])
@@ -77,7 +77,7 @@ def test_a_tet_that_has_strained_enough_is_tired_and_keeps_what_it_has() -> None
 
 
 @pytest.mark.parametrize(("row", "value"), [
-    (tet4.VOLUME, 0.199 * VOLUME), (tet4.VOLUME, 3.001 * VOLUME), (tet4.LIMIT, 2.001e6),
+    (scratch.VOLUME, 0.199 * VOLUME), (scratch.VOLUME, 3.001 * VOLUME), (scratch.LIMIT, 2.001e6),
 ])  # fmt: skip
 def test_a_flat_or_swollen_or_stiff_tet_is_broken_and_limits_the_step_no_more(row: int, value: float) -> None:
     chunk = Chunk()
@@ -85,22 +85,22 @@ def test_a_flat_or_swollen_or_stiff_tet_is_broken_and_limits_the_step_no_more(ro
     chunk.s[rows.PLASTIC_STRAIN, 5] = 0.6
     assert chunk.mark() == wear.BROKEN
     assert np.flatnonzero(chunk.worn).tolist() == [3, 5]
-    assert chunk.changed() == ([tet4.LIMIT + 3], [])
-    assert chunk.w[tet4.LIMIT + 3] == 0.0
+    assert chunk.changed() == ([scratch.LIMIT + 3], [])
+    assert chunk.w[scratch.LIMIT + 3] == 0.0
 
 
 @pytest.mark.parametrize("count", [rows.VOLUME_FLUX, rows.TEMPERATURE + 1])
 @pytest.mark.parametrize("value", [-0.5, 0.0])
 def test_a_tet_inside_out_acts_on_nobody(value: float, count: int) -> None:
     chunk = Chunk(count)
-    chunk.w[tet4.VOLUME + 3] = value * VOLUME
-    chunk.w[tet4.LIMIT + 3] = np.nan
+    chunk.w[scratch.VOLUME + 3] = value * VOLUME
+    chunk.w[scratch.LIMIT + 3] = np.nan
     assert chunk.mark() == wear.BROKEN
     assert np.flatnonzero(chunk.worn).tolist() == [3]
     assert (chunk.s[: rows.VISCOUS + 1, 3] == 0.0).all()
     w, s = chunk.changed()
-    assert w == [tet4.LIMIT + 3]
-    assert chunk.w[tet4.LIMIT + 3] == 0.0
+    assert w == [scratch.LIMIT + 3]
+    assert chunk.w[scratch.LIMIT + 3] == 0.0
     assert {tet for _, tet in s} == {3}
     assert {row for row, _ in s} <= {*range(rows.VISCOUS + 1)}
 
@@ -112,12 +112,12 @@ def test_a_tet_inside_out_acts_on_nobody(value: float, count: int) -> None:
 def test_what_is_not_a_number_stays_so_and_ends_the_run(row: int, value: float, volume: float) -> None:
     """The limit of the step becomes NaN: step.py stops there and names the tet. No NaN is turned into a zero."""
     chunk = Chunk()
-    chunk.w[tet4.VOLUME + 3] = volume * VOLUME if row >= 0 else np.nan
+    chunk.w[scratch.VOLUME + 3] = volume * VOLUME if row >= 0 else np.nan
     if row >= 0:
         chunk.s[row, 3] = value
     assert chunk.mark() == wear.SOUND
     assert not chunk.worn.any()
-    assert np.isnan(chunk.w[tet4.LIMIT + 3])
+    assert np.isnan(chunk.w[scratch.LIMIT + 3])
     assert row < 0 or not np.isfinite(chunk.s[row, 3])
     assert {place for place, _ in chunk.changed()[1]} <= {row}
 
@@ -125,7 +125,7 @@ def test_what_is_not_a_number_stays_so_and_ends_the_run(row: int, value: float, 
 def test_a_block_without_plastic_strain_wears_by_its_shape_only() -> None:
     chunk = Chunk(rows.VOLUME_FLUX)
     assert chunk.mark() == wear.SOUND
-    chunk.w[tet4.VOLUME + 6] = 4.0 * VOLUME
+    chunk.w[scratch.VOLUME + 6] = 4.0 * VOLUME
     assert chunk.mark() == wear.BROKEN
     assert np.flatnonzero(chunk.worn).tolist() == [6]
 

@@ -17,7 +17,7 @@ from ..kernels.jit import njit
 from ..materials.law import BULK, DENSITY, Q_LINEAR, Q_QUADRATIC, Q_SHOCK
 from ..model.rows import MASS, VISCOUS, WORK, WORK_VISCOUS
 from ..model.state import CHUNK
-from .tet4 import CHANGE, LIMIT, MODULUS, VOLUME
+from .scratch import CHANGE, LIMIT, MODULUS, VOLUME
 
 SQUEEZED = 0.2
 """Share of the initial volume below which the barrier acts. Chosen: tets of Taylor bars keep 0.56, of a long rod

@@ -19,13 +19,17 @@ from ..materials.law import (
     Q_SHOCK,
     SHEAR,
 )
-from ..materials.models import strengthen
+from ..materials.models import press, strengthen, swell
 from ..materials.viscosity import bulk_viscosity
+from ..model.rows import BULKING_STEP
+from . import forces, limits, scratch, tet4
 from . import pressure as averaged
-from . import tet4
-from .flat import without_flux
+from .flat import exclude_flux, own_pressure, own_strain
+from .heat_and_bulking import HEATED, gather_corners, gather_heat
 from .hot import mark_hot
-from .records import HOT, LARGEST_FORCE, LARGEST_LIMIT, LIMITING_TET, WORN
+from .matter import TETS, from_nodes, pressure_place
+from .mean import keep_before
+from .records import BODY, HOT, LARGEST_FORCE, LARGEST_LIMIT, LIMITING_TET, MARKS, MEANS, WORN
 from .wear import SOUND, mark_worn
 
 _NO_TET = 2**62
@@ -37,14 +41,14 @@ _F1, _F2, _I1, _I2 = types.float64[::1], types.float64[:, ::1], types.int64[::1]
 @njit(types.void(_F1, _F2, _T2, _I, _F), cache=True, error_model="numpy")
 def rates(w, v, t, n, dt):  # type: ignore[no-untyped-def]
     """Computes rates of deformation from the edges of a chunk and the velocities of its nodes."""
-    tet4.gather(w[tet4.RATE :], v, t, w[:0], n)
+    tet4.gather(w[scratch.RATE :], v, t, w[:0], n)
     tet4.kinematics(w, n, dt)
 
 
 @njit(types.void(_F1, _F2, _T2, _I), cache=True, error_model="numpy")
 def first_speeds(w, v, t, n):  # type: ignore[no-untyped-def]
     """Sets SPEED of tets whose volume before the step is not stored, from the velocities of their nodes."""
-    tet4.gather(w[tet4.RATE :], v, t, w[:0], n)
+    tet4.gather(w[scratch.RATE :], v, t, w[:0], n)
     tet4.speeds(w, n)
 
 
@@ -83,8 +87,8 @@ def viscosity_and_limit(w, s, params, n, dt, averaged):  # type: ignore[no-untyp
         initial = params[DENSITY] if averaged and params[DILATES] == 0.0 else 0.0
         bulk_viscosity(w, s, n, linear, shock, quadratic, frequency, params[BREAKS] > 0.0, initial)
     else:
-        tet4.step_limit(w, s, n)
-    tet4.motion_limit(w, n)
+        limits.step_limit(w, s, n)
+    limits.motion_limit(w, n)
 
 
 @njit(types.void(_I1, _I1, _I1, _I, _I), cache=True)
@@ -95,12 +99,12 @@ def note_peaks(peaks, bits, ids, n, force):  # type: ignore[no-untyped-def]
     peaks[LARGEST_FORCE] = max(peaks[LARGEST_FORCE], force)
     limit = 0
     for i in range(n):
-        limit = max(limit, bits[tet4.LIMIT + i] & tet4.MAGNITUDE)
+        limit = max(limit, bits[scratch.LIMIT + i] & forces.MAGNITUDE)
     if limit > peaks[LARGEST_LIMIT]:
         peaks[LARGEST_LIMIT], peaks[LIMITING_TET] = limit, _NO_TET
     if limit == peaks[LARGEST_LIMIT]:
         for i in range(n):
-            if bits[tet4.LIMIT + i] & tet4.MAGNITUDE == limit:
+            if bits[scratch.LIMIT + i] & forces.MAGNITUDE == limit:
                 peaks[LIMITING_TET] = min(peaks[LIMITING_TET], ids[i])
 
 
@@ -121,8 +125,8 @@ def gather_peaks(threads):  # type: ignore[no-untyped-def]
 @njit(_I(_I2, _F1, _I1, _I1, _I1, _T2, _F1, _I1, _I, _F), cache=True, error_model="numpy")
 def sum_forces(force, w, wi, bits, peaks, t, s, ids, n, scale):  # type: ignore[no-untyped-def]
     """Adds the forces of a chunk of tets with these global ids to the nodal sums; returns the bits of the largest."""
-    largest = tet4.internal_forces(wi, w, s, n, scale)
-    tet4.scatter_forces(force, wi, t, n)
+    largest = forces.internal_forces(wi, w, s, n, scale)
+    forces.scatter_forces(force, wi, t, n)
     note_peaks(peaks, bits, ids, n, largest)
     return largest
 
@@ -134,20 +138,73 @@ def sum_fluxes(gradient, pressure, w, wi, peaks, flat, t, n, scale):  # type: ig
     """
     largest = averaged.pressure_fluxes(wi, w, pressure, t, n, scale)
     if len(flat) > 0:
-        without_flux(wi, flat, n)
+        exclude_flux(wi, flat, n)
     averaged.scatter_fluxes(gradient, wi, t, n)
     peaks[LARGEST_FORCE] = max(peaks[LARGEST_FORCE], largest)
     return largest
 
 
-@njit(_B(_B1, _F1, types.uint8[::1], _F1, _F, _F1, _I1, _F1, _F1, _I, _I), cache=True, error_model="numpy")
-def mark(worn, life, hot, weakest, shear, w, peaks, s, params, rows, n):  # type: ignore[no-untyped-def]
-    """Marks the ``worn`` tets of a chunk and its ``hot`` faces; returns True if there are any."""
-    found, some_hot = SOUND, False
-    if len(worn) > 0:
-        found = mark_worn(worn, w, s, params, life, rows, n)
+@njit(_B(MARKS, _I, _I, _F1, _I1, _F1, _F1, _I), cache=True, error_model="numpy", forceinline=True)
+def mark(marks, first, last, w, peaks, s, params, rows):  # type: ignore[no-untyped-def]
+    """Marks the worn tets ``first`` to ``last`` of a block and their overstressed faces; returns True if there are any.
+
+    ``w``, ``s``: of their chunk.
+    """
+    found, some_hot, n = SOUND, False, last - first
+    if len(marks.worn) > 0:
+        found = mark_worn(marks.worn[first:last], w, s, params, marks.life, rows, n)
         peaks[WORN] = max(peaks[WORN], found)
-    if len(hot) > 0:
-        some_hot = mark_hot(hot, w, s, weakest, shear, n)
+    if len(marks.hot) > 0:
+        some_hot = mark_hot(marks.hot[first:last], w, s, marks.weakest[first:last], marks.shear, n)
         peaks[HOT] |= some_hot
     return found != SOUND or some_hot
+
+
+@njit(types.void(_F1, _F2, _T2, _F1, _B, _I), cache=True, error_model="numpy")
+def volumes_at_rest(w, x, t, s, shape, n):  # type: ignore[no-untyped-def]
+    """Sets VOLUME_MID and DILATATION of a chunk at rest; ``shape``: its law acts from the undeformed shape."""
+    if shape:
+        tet4.unchanged(w, s, n)
+    else:
+        tet4.gather(w[scratch.EDGE :], x, t, s[:0], n)
+        tet4.at_rest(w, n)
+
+
+@njit(types.void(_F1, _F1, BODY, MEANS, _T2, _B1, _I), cache=True, error_model="numpy", forceinline=True)
+def take_means(w, s, body, means, means_of, flat, n):  # type: ignore[no-untyped-def]
+    """Sets SEEN from the nodal means of a chunk, and adds those of heat or bulking to its state."""
+    averaged.gather_strains(w, means.strain, means_of, n)
+    if body.rows == HEATED:
+        gather_heat(s, means.more, means_of, n)
+    elif body.rows > BULKING_STEP:
+        gather_corners(w, s, body.params, means.more, means_of, means.strain, flat, n)
+
+
+@njit(types.void(_F1, _F1, _F2, _T2, _B, _I, _F), cache=True, error_model="numpy")
+def own_change(w, s, v, t, shape, n, dt):  # type: ignore[no-untyped-def]
+    """Sets CHANGE and SPEED of a chunk after the first pass; ``shape``: its law acts from the undeformed shape."""
+    if shape:
+        averaged.recall_growth(w, s, n, dt)
+        if dt <= 0.0:
+            first_speeds(w, v, t, n)
+    else:
+        averaged.recall_flux(w, s, n, dt)
+
+
+@njit(types.void(_F1, _F1, BODY, _F2, _T2, _B1, _I), cache=True, error_model="numpy", forceinline=True)
+def averaged_pressure(w, s, body, matter, means_of, flat, n):  # type: ignore[no-untyped-def]
+    """Computes the pressure of a chunk, its work and MODULUS, in the averaged forms: in its tets or from its nodes;
+    that of ``flat`` tets from their own strain.
+    """
+    params, eos, rows = body.params, body.eos, body.rows
+    if len(flat) > 0:
+        own_strain(w, s, params, flat, rows, n)
+    swell(eos, w, s, params, n)
+    keep_before(w, s, params, n)
+    if pressure_place(eos, params) == TETS:
+        press(eos, w, s, params, n)
+    else:
+        alone = s.copy() if len(flat) > 0 else s[:0]
+        from_nodes(w, s, params, matter, means_of, n)
+        if len(flat) > 0:
+            own_pressure(eos, w, s, alone, params, flat, rows, n)

@@ -17,7 +17,7 @@ from ..model.state import CHUNK, Block, Flags, Floats
 from .heat_and_bulking import stretch_corner
 from .mean import book_averaged
 from .pressure import STABILISE
-from .tet4 import CHANGE, MODULUS, SEEN, VOLUME, VOLUME_MID
+from .scratch import CHANGE, MODULUS, SEEN, VOLUME, VOLUME_MID
 
 THINNEST = 0.1
 """Smallest altitude over longest edge of a tet whose volume strain is averaged; 0.82 for a regular tet. Chosen: a
@@ -39,7 +39,7 @@ def flat_tets(block: Block, x0: Floats) -> Flags:
 
 
 @njit("void(float64[::1], boolean[::1], int64)", cache=True)
-def keep_out(w, flat, n):  # type: ignore[no-untyped-def]
+def exclude_flat(w, flat, n):  # type: ignore[no-untyped-def]
     """Excludes flat tets from the nodal sums: sets their volume and their stabilising fluxes to zero."""
     for i in range(n):
         if flat[i]:
@@ -49,7 +49,7 @@ def keep_out(w, flat, n):  # type: ignore[no-untyped-def]
 
 
 @njit("void(float64[::1], float64[::1], float64[::1], boolean[::1], int64, int64)", cache=True, error_model="numpy")
-def see_own(w, s, params, flat, rows, n):  # type: ignore[no-untyped-def]
+def own_strain(w, s, params, flat, rows, n):  # type: ignore[no-untyped-def]
     """Sets SEEN of flat tets, and HEAT if they have heat, to their own values.
 
     The change of volume over the volume at mid-step, which is that of the end less half the change, up to terms of
@@ -73,7 +73,7 @@ def see_own(w, s, params, flat, rows, n):  # type: ignore[no-untyped-def]
     cache=True,
     error_model="numpy",
 )
-def press_alone(eos, w, s, alone, params, flat, rows, n):  # type: ignore[no-untyped-def]
+def own_pressure(eos, w, s, alone, params, flat, rows, n):  # type: ignore[no-untyped-def]
     """Computes pressure, its work and MODULUS of flat tets, if those of other tets are means of their nodes:
     ``alone`` is the state before the pressure, and is overwritten.
     """
@@ -89,7 +89,7 @@ def press_alone(eos, w, s, alone, params, flat, rows, n):  # type: ignore[no-unt
 
 
 @njit("void(int64[::1], boolean[::1], int64)", cache=True)
-def without_flux(wi, flat, n):  # type: ignore[no-untyped-def]
+def exclude_flux(wi, flat, n):  # type: ignore[no-untyped-def]
     """Excludes flat tets from the nodal sums of the pressure gradient."""
     for i in range(n):
         if flat[i]:

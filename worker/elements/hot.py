@@ -3,7 +3,7 @@
 from ..kernels.jit import njit
 from ..model.rows import PRESSURE, S_XX, S_XY, S_YY, S_YZ, S_ZX, S_ZZ
 from ..model.state import CHUNK
-from .tet4 import EDGE
+from .scratch import EDGE
 
 _SXX, _SYY, _SZZ = S_XX * CHUNK, S_YY * CHUNK, S_ZZ * CHUNK
 _SYZ, _SZX, _SXY = S_YZ * CHUNK, S_ZX * CHUNK, S_XY * CHUNK

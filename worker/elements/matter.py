@@ -19,7 +19,7 @@ from ..materials.elastic import sheared
 from ..materials.law import BULK, DENSITY, DILATES, FROM_SHAPE, ORDER, SHEAR, SPALL
 from ..model.rows import MASS, PORES, PRESSURE, WORK, WORK_AVERAGED, WORK_PLASTIC
 from ..model.state import CHUNK, Floats
-from .tet4 import CHANGE, MODULUS
+from .scratch import CHANGE, MODULUS
 
 RATIO, PORES_AT, PRESSURE_AT, WORKED, TORN, OPENED, STIFF = range(7)
 """Columns by node. State: volume ratio; pores as in state.PORES; pressure, Pa. Of the step, per initial volume: work
@@ -35,7 +35,7 @@ _TAKEN, _PLASTIC = WORK_AVERAGED * CHUNK, WORK_PLASTIC * CHUNK
 
 
 @njit("int64(int64, float64[::1])", cache=True)
-def whose(eos, params):  # type: ignore[no-untyped-def]
+def pressure_place(eos, params):  # type: ignore[no-untyped-def]
     """Returns TETS or LINEAR for the number of the equation of state and the constants of a part.
 
     With heat it is TETS: a node at the surface of a strong shock is compressed more than the mean of four (at 10
@@ -93,7 +93,7 @@ def _mean(matter, tets, i, k):  # type: ignore[no-untyped-def]
     cache=True,
     error_model="numpy",
 )
-def take_means(w, s, params, matter, tets, n):  # type: ignore[no-untyped-def]
+def from_nodes(w, s, params, matter, tets, n):  # type: ignore[no-untyped-def]
     """Sets pressure, its work and MODULUS of ``n`` tets from the state at their nodes; WORK_AVERAGED: work on the
     own volume less the work at the nodes.
     """

@@ -12,7 +12,7 @@ from ..materials.elastic import sheared, squeezed
 from ..materials.law import BULK, DILATES
 from ..model.rows import DILATION, PRESSURE, WORK_AVERAGED
 from ..model.state import CHUNK
-from .tet4 import BEFORE, CHANGE, CHANGE_SEEN, SEEN, VOLUME_MID, VOLUME_SEEN
+from .scratch import BEFORE, CHANGE, CHANGE_SEEN, SEEN, VOLUME_MID, VOLUME_SEEN
 
 _P, _GROWN, _TAKEN = PRESSURE * CHUNK, DILATION * CHUNK, WORK_AVERAGED * CHUNK
 

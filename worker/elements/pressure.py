@@ -18,19 +18,8 @@ from ..kernels.jit import njit
 from ..materials.law import BULK
 from ..model.rows import DILATION, MASS, PRESSURE, TET_VOLUME, VOLUME_FLUX, WORK
 from ..model.state import CHUNK
-from .tet4 import (
-    CHANGE,
-    DILATATION,
-    EDGE,
-    NODAL,
-    SEEN,
-    SPEED,
-    VOLUME,
-    VOLUME_MID,
-    VOLUME_SEEN,
-    largest_of,
-    quanta,
-)
+from .forces import largest_of, quanta
+from .scratch import CHANGE, DILATATION, EDGE, NODAL, SEEN, SPEED, VOLUME, VOLUME_MID, VOLUME_SEEN
 
 QUANTA = float(2**52)
 """Quanta per unit of volume strain, and per unit of relative nodal volume."""
@@ -53,7 +42,7 @@ def keep_flux(w, s, n):  # type: ignore[no-untyped-def]
 
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
-def tell_dilation(w, s, params, n, dt):  # type: ignore[no-untyped-def]
+def subtract_dilation(w, s, params, n, dt):  # type: ignore[no-untyped-def]
     """Subtracts the dilation of the last step from tets, so that the nodal mean of it enters their pressure in its
     place.
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from ..kernels.jit import record, types
 from ..model.state import CHUNK, Bits, Flags, Floats, Ints, Tets
-from . import tet4
+from . import scratch
 
 LARGEST_LIMIT, LIMITING_TET, LARGEST_FORCE, WORN, HOT = range(5)
 """Places in ``Scratch.peaks``: bits of the largest one-over-stable-step, 1/s; smallest global id of the tets that
@@ -99,9 +99,9 @@ class Scratches(NamedTuple):
     @classmethod
     def of(cls, threads: int) -> "Scratches":
         """Returns rows that start on a cache line, so that the speed does not depend on the address."""
-        room = np.zeros(threads * tet4.SCRATCH + _LINE)
+        room = np.zeros(threads * scratch.SCRATCH + _LINE)
         first = -(room.ctypes.data // room.itemsize) % _LINE
-        w = room[first:][: threads * tet4.SCRATCH].reshape(threads, -1)
+        w = room[first:][: threads * scratch.SCRATCH].reshape(threads, -1)
         return cls(w, np.zeros((threads, 9 * CHUNK), np.int64), w.view(np.int64), np.zeros((threads, _LINE), np.int64))
 
 

@@ -10,7 +10,8 @@ and the same stable step.
 import numpy as np
 
 from ..kernels.jit import njit
-from .tet4 import LIMIT, MAGNITUDE
+from .forces import MAGNITUDE
+from .scratch import LIMIT
 
 NOTED, TET, STEADY = range(3)
 """Places of a chunk in ``Block.quiet``: bits of its largest one-over-stable-step, 1/s, 0 if it is not noted; the

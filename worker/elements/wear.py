@@ -29,7 +29,7 @@ from ..model.rows import (
     WORK_VISCOUS,
 )
 from ..model.state import CHUNK, Floats
-from .tet4 import EDGE, LIMIT, VOLUME, VOLUME_MID
+from .scratch import EDGE, LIMIT, VOLUME, VOLUME_MID
 
 STRAIN, LOW, HIGH, FREQUENCY, DAMAGED = range(5)
 """Places in ``life`` of a block: largest plastic strain, smallest and largest volume over the initial one, largest
@@ -67,7 +67,7 @@ def _release(s, i):  # type: ignore[no-untyped-def]
 
 
 @njit("boolean(float64[::1], int64)", cache=True, error_model="numpy")
-def any_inside_out(w, n):  # type: ignore[no-untyped-def]
+def any_inverted(w, n):  # type: ignore[no-untyped-def]
     """Sets VOLUME at the end of the step, as tet4.end_gradients does; returns True if a tet of the chunk is
     inverted.
     """
@@ -116,7 +116,7 @@ def _half_of_last(s, x, v, tet, i, dt):  # type: ignore[no-untyped-def]
     cache=True,
     error_model="numpy",
 )
-def let_go(w, s, before, x, v, tets, rows, n, dt):  # type: ignore[no-untyped-def]
+def reset_inverted(w, s, before, x, v, tets, rows, n, dt):  # type: ignore[no-untyped-def]
     """Resets inverted tets of a chunk to their state ``before`` the step, with zero stress.
 
     The stress at the end of the step never acts on a node; that at its start has done half of its work in the step
@@ -148,14 +148,14 @@ def mark_worn(worn, w, s, params, life, rows, n):  # type: ignore[no-untyped-def
     found = SOUND
     for i in range(n):
         ratio = w[VOLUME + i] * params[DENSITY] / s[_MASS + i]
-        inside_out = w[VOLUME + i] <= 0.0
-        if not _finite(s, i) or not (inside_out or (w[VOLUME + i] > 0.0 and w[LIMIT + i] >= 0.0)):
+        inverted = w[VOLUME + i] <= 0.0
+        if not _finite(s, i) or not (inverted or (w[VOLUME + i] > 0.0 and w[LIMIT + i] >= 0.0)):
             w[LIMIT + i] = np.nan
-        elif inside_out or not (life[LOW] <= ratio <= life[HIGH] and w[LIMIT + i] <= life[FREQUENCY]):
+        elif inverted or not (life[LOW] <= ratio <= life[HIGH] and w[LIMIT + i] <= life[FREQUENCY]):
             worn[i] = True
             w[LIMIT + i] = 0.0
             found = BROKEN
-            if inside_out:
+            if inverted:
                 _release(s, i)
         else:
             tired = rows > PLASTIC_STRAIN and s[_STRAIN + i] > life[STRAIN]

@@ -6,7 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..elements.tet4 import EDGE, SCRATCH, end_gradients, gather, internal_forces
+from ..elements.forces import internal_forces
+from ..elements.scratch import EDGE, SCRATCH
+from ..elements.tet4 import end_gradients, gather
 from ..kernels.jit import njit, record, types
 from ..model.rows import VISCOUS
 from ..model.state import CHUNK, Floats, Ints, Model, Tets
@@ -25,7 +27,7 @@ _I1, _I2, _N1 = types.int64[::1], types.int64[:, ::1], types.int32[::1]
 
 
 class Room(NamedTuple):
-    """Scratch for a chunk of tets (elements/tet4.py)."""
+    """Scratch for a chunk of tets (elements/scratch.py)."""
 
     w: Floats
     """(SCRATCH,)."""
@@ -93,7 +95,7 @@ def _apply(force, change, parents, first):  # type: ignore[no-untyped-def]
 @njit(types.void(_ROOM, _N1, _I1, types.int64, MESH, POINTS, types.float64), cache=True, error_model="numpy")
 def _forces(room, place, chosen, n, mesh, x, scale):  # type: ignore[no-untyped-def]
     """Computes the forces of the present stress of the tets of ``n`` rows, on their nodes 1, 2, 3
-    (elements/tet4.py), in ``room.forces``.
+    (elements/forces.py), in ``room.forces``.
     """
     for i in range(n):
         e = place[chosen[i]]

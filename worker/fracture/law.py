@@ -14,7 +14,7 @@ energy is the area under the law from ``lent`` on, a triangle up to the knee and
 
 import numpy as np
 
-from ..elements.tet4 import largest_of, quanta
+from ..elements.forces import largest_of, quanta
 from ..kernels.jit import njit, types
 from .columns import FACETS
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..elements.tet4 import D_XX, D_XY, D_YY, D_YZ, D_ZX, D_ZZ, DILATATION, SPIN, VOLUME_MID
+from ..elements.scratch import D_XX, D_XY, D_YY, D_YZ, D_ZX, D_ZZ, DILATATION, SPIN, VOLUME_MID
 from ..kernels.jit import njit
 from ..model.rows import PRESSURE, S_XX, S_XY, S_YY, S_YZ, S_ZX, S_ZZ, WORK
 from ..model.state import CHUNK

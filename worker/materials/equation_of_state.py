@@ -8,7 +8,7 @@ import numpy as np
 
 from conoid.cases.model.materials import MieGruneisen
 
-from ..elements.tet4 import CHANGE, MODULUS, NODAL, SEEN, VOLUME_SEEN
+from ..elements.scratch import CHANGE, MODULUS, NODAL, SEEN, VOLUME_SEEN
 from ..kernels.jit import njit
 from ..model.rows import (
     DILATION,

@@ -6,7 +6,7 @@ order in strain is Hencky's, G (ln V : ln V). Derived in docs/theory/materials.m
 
 import numpy as np
 
-from ..elements.tet4 import EDGE, MODULUS, MOVED, RATE, TRIAL, VOLUME
+from ..elements.scratch import EDGE, MODULUS, MOVED, RATE, TRIAL, VOLUME
 from ..kernels.jit import njit
 from ..model.rows import DISTORTION, MASS, S_XX, S_XY, S_YY, S_YZ, S_ZX, S_ZZ, TET_VOLUME, WORK
 from ..model.state import CHUNK
@@ -126,7 +126,7 @@ def hyperelastic(w, s, params, n, dt):  # type: ignore[no-untyped-def]
 def stiffen(w, s, params, n):  # type: ignore[no-untyped-def]
     """Raises MODULUS to what a strained tet has at most: K + 4/3 (G + 2 W / V0) / |J| instead of K + 4/3 G.
 
-    Positive for a tet that is inside out too: that is how the limit of its step finds it (tet4.step_limit).
+    Positive for a tet that is inside out too: that is how the limit of its step finds it (limits.step_limit).
     """
     shear = params[SHEAR]
     of_mass = shear / params[DENSITY]

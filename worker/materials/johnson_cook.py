@@ -10,7 +10,7 @@ on which tets share the chunk.
 
 from conoid.cases.laws.johnson_cook import JohnsonCook
 
-from ..elements.tet4 import D_XX, D_XY, D_YY, D_YZ, D_ZX, D_ZZ, NODAL, TRIAL, VOLUME_MID
+from ..elements.scratch import D_XX, D_XY, D_YY, D_YZ, D_ZX, D_ZZ, NODAL, TRIAL, VOLUME_MID
 from ..kernels.jit import njit
 from ..model.rows import (
     DAMAGE,

@@ -10,7 +10,7 @@ import numpy as np
 
 from conoid.cases.laws.johnson_holmquist import JohnsonHolmquist
 
-from ..elements.tet4 import (
+from ..elements.scratch import (
     BEFORE,
     CHANGE,
     CHANGE_SEEN,

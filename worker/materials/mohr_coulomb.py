@@ -12,7 +12,7 @@ import numpy as np
 
 from conoid.cases.laws.mohr_coulomb import MohrCoulomb
 
-from ..elements.tet4 import CHANGE, D_XX, D_XY, D_YY, D_YZ, D_ZX, D_ZZ, SEEN, TRIAL, VOLUME_MID, VOLUME_SEEN
+from ..elements.scratch import CHANGE, D_XX, D_XY, D_YY, D_YZ, D_ZX, D_ZZ, SEEN, TRIAL, VOLUME_MID, VOLUME_SEEN
 from ..kernels.jit import njit
 from ..model.rows import (
     DILATION,

@@ -4,7 +4,7 @@ import numpy as np
 
 from conoid.cases.laws.linear_hardening import LinearHardening
 
-from ..elements.tet4 import D_XX, D_XY, D_YY, D_YZ, D_ZX, D_ZZ, TRIAL, VOLUME_MID
+from ..elements.scratch import D_XX, D_XY, D_YY, D_YZ, D_ZX, D_ZZ, TRIAL, VOLUME_MID
 from ..kernels.jit import njit
 from ..model.rows import PLASTIC_STRAIN, S_XX, S_XY, S_YY, S_YZ, S_ZX, S_ZZ, WORK_PLASTIC, YIELD
 from ..model.state import CHUNK

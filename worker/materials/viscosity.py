@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from ..elements.tet4 import AREAS, CHANGE, LENGTH_FACTOR, LIMIT, MODULUS, SEEN, VOLUME, VOLUME_SEEN
+from ..elements.limits import LENGTH_FACTOR
+from ..elements.scratch import AREAS, CHANGE, LIMIT, MODULUS, SEEN, VOLUME, VOLUME_SEEN
 from ..kernels.jit import njit
 from ..model.rows import MASS, PRESSURE, VISCOUS, WORK_VISCOUS
 from ..model.state import CHUNK

@@ -19,7 +19,7 @@ from .comm import Comm
 
 CONTRIBUTION_BITS = 51
 """A contribution is below 2^51 quanta, where the float64 values round 1.5 times 2^52 are all integers
-(elements/tet4.py)."""
+(elements/forces.py)."""
 HEADROOM_BITS = 5
 """Contributions may grow 32-fold in a step before the sum has to be repeated."""
 _NEAREST_BITS = 0x4338000000000000

@@ -115,7 +115,7 @@ def _sharing(sim: Simulation) -> Sharing | None:
 def _fragments(sim: Simulation) -> tuple[int, list[Ints]]:
     """Return the number of fragments and, for each block, (n,) the fragment of each tet; of bodies if none breaks."""
     if sim.record is not None:
-        sim.record.look()
+        sim.record.update()
         return sim.record.count, sim.record.labels
     body = np.array(bodies(sim.case))
     return len(np.unique(body)), [np.full(block.n, body[block.part]) for block in sim.model.blocks]

@@ -1,0 +1,38 @@
+"""Stable time step of the four-node tetrahedron."""
+
+import numpy as np
+
+from ..kernels.jit import njit
+from ..model.rows import MASS
+from ..model.state import CHUNK
+from .scratch import AREAS, LIMIT, MODULUS, SPEED, VOLUME
+
+_MASS = MASS * CHUNK
+CLOSING = 4.0
+"""Fewest steps in which a tet would lose, or gain, all of its volume at the rate of the last step. Chosen: about the
+value that the default viscosity requires, 4.3; after such a step the error of p = -K ln J is 0.5 %
+(docs/theory/time_integration.md)."""
+LENGTH_FACTOR = 1.2009369551760027
+"""V^(1/3) times sqrt(sum |grad N|^2) of a regular tet, sqrt(6) / (6 sqrt(2))^(1/3): the length l, LENGTH_FACTOR over
+that root, is V^(1/3) for a regular tet and decreases with the altitude of a flat one."""
+
+
+@njit("void(float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
+def step_limit(w, s, n):  # type: ignore[no-untyped-def]
+    """Sets LIMIT: c sqrt(sum |grad N|^2), one over the largest stable step, 1/s; NaN if the volume is not positive.
+
+    Twice this is at least the highest frequency of a tet with lumped mass (derived in
+    docs/theory/time_integration.md).
+    """
+    for i in range(n):
+        volume = w[VOLUME + i]
+        w[LIMIT + i] = np.sqrt(w[AREAS + i] * w[MODULUS + i] / (volume * s[_MASS + i]))
+
+
+@njit("void(float64[::1], int64)", cache=True)
+def motion_limit(w, n):  # type: ignore[no-untyped-def]
+    """Raises LIMIT to CLOSING times the rate of change of the volume, SPEED, 1/s; NaN stays NaN."""
+    for i in range(n):
+        rate = CLOSING * abs(w[SPEED + i])
+        limit = w[LIMIT + i]
+        w[LIMIT + i] = rate if limit < rate else limit

@@ -1,0 +1,48 @@
+"""Rows of the scratch of a thread: CHUNK float64 numbers each, starting at these places.
+
+The rows from NODAL to MOVED are used by each pass and each law for itself; the four from CORNER_CHANGE on by the second
+pass of the averaged pressure forms.
+"""
+
+from ..model.state import CHUNK
+
+EDGE = 0
+"""9 rows: edges e1, e2, e3, m; later b1, b2, b3 of the end of the step, m^2 (tet4.py)."""
+RATE = 9 * CHUNK
+"""9 rows: velocity differences, m/s; later rate of deformation D and SPIN."""
+D_XX, D_YY, D_ZZ, D_YZ, D_ZX, D_XY = (RATE + k * CHUNK for k in range(6))
+SPIN = RATE + 6 * CHUNK
+"""3 rows: axial vector of dt/2 times the spin."""
+VOLUME_MID = 18 * CHUNK
+"""Volume at mid-step, m^3."""
+DILATATION = 19 * CHUNK
+"""Trace of the rate of deformation, 1/s."""
+VOLUME = 20 * CHUNK
+"""Volume at the end of the step, m^3."""
+AREAS = 21 * CHUNK
+"""Sum of |b|^2 over the four nodes, m^4."""
+MODULUS = 22 * CHUNK
+"""Density times the square of the wave speed, Pa."""
+LIMIT = 23 * CHUNK
+"""One over the largest stable step, 1/s."""
+TRIAL = 24 * CHUNK
+"""Von Mises stress of the trial stress, Pa."""
+SEEN = 25 * CHUNK
+"""Volume strain of the step in the pressure: of the tet, or the mean over its nodes."""
+CHANGE = 26 * CHUNK
+"""Change of the volume of the tet in the step, m^3."""
+NODAL = 27 * CHUNK
+CORNER_CHANGE = 36 * CHUNK
+"""4 rows: change of the volume ratio at each corner."""
+MOVED = 40 * CHUNK
+"""9 rows: differences of the displacements of nodes 1, 2, 3 to node 0, m."""
+SPEED = 49 * CHUNK
+"""Rate of change of the volume over it, 1/s."""
+VOLUME_SEEN = 50 * CHUNK
+"""Volume that belongs to the pressure, m^3."""
+CHANGE_SEEN = 51 * CHUNK
+"""Change of VOLUME_SEEN in the step, m^3."""
+BEFORE = 52 * CHUNK
+"""Pressure before the step, Pa."""
+SCRATCH = 53 * CHUNK
+"""Size of the scratch."""
