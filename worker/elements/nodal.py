@@ -24,14 +24,14 @@ def complete(table, begin, end, thread):  # type: ignore[no-untyped-def]
     node without tets; nodal pressures of n+1; and nodal volumes, m^3, for ``project``. Sets the sums to zero.
     """
     means, volumes, more, bulk, pressed, part, kinds, params = _complete(table)
-    sums, strain, told, split, matter = means.sums, means.strain, means.more, means.split, means.matter
+    sums, strain, extra, split, matter = means.sums, means.strain, means.more, means.split, means.matter
     pressure, gradient = means.pressure, means.gradient
     for a in range(begin, end):
         volume = sums[a, 1]
         found = sums[a, 0] / volume if volume > 0 else 0.0
         strain[a] = found
         if more:
-            told[a] = sums[a, 2] / volume if volume > 0 else 0.0
+            extra[a] = sums[a, 2] / volume if volume > 0 else 0.0
         if pressed:
             press_node(matter[a], found, kinds[part[a]], params[part[a]])
         if split:

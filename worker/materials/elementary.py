@@ -1,7 +1,7 @@
-"""log and exp of our own: the same bits on any processor, in loops over a chunk that the compiler turns into vectors.
+"""Own log and exp, with the same bits on any processor, in loops over a chunk that the compiler vectorises.
 
-Only + - * /, and the bits of a float64 as an integer, which are alike in a vector lane and in a scalar; so no result
-depends on a C library. Derived in docs/theory/sums.md.
+Only + - * /, and the bits of a float64 as an integer, which give the same result in a vector lane and in a scalar;
+so no result depends on a C library. Derived in docs/theory/sums.md.
 """
 
 import numpy as np
@@ -14,20 +14,22 @@ _LN2_HIGH, _LN2_LOW = 0.693147180369123816490, 1.90821492927058770002e-10
 _INVERSE_LN2 = 1.4426950408889634
 """1 / ln 2."""
 NEAREST = 6755399441055744.0
-"""1.5 times 2^52: where it is added to a smaller number, the nearest integer stands in the last bits of the sum."""
+"""1.5 times 2^52: after adding it to a smaller number, the last bits of the sum contain the nearest integer."""
 _ROOT_HALF = 0x3FE6A09E667F3BCD
-"""Bits of sqrt(1/2): what lies above is divided by a power of two until it does not."""
+"""Bits of sqrt(1/2): larger arguments are divided by a power of two until they are below it times 2."""
 _WHOLE, _OFFSET, _BIASED = 0x4330000000000000, 4096, 4503599627374592.0
-"""Bits of 2^52; a number that makes exponents positive; and their sum, as a float64: integers become floats by it."""
+"""Bits of 2^52; a number that makes exponents positive; and their sum, as a float64: they convert integers to
+floats."""
 LEAST, MOST = -700.0, 700.0
-"""Arguments of ``exp``: its result is a normal number between them, 1e-304 to 1e304."""
+"""Range of arguments of ``exp`` in which the result is a normal number, 1e-304 to 1e304."""
 
 
 @njit("float64(float64)", cache=True, error_model="numpy", forceinline=True)
 def log(x):  # type: ignore[no-untyped-def]
-    """ln x of a positive normal number, within 4e-16 of it.
+    """Returns ln x of a positive normal number; relative error 4e-16.
 
-    With x = 2^k f, f between sqrt(1/2) and sqrt(2), and s = (f - 1) / (f + 1) it is k ln 2 + 2 (s + s^3/3 + s^5/5 ...).
+    With x = 2^k f, f between sqrt(1/2) and sqrt(2), and s = (f - 1) / (f + 1) it is k ln 2 + 2 (s + s^3/3 + s^5/5
+    ...).
     """
     bits = np.float64(x).view(np.int64)
     k = (bits - _ROOT_HALF) >> 52
@@ -45,7 +47,7 @@ def log(x):  # type: ignore[no-untyped-def]
 
 @njit("UniTuple(float64, 2)(float64)", cache=True, error_model="numpy", forceinline=True)
 def _reduced(x):  # type: ignore[no-untyped-def]
-    """k, in the last bits of a float64, and e^r - 1 in 12 terms, with r = x - k ln 2."""
+    """Returns k, in the last bits of a float64, and e^r - 1 in 12 terms, with r = x - k ln 2."""
     shifted = x * _INVERSE_LN2 + NEAREST
     k = shifted - NEAREST
     r = (x - k * _LN2_HIGH) - k * _LN2_LOW
@@ -59,20 +61,20 @@ def _reduced(x):  # type: ignore[no-untyped-def]
 
 @njit("float64(float64, float64)", cache=True, error_model="numpy", forceinline=True)
 def _doubled(x, shifted):  # type: ignore[no-untyped-def]
-    """2^k x, with k in the last bits of ``shifted``."""
+    """Returns 2^k x, with k in the last bits of ``shifted``."""
     return np.int64(np.float64(x).view(np.int64) + (np.float64(shifted).view(np.int64) << 52)).view(np.float64)
 
 
 @njit("float64(float64)", cache=True, error_model="numpy", forceinline=True)
 def exp(x):  # type: ignore[no-untyped-def]
-    """e^x for x from LEAST to MOST, within 3e-16 of it: 2^k e^r."""
+    """Returns e^x for x from LEAST to MOST; relative error 3e-16: 2^k e^r."""
     shifted, grown = _reduced(x)
     return _doubled(1.0 + grown, shifted)
 
 
 @njit("float64(float64)", cache=True, error_model="numpy")
 def exp_less_one(x):  # type: ignore[no-untyped-def]
-    """e^x - 1 for x up to MOST, within 4e-16 of it: 2^k (e^r - 1) + (2^k - 1); -1 below LEAST."""
+    """Returns e^x - 1 for x up to MOST; relative error 4e-16: 2^k (e^r - 1) + (2^k - 1); -1 below LEAST."""
     if x < LEAST:
         return -1.0
     shifted, grown = _reduced(x)
@@ -82,8 +84,8 @@ def exp_less_one(x):  # type: ignore[no-untyped-def]
 
 @njit("float64(float64, float64)", cache=True, error_model="numpy")
 def power(x, exponent):  # type: ignore[no-untyped-def]
-    """x to the ``exponent``, for x that is 0 or a positive normal number and an exponent that is positive; no less than
-    e^LEAST and no more than e^MOST but for 0.
+    """Returns x to the ``exponent``, for x zero or a positive normal number and a positive exponent; limited to
+    e^LEAST and e^MOST, except 0.
     """
     return exp(max(min(exponent * log(x), MOST), LEAST)) if x > 0.0 else 0.0
 
@@ -98,7 +100,7 @@ def logarithms(w, row, n):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], int64, int64, float64)", cache=True, error_model="numpy")
 def powers(w, row, n, exponent):  # type: ignore[no-untyped-def]
-    """Replaces the ``n`` numbers from ``row`` on, logarithms, by the powers of what they are the logarithms of."""
+    """Replaces the ``n`` logarithms from ``row`` on by the powers of their arguments, exp(exponent * logarithm)."""
     values = w[row : row + CHUNK]
     for i in range(n):
         values[i] = exp(max(exponent * values[i], LEAST))

@@ -1,7 +1,7 @@
-"""Pressure from the dilatation, and the tangent modulus that sets the wave speed.
+"""Equations of state: pressure from the volume strain, and the tangent modulus for the wave speed.
 
-Both take the volume strain of the step that the pressure sees (the tet's own, or averaged over its nodes) from row
-SEEN of the scratch, and the tet's own change of volume from CHANGE, so that the work is what the nodal forces do.
+The volume strain of the step (of the tet, or averaged over its nodes) is in row SEEN of the scratch, the change of
+the volume of the tet in CHANGE, so that the work booked is that of the nodal forces.
 """
 
 import numpy as np
@@ -32,14 +32,15 @@ _P, _MASS, _WORK, _RATIO = PRESSURE * CHUNK, MASS * CHUNK, WORK * CHUNK, VOLUME_
 _WORK_VISCOUS, _WORK_PLASTIC, _PORES = WORK_VISCOUS * CHUNK, WORK_PLASTIC * CHUNK, PORES * CHUNK
 _HEAT, _GROWN = HEAT * CHUNK, DILATION * CHUNK
 _OLD, _KNOWN, _FACTOR = NODAL, NODAL + CHUNK, NODAL + 2 * CHUNK
-"""Rows of the scratch: the pressure before the step, Pa; of the energy equation factor * new = cold part + known."""
+"""Scratch rows: pressure before the step, Pa; coefficients of the energy equation factor * new = cold part + known."""
 _LEAST = 0.05
-"""Of the bulk modulus at rest: what the wave speed has at least. Chosen: it makes steps shorter, never too long."""
+"""Least share of the bulk modulus at rest in the wave speed. Chosen: it shortens the stable step, never lengthens
+it."""
 
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
 def linear(w, s, params, n):  # type: ignore[no-untyped-def]
-    """p -= K d(volume strain): integrates to p = -K ln(V/V0)."""
+    """Linear pressure p -= K d(volume strain): integrates to p = -K ln(V/V0)."""
     bulk, stiff = params[BULK], params[BULK] + 4.0 / 3.0 * params[SHEAR]
     for i in range(n):
         old = s[_P + i]
@@ -53,8 +54,8 @@ def linear(w, s, params, n):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64, float64, float64)", cache=True, error_model="numpy")
 def _book_pores(w, s, params, i, strain, mean):  # type: ignore[no-untyped-def]
-    """The plastic work of pores that have grown by ``strain`` of the volume: the ``mean`` pressure of the step times
-    that, as the whole work is. What the stress stores is of more volume afterwards, or of less.
+    """Books the plastic work of pores that have grown by the volume strain ``strain``: ``mean`` pressure of the step
+    times it, as for the whole work. The elastic energy density then belongs to more volume, or to less.
     """
     stored = squeezed(s, params, i)
     if params[ORDER] != FROM_SHAPE:
@@ -64,8 +65,9 @@ def _book_pores(w, s, params, i, strain, mean):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
 def _tear_linear(w, s, params, n):  # type: ignore[no-untyped-def]
-    """Moves volume strain between matter and pores: no pressure is below minus the spall pressure, nor above zero while
-    there are pores. A dilation that averaging has taken back (below zero) was in the pressure before the step.
+    """Limits the pressure by the tension cut-off, by moving volume strain between solid and pores: p >= -spall, and
+    p <= 0 while there are pores. A dilation that averaging took back (row DILATION below zero) was in the pressure
+    before the step.
     """
     bulk, spall, dilates = params[BULK], params[SPALL], params[DILATES] > 0.0
     for i in range(n):
@@ -76,13 +78,13 @@ def _tear_linear(w, s, params, n):  # type: ignore[no-untyped-def]
         s[_P + i] = p + bulk * strain
         s[_PORES + i] = pores + strain
         s[_WORK + i] -= 0.5 * bulk * strain * w[CHANGE + i]
-        told = max(-s[_GROWN + i], 0.0) if dilates else 0.0
-        _book_pores(w, s, params, i, strain, 0.5 * (p + bulk * (w[SEEN + i] + told) + s[_P + i]))
+        subtracted = max(-s[_GROWN + i], 0.0) if dilates else 0.0
+        _book_pores(w, s, params, i, strain, 0.5 * (p + bulk * (w[SEEN + i] + subtracted) + s[_P + i]))
 
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
 def volumes_by_ratio(w, s, params, n):  # type: ignore[no-untyped-def]
-    """VOLUME_SEEN of n, m^3, where a tet knows the ratio of volumes of its matter."""
+    """Sets VOLUME_SEEN of n, m^3, for tets that store the volume ratio of their solid."""
     per_density, porous = 1.0 / params[DENSITY], params[SPALL] < np.inf
     for i in range(n):
         whole = 1.0 + s[_PORES + i] if porous else 1.0
@@ -91,7 +93,7 @@ def volumes_by_ratio(w, s, params, n):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
 def volumes_by_pressure(w, s, params, n):  # type: ignore[no-untyped-def]
-    """VOLUME_SEEN of n of the linear pressure, m^3: V0 exp(pores - p / K)."""
+    """Sets VOLUME_SEEN of n for the linear pressure, m^3: V0 exp(pores - p / K)."""
     per_density, per_bulk, porous = 1.0 / params[DENSITY], 1.0 / params[BULK], params[SPALL] < np.inf
     for i in range(n):
         pores = s[_PORES + i] if porous else 0.0
@@ -100,9 +102,11 @@ def volumes_by_pressure(w, s, params, n):  # type: ignore[no-untyped-def]
 
 @njit("UniTuple(float64, 2)(float64[::1], float64)", cache=True, error_model="numpy", forceinline=True)
 def cold(params, ratio):  # type: ignore[no-untyped-def]
-    """The pressure without heat at a volume ratio, p_H (1 - gamma chi / 2), and its slope by chi less gamma p_H / 2.
+    """Returns the pressure without heat at a volume ratio, p_H (1 - gamma chi / 2), and its derivative by chi less
+    gamma p_H / 2.
 
-    Not a number where there is no Hugoniot: from the pole of p_H on, chi = 1 / S, and without a volume.
+    NaN where the Hugoniot does not exist: from the pole of p_H on, chi = 1 / S, and for a volume that is not
+    positive.
     """
     gamma, slope = params[_GAMMA], params[_SLOPE]
     stiffness = params[DENSITY] * params[_C0] * params[_C0]
@@ -118,19 +122,22 @@ def cold(params, ratio):  # type: ignore[no-untyped-def]
 
 @njit("float64(float64[::1], float64, float64, float64)", cache=True, error_model="numpy", forceinline=True)
 def modulus(params, ratio, tangent, pressure):  # type: ignore[no-untyped-def]
-    """rho c^2, Pa: of the bulk at least _LEAST of that at rest, since strong tension makes it negative; NaN stays."""
+    """Returns rho c^2, Pa: with a bulk modulus of at least _LEAST of that at rest, since strong tension makes it
+    negative; NaN stays NaN.
+    """
     bulk, least = ratio * (tangent + params[_GAMMA] * pressure), _LEAST * params[BULK]
     return (least if bulk < least else bulk) + 4.0 / 3.0 * params[SHEAR]
 
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
 def mie_gruneisen(w, s, params, n):  # type: ignore[no-untyped-def]
-    """p = p_H(chi) (1 - gamma chi / 2) + gamma rho_0 e, chi = 1 - V/V0; in tension p_H is rho_0 c0^2 chi.
+    """Mie-Grueneisen: p = p_H(chi) (1 - gamma chi / 2) + gamma rho_0 e, chi = 1 - V/V0; in tension p_H is rho_0 c0^2
+    chi.
 
-    e is the work done so far (stress, plastic and viscous) over the mass. The energy equation with the mean pressure
-    of the step is linear in the new pressure and solved in closed form. The factor 1 - gamma chi / 2 applies to
-    compression only. In the averaged forms e is HEAT, a mean over nodes but for flat tets, up to this step's work of
-    the pressure; that work is the one on the averaged volume.
+    e is the work so far (stress, plastic and viscous) over the mass. The energy equation with the mean pressure of
+    the step is linear in the new pressure, and solved in closed form. The factor 1 - gamma chi / 2 applies to
+    compression only. In the averaged forms e is HEAT, a mean over nodes except for flat tets, up to the work of the
+    pressure in this step; that work is the one on the averaged volume.
     """
     gamma, heating = params[_GAMMA], params[_GAMMA] * params[DENSITY]
     averaged, bulk = len(s) > NODAL_WORK * CHUNK, params[BULK]
@@ -159,8 +166,9 @@ def mie_gruneisen(w, s, params, n):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
 def _tear(w, s, params, n):  # type: ignore[no-untyped-def]
-    """As ``_tear_linear``: at the cut-off, and at zero while pores close, the cold pressure is linear in the ratio of
-    the matter, which follows from the pressure; matter whose pores are gone has the pressure of its ratio.
+    """Limits the pressure as ``_tear_linear``: at the cut-off, and at zero while pores close, the cold pressure is
+    linear in the ratio of the solid, which so follows from the pressure; after the pores have closed, the pressure
+    follows from the ratio.
     """
     spall, stiffness = params[SPALL], params[BULK]
     for i in range(n):
@@ -186,11 +194,11 @@ def _gruneisen(eos: MieGruneisen) -> tuple[float, ...]:
 
 
 def pole(params: Floats) -> float:
-    """The compression 1 - V/V0 at which p_H is infinite, 1 / S; at most 1, where nothing is left of the volume."""
+    """Returns the compression 1 - V/V0 at which p_H is infinite, 1 / S; at most 1, zero volume."""
     return 1.0 / max(float(params[_SLOPE]), 1.0)
 
 
 ELASTIC = Equation("", 0, lambda _: (), linear, volumes_by_pressure)
-"""The pressure of the elasticity."""
+"""Linear pressure with the bulk modulus of the elasticity."""
 GRUNEISEN = Equation("mie_gruneisen", VOLUME_RATIO + 1, _gruneisen, mie_gruneisen, volumes_by_ratio, NODAL_WORK + 1)
-"""Compression and heat."""
+"""Pressure of compression and heat."""

@@ -1,7 +1,8 @@
-"""Elastic shear of a material without a strength: the deviatoric stress has a potential, so it keeps its energy.
+"""Hyperelastic shear of materials without a strength law: the deviatoric stress has a potential, so that its energy is
+conserved.
 
-W = V0 G/4 (tr b + tr b^-1 - 6), b = J^(-2/3) F F^T: the Mooney-Rivlin form with equal constants, which to the fourth
-order in strain is Hencky's, G (ln V : ln V). Derived in docs/theory/materials.md.
+W = V0 G/4 (tr b + tr b^-1 - 6), b = J^(-2/3) F F^T: the Mooney-Rivlin form with equal constants, equal to Hencky's,
+G (ln V : ln V), up to the fourth order in strain. Derived in docs/theory/materials.md.
 """
 
 import numpy as np
@@ -18,18 +19,19 @@ _WORK, _MASS, _DISTORTION = WORK * CHUNK, MASS * CHUNK, DISTORTION * CHUNK
 _THIRD = 1.0 / 3.0
 _ONE = 0x3FF0000000000000
 """Bits of 1.0."""
-# Rows of the scratch: rate of deformation and spin are not needed here.
+# Scratch rows: those of rate of deformation and spin are free here.
 _AXX, _AYY, _AZZ, _AYZ, _AZX, _AXY = (RATE + k * CHUNK for k in range(6))
 _MORE, _LESS, _HALF_SHEAR, _K = RATE + 6 * CHUNK, RATE + 7 * CHUNK, RATE + 8 * CHUNK, TRIAL
 
 
 @njit("float64(float64)", cache=True, error_model="numpy", forceinline=True)
 def inverse_sixth_root(u):  # type: ignore[no-untyped-def]
-    """u^(-1/6), to round-off for u from 1e-24 to 1e24: y (1 - r)^(-1/6), 1 - r = u y^6, by its series, three times.
+    """Returns u^(-1/6), to round-off for u from 1e-24 to 1e24: y (1 - r)^(-1/6), 1 - r = u y^6, by its series, three
+    times.
 
-    Only + - * and the bits of a float64 as an integer, which are alike in a vector lane and in a scalar: no root and no
-    quotient, which take a processor as long as ten products. The bits are a logarithm, piecewise linear; a sixth of
-    their distance from those of 1, by shifts, makes the y to begin with, which is right at 1.
+    Only + - * and the bits of a float64 as an integer, with equal results in a vector lane and in a scalar: no root
+    and no quotient, which take as long as ten products. The bits are a piecewise linear logarithm; a sixth of their
+    distance from those of 1, by shifts, gives the first y, which is exact at 1.
     """
     far = np.float64(u).view(np.int64) - _ONE
     y = np.int64(_ONE - ((far >> 3) + (far >> 5) + (far >> 7) + (far >> 9) + (far >> 11))).view(np.float64)
@@ -42,7 +44,9 @@ def inverse_sixth_root(u):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], int64)", cache=True, error_model="numpy")
 def _strains(w, n):  # type: ignore[no-untyped-def]
-    """Rows of A = F^-T F^-1 - 1 = K^T K - K - K^T, K = du/dx = sum over nodes of u_a b_a / V, and of det(1 + A) - 1."""
+    """Sets rows of A = F^-T F^-1 - 1 = K^T K - K - K^T, K = du/dx = sum over nodes of u_a b_a / V, and of det(1 + A)
+    - 1.
+    """
     for i in range(n):
         b1x, b1y, b1z = w[EDGE + i], w[EDGE + CHUNK + i], w[EDGE + 2 * CHUNK + i]
         b2x, b2y, b2z = w[EDGE + 3 * CHUNK + i], w[EDGE + 4 * CHUNK + i], w[EDGE + 5 * CHUNK + i]
@@ -71,9 +75,10 @@ def _strains(w, n):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], int64, float64)", cache=True, error_model="numpy")
 def _roots(w, n, shear):  # type: ignore[no-untyped-def]
-    """Rows k = det(1 + A)^(-1/3), k - 1 without cancellation, G / 2J: long chains, which overlap in a loop alone.
+    """Sets rows k = det(1 + A)^(-1/3), k - 1 without cancellation, and G / 2J. In a loop of their own these long chains
+    of operations overlap.
 
-    Not a number where round-off leaves no positive determinant.
+    NaN if round-off leaves no positive determinant.
     """
     half = 0.5 * shear
     for i in range(n):
@@ -89,11 +94,11 @@ def _roots(w, n, shear):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
 def hyperelastic(w, s, params, n, dt):  # type: ignore[no-untyped-def]
-    """The deviatoric stress G / 2J dev(b - b^-1) of a chunk, Pa; its work is the change of its potential.
+    """Computes the deviatoric stress G / 2J dev(b - b^-1) of a chunk, Pa; its work is the change of its potential.
 
-    ``w`` holds V grad N of the end of the step, and from MOVED on the displacements. All is made of A and so of their
-    gradient, so that small strains keep their digits and none leaves nothing: b^-1 = k (1 + A), so that
-    b^-1 - 1 = k A + (k - 1), and b is the adjugate of b^-1, whose determinant is one.
+    ``w`` holds V grad N of the end of the step, and from MOVED on the displacements. Everything is computed from A
+    and so from the displacement gradient: small strains keep their digits, and zero strain gives exactly zero
+    stress. b^-1 = k (1 + A), so that b^-1 - 1 = k A + (k - 1); b is the adjugate of b^-1, as its determinant is one.
     """
     _strains(w, n)
     _roots(w, n, params[SHEAR])
@@ -124,9 +129,9 @@ def hyperelastic(w, s, params, n, dt):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
 def stiffen(w, s, params, n):  # type: ignore[no-untyped-def]
-    """Raises MODULUS to what a strained tet has at most: K + 4/3 (G + 2 W / V0) / |J| instead of K + 4/3 G.
+    """Raises MODULUS from K + 4/3 G to an upper bound for a strained tet: K + 4/3 (G + 2 W / V0) / |J|.
 
-    Positive for a tet that is inside out too: that is how the limit of its step finds it (limits.step_limit).
+    Positive for an inverted tet as well: limits.step_limit detects it by its volume.
     """
     shear = params[SHEAR]
     of_mass = shear / params[DENSITY]
@@ -136,4 +141,4 @@ def stiffen(w, s, params, n):  # type: ignore[no-untyped-def]
 
 
 LAW = Law("", FROM_SHAPE, lambda _: TET_VOLUME + 1, lambda _: (), lambda *_: {}, hyperelastic)
-"""Materials without a strength."""
+"""Law of materials without a strength."""

@@ -1,11 +1,11 @@
-"""Johnson-Cook flow stress, radial return with adiabatic heating.
+"""Johnson-Cook flow stress: radial return with adiabatic heating.
 
 sigma = (A + B e^n) (1 + C ln max(rate / rate_0, 1)) (1 - T*^m). Johnson and Cook 1983. With ``softening`` s this is
-multiplied by 1 - s D, with the damage D of the beginning of the step. Borvik and others 2001.
+multiplied by 1 - s D, with the damage D at the start of the step. Borvik and others 2001.
 
-The tets of a chunk that yield are laid side by side in the scratch and solved for together, loop after loop, with
-logarithms and powers of our own. Those that have converged are laid behind the others and left alone: no answer depends
-on which tets share the chunk.
+The yielding tets of a chunk are copied side by side into the scratch and solved together, loop after loop, with own
+logarithms and powers. Converged tets are moved behind the others and not changed any more: no answer depends on
+which tets share the chunk.
 """
 
 from conoid.cases.laws.johnson_cook import JohnsonCook
@@ -38,38 +38,40 @@ _SXX, _SYY, _SZZ = S_XX * CHUNK, S_YY * CHUNK, S_ZZ * CHUNK
 _SYZ, _SZX, _SXY = S_YZ * CHUNK, S_ZX * CHUNK, S_XY * CHUNK
 _STRAIN, _WORK, _YIELD, _FLOW = PLASTIC_STRAIN * CHUNK, WORK_PLASTIC * CHUNK, YIELD * CHUNK, FLOW * CHUNK
 _TEMPERATURE, _MASS, _P, _DAMAGE = TEMPERATURE * CHUNK, MASS * CHUNK, PRESSURE * CHUNK, DAMAGE * CHUNK
-# Rows of the scratch, of the tets that yield: places in the chunk; what is known, with the share of the strength that
-# damage leaves; the bracket, the increment, whether it is still sought; the flow stress without the rate; e, T* and the
-# relative rate, then logarithms and powers.
+# Scratch rows, by yielding tet: place in the chunk; known quantities, with the share of the strength that
+# damage leaves; bracket, increment, whether it is not converged; flow stress without rate; e, T* and the
+# relative rate, then their logarithms and powers.
 _PLACE, _Q, _KNOWN, _HOT, _WARM, _LEFT, _LOW, _HIGH, _D, _OPEN, _STATIC, _SUM, _FAST, _SOFT, _T = (
     NODAL + k * CHUNK for k in range(15)
 )
 _MOST = 140
-"""Steps at most: the halvings among them alone have reached the last bit of a float64 by then (52 bits)."""
+"""Most iterations: the halvings among them alone reach the last bit of a float64 (52 bits)."""
 _CLOSE = 1e-4
-"""A Newton step below this share of the strain increment leaves an error of its square: below 1e-8 of the stress."""
+"""Relative Newton step at which the iteration ends: the error is its square, below 1e-8 of the stress."""
 _PATIENT = 20
-"""Steps after which every second one is a halving: a metal that softens may have Newton jump to and fro. The first
-yield, whose increments may be 1e-2 or 1e-21, takes up to 20 by itself; smaller ones still, of a trial stress less than
-1e5 Pa beyond the flow stress, up to 100 with the halvings."""
+"""Iterations after which every second one is a halving: with softening, Newton's method may alternate between two
+values. The first yield, with increments between 1e-2 and 1e-21, takes up to 20 by itself; still smaller ones, of a
+trial stress less than 1e5 Pa above the flow stress, up to 100 with the halvings."""
 _BELOW = 1.0 - 2.0**-40
-"""Of the increment from which on the rate counts, where the flow stress has a kink: safely on the side without."""
+"""Share of the increment at which the rate term begins, a kink of the flow stress: just below the kink."""
 _NARROW = 1e-12
-"""A bracket that is narrower, relative to its upper end, holds the answer."""
+"""Relative width of a bracket that ends the iteration."""
 _STEEPEST = 600.0
-"""Largest exponent of e in the fracture strain, either way: strains of 1e260 and of nothing."""
+"""Largest magnitude of the exponent of e in the fracture strain: strains from 0 to 1e260."""
 _MOST_TENSE = 1.5
-"""Largest tension over the flow stress: beyond it the fracture strain of Johnson and Cook 1985 is not measured."""
+"""Largest tension over the flow stress: above it the fracture strain of Johnson and Cook 1985 is not measured."""
 _LEAST_STRAIN = 1e-6
-"""Smallest fracture strain. Chosen: constants that make it negative break what yields at all."""
+"""Smallest fracture strain. Chosen: with constants that make it negative, a tet breaks at first yield."""
 _TWO_THIRDS = 2.0 / 3.0
 _TINY = 1e-300
-"""Instead of zero, of which there is no logarithm."""
+"""Replaces zero, which has no logarithm."""
 
 
 @njit("int64(float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
 def gather(w, s, params, n):  # type: ignore[no-untyped-def]
-    """Lays the tets beyond their rate-free flow stress side by side; returns how many. The root is in [0, q / 3 G]."""
+    """Copies the tets above their rate-free flow stress side by side; returns their number. The root is in [0, q / 3
+    G].
+    """
     m, shear3, softening = 0, 3.0 * params[SHEAR], params[_SOFTENING]
     for i in range(n):
         q = w[TRIAL + i]
@@ -90,7 +92,7 @@ def gather(w, s, params, n):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
 def _factors(w, params, m, dt):  # type: ignore[no-untyped-def]
-    """e^n, the logarithm of the relative rate, at least 0, and T*^m, at the present increments."""
+    """Computes e^n, the logarithm of the relative rate, at least 0, and T*^m, at the present increments."""
     shear3, fast, cold = 3.0 * params[SHEAR], 1.0 / (dt * params[_RATE]), params[_T0]
     per_span = 1.0 / (params[_MELT] - params[_T0])
     for j in range(m):
@@ -110,19 +112,23 @@ def _factors(w, params, m, dt):  # type: ignore[no-untyped-def]
 
 @njit("int64(float64[::1], float64[::1], int64, float64, boolean)", cache=True, error_model="numpy")
 def _newton(w, params, m, dt, halve):  # type: ignore[no-untyped-def]
-    """A step of Newton towards q - 3 G d = flow stress(d), or a halving; how many go on.
+    """One iteration of q - 3 G d = flow stress(d) for ``m`` tets; returns the number that have not converged.
 
-    The left side falls and the right side rises with d until the metal softens, so the root stays bracketed. A step
-    that leaves the bracket is a halving, and all are with ``halve``.
+    The left side decreases with d, and the right side increases until the metal softens: the root stays in its bracket.
 
-    Where the flow stress rises more steeply than the trial stress falls it rises as the logarithm or a power of d, by
-    its rate or on the first yield. There, and where a step in d would pass the kink at which the rate begins to count,
-    it is one in ln d, to second order: steps in d would lead to and fro between increments of 1e-9 and 1e-5. One that
-    passes the kink all the same ends there.
+    1. Residual and slope at d.
+    2. New bracket.
+    3. Newton step in d. It is one in ln d, to second order, where the flow stress increases more steeply than the trial
+       stress decreases (as the logarithm or a power of d: by the rate, or on first yield), and where a step in d would
+       cross the kink at which the rate term begins: steps in d would alternate between 1e-9 and 1e-5. A step that
+       crosses the kink in ln d as well ends there.
+    4. Halving instead, if the step leaves the bracket, and always with ``halve``.
+    5. Convergence, by the step or by the width of the bracket.
     """
     shear3, going, kink = 3.0 * params[SHEAR], 0, _BELOW * dt * params[_RATE]
     a, b, n, c, per_span = params[_A], params[_B], params[_N], params[_C], params[_M] / (params[_MELT] - params[_T0])
     for j in range(m):
+        # 1.
         d, low, high, warm = w[_D + j], w[_LOW + j], w[_HIGH + j], w[_WARM + j]
         stress, within = w[_Q + j] - shear3 * d, w[_T + j]
         power, strain = b * w[_SUM + j], max(w[_KNOWN + j] + d, _TINY)
@@ -139,7 +145,9 @@ def _newton(w, params, m, dt, halve):  # type: ignore[no-untyped-def]
         by_strain = n * power / strain * rate * heat
         residual = stress - hardening * rate * heat
         slope = -shear3 - by_strain - by_rate - hardening * rate * by_heat * warm * (stress - shear3 * d)
+        # 2.
         low, high = (d if residual > 0.0 else low), (high if residual > 0.0 else d)
+        # 3.
         new = d - residual / slope
         x = (new - d) / d
         grown = 1.0 + abs(x) + 0.5 * x * x
@@ -148,8 +156,10 @@ def _newton(w, params, m, dt, halve):  # type: ignore[no-untyped-def]
         new = grown if steep else new
         passes = counts & (new < kink)
         new = kink if passes else new
+        # 4.
         newton = (low <= new) & (new <= high) & (slope < 0.0) & (not halve)
         new = new if newton else 0.5 * (low + high)
+        # 5.
         done = (newton & (not passes) & (abs(new - d) <= _CLOSE * new)) | (high - low <= _NARROW * high)
         w[_STATIC + j] = hardening * heat
         w[_D + j], w[_LOW + j], w[_HIGH + j] = new, low, high
@@ -160,7 +170,7 @@ def _newton(w, params, m, dt, halve):  # type: ignore[no-untyped-def]
 
 @njit("int64(float64[::1], int64)", cache=True)
 def _open_first(w, m):  # type: ignore[no-untyped-def]
-    """Lays those of ``m`` tets that are still sought before the others; how many."""
+    """Moves those of ``m`` tets that have not converged before the others; returns their number."""
     n = 0
     for j in range(m):
         if w[_OPEN + j] > 0.0:
@@ -173,7 +183,7 @@ def _open_first(w, m):  # type: ignore[no-untyped-def]
 
 @njit("int64(float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
 def increments(w, params, m, dt):  # type: ignore[no-untyped-def]
-    """Finds the strain increments of the ``m`` tets in the scratch; how many steps they took in all."""
+    """Solves for the strain increments of the ``m`` tets in the scratch; returns the total number of iterations."""
     sought, steps = m, 0
     for k in range(_MOST):
         steps += sought
@@ -187,8 +197,8 @@ def increments(w, params, m, dt):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64, int64, float64)", cache=True, error_model="numpy")
 def _return(w, s, params, m, n, dt):  # type: ignore[no-untyped-def]
-    """Scales the deviators to the flow stress and books strain, heat, and work: that of the mean of the rotated old
-    stress and the new one (as in mohr_coulomb.py), so that what is left is the elastic energy of the stress.
+    """Scales the deviatoric stress to the flow stress; books strain, heat, and the work of the mean of the rotated
+    old stress and the new one (as in mohr_coulomb.py), so that the rest is the elastic energy of the stress.
     """
     shear3, shear2 = 3.0 * params[SHEAR], 2.0 * params[SHEAR]
     for i in range(n):
@@ -220,7 +230,7 @@ def _return(w, s, params, m, n, dt):  # type: ignore[no-untyped-def]
 def _wear(w, s, params, m, dt):  # type: ignore[no-untyped-def]
     """Adds d over the fracture strain, (D1 + D2 e^(D3 t)) (1 + D4 ln rate) (1 + D5 T*), to the damage, at most 1.
 
-    t is the tension -p over the flow stress, at most _MOST_TENSE, with the pressure of the beginning of the step.
+    t is the tension -p over the flow stress, at most _MOST_TENSE, with the pressure at the start of the step.
     Johnson and Cook 1985.
     """
     fast, per_span = 1.0 / (dt * params[_RATE]), 1.0 / (params[_MELT] - params[_T0])
@@ -242,7 +252,7 @@ def _wear(w, s, params, m, dt):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
 def johnson_cook(w, s, params, n, dt):  # type: ignore[no-untyped-def]
-    """Returns the trial stress of the tets beyond their rate-free flow stress; heats them by the plastic work."""
+    """Returns the trial stress of the tets above their rate-free flow stress; heats them by the plastic work."""
     equivalent_stress(w, s, n)
     m = gather(w, s, params, n)
     if m == 0:
@@ -262,7 +272,7 @@ def _constants(law: JohnsonCook) -> tuple[float, ...]:
 
 
 def initial_yield(law: JohnsonCook, temperature: float) -> float:
-    """Flow stress at zero plastic strain and vanishing rate, Pa."""
+    """Returns the flow stress at zero plastic strain and vanishing rate, Pa."""
     span = law.melt_temperature - law.reference_temperature
     homologous = min(max((temperature - law.reference_temperature) / span, 0.0), 1.0)
     return float(law.A * (1.0 - power(homologous, law.m)))
@@ -278,4 +288,4 @@ def _begin(law: JohnsonCook, temperature: float) -> dict[int, float]:
 
 
 LAW = Law("johnson_cook", BEFORE_PRESSURE, _rows, _constants, _begin, johnson_cook)
-"""Strength with the heat of the plastic work, and damage, at which erosion removes tets."""
+"""Strength with heat from plastic work, and damage, at which erosion removes tets."""

@@ -1,7 +1,8 @@
-"""Johnson-Holmquist 2: strength of a brittle material by pressure, rate and damage; pressure with bulking; tension.
+"""Johnson-Holmquist 2: strength of a brittle material by pressure, rate and damage; pressure with bulking; tension
+cut-off.
 
-Johnson and Holmquist 1994. The order of a step is in docs/theory/materials.md: the pressure of n+1, with the bulking
-and the damage of n; the strength there; the return; the damage and the bulking of n+1.
+Johnson and Holmquist 1994. Order in a step (docs/theory/materials.md): pressure of n+1, with bulking and damage of
+n; strength at that pressure; return; damage and bulking of n+1.
 """
 
 import math
@@ -62,12 +63,13 @@ _P, _STRAIN, _PLASTIC, _WORK = PRESSURE * CHUNK, PLASTIC_STRAIN * CHUNK, WORK_PL
 _DAMAGE, _BULKING, _RATIO = DAMAGE * CHUNK, BULKING * CHUNK, VOLUME_RATIO * CHUNK
 _BULKING_STEP, _CORNERS = BULKING_STEP * CHUNK, CORNERS * CHUNK
 _AVERAGED, _MASS = WORK_AVERAGED * CHUNK, MASS * CHUNK
-# Rows of the scratch: (p* + T*)^N; (p* + T*)^D2; p*^M; the logarithm of the relative rate.
+# Scratch rows: (p* + T*)^N; (p* + T*)^D2; p*^M; logarithm of the relative rate.
 _INTACT, _FRACTURE, _CRUMBLED, _FAST = (NODAL + k * CHUNK for k in range(4))
 _TINY = 1e-300
-"""Instead of zero, of which there is no logarithm."""
+"""Replaces zero, which has no logarithm."""
 _LEAST = 0.05
-"""Of the bulk modulus at rest: what the wave speed has at least. Chosen: it makes steps shorter, never too long."""
+"""Least share of the bulk modulus at rest in the wave speed. Chosen: it shortens the stable step, never lengthens
+it."""
 _THIRD, _TWO_THIRDS = 1.0 / 3.0, 2.0 / 3.0
 
 
@@ -75,8 +77,8 @@ _THIRD, _TWO_THIRDS = 1.0 / 3.0, 2.0 / 3.0
     "UniTuple(float64, 2)(float64[::1], float64, float64, float64)", cache=True, error_model="numpy", forceinline=True
 )
 def _pressed(params, ratio, bulking, least):  # type: ignore[no-untyped-def]
-    """p = K m + K2 m^2 + K3 m^3 + bulking, m = V0/V - 1; in tension K m + bulking, and at ``least`` -T (1 - D); and the
-    modulus of the bulk.
+    """Returns p = K m + K2 m^2 + K3 m^3 + bulking, m = V0/V - 1; in tension K m + bulking, at least ``least`` = -T
+    (1 - D); and the tangent bulk modulus.
     """
     bulk, second, third = params[BULK], params[_K2], params[_K3]
     m = 1.0 / ratio - 1.0
@@ -88,8 +90,9 @@ def _pressed(params, ratio, bulking, least):  # type: ignore[no-untyped-def]
 
 @njit("float64(float64[::1], float64, float64, float64, float64)", cache=True, error_model="numpy")
 def _stored(params, ratio, p, bulking, least):  # type: ignore[no-untyped-def]
-    """What the pressure ``p`` of ``_pressed`` stores, of the undeformed volume, Pa: the integral of -p over the ratio
-    from that without pressure on. Beyond that of ``least`` nothing is added; under compression a triangle will do.
+    """Returns the elastic energy of the pressure ``p`` of ``_pressed``, per initial volume, Pa: the integral of -p
+    over the volume ratio, from the ratio at zero pressure. Beyond the ratio at ``least`` it is constant; under
+    compression it is a triangle.
     """
     bulk = params[BULK]
     stiff = bulk - bulking
@@ -102,8 +105,8 @@ def _stored(params, ratio, p, bulking, least):  # type: ignore[no-untyped-def]
 
 @njit("float64(float64[::1], float64, float64, float64, float64, float64, float64)", cache=True, error_model="numpy")
 def _beyond(params, before, after, old, new, bulking, least):  # type: ignore[no-untyped-def]
-    """Of the mean pressure's work between two ratios, what is not stored, of the undeformed volume, Pa: none but where
-    the tension comes to its end.
+    """Returns the part of the mean pressure's work between two ratios that is not stored, per initial volume, Pa:
+    non-zero only where the tension cut-off acts.
     """
     if (new > least or not after > before) and (old > least or not before > after):
         return 0.0
@@ -113,18 +116,20 @@ def _beyond(params, before, after, old, new, bulking, least):  # type: ignore[no
 
 @njit("float64(float64[::1], float64, float64, float64, float64)", cache=True, error_model="numpy", forceinline=True)
 def _opened(params, before, after, bulking, least):  # type: ignore[no-untyped-def]
-    """By how much a tet whose own ratio goes from ``before`` to ``after`` has opened beyond the end of its tension."""
+    """Returns the growth of the volume ratio of a tet beyond the tension cut-off, from ``before`` to ``after``."""
     end = params[BULK] / (params[BULK] - bulking + least)
     return max(after - end, 0.0) - max(before - end, 0.0)
 
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
 def crumbling(w, s, params, n):  # type: ignore[no-untyped-def]
-    """The pressure of ``_pressed``; where it is averaged the mean of that at the four nodes, each with the end of its
-    own tension, and what it stores is the sum over them (elements/heat_and_bulking.py). Plastic work is also what the
-    pressure of n does otherwise than that of the same ratio with the bulking and the damage of now, and what is beyond
-    the tension. The pressure says no ratio there: it counts how far the tet has opened itself, not what neighbours that
-    have no tension any more have made of their nodes.
+    """Computes the pressure of ``_pressed``; in the averaged forms the mean over the four nodes, each with its own
+    cut-off, and with the energy summed over them (elements/heat_and_bulking.py).
+
+    Booked as plastic work: the difference between the work of the pressure of n and that at the same ratio with the
+    present bulking and damage, and the work beyond the cut-off. There the pressure does not determine a volume
+    ratio: the opening of the tet itself counts, not the ratio at its nodes, which neighbours without tension may
+    have opened.
     """
     bulk, averaged = params[BULK], len(s) > _BULKING_STEP
     for i in range(n):
@@ -163,7 +168,9 @@ def crumbling(w, s, params, n):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
 def _factors(w, s, params, n):  # type: ignore[no-untyped-def]
-    """Powers of the pressure, about zero where it has none; the logarithm of the squared relative rate, at least 0."""
+    """Computes powers of the pressure, about zero where there is none, and the logarithm of the squared relative
+    rate, at least 0.
+    """
     per_pressure, tension = 1.0 / params[_PHEL], params[_T] / params[_PHEL]
     per_rate = _TWO_THIRDS / (params[_RATE] * params[_RATE])
     for i in range(n):
@@ -186,8 +193,8 @@ def _factors(w, s, params, n):  # type: ignore[no-untyped-def]
 
 
 @njit("float64(float64[::1], float64[::1], int64, float64, float64, boolean)", cache=True, error_model="numpy")
-def _let_go(s, params, i, damage, grown, averaged):  # type: ignore[no-untyped-def]
-    """What tension stores less than before when the damage of tet ``i`` has ``grown``, of the undeformed volume, Pa."""
+def _tension_lost(s, params, i, damage, grown, averaged):  # type: ignore[no-untyped-def]
+    """Returns the loss of tensile energy when the damage of tet ``i`` has ``grown``, per initial volume, Pa."""
     before, after = -params[_T] * (1.0 - damage), -params[_T] * (1.0 - grown)
     lost = 0.0
     for k in range(4 if averaged else 1):
@@ -200,11 +207,11 @@ def _let_go(s, params, i, damage, grown, averaged):  # type: ignore[no-untyped-d
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
 def johnson_holmquist(w, s, params, n, dt):  # type: ignore[no-untyped-def]
-    """Returns the trial deviators to the strength at the new pressure; damage and bulking; books the plastic work.
+    """Returns the trial stress to the strength at the new pressure; updates damage and bulking; books the plastic work.
 
-    The strength is that of the damage at n: the return is a division. The plastic work is that of the mean of the
-    rotated old stress and the new one (as in mohr_coulomb.py), also where damage or pressure let the strength fall;
-    what becomes bulking is kept, and is taken off. Where the pressure is a mean over nodes, the new bulking goes to the
+    The strength uses the damage of n, so that the return is a division. The plastic work is that of the mean of the
+    rotated old stress and the new one (as in mohr_coulomb.py), also where damage or pressure lower the strength;
+    energy that becomes bulking is stored, and subtracted. In the averaged forms new bulking is distributed to the
     nodes first (elements/heat_and_bulking.py).
     """
     equivalent_stress(w, s, n)
@@ -213,6 +220,7 @@ def johnson_holmquist(w, s, params, n, dt):  # type: ignore[no-untyped-def]
     tension, averaged = params[_T], len(s) > _BULKING_STEP
     grows = _BULKING_STEP if averaged else _BULKING
     for i in range(n):
+        # 1. Strength at the new pressure, between those of intact and of fractured material.
         q, p, damage = w[TRIAL + i], s[_P + i], s[_DAMAGE + i]
         rate = 1.0 + 0.5 * params[_C] * w[_FAST + i]
         intact = hel * params[_A] * rate * w[_INTACT + i] if p > -tension else 0.0
@@ -221,9 +229,11 @@ def johnson_holmquist(w, s, params, n, dt):  # type: ignore[no-untyped-def]
         strength = intact - damage * (intact - crumbled)
         if q <= strength:
             continue
+        # 2. Plastic strain, and damage by its share of the fracture strain.
         strain = (q - strength) / (3.0 * shear)
         fracture = params[_D1] * w[_FRACTURE + i] if p > -tension else 0.0
         grown = damage + strain / fracture if strain < (1.0 - damage) * fracture else 1.0
+        # 3. Return, and its work.
         factor = strength / q
         mean = w[DILATATION + i] * _THIRD
         moved = (
@@ -237,8 +247,9 @@ def johnson_holmquist(w, s, params, n, dt):  # type: ignore[no-untyped-def]
             s[row * CHUNK + i] *= factor
         s[_STRAIN + i] += strain
         s[_PLASTIC + i] += w[VOLUME_MID + i] * max(lost, 0.0)
+        # 4. Damage: less tension, and bulking by the deviatoric energy that the lower strength releases.
         s[_DAMAGE + i] = grown
-        s[_PLASTIC + i] += s[_MASS + i] / params[DENSITY] * _let_go(s, params, i, damage, grown, averaged)
+        s[_PLASTIC + i] += s[_MASS + i] / params[DENSITY] * _tension_lost(s, params, i, damage, grown, averaged)
         m = 1.0 / s[_RATIO + i] - 1.0
         if m > 0.0:
             after = intact - grown * (intact - crumbled)
@@ -260,10 +271,10 @@ def _constants(law: JohnsonHolmquist) -> tuple[float, ...]:
 
 
 PRESSURE_LAW = Equation("johnson_holmquist", DAMAGE + 1, lambda _: (), crumbling, volumes_by_ratio, CORNERS + 4)
-"""Its own pressure: it has the bulking, a mean over nodes where the pressure is one, and its own tension cut-off."""
+"""Pressure of the law: contains bulking, a nodal mean in the averaged forms, and its own tension cut-off."""
 LAW = Law(
     "johnson_holmquist", AFTER_PRESSURE, lambda _: DAMAGE + 1, _constants,
     lambda *_: {CORNERS + k: 1.0 for k in range(4)}, johnson_holmquist,
     PRESSURE_LAW.model,
 )  # fmt: skip
-"""Tension ends at T (1 - D): what has crumbled has none."""
+"""Tension is limited to T (1 - D): fully damaged material has none."""

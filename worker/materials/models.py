@@ -1,7 +1,7 @@
-"""The laws and the equations of state that there are, and the kernels that pick a block's.
+"""Lists of the strength laws and equations of state, and the kernels that select that of a block.
 
-``LAWS`` and ``EQUATIONS`` number them by their places; a block carries both numbers and one vector of constants. Who
-adds a law adds its line to LAWS and its branch below; tests/worker/test_laws.py finds one that lacks its branch.
+``LAWS`` and ``EQUATIONS`` number them by their places; a block stores both numbers and one vector of constants. A
+new law needs a line in LAWS and a branch below; tests/worker/test_laws.py checks that it has its branch.
 """
 
 import math
@@ -40,7 +40,7 @@ EQUATIONS = (equation_of_state.ELASTIC, equation_of_state.GRUNEISEN, johnson_hol
 
 @njit("void(int64, float64[::1], float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
 def strengthen(law, w, s, params, n, dt):  # type: ignore[no-untyped-def]
-    """The kernel of a law of LAWS: the deviatoric stress of a chunk, and what the law remembers."""
+    """Calls the kernel of number ``law`` in LAWS: deviatoric stress of a chunk, and the state of the law."""
     if law == 0:
         hyperelastic.hyperelastic(w, s, params, n, dt)
     elif law == 1:
@@ -55,7 +55,7 @@ def strengthen(law, w, s, params, n, dt):  # type: ignore[no-untyped-def]
 
 @njit("void(int64, float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
 def press(equation, w, s, params, n):  # type: ignore[no-untyped-def]
-    """The kernel of an equation of EQUATIONS: the pressure of a chunk, its work, and the MODULUS."""
+    """Calls the kernel of number ``equation`` in EQUATIONS: pressure of a chunk, its work, and MODULUS."""
     if equation == 0:
         equation_of_state.linear(w, s, params, n)
     elif equation == 1:
@@ -66,7 +66,7 @@ def press(equation, w, s, params, n):  # type: ignore[no-untyped-def]
 
 @njit("void(int64, float64[::1], float64[::1], float64[::1], int64)", cache=True, error_model="numpy")
 def swell(equation, w, s, params, n):  # type: ignore[no-untyped-def]
-    """The volumes of an equation of EQUATIONS: VOLUME_SEEN of a chunk, before the step."""
+    """Sets VOLUME_SEEN of a chunk before the step, for number ``equation`` in EQUATIONS."""
     if equation == 0:
         equation_of_state.volumes_by_pressure(w, s, params, n)
     else:
@@ -74,34 +74,34 @@ def swell(equation, w, s, params, n):  # type: ignore[no-untyped-def]
 
 
 def strength_of(material: Material) -> int:
-    """The number of the material's law of strength."""
+    """Returns the number of the material's strength law."""
     return [law.model for law in LAWS].index("" if material.strength is None else material.strength.model)
 
 
 def eos_of(material: Material) -> int:
-    """The number of the material's equation of state."""
+    """Returns the number of the material's equation of state."""
     name = law_of(material).equation or ("" if material.eos is None else material.eos.model)
     return [equation.model for equation in EQUATIONS].index(name)
 
 
 def law_of(material: Material) -> Law:
-    """The material's law of strength."""
+    """Returns the material's strength law."""
     return LAWS[strength_of(material)]
 
 
 def equation_of(material: Material) -> Equation:
-    """The material's equation of state."""
+    """Returns the material's equation of state."""
     return EQUATIONS[eos_of(material)]
 
 
 def moduli(material: Material) -> tuple[float, float]:
-    """Bulk modulus at rest and shear modulus, Pa."""
+    """Returns bulk modulus at rest and shear modulus, Pa."""
     return material.bulk, material.elastic.shear
 
 
 def parameters(material: Material, viscosity: Viscosity | None, *, breaks: bool = False) -> Floats:
-    """(SIZE,) constants of a material, SI; ``viscosity`` None switches the bulk viscosity off; ``breaks``: whether the
-    part fractures.
+    """(SIZE,) constants of a material, SI; ``viscosity`` None: no bulk viscosity; ``breaks``: True if the part
+    fractures.
     """
     law, params = law_of(material), np.zeros(SIZE)
     params[DENSITY], params[ORDER] = material.density, law.order
@@ -117,7 +117,7 @@ def parameters(material: Material, viscosity: Viscosity | None, *, breaks: bool 
 
 
 def rows_of(material: Material, pressure: str) -> int:
-    """How many rows of state an element of this material needs (worker/model/rows.py)."""
+    """Returns the number of state rows of a tet of this material (worker/model/rows.py)."""
     equation = equation_of(material)
     averaged = 0 if pressure == "standard" else max(rows.WORK_AVERAGED + 1, equation.averaged)
     porous = 0 if material.spall is None else rows.PORES + 1
@@ -125,6 +125,6 @@ def rows_of(material: Material, pressure: str) -> int:
 
 
 def beginning(material: Material, temperature: float) -> dict[int, float]:
-    """Rows of state that do not begin with zero, as far as a block has them."""
+    """Returns the initial values of rows that do not start at zero, as far as a block has them."""
     own = law_of(material).begin(material.strength, temperature)
     return {rows.VOLUME_RATIO: 1.0, rows.TEMPERATURE: temperature, **own}

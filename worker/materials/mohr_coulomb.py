@@ -1,9 +1,9 @@
-"""Mohr-Coulomb strength of brittle materials: the deviator returns at the given pressure, or with dilation.
+"""Mohr-Coulomb strength of brittle materials: return of the deviatoric stress at constant pressure, or with dilation.
 
 f = (s1 - s3) + (s1 + s3) sin(phi) - 2 c cos(phi) <= 0 with s1 >= s2 >= s3, tension positive, and s1 - s3 <= cap.
-Flow keeps the volume, or is along the same form with the dilation angle psi instead of phi, and the pressure rises.
-Derived in docs/theory/materials.md. The steps of the return are inlined by force: as calls they take three times as
-long.
+Plastic flow keeps the volume; or it follows the same form with the dilation angle psi in place of phi, and the
+pressure increases. Derived in docs/theory/materials.md. The parts of the return are inlined: as calls they take
+three times as long.
 """
 
 import math
@@ -36,7 +36,7 @@ from .turning import sine_and_cosine
 
 _SINE, _COHESION, _CAP, _FAILURE = FIRST, FIRST + 1, FIRST + 4, FIRST + 5
 _RESIDUAL = 2
-"""How far behind _SINE and _COHESION those of failed material stand."""
+"""Distance in the constants from _SINE and _COHESION to those of failed material."""
 _SXX, _SYY, _SZZ = S_XX * CHUNK, S_YY * CHUNK, S_ZZ * CHUNK
 _SYZ, _SZX, _SXY = S_YZ * CHUNK, S_ZX * CHUNK, S_XY * CHUNK
 _P, _STRAIN, _WORK = PRESSURE * CHUNK, PLASTIC_STRAIN * CHUNK, WORK_PLASTIC * CHUNK
@@ -55,10 +55,12 @@ _SHEAR, _AXIAL = 1.0 / math.sqrt(3.0), 2.0 / 3.0
     forceinline=True,
 )
 def principal(xx, yy, zz, yz, zx, xy):  # type: ignore[no-untyped-def]
-    """Principal values, the largest first, of a deviator with the von Mises stress one; to round-off, equal ones too.
+    """Returns the principal values, the largest first, of a deviator with von Mises stress one; to round-off, also
+    equal values.
 
-    The value x that stands apart solves x^3 - x / 3 = det s, always well: three steps of Newton from the chord. The
-    rest of s, without x and its projector (s^2 + x s + x^2 - 1/3) / (3 x^2 - 1/3), is the distance of the other two.
+    The isolated value x solves x^3 - x / 3 = det s, which is well conditioned: three Newton steps from the chord.
+    The rest of s, without x and its projector (s^2 + x s + x^2 - 1/3) / (3 x^2 - 1/3), gives the distance of the
+    other two.
     """
     det = xx * (yy * zz - yz * yz) + xy * (yz * zx - xy * zz) + zx * (xy * yz - yy * zx)
     size = abs(det)
@@ -86,10 +88,10 @@ def principal(xx, yy, zz, yz, zx, xy):  # type: ignore[no-untyped-def]
     forceinline=True,
 )
 def returned(d1, d2, d3, strength, sine, cap):  # type: ignore[no-untyped-def]
-    """The principal deviatoric stresses d1 >= d2 >= d3 brought back to the strength; unchanged where they are below it.
+    """Returns the principal deviatoric stresses d1 >= d2 >= d3 projected onto the yield surface; unchanged if below it.
 
     (1 + sine) d1 - (1 - sine) d3 <= strength and d1 - d3 <= cap. Flow is along (1, 0, -1), at constant d2, for both
-    planes; where it would change the order two of the three are equal, and only one point is left.
+    planes; where that would change the order, two of the three are equal, which leaves one point.
     """
     new = min(0.5 * (strength - (1.0 - sine) * d2), 0.5 * (cap - d2))
     if not new < d1:
@@ -110,10 +112,10 @@ def returned(d1, d2, d3, strength, sine, cap):  # type: ignore[no-untyped-def]
     forceinline=True,
 )
 def dilated(d1, d2, d3, strength, sine, cap, psi, shear2, bulk):  # type: ignore[no-untyped-def]
-    """As ``returned`` with flow along (1 + psi, 0, psi - 1), which lets the volume and so the pressure and the strength
-    grow; psi is the sine. With the new values how much flow there was: the volume strain is 2 psi of it.
+    """Returns the same with flow along (1 + psi, 0, psi - 1), which increases volume, pressure and strength; psi: sine
+    of the dilation angle. Also returns the amount of flow; the plastic volume strain is 2 psi of it.
 
-    The cap comes first, at constant volume. Where nothing is left of the deviator, flow ends.
+    The cap is applied first, at constant volume. Flow ends where the deviator is zero.
     """
     d1, d2, d3 = returned(d1, d2, d3, np.inf, sine, cap)
     up, down, stiff = 1.0 + psi * _THIRD, 1.0 - psi * _THIRD, 4.0 * bulk * sine * psi
@@ -136,16 +138,17 @@ def dilated(d1, d2, d3, strength, sine, cap, psi, shear2, bulk):  # type: ignore
 
 @njit("void(float64[::1], float64[::1], int64, float64, float64, float64)", cache=True, error_model="numpy",
       forceinline=True)  # fmt: skip
-def grow(w, s, i, grown, told, bulk):  # type: ignore[no-untyped-def]
-    """Adds a plastic volume strain to the pressure of tet ``i``: its work is that of the mean pressure of the step.
+def grow(w, s, i, grown, subtracted, bulk):  # type: ignore[no-untyped-def]
+    """Adds a plastic volume strain ``grown`` to the pressure of tet ``i``, and books its work with the mean pressure of
+    the step.
 
-    ``told`` is the strain of the step before that the averaged forms have taken back from the old pressure.
+    ``subtracted``: strain of the last step that the averaged forms have subtracted from the old pressure.
     """
     more = bulk * grown
     s[_P + i] += more
     s[_GROWN + i] = grown
     s[_WHOLE_WORK + i] -= 0.5 * more * w[CHANGE + i]
-    s[_WORK + i] -= w[VOLUME_SEEN + i] * grown * (s[_P + i] + 0.5 * (bulk * (w[SEEN + i] + told) - more))
+    s[_WORK + i] -= w[VOLUME_SEEN + i] * grown * (s[_P + i] + 0.5 * (bulk * (w[SEEN + i] + subtracted) - more))
 
 
 @njit(
@@ -156,10 +159,11 @@ def grow(w, s, i, grown, told, bulk):  # type: ignore[no-untyped-def]
     forceinline=True,
 )
 def with_values(xx, yy, zz, yz, zx, xy, d1, d2, d3, e1, e2, e3):  # type: ignore[no-untyped-def]
-    """The tensor with the principal directions of the given one and the values e instead of its values d.
+    """Returns the tensor with the principal directions of the given one, and the values e in place of its values d.
 
-    e2 + [e2, e3] (s - d2) + [e1, e2, e3] (s - d2) (s - d3), Newton's interpolation: no directions are needed. After
-    ``returned`` the first differences lie between 0 and 1, so equal values do no harm: e is equal where d is.
+    e2 + [e2, e3] (s - d2) + [e1, e2, e3] (s - d2) (s - d3), Newton's interpolation, which needs no directions. After
+    ``returned`` the first differences are between 0 and 1, so that equal values cause no error: e is equal where d
+    is.
     """
     upper = (e1 - e2) / (d1 - d2) if e1 > e2 else 0.0
     lower = (e2 - e3) / (d2 - d3) if e2 > e3 else 0.0
@@ -180,20 +184,21 @@ def with_values(xx, yy, zz, yz, zx, xy, d1, d2, d3, e1, e2, e3):  # type: ignore
 
 @njit("void(float64[::1], float64[::1], float64[::1], int64, float64)", cache=True, error_model="numpy")
 def mohr_coulomb(w, s, params, n, dt):  # type: ignore[no-untyped-def]
-    """Returns the trial deviators that are too strong for their new pressure; books the plastic work.
+    """Returns the trial stress of tets above the yield surface at their new pressure; books the plastic work.
 
-    Plastic work is that of the mean of the rotated old stress and the new one, as the whole work is: what remains is
-    the elastic energy of the stress, also where the strength itself falls, by a release of pressure or by failure.
-    Where the volume grows, that energy is of more volume afterwards, and the flow has given it. While there are pores
-    nothing dilates: they would take the growth, and no pressure would rise.
+    The plastic work is that of the mean of the rotated old stress and the new one, as the whole work is: the rest is
+    the elastic energy of the stress, also where the strength decreases, by lower pressure or by failure. Where the
+    volume grows, that energy belongs to more volume afterwards, and comes from the flow. With open pores there is no
+    dilation: the pores would take the growth, and the pressure would not increase.
     """
     equivalent_stress(w, s, n)
     shear2, cap, dilates = 2.0 * params[SHEAR], params[_CAP], params[DILATES] > 0.0
     porous = params[SPALL] < np.inf
     for i in range(n):
-        k, told = _RESIDUAL if s[_STRAIN + i] > params[_FAILURE] else 0, 0.0
+        # 1. Strength at the new pressure, or residual strength; no return below it.
+        k, subtracted = _RESIDUAL if s[_STRAIN + i] > params[_FAILURE] else 0, 0.0
         if dilates:
-            told = max(-s[_GROWN + i], 0.0)
+            subtracted = max(-s[_GROWN + i], 0.0)
             s[_GROWN + i] = 0.0
         sine = params[_SINE + k]
         strength = params[_COHESION + k] + 2.0 * sine * s[_P + i]
@@ -201,21 +206,24 @@ def mohr_coulomb(w, s, params, n, dt):  # type: ignore[no-untyped-def]
         most = _MISES * q
         if (most * np.sqrt(1.0 + sine * sine * _THIRD) <= strength and most <= cap) or q == 0.0:
             continue
+        # 2. Principal values d of the deviator with von Mises stress one.
         r = 1.0 / q
         mean = (s[_SXX + i] + s[_SYY + i] + s[_SZZ + i]) * _THIRD
         sxx, syy, szz = r * (s[_SXX + i] - mean), r * (s[_SYY + i] - mean), r * (s[_SZZ + i] - mean)
         syz, szx, sxy = r * s[_SYZ + i], r * s[_SZX + i], r * s[_SXY + i]
         d1, d2, d3 = principal(sxx, syy, szz, syz, szx, sxy)
+        # 3. Values e on the yield surface; with dilation also the pressure.
         if dilates and k == 0 and not (porous and s[_PORES + i] > 0.0):
             e1, e2, e3, flow = dilated(d1, d2, d3, r * strength, sine, r * cap, params[DILATES], shear2, params[BULK])
             grown = 2.0 * params[DILATES] * q * flow
-            grow(w, s, i, grown, told, params[BULK])
+            grow(w, s, i, grown, subtracted, params[BULK])
             stored = squeezed(s, params, i) + 0.5 * q * q / shear2 * (e1 * e1 + e2 * e2 + e3 * e3)
             s[_WORK + i] -= w[VOLUME_SEEN + i] * grown * stored
         else:
             e1, e2, e3 = returned(d1, d2, d3, max(r * strength, 0.0), sine, r * cap)
         if e1 == d1:
             continue
+        # 4. Tensor with the values e; plastic strain and work.
         nxx, nyy, nzz, nyz, nzx, nxy = with_values(sxx, syy, szz, syz, szx, sxy, d1, d2, d3, e1, e2, e3)
         s[_SXX + i], s[_SYY + i], s[_SZZ + i] = q * nxx, q * nyy, q * nzz
         s[_SYZ + i], s[_SZX + i], s[_SXY + i] = q * nyz, q * nzx, q * nxy
@@ -232,7 +240,7 @@ def mohr_coulomb(w, s, params, n, dt):  # type: ignore[no-untyped-def]
 
 
 def _constants(law: MohrCoulomb) -> tuple[float, ...]:
-    """What is not given never happens."""
+    """Returns the constants; infinite for limits that are not given."""
     residual = law.residual_friction_angle
     angle = min(math.radians(30.0), law.friction_angle) if residual is None else residual
     return (
@@ -244,7 +252,7 @@ def _constants(law: MohrCoulomb) -> tuple[float, ...]:
 
 
 def _sine_and_cohesion(cohesion: float, angle: float) -> tuple[float, float]:
-    """sin(phi) and 2 c cos(phi), Pa."""
+    """Returns sin(phi) and 2 c cos(phi), Pa."""
     sine, cosine = sine_and_cosine(angle)
     return sine, 2.0 * cohesion * cosine
 
@@ -257,4 +265,4 @@ LAW = Law(
     "mohr_coulomb", AFTER_PRESSURE, _rows, _constants, lambda *_: {}, mohr_coulomb,
     dilates=lambda law: sine_and_cosine(law.dilation_angle)[0],
 )  # fmt: skip
-"""Beyond the apex nothing is left of the deviator; the pressure of tension stays, to be broken by facets."""
+"""Beyond the apex the deviator is zero; the pressure stays tensile until facets break."""

@@ -1,4 +1,4 @@
-"""Sine and cosine to the last bit: those of the C library differ between processors, and digests with them."""
+"""Sine and cosine to the last bit: those of C libraries differ between processors, and so would digests."""
 
 from decimal import Context, Decimal
 
@@ -6,15 +6,15 @@ import numpy as np
 import numpy.typing as npt
 
 _DIGITS = Context(prec=60)
-"""More than a float64 needs after terms as large as those of a turn have cancelled."""
+"""Decimal digits: more than a float64 needs after the cancellation of terms of a whole turn."""
 _MANY = Context(prec=120)
-"""As many again as the largest angle of a case has before the point."""
+"""Digits for the largest angle of a case: as many again before the decimal point."""
 _SMALL = Decimal("1e-40")
-"""Terms from here on change no float64."""
+"""Size of a term that no longer changes a float64."""
 
 
 def _arc_tangent(n: int) -> Decimal:
-    """Of 1 / n."""
+    """Returns the arc tangent of 1 / n."""
     total, power, k = Decimal(0), _MANY.divide(Decimal(1), Decimal(n)), 1
     while power > Decimal(f"1e-{_MANY.prec}"):
         term = _MANY.divide(power, Decimal(k if k % 4 == 1 else -k))
@@ -27,7 +27,9 @@ _TURN = _MANY.subtract(_MANY.multiply(Decimal(32), _arc_tangent(5)), _MANY.multi
 
 
 def sine_and_cosine(angle: float) -> tuple[float, float]:
-    """Of an ``angle``, radians, below 1e60: whole turns off, the power series in decimals, then rounded."""
+    """Returns sine and cosine of an ``angle``, radians, below 1e60: remainder of whole turns, power series in
+    decimals, then rounded.
+    """
     x = _MANY.remainder(Decimal(angle), _TURN)
     sums, term, k = [Decimal(0), Decimal(1)], Decimal(1), 0
     while _DIGITS.abs(term) > _SMALL:
@@ -38,7 +40,7 @@ def sine_and_cosine(angle: float) -> tuple[float, float]:
 
 
 def sines_and_cosines(angles: npt.NDArray[np.float64]) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
-    """Of many, in their shape."""
+    """Returns sines and cosines of many angles, in their shape."""
     some, which = np.unique(angles, return_inverse=True)
     parts = np.array([sine_and_cosine(angle) for angle in some.tolist()]).reshape(-1, 2)
     return parts[which, 0].reshape(angles.shape), parts[which, 1].reshape(angles.shape)

@@ -1,4 +1,4 @@
-"""Bulk viscosity, and what it takes from the stable step."""
+"""Bulk viscosity and its effect on the stable step."""
 
 import numpy as np
 
@@ -9,22 +9,23 @@ from ..model.rows import MASS, PRESSURE, VISCOUS, WORK_VISCOUS
 from ..model.state import CHUNK
 
 HALF = 0.01
-"""Of the wave speed: a difference of speed over a tet at which half of the shock term is there. Chosen between elastic
-waves in bars (10 m/s over some tets: 5e-4) and weak shocks (300 m/s in copper: 0.03)."""
+"""Velocity difference over a tet, over the wave speed, at which the shock term has half of its value. Chosen between
+elastic waves in bars (10 m/s over some tets: 5e-4) and weak shocks (300 m/s in copper: 0.03)."""
 SQUEEZED = 0.1
-"""Of the volume: compression in which an averaged tet's own rate is resisted in full. Chosen by what columns of metal
-bear at 1.5 and 2 km/s (docs/theory/contact.md, "Plates under 100 GPa"); where metal flows at 100 m/s it is some
-1e-3."""
+"""Volume strain in compression at which the viscosity of an averaged tet resists its own rate in full. Chosen by
+loads on columns of metal at 1.5 and 2 km/s (docs/theory/contact.md, "Plates under 100 GPa"); in metal that flows at
+100 m/s the strain is about 1e-3."""
 _P, _Q, _MASS, _WORK = PRESSURE * CHUNK, VISCOUS * CHUNK, MASS * CHUNK, WORK_VISCOUS * CHUNK
 
 
 @njit("float64(float64, float64, float64, float64)", cache=True, error_model="numpy")
 def resisted(own, mean, kept, squeezed):  # type: ignore[no-untyped-def]
-    """The rate of compression, 1/s, that the viscosity of an averaged tet resists: the ``mean`` that its pressure sees.
+    """Returns the rate of compression, 1/s, that the viscosity of an averaged tet resists: the ``mean`` rate in its
+    pressure, and a share of the excess of its ``own`` rate.
 
-    Of what its ``own`` is beyond that, noise for the most part, a share: the volume that it has lost to its neighbours,
-    ``kept`` is its own over the seen one, and what all are ``squeezed`` by, 1 - V_seen / V0, over SQUEEZED. No pressure
-    stops a tet that is smaller than it is seen, and noise under a high one crushes it.
+    The excess is mostly noise. The share is the volume that the tet has lost to its neighbours (``kept``: its own
+    volume over the averaged one), and the common compression ``squeezed``, 1 - V_seen / V0, over SQUEEZED. A tet
+    smaller than its averaged volume has no pressure of its own that stops it; under high pressure noise crushes it.
     """
     mean = max(mean, 0.0)
     share = min(max(1.0 - kept, 0.0) + max(squeezed, 0.0) / SQUEEZED, 1.0)
@@ -37,16 +38,17 @@ def resisted(own, mean, kept, squeezed):  # type: ignore[no-untyped-def]
     error_model="numpy",
 )
 def bulk_viscosity(w, s, n, linear, shock, quadratic, rate_of_change, breaks, initial):  # type: ignore[no-untyped-def]
-    """q = density u ((linear + shock S) c + quadratic u), u = l |rate|, in compression, Pa; its work; LIMIT, 1/s.
+    """Computes q = density u ((linear + shock S) c + quadratic u), u = l |rate|, in compression, Pa; its work; LIMIT,
+    1/s.
 
-    von Neumann and Richtmyer 1950 (quadratic), Landshoff 1955 (linear); S = u / (u + HALF c) tells a shock from an
-    elastic wave. ``rate_of_change`` turns CHANGE into a volume flux, 1/s. With G = sqrt(sum |grad N|^2) and Q the
-    tangent (linear + shock S (2 - S)) c + 2 quadratic u the largest stable step is
-    1 / (G (G l Q + sqrt((G l Q)^2 + c^2))); l = LENGTH_FACTOR / G. Both are derived in docs/theory/time_integration.md.
-    A tet that is inside out has no viscosity, and NaN as its limit. One that is at rest or expands is bounded as one
-    that begins to be compressed; where a part ``breaks``, one in tension as one that is compressed at the speed at
-    which it would be let go, |p| / (density c). ``initial``: the density at the start where the pressure sees the mean
-    of the nodes, and so does the viscosity (``resisted``); else 0.
+    von Neumann and Richtmyer 1950 (quadratic), Landshoff 1955 (linear); S = u / (u + HALF c) distinguishes a shock
+    from an elastic wave. ``rate_of_change`` converts CHANGE to a volume flux, 1/s. With G = sqrt(sum |grad N|^2) and
+    Q the tangent (linear + shock S (2 - S)) c + 2 quadratic u the largest stable step is 1 / (G (G l Q + sqrt((G l
+    Q)^2 + c^2))); l = LENGTH_FACTOR / G. Both are derived in docs/theory/time_integration.md. An inverted tet has no
+    viscosity, and NaN as its limit. The limit of a tet at rest or in expansion is that at the onset of compression;
+    where a part ``breaks``, that of a tet in tension is the one in compression at the speed of its release, |p| /
+    (density c). ``initial``: initial density in the averaged forms, whose viscosity resists a mean rate
+    (``resisted``); else 0.
     """
     for i in range(n):
         mass, change = s[_MASS + i], w[CHANGE + i]
