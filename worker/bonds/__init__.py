@@ -1,1 +1,1 @@
-"""Bonds of meshes that do not match: nodes of one surface tied to faces of another."""
+"""Tied bonds between non-matching meshes: nodes of one surface tied to faces of another."""

@@ -1,9 +1,20 @@
-"""What two triangles have in common when one is projected onto the plane of the other, and integrals over it.
+r"""Common area of two triangles, the mortar one projected onto the plane of the tied one, and integrals over it.
 
-The master triangle is projected along the normal of the slave triangle; the common polygon is cut out of the slave
-triangle by the three lines of the other one (Sutherland and Hodgman 1974) and divided into triangles from its first
-corner. The shape functions of both are linear there, and their products are quadratic: three points in the middles of
-the sides integrate them exactly.
+::
+
+               m2                  Tied face 0, 1, 2 and mortar face m0, m1, m2, in the plane of the tied face. The
+              /  \                 common polygon a, b, e, d (#) is the tied triangle cut by the three lines of the
+        2    /    \                mortar one (Sutherland and Hodgman 1974), and divided into triangles from its
+        | \ /      \               first corner.
+        |  e        \
+        | /##\       \                 own_ij  = int N_i N_j dA      i, j: corners of the tied face
+        |/#####\      \                both_ij = int N_i M_j dA      j: corner of the mortar face
+        d########\     \
+       /|##########\    \          The shape functions N and M are linear, their products quadratic: three points, in
+     m0-a-----------b----m1        the middles of the sides of each triangle, integrate them exactly.
+        |             \
+        0---------------1          The normals point towards each other: seen from outside the tied face, the mortar
+                                   triangle runs clockwise.
 """
 
 import numpy as np
@@ -11,9 +22,9 @@ import numpy as np
 from ..kernels.jit import njit, types
 
 _MOST = 9
-"""Corners of a triangle that is cut by three lines, at most six, and room."""
+"""Room for the corners of a triangle cut by three lines, at most six."""
 OPPOSED = -0.5
-"""Largest cosine between the normals of two faces that are bonded: 60 degrees. Chosen."""
+"""Largest cosine between the normals of two faces that are bonded: 60 degrees from opposed. Chosen."""
 _F1, _F2, _F3, _N2, _I = (
     types.float64[::1], types.float64[:, ::1], types.float64[:, :, ::1], types.int32[:, ::1], types.int64,
 )  # fmt: skip
@@ -21,7 +32,9 @@ _F1, _F2, _F3, _N2, _I = (
 
 @njit(types.boolean(_F2, _F2, types.int32[::1]), cache=True, error_model="numpy")
 def _frame(frame, x, face):  # type: ignore[no-untyped-def]
-    """Rows of ``frame``: two unit vectors in the plane of a face, and its normal; False where it has no area."""
+    """Sets the rows of ``frame``: two unit vectors in the plane of a face, and its normal; returns False if the face
+    has no area.
+    """
     for i in range(3):
         frame[0, i] = x[face[1], i] - x[face[0], i]
         frame[1, i] = x[face[2], i] - x[face[0], i]
@@ -44,7 +57,9 @@ def _frame(frame, x, face):  # type: ignore[no-untyped-def]
 
 @njit(types.void(_F2, _F2, _F2, types.int32[::1], _I), cache=True)
 def _project(flat, frame, x, face, origin):  # type: ignore[no-untyped-def]
-    """Corners of a face in the frame of another one, whose first corner is ``origin``: along it twice, and above."""
+    """Sets ``flat`` to the corners of a face in the ``frame`` of another one, whose first corner is ``origin``: two
+    coordinates in its plane, and the height.
+    """
     for k in range(3):
         for a in range(3):
             flat[k, a] = 0.0
@@ -54,7 +69,7 @@ def _project(flat, frame, x, face, origin):  # type: ignore[no-untyped-def]
 
 @njit(types.void(_F1, _F2, types.float64, types.float64), cache=True, error_model="numpy")
 def _shares(shares, flat, p, q):  # type: ignore[no-untyped-def]
-    """Area coordinates of a point of the plane in a triangle."""
+    """Sets ``shares`` to the area coordinates of a point of the plane in a triangle."""
     e, f = flat[1, 0] - flat[0, 0], flat[1, 1] - flat[0, 1]
     g, h = flat[2, 0] - flat[0, 0], flat[2, 1] - flat[0, 1]
     area, r, s = e * h - f * g, p - flat[0, 0], q - flat[0, 1]
@@ -64,8 +79,8 @@ def _shares(shares, flat, p, q):  # type: ignore[no-untyped-def]
 
 @njit(_I(_F2, _F2, _I, _F2), cache=True, error_model="numpy")
 def _cut(polygon, room, n, flat):  # type: ignore[no-untyped-def]
-    """Cuts off what of the ``polygon`` of ``n`` corners is outside of a triangle that runs clockwise; returns how many
-    corners are left.
+    """Cuts the ``polygon`` of ``n`` corners by the three lines of a triangle that runs clockwise; returns the new
+    number of corners.
     """
     for k in range(3):
         a, b = (k + 1) % 3, k
@@ -91,10 +106,16 @@ def _cut(polygon, room, n, flat):  # type: ignore[no-untyped-def]
 
 @njit(types.void(_F1, _F2, _F3, _F3, _F3, _F2, _N2, _N2, _N2), cache=True, error_model="numpy")
 def common(area, far, own, both, corner, x, slaves, masters, pairs):  # type: ignore[no-untyped-def]
-    """Of each of the ``pairs`` (p, 2) of a slave and a master face: the ``area`` (p,) that they have in common, m^2;
-    ``far`` (p, 2): the least and the largest height of the master over the slave there, m; the integrals over it of the
-    products of the shape functions of the slave's corners, ``own`` (p, 3, 3), and of the slave's with the master's,
-    ``both``, m^2; and the area coordinates in the master of the slave's corners, ``corner``.
+    """Computes, for each of the ``pairs`` (p, 2) of a tied face (of ``slaves``) and a mortar face (of ``masters``):
+
+    ``area`` (p,): common area, m^2; ``far`` (p, 2): smallest and largest height of the mortar face over the tied one
+    there, m; ``own``, ``both`` (p, 3, 3): the integrals drawn above, m^2; ``corner`` (p, 3, 3): area coordinates of the
+    corners of the tied face in the mortar face.
+
+    1. Frames of both faces; they must have an area and face each other.
+    2. Both faces in the frame of the tied one.
+    3. The common polygon.
+    4. Integrals over its triangles.
     """
     frame, other, slave, flat = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
     polygon, room = np.empty((_MOST, 2)), np.empty((_MOST, 2))
@@ -105,6 +126,7 @@ def common(area, far, own, both, corner, x, slaves, masters, pairs):  # type: ig
         for i in range(3):
             for j in range(3):
                 own[p, i, j], both[p, i, j], corner[p, i, j] = 0.0, 0.0, -1.0
+        # 1.
         if not (_frame(frame, x, s) and _frame(other, x, m)):
             continue
         facing = 0.0
@@ -112,14 +134,17 @@ def common(area, far, own, both, corner, x, slaves, masters, pairs):  # type: ig
             facing += frame[2, i] * other[2, i]
         if not facing <= OPPOSED:
             continue
+        # 2.
         _project(slave, frame, x, s, s[0])
         _project(flat, frame, x, m, s[0])
+        # 3.
         for k in range(3):
             polygon[k, 0], polygon[k, 1] = slave[k, 0], slave[k, 1]
             _shares(theirs, flat, slave[k, 0], slave[k, 1])
             for j in range(3):
                 corner[p, k, j] = theirs[j]
         n = _cut(polygon, room, 3, flat)
+        # 4.
         for k in range(1, n - 1):
             e, f = polygon[k, 0] - polygon[0, 0], polygon[k, 1] - polygon[0, 1]
             g, h = polygon[k + 1, 0] - polygon[0, 0], polygon[k + 1, 1] - polygon[0, 1]

@@ -1,4 +1,4 @@
-"""The faces of a bonded interface where they are now: which corners they have, and which are left."""
+"""Present corners of the faces of a bonded interface."""
 
 import numpy as np
 
@@ -8,23 +8,23 @@ from ..parallel.comm import Comm
 
 
 class Faces:
-    """Faces by their names, 4 * global tet id + local face, on one rank."""
+    """Faces of all bonds on one rank, by name: 4 * global tet id + local face."""
 
     def __init__(self, names: Ints, model: Model) -> None:
         """``names``: ascending, the same on all ranks."""
         self.names, self._model = names, model
         self.corners: Ints = np.full((len(names), 3), -1)
-        """(f, 3) global ids of the corners, -1 for faces that are gone; as of the last ``follow``, on all ranks."""
+        """(f, 3) global ids of the corners, -1 for removed faces; of the last ``follow``, on all ranks."""
         self._block, self._place = np.full((2, len(names)), -1)
 
     def changed(self) -> bool:
-        """Whether a face of this rank has other corners, or is gone."""
+        """Returns True if a face of this rank has other corners than at the last ``follow``, or was removed."""
         lost = (self._block >= 0) & ~self._stay()
         here = (self._block >= 0) & ~lost
         return bool(lost.any() or (self._here(here) != self.corners[here]).any())
 
     def follow(self, comm: Comm) -> None:
-        """Takes the corners as they are; all ranks take part."""
+        """Updates the corners. Collective."""
         self._locate(~self._stay())
         here = self._block >= 0
         rows = np.column_stack([np.flatnonzero(here), self._here(here)])
@@ -33,7 +33,7 @@ class Faces:
         self.corners[every[:, 0]] = every[:, 1:]
 
     def here(self, names: Ints) -> Flags:
-        """Which faces are of tets of this rank."""
+        """Returns which faces belong to tets of this rank."""
         return np.asarray(self._block[np.searchsorted(self.names, names)] >= 0)
 
     def of(self, names: Ints) -> Ints:
@@ -41,7 +41,7 @@ class Faces:
         return self.corners[np.searchsorted(self.names, names)]
 
     def _stay(self) -> Flags:
-        """Which faces are where they were found; False for those that are not here."""
+        """Returns which faces are still at their last places; False for faces of other ranks."""
         found = np.zeros(len(self.names), bool)
         for b, block in enumerate(self._model.blocks):
             some = np.flatnonzero((self._block == b) & (self._place < block.n))
@@ -59,7 +59,7 @@ class Faces:
             self._block[rows], self._place[rows] = b, order[at[found]]
 
     def _here(self, some: Flags) -> Ints:
-        """(k, 3) corners of faces of this rank."""
+        """(k, 3) present corners of faces of this rank."""
         corners = np.empty((len(self.names), 3), np.int64)
         for b, block in enumerate(self._model.blocks):
             rows = np.flatnonzero(some & (self._block == b))

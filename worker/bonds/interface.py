@@ -1,12 +1,14 @@
-"""Finds, at the start, which nodes of one part are tied to which faces of another, with what weights.
+"""Tied interface at the start: the nodes of one part that are tied to faces of another, and their weights.
 
-The nodes of the finer surface, the slave, are tied to faces of the other, the master: for the velocities of both
+The nodes of the finer surface, the tied side, are tied to faces of the other, the mortar side; for the velocities of
+both
 
     D_i v_i = sum_j M_ij v_j,   D_i = int psi_i dA,   M_ij = int psi_i N_j dA,
 
-with the shape functions N of the master and psi dual to those of the slave on every slave face (Wohlmuth 2000): a
-constant stress passes exactly, and one slave node stands in each row. A slave face that the master covers in part has
-the shares of its area at those of its nodes that lie on the master, each tied to the point of the face below it.
+with the shape functions N of the mortar side and psi dual to those of the tied side on every tied face (dual mortar
+method, Wohlmuth 2000): a constant stress is transmitted exactly, and each row contains one tied node. On a tied face
+that the mortar side covers only in part, the nodes that lie on the mortar side are tied to the point of the face
+below them (collocation), with their shares of the covered area.
 """
 
 from dataclasses import dataclass
@@ -27,29 +29,29 @@ from .pieces import Pieces
 from .rows import assembled
 
 _NEAR = 10.0
-"""Of the largest distance that is bonded: nodes up to so far are counted in a warning."""
+"""Multiple of the largest bonded distance up to which nodes that are not tied are counted in a warning."""
 _COVERED = 0.95
-"""Share of a slave face from which on it counts as covered. Chosen: between curved surfaces, whose faces have other
-normals each, sheets of 1 or 2 % are in two faces or in none."""
+"""Share of a tied face from which on it counts as covered. Chosen: between curved surfaces, whose faces are not
+parallel, gaps and overlaps of 1 or 2 % occur."""
 _LEAST = 1e-9
-"""Of the area of a slave face: what is less is no piece."""
+"""Share of the area of a tied face below which a common area is ignored."""
 _ON = 1e-6
-"""Area coordinate up to which a node may lie beside a face and still on it."""
+"""Area coordinate by which a node may lie outside a face and still counts as on it."""
 
 
 @dataclass
 class Found:
-    """The bonds of meshes that do not match, at the start."""
+    """Tied bonds at the start, and warnings."""
 
     pieces: Pieces
     x: Floats
-    """(nodes, 3) positions with the slave nodes on the master, m."""
+    """(nodes, 3) positions with the tied nodes moved onto the mortar side, m."""
     warnings: list[str]
 
 
 @dataclass
 class _Faces:
-    """The exposed faces of a part."""
+    """Exposed faces of a part."""
 
     name: Ints
     """(f,) 4 * tet + local face."""
@@ -63,7 +65,7 @@ class _Faces:
 
 
 def tied_pairs(case: Case) -> list[tuple[int, int, int]]:
-    """Bond, and the numbers of its two parts, of every tied bond."""
+    """Returns number of the bond and numbers of its two parts, for every tied bond."""
     names = [part.name for part in case.parts]
     return [
         (k, names.index(bond.parts[0]), names.index(bond.parts[1]))
@@ -73,23 +75,23 @@ def tied_pairs(case: Case) -> list[tuple[int, int, int]]:
 
 
 def find(case: Case, x: Floats, tets: Indices, tet_part: Indices, exposed: Flags) -> Found:
-    """The pieces of all tied bonds; ``exposed`` (tets, 4). Raises InputError where a bond ties nothing."""
-    found, told, x = list[Pieces](), list[str](), x.copy()
+    """Returns the pieces of all tied bonds; ``exposed`` (tets, 4). Raises InputError if a bond ties no node."""
+    found, warnings, x = list[Pieces](), list[str](), x.copy()
     for bond, one, two in tied_pairs(case):
         if not ((tet_part == one).any() and (tet_part == two).any()):
-            continue  # before a run, where a mesh is not there
+            continue  # before a run, a mesh may be missing
         pieces, more = _bonded(
             case, bond, x, [_surface(x, tets, exposed & (tet_part == part)[:, None]) for part in (one, two)]
         )
-        told += more
+        warnings += more
         found.append(pieces)
         _settle(x, pieces, tets)
         _refuse_inverted(bond, x, tets)
-    return Found(Pieces.joined(found), x, told)
+    return Found(Pieces.joined(found), x, warnings)
 
 
 def _surface(x: Floats, tets: Indices, exposed: Flags) -> _Faces:
-    """The ``exposed`` (tets, 4) faces."""
+    """Returns the ``exposed`` (tets, 4) faces."""
     tet, face = np.nonzero(exposed)
     nodes = np.ascontiguousarray(tets[tet[:, None], FACES[face]], np.int32)
     return _Faces(4 * tet + face, nodes, np.sqrt(2.0 * face_areas(x, nodes)))
@@ -98,7 +100,7 @@ def _surface(x: Floats, tets: Indices, exposed: Flags) -> _Faces:
 def _bonded(
     case: Case, bond: int, x: Floats, sides: list[_Faces]
 ) -> tuple[Pieces, list[str]]:  # fmt: skip
-    """The pieces of one bond, and what the user should know."""
+    """Returns the pieces of one bond, and warnings."""
     spec = case.bond[bond]
     assert isinstance(spec, TiedBond)
     reach = [_NEAR * (np.full(len(s.size), spec.gap) if spec.gap is not None else GAP * s.size) for s in sides]
@@ -112,15 +114,15 @@ def _bonded(
     limit = spec.gap if spec.gap is not None else GAP * np.minimum(slave.size[cut.slave], master.size[cut.master])
     near = (cut.distance <= limit) & (cut.area > _LEAST * slave.size[cut.slave] ** 2)
     names = spec.parts if turned else spec.parts[::-1]
-    told = _missed(bond, x, slave, cut, near, limit, names)
+    warnings = _missed(bond, x, slave, cut, near, limit, names)
     pieces = _weighted(bond, slave, master, cut.take(near))
     if not len(pieces):
         raise InputError(_nothing(bond, spec, cut, limit))
-    return pieces, told
+    return pieces, warnings
 
 
 def _near(x: Floats, one: _Faces, two: _Faces, reach: Floats, other: Floats) -> Indices:
-    """(p, 2) faces of either that may lie near each other."""
+    """(p, 2) pairs of faces of the two parts that may lie near each other."""
     faces, part = np.concatenate([one.nodes, two.nodes]), np.zeros(len(x), np.int32)
     part[two.nodes] = 1
     corners, many = np.ascontiguousarray(faces), len(one.nodes)
@@ -134,7 +136,7 @@ def _near(x: Floats, one: _Faces, two: _Faces, reach: Floats, other: Floats) -> 
 
 @dataclass
 class _Cut:
-    """Pairs of faces, see clipping.common."""
+    """Pairs of faces with their common areas and integrals, see clipping.common."""
 
     slave: Ints
     master: Ints
@@ -160,7 +162,7 @@ class _Cut:
 
 
 def _weighted(bond: int, slave: _Faces, master: _Faces, cut: _Cut) -> Pieces:
-    """The pieces with their weights: dual shape functions where the face is covered, points of faces elsewhere."""
+    """Returns the pieces with their weights: dual shape functions on covered tied faces, collocation on others."""
     own, area = np.zeros((len(slave.name), 3, 3)), np.zeros(len(slave.name))
     np.add.at(own, cut.slave, cut.own)
     np.add.at(area, cut.slave, cut.area)
@@ -182,8 +184,8 @@ def _weighted(bond: int, slave: _Faces, master: _Faces, cut: _Cut) -> Pieces:
 
 
 def _dual(own: Floats, lumped: Floats) -> Floats:
-    """(f, 3, 3) the shape functions dual to those of a face, as combinations of these: lumped times the inverse of
-    ``own``, by its cofactors.
+    """(f, 3, 3) dual shape functions of faces, as combinations of the shape functions: ``lumped`` times the inverse
+    of ``own``, by cofactors.
     """
     inverse = np.empty_like(own)
     for i in range(3):
@@ -195,7 +197,9 @@ def _dual(own: Floats, lumped: Floats) -> Floats:
 
 
 def _collocate(weights: Floats, cut: _Cut, some: Flags, lumped: Floats) -> None:
-    """Weights of slave faces that are covered in part: of each corner the piece in which it lies deepest has them."""
+    """Sets the weights on tied faces that are covered in part: for each corner those in the piece in which it lies
+    deepest.
+    """
     rows = np.flatnonzero(some)
     inside = cut.corner[rows].min(axis=2)
     for k in range(3):
@@ -209,7 +213,7 @@ def _collocate(weights: Floats, cut: _Cut, some: Flags, lumped: Floats) -> None:
 
 
 def _settle(x: Floats, pieces: Pieces, tets: Indices) -> None:
-    """Moves the slave nodes to the places on the master that they are tied to."""
+    """Moves the tied nodes to their points on the mortar side."""
     rows = assembled(pieces, corners(pieces.slave, tets), corners(pieces.master, tets))
     where = np.zeros((len(rows.node), 3))
     for i in range(3):
@@ -234,7 +238,7 @@ def _refuse_inverted(bond: int, x: Floats, tets: Indices) -> None:
 def _missed(
     bond: int, x: Floats, slave: _Faces, cut: _Cut, near: Flags, limit: Floats | float, names: tuple[str, str]
 ) -> list[str]:
-    """A warning of nodes that face the other part and are too far from it."""
+    """Returns a warning about nodes that face the other part and are too far from it."""
     tied = np.unique(slave.nodes[cut.slave[near]])
     aside = ~near & (cut.least > 0.0) & (cut.distance > limit) & (cut.distance <= _NEAR * limit)
     left = np.setdiff1d(np.unique(slave.nodes[cut.slave[aside]]), tied)
@@ -253,7 +257,7 @@ def _worded(limit: Floats | float) -> str:
 
 
 def _nothing(bond: int, spec: TiedBond, cut: _Cut, limit: Floats | float) -> str:
-    """Why a bond ties nothing."""
+    """Returns the reason for which a bond ties no node."""
     one, two = spec.parts
     if not len(cut.area):
         return f"bond[{bond}].parts: no faces of {one!r} and {two!r} lie face to face; move the parts to each other"

@@ -1,12 +1,12 @@
-r"""What a bond that may break carries: a traction within an ellipse that shrinks as the bond opens.
+"""Law of a bond that may break: the traction is limited by an ellipse that shrinks with the opening.
 
     (<t_n> / s_n)^2 + (|t_s| / s_s)^2 <= (1 - D)^2,   dD = d(delta) / delta_c,   delta_c = 2 G / |T|,
 
-with the traction T at which the bond breaks in the present direction and the energy G that it takes per area,
-1 / G = (1 - B) / G_n + B / G_s, B the share of the work that is done in shear. So the traction falls linearly with the
-opening delta, and an opening in one direction takes G in all. Up to the strength nothing opens. What has opened closes
-without resistance, carries pressure once it is closed, and carries tension again where it was widest: no energy is
-stored in it, and none comes back. What has slid stays where it is.
+with T the traction on the initial ellipse in the present direction, and G the fracture energy per area, 1 / G = (1 -
+B) / G_n + B / G_s, B the share of shear in the work. So the traction falls linearly with the opening delta, and
+opening in one direction takes the energy G. Below the strength the bond does not open. An open bond closes without
+resistance, transmits pressure when it is closed, and transmits tension again at its widest opening: it stores no
+energy, and releases none. Sliding is permanent.
 """
 
 import numpy as np
@@ -31,18 +31,18 @@ from .records import (
 from .records import NODES as _NODES
 
 _FULL = 1.0 - 1e-6
-"""Of the ellipse: a traction beyond this opens the bond."""
+"""Share of the ellipse above which a traction opens the bond."""
 _F, _I = types.float64, types.int64
 _VECTOR = types.UniTuple(_F, 3)  # type: ignore[no-untyped-call]
 
 
 @njit(_VECTOR(_VECTOR, _VECTOR, _VECTOR, _F, _F, _F, _F, _F, _F, _F), cache=True, error_model="numpy")
 def project(push, speed, out, closed, play, step, normal_limit, shear_limit, dt, stiff):  # type: ignore[no-untyped-def]
-    """The impulse ``push`` of a row, changed by ``step`` kg times what is left of the relative ``speed``, and brought
-    into the ellipse of the largest impulses across and along. ``out``: normal out of the slave.
+    """Returns the impulse ``push`` of a row minus ``step``, kg, times the relative ``speed``, projected onto the
+    ellipse of the largest impulses across and along the interface. ``out``: normal out of the tied side.
 
-    ``closed``: by how much the bond may close, and ``play``: open, m, before it resists; ``dt``: of the step ahead, s;
-    ``stiff``: share of the strength that is left.
+    ``closed``: distance by which the bond may close, and ``play``: by which it may open, m, without resistance;
+    ``dt``: time step, s; ``stiff``: remaining share of the strength.
     """
     along, opening = dot(push, out), -dot(speed, out)
     x = push[0] - along * out[0] - step * (speed[0] + opening * out[0])
@@ -58,7 +58,7 @@ def project(push, speed, out, closed, play, step, normal_limit, shear_limit, dt,
 
 @njit(_VECTOR(ROWS, _NODES, _I), cache=True, error_model="numpy")
 def normal(rows, nodes, r):  # type: ignore[no-untyped-def]
-    """The mean normal of the slave faces at the node of row ``r``."""
+    """Returns the mean normal of the tied faces at the node of row ``r``."""
     x, face = nodes.x, rows.face
     p, q, w = 0.0, 0.0, 0.0
     for s in range(rows.side[r], rows.side[r + 1]):
@@ -71,15 +71,21 @@ def normal(rows, nodes, r):  # type: ignore[no-untyped-def]
 
 @njit(_I(ROWS, _NODES, _F, _F, _I, _I), cache=True, error_model="numpy")
 def open_bonds(rows, nodes, mean_dt, dt, first, stop):  # type: ignore[no-untyped-def]
-    """Takes the relative velocities of the rows from ``first`` to ``stop`` at the end of the step, opens those whose
-    traction is at its limit by them; returns how many have come apart.
+    """Opens the rows from ``first`` to ``stop`` whose traction is at its limit; returns the number that have failed.
 
-    ``mean_dt``: over which impulses act, ``dt``: of the step ahead, s.
+    ``mean_dt``: duration of the impulses, ``dt``: time step, s.
+
+    1. Relative velocity at the end of the step, stored for the next one.
+    2. Tension and shear of the impulse, opening velocity, power.
+    3. Damage, if the impulse is at the ellipse: at once without fracture energy, else in proportion to the opening.
+    4. Present and largest opening of a damaged row.
+    5. A failed row has no impulse.
     """
     v, state, laws, apart = nodes.v, rows.state, rows.laws, 0
     for r in range(first, stop):
         if state[r, DAMAGE] >= 1.0:
             continue
+        # 1.
         for i in range(3):
             speed = v[rows.node[r], i]
             for e in range(rows.begin[r], rows.begin[r + 1]):
@@ -89,6 +95,7 @@ def open_bonds(rows, nodes, mean_dt, dt, first, stop):  # type: ignore[no-untype
         b = rows.bond[r]
         if laws[b, BREAKS] == 0.0:
             continue
+        # 2.
         along, opening, work, shear = 0.0, 0.0, 0.0, 0.0
         for i in range(3):
             along += state[r, PUSH + i] * state[r, NORMAL + i]
@@ -99,6 +106,7 @@ def open_bonds(rows, nodes, mean_dt, dt, first, stop):  # type: ignore[no-untype
             work -= slide * state[r, SPEED + i]
         across = max(along, 0.0)
         work += across * opening
+        # 3.
         force, tension = mean_dt * rows.area[r], across * across
         size = np.sqrt(tension / (force * laws[b, STRENGTH]) ** 2 + shear / (force * laws[b, SHEAR_STRENGTH]) ** 2)
         full = size > 0.0 and size >= _FULL * (1.0 - state[r, DAMAGE])
@@ -110,9 +118,11 @@ def open_bonds(rows, nodes, mean_dt, dt, first, stop):  # type: ignore[no-untype
             length = np.sqrt(tension + shear)
             critical = 2.0 * energy * size * force / length
             state[r, DAMAGE] = min(state[r, DAMAGE] + max(dt * work / length, 0.0) / critical, 1.0)
+        # 4.
         if state[r, DAMAGE] > 0.0:
             state[r, OPENING] = max(state[r, OPENING] + dt * opening, 0.0)
             state[r, WIDEST] = max(state[r, WIDEST], state[r, OPENING])
+        # 5.
         if state[r, DAMAGE] >= 1.0:
             apart += 1
             for i in range(3):

@@ -1,8 +1,9 @@
-"""The part of the tied rows that one rank has: those of the nodes that it owns, and the nodes that they push.
+"""Rows of tied nodes on one rank: those of the nodes that it owns, and the nodes that they push.
 
-The table of a rank has the nodes of its rows, and the tied and master nodes that it holds: another rank may push those.
-Positions and velocities of what it does not hold come from their owners, sums of impulses go to all ranks that have the
-node in their tables. Every rank knows all rows (rows.py), so who has what is told once, when the rows change.
+The table of nodes of a rank contains the nodes of its rows, and the tied and mortar nodes that it has: these may be
+pushed by rows of other ranks. Positions and velocities of nodes that it does not have are copied from their owners;
+sums of impulses are sent to all ranks with the node in their table. Every rank has the list of all rows (rows.py);
+the messages are planned once, when the rows change.
 """
 
 import math
@@ -17,38 +18,38 @@ from .records import BREAKS, KEPT, NORMAL, STATE, TiedNodes, TiedRows
 from .rows import Rows
 
 _SETTLED = 1e-7
-"""Of what a step changes of the impulses, that its sweeps leave. Chosen: the energy that the bond takes is less than
-1e-9 of what passes it then (docs/theory/bonds.md)."""
+"""Share of the change of the impulses in a step that its sweeps leave unsolved. Chosen: the energy dissipated by the
+bond is then below 1e-9 of the energy that passes through it (docs/theory/bonds.md)."""
 _SLOWEST = 0.02
-"""Least bound of the smallest eigenvalue of the rows over the largest one: 60 sweeps. Chosen: tied nodes that are held
-have none."""
+"""Least bound of the smallest eigenvalue of the rows over the largest one: 60 sweeps. Chosen: tied nodes with
+prescribed motion have no bound above zero."""
 _WORDS = 6
-"""Position and velocity."""
+"""Words of a node: position and velocity."""
 
 
 @dataclass
 class Layout:
-    """What the sweeps of a rank work on."""
+    """Arrays and messages of the sweeps of a rank."""
 
     rows: TiedRows
     nodes: TiedNodes
     number: Ints
-    """(r,) which of all rows each is."""
+    """(r,) number of each row among all rows."""
     held: Indices
-    """(h,) places in the table of the nodes that this rank holds."""
+    """(h,) places in the table of the nodes that this rank has."""
     local: Indices
     """(h,) their local indices."""
     sweeps: int
-    """In a step."""
+    """Number of sweeps in a step."""
     momentum: float
-    """How far an impulse goes on as it has changed."""
+    """Nesterov's extrapolation factor of the impulses."""
     messages: "Messages"
 
 
 def momentum(least: float) -> tuple[float, int]:
-    """Of the impulses, and how many sweeps leave _SETTLED; ``least``: the smallest eigenvalue of the rows over the
-    largest, at least. With q its root impulses go on by (1 - q) / (1 + q), and a sweep leaves 1 - q (Nesterov 2004,
-    2.2.1).
+    """Returns the extrapolation factor, and the number of sweeps that leave _SETTLED; ``least``: bound of the
+    smallest eigenvalue of the rows over the largest. With q its square root the factor is (1 - q) / (1 + q), and a
+    sweep reduces the residual by 1 - q (Nesterov 2004, 2.2.1).
     """
     root, sweeps, left = math.sqrt(max(least, _SLOWEST)), 1, 1.0
     while left > _SETTLED:
@@ -59,8 +60,8 @@ def momentum(least: float) -> tuple[float, int]:
 def laid_out(
     rows: Rows, states: Floats, laws: Floats, nodes: Nodes, mobility: Floats, planes: Flags, comm: Comm
 ) -> Layout:  # fmt: skip
-    """The layout of ``rows`` with their ``states`` (r, KEPT); ``mobility`` (nodes, 3): 1/kg; ``planes`` (nodes, 3):
-    what planes of symmetry hold. All ranks take part.
+    """Returns the layout of ``rows`` with their ``states`` (r, KEPT); ``mobility`` (nodes, 3): 1/kg; ``planes``
+    (nodes, 3): components held by planes of symmetry. Collective.
     """
     place = nodes.places(rows.node)
     mine = (place >= 0) & nodes.owned[place]
@@ -85,10 +86,10 @@ def laid_out(
 def _norms(
     rows: Rows, mine: Flags, ids: Ints, table: Floats, planes: Flags, comm: Comm
 ) -> tuple[float, Floats]:  # fmt: skip
-    """A bound of the smallest eigenvalue of all rows over the largest, and (r, 3) one over the bounds of the l1 norms
-    of those of this rank, kg: sum_k |w_k| S_k / m_k, S_k the sum of |w_k| over all rows. 0 where nothing moves, and
-    across ``planes`` (r, 3) of symmetry that the tied node lies on: with the mirror image of the master it does not
-    leave it.
+    """Returns a bound of the smallest eigenvalue of all rows over the largest, and (r, 3) one over the bounds of the
+    l1 norms of the rows of this rank, kg: sum_k |w_k| S_k / m_k, S_k the sum of |w_k| over all rows. 0 where no node
+    moves, and across ``planes`` (r, 3) of symmetry that contain the tied node: the mirror image of the mortar side
+    keeps it there.
     """
     known = np.unique(np.concatenate([rows.node, rows.master]))
     sums = np.bincount(np.searchsorted(known, rows.master), np.abs(rows.weight), len(known))
@@ -127,7 +128,7 @@ def _rows(rows: Rows, mine: Flags, ids: Ints, inverse: Floats, states: Floats, l
 
 
 def _nodes(rows: TiedRows, ids: Ints, mobility: Floats) -> TiedNodes:
-    """The table, and the entries of each node: those of masters, and NaN where it is the tied one."""
+    """Returns the table of nodes, and the entries of each node: weights of mortar nodes, and NaN for the tied node."""
     n = len(ids)
     of = np.repeat(np.arange(len(rows.node)), np.diff(rows.begin))
     at = np.concatenate([rows.master, rows.node])
@@ -142,22 +143,24 @@ def _nodes(rows: TiedRows, ids: Ints, mobility: Floats) -> TiedNodes:
 
 @dataclass
 class Messages:
-    """Between ranks, in every step."""
+    """Messages between ranks, in every step."""
 
     sums: Exchange
     copies: Exchange
     sends: Indices
-    """Places in the table of what others are sent of the sums, rank after rank; ``receives``, what they send."""
+    """Places in the table of the sums that are sent, rank by rank; ``receives``: of those received."""
     receives: Indices
     gives: Indices
-    """The same of copies of nodes."""
+    """Places of the copies of nodes that are sent; ``takes``: of those received."""
     takes: Indices
     buffers: tuple[Ints, Ints, Ints, Ints]
-    """Of the sums out and in, and of the copies."""
+    """Buffers of the sums, sent and received, and of the copies."""
 
     @classmethod
     def of(cls, ids: Ints, pushed: Flags, local: Indices, nodes: Nodes, comm: Comm) -> "Messages":
-        """For the table ``ids`` with the ``local`` indices; ``pushed`` by rows of this rank. All ranks take part."""
+        """Plans the messages for the table ``ids`` with the ``local`` indices; ``pushed``: by rows of this rank.
+        Collective.
+        """
         owned = (local >= 0) & nodes.owned[local]
         tables = comm.share((ids, pushed, local >= 0, owned))
         kinds: list[list[tuple[int, Ints]]] = [[], [], [], []]
@@ -182,11 +185,11 @@ class Messages:
 
     @property
     def alone(self) -> bool:
-        """Whether no other rank pushes or has nodes of the table."""
+        """True if no message is needed."""
         return not (len(self.sends) or len(self.receives) or len(self.gives) or len(self.takes))
 
     def copy(self, x: Floats, v: Floats) -> None:
-        """Takes rows of ``x`` and ``v`` (n, 3) of nodes that are not held here from their owners."""
+        """Copies the rows of ``x`` and ``v`` (n, 3) of nodes that this rank does not have from their owners."""
         out, into = self.buffers[2], self.buffers[3]
         out[:, :3], out[:, 3:] = x[self.gives].view(np.int64), v[self.gives].view(np.int64)
         self.copies.begin()
@@ -194,14 +197,14 @@ class Messages:
         x[self.takes], v[self.takes] = into[:, :3].copy().view(np.float64), into[:, 3:].copy().view(np.float64)
 
     def complete(self, words: Ints) -> None:
-        """Adds to the sums ``words`` (n, 3) what rows of other ranks have given."""
+        """Adds the contributions of rows of other ranks to the sums ``words`` (n, 3)."""
         self.buffers[0][:] = words[self.sends]
         self.sums.begin()
         self.sums.finish()
         np.add.at(words, self.receives, self.buffers[1])
 
     def free(self) -> None:
-        """Gives them back to MPI."""
+        """Frees the persistent messages."""
         self.sums.free()
         self.copies.free()
 

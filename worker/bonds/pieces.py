@@ -1,4 +1,4 @@
-"""Pieces of a bonded interface: what a slave face and a master face have in common, as every rank knows them."""
+"""Pieces of a bonded interface: common areas of a tied face and a mortar face, known to every rank."""
 
 from dataclasses import dataclass
 from typing import Self
@@ -11,24 +11,24 @@ from ..model.state import Flags, Floats, Ints
 
 @dataclass
 class Pieces:
-    """By bond, slave face and master face; a face is named 4 * global tet id + local face, its corners in the order of
-    mesh/faces.py.
+    """Pieces by bond, tied face (column ``slave``) and mortar face (column ``master``); a face has the name 4 *
+    global tet id + local face, and its corners the order of mesh/faces.py.
     """
 
     bond: Ints
     """(p,) number of the bond in the case."""
     slave: Ints
-    """(p,) the face whose nodes are tied."""
+    """(p,) tied face."""
     master: Ints
-    """(p,) the face that they are tied to."""
+    """(p,) mortar face that it is tied to."""
     weights: Floats
-    """(p, 9) of each corner of the slave with each of the master, slave by slave, m^2."""
+    """(p, 9) weight of each corner of the tied face with each of the mortar face, row by row, m^2."""
     of_face: Ints
-    """(p,) how many pieces the slave face had at the start: one that has lost a piece is tied no more."""
+    """(p,) number of pieces of the tied face at the start: a face that has lost one of its pieces is no longer tied."""
 
     @classmethod
     def none(cls) -> Self:
-        """No piece."""
+        """Returns no pieces."""
         words = np.zeros(0, np.int64)
         return cls(words, words, words, np.zeros((0, 9)), words)
 
@@ -36,13 +36,13 @@ class Pieces:
         return len(self.bond)
 
     def take(self, chosen: Flags | Ints) -> Self:
-        """Some of them."""
+        """Returns the chosen pieces."""
         return type(self)(
             self.bond[chosen], self.slave[chosen], self.master[chosen], self.weights[chosen], self.of_face[chosen]
         )
 
     def table(self) -> Table:
-        """The columns, for a parcel."""
+        """Returns the columns, for a parcel."""
         return {
             "bond": self.bond, "slave": self.slave, "master": self.master, "weights": self.weights,
             "of_face": self.of_face,
@@ -50,7 +50,7 @@ class Pieces:
 
     @classmethod
     def of(cls, tables: list[Table]) -> Self:
-        """All pieces of some tables, in order."""
+        """Returns the pieces of several tables, sorted."""
         some = [table for table in tables if table and len(table["bond"])]
         if not some:
             return cls.none()
@@ -60,5 +60,5 @@ class Pieces:
 
     @classmethod
     def joined(cls, some: "list[Pieces]") -> "Pieces":
-        """All of them, in order."""
+        """Returns the pieces of several lists, sorted."""
         return cls.of([each.table() for each in some])

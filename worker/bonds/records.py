@@ -1,4 +1,4 @@
-"""Records of the tied rows of a rank: what the kernels of sweeps.py and law.py take."""
+"""Records of the tied rows of a rank, which the kernels of sweeps.py and law.py take."""
 
 from typing import NamedTuple
 
@@ -6,68 +6,68 @@ from ..kernels.jit import record, types
 from ..model.state import Floats, Indices, Ints
 
 PUSH, LAST, SPEED, DAMAGE, OPENING, WIDEST, NORMAL = 0, 3, 6, 9, 10, 11, 12
-"""First words of a row's ``TiedRows.state``: impulse on the tied node (3), N s, and before momentum took it ahead (3);
-the relative velocity after the last step (3), m/s; damage, 0 intact, 1 apart; distance across the interface by which it
-has opened, and the largest so far, m; unit normal out of the slave (3)."""
+"""Places in a row of ``TiedRows.state``: impulse on the tied node (3), N s, and the same before Nesterov's
+extrapolation (3); relative velocity after the last step (3), m/s; damage, 0 intact, 1 failed; present opening across
+the interface, and the largest so far, m; unit normal out of the tied side (3)."""
 STATE = 15
-"""Words of it."""
+"""Number of places."""
 KEPT = 12
-"""Of these, the first that a run must remember."""
+"""Number of places, from the first on, that a checkpoint contains."""
 STRENGTH, SHEAR_STRENGTH, ENERGY, SHEAR_ENERGY, BREAKS = range(5)
-"""Columns of ``TiedRows.laws``: Pa, J/m^2, and 1 for a bond that may break, else 0."""
+"""Columns of ``TiedRows.laws``: strengths, Pa, fracture energies, J/m^2, and 1 for a bond that may break, else 0."""
 
 
 class TiedRows(NamedTuple):
-    """Rows that this rank computes: their nodes stand in the table of layout.py."""
+    """Rows that this rank computes; nodes are places in the table of layout.py."""
 
     node: Indices
     """(r,) the tied node."""
     begin: Ints
-    """(r + 1,) where the weights of each row begin."""
+    """(r + 1,) start of the weights of each row."""
     master: Indices
-    """(e,) the nodes that it is tied to."""
+    """(e,) mortar nodes of each row."""
     weight: Floats
-    """(e,)."""
+    """(e,) their weights."""
     area: Floats
-    """(r,) m^2."""
+    """(r,) area of the interface that belongs to the row, m^2."""
     inverse: Floats
-    """(r, 3) one over the bound of the l1 norm of the row, by axis, kg; 0 along an axis that the row leaves alone. Of a
-    row that may break the others are equal."""
+    """(r, 3) one over the bound of the l1 norm of the row, by axis, kg; 0 along an axis that the row does not
+    constrain. Equal for all other axes of a row that may break."""
     bond: Indices
     """(r,) row of ``laws``."""
     laws: Floats
-    """(b, 5)."""
+    """(b, 5) constants of the bonds."""
     side: Ints
-    """(r + 1,) where the slave faces at each tied node begin."""
+    """(r + 1,) start of the tied faces at each tied node."""
     face: Indices
     """(s, 3) their corners."""
     state: Floats
-    """(r, STATE)."""
+    """(r, STATE) state of each row."""
     change: Floats
-    """(r, 3) of the impulse in this sweep, N s."""
+    """(r, 3) change of the impulse in this sweep, N s."""
     own: Ints
-    """(r, 3) the same as the tied node gets it, quanta."""
+    """(r, 3) the same on the tied node, quanta."""
 
 
 class TiedNodes(NamedTuple):
-    """The table of nodes, by global id, and the rows that push each."""
+    """Table of nodes, by global id, and the rows that push each node."""
 
     x: Floats
-    """(n, 3) m."""
+    """(n, 3) positions, m."""
     v: Floats
-    """(n, 3) m/s."""
+    """(n, 3) velocities, m/s."""
     mobility: Floats
-    """(n, 3) 1/kg."""
+    """(n, 3) mobilities, 1/kg."""
     words: Ints
-    """(n, 3) impulses of a sweep, quanta."""
+    """(n, 3) sums of the impulses of a sweep, quanta."""
     total: Ints
-    """(n, 3) of the step."""
+    """(n, 3) sums of the impulses of the step, quanta."""
     first: Ints
-    """(n + 1,) where the entries of each node begin."""
+    """(n + 1,) start of the entries of each node."""
     row: Indices
-    """(m,) which row pushes it."""
+    """(m,) row that pushes the node."""
     share: Floats
-    """(m,) weight of the node in that row; NaN: it is the tied one."""
+    """(m,) weight of the node in that row; NaN for the tied node."""
 
 
 _F1, _F2, _I1, _I2, _N1, _N2 = (

@@ -1,4 +1,4 @@
-"""Rows of tied nodes: each node, the nodes that it is tied to, and their weights; from the pieces of the interface."""
+"""Rows of tied nodes, from the pieces of the interface: the tied node, its mortar nodes, and their weights."""
 
 from dataclasses import dataclass
 
@@ -8,32 +8,32 @@ from ..model.state import Flags, Floats, Ints
 from .pieces import Pieces
 
 _NOTHING = 1e-12
-"""Of the area of a row: a weight below this is rounding."""
+"""Share of the area of a row below which a weight is rounding."""
 
 
 @dataclass
 class Rows:
-    """By bond and node."""
+    """Rows by bond and node."""
 
     bond: Ints
     """(r,) number of the bond."""
     node: Ints
     """(r,) global id of the tied node."""
     area: Floats
-    """(r,) of the interface that belongs to it, m^2."""
+    """(r,) area of the interface that belongs to the row, m^2."""
     row: Ints
     """(e,) row of each weight, ascending."""
     master: Ints
-    """(e,) global id of the node that it is of."""
+    """(e,) global id of the mortar node of each weight."""
     weight: Floats
-    """(e,) those of a row add up to one."""
+    """(e,) weights; those of a row add up to one."""
     side: Ints
-    """(s,) row of each slave face at its node."""
+    """(s,) row of each tied face at its node."""
     face: Ints
     """(s, 3) global ids of its corners."""
 
     def take(self, chosen: Flags) -> "Rows":
-        """Some of them."""
+        """Returns the chosen rows."""
         again, entries, sides = np.cumsum(chosen) - 1, chosen[self.row], chosen[self.side]
         return Rows(
             self.bond[chosen], self.node[chosen], self.area[chosen], again[self.row[entries]], self.master[entries],
@@ -42,12 +42,14 @@ class Rows:
 
 
 def assembled(pieces: Pieces, slaves: Ints, masters: Ints) -> Rows:
-    """The rows of ``pieces`` whose faces have the corners ``slaves`` and ``masters`` (p, 3), global ids."""
+    """Returns the rows of ``pieces`` whose tied faces have the corners ``slaves`` and mortar faces the corners
+    ``masters`` (p, 3), global ids.
+    """
     p, many = len(pieces), int(max(slaves.max(initial=0), masters.max(initial=0))) + 1
     key = np.repeat(pieces.bond[:, None] * many + slaves, 3, axis=1).reshape(-1)
     other, value = np.tile(masters, (1, 3)).reshape(-1), pieces.weights.reshape(-1)
     names, of = np.unique(key, return_inverse=True)
-    area = np.bincount(of, value, len(names)).astype(np.float64)  # whole numbers where there is none
+    area = np.bincount(of, value, len(names)).astype(np.float64)  # bincount of no pieces gives integers
     some = area > _NOTHING * area.max(initial=0.0)
     renumbered = np.cumsum(some) - 1
     kept = some[of]
@@ -61,7 +63,7 @@ def assembled(pieces: Pieces, slaves: Ints, masters: Ints) -> Rows:
 
 
 def _sides(pieces: Pieces, slaves: Ints, names: Ints, many: int) -> tuple[Ints, Ints]:
-    """The slave faces at the node of each row."""
+    """Returns the tied faces at the node of each row."""
     _, first = np.unique(np.column_stack([pieces.bond, pieces.slave]), axis=0, return_index=True)
     key = (pieces.bond[first, None] * many + slaves[first]).reshape(-1)
     at = np.minimum(np.searchsorted(names, key), max(len(names) - 1, 0))

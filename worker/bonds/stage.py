@@ -1,9 +1,9 @@
-"""Bonds of meshes that do not match, in the time step.
+"""Tied bonds between non-matching meshes, in the time step.
 
-The rows (rows.py) are made of the pieces of the interface (interface.py) and of the corners that their faces have now:
-where a node separates, its copies are tied by their own faces, and where a tet has eroded its faces are tied no more.
-Every rank knows all pieces and rows; the state of a row is with the rank that owns its node, and told to all when rows
-change. Contact sees no pair whose nodes are tied by one bond (``bits``).
+The rows (rows.py) follow from the pieces of the interface (interface.py) and the present corners of their faces:
+copies of a separated node are tied by their own faces, and faces of removed tets are no longer tied. Every rank has
+the list of all pieces and rows; the state of a row is on the rank that owns its node, and is sent to all ranks when
+rows change. Contact ignores pairs whose nodes are tied by one bond (``bits``).
 """
 
 import numpy as np
@@ -30,25 +30,25 @@ from .records import DAMAGE, KEPT, PUSH
 from .rows import Rows, assembled
 
 _BITS = 62
-"""Bonds that contact tells from each other; further ones share a bit."""
+"""Bonds that contact distinguishes; further ones share a bit."""
 
 
 class Bonds:
-    """The tied bonds of a case on one rank."""
+    """Tied bonds of a case on one rank."""
 
     def __init__(
         self, case: Case, model: Model, pieces: Pieces, bounds: list[Boundary], comm: Comm, clock: Clock, team: Team,
         impulse: float,
     ) -> None:  # fmt: skip
-        """``pieces``: of all ranks; none for a run that goes on. ``impulse``: the most that may be on one node in a
-        step, N s. All ranks take part.
+        """``pieces``: of all ranks; none for a run that resumes. ``impulse``: bound of the impulse on one node in a
+        step, N s. Collective.
         """
         self._model, self._bounds, self._comm, self._clock, self._team = model, bounds, comm, clock, team
         self._laws, self._scale, n = _laws(case), fixed_point.scale_for(impulse), model.nodes.n
         self.loss, self.external = np.zeros((2, n))
-        """(nodes,) energy that the bonds have taken, and work that what holds nodes does against them, J."""
+        """(nodes,) energy dissipated by the bonds, and work from outside by prescribed velocities against them, J."""
         self.apart = False
-        """Whether a row of this rank has come apart in the step."""
+        """True if a row of this rank has failed in the step."""
         self._local: Indices = np.zeros(0, np.int32)
         self._total, self._before, self._mean_dt = np.zeros((0, 3), np.int64), np.zeros((0, 3)), 0.0
         some = sweeps.TASK_SIZE
@@ -57,7 +57,7 @@ class Bonds:
         self._move = Pass(team, sweeps.move_task, *sweeps.MOVE, size=some)
         self._layout: Layout | None = None
         self.version = 0
-        """Grows when rows change."""
+        """Number that increases when rows change."""
         self._laid_mobility: Floats = np.zeros((0, 3))
         self._set(pieces)
         if len(pieces):
@@ -65,26 +65,26 @@ class Bonds:
 
     @property
     def tied(self) -> int:
-        """Nodes of all ranks that are tied."""
+        """Number of tied nodes of all ranks."""
         return int((self._states[:, DAMAGE] < 1.0).sum())
 
     def bits(self, ids: Ints) -> Ints:
-        """(k,) the bonds that tie each node, as bits."""
+        """(k,) bonds that tie each node, as bits."""
         at = places(self._known, ids)
         return np.where(at >= 0, self._bits[at], 0) if len(self._known) else np.zeros(len(ids), np.int64)
 
     # The step ------------------------------------------------------------------------------------------------------
 
     def note(self, state: Nodes) -> None:
-        """Before the kick: books the second half of the last impulses' work, and keeps v(n-1/2)."""
+        """Before the kick: books the second half of the work of the last impulses, and stores v(n-1/2)."""
         self._before = state.v[self._local]
         self._book()
         layout = self._laid
         self._local, self._before = layout.local, state.v[layout.local]
 
     def predict(self, state: Nodes) -> None:
-        """After the kick: begins with the impulses of the step before, so that contact sees nearly the velocities of
-        bodies that hold together. All ranks take part.
+        """After the kick: applies the impulses of the last step (warm start), so that contact starts from velocities
+        at which the bonds nearly hold. Collective.
         """
         layout, mean_dt = self._laid, self._clock.mean_dt
         ratio = mean_dt / self._mean_dt if self._mean_dt > 0.0 else 0.0
@@ -96,8 +96,8 @@ class Bonds:
         state.v[layout.local] = layout.nodes.v[layout.held]
 
     def solve(self, state: Nodes, *, touched: bool) -> None:
-        """The impulses that tie the nodes in v(n+1/2); ``touched``: whether velocities have changed since ``predict``.
-        All ranks take part.
+        """Solves for the impulses of the tied nodes in v(n+1/2); ``touched``: True if velocities have changed since
+        ``predict``. Collective.
         """
         layout, clock = self._laid, self._clock
         if touched:
@@ -116,22 +116,22 @@ class Bonds:
         self._book()
 
     def follow(self) -> None:
-        """Takes up the faces as they are, when a node of one has separated or its tet has left, and what has come
-        apart. All ranks take part.
+        """Updates the rows after a node of a face has separated, a tet of a face was removed, or a row has failed.
+        Collective.
         """
         changed = np.array([float(self.apart or self._faces.changed())])
         if self._comm.maximum(changed)[0] > 0.0:
             self._rebuild()
 
     def grow(self, split: Split, ids: Ints) -> None:
-        """Takes up the copies of nodes; what has been booked stays with their parents."""
+        """Extends the accounts by the copies of nodes; booked values stay with the parents."""
         more = np.zeros(split.copies.n)
         self.loss, self.external = extended(self.loss, more), extended(self.external, more)
 
-    # A run that goes on --------------------------------------------------------------------------------------------
+    # Checkpoint and migration --------------------------------------------------------------------------------------
 
     def keep(self, parcel: Parcel) -> None:
-        """Adds what must be remembered."""
+        """Adds the state to a parcel."""
         nodes, rows = self._model.nodes, self._rows
         impulse = np.zeros((nodes.n, 3), np.int64)
         impulse[self._local] = self._total
@@ -146,7 +146,7 @@ class Bonds:
         }  # fmt: skip
 
     def resume(self, parcel: Parcel) -> None:
-        """Takes it back; all ranks take part."""
+        """Restores the state from a parcel. Collective."""
         self._scale, self._mean_dt = parcel.known["bonds"]
         self.loss, self.external = (np.array(parcel.nodes[f"bonds.{name}"]) for name in ("loss", "external"))
         impulse = parcel.nodes["bonds.impulse"]
@@ -158,11 +158,11 @@ class Bonds:
         self._rebuild([none, *((table["bond"], table["node"], table["state"]) for table in tables)])
 
     def free(self) -> None:
-        """Gives the messages back to MPI."""
+        """Frees the persistent messages."""
         if self._layout is not None:
             self._layout.messages.free()
 
-    # Below ---------------------------------------------------------------------------------------------------------
+    # Private -------------------------------------------------------------------------------------------------------
 
     @property
     def _laid(self) -> Layout:
@@ -185,7 +185,7 @@ class Bonds:
             layout.messages.copy(nodes.x, nodes.v)
 
     def _apply(self) -> None:
-        """Turns the changes of the impulses into velocities."""
+        """Converts the changes of the impulses to velocities."""
         layout, n = self._laid, len(self._laid.nodes.v)
         self._give.run(n, layout.rows, layout.nodes, self._scale)
         if not layout.messages.alone:
@@ -193,19 +193,19 @@ class Bonds:
         self._move.run(n, layout.nodes, self._scale)
 
     def _book(self) -> None:
-        """Half of the work of the impulses of a step, with v(n-1/2)."""
+        """Books half of the work of the impulses of a step, with v(n-1/2)."""
         held = self._laid_mobility[self._local]
         sweeps.book(self.loss, self.external, self._local, self._before, self._total, held, self._scale)
 
     def _evolved(self) -> Floats:
-        """(rows, KEPT) states of all rows, as far as this rank knows them."""
+        """(rows, KEPT) states of all rows; up to date for the rows of this rank."""
         states = self._states.copy()
         if self._layout is not None:
             states[self._layout.number] = self._layout.rows.state[:, :KEPT]
         return states
 
-    def _told(self) -> Floats:
-        """The states of all rows, on all ranks."""
+    def _joined_states(self) -> Floats:
+        """Returns the states of all rows, up to date, on all ranks. Collective."""
         layout = self._layout
         if layout is None:
             return self._states
@@ -215,8 +215,10 @@ class Bonds:
         return states
 
     def _rebuild(self, known: list[tuple[Ints, Ints, Floats]] | None = None) -> None:
-        """Makes the rows of the pieces as they are; ``known``: bonds, nodes and states of rows from before."""
-        pieces, old, states = self._pieces, self._faces.of(self._pieces.slave), self._told()
+        """Makes the rows from the pieces and present corners; ``known``: bonds, nodes and states of rows from a
+        parcel. Collective.
+        """
+        pieces, old, states = self._pieces, self._faces.of(self._pieces.slave), self._joined_states()
         self._faces.follow(self._comm)
         left = self._left(pieces)
         self._pieces, old = pieces.take(left), old[left]
@@ -231,7 +233,7 @@ class Bonds:
         self._lay_out()
 
     def _left(self, pieces: Pieces) -> "np.ndarray":
-        """Which pieces are of slave faces all of whose pieces are there."""
+        """Returns which pieces belong to tied faces that still have all their pieces."""
         whole = (self._faces.of(pieces.slave)[:, 0] >= 0) & (self._faces.of(pieces.master)[:, 0] >= 0)
         _, of = np.unique(np.column_stack([pieces.bond, pieces.slave]), axis=0, return_inverse=True)
         of = of.reshape(-1)
@@ -250,7 +252,9 @@ class Bonds:
         self._mark(rows)
 
     def _mark(self, rows: Rows) -> None:
-        """Which nodes contact does not see together: those of rows, and corners of slave faces beside the master."""
+        """Sets the bits of nodes that contact ignores with each other: nodes of rows, and corners of tied faces that
+        lie beside the mortar side.
+        """
         corner, bond = rows.face.reshape(-1), np.repeat(rows.bond[rows.side], 3)
         beside = ~np.isin(corner, self._rows.node)
         ids = np.concatenate([rows.node, rows.master, corner[beside]])
@@ -271,7 +275,9 @@ def _laws(case: Case) -> Floats:
 
 
 def _of(bonds: Ints, nodes: Ints, bond: Ints, node: Ints, states: Floats) -> Floats:
-    """States by ``bonds`` and ``nodes`` (k,), of those of each ``bond`` and ``node`` (r,); zero where there is none."""
+    """States by ``bonds`` and ``nodes`` (k,), taken from those of each ``bond`` and ``node`` (r,); zero for rows
+    without one.
+    """
     many = int(max(nodes.max(initial=0), node.max(initial=0))) + 1
     keys, wanted = bond * many + node, bonds * many + nodes
     order = np.argsort(keys, kind="stable")
@@ -282,8 +288,8 @@ def _of(bonds: Ints, nodes: Ints, bond: Ints, node: Ints, states: Floats) -> Flo
 
 
 def _carried(rows: Rows, old: Rows, states: Floats, bond: Ints, now: Ints, before: Ints) -> Floats:
-    """States of ``rows`` by those of the ``old`` ones: a copy goes on as its parent, by the corners of slave faces
-    ``now`` and ``before`` (p, 3), and the impulse goes with the area.
+    """States of ``rows`` from those of the ``old`` ones: a copy inherits from its parent, found by the corners of
+    tied faces ``now`` and ``before`` (p, 3); the impulse in proportion to the area.
     """
     pairs = np.unique(np.column_stack([np.repeat(bond, 3), now.reshape(-1), before.reshape(-1)]), axis=0)
     parents = _of(pairs[:, 0], pairs[:, 2], old.bond, old.node, np.column_stack([states, old.area]))

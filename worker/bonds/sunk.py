@@ -1,4 +1,4 @@
-"""Parts that a tied bond joins and that reach further into each other than its gap: contact never sees them."""
+"""Overlap, at the start, of two parts with a tied bond, which contact does not detect."""
 
 from collections.abc import Iterator
 
@@ -17,8 +17,9 @@ from .pieces import Pieces
 
 
 def sunk(case: Case, x: Floats, tets: Indices, tet_part: Indices, exposed: Flags, tied: Pieces) -> Iterator[str]:
-    """A warning for each bond that leaves nodes out which lie inside of the other part, once those that are ``tied``
-    have been moved onto it; ``exposed`` (tets, 4). Raises InputError where a node of either is deeper than its gap.
+    """Yields a warning for each bond whose parts still have nodes inside each other, after the nodes that are
+    ``tied`` have been moved onto the mortar side; ``exposed`` (tets, 4). Raises InputError if a node of either part
+    is deeper than the gap of the bond.
     """
     for k, one, two in tied_pairs(case):
         spec = case.bond[k]
@@ -52,7 +53,7 @@ def sunk(case: Case, x: Floats, tets: Indices, tet_part: Indices, exposed: Flags
 
 
 def _both(case: Case, one: int, two: int) -> Flags:
-    """(parts, parts) that these two meet, and no others."""
+    """(parts, parts) True for this pair of parts only."""
     allowed = np.zeros((len(case.parts), len(case.parts)), bool)
     allowed[one, two] = allowed[two, one] = True
     return allowed

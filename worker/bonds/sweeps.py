@@ -1,13 +1,13 @@
-"""Impulses that keep tied nodes where they are tied: Jacobi sweeps whose order does not matter.
+"""Impulses of tied nodes: Jacobi sweeps, independent of order.
 
-A row asks for no relative velocity between its node s and the point of the master, v_s - sum_j W_j v_j = 0, along
-all axes. Its impulse J acts on s, and -W_j J on the others: in quanta, the tied node gets minus what the others get, so
-that momentum stays as it is. A sweep corrects every impulse by the speed that is left over a bound of the l1 norm of
-its row, and the impulse goes on as it has changed (Nesterov 1983 for a strongly convex problem): the convergence is
-that of layout.momentum. A row that may break is brought back to what its bond carries (law.py) in every sweep.
+A row requires zero relative velocity between its node s and the point of the mortar side, v_s - sum_j W_j v_j = 0,
+along all axes. Its impulse J acts on s, and -W_j J on the mortar nodes; in quanta, the tied node gets minus the sum of
+the others, so that momentum is conserved exactly. A sweep changes every impulse by the remaining relative velocity over
+a bound of the l1 norm of its row, and extrapolates the change (Nesterov 1983 for a strongly convex problem; factor in
+layout.momentum). In every sweep a row that may break is projected onto its limit (law.py).
 
-A pass over rows makes the impulses, a pass over nodes adds them up by the rows of each node: neither writes what
-another task of it reads, and sums are of integers.
+A pass over rows computes the impulses; a pass over nodes sums them by the rows of each node: no task reads what
+another task of the same pass writes, and the sums are of integers.
 """
 
 import numpy as np
@@ -33,7 +33,7 @@ from .records import (
 _F1 = types.float64[::1]
 _F, _I, _F2, _I2, _N1 = types.float64, types.int64, types.float64[:, ::1], types.int64[:, ::1], types.int32[::1]
 TASK_SIZE = 256
-"""Rows or nodes of a task. Chosen: some 20 us of work, of which a region of threads costs 2."""
+"""Rows or nodes of a task. Chosen: about 20 us of work, against 2 us for a region of threads."""
 ACT = ROWS, NODES, _F, _F, _F, _F
 GIVE = ROWS, NODES, _F
 MOVE = NODES, _F
@@ -42,8 +42,8 @@ _act, _give, _move = reader(*ACT), reader(*GIVE), reader(*MOVE)
 
 @njit(types.void(ROWS, NODES, _F, _F, _F, _F, _I, _I), cache=True, error_model="numpy")
 def act(rows, nodes, ahead, mean_dt, dt, scale, first, stop):  # type: ignore[no-untyped-def]
-    """Corrects the impulses of the rows from ``first`` to ``stop``; ``ahead``: how far each goes on as it has changed;
-    ``mean_dt``: over which impulses act, ``dt``: of the step ahead, s; ``scale``: quanta per N s.
+    """Corrects the impulses of the rows from ``first`` to ``stop``; ``ahead``: extrapolation factor; ``mean_dt``:
+    duration of the impulses, ``dt``: time step, s; ``scale``: quanta per N s.
     """
     v, state, laws, inverse, change, own = nodes.v, rows.state, rows.laws, rows.inverse, rows.change, rows.own
     node, begin, master, weight = rows.node, rows.begin, rows.master, rows.weight
@@ -76,8 +76,8 @@ def act(rows, nodes, ahead, mean_dt, dt, scale, first, stop):  # type: ignore[no
 
 @njit(types.void(ROWS, NODES, _F, _F, _I, _I), cache=True)
 def resume(rows, nodes, ratio, scale, first, stop):  # type: ignore[no-untyped-def]
-    """The rows from ``first`` to ``stop`` begin with ``ratio`` times their last impulses, and with the normals of
-    their faces as they are.
+    """Warm start: the rows from ``first`` to ``stop`` start with ``ratio`` times their last impulses, and with the
+    present normals of their faces.
     """
     state, laws, begin = rows.state, rows.laws, rows.begin
     for r in range(first, stop):
@@ -95,7 +95,7 @@ def resume(rows, nodes, ratio, scale, first, stop):  # type: ignore[no-untyped-d
 
 @njit(types.void(ROWS, NODES, _F, _I, _I), cache=True)
 def give(rows, nodes, scale, first, stop):  # type: ignore[no-untyped-def]
-    """Adds up what the rows of this rank give to the nodes from ``first`` to ``stop``, in quanta."""
+    """Sums the impulses of the rows of this rank on the nodes from ``first`` to ``stop``, in quanta."""
     words, share, row, change, own = nodes.words, nodes.share, nodes.row, rows.change, rows.own
     for a in range(first, stop):
         for i in range(3):
@@ -111,7 +111,7 @@ def give(rows, nodes, scale, first, stop):  # type: ignore[no-untyped-def]
 
 @njit(types.void(NODES, _F, _I, _I), cache=True)
 def move(nodes, scale, first, stop):  # type: ignore[no-untyped-def]
-    """Turns the impulses of all ranks on the nodes from ``first`` to ``stop`` into velocities."""
+    """Converts the impulses of all ranks on the nodes from ``first`` to ``stop`` to velocities."""
     v, words, total, mobility = nodes.v, nodes.words, nodes.total, nodes.mobility
     for a in range(first, stop):
         for i in range(3):
@@ -121,7 +121,7 @@ def move(nodes, scale, first, stop):  # type: ignore[no-untyped-def]
 
 @njit(types.void(ROWS, NODES, _F, _F, _F, _F, _I), cache=True)
 def sweep_all(rows, nodes, ahead, mean_dt, dt, scale, many):  # type: ignore[no-untyped-def]
-    """``many`` sweeps of all rows, none of whose nodes another rank pushes."""
+    """Runs ``many`` sweeps of all rows, on a rank whose nodes no other rank pushes."""
     for k in range(many):
         act(rows, nodes, ahead if k + 1 < many else 0.0, mean_dt, dt, scale, 0, len(rows.node))
         give(rows, nodes, scale, 0, len(nodes.v))
@@ -130,29 +130,29 @@ def sweep_all(rows, nodes, ahead, mean_dt, dt, scale, many):  # type: ignore[no-
 
 @njit(TASK, cache=True)
 def act_task(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``act``."""
+    """Task: ``act``."""
     rows, nodes, ahead, mean_dt, dt, scale = _act(table)
     act(rows, nodes, ahead, mean_dt, dt, scale, first, stop)
 
 
 @njit(TASK, cache=True)
 def give_task(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``give``."""
+    """Task: ``give``."""
     rows, nodes, scale = _give(table)
     give(rows, nodes, scale, first, stop)
 
 
 @njit(TASK, cache=True)
 def move_task(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``move``."""
+    """Task: ``move``."""
     nodes, scale = _move(table)
     move(nodes, scale, first, stop)
 
 
 @njit(types.void(_F1, _F1, _N1, _F2, _I2, _F2, _F), cache=True)
 def book(loss, external, local, before, total, mobility, scale):  # type: ignore[no-untyped-def]
-    """Half of the work of the impulses ``total`` (n, 3) at ``local`` (n,) nodes with the velocities ``before``
-    (n, 3): taken by the bonds, and from outside where a velocity is held.
+    """Books half of the work of the impulses ``total`` (n, 3) on ``local`` (n,) nodes with the velocities ``before``
+    (n, 3): energy dissipated by the bonds, and work from outside where the velocity is prescribed.
     """
     for k in range(len(local)):
         a = local[k]
