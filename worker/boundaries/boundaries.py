@@ -1,8 +1,9 @@
-"""What acts on velocities between kick and move: symmetry planes here, walls in walls.py, what drives in drivers.py.
+"""Boundary conditions on velocities between kick and move: planes of symmetry here, walls in walls.py, loads and
+prescribed motion in drivers.py.
 
-Each books the work that it does on the body. An impulse at time n does it in two halves, with the velocity before and
-after: at time n only the first has been spent (the kinetic energy of the ledger is 1/2 m v(n-1/2) . v(n+1/2)), and the
-second is booked when ``note`` is called before the next kick.
+Each boundary books the work that it does on the body. The work of an impulse at time n is booked in two halves, with
+the velocity before and after: the kinetic energy of the ledger at n, 1/2 m v(n-1/2) . v(n+1/2), contains the first
+half only; ``note`` books the second one before the next kick.
 """
 
 from abc import ABC, abstractmethod
@@ -23,21 +24,21 @@ from ..parallel.team import team
 from . import impulses
 
 FREE, PRESCRIBED, MIRRORED = range(3)
-"""What a boundary does to a velocity component: it may change it by forces and impulses only; it sets it; it sets it to
-zero because the node lies on a plane of symmetry across that axis."""
+"""Effect of a boundary on a velocity component: free (changed by forces and impulses only); prescribed; zero,
+because the node lies on a plane of symmetry across that axis."""
 KEPT = ("contact_loss", "external_work", "_impulse")
-"""What every boundary remembers of its nodes."""
+"""Columns by node that every boundary stores in a checkpoint."""
 
 
 class Boundary(ABC):
-    """What the time step asks of a boundary."""
+    """Interface of a boundary to the time step."""
 
     after_contact = False
-    """Whether it acts after contact: nothing may undo what it corrects."""
+    """True if it acts after contact: contact must not change the velocities that it corrects."""
     mirrors = False
-    """Whether its nodes lie on one plane in which the body is mirrored: exposed faces in that plane are no surface."""
+    """True if its nodes lie on one plane in which the body is mirrored: exposed faces in that plane are not surface."""
     on_faces = False
-    """Whether it acts on faces of tets, not on nodes."""
+    """True if it acts on faces of tets, not on nodes."""
 
     def __init__(self, nodes: Indices) -> None:
         self.nodes = nodes
@@ -46,60 +47,63 @@ class Boundary(ABC):
         self.external_work = np.zeros(len(nodes))
         """(n,) work done on the body from outside, J."""
         self.given: Floats | None = None
-        """(n, 3 walls) what each wall has given each node so far, N s; none of what is no wall."""
+        """(n, 3 walls) sum of the impulses of each wall on each node so far, N s; None for a boundary that is not a
+        wall."""
         self.friction_loss: Floats | None = None
-        """(n,) what of ``contact_loss`` friction has taken, J; none where there is no friction."""
+        """(n,) part of ``contact_loss`` by friction, J; None without friction."""
         self.last_push = 0.0
-        """Last time at which the boundary pushed, s."""
+        """Time of the last impulse, s."""
 
         self._before = np.zeros((len(nodes), 3))
         """(n, 3) v(n-1/2), m/s."""
         self._impulse = np.zeros((len(nodes), 3))
-        """(n, 3) of the last step, N s."""
+        """(n, 3) impulse of the last step, N s."""
         self.over = Ranges(team(1))
-        """Whose threads go over its nodes."""
+        """Threads for the ranges of its nodes."""
         self._notes = Arguments(*impulses.NOTE)
         self._rooms = Rooms("nodes", *KEPT, "_before")
         self._kept: tuple[str, ...] = KEPT
-        """What it remembers of its nodes."""
+        """Columns by node that it stores in a checkpoint."""
 
     @abstractmethod
     def held_components(self) -> Bits:
-        """(n, 3) FREE, PRESCRIBED or MIRRORED. What is not FREE has no mobility in contact."""
+        """(n, 3) FREE, PRESCRIBED or MIRRORED. Components that are not FREE have no mobility in contact."""
 
     def start(self, state: Nodes) -> None:  # noqa: B027 (forces agree with any velocity)
-        """Makes the initial velocities agree with the boundary."""
+        """Makes the initial velocities consistent with the boundary."""
 
     def note(self, state: Nodes) -> None:  # noqa: B027 (a symmetry plane does no work)
-        """Before the kick: keeps v(n-1/2), and books the second half of the last impulses' work."""
+        """Before the kick: stores v(n-1/2), and books the second half of the work of the last impulses."""
 
     def _note(self, state: Nodes, account: Floats, factor: float) -> None:
-        """``note`` with an account of the work of its impulses, J; ``factor``: a half with its sign there."""
+        """Does ``note`` with an account of the work of its impulses, J; ``factor``: 1/2 with the sign of the work in
+        the account.
+        """
         table = self._notes.set(state.v, self.nodes, self._before, self._impulse, account, factor)
         self.over.run(impulses.note, table, len(self.nodes))
 
     def measure(self, mass: float, speed: float) -> None:  # noqa: B027 (most add up no integers of their own)
-        """The quanta, by the largest nodal ``mass``, kg, and ``speed``, m/s, of the scene."""
+        """Sets the quanta from the largest nodal ``mass``, kg, and ``speed``, m/s, of the scene."""
 
     def mirror(self, vectors: Floats) -> None:  # noqa: B027 (most boundaries mirror nothing)
-        """Takes what the mirror image cancels out of the means of ``vectors`` (nodes, 3) over the tets of its nodes."""
+        """Sets the components of nodal means ``vectors`` (nodes, 3) that the mirror image cancels to zero."""
 
     @abstractmethod
     def apply(self, state: Nodes, dt: float, t: float) -> None:
-        """Corrects v(n+1/2) at time ``t``, s; ``dt`` is the step ahead, s."""
+        """Corrects v(n+1/2) at time ``t``, s; ``dt``: time step, s."""
 
     def after_move(self, state: Nodes) -> None:  # noqa: B027 (most boundaries act on velocities alone)
         """Corrects x(n+1)."""
 
     def release(self, loose: Flags, bounds: "list[Boundary]") -> None:  # noqa: B027 (most hold a node, tets or not)
-        """Nodes without tets that fly on, ``loose`` (nodes,), are particles from now on; ``bounds``: all of the scene,
-        those before this one have released theirs.
+        """Treats nodes without tets, ``loose`` (nodes,), as particles from now on; ``bounds``: all boundaries, of
+        which those before this one have been called.
         """
 
     def grow(self, split: Split, ids: Ints) -> None:
-        """Takes up the copies of its nodes; ``ids``: of the local nodes.
+        """Adds the copies of its nodes; ``ids``: global ids of the local nodes.
 
-        What has been booked, and the impulse of the last step, stay with the parent.
+        Booked values and the impulse of the last step stay with the parent.
         """
         parents, n = split.copies.parents, len(self.nodes)
         rooms = self._rooms.of(self, len(parents))
@@ -109,10 +113,10 @@ class Boundary(ABC):
             self._inherit(at)
 
     def drop(self, tets: Ints) -> None:  # noqa: B027 (most boundaries act on nodes)
-        """Tets with these global ids have left, on any rank; what is ``on_faces`` of theirs goes with them."""
+        """Removes the loads on faces of the tets with these global ids, which erosion has removed on any rank."""
 
     def keep(self, parcel: Parcel, name: str) -> None:
-        """Adds what the boundary must remember to a parcel, under its ``name``."""
+        """Adds the state of the boundary to a parcel, under its ``name``."""
         for key in self._kept:
             values = getattr(self, key)
             column = np.zeros((length(parcel.nodes), *values.shape[1:]))
@@ -120,49 +124,49 @@ class Boundary(ABC):
             parcel.nodes[f"{name}.{key}"] = column
 
     def resume(self, parcel: Parcel, name: str, dt: float) -> None:
-        """Takes it back; ``dt``: of the last step, s."""
+        """Restores the state from a parcel; ``dt``: of the last step, s."""
         for key in self._kept:
             setattr(self, key, parcel.nodes[f"{name}.{key}"][self.nodes])
         self._before = np.zeros((len(self.nodes), 3))
 
     def free(self) -> None:  # noqa: B027 (most boundaries send no messages)
-        """Gives all standing messages back to MPI."""
+        """Frees all persistent messages."""
 
     def _inherit(self, at: Ints) -> None:  # noqa: B027 (a boundary of its own may keep more by node)
-        """Takes up copies of the nodes at the places ``at``; they stand behind all nodes."""
+        """Extends own columns by copies of the nodes at the places ``at``, after all other nodes."""
 
 
 class Stopping(Boundary):
-    """Walls: they stop nodes, and add up the impulses that they give."""
+    """Walls: they stop nodes, and sum the impulses on them."""
 
     after_contact = True
 
-    def __init__(self, nodes: Indices, walls: int, *, tells: bool) -> None:
-        """So many ``walls``; ``tells``: whether ``since_told`` will be called."""
+    def __init__(self, nodes: Indices, walls: int, *, reports: bool) -> None:
+        """``walls``: number of walls; ``reports``: True if ``since_last_report`` will be called."""
         super().__init__(nodes)
         self.given: Floats = np.zeros((len(nodes), 3 * walls))
         self._kept = (*KEPT, "given")
-        if tells:
+        if reports:
             self._told = self.given.copy()
             self._kept = (*self._kept, "_told")
 
-    def since_told(self) -> Floats:
-        """(n, 3) what the walls have given each node since this was last asked, N s."""
+    def since_last_report(self) -> Floats:
+        """(n, 3) impulses of the walls on each node since the last call, N s."""
         found = (self.given - self._told).reshape(len(self.given), -1, 3).sum(axis=1)
         self._told[:] = self.given
         return np.asarray(found)
 
 
 class SymmetryPlane(Boundary):
-    """Nodes that start on a plane across an axis have no velocity along it, while they have tets: these are mirrored,
-    and hold the node on the plane. A node without tets and its images are particles (mirrors.py).
+    """Plane of symmetry: nodes that start on it have no velocity across it while they have tets; the mirrored tets
+    hold such a node on the plane. A node without tets, and its image, are particles (mirrors.py).
     """
 
     mirrors = True
 
     def __init__(self, nodes: Indices, axis: int, beside: Flags | None = None) -> None:
-        """``beside`` (n,): nodes of bodies that lie on one side of the plane, where their images are on the other; all
-        if not given. A node of a body that lies on both sides stays on the plane.
+        """``beside`` (n,): nodes of bodies that lie on one side of the plane, with their images on the other; None:
+        all nodes. A node of a body that lies on both sides stays on the plane.
         """
         super().__init__(nodes)
         self._axis = axis
@@ -194,10 +198,10 @@ class SymmetryPlane(Boundary):
 
 @dataclass(frozen=True)
 class Acts:
-    """The boundaries that have something to do at each place of a step, in the order in which they act."""
+    """Boundaries by their place in a step, in the order in which they act."""
 
     boundaries: int
-    """Number of all."""
+    """Number of all boundaries."""
     noting: tuple[Boundary, ...]
     before_contact: tuple[Boundary, ...]
     after_contact: tuple[Boundary, ...]
@@ -205,7 +209,7 @@ class Acts:
 
     @classmethod
     def of(cls, scene: list[Boundary]) -> Self:
-        """Those of a scene."""
+        """Sorts the boundaries of a scene."""
         return cls(
             len(scene),
             tuple(each for each in scene if type(each).note is not Boundary.note),
@@ -216,7 +220,7 @@ class Acts:
 
 
 def mirrored(n: int, bounds: Iterable[Boundary]) -> Flags:
-    """(n, 3) which components of the velocities of ``n`` nodes planes of symmetry hold."""
+    """(n, 3) velocity components of ``n`` nodes that planes of symmetry hold."""
     found = np.zeros((n, 3), bool)
     for bound in bounds:
         found[bound.nodes] |= bound.held_components() == MIRRORED
@@ -224,7 +228,7 @@ def mirrored(n: int, bounds: Iterable[Boundary]) -> Flags:
 
 
 def driven(n: int, bounds: Iterable[Boundary]) -> Flags:
-    """(n,) which of ``n`` nodes have a component of their velocity prescribed."""
+    """(n,) nodes with a prescribed velocity component."""
     found = np.zeros(n, bool)
     for bound in bounds:
         found[bound.nodes] |= (bound.held_components() == PRESCRIBED).any(axis=1)
@@ -232,7 +236,7 @@ def driven(n: int, bounds: Iterable[Boundary]) -> Flags:
 
 
 def free(nodes: Indices) -> Bits:
-    """(n, 3) what a boundary holds that holds nothing."""
+    """(n, 3) FREE for all components."""
     return np.full((len(nodes), 3), FREE, np.uint8)
 
 
@@ -241,8 +245,8 @@ def free(nodes: Indices) -> Bits:
     cache=True,
 )
 def _inherit(nodes, loss, work, impulse, before, n, parents, first):  # type: ignore[no-untyped-def]
-    """Rows from ``n`` on of the rooms of a boundary's columns, for the copies of its nodes: ``first`` is the local
-    index of the first copy, ``parents`` (copies,) are ascending. Returns the places of their parents among the ``n``.
+    """Fills the rows from ``n`` on of the columns of a boundary for the copies of its nodes: ``first``: local index
+    of the first copy, ``parents`` (copies,): ascending. Returns the places of their parents among the ``n`` nodes.
     """
     at, k = np.empty(len(parents), np.int64), 0
     for c in range(len(parents)):

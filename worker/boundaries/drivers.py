@@ -24,7 +24,7 @@ class Driver(Boundary):
         self._note(state, self.external_work, 0.5)
 
     def _act(self, kernel: Kernel, arguments: Arguments, state: Nodes, *values: Any) -> None:
-        """Applies a kernel (impulses.py) with what it takes besides the nodes."""
+        """Applies a kernel (impulses.py) with its further arguments ``values``."""
         table = arguments.set(
             state.v, state.mass, self.nodes, self._before, self._impulse, self.external_work, *values
         )  # fmt: skip
@@ -32,8 +32,8 @@ class Driver(Boundary):
 
 
 class Course:
-    """A factor over time: linear between the given ``points`` (time, s, and factor), constant before and after; 1
-    without any.
+    """Factor over time: linear between the given ``points`` (time, s, and factor), constant before and after; 1
+    without points.
     """
 
     def __init__(self, points: Sequence[tuple[float, float]] = ()) -> None:
@@ -41,7 +41,7 @@ class Course:
         self._constant = float(self._factors[0]) if len(self._factors) == 1 else None
 
     def mean(self, begin: float, end: float) -> float:
-        """Of the factor between two times, s, exactly; its value where they are one."""
+        """Returns the exact mean of the factor between two times, s; its value if they are equal."""
         if self._constant is not None:
             return self._constant
         within = self._times[(self._times > begin) & (self._times < end)]
@@ -53,8 +53,8 @@ class Course:
 
 
 class Gravity(Driver):
-    """An ``acceleration`` (3,), m/s^2, times the mean factor of the ``course`` over the mean step of the kick: in free
-    fall velocities are exact at n+1/2, and positions at n where it is constant.
+    """Gravity: an ``acceleration`` (3,), m/s^2, times the mean factor of the ``course`` over the mean step of the
+    kick: in free fall velocities are exact at n+1/2, and positions at n if it is constant.
     """
 
     def __init__(self, nodes: Indices, acceleration: Floats, course: Course) -> None:
@@ -78,10 +78,10 @@ class Gravity(Driver):
 
 
 class Traction(Driver):
-    """Forces on corners of tets, times the mean factor of the ``course`` over the mean step of the kick. They go with
+    """Forces on corners of tets, times the mean factor of the ``course`` over the mean step of the kick; removed with
     their tets.
 
-    ``load`` is on all ``corners`` (m,) that are local nodes.
+    ``load``: forces on all ``corners`` (m,) that are local nodes.
     """
 
     on_faces = True
@@ -91,7 +91,7 @@ class Traction(Driver):
         self._corners, self._load, self._course = corners, load, course
         self._arguments = Arguments(*impulses.PUSH)
         self.force = self._summed()
-        """(n, 3) N."""
+        """(n, 3) force on each node, N."""
         self._last_dt = 0.0
 
     def held_components(self) -> Bits:
@@ -137,9 +137,9 @@ class Traction(Driver):
 
 
 class PrescribedVelocity(Driver):
-    """Nodes whose velocity has given components, times the factor of the ``course``; NaN leaves a component free.
+    """Prescribed velocity components of nodes, times the factor of the ``course``; NaN for a free component.
 
-    A step takes the mean factor over its length, so that positions at n are those of the course.
+    A step takes the mean factor over its length, so that positions at n are exact.
     """
 
     def __init__(self, nodes: Indices, velocity: Floats, course: Course) -> None:
@@ -162,7 +162,7 @@ class PrescribedVelocity(Driver):
 
 
 class PrescribedRotation(Driver):
-    """Nodes that turn rigidly: each step is the chord of the exact rotation."""
+    """Prescribed rigid rotation of nodes: the velocity of a step is along the chord of the exact rotation."""
 
     def __init__(self, nodes: Indices, centre: Floats, rate: Floats) -> None:
         super().__init__(nodes)
@@ -180,7 +180,7 @@ class PrescribedRotation(Driver):
         self._act(impulses.prescribe, self._arguments, state, chord, 1.0)
 
     def _chord(self, state: Nodes, dt: float) -> Floats:
-        """(n, 3) the velocities of a step ``dt``, s, m/s."""
+        """(n, 3) velocities of a step ``dt``, s, m/s."""
         r = state.x[self.nodes] - self._centre
         speed = math.sqrt(sum(float(component) ** 2 for component in self._rate))
         if dt == 0.0 or speed == 0.0:

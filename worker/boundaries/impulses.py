@@ -1,5 +1,5 @@
-"""The impulses that boundaries give to nodes, and half of their work before and after: kernels of tasks over the nodes
-of a boundary (boundaries.py).
+"""Impulses of boundaries on nodes, and halves of their work: kernels of tasks over the nodes of a boundary
+(boundaries.py).
 """
 
 import numpy as np
@@ -10,23 +10,23 @@ from ..parallel.team import TASK
 
 _F, _F1, _F2, _N1 = types.float64, types.float64[::1], types.float64[:, ::1], types.int32[::1]
 NOTE = _F2, _N1, _F2, _F2, _F1, _F
-"""v (nodes, 3), nodes (n,), and by place: v(n-1/2) and impulses (n, 3), N s, the account of their work (n,), J; a half
-with the sign of the work in the account."""
+"""Types of: v (nodes, 3), nodes (n,); by place: v(n-1/2) and impulses (n, 3), N s, account of their work (n,), J;
+1/2 with the sign of the work in the account."""
 _ACT = _F2, _F1, _N1, _F2, _F2, _F1
-"""v, mass (nodes,), nodes; v(n-1/2), impulses and account as above. The work is from outside."""
+"""Types of: v, mass (nodes,), nodes; v(n-1/2), impulses and account as above. The work is from outside."""
 PRESCRIBE = (*_ACT, _F2, _F)
-"""And the velocities (n, 3), m/s, NaN where it is free, and their factor."""
+"""Further types: velocities (n, 3), m/s, NaN for a free component, and their factor."""
 ACCELERATE = (*_ACT, _F1)
-"""And the velocity gained (3,), m/s."""
+"""Further type: velocity increment (3,), m/s."""
 PUSH = (*_ACT, _F2, _F)
-"""And forces (n, 3), N, and for how long they act, s."""
+"""Further types: forces (n, 3), N, and their duration, s."""
 _note, _prescribe, _accelerate, _push = reader(*NOTE), reader(*PRESCRIBE), reader(*ACCELERATE), reader(*PUSH)
 
 
 @njit("void(float64[::1], float64[:, ::1], float64[:, ::1], int64, float64)", cache=True)
 def book(account, impulse, before, j, factor):  # type: ignore[no-untyped-def]
-    """Adds ``factor``, a half with a sign, times the work of the impulse at the place ``j`` at the velocity ``before``
-    there to the ``account``, J.
+    """Adds ``factor``, 1/2 with a sign, times the work of the impulse at place ``j`` at the velocity ``before`` to
+    the ``account``, J.
     """
     work = 0.0
     for i in range(3):
@@ -36,7 +36,7 @@ def book(account, impulse, before, j, factor):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def note(table, begin, end, thread):  # type: ignore[no-untyped-def]
-    """Keeps v(n-1/2), and books the second half of the work of the last impulses."""
+    """Task: stores v(n-1/2), and books the second half of the work of the last impulses."""
     v, nodes, before, impulse, account, factor = _note(table)
     for j in range(begin, end):
         a = nodes[j]
@@ -47,7 +47,7 @@ def note(table, begin, end, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def prescribe(table, begin, end, thread):  # type: ignore[no-untyped-def]
-    """Sets the velocities that are not free."""
+    """Task: sets the prescribed velocity components."""
     v, mass, nodes, before, impulse, account, velocity, factor = _prescribe(table)
     for j in range(begin, end):
         a = nodes[j]
@@ -61,7 +61,7 @@ def prescribe(table, begin, end, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def accelerate(table, begin, end, thread):  # type: ignore[no-untyped-def]
-    """Adds the same to all velocities."""
+    """Task: adds the same velocity to all nodes."""
     v, mass, nodes, before, impulse, account, gained = _accelerate(table)
     for j in range(begin, end):
         a = nodes[j]
@@ -73,7 +73,7 @@ def accelerate(table, begin, end, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True, error_model="numpy")
 def push(table, begin, end, thread):  # type: ignore[no-untyped-def]
-    """Forces over a time."""
+    """Task: applies forces for a time."""
     v, mass, nodes, before, impulse, account, force, time = _push(table)
     for j in range(begin, end):
         a = nodes[j]

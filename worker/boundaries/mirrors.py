@@ -1,8 +1,8 @@
-"""Symmetry planes for the nodes beside them: what flies at a plane meets its mirror image there.
+"""Planes of symmetry for the nodes beside them: a node that reaches the plane hits its mirror image there.
 
-A node with tets and its image press on each other with equal forces, so that neither passes the plane: that is a wall
-for each side of it. Nodes without tets do not meet each other: such a node passes its image, and the image comes in
-where the node goes out, with the mirrored position and velocity. So debris turns round at a plane without a loss.
+A node with tets and its image exert equal forces on each other, so that neither passes the plane: the plane is a
+wall for each side. Nodes without tets do not interact: such a node passes its image, and is replaced by it, with
+mirrored position and velocity. So debris is reflected at a plane without a loss.
 """
 
 from typing import Self
@@ -20,15 +20,15 @@ from ..scene.conditions import AXES, part_sides, sides
 from .boundaries import Boundary, driven, free
 
 _TOGETHER = 64
-"""Nodes that are looked at in one loop, which compilers make vectors of; only where one of them would be beyond are
-they looked at on their own."""
+"""Number of nodes that are tested in one loop with vector instructions; only if one of them would be beyond the
+plane are they tested one by one."""
 _TURNS = 1000
-"""Planes that a node without tets may pass in a step; a velocity that is not finite would go on for ever."""
+"""Most planes that a node without tets may pass in a step; it ends the loop for a velocity that is not finite."""
 
 
 class Mirrors(Boundary):
-    """No node ends the step beyond a symmetry plane that it started beside. An impulse stops a node with tets there,
-    and never pulls; one without tets is reflected.
+    """Keeps nodes from ending the step beyond a plane of symmetry that they started beside. An impulse stops a node
+    with tets there, and never pulls; one without tets is reflected.
     """
 
     after_contact = True
@@ -37,9 +37,9 @@ class Mirrors(Boundary):
         self, nodes: Indices, axes: Ints, at: Floats, sides: Floats, restitution: float = 0.0,
         loose_sides: Floats | None = None,
     ) -> None:  # fmt: skip
-        """Planes across the ``axes`` (planes,) at the heights ``at`` (planes,), m; ``sides`` (n, planes): 1 for a node
-        above, -1 for one below, 0 for one that the plane does not hold; ``restitution``: as of contact;
-        ``loose_sides``: the same for a node once it has no tets, as ``sides`` if not given.
+        """``axes`` (planes,), ``at`` (planes,): axis across each plane, and its coordinate, m; ``sides`` (n,
+        planes): 1 for a node above, -1 below, 0 for one that the plane does not stop; ``restitution``: as in
+        contact; ``loose_sides``: the same for a node without tets, None: as ``sides``.
         """
         super().__init__(nodes)
         self._axes, self._at, self._sides, self._restitution = axes, at, sides, restitution
@@ -47,15 +47,16 @@ class Mirrors(Boundary):
         self._stopped: Ints = np.zeros(0, np.int64)
         """Places of the nodes that were stopped or reflected in the last step."""
         self._loose: Ints = np.zeros(0, np.int64)
-        """Places of those without tets."""
+        """Places of the nodes without tets."""
         self._reflected: Ints = np.zeros(0, np.int64)
         self._aside = np.zeros((0, 3))
-        """Places of those that are reflected in this step, and how far their images are from where they go, m."""
+        """Places of the nodes that are reflected in this step, and the vectors from their new positions to those of
+        their images, m."""
 
     @classmethod
     def of(cls, case: Case, model: Model, bounds: list[Boundary], comm: Comm) -> Self:
-        """All symmetry planes of a case, and the nodes that start beside them or may come there without tets; those of
-        prescribed motion, and of rigid parts, are left alone. All ranks take part.
+        """Returns the planes of symmetry of a case, with the nodes that start beside them or may pass them without
+        tets; except nodes of prescribed motion and of rigid parts. Collective.
         """
         specs, of = [spec for _, spec in case.boundaries_of(Symmetry)], model.nodes.part
         axes, at = np.array([AXES[spec.axis] for spec in specs]), np.array([spec.at for spec in specs])
@@ -108,7 +109,7 @@ class Mirrors(Boundary):
 
 @njit("void(float64[::1], float64[:, ::1], float64[:, ::1], int64[::1])", cache=True)
 def _book(loss, impulse, before, rows):  # type: ignore[no-untyped-def]
-    """Half of what the impulses of these ``rows`` take from the body, at the velocities ``before`` them."""
+    """Books half of the work of the impulses of these ``rows`` at the velocities ``before`` them, as loss."""
     for j in rows:
         for i in range(3):
             loss[j] -= 0.5 * impulse[j, i] * before[j, i]
@@ -121,9 +122,9 @@ def _book(loss, impulse, before, rows):  # type: ignore[no-untyped-def]
     error_model="numpy",
 )
 def _stop(x, v, before, impulse, mass, nodes, axes, at, sides, restitution, dt):  # type: ignore[no-untyped-def]
-    """The velocity of a node that would be beyond a plane ends it on the plane, or leads away from it with a share of
-    the speed at which it came, of ``before`` (n, 3): v(n-1/2). Adds to ``impulse``; returns the places of those that
-    were stopped, by some plane.
+    """Stops nodes with tets that would end beyond a plane: the velocity ends on the plane, or is the rebound
+    velocity if there is ``restitution`` of that ``before`` (n, 3): v(n-1/2). Adds to ``impulse``; returns the places
+    of the stopped nodes.
     """
     stopped, n = np.empty(len(nodes), np.int64), 0
     for first in range(0, len(nodes), _TOGETHER):
@@ -157,9 +158,9 @@ def _stop(x, v, before, impulse, mass, nodes, axes, at, sides, restitution, dt):
     cache=True,
 )
 def _reflect(x, v, impulse, mass, nodes, rows, axes, at, sides, dt):  # type: ignore[no-untyped-def]
-    """Of the nodes at the places ``rows`` that would end the step beyond planes, the velocity becomes that of their
-    last image. Adds to ``impulse``; returns the places of these nodes, and (n, 3) from where their velocities take them
-    to where the images end the step, m.
+    """Reflects the nodes at the places ``rows`` that would end the step beyond planes: sets the velocity of their
+    last image. Adds to ``impulse``; returns the places of these nodes, and (n, 3) the vectors from the ends of their
+    motion to those of their images, m.
     """
     turned, aside, n = np.empty(len(rows), np.int64), np.zeros((len(rows), 3)), 0
     for j in rows:

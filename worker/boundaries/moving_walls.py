@@ -1,14 +1,21 @@
-"""Rigid walls that move or are round: what stops the nodes of deformable bodies there.
+r"""Rigid walls that move or are round: they stop the nodes of deformable bodies.
 
-As at a fixed plane (walls.py) an impulse stops a node at the surface where that is at the end of the step, never pulls,
-and another across it takes what the node has of speed along the wall, with as much at most as Coulomb's friction
-allows. A wall with a mass M ends the step as fast as all impulses make it: its velocity V solves
+::
 
-    M (V - V(n-1/2)) + sum of the impulses, which rise with V = 0,
+        node   x(n)                      gap g at n, relative velocity u = v - V
+             .  \                        impulse along n: no gap below zero at the end of the step, g + dt u . n >= 0
+        n ^   .  \ dt v                  impulse along the wall: against sliding, at most mu times the normal one
+          |    .  v
+        ==|=====.=======> dt V  wall     mirrored components: held by planes of symmetry, no impulse
 
-by Newton's method, whose derivative is M and the masses of the nodes that are stopped, along their normals, or along
-all axes where they stick. Impulses are rounded to quanta, and the wall gets minus their sum: momentum is exact, and the
-same on any number of ranks and threads.
+As at a fixed plane (walls.py), impulses never pull. A wall with a mass M ends the step with the velocity that all
+impulses give it: V solves
+
+    M (V - V(n-1/2)) + sum of the impulses, which increase with V, = 0
+
+by Newton's method; the derivative is M plus the masses of the stopped nodes, along their normals, or along all axes for
+nodes that stick. Impulses are rounded to quanta, and the wall gets minus their sum: momentum is conserved exactly, with
+the same result for any number of ranks and threads.
 """
 
 import numpy as np
@@ -25,45 +32,45 @@ from .wall_shapes import SHAPES, Walls, gap
 from .walls import ACROSS
 
 _NEWTON, _ENOUGH = 20, 1e-9
-"""Iterations at most, and the change of V, over its own, that ends them. The sum is piecewise linear in V where nothing
-slides: two or three are enough."""
+"""Most iterations, and the relative change of V that ends them. The sum is piecewise linear in V without sliding:
+two or three are enough."""
 _SWEEPS = 4
-"""Times each wall is looked at where there are several (walls.py)."""
+"""Passes over the walls, if there are several (walls.py)."""
 _LINE = 16
-"""Words of a thread's sums: impulse (3), its derivative xx, yy, zz, yz, zx, xy, and room, so that no two threads write
+"""Words of a thread's sums: impulse (3), its derivative xx, yy, zz, yz, zx, xy; padded, so that no two threads write
 to one cache line."""
 
 
 class MovingWalls(Stopping):
-    """``held`` (n, w): which of the ``walls`` hold which node; fixed planes hold none here."""
+    """Moving or round walls; ``held`` (n, w): which of the ``walls`` stop which node, none for fixed planes."""
 
     def __init__(
-        self, nodes: Indices, owned: Flags, walls: Walls, held: Flags, planes: Flags, comm: Comm, tells: bool = False,
+        self, nodes: Indices, owned: Flags, walls: Walls, held: Flags, planes: Flags, comm: Comm, reports: bool = False,
     ) -> None:  # fmt: skip
-        """``owned`` (n,); ``planes`` (n, 3): components that planes of symmetry hold; ``tells``: whether somebody will
-        ask what they have given since the last time.
+        """``owned`` (n,); ``planes`` (n, 3): components held by planes of symmetry; ``reports``: True if
+        ``since_last_report`` will be called.
         """
-        super().__init__(nodes, walls.n, tells=tells)
+        super().__init__(nodes, walls.n, reports=reports)
         self.walls, self._owned, self._held, self._mirrored, self._comm = walls, owned, held, planes, comm
         self.scale = self._weight = 1.0
         """Quanta per N s, and per kg."""
         n, w = len(nodes), walls.n
         self._step, self._rubbed = np.zeros((2, n, 3 * w))
-        """(n, 3 walls) the same in the last step, and what of it is friction."""
+        """(n, 3 walls) impulses of the last step, and the part of them by friction, N s."""
         self.friction_loss = np.zeros(n)
         self._kept = (*self._kept, "friction_loss", "_step", "_rubbed")
         self._pushed = False
         self._arguments, self._books = Arguments(*_PUSH), Arguments(*_BOOK)
 
     def measure(self, mass: float, speed: float) -> None:
-        """The quanta, by the largest nodal ``mass``, kg, and ``speed``, m/s, of the scene."""
+        """Sets the quanta from the largest nodal ``mass``, kg, and ``speed``, m/s, of the scene."""
         self.scale, self._weight = scale_for(mass * speed), scale_for(mass)
 
     def held_components(self) -> Bits:
         return free(self.nodes)
 
     def depths(self, state: Nodes) -> Floats:
-        """(w,) how deep the deepest node starts behind each wall, m."""
+        """(w,) depth of the deepest node behind each wall at the start, m."""
         found = np.full(self.walls.n, -np.inf)
         deepest(found, self.walls.shapes, state.x, self.nodes, self._held)
         return found
@@ -84,7 +91,7 @@ class MovingWalls(Stopping):
         self._pushed = True
 
     def note(self, state: Nodes) -> None:
-        self._note(state, self.contact_loss, 0.0)  # keeps v(n-1/2)
+        self._note(state, self.contact_loss, 0.0)  # stores v(n-1/2) only
         if self._pushed:
             self._book(self.walls.speed, self._before)
             self._step[:], self._rubbed[:] = 0.0, 0.0
@@ -105,7 +112,7 @@ class MovingWalls(Stopping):
             self._book(before, self._before)
 
     def _stop(self, state: Nodes, k: int, dt: float) -> bool:
-        """Stops the nodes at wall ``k`` in a step ``dt``, s; whether any rank has one."""
+        """Stops the nodes at wall ``k`` in a step ``dt``, s; returns True if any rank has one."""
         walls, mass = self.walls, self.walls.mass[k]
         start = walls.speed[k].copy()
         speed = start.copy()
@@ -128,8 +135,8 @@ class MovingWalls(Stopping):
         return bool(sums[:3].any())
 
     def _sum(self, state: Nodes, k: int, speed: Floats, dt: float, *, gives: bool) -> Ints:
-        """(_LINE,) sums over the owned nodes of the impulses of wall ``k`` at a ``speed`` (3,), and of the derivative,
-        of all ranks where that counts; ``gives``: the nodes get the impulses.
+        """(_LINE,) sums, over the owned nodes, of the impulses of wall ``k`` at a velocity ``speed`` (3,), and of
+        the derivative; over all ranks for a wall with a mass. ``gives``: applies the impulses to the nodes.
         """
         sums, walls = np.zeros((self.over.threads, _LINE), np.int64), self.walls
         table = self._arguments.set(
@@ -142,7 +149,9 @@ class MovingWalls(Stopping):
         return self._comm.sum(own) if walls.lightness[k] > 0.0 and self._comm.size > 1 else own
 
     def _book(self, of_walls: Floats, of_nodes: Floats) -> None:
-        """Half of the work of the step's impulses at velocities of the walls (w, 3) and of the nodes (n, 3), m/s."""
+        """Books half of the work of the impulses of the step at velocities of the walls (w, 3) and of the nodes (n,
+        3), m/s.
+        """
         table = self._books.set(
             self.contact_loss, self.friction_loss, self.external_work, self._step, self._rubbed, of_walls, of_nodes,
             self.walls.lightness,
@@ -171,7 +180,7 @@ _of_push, _of_book = reader(*_PUSH), reader(*_BOOK)
 
 @njit(types.void(_F1, SHAPES, _F2, _N1, _B2), cache=True)
 def deepest(found, shapes, x, nodes, held):  # type: ignore[no-untyped-def]
-    """Raises ``found`` (w,) to the depth of the deepest of the ``nodes`` behind each wall that holds it, m."""
+    """Raises ``found`` (w,) to the depth of the deepest of the ``nodes`` behind each wall that stops it, m."""
     normal = np.empty(3)
     for j in range(len(nodes)):
         a = nodes[j]
@@ -182,7 +191,14 @@ def deepest(found, shapes, x, nodes, held):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True, error_model="numpy")
 def _push_out(table, begin, end, thread):  # type: ignore[no-untyped-def]
-    """See ``MovingWalls._sum``."""
+    """Task of ``MovingWalls._sum``, for the nodes that wall ``k`` stops.
+
+    1. Nodes whose gap would be negative at the end of the step.
+    2. Normal impulse, along the components that are not mirrored.
+    3. Sliding velocity after it, and the share of it that Coulomb's friction takes.
+    4. Impulse in quanta: applied to the node if ``gives``; added to the sum, on the rank that owns the node.
+    5. Derivative of the impulse by the velocity of the wall, unless ``gives``.
+    """
     (
         sums, x, v, mass, nodes, owned, held, mirrored, given, step, rubbed, shapes, wall, k, mu, scale, weight, dt,
         gives,
@@ -191,6 +207,7 @@ def _push_out(table, begin, end, thread):  # type: ignore[no-untyped-def]
     for j in range(begin, end):
         if not held[j, k]:
             continue
+        # 1.
         a = nodes[j]
         far = gap(normal, shapes, k, x[a, 0], x[a, 1], x[a, 2])
         speed, along = 0.0, 0.0
@@ -200,10 +217,12 @@ def _push_out(table, begin, end, thread):  # type: ignore[no-untyped-def]
                 along += normal[i] * normal[i]
         if far + dt * speed >= 0.0 or along <= ACROSS:
             continue
+        # 2.
         push = -(far / dt + speed) / along
         size, share = 0.0, 0.0
         for i in range(3):
             impulse[i] = 0.0 if mirrored[j, i] else push * normal[i]
+        # 3.
         if mu > 0.0:
             speed = speed + push * along
             for i in range(3):
@@ -211,6 +230,7 @@ def _push_out(table, begin, end, thread):  # type: ignore[no-untyped-def]
                 size += slide[i] * slide[i]
             most = mu * push
             share = most / np.sqrt(size) if size > most * most else 1.0
+        # 4.
         for i in range(3):
             rub = -share * slide[i] if mu > 0.0 else 0.0
             words[i] = np.int64(np.rint(mass[a] * (impulse[i] + rub) * scale))
@@ -221,6 +241,7 @@ def _push_out(table, begin, end, thread):  # type: ignore[no-untyped-def]
                 rubbed[j, 3 * k + i] += mass[a] * rub
             if owned[j]:
                 sums[thread, i] += words[i]
+        # 5.
         if owned[j] and not gives:
             sticks = mu > 0.0 and share == 1.0
             for m in range(6):
@@ -235,7 +256,7 @@ def _push_out(table, begin, end, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def _book(table, begin, end, thread):  # type: ignore[no-untyped-def]
-    """See ``MovingWalls._book``: what a wall without a mass does is work from outside."""
+    """Task of ``MovingWalls._book``: the work of a wall without a mass is from outside."""
     loss, friction, external, step, rubbed, of_walls, of_nodes, lightness = _of_book(table)
     for j in range(begin, end):
         for k in range(len(lightness)):

@@ -1,12 +1,12 @@
-"""A pressure that follows the surface: on the present area of each face, against its present normal.
+"""Pressure that follows the surface: on the present area of each face, along its present normal.
 
-The force of a face, -p (b - a) x (c - a) / 2, goes to its nodes a, b, c in thirds, in quanta of a power of two: sums
-over faces do not depend on their order, and shared nodes are completed in one exchange. The impulses of a step are
-those of a traction, and so is the account of their work: with x(n), v(n-1/2) and v(n+1/2) of the nodes it closes
-whatever way the surface goes.
+The force of a face, -p (b - a) x (c - a) / 2, is distributed to its nodes a, b, c in thirds, in quanta of a power of
+two: sums over faces are independent of their order, and shared nodes are completed in one exchange. Impulses and their
+work are those of a traction: with x(n), v(n-1/2) and v(n+1/2) of the nodes the energy account closes for any motion of
+the surface.
 
-Faces of a closed surface have no force and no moment in sum, but for what rounding leaves: half a quantum a node and
-face, of which the largest force of a node of a face has 2^42 at the start.
+The faces of a closed surface have zero total force and moment, up to rounding: half a quantum for each node and
+face; the largest force on a node of a face is 2^42 quanta at the start.
 """
 
 import math
@@ -29,22 +29,22 @@ from .boundaries import KEPT, free
 from .drivers import Course, Driver
 
 _BITS = 42
-"""Quanta of the largest force of a node of a face at the start, as a power of two. Chosen: what a face loses by
-rounding is 1e-13 of it, and there is room for an area 2^(_MOST - _BITS) times as large."""
+"""Quanta of the largest force on a node of a face at the start, as a power of two. Chosen: rounding is 1e-13 of the
+force of a face, and the area may grow by a factor 2^(_MOST - _BITS)."""
 _MOST = 56
-"""Quanta of a node of a face at most, as a power of two: 64 faces fit the sum of a node."""
+"""Most quanta on a node of a face, as a power of two: 64 faces fit into the sum of a node."""
 
 
 def scale(spec: Traction, outward: Floats) -> float:
-    """Quanta per newton for faces with areas along their normals, ``outward`` (m, 3), m^2."""
+    """Returns the quanta per newton for faces with area vectors ``outward`` (m, 3), m^2."""
     largest = abs(spec.pressure or 0.0) * float(np.abs(outward).max(initial=0.0)) / 3.0
     return math.ldexp(1.0, _BITS - math.frexp(largest)[1]) if largest > 0.0 else 1.0
 
 
 class SurfacePressure(Driver):
-    """A ``pressure``, Pa, on faces, times the mean factor of the ``course`` over the mean step of the kick.
+    """Applies a ``pressure``, Pa, to faces, times the mean factor of the ``course`` over the mean step of the kick.
 
-    A rank has the faces of its tets, and of the nodes all that have a load on any rank.
+    A rank has the faces of its tets, and all its nodes that are loaded on any rank.
     """
 
     on_faces = True
@@ -52,7 +52,7 @@ class SurfacePressure(Driver):
     def __init__(
         self, model: Model, faces: LoadedFaces, pressure: float, course: Course, neighbours: list[Neighbour], comm: Comm
     ) -> None:  # fmt: skip
-        """All ranks take part."""
+        """Collective."""
         self._model, self._comm, self._neighbours = model, comm, neighbours
         self._faces, self._corners = faces, model.nodes.places(faces.nodes.reshape(-1)).reshape(-1, 3)
         self._quanta = -pressure * faces.scale / 6.0
@@ -62,14 +62,14 @@ class SurfacePressure(Driver):
         self._places = self._placed()
         self._shared: SharedSum | None = None
         self._sharing: list[Indices] = []
-        """The nodes that each neighbour shared when that was made."""
+        """Nodes shared with each neighbour when the exchange was planned."""
         self._watched: list[tuple[Block, Ints, Ints]] | None = None
-        """Blocks of parts that fracture, the faces of each, and the places of their tets; None before it is asked."""
+        """Blocks of parts that fracture, the faces of each, and the places of their tets; None before the first use."""
 
     @property
     def force(self) -> Floats:
-        """(n, 3) N, at the present positions; not a number where a face has outgrown the quanta, which ends the step
-        in an error on all ranks. All ranks take part.
+        """(n, 3) force, N, at the present positions; NaN if a face has outgrown the quanta, which ends the run with
+        an error on all ranks. Collective.
         """
         sums = np.zeros((len(self.nodes), 3), np.int64)
         largest = _press(sums, self._model.nodes.x, self._corners, self._places, self._quanta)
@@ -82,7 +82,7 @@ class SurfacePressure(Driver):
         return free(self.nodes)
 
     def apply(self, state: Nodes, dt: float, t: float) -> None:
-        self._let_go()
+        self._drop_loose_faces()
         factor = 0.5 * (self._last_dt + dt) * self._course.mean(t - 0.5 * self._last_dt, t + 0.5 * dt)
         self._last_dt = dt
         self._act(impulses.push, self._arguments, state, self.force, factor)
@@ -118,18 +118,18 @@ class SurfacePressure(Driver):
             self._watched = None
 
     def _placed(self) -> Indices:
-        """(m, 3) where the corners stand among the nodes."""
+        """(m, 3) places of the corners among the nodes."""
         return np.searchsorted(self.nodes, self._corners).astype(np.int32)
 
     def _agreed(self, some: Flags) -> Indices:
-        """``some`` (nodes,), and those of the faces, as far as any rank has them; all ranks take part."""
+        """Returns ``some`` (nodes,), and the nodes of the faces, of any rank. Collective."""
         some[self._corners] = True
         sums = some[:, None].astype(np.int64)
         complete(self._comm, self._neighbours, sums, Tag.LOAD)
         return np.flatnonzero(sums).astype(np.int32)
 
     def _sums(self) -> SharedSum:
-        """The exchange of the loaded nodes that are shared; anew when nodes have separated."""
+        """Returns the exchange of the shared loaded nodes; planned again after nodes have separated."""
         if self._shared is None or any(
             one.nodes is not nodes for one, nodes in zip(self._neighbours, self._sharing, strict=True)
         ):
@@ -143,15 +143,17 @@ class SurfacePressure(Driver):
         return self._shared
 
     def _within(self, block: Block) -> tuple[Block, Ints, Ints]:
-        """A block of a part that fractures, which does not erode, with its faces and the places of their tets."""
+        """Returns a block of a part that fractures, its faces, and the places of their tets. Such parts do not
+        erode.
+        """
         order = np.argsort(block.id)
         at = np.minimum(np.searchsorted(block.id, self._faces.tets, sorter=order), max(block.n - 1, 0))
         places = order[at]
         rows = np.flatnonzero(block.id[places] == self._faces.tets)
         return block, rows, places[rows]
 
-    def _let_go(self) -> None:
-        """Faces of tets that have come off alone have no load any more."""
+    def _drop_loose_faces(self) -> None:
+        """Removes the load from faces of tets that have broken off on all sides."""
         if self._watched is None:
             self._watched = [self._within(block) for block in self._model.blocks if len(block.bond)]
         stay = np.ones(len(self._faces.tets), bool)
@@ -163,8 +165,8 @@ class SurfacePressure(Driver):
 
 @njit("float64(int64[:, ::1], float64[:, ::1], int32[:, ::1], int32[:, ::1], float64)", cache=True)
 def _press(sums, x, corners, places, factor):  # type: ignore[no-untyped-def]
-    """Adds ``factor`` times twice the area of each face along its normal to the ``sums`` (n, 3) at the ``places`` of
-    its ``corners`` (m, 3), in quanta. Returns the largest component.
+    """Adds ``factor`` times twice the area vector of each face to the ``sums`` (n, 3) at the ``places`` of its
+    ``corners`` (m, 3), in quanta. Returns the largest component.
     """
     largest = 0.0
     for k in range(len(corners)):

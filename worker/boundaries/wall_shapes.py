@@ -1,4 +1,4 @@
-"""The surfaces of rigid walls: planes, cylinders and spheres, and how they move."""
+"""Surfaces of rigid walls, planes, cylinders and spheres, and their motion."""
 
 from typing import NamedTuple
 
@@ -15,18 +15,18 @@ KINDS = ("plane", "cylinder", "sphere")
 
 
 class Shapes(NamedTuple):
-    """One row a wall."""
+    """Shapes of walls, one row each."""
 
     kind: Ints
     """(w,) PLANE, CYLINDER or SPHERE."""
     point: Floats
-    """(w, 3) of the plane, of the axis, or the centre, m."""
+    """(w, 3) point of the plane or the axis, or the centre, m."""
     axis: Floats
     """(w, 3) unit normal of a plane, unit direction of the axis of a cylinder."""
     radius: Floats
-    """(w,) m."""
+    """(w,) radius, m."""
     side: Floats
-    """(w,) 1 where bodies are outside, -1 where they are inside."""
+    """(w,) 1 if bodies are outside, -1 if they are inside."""
 
 
 _F, _F1, _F2 = types.float64, types.float64[::1], types.float64[:, ::1]
@@ -34,7 +34,7 @@ SHAPES = record(Shapes, types.int64[::1], _F2, _F2, _F1, _F1)
 
 
 class Walls:
-    """The walls of a case with their state, the same on all ranks."""
+    """Walls of a case with their state, equal on all ranks."""
 
     def __init__(self, specs: list[Wall]) -> None:
         n = len(specs)
@@ -51,42 +51,42 @@ class Walls:
         self._given = np.array([each.velocity for each in specs]).reshape(n, 3)
         self._courses = [Course(each.course) for each in specs]
         self.mass = np.array([each.mass or np.inf for each in specs])
-        """(w,) kg; infinite where a wall is fixed or driven."""
+        """(w,) kg; infinite for a fixed or driven wall."""
         self.lightness = np.array([0.0 if each.mass is None else 1.0 / each.mass for each in specs])
         self.plain = np.array([each.plain for each in specs], bool)
-        """(w,) fixed planes."""
+        """(w,) True for fixed planes."""
         self.speed = np.array([self._driven(k, 0.0, 0.0) for k in range(n)]).reshape(n, 3)
-        """(w, 3) m/s at mid-step."""
+        """(w, 3) velocity at mid-step, m/s."""
         self.before = self.speed.copy()
         """(w, 3) v(n-1/2), m/s."""
 
     @property
     def n(self) -> int:
-        """How many there are."""
+        """Number of walls."""
         return len(self.mass)
 
     def keep(self) -> tuple[Floats, Floats]:
-        """Where they are and how they move."""
+        """Returns positions and velocities, for a checkpoint."""
         return self.shapes.point.copy(), self.speed.copy()
 
     def resume(self, known: tuple[Floats, Floats]) -> None:
-        """Takes it back; of no wall a checkpoint has arrays without rows."""
+        """Restores positions and velocities; for no walls a checkpoint has arrays without rows."""
         point, speed = known
         self.shapes.point[:], self.speed[:] = np.reshape(point, (-1, 3)), np.reshape(speed, self.speed.shape)
 
     def words(self) -> bytes:
-        """Of the digest: of those that move."""
+        """Returns the words of moving walls for the digest."""
         moving = ~self.plain
         return bytes(self.shapes.point[moving].tobytes() + self.speed[moving].tobytes())
 
     def kinetic(self) -> float:
-        """Of those with a mass at n, J: that of the leapfrog."""
+        """Returns the kinetic energy of walls with a mass at n, J: the product of the velocities before and after."""
         free = self.lightness > 0.0
         squares = self.before[free] * self.speed[free]
         return float((0.5 * self.mass[free] * ((squares[:, 0] + squares[:, 1]) + squares[:, 2])).sum())
 
     def momenta(self) -> Floats:
-        """(6,) momentum, kg m/s, and angular momentum about the origin, kg m^2/s, of those with a mass at n."""
+        """(6,) momentum, kg m/s, and angular momentum about the origin, kg m^2/s, of walls with a mass at n."""
         free = self.lightness > 0.0
         p = 0.5 * self.mass[free, None] * (self.before[free] + self.speed[free])
         x = self.shapes.point[free]
@@ -94,17 +94,17 @@ class Walls:
         return np.concatenate([p.sum(axis=0), np.stack(about, axis=1).sum(axis=0)])
 
     def note(self) -> None:
-        """Before the kick: keeps v(n-1/2)."""
+        """Before the kick: stores v(n-1/2)."""
         self.before[:] = self.speed
 
     def kick(self, dt: float, t: float) -> None:
-        """Driven walls take the mean velocity of the step ahead."""
+        """Sets the velocity of driven walls to its mean over the step."""
         for k in range(self.n):
             if self.lightness[k] == 0.0:
                 self.speed[k] = self._driven(k, t, t + dt)
 
     def move(self, dt: float) -> None:
-        """To n+1."""
+        """Moves the walls to n+1."""
         self.shapes.point[:] += dt * self.speed
 
     def _driven(self, k: int, begin: float, end: float) -> Floats:
@@ -113,8 +113,8 @@ class Walls:
 
 @njit(types.float64(_F1, SHAPES, types.int64, _F, _F, _F), cache=True, error_model="numpy")
 def gap(normal, shapes, k, x, y, z):  # type: ignore[no-untyped-def]
-    """Distance of a point from wall ``k``, m, negative behind it; sets the unit ``normal`` (3,) out of the wall there.
-    On the axis of a cylinder, or in the centre of a sphere, it is zero.
+    """Returns the distance of a point from wall ``k``, m, negative behind it; sets the unit ``normal`` (3,) out of
+    the wall there, zero on the axis of a cylinder or in the centre of a sphere.
     """
     p, a = shapes.point, shapes.axis
     dx, dy, dz = x - p[k, 0], y - p[k, 1], z - p[k, 2]

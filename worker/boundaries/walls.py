@@ -1,4 +1,4 @@
-"""Rigid walls: an impulse stops a node there, and friction what it has of speed along the wall."""
+"""Rigid walls that are fixed planes: impulses stop nodes there, with Coulomb friction along the wall."""
 
 import numpy as np
 
@@ -11,32 +11,33 @@ from .boundaries import KEPT, Boundary, Stopping, free, mirrored
 from .impulses import book
 
 _SWEEPS = 4
-"""Times a node is taken to each wall. Chosen: two walls at right angles take one; what a sharper corner leaves after
-four is taken in the next step."""
+"""Passes over the walls for each node. Chosen: two walls at right angles take one; the rest at a sharper corner is
+corrected in the next step."""
 ACROSS = 1e-12
-"""Of a wall's unit normal, what is left of its square along the planes of symmetry that hold a node: with less the wall
-lies along a plane and cannot push the node. Chosen far above rounding (1e-32) and below any angle that is meant."""
+"""Least square of the part of a wall's unit normal that the planes of symmetry at a node leave free: with less, the
+wall is parallel to a plane and cannot push the node. Chosen far above rounding (1e-32) and below any intended angle."""
 
 
 class RigidWalls(Stopping):
-    """No node ends the step behind a wall: an impulse along its normal stops the node there, never pulls. Another along
-    the wall takes what the node has of speed there, with as much of that impulse at most as Coulomb's ``friction`` (w,)
-    allows.
+    """Stops nodes at walls: an impulse along the normal keeps a node from ending the step behind a wall, and never
+    pulls. Another one along the wall reduces its sliding velocity, at most by Coulomb's ``friction`` (w,) times the
+    normal one.
 
-    ``points`` and ``normals`` (w, 3), ``held`` (n, w): which walls hold which node. A node between two walls is taken
-    to each in turn, a few times. ``mirrored`` (n, 3): the components that planes of symmetry hold, none if not given; a
-    wall that is not at right angles to a plane pushes the nodes on it along it, and the plane takes the rest.
+    ``points`` and ``normals`` (w, 3); ``held`` (n, w): which walls stop which node. A node between two walls is
+    stopped by each in turn, several times. ``mirrored`` (n, 3): components held by planes of symmetry, None for
+    none; a wall that is not at right angles to a plane pushes the nodes on the plane along it; the plane takes the
+    other component.
     """
 
     def __init__(
         self, nodes: Indices, points: Floats, normals: Floats, held: Flags, mirrored: Flags | None = None,
-        friction: Floats | None = None, tells: bool = False,
+        friction: Floats | None = None, reports: bool = False,
     ) -> None:  # fmt: skip
-        """``tells``: whether somebody will ask what they have given since the last time."""
-        super().__init__(nodes, len(points), tells=tells)
+        """``reports``: True if ``since_last_report`` will be called."""
+        super().__init__(nodes, len(points), reports=reports)
         self._friction = np.zeros(len(points)) if friction is None else friction
         self._rubbed = np.zeros((len(nodes) if self._friction.any() else 0, 3))
-        """(n, 3) impulse of friction of the last step, N s; (0, 3) where there is no friction."""
+        """(n, 3) friction impulse of the last step, N s; (0, 3) without friction."""
         self._mirrored = np.zeros((len(nodes), 3), bool) if mirrored is None else mirrored
         self._points = points
         self._normals = normals / np.linalg.norm(normals, axis=1)[:, None]
@@ -51,7 +52,7 @@ class RigidWalls(Stopping):
         return free(self.nodes)
 
     def depths(self, state: Nodes) -> Floats:
-        """(w,) how deep the deepest node starts behind each wall, m."""
+        """(w,) depth of the deepest node behind each wall at the start, m."""
         depths = np.full(len(self._points), -np.inf)
         for k, (point, normal) in enumerate(zip(self._points, self._normals, strict=True)):
             behind = ((point - state.x[self.nodes[self._held[:, k]]]) * normal).sum(axis=1)
@@ -100,17 +101,22 @@ _of_push = reader(*_PUSH)
 
 @njit("void(float64[::1], float64[:, ::1], float64[:, ::1])", cache=True)
 def book_all(loss, impulse, before):  # type: ignore[no-untyped-def]
-    """Half of what the impulses (n, 3) take at the velocities ``before`` them."""
+    """Books half of the work of the impulses (n, 3) at the velocities ``before`` them, as loss."""
     for j in range(len(loss)):
         book(loss, impulse, before, j, -0.5)
 
 
 @njit(TASK, cache=True, error_model="numpy")
 def _push_out(table, begin, end, thread):  # type: ignore[no-untyped-def]
-    """Impulse form: the gap at the end of the step is never negative; the impulse is along what is left of the normal
-    without the ``mirrored`` components, and that of friction across it. Adds to ``impulse``, to what of it friction has
-    ``rubbed``, where there is some, and to what each wall has ``given``, and books half of the work; ``pushed``
-    (threads, 8): whether a wall did, and room.
+    """Task: stops the nodes of a range at all walls, and books half of the work.
+
+    Adds to ``impulse``, to ``rubbed``, the part of it by friction, and to ``given``, the impulses of each wall; sets
+    ``pushed`` (threads, 8; the rest is padding) if a wall stopped a node.
+
+    1. Gap and velocity along the normal, and the square of the normal without ``mirrored`` components.
+    2. Impulse such that the gap at the end of the step is zero.
+    3. Friction: sliding velocity across the normal, at most mu times the normal one.
+    4. Next pass, if a node between several walls was stopped by one of them.
     """
     (
         x, v, mass, nodes, before, impulse, rubbed, given, loss, friction_loss, points, normals, friction, held,
@@ -122,6 +128,7 @@ def _push_out(table, begin, end, thread):  # type: ignore[no-untyped-def]
         for _ in range(_SWEEPS):
             moved = False
             for k in range(len(points)):
+                # 1.
                 gap, speed, along = 0.0, 0.0, 1.0
                 for i in range(3):
                     gap += (x[a, i] - points[k, i]) * normals[k, i]
@@ -129,6 +136,7 @@ def _push_out(table, begin, end, thread):  # type: ignore[no-untyped-def]
                     if mirrored[j, i]:
                         along -= normals[k, i] * normals[k, i]
                 if held[j, k] and gap + dt * speed < 0.0 and along > ACROSS:
+                    # 2.
                     push = -(gap / dt + speed) / along
                     for i in range(3):
                         if mirrored[j, i]:
@@ -140,6 +148,7 @@ def _push_out(table, begin, end, thread):  # type: ignore[no-untyped-def]
                     moved = any_moved = True
                     if friction[k] == 0.0:
                         continue
+                    # 3.
                     speed, size = 0.0, 0.0
                     for i in range(3):
                         speed += v[a, i] * normals[k, i]
@@ -153,6 +162,7 @@ def _push_out(table, begin, end, thread):  # type: ignore[no-untyped-def]
                         impulse[j, i] -= mass[a] * share * slide[i]
                         rubbed[j, i] -= mass[a] * share * slide[i]
                         given[j, 3 * k + i] -= mass[a] * share * slide[i]
+            # 4.
             if not moved or len(points) == 1:
                 break
         if any_moved:

@@ -26,5 +26,5 @@ def _impulses(sim: Simulation) -> Floats | None:
         found += sim.contact.books.pressed / sim.contact.books.scale
         sim.contact.books.pressed[:] = 0
     for walls in (bound for bound in sim.boundaries if isinstance(bound, RigidWalls | MovingWalls)):
-        found[walls.nodes] += walls.since_told()
+        found[walls.nodes] += walls.since_last_report()
     return found

@@ -1,1 +1,1 @@
-"""Rigid parts: six degrees of freedom each, the same on all ranks, moved by sums of integer impulses."""
+"""Rigid parts: bodies with six degrees of freedom each, equal on all ranks, moved by integer sums of impulses."""

@@ -1,4 +1,4 @@
-"""The state of the rigid bodies of a case, the same on all ranks."""
+"""State of the rigid bodies of a case, equal on all ranks."""
 
 import math
 from dataclasses import dataclass
@@ -14,51 +14,52 @@ from . import rotation
 from .motion import Held
 
 STATE = ("centre", "q", "speed", "momentum")
-"""What changes from step to step."""
+"""Quantities that change from step to step."""
 
 
 @dataclass
 class Bodies:
-    """One row a body."""
+    """Rigid bodies, one row each."""
 
     part: Ints
-    """(b,) which part it is."""
+    """(b,) number of the part."""
     mass: Floats
-    """(b,) kg."""
+    """(b,) mass, kg."""
     origin: Floats
     """(b, 3) centre of mass at the start, m."""
     inertia: Floats
-    """(b, 3, 3) about it, along the axes of the case at the start, kg m^2."""
+    """(b, 3, 3) inertia about the centre, along the axes of the case, at the start, kg m^2."""
     reach: Floats
-    """(b,) a power of two above the distance of any node from the centre, m: the quantum of moments is that of impulses
-    times it."""
+    """(b,) a power of two above the distance of any node from the centre, m: the quantum of moments is that of
+    impulses times it."""
     held: list[Held]
 
     def __post_init__(self) -> None:
-        """At rest, where it starts."""
+        """Sets the state at rest, at the initial position."""
         n = len(self.part)
         self.centre, self.speed, self.momentum = self.origin.copy(), np.zeros((n, 3)), np.zeros((n, 3))
-        """Of mass, m; m/s and, about it, kg m^2/s at mid-step."""
+        """Centre of mass, m; its velocity, m/s, and the angular momentum about it, kg m^2/s, at mid-step."""
         self.q = np.tile([1.0, 0.0, 0.0, 0.0], (n, 1))
-        """(b, 4) unit quaternion from the axes of the start, scalar first."""
+        """(b, 4) unit quaternion of the rotation from the start, scalar first."""
         self.inverse = np.array([inverse(tensor) for tensor in self.inertia]).reshape(n, 3, 3)
         self.rotation, self.compliance = np.empty((n, 3, 3)), np.empty((n, 3, 3))
-        """(b, 3, 3) of the present; inverse of the inertia in space, of the axis alone where it turns about one."""
+        """(b, 3, 3) present rotation; inverse of the inertia in space, about the axis only for a body that turns
+        about one."""
         self.free = np.array([each.free for each in self.held]).reshape(n, 3)
         self.turns = np.array([each.turns for each in self.held]).reshape(n, 3)
-        """(b, 3) 1 along what axes it moves, and turns about, as impulses make it."""
+        """(b, 3) 1 for axes along which impulses move the body, and about which they turn it; else 0."""
         self.loose = np.flatnonzero(self.turns.all(axis=1))
-        """Those that turn freely."""
+        """Bodies that turn freely."""
         self.lightness = self.free / self.mass[:, None]
         self.pose()
 
     @property
     def n(self) -> int:
-        """How many there are."""
+        """Number of bodies."""
         return len(self.part)
 
     def pose(self) -> None:
-        """What depends on the orientation."""
+        """Updates the quantities that depend on the orientation."""
         rotation.turns_of(self.rotation, self.q)
         rotation.spatial(self.compliance, self.rotation, self.inverse)
         for b in range(self.n):
@@ -67,27 +68,27 @@ class Bodies:
                 self.compliance[b] = 0.0
                 self.compliance[b, axis, axis] = 1.0 / self.about(b)[axis, axis]
         self.yielding = self.compliance * self.turns[:, :, None]
-        """(b, 3, 3) the same, 0 where something holds the rotation."""
+        """(b, 3, 3) the same, 0 where the rotation is held."""
 
     def about(self, b: int) -> Floats:
-        """(3, 3) inertia of a body in space, kg m^2."""
+        """Returns the inertia of a body in space, (3, 3), kg m^2."""
         found = np.empty((1, 3, 3))
         rotation.spatial(found, self.rotation[b : b + 1], self.inertia[b : b + 1])
         return np.asarray(found[0])
 
     def rates(self, momentum: Floats) -> Floats:
-        """(b, 3) rotation vectors of angular momenta, rad/s."""
+        """Returns the rotation vectors (b, 3) of angular momenta, rad/s."""
         return times(self.compliance, momentum)
 
 
 def times(tensors: Floats, vectors: Floats) -> Floats:
-    """(b, 3) products of tensors (b, 3, 3) and vectors, in a fixed order of sums."""
+    """(b, 3) products of tensors (b, 3, 3) and vectors; the order of the sums is fixed."""
     parts = tensors * vectors[:, None, :]
     return np.asarray((parts[..., 0] + parts[..., 1]) + parts[..., 2])
 
 
 def dot(a: Floats, b: Floats) -> Floats:
-    """(b,) scalar products of rows of three."""
+    """(b,) scalar products of rows of three; the order of the sums is fixed."""
     parts = a * b
     return np.asarray((parts[:, 0] + parts[:, 1]) + parts[:, 2])
 
@@ -98,7 +99,7 @@ def cross(a: Floats, b: Floats) -> Floats:
 
 
 def inverse(tensor: Floats) -> Floats:
-    """(3, 3) of a symmetric one, by its cofactors."""
+    """(3, 3) inverse of a symmetric tensor, by its cofactors."""
     xx, yy, zz, yz, zx, xy = (float(tensor[i, j]) for i, j in ((0, 0), (1, 1), (2, 2), (1, 2), (2, 0), (0, 1)))
     a, b, c = yy * zz - yz * yz, zx * yz - xy * zz, xy * yz - yy * zx
     whole = xx * a + xy * b + zx * c
@@ -107,14 +108,16 @@ def inverse(tensor: Floats) -> Floats:
 
 
 def of_nodes(case: Case, nodes: Nodes) -> Indices:
-    """(nodes,) which rigid body each node is of, -1 for none."""
+    """(nodes,) number of the rigid body of each node, -1 for none."""
     number = np.full(len(case.parts), -1, np.int32)
     number[case.rigid] = np.arange(len(case.rigid), dtype=np.int32)
     return np.asarray(number[nodes.part])
 
 
 def measured(case: Case, nodes: Nodes, held: list[Held], comm: Comm) -> Bodies:
-    """The bodies of a case at the start, of its ``nodes`` on all ranks, and what acts on each; all take part."""
+    """Returns the bodies of a case at the start, from its ``nodes`` on all ranks; ``held``: constraints and loads of
+    each. Collective.
+    """
     of = of_nodes(case, nodes)
     found = [_measured(case.parts[i], nodes, of == b, comm) for b, i in enumerate(case.rigid)]
     masses, centres, tensors, reach = (list(column) for column in zip(*found, strict=True))
@@ -127,7 +130,9 @@ def measured(case: Case, nodes: Nodes, held: list[Held], comm: Comm) -> Bodies:
 
 
 def _measured(part: Part, nodes: Nodes, chosen: Flags, comm: Comm) -> tuple[float, Floats, Floats, float]:
-    """Mass, kg, centre, m, inertia about it, kg m^2, and reach, m, of a body that has the nodes ``chosen``."""
+    """Returns mass, kg, centre, m, inertia about it, kg m^2, and reach, m, of a body with the nodes ``chosen``.
+    Collective.
+    """
     spec, some = part.rigid, chosen & nodes.owned
     assert spec is not None
     m, x = nodes.mass[some], nodes.x[some]
@@ -143,13 +148,13 @@ def _measured(part: Part, nodes: Nodes, chosen: Flags, comm: Comm) -> tuple[floa
 
 
 def tensor_of(six: tuple[float, ...]) -> Floats:
-    """(3, 3) of the components xx, yy, zz, yz, zx, xy."""
+    """(3, 3) symmetric tensor of the components xx, yy, zz, yz, zx, xy."""
     xx, yy, zz, yz, zx, xy = six
     return np.array([[xx, xy, zx], [xy, yy, yz], [zx, yz, zz]])
 
 
 def _start(bodies: Bodies, b: int, part: Part) -> None:
-    """The motion of a body at the start, as far as what holds it allows."""
+    """Sets the initial motion of a body, within its constraints."""
     held, rate, speed = bodies.held[b], np.zeros(3), np.array(part.velocity)
     if part.spin is not None:
         rate = np.array(part.spin.rate)

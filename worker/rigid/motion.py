@@ -1,4 +1,4 @@
-"""What acts on a rigid body from outside: gravity, planes of symmetry, prescribed motion."""
+"""Loads and constraints of a rigid body from outside: gravity, planes of symmetry, prescribed motion."""
 
 import math
 from collections.abc import Collection
@@ -16,24 +16,24 @@ from ..model.state import Floats
 
 @dataclass
 class Held:
-    """Of one body."""
+    """Loads and constraints of one body."""
 
     free: Floats = field(default_factory=lambda: np.ones(3))
-    """(3,) 1 along the axes along which impulses move it."""
+    """(3,) 1 for axes along which impulses move it, else 0."""
     turns: Floats = field(default_factory=lambda: np.ones(3))
-    """(3,) 1 about the axes about which they turn it: all of them, one, or none."""
+    """(3,) 1 for axes about which impulses turn it, else 0: all of them, one, or none."""
     driven: dict[int, tuple[float, Course]] = field(default_factory=dict)
-    """By axis, the speed that is prescribed, m/s, and its factor."""
+    """Prescribed velocity, m/s, and its factor over time, by axis."""
     spin: tuple[Floats, Floats] | None = None
-    """A point of the line that it is turned about, m, and the rotation vector, rad/s."""
+    """Point on the axis of a prescribed rotation, m, and the rotation vector, rad/s."""
     pulls: list[tuple[Floats, Course]] = field(default_factory=list)
     """Accelerations, m/s^2."""
     prescribed: bool = False
-    """Whether any motion is prescribed: walls do not hold it then."""
+    """True if any motion is prescribed: walls do not stop the body then."""
 
     @classmethod
     def of(cls, case: Case, part: Part, beside: Collection[int] = ()) -> "Held":
-        """By the boundaries that hold the ``part``, without the planes of symmetry that it starts ``beside``."""
+        """Collects the boundaries that act on the ``part``, except the planes of symmetry that it starts ``beside``."""
         found = cls()
         for index, boundary in enumerate(case.boundaries):
             if index in beside:
@@ -58,24 +58,24 @@ class Held:
             self.spin = np.array(boundary.spin.centre), np.array(boundary.spin.rate)
 
     def _fix(self, axis: int, speed: float, course: Course) -> None:
-        """All nodes have this speed along an axis: the body turns about no other one."""
+        """Prescribes the velocity of all nodes along an axis: the body can turn about that axis only."""
         self.free[axis] = 0.0
         self.driven[axis] = speed, course
         self.turns = self.turns * (np.arange(3) == axis)
 
     def begin(self, speed: Floats, rate: Floats, centre: Floats) -> tuple[Floats, Floats]:
-        """Velocity of the ``centre``, m/s, and rotation vector, rad/s, at the start."""
+        """Returns the velocity of the ``centre``, m/s, and the rotation vector, rad/s, at the start."""
         if self.spin is not None:
             arm = centre - self.spin[0]
             return np.cross(self.spin[1], arm), self.spin[1]
         return self._driven(speed, 0.0, 0.0), rate * self.turns
 
     def kept(self, momentum: Floats) -> Floats:
-        """(3,) of an angular momentum, what the body may have."""
+        """(3,) the allowed components of an angular momentum."""
         return momentum if self.spin is not None else momentum * self.turns
 
     def kick(self, speed: Floats, centre: Floats, last_dt: float, dt: float, t: float) -> Floats:
-        """(3,) v*(n+1/2) of v(n-1/2), m/s."""
+        """(3,) v*(n+1/2) from v(n-1/2), m/s."""
         if self.spin is not None:
             return np.asarray((self.turned(centre, dt) - centre) / dt) if dt > 0.0 else speed
         gained = speed
@@ -91,7 +91,7 @@ class Held:
         return found
 
     def turned(self, point: Floats, dt: float) -> Floats:
-        """(3,) where the prescribed rotation takes a point in a step ``dt``, s."""
+        """(3,) position of a point after the prescribed rotation of a step ``dt``, s."""
         assert self.spin is not None
         axis, sine, cosine = self._angle(dt)
         arm = point - self.spin[0]
@@ -99,7 +99,7 @@ class Held:
         return np.asarray(point + sine * across + (1.0 - cosine) * np.cross(axis, across))
 
     def half(self, dt: float) -> Floats:
-        """(3,) axis of the prescribed rotation in a step ``dt``, s, times the tangent of half its angle."""
+        """(3,) axis of the prescribed rotation of a step ``dt``, s, times the tangent of half its angle."""
         axis, sine, cosine = self._angle(dt)
         return np.asarray(axis * (sine / (1.0 + cosine)))
 

@@ -1,14 +1,15 @@
-"""The free rotation of rigid bodies, and where it takes their nodes.
+"""Free rotation of rigid bodies, and positions and velocities of their nodes.
 
-Orientations are unit quaternions q, rotations R(q); the state is the angular momentum l in space, so that what no
-moment acts on keeps it to the bit. A step turns a body by the implicit midpoint rule for Euler's equations: with
-p = R^T l in the body and the mean m of p before and after,
+Orientations are unit quaternions q with rotations R(q); the state is the angular momentum l in space, so that it is
+constant to the bit without a moment. A step rotates a body by the implicit midpoint rule for Euler's equations: with p
+= R^T l in the body and m the mean of p before and after,
 
-    m = p + dt/2 m x (I^-1 m),    q' = q (1, dt/2 I^-1 m) / norm,
+    m = p + dt/2 m x (I^-1 m),    q' = q (1, dt/2 I^-1 m) / norm.
 
-whose second line is the Cayley map of dt I^-1 m to a rotation: it takes p to 2 m - p, so that l stays, and m . I^-1 m
-terms show that p . I^-1 p, twice the energy, does (Hairer, Lubich and Wanner 2006, Geometric Numerical Integration,
-IV.2: the midpoint rule keeps quadratic invariants). The error of the phase is of second order in dt.
+The second equation is the Cayley map of dt I^-1 m to a rotation: it maps p to 2 m - p, so that l is conserved;
+multiplying the first by I^-1 m shows that p . I^-1 p, twice the energy, is conserved too (Hairer, Lubich and Wanner
+2006, Geometric Numerical Integration, IV.2: the midpoint rule preserves quadratic invariants). The error of the
+phase is of second order in dt.
 """
 
 import numpy as np
@@ -16,9 +17,9 @@ import numpy as np
 from ..kernels.jit import njit
 
 _ENOUGH = 1e-16
-"""Change of the mean, over its size, below which it is found."""
+"""Relative change of the mean that ends the iteration."""
 _MOST = 60
-"""Fixed-point iterations: each takes the error down by dt times the rate of precession, below a tenth (stage.py)."""
+"""Most fixed-point iterations: each reduces the error by dt times the rate of precession, below a tenth (stage.py)."""
 
 
 @njit("void(float64[:, :, ::1], float64[:, ::1])", cache=True)
@@ -89,8 +90,8 @@ def _apply(out, tensor, b, vector):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[:, ::1], int64, float64, float64, float64, boolean)", cache=True)
 def multiply(q, b, x, y, z, in_space):  # type: ignore[no-untyped-def]
-    """Multiplies ``q[b]`` by (1, x, y, z) and normalises it: a rotation by twice the arc tangent of the length, about
-    an axis in the body, or ``in_space``.
+    """Multiplies ``q[b]`` by (1, x, y, z) and normalises it: a rotation by twice the arc tangent of the length of
+    (x, y, z), about this axis in the body, or ``in_space``.
     """
     a, c, d, e = q[b, 0], q[b, 1], q[b, 2], q[b, 3]
     sign = -1.0 if in_space else 1.0
@@ -105,7 +106,9 @@ def multiply(q, b, x, y, z, in_space):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[:, ::1], int32[::1], int32[::1], float64[:, ::1], float64[:, :, ::1], float64[:, ::1])", cache=True)
 def place(x, nodes, body, arms, rotation, centre):  # type: ignore[no-untyped-def]
-    """Positions ``x`` of the ``nodes`` (k,) of bodies: the ``arms`` (k, 3) of the start, turned, from their centres."""
+    """Sets the positions ``x`` of the ``nodes`` (k,) of bodies: the initial ``arms`` (k, 3), rotated, plus the
+    centre.
+    """
     for k in range(len(nodes)):
         a, b = nodes[k], body[k]
         for i in range(3):
@@ -119,7 +122,7 @@ def place(x, nodes, body, arms, rotation, centre):  # type: ignore[no-untyped-de
     cache=True,
 )
 def carry(v, x, nodes, body, centre, speed, rate):  # type: ignore[no-untyped-def]
-    """Velocities of the nodes: that of the centre, ``speed`` (b, 3), and ``rate`` (b, 3) x arm."""
+    """Sets the velocities of the ``nodes``: that of the centre, ``speed`` (b, 3), plus ``rate`` (b, 3) x arm."""
     for k in range(len(nodes)):
         a, b = nodes[k], body[k]
         rx, ry, rz = x[a, 0] - centre[b, 0], x[a, 1] - centre[b, 1], x[a, 2] - centre[b, 2]

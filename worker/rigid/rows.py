@@ -1,10 +1,10 @@
-"""Rigid bodies in the sweeps of contact: one node with six degrees of freedom each.
+"""Rigid bodies in the sweeps of contact: each body is one node with six degrees of freedom.
 
-A contact gives integer impulses to slots (contact/solver/sweeps.py), which are completed as those of other nodes are.
-At the rank that owns the node, those of the slots of a rigid body are summed as integers, with their moments about its
-centre, and then over the ranks; the body moves, and its slots with it. So the rows of one body are coupled through its
-mass and inertia, and the sweeps are Jacobi's as they are for shared nodes: the norm of a row is bounded by the l1 norm
-over all rows of the body (``norms``), and no order of contacts or ranks changes a bit.
+Contacts give integer impulses to slots (contact/solver/sweeps.py), and shared slots are completed as for other nodes.
+On the rank that owns the node of a slot, the impulses and their moments about the centre of the body are summed as
+integers, then over the ranks; the body moves, and its slots with it. So all rows of a body are coupled through its mass
+and inertia, and the sweeps are Jacobi sweeps, as for shared nodes: the norm of a row is bounded by the l1 norm over all
+rows of the body (``norms``), and the result is independent of the order of contacts and ranks.
 """
 
 import numpy as np
@@ -14,9 +14,10 @@ from ..contact.solver.loading import SHARES
 from ..kernels.jit import njit, types
 
 WEIGHTS = 8
-"""Words of a body: sums over its slots of |w| |n_i|, of |arm x (|w| |n|)|_i over the reach, of |w|, of |arm| |w|."""
+"""Words of the weights of a body: sums over its slots of |w| |n_i|, of |arm x (|w| |n|)|_i over the reach, of |w|,
+of |arm| |w|."""
 WORDS = 6
-"""Of an impulse (3), quanta, and a moment (3), quanta times the reach of the body."""
+"""Words of an impulse (3), quanta, and a moment (3), quanta times the reach of the body."""
 _F, _F1, _F2, _F3 = types.float64, types.float64[::1], types.float64[:, ::1], types.float64[:, :, ::1]
 _N1, _I2, _B1 = types.int32[::1], types.int64[:, ::1], types.boolean[::1]
 
@@ -43,10 +44,10 @@ def weigh(words, active, slots, body, arms, owned, reach):  # type: ignore[no-un
 
 @njit(types.void(NODES, _I2, _N1, _N1, _F2, _F1, _F2, _F3), cache=True, error_model="numpy")
 def norms(active, words, slots, body, arms, reach, lightness, yielding):  # type: ignore[no-untyped-def]
-    """Row weights and mobilities of ``slots``, such that their products are what a row of the contact matrix has at
-    most: sum_i |n_i| Q_i along a normal n, Q of any direction across. ``words``: of all ranks, see ``weigh``;
-    ``lightness`` (b, 3) one over the mass, 1/kg, and ``yielding`` (b, 3, 3) the inverse of the inertia in space, zero
-    where the motion is held.
+    """Sets row weights and mobilities of ``slots`` such that their products bound a row of the contact matrix: sum_i
+    |n_i| Q_i along a normal n, Q for any direction across. ``words``: of all ranks, see ``weigh``; ``lightness`` (b,
+    3) one over the mass, 1/kg, and ``yielding`` (b, 3, 3) the inverse of the inertia in space, zero where the motion
+    is held.
     """
     sums, fixed, moment, along = active.row_weights, active.fixed, np.empty(3), np.empty(3)
     for k in range(len(slots)):
@@ -71,8 +72,8 @@ def norms(active, words, slots, body, arms, reach, lightness, yielding):  # type
 
 @njit(types.void(_I2, NODES, _N1, _N1, _F2, _B1, _F1), cache=True)
 def gather(words, active, slots, body, arms, owned, reach):  # type: ignore[no-untyped-def]
-    """Takes the impulses of a sweep from ``slots`` and adds those of ``owned`` ones to ``words`` (b, WORDS) of their
-    bodies.
+    """Moves the impulses of a sweep from ``slots`` to their bodies: adds those of ``owned`` slots to ``words`` (b,
+    WORDS), and sets all to zero.
     """
     moving = active.moving_words
     for k in range(len(slots)):
@@ -92,7 +93,9 @@ def gather(words, active, slots, body, arms, owned, reach):  # type: ignore[no-u
 
 @njit(types.void(NODES, _N1, _N1, _F2, _F2, _F2), cache=True)
 def spread(active, slots, body, arms, speed, rate):  # type: ignore[no-untyped-def]
-    """Velocities of ``slots`` as their bodies move, ``speed`` and ``rate`` (b, 3), and the paths that they take."""
+    """Sets the velocities of ``slots`` to the motion of their bodies, ``speed`` and ``rate`` (b, 3); adds the change
+    to their paths.
+    """
     v, path = active.moving, active.path
     for k in range(len(slots)):
         s, b = slots[k], body[k]

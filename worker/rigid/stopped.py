@@ -1,4 +1,4 @@
-"""Which rigid bodies each wall stops, and the nodes of their surfaces."""
+"""Rigid bodies that each wall stops, and the nodes of their surfaces."""
 
 import numpy as np
 
@@ -10,9 +10,9 @@ from .bodies import Bodies, of_nodes
 
 
 def stopped(case: Case, nodes: Nodes, bodies: Bodies, beside: Ints, comm: Comm) -> tuple[Flags, Floats, Indices]:
-    """Which walls (walls, b), and behind them the two sides of each plane of symmetry, stop which bodies, and of all
-    nodes of these, on all ranks, the arms at the start, m, and the body: by ascending id. ``beside`` (planes, parts):
-    the side on which a body starts, 1 or -1. All ranks take part.
+    """Returns which walls (walls, b), followed by the two sides of each plane of symmetry, stop which bodies; and
+    for all nodes of these bodies, on all ranks, the initial arms, m, and the body, by ascending id. ``beside``
+    (planes, parts): the side on which a body starts, 1 or -1. Collective.
     """
     held = np.concatenate([_by_walls(case, bodies), _by_planes(case, bodies, beside)])
     held &= np.array([not each.prescribed for each in bodies.held], bool)
@@ -34,6 +34,6 @@ def _by_walls(case: Case, bodies: Bodies) -> Flags:
 
 
 def _by_planes(case: Case, bodies: Bodies, beside: Ints) -> Flags:
-    """The side above each plane, then that below."""
+    """Returns the side above each plane, then that below."""
     side = beside[:, bodies.part]
     return np.stack([side > 0, side < 0], axis=1).reshape(2 * len(case.boundaries_of(Symmetry)), bodies.n)

@@ -1,9 +1,18 @@
-"""Walls that stop rigid bodies: impulses at the nodes of their surfaces.
+r"""Walls that stop rigid bodies: impulses at the nodes of their surfaces.
 
-The bodies and the walls are the same on all ranks, and so are the nodes here: every rank computes all impulses, one
-after the other (Gauss-Seidel), with no message. Each row asks that its node is not behind its wall at the end of the
-step; impulses never pull, those of friction lie within Coulomb's cone. They are kept through a step, within the sweeps
-of contact and after them, so that a body between a wall and another body gives way to neither.
+::
+
+           \   body   /                row: node i of a body near a wall
+            \        /                 arm r from the centre c, normal n out of the wall
+             \  c + /                  velocity of the node  u = v + w x r - V   (V: velocity of the wall)
+              \  / r                   gap at the end of the step  g + dt u . n >= 0,  least = -g / dt
+               i   ^ n
+          =====.===|=========          impulse p n, p >= 0, acts on v, w and -V;  friction |f| <= mu p, across n
+              wall    V
+
+Bodies, walls and the nodes here are equal on all ranks: every rank computes all impulses, one after the other
+(Gauss-Seidel), without messages. Impulses are kept during a step, within the sweeps of contact and after them, so that
+a body between a wall and another body penetrates neither.
 """
 
 from typing import NamedTuple
@@ -17,32 +26,33 @@ from ..model.state import Flags, Floats, Indices, Ints
 from .bodies import Bodies, dot
 
 _NEAR = 2.0
-"""Times what a body moves in a step, from where on a wall is looked at."""
+"""Multiple of the motion of a body in a step within which walls are checked."""
 _CLOSE = 1e-3
-"""Of the reach of a body, the same for what hits it in the step, and the depth behind a wall that ends a run."""
+"""Share of the reach of a body: added to the distance within which walls are checked, and the depth behind a wall
+that ends the run."""
 _MOST, _ENOUGH = 200, 1e-12
-"""Passes over the rows, and the change of an impulse, over the largest, that ends them."""
+"""Most passes over the rows, and the relative change of an impulse that ends them."""
 
 
 class Rows(NamedTuple):
-    """Nodes of bodies near walls."""
+    """Nodes of bodies near walls, one row for each node and wall."""
 
     body: Ints
     wall: Ints
     arm: Floats
-    """(m, 3) from the centre of the body, m."""
+    """(m, 3) arm from the centre of the body, m."""
     normal: Floats
-    """(m, 3) out of the wall."""
+    """(m, 3) unit normal out of the wall."""
     least: Floats
-    """(m,) speed along it that takes the node to the wall in the step, m/s."""
+    """(m,) velocity along the normal at which the node reaches the wall at the end of the step, m/s."""
     push: Floats
-    """(m,) impulse along it so far, N s."""
+    """(m,) normal impulse so far, N s."""
     rub: Floats
     """(m, 3) impulse of friction so far, N s."""
 
     @classmethod
     def room(cls, n: int) -> "Rows":
-        """For as many."""
+        """Returns room for ``n`` rows."""
         return cls(
             np.empty(n, np.int64), np.empty(n, np.int64), np.empty((n, 3)), np.empty((n, 3)), np.empty(n), np.zeros(n),
             np.zeros((n, 3)),
@@ -55,28 +65,28 @@ ROWS = record(Rows, _I1, _I1, _F2, _F2, _F1, _F1, _F2)
 
 
 class BodyStops:
-    """The walls of a case and the bodies that they stop."""
+    """Walls of a case and the bodies that they stop."""
 
     def __init__(
         self, walls: Walls, bodies: Bodies, held: Flags, arms: Floats, body: Indices, restitution: Floats,
         names: list[str],
     ) -> None:  # fmt: skip
-        """``held`` (walls, b): which stop which; ``arms`` (k, 3) of all nodes of the surfaces at the start, m, each of
-        a ``body`` (k,); ``restitution`` (walls,); ``names`` (b,) of the parts.
+        """``held`` (walls, b): which walls stop which bodies; ``arms`` (k, 3) of all surface nodes at the start, m,
+        each of a ``body`` (k,); ``restitution`` (walls,); ``names`` (b,) of the parts.
         """
         self._restitution, self._names = restitution, names
         self.walls, self._bodies, self._held, self._arms, self._body = walls, bodies, held, arms, body
         self._all = Rows.room(len(arms) * walls.n)
         self._many = 0
         self.given = np.zeros((walls.n, bodies.n, 3))
-        """(walls, b, 3) what each wall has given each body so far, N s."""
+        """(walls, b, 3) sum of the impulses of each wall on each body so far, N s."""
         self.impulse, self.rubbed = np.zeros((2, bodies.n, 6))
-        """(b, 6) impulse, N s, and moment, N m s, of the step, and what of it is friction."""
+        """(b, 6) impulse, N s, and moment, N m s, of the step; and the part of them by friction."""
         self.of_walls, self.rubbed_by = np.zeros((2, walls.n, bodies.n, 3))
-        """(walls, b, 3) impulses of the step, and what of them is friction, N s."""
+        """(walls, b, 3) impulses of the step; and the part of them by friction, N s."""
 
     def begin(self, dt: float) -> None:
-        """The rows of a step, s; the bodies and walls are as they are at n, with their velocities before impulses."""
+        """Finds the rows of a step ``dt``, s, at the positions of n, with the velocities before impulses."""
         bodies = self._bodies
         rate = bodies.rates(bodies.momentum)
         size = np.sqrt((bodies.speed * bodies.speed).sum(axis=1)) + bodies.reach * np.sqrt((rate * rate).sum(axis=1))
@@ -92,7 +102,7 @@ class BodyStops:
         self.impulse[:], self.rubbed[:], self.of_walls[:], self.rubbed_by[:] = 0.0, 0.0, 0.0, 0.0
 
     def stop(self, speed: Floats, rate: Floats) -> None:
-        """Corrects ``speed`` and ``rate`` (b, 3) of the bodies, and those of walls with a mass."""
+        """Corrects ``speed`` and ``rate`` (b, 3) of the bodies, and the velocities of walls with a mass."""
         if self._many:
             walls = self.walls
             press(
@@ -101,13 +111,13 @@ class BodyStops:
             )  # fmt: skip
 
     def _rebound(self, speed: Floats, rate: Floats) -> None:
-        """Of rows whose nodes would be behind, the speed that restitution asks for, m/s."""
+        """Raises ``least`` of rows whose nodes would end behind the wall to the velocity of restitution, m/s."""
         wall, least, along = self._all.wall[: self._many], self._all.least[: self._many], self._along(speed, rate)
         back = -self._restitution[wall] * along
         least[:] = np.where((along < least) & (self._restitution[wall] > 0.0), np.maximum(least, back), least)
 
     def _along(self, speed: Floats, rate: Floats) -> Floats:
-        """(rows,) speed of each node out of its wall, m/s."""
+        """(rows,) velocity of each node along the normal of its wall, relative to it, m/s."""
         rows, n = self._all, self._many
         b, r, w = rows.body[:n], rows.arm[:n], rate[rows.body[:n]]
         turning = [w[:, i] * r[:, j] - w[:, j] * r[:, i] for i, j in ((1, 2), (2, 0), (0, 1))]
@@ -115,8 +125,8 @@ class BodyStops:
         return dot(v, rows.normal[:n])
 
     def end(self, speed: Floats, rate: Floats, dt: float, t: float) -> None:
-        """The impulses of the step ``dt``, s, at ``t``, s, are given. Raises PhysicsError, on all ranks, where they
-        leave a node behind its wall.
+        """Books the impulses of the step ``dt``, s, at ``t``, s. Raises PhysicsError, on all ranks, if a node would
+        still end behind its wall.
         """
         self.given += self.of_walls
         if self._many:
@@ -125,13 +135,13 @@ class BodyStops:
             worst = int(depth.argmax())
             if depth[worst] > _CLOSE:
                 raise PhysicsError(
-                    f"at t = {t:.6g} s rigid part {self._names[body[worst]]!r} has no way out of a wall: it is between "
-                    "walls that close, or a plane of symmetry or a velocity holds it; let the walls stop before, or "
-                    "give one a mass"
+                    f"at t = {t:.6g} s rigid part {self._names[body[worst]]!r} cannot be kept out of a wall: it is "
+                    "between walls that close, or held by a plane of symmetry or a velocity; let the walls stop "
+                    "before, or give one of them a mass"
                 )
 
     def deepest(self) -> Floats:
-        """(walls,) how deep bodies are behind each, m."""
+        """(walls,) depth of the deepest node behind each wall, m."""
         rows = Rows.room(len(self._arms) * self.walls.n)
         bodies = self._bodies
         many = find(
@@ -145,7 +155,9 @@ class BodyStops:
 
 @njit(types.int64(ROWS, SHAPES, types.boolean[:, ::1], _F2, _N1, _F3, _F2, _F1, _F), cache=True, error_model="numpy")
 def find(rows, shapes, held, arms, body, rotation, centre, near, dt):  # type: ignore[no-untyped-def]
-    """The nodes less than ``near`` (b,), m, in front of a wall that stops their body; returns how many."""
+    """Finds the nodes less than ``near`` (b,), m, in front of a wall that stops their body; returns the number of
+    rows.
+    """
     n, arm, normal = 0, np.empty(3), np.empty(3)
     for k in range(len(body)):
         b = body[k]
@@ -172,18 +184,28 @@ def find(rows, shapes, held, arms, body, rotation, centre, near, dt):  # type: i
 def press(  # type: ignore[no-untyped-def]
     rows, many, speed, rate, lightness, yielding, wall_speed, wall_lightness, friction, impulse, rubbed, given, by
 ):
-    """Passes over the rows; adds their impulses to ``impulse`` (b, 6) and to what each wall has ``given``
-    (walls, b, 3), and those of friction to ``rubbed`` and ``by`` as well.
+    """Passes over the rows until the impulses settle.
+
+    Adds the impulses to ``impulse`` (b, 6) and ``given`` (walls, b, 3), those of friction to ``rubbed`` and ``by`` as
+    well.
+
+    1. Velocity u of the node relative to the wall.
+    2. Compliance along n of body and wall: 1 / m + (r x n) . I^-1 (r x n) + 1 / M.
+    3. Normal impulse: changed by (least - u . n) / compliance, and not below zero.
+    4. Friction: u again, without its normal part, over a bound of the compliance across n; the sum of the step is
+       limited to mu p.
     """
     turn, slip, change = np.empty(3), np.empty(3), np.empty(3)
     for _ in range(_MOST):
         largest, moved = 0.0, 0.0
         for r in range(many):
+            # 1.
             b, w = rows.body[r], rows.wall[r]
             x, y, z = rows.arm[r, 0], rows.arm[r, 1], rows.arm[r, 2]
             slip[0] = speed[b, 0] + (rate[b, 1] * z - rate[b, 2] * y) - wall_speed[w, 0]
             slip[1] = speed[b, 1] + (rate[b, 2] * x - rate[b, 0] * z) - wall_speed[w, 1]
             slip[2] = speed[b, 2] + (rate[b, 0] * y - rate[b, 1] * x) - wall_speed[w, 2]
+            # 2.
             p, q, s = rows.normal[r, 0], rows.normal[r, 1], rows.normal[r, 2]
             turn[0], turn[1], turn[2] = y * s - z * q, z * p - x * s, x * q - y * p
             gives, along = wall_lightness[w], 0.0
@@ -194,6 +216,7 @@ def press(  # type: ignore[no-untyped-def]
                     gives += turn[i] * yielding[b, i, j] * turn[j]
             if not gives > 0.0:
                 continue
+            # 3.
             push = max(0.0, rows.push[r] + (rows.least[r] - along) / gives)
             more = push - rows.push[r]
             rows.push[r] = push
@@ -203,6 +226,7 @@ def press(  # type: ignore[no-untyped-def]
             _give(b, w, x, y, z, change, speed, rate, lightness, yielding, wall_speed, wall_lightness, impulse, given)
             if friction[w] == 0.0 or (push == 0.0 and more == 0.0):
                 continue
+            # 4.
             slip[0] = speed[b, 0] + (rate[b, 1] * z - rate[b, 2] * y) - wall_speed[w, 0]
             slip[1] = speed[b, 1] + (rate[b, 2] * x - rate[b, 0] * z) - wall_speed[w, 1]
             slip[2] = speed[b, 2] + (rate[b, 0] * y - rate[b, 1] * x) - wall_speed[w, 2]
@@ -234,7 +258,7 @@ def press(  # type: ignore[no-untyped-def]
 
 @njit(types.void(types.int64, types.int64, _F, _F, _F, _F1, _F2, _F2, _F2, _F3, _F2, _F1, _F2, _F3), cache=True)
 def _give(b, w, x, y, z, change, speed, rate, lightness, yielding, wall_speed, wall_lightness, impulse, given):  # type: ignore[no-untyped-def]
-    """An impulse ``change`` (3,), N s, at an arm of a body, from a wall."""
+    """Applies an impulse ``change`` (3,), N s, of a wall at an arm of a body."""
     p, q, s = change[0], change[1], change[2]
     t, u, v = y * s - z * q, z * p - x * s, x * q - y * p
     impulse[b, 3] += t

@@ -1,4 +1,4 @@
-"""What rigid bodies and walls with a mass add to the sums of the ledger."""
+"""Contribution of rigid bodies and of walls with a mass to the sums of the ledger."""
 
 import numpy as np
 
@@ -8,14 +8,14 @@ from .stage import Rigid
 
 
 def energy_of(rigid: Rigid | None, walls: Walls) -> float:
-    """Kinetic, J."""
+    """Returns the kinetic energy, J."""
     return walls.kinetic() + (float(rigid.kinetic().sum()) if rigid is not None else 0.0)
 
 
 def add_undeformed(sums: Floats, of_parts: Floats, rigid: Rigid | None, walls: Walls) -> None:
-    """Adds to ``sums`` (10,) over the nodes (energy.py): kinetic energy, loss by contact and work from outside, J,
-    momentum, kg m/s, what unequal steps have taken, and angular momentum, kg m^2/s; to those of each part, ``of_parts``
-    (parts, .), the kinetic energy.
+    """Adds to ``sums`` (10,) over the nodes (accounts/energy.py): kinetic energy, loss by contact and work from
+    outside, J, momentum, kg m/s, the work of unequal steps (zero here), and angular momentum, kg m^2/s; adds the
+    kinetic energy to that of each part, ``of_parts`` (parts, .).
     """
     if rigid is None and not walls.lightness.any():
         return
