@@ -1,5 +1,5 @@
 """Largest compression of brittle materials without a law of compressive failure, in every step, over Griffith's
-criterion (cases/compression.py).
+criterion (cases/warnings/compression.py).
 
 Such a material breaks in tension only and bears any compression. Each stress is compared with the criterion of
 Griffith (1924): (s1 - s3)^2 / (8 T (s1 + s3)) for the largest and the smallest pressure, s1 and s3, and the tensile
