@@ -10,7 +10,7 @@ from conoid.cases.output import snapshot
 
 from ..errors import ServiceError
 from . import download
-from .shapes import FragmentCourse
+from .schemas.history import FragmentCourse
 
 MOST = 200
 """Snapshots that are read for a course, evenly over those of a run. Chosen: 0.2 s where no one is known yet."""

@@ -9,7 +9,7 @@ from fastapi import FastAPI
 
 from conoid.cases.reference import json_schema
 
-from . import shapes
+from . import schemas
 
 _CASE = "#/components/schemas/Case"
 CASE_BODY: dict[str, Any] = {
@@ -139,11 +139,11 @@ def install(app: FastAPI) -> None:
     def openapi() -> dict[str, Any]:
         made = own()
         case = json_schema.json_schema("#/components/schemas/{model}")
-        _, shapes_ = msgspec.json.schema_components(shapes.ALL, ref_template="#/components/schemas/{name}")
-        for shape in shapes_.values():
-            _tell_of_null(shape.get("properties", {}))
+        _, answers = msgspec.json.schema_components(schemas.ALL, ref_template="#/components/schemas/{name}")
+        for schema in answers.values():
+            _mark_null(schema.get("properties", {}))
         made["components"] = {
-            "schemas": {**case.pop("$defs"), "Case": case, **shapes_},
+            "schemas": {**case.pop("$defs"), "Case": case, **answers},
             "securitySchemes": {"token": {"type": "http", "scheme": "bearer"}},
         }
         for path, operations in made["paths"].items():
@@ -154,7 +154,7 @@ def install(app: FastAPI) -> None:
     app.openapi = openapi  # type: ignore[method-assign]
 
 
-def _tell_of_null(properties: dict[str, dict[str, Any]]) -> None:
+def _mark_null(properties: dict[str, dict[str, Any]]) -> None:
     """JSON has no NaN: a number that is not known is null."""
     for schema in properties.values():
         default = schema.get("default")

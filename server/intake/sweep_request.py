@@ -7,7 +7,7 @@ import msgspec
 
 from conoid.cases.load import CaseError, Problem, apply_overrides, json_data
 
-from ..answers.shapes import MOST_POINTS
+from ..answers.schemas.sweeps import MOST_POINTS
 from ..errors import ServiceError, invalid_case
 
 

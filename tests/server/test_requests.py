@@ -17,7 +17,7 @@ from starlette.testclient import TestClient
 
 from conoid.cases.load import shipped_path
 from conoid.cases.reference.json_schema import json_schema
-from conoid.server.answers import reference, shapes
+from conoid.server.answers import reference
 from conoid.server.app import ROUTERS, build_app, opened
 from conoid.server.errors import ServiceError
 from conoid.server.requests.connections import BODY
@@ -510,7 +510,7 @@ def test_openapi_has_the_schema_of_a_case(server: Running) -> None:
     assert "#/$defs/" not in text
     for name in set(re.findall(r'"#/components/schemas/(\w+)"', text)):
         assert name in schemas
-    _, ours = msgspec.json.schema_components(shapes.ALL)
+    _, ours = msgspec.json.schema_components(ALL)
     assert not ours.keys() & json_schema()["$defs"].keys(), "two shapes of one name"
 
 

@@ -1,0 +1,18 @@
+"""Schemas of the JSON answers, one module for each subject. OpenAPI has them, and the routes build such answers."""
+
+from conoid.cases.output.search import Search
+
+from .cases import Gallery, Validation
+from .files import Files, SentFile, SentFiles
+from .history import EventPage, FragmentCourse, History, Snapshots
+from .problems import Problem
+from .runs import Receipt, RunPage, RunStatus
+from .site import Health, Me
+from .sweeps import Reported, Sweep, SweepPage, Wish
+from .table import Table
+
+ALL = (
+    Problem, Receipt, RunPage, RunStatus, Table, Validation, Gallery, EventPage, Files, SentFile, SentFiles, Snapshots,
+    FragmentCourse, History, Me, Health, Wish, SweepPage, Sweep, Search, Reported,
+)  # fmt: skip
+"""Schemas of whole answers and of requests."""

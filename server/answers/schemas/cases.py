@@ -1,0 +1,51 @@
+"""Cases: the check of one, and the shipped ones."""
+
+from typing import Any
+
+import msgspec
+
+from .problems import ProblemEntry
+
+
+class NamedFile(msgspec.Struct, kw_only=True):
+    """A file that a case names, and the sha256 of its content."""
+
+    path: str
+    sha256: str
+
+
+class CaseFile(msgspec.Struct, kw_only=True):
+    """A file that a case names in the table ``key``; ``sha256`` is empty where the case has no hash."""
+
+    key: str
+    path: str
+    sha256: str
+
+
+class Validation(msgspec.Struct, kw_only=True):
+    """Result of the check of a case. A valid case has warnings, an estimate, the case with all defaults, and a survey
+    of its mesh files: content by part, loads, bodies in contact.
+    """
+
+    valid: bool
+    problems: list[ProblemEntry]
+    warnings: list[ProblemEntry] = []
+    estimate: dict[str, float] = {}
+    case: dict[str, Any] = {}
+    files: list[CaseFile] = []
+    survey: dict[str, Any] = {}
+
+
+class GalleryEntry(msgspec.Struct, kw_only=True):
+    """A shipped case."""
+
+    name: str
+    title: str
+    description: str
+    url: str
+
+
+class Gallery(msgspec.Struct, kw_only=True):
+    """The shipped cases."""
+
+    cases: list[GalleryEntry]

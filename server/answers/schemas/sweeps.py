@@ -1,0 +1,68 @@
+"""Sweeps: the request, lists, and one sweep."""
+
+from typing import Annotated, Any
+
+import msgspec
+
+from conoid.cases.output.search import Search
+
+from .runs import ListedRun
+
+MOST_POINTS = 1000
+"""Largest number of points of a sweep. Chosen: the cases of that many points are made in a second."""
+
+
+class Wish(msgspec.Struct, kw_only=True, forbid_unknown_fields=True):
+    """Request for a sweep: a case as plain data, the changed values of each point by key, the largest number of runs at
+    a time.
+    """
+
+    case: dict[str, Any]
+    points: Annotated[list[dict[str, Any]], msgspec.Meta(min_length=1, max_length=MOST_POINTS)]
+    at_once: Annotated[int, msgspec.Meta(ge=1)] | None = None
+
+
+class SweepLine(msgspec.Struct, kw_only=True):
+    """A sweep in a list: number of runs by state, and number of removed runs."""
+
+    id: str
+    owner: str
+    name: str
+    submitted: float
+    at_once: int | None
+    total: int
+    states: dict[str, int]
+    removed: int
+    url: str
+    search: Search | None
+    """Last report of an adaptive sweep."""
+    reported: float | None
+    """Time of this report, Unix s."""
+
+
+class Reported(msgspec.Struct, kw_only=True):
+    """Answer to a report of an adaptive sweep: the sweep, and whether its client must submit no further point."""
+
+    id: str
+    url: str
+    stop: bool
+
+
+class SweepPage(msgspec.Struct, kw_only=True):
+    """Sweeps of the user, newest first, and the parameter ``before`` of the next page; null on the last page."""
+
+    sweeps: list[SweepLine]
+    next: str | None
+
+
+class SweepPoint(msgspec.Struct, kw_only=True):
+    """Changed values of a point, and its run."""
+
+    values: dict[str, Any]
+    run: ListedRun
+
+
+class Sweep(SweepLine, kw_only=True):
+    """A sweep with its points."""
+
+    points: list[SweepPoint]

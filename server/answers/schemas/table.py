@@ -1,0 +1,46 @@
+"""The table of runs: values of the cases and results."""
+
+import msgspec
+
+from conoid.cases.messages import Progress
+
+from .runs import ListedRun
+
+
+class TableRow(ListedRun, kw_only=True):
+    """A run in the table: index of its group of similar cases, values that differ from those of the group, results."""
+
+    progress: Progress | None
+    case: int | None
+    values: dict[str, bool | int | float | str | None]
+    results: list[float | None] | None
+    references: int
+    """Number of reference values with which the run was compared."""
+    missed: list[str]
+    """Names of the reference values that the run does not reach."""
+
+
+class Result(msgspec.Struct, kw_only=True):
+    """Name and unit of a result."""
+
+    name: str
+    unit: str
+
+
+class AlikeCases(msgspec.Struct, kw_only=True):
+    """A group of similar cases: common values by key in SI units, units by key, and the results of their runs."""
+
+    values: dict[str, bool | int | float | str]
+    units: dict[str, str]
+    results: list[Result]
+
+
+class Table(msgspec.Struct, kw_only=True):
+    """Runs, newest first, and the cursor of the next page, null on the last page. The values and results of ``pending``
+    of them have not been read yet.
+    """
+
+    runs: list[TableRow]
+    cases: list[AlikeCases]
+    pending: int
+    next: str | None
