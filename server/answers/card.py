@@ -1,6 +1,7 @@
-"""What the table of runs tells of a run beside its state: the values of its case, and its results once it has ended.
+"""The card of a run in the table of runs: the values of its case and, after its end, its results.
 
-Neither changes any more then, so a card is made once, of the files in the run's folder.
+A case never changes, and results do not change after the end, so a card is made once from the files in the run's
+folder.
 """
 
 import zlib
@@ -19,47 +20,48 @@ from ..runs import folder
 from ..runs.journal import DAMAGED
 
 FORM = 1
-"""Of a card as it is kept; one of another form is made again."""
+"""Version of the stored form of a card. A card of another version is made again."""
 _KEYS, _LETTERS = 1000, 200
-"""Values of a case, and characters of one. Chosen: a case of ten parts has 500 values."""
+"""Largest number of values of a case, and of characters of one value. Chosen: a case of ten parts has 500 values."""
 _RESULTS = 200
-"""Of a run. Chosen: a run of twenty probes has 100."""
+"""Largest number of results of a run. Chosen: a run of twenty probes has 100."""
 _MOST_BYTES = 8 << 20
-"""Of a case's file that is read. Chosen: ten times the largest body of a request, with every default."""
+"""Largest size in bytes of a case file that is read. Chosen: ten times the largest body of a request, with every
+default."""
 _LEFT_OUT = ("digest", ".passed")
-"""How the names of results end that are no numbers."""
+"""Endings of the names of results that are not numbers."""
 
 
 class Card(msgspec.Struct, kw_only=True, frozen=True):
-    """Of one run; ``results`` is None before it has ended."""
+    """Values and results of one run; ``results`` is None before its end."""
 
     title: str = ""
     values: dict[str, Scalar] = {}
-    """Of the case, by key, in SI units."""
+    """Values of the case by key, in SI units."""
     results: dict[str, float | None] | None = None
     units: dict[str, str] = {}
-    """Of results that have one."""
+    """Units of the results that have one, by name."""
     references: int = 0
-    """Reference numbers that the run was compared with."""
+    """Number of reference values with which the run was compared."""
     missed: list[str] = []
-    """Names of those that it misses."""
+    """Names of the reference values that the run does not reach."""
 
 
 _decoder = msgspec.json.Decoder(Card)
 
 
 def packed(card: Card) -> bytes:
-    """A card as it is kept."""
+    """Returns the stored form of a card."""
     return zlib.compress(msgspec.json.encode(card), 1)
 
 
 def unpacked(data: bytes) -> Card:
-    """Raises msgspec.MsgspecError, zlib.error for what is no card."""
+    """Returns a card from its stored form. Raises msgspec.MsgspecError, zlib.error for other data."""
     return _decoder.decode(zlib.decompress(data))
 
 
 def of(path: Path, final: bool) -> Card:
-    """The card of the run in the folder ``path``; what is gone or damaged there is left out."""
+    """Makes the card of the run in the folder ``path``. Missing and damaged files are left out."""
     ended = _ended(path) if final else None
     found = {
         pair: _number(value)
@@ -77,7 +79,7 @@ def of(path: Path, final: bool) -> Card:
 
 
 def _number(value: float | None) -> float | None:
-    """None for a whole number that is larger than any float, too."""
+    """Converts a result to float; None for an integer that is too large for a float."""
     try:
         return None if value is None else float(value)
     except OverflowError:

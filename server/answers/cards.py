@@ -1,4 +1,4 @@
-"""The cards of runs, kept in the database: an index over the folders of runs, which can be made again from them."""
+"""Cards of runs in the database. They are an index over the folders of runs, and can be made again from them."""
 
 import time
 import zlib
@@ -14,18 +14,18 @@ from . import card
 from .card import Card
 
 _PATIENCE = 0.5
-"""s that a request spends on making cards; the next one goes on. Chosen: some hundred runs."""
+"""Time in s in which a request makes missing cards; the next request makes more. Chosen: some hundred runs."""
 
 
 class Cards:
-    """May be used from any thread."""
+    """Reads cards from the database and makes missing ones. Methods may be called from any thread."""
 
     def __init__(self, runs: Path, store: Store) -> None:
-        """``runs`` is the folder of all runs. Reads nothing yet."""
+        """``runs`` is the folder of all runs. Nothing is read yet."""
         self._runs, self._store = runs, store
 
     def of(self, runs: Sequence[Run]) -> dict[str, Card]:
-        """Cards by the ids of the runs; without those that there was no time to make. Raises SQLAlchemyError."""
+        """Returns cards by run id. Runs whose cards could not be made in time are missing. Raises SQLAlchemyError."""
         known = {each.run: each for each in self._store.cards([run.id for run in runs])}
         found, made, until = dict[str, Card](), list[KeptCard](), time.monotonic() + _PATIENCE
         for run in runs:
@@ -39,7 +39,7 @@ class Cards:
         return found
 
     def _keep(self, made: list[KeptCard], found: dict[str, Card]) -> None:
-        """What cannot be kept now is made again when it is asked for."""
+        """Stores cards. After a failure the same cards are made again for the next request."""
         try:
             self._store.keep_cards(made, {each.run: found[each.run].title for each in made})
         except SQLAlchemyError:
@@ -47,7 +47,7 @@ class Cards:
 
 
 def _read(kept: KeptCard | None, run: Run) -> Card | None:
-    """The card that is kept, where it is the one of the run as it is now."""
+    """Returns the stored card if it belongs to the present state of the run, else None."""
     if kept is None or kept.form != card.FORM or kept.final != run.state.final:
         return None
     try:

@@ -1,8 +1,8 @@
-"""history.csv as columns for charts: as many lines as are kept, thinned so that no peak is lost.
+"""history.csv as columns for charts, reduced so that no peak is lost.
 
-Lines are gathered into groups, each of as many lines. Of each column a group keeps its least and its greatest value, in
-the order in which they came. When there are too many groups, two become one, so that memory and answers are bounded
-while a file of any length is read once.
+Lines are gathered in groups of equal size. A group keeps the minimum and the maximum of each column, in the order in
+which they occurred. When there are too many groups, pairs of groups are merged. So memory and answers are bounded,
+and a file of any length is read once.
 """
 
 import csv
@@ -19,22 +19,23 @@ from conoid.cases.reading import whole
 from ..runs.journal import Tail
 
 _GROUPS = 4096
-"""Groups that are kept, at most: more than a screen has pixels. Chosen."""
+"""Largest number of groups: more than the pixels of a screen. Chosen."""
 _NUMBERS = 400_000
-"""Groups times columns that are kept, at most. Chosen: 6 MB."""
+"""Largest product of groups and columns. Chosen: 6 MB."""
 _SENT = 200_000
-"""Numbers of an answer, at most. Chosen: 4 MB of JSON."""
+"""Largest number of values in an answer. Chosen: 4 MB of JSON."""
 _BLOCK = 1 << 20
-"""Bytes that are read at once. Chosen."""
+"""Bytes of one read. Chosen."""
 _AT_ONCE = 32
-"""Blocks that are read for one answer, at most: some 100,000 lines, half a second. Chosen."""
+"""Largest number of blocks that are read for one answer: some 100,000 lines, half a second. Chosen."""
 _TEXT = frozenset({"limiter"})
-"""Columns that have no numbers."""
-csv.field_size_limit(1 << 30)  # What is longer than a number is none; it is no error.
+"""Columns of text."""
+csv.field_size_limit(1 << 30)
+"""The csv module refuses longer fields. A field that is not a number becomes NaN."""
 
 
 class Columns:
-    """What has been read of a history.csv; its holder takes a lock."""
+    """Content of a history.csv as far as it has been read. The caller holds a lock."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -44,22 +45,22 @@ class Columns:
         self._tail = Tail(self._path)
         self._file = self._size = 0
         self.units: dict[str, str] = {}
-        """By name, of the columns of numbers."""
+        """Units of the columns of numbers, by name."""
         self.lines = 0
         self.behind = False
-        """Whether the file has lines that have not been read."""
+        """True while the file has lines that have not been read."""
         self._width, self._every = 0, 1
         self._places: list[int] = []
-        """Of the columns of numbers in a line."""
+        """Positions of the columns of numbers in a line."""
         self._kept: list[array[float]] = []
-        """By column, two values a group of ``_every`` lines."""
+        """Two values for each group of ``_every`` lines, by column."""
         self._open: list[list[float]] = []
-        """By column, lines that make no whole group yet."""
+        """Values of the lines of the last, incomplete group, by column."""
         self._extremes: list[tuple[float, float]] = []
         self._last: list[float] = []
 
     def catch_up(self) -> None:
-        """Reads what is new, at most ``_AT_ONCE`` blocks of it. A file that has been written anew is begun anew."""
+        """Reads new lines, at most ``_AT_ONCE`` blocks. A file that was replaced is read from its beginning."""
         if self._is_another():
             self._begin()
             self._is_another()
@@ -72,7 +73,8 @@ class Columns:
         self.behind = True
 
     def _is_another(self) -> bool:
-        """Whether this is not the file of the last time: a run that goes on from a checkpoint writes a new one."""
+        """Whether the file was replaced since the last call: a run that continues from a checkpoint writes a new
+        one."""
         try:
             with whole.opened(self._path, links=False) as file:
                 now = os.fstat(file.fileno())
@@ -89,9 +91,9 @@ class Columns:
         rows = [row for row in rows if len(row) == self._width]
         if not rows:
             return
-        told = list(zip(*rows, strict=True))
+        columns = list(zip(*rows, strict=True))
         for at, place in enumerate(self._places):
-            self._add(at, _numbers(told[place]))
+            self._add(at, _numbers(columns[place]))
         self.lines += len(rows)
         self._merge()
 
@@ -99,7 +101,7 @@ class Columns:
         pairs = [history.split(name) for name in names]
         self._width = len(names)
         places = {name: k for k, (name, _) in reversed([*enumerate(pairs)]) if name not in _TEXT}
-        self._places = sorted(places.values())  # Of columns with the same name the first.
+        self._places = sorted(places.values())  # the first of several columns with the same name
         self.units = dict(pairs[k] for k in self._places)
         number = len(self._places)
         self._kept = [array("d") for _ in range(number)]
@@ -117,7 +119,7 @@ class Columns:
         self._open[at] = values[ends:]
 
     def _merge(self) -> None:
-        """Until there are no more groups than may be kept."""
+        """Merges pairs of groups until the number of groups is within the limit."""
         most = 2 * max(2, min(_GROUPS, _NUMBERS // max(1, len(self._kept))))
         while self._kept and len(self._kept[0]) > most:
             self._kept = [
@@ -127,15 +129,15 @@ class Columns:
             self._every *= 2
 
     def statistics(self) -> dict[str, dict[str, Any]]:
-        """Of each column its unit, its last, its least and its greatest value."""
+        """Returns unit, last value, minimum and maximum of each column."""
         return {
             name: {"unit": unit, "last": last, "least": low, "most": high}
             for (name, unit), last, (low, high) in zip(self.units.items(), self._last, self._extremes, strict=True)
         }
 
     def values(self, names: Sequence[str], points: int) -> dict[str, list[float]]:
-        """Columns by name, of about ``points`` lines at most: all there are, or of each group of lines the least and
-        the greatest value, in their order, and the last line.
+        """Returns columns by name, of about ``points`` values at most: all values, or the minimum and the maximum of
+        each group of lines in their order, and the last value.
         """
         chosen = frozenset(names)
         places = {name: at for at, name in enumerate(self.units) if name in chosen}
@@ -153,9 +155,7 @@ class Columns:
 
 
 def extremes(values: Sequence[float]) -> tuple[float, float]:
-    """The least and the greatest of some numbers, in the order in which they come first; those that are no numbers are
-    passed over.
-    """
+    """Returns the minimum and the maximum in the order of their first occurrence. NaN is ignored."""
     total = sum(values)
     if total != total:
         values = [value for value in values if value == value]

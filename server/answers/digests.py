@@ -12,28 +12,29 @@ from ..requests.thread_pool import ThreadPool
 State = tuple[int, int, int, int, int]
 """State of a file: device, inode, times of the last change of content and of the inode in ns, size in bytes."""
 _KEPT = 10_000
-"""Digests that are kept, 32 bytes each. Chosen."""
+"""Largest number of stored digests, 32 bytes each. Chosen."""
 _SLICE, _CHUNK = 1 << 25, 1 << 18
-"""Bytes of one task, and bytes of one read. Chosen: 0.1 s, between which other requests of the user are served."""
+"""Bytes of one task, and bytes of one read. Chosen: a task takes 0.1 s; other requests of the user are served
+between tasks."""
 
 
 def state_of(file: BinaryIO) -> State:
-    """State of an open file."""
+    """Returns the state of an open file."""
     status = os.fstat(file.fileno())
     return status.st_dev, status.st_ino, status.st_mtime_ns, status.st_ctime_ns, status.st_size
 
 
 class Digests:
-    """Digests of files. Used in the thread of the event loop."""
+    """Digests of files by their state. Used in the thread of the event loop."""
 
     def __init__(self, pool: ThreadPool) -> None:
-        """None is known yet."""
+        """Starts without digests."""
         self._pool = pool
         self._known: OrderedDict[State, bytes] = OrderedDict()
         self._locks: WeakValueDictionary[State, asyncio.Lock] = WeakValueDictionary()
 
     async def of(self, file: BinaryIO, state: State) -> bytes:
-        """SHA-256 of the first ``size`` bytes. Raises OSError, ServiceError 503."""
+        """Returns the SHA-256 of the first ``size`` bytes. Raises OSError, ServiceError 503."""
         lock = self._locks.setdefault(state, asyncio.Lock())
         async with lock:
             if state not in self._known:

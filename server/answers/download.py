@@ -1,4 +1,4 @@
-"""Sends a file of a run's folder, whole or in part, and nothing outside of it."""
+"""Download of files from a run's folder, whole or in part. Files outside the folder are never sent."""
 
 import base64
 import hashlib
@@ -21,9 +21,9 @@ from ..requests.user_limits import place_of
 from .digests import Digests, State, state_of
 
 _CHUNK = 1 << 18
-"""Bytes that are read and sent at once. Chosen: larger ones are not faster."""
+"""Bytes of one read and one send. Chosen: larger blocks are not faster."""
 _SMALL = 1 << 20
-"""Bytes of a file that is sent, and hashed, in a moment. Chosen: 1 ms of a processor."""
+"""Largest size in bytes of a file that is sent and hashed at once. Chosen: 1 ms of a processor."""
 _RANGE = re.compile(r"bytes=(\d{0,18})-(\d{0,18})")
 _TYPES = {
     ".json": "application/json", ".jsonl": "application/x-ndjson", ".toml": "application/toml",
@@ -34,7 +34,7 @@ _TYPES = {
 
 @dataclass(frozen=True)
 class Entry:
-    """A file of a run, with its path relative to the run's folder; ``modified`` in Unix s."""
+    """A file of a run. ``path`` is relative to the run's folder; ``modified`` in Unix s."""
 
     path: str
     size: int
@@ -42,7 +42,7 @@ class Entry:
 
 
 def listing(folder: Path) -> list[Entry]:
-    """Every regular file below ``folder``, by path; links and hidden names are left out."""
+    """Lists the regular files below ``folder`` by path, without links and hidden names."""
     entries = []
     for here, folders, names in os.walk(folder):
         folders[:] = [name for name in folders if not name.startswith(".")]
@@ -58,8 +58,8 @@ def listing(folder: Path) -> list[Entry]:
 def open_inside(folder: Path, relative: str) -> BinaryIO:
     """Opens a regular file below ``folder``. Raises ServiceError 404 for everything else.
 
-    Each step of the path is opened from the one before without following links, so that neither ``..`` nor a link,
-    not even one put there at this moment, leads outside.
+    Each part of the path is opened relative to the folder before it, and links are not followed. So neither ``..``
+    nor a link leads outside, even a link that is created during the call.
     """
     parts = relative.split("/")
     if any(part in {"", ".", ".."} or part.startswith(".") or "\0" in part for part in parts):
@@ -86,17 +86,17 @@ def _walk(folder: Path, parts: list[str]) -> int:
 
 
 class Downloads:
-    """Belongs to the event loop."""
+    """Sends files. Used in the thread of the event loop."""
 
     def __init__(self, pool: ThreadPool) -> None:
-        """Files are read in the lane of who asks."""
+        """``pool`` has the threads that read files, with limits for each user."""
         self._pool, self._digests = pool, Digests(pool)
 
     async def respond(self, request: Request, folder: Path, relative: str, ended: bool) -> Response:
-        """The file as it is now, honouring Range, If-Range and If-None-Match; its sha256 stands in Repr-Digest.
+        """Sends the present content of a file, with Range, If-Range and If-None-Match; Repr-Digest has its sha256.
 
-        A large file of a run that goes on has no Repr-Digest: it may grow faster than it is read. A file that is still
-        growing is sent up to its size at this moment. Raises ServiceError 404, 416, 429, 503.
+        Repr-Digest is left out for a large file of an open run: such a file may grow faster than it can be read. A
+        growing file is sent up to its size at the time of the request. Raises ServiceError 404, 416, 429, 503.
         """
         file, state = await self._pool.run(_opened, folder, relative)
         try:
@@ -128,7 +128,7 @@ class Downloads:
     async def whole(
         self, request: Request, folder: Path, relative: str, headers: Mapping[str, str], media_type: str
     ) -> Response:
-        """A file that does not change, with headers of the caller's. Raises ServiceError 404, 429, 503."""
+        """Sends a file that never changes, with headers of the caller. Raises ServiceError 404, 429, 503."""
         file, state = await self._pool.run(_opened, folder, relative)
         try:
             if state[-1] > _SMALL:
@@ -145,13 +145,13 @@ def _opened(folder: Path, relative: str) -> tuple[BinaryIO, State]:
 
 
 def is_known(etag: str, text: str) -> bool:
-    """Whether an If-None-Match has this ETag, or all there are; one that a proxy has made weak counts as well."""
+    """Whether an If-None-Match contains this ETag or ``*``; a weak form, which proxies make, counts as well."""
     known = {tag.strip().removeprefix("W/") for tag in text.split(",")}
     return etag in known or known == {"*"}
 
 
 def tagged(body: bytes, known: str) -> Response:
-    """JSON with an ETag, or 304 where the caller knows it."""
+    """Returns JSON with an ETag, or 304 if the client has this ETag."""
     etag = f'"{hashlib.sha256(body).hexdigest()[:32]}"'
     headers = {"ETag": etag, "Cache-Control": "private, no-cache"}
     if is_known(etag, known):
@@ -160,7 +160,7 @@ def tagged(body: bytes, known: str) -> Response:
 
 
 def _part(request: Request, size: int, etag: str) -> tuple[int, int, int]:
-    """First byte, end and status of the answer; several ranges at once are answered with the whole file."""
+    """Returns first byte, end and status of the answer. A request for several ranges gets the whole file."""
     match = _RANGE.fullmatch(request.headers.get("range", "").replace(" ", ""))
     if match is None or match[0] == "bytes=-" or request.headers.get("if-range", etag) != etag:
         return 0, size, 200
@@ -175,7 +175,7 @@ def _part(request: Request, size: int, etag: str) -> tuple[int, int, int]:
 
 
 class _FileResponse(StreamingResponse):
-    """A part of an open file; closes it, also when the client leaves in the middle."""
+    """Yields a part of an open file; closes the file, also when the client disconnects."""
 
     def __init__(
         self, pool: ThreadPool, file: BinaryIO, begin: int, end: int, status: int, headers: Mapping[str, str]

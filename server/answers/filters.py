@@ -1,4 +1,4 @@
-"""Which runs of a user a list has, as conditions of SQL: by state, label, case, words and time."""
+"""Filters of a list of runs as conditions of SQL: state, label, case, words and time."""
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -11,7 +11,7 @@ from conoid.cases.run import State
 from ..database.tables import LABELS, RUNS
 
 OPEN = [state.value for state in State if not state.final]
-"""Of runs that have not ended."""
+"""States of runs that have not ended."""
 _ESCAPE = "\\"
 _SPECIAL = re.compile(r"([\\%_])")
 _Column = sa.ColumnElement[str]
@@ -19,25 +19,26 @@ _Column = sa.ColumnElement[str]
 
 @dataclass(frozen=True)
 class Chosen:
-    """What the runs of a list have in common; what is left out excludes none. Times are Unix s."""
+    """Filters of a list; a filter without a value excludes nothing. Times are Unix s."""
 
     states: Sequence[State] = ()
     labels: Mapping[str, str] = field(default_factory=dict)
     case: str = ""
-    """The name of the case; ``*`` stands for any letters."""
+    """Name of the case; ``*`` stands for any characters."""
     words: Sequence[str] = ()
-    """Each stands in the case's name or title, the labels, the state, the cause or the message, or begins the id."""
+    """Words that must all occur: in the case's name or title, labels, state, cause or message, or at the start of
+    the id."""
     since: float | None = None
-    """Submitted then, or later."""
+    """Submitted at this time or later."""
     until: float | None = None
-    """Submitted before."""
+    """Submitted before this time."""
     runs: Sequence[str] | None = None
-    """One of these; None: of all."""
+    """Runs with these ids; None: no filter."""
     changed: float | None = None
-    """Open, or submitted or ended then, or later."""
+    """Open runs, and runs that were submitted or ended at this time or later."""
 
     def where(self, owner: str) -> Iterator[sa.ColumnElement[bool]]:
-        """The conditions, all of which hold."""
+        """Yields the conditions, all of which must hold."""
         runs = RUNS.c
         yield runs.owner == owner
         if self.states:
@@ -63,7 +64,7 @@ def _literal(text: str) -> str:
 
 
 def _like(column: _Column, pattern: str) -> sa.ColumnElement[bool]:
-    """Whatever the case of the letters; databases differ in it."""
+    """Compares without case; the default of this differs between databases."""
     return sa.func.lower(column).like(pattern.lower(), escape=_ESCAPE)
 
 

@@ -1,4 +1,4 @@
-"""The course of one fragment over the snapshots of a run."""
+"""History of one fragment over the snapshots of a run."""
 
 import os
 from collections.abc import Iterator, Sequence
@@ -13,41 +13,42 @@ from . import download
 from .schemas.history import FragmentCourse
 
 MOST = 200
-"""Snapshots that are read for a course, evenly over those of a run. Chosen: 0.2 s where no one is known yet."""
+"""Largest number of snapshots that are read for a history, evenly spaced. Chosen: 0.2 s without cached tables."""
 _KNOWN = 512
-"""Snapshots whose tables of fragments are kept, of all runs: 50 MB at most."""
+"""Number of cached tables of fragments, of all runs: 50 MB at most."""
 _HEADER = 16
-"""Bytes that say how long the header is."""
+"""Bytes at the start of a snapshot that contain the length of the header."""
 _LONGEST = 1 << 24
-"""Bytes of a header that is read. Chosen: a hundred times the longest of a shipped case."""
+"""Largest size in bytes of a header. Chosen: a hundred times the longest header of a shipped case."""
 _DAMAGE = ValueError, IndexError, TypeError, OverflowError, RecursionError
-"""What a header with wrong numbers, and a file that ends before its columns do, come to."""
+"""Errors that a header with wrong numbers or a truncated file causes."""
 _COLUMNS = "fragment_id", "fragment_mass", "fragment_velocity", "fragment_size", "fragment_tets"
 
 
-def course(folder: Path, told: Sequence[Snapshot], label: int) -> FragmentCourse:
-    """Of the fragment ``label`` of the run in ``folder``; a snapshot without it, or a damaged one, has no row."""
-    most = min(MOST, len(told))
-    chosen = sorted({round(k * (len(told) - 1) / max(most - 1, 1)) for k in range(most)})
-    rows = [row for k in chosen for row in _found(folder, told[k], label)]
+def course(folder: Path, snapshots: Sequence[Snapshot], label: int) -> FragmentCourse:
+    """Returns the history of the fragment ``label`` of the run in ``folder``. A snapshot without the fragment, or a
+    damaged one, gives no row."""
+    most = min(MOST, len(snapshots))
+    chosen = sorted({round(k * (len(snapshots) - 1) / max(most - 1, 1)) for k in range(most)})
+    rows = [row for k in chosen for row in _found(folder, snapshots[k], label)]
     columns = [list(column) for column in zip(*rows, strict=True)] or [[] for _ in range(6)]
     return FragmentCourse(**dict(zip(("n", "t", "mass", "speed", "size", "tets"), columns, strict=True)))
 
 
-def _found(folder: Path, told: Snapshot, label: int) -> Iterator[tuple[float, ...]]:
+def _found(folder: Path, message: Snapshot, label: int) -> Iterator[tuple[float, ...]]:
     try:
-        identity, mass, velocity, size, tets = _table(folder, told.path, told.sha256)
+        identity, mass, velocity, size, tets = _table(folder, message.path, message.sha256)
         row = identity.tolist().index(label)
         speed = sum(part * part for part in velocity[3 * row : 3 * row + 3]) ** 0.5
-        yield told.n, told.t, mass[row], speed, size[row], tets[row]
+        yield message.n, message.t, mass[row], speed, size[row], tets[row]
     except (ServiceError, OSError, *_DAMAGE):
         return
 
 
 @lru_cache(maxsize=_KNOWN)
 def _table(folder: Path, path: str, _sha256: str) -> tuple[memoryview, ...]:
-    """The columns of the table of fragments; no more of the file is read than they are. Raises ServiceError, OSError,
-    ValueError.
+    """Returns the columns of the table of fragments; only these are read from the file. Raises ServiceError,
+    OSError, ValueError.
     """
     with download.open_inside(folder, path) as file:
         start = file.read(_HEADER)

@@ -1,8 +1,7 @@
-"""What a run has said so far, thinned, so that a run of a million events opens at once.
+"""History of a run from its journal, with a limited number of reports: a run of a million events is shown at once.
 
-The journal is read once, and from then on what is new of it. Most lines are only looked at in their first letters; of
-the reports a few thousand are kept as they stand, every so many of them, and more and more of them are passed over as
-the run goes on. The rare events (cuts, snapshots, states) are all kept.
+The journal is read once, then only its new lines. For most lines only the type is read. Every n-th report is kept
+unchanged, and n doubles when the limit is reached. All rare events (balance events, snapshots, states) are kept.
 """
 
 import re
@@ -24,11 +23,11 @@ from .log_messages import KINDS, Notes
 _SAMPLES = 4096
 """Largest number of reports that are kept of a run. Chosen: some times the pixels of a chart."""
 _BYTES = 16 << 20
-"""Largest size of the kept reports of a run, bytes. Chosen: room for all of them up to some hundred ranks."""
+"""Largest size of the kept reports of a run, bytes. Chosen: room for all reports of a run of some hundred ranks."""
 _CUTS = 10_000
 """Number of newest balance events that are kept. Chosen."""
 _RUNS = 16
-"""Number of runs whose history is kept, the last ones asked for. Chosen."""
+"""Number of runs whose history is cached, the most recently requested. Chosen."""
 _BLOCK = 4 << 20
 """Bytes of one read of the journal. Chosen."""
 _TYPE = slice(9, 13)
@@ -41,7 +40,7 @@ _status = msgspec.json.Decoder(Status)
 
 @dataclass(frozen=True)
 class Sample:
-    """A report: the newest line of each type at its time; b"" for types without a line yet."""
+    """A report: the newest line of each type at this time; b"" for a type without a line yet."""
 
     progress: bytes
     load: bytes
@@ -56,11 +55,11 @@ class Sample:
 
 @dataclass
 class History:
-    """The history of a run, up to the part of its journal that has been read."""
+    """History of a run, up to the part of its journal that has been read."""
 
     path: Path
     last: int = 0
-    """Number of the last event."""
+    """``seq`` of the last event."""
     wall: float = 0.0
     """Unix time of the last status, s."""
     began: float | None = None
@@ -70,21 +69,21 @@ class History:
     newest: Sample | None = None
     cuts: list[bytes] = field(default_factory=list)
     snapshots: dict[int, bytes] = field(default_factory=dict)
-    """Lines of snapshots by number."""
+    """Lines of snapshots by their number."""
     notes: Notes = field(default_factory=Notes)
     answers: dict[int, tuple[int, bytes]] = field(default_factory=dict)
-    """Answers for a run that has ended, by their number of points: the last event, and the body."""
+    """Answers for a run that has ended, by number of points: ``seq`` of the last event, and the body."""
 
     def __post_init__(self) -> None:
         self.lock = threading.Lock()
         self.columns = Columns(self.path.with_name(layout.HISTORY))
-        """Columns of history.csv; they are read separately, under the same lock."""
+        """Columns of history.csv. The file is read separately, under the same lock."""
         self._tail = Tail(self.path)
         self._progress = self._counts = self._snapshot = b""
         self._every, self._reports, self._size = 1, 0, 0
 
     def catch_up(self) -> None:
-        """Reads new lines of the journal; the lock is held."""
+        """Reads new lines of the journal. The caller holds the lock."""
         while block := self._tail.block(_BLOCK):
             lines = block.split(b"\n")
             for line in lines:
@@ -118,9 +117,9 @@ class History:
             if kind == b"stat":
                 self._state(_status.decode(line))
             elif kind == b"snap":
-                told = _snapshot.decode(line.decode())
-                if Path(told.path).name and _SHA256.fullmatch(told.sha256):
-                    self.snapshots[told.n] = self._snapshot = line
+                message = _snapshot.decode(line.decode())
+                if Path(message.path).name and _SHA256.fullmatch(message.sha256):
+                    self.snapshots[message.n] = self._snapshot = line
             elif msgspec.json.decode(line.decode(), type=msgspec.Raw):
                 self.cuts.append(line)
                 del self.cuts[:-_CUTS]
@@ -137,15 +136,15 @@ _RARE = frozenset({b"stat", b"snap", b"bala"})
 
 
 class Histories:
-    """Histories of the runs that were asked for last, for any thread."""
+    """Cache of the most recently requested histories, for any thread."""
 
     def __init__(self) -> None:
-        """None yet."""
+        """Starts without histories."""
         self._lock = threading.Lock()
         self._known: OrderedDict[Path, History] = OrderedDict()
 
     def of(self, path: Path) -> History:
-        """The history of the journal at ``path``; the caller takes its lock and calls ``catch_up``."""
+        """Returns the history of the journal at ``path``. The caller takes its lock and calls ``catch_up``."""
         with self._lock:
             found = self._known.setdefault(path, History(path))
             self._known.move_to_end(path)

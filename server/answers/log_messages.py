@@ -1,4 +1,4 @@
-"""What a run has said in words since its beginning: log, states and checkpoints, as lines of the journal."""
+"""Messages of a run for people: log, states and checkpoints, as lines of the journal."""
 
 from collections import deque
 from dataclasses import dataclass, field
@@ -10,11 +10,11 @@ from conoid.cases.messages import Checkpoint, Log, Status, to_json
 from ..runs.journal import DAMAGED
 
 _FIRST, _NEWEST = 200, 800
-"""Lines that are kept, from the beginning and from the end. Chosen: what somebody reads, and little to send."""
+"""Number of lines that are kept from the beginning and from the end. Chosen: enough to read, small to send."""
 _LONGEST = 2000
-"""Letters of a text that is kept. Chosen: the longest warning of a shipped case has 500."""
+"""Largest number of characters of a message. Chosen: the longest warning of a shipped case has 500."""
 _WARNINGS = 200
-"""Warnings that are kept, the first ones. Chosen."""
+"""Largest number of warnings; later ones are dropped. Chosen."""
 KINDS = frozenset({b'log"', b"stat", b"chec"})
 """First letters of the types of these messages."""
 
@@ -23,16 +23,16 @@ _decode = msgspec.json.Decoder(Log | Status | Checkpoint).decode
 
 @dataclass
 class Notes:
-    """Bounded: of a long log the lines in the middle are left out, and counted."""
+    """A bounded log: of a long log the lines in the middle are dropped and counted."""
 
     first: list[bytes] = field(default_factory=list)
     newest: deque[bytes] = field(default_factory=lambda: deque(maxlen=_NEWEST))
     warnings: dict[str, bytes] = field(default_factory=dict)
-    """The line of each warning and error by its text: what is said again is there once."""
+    """Lines of warnings and errors by text, so that a repeated text occurs once."""
     left_out: int = 0
 
     def take(self, line: bytes) -> None:
-        """Keeps a line of the journal; one that is damaged is passed over."""
+        """Adds a line of the journal; a damaged line is ignored."""
         try:
             message = _decode(line.decode())
         except DAMAGED:
@@ -48,13 +48,13 @@ class Notes:
             self.newest.append(line)
 
     def shown(self) -> dict[str, object]:
-        """As it is sent, oldest first."""
+        """Returns the log as it is sent, oldest message first."""
         lines = [msgspec.Raw(line) for line in (*self.first, *self.newest)]
         return {"log": lines, "log_left_out": self.left_out, "warnings": list(map(msgspec.Raw, self.warnings.values()))}
 
 
 def _shortened(message: Log | Status | Checkpoint, line: bytes) -> bytes:
-    """A line without what is too long of its text, and without what is no part of the message then."""
+    """Shortens long texts of a line, and drops fields that the message type does not have."""
     if len(line) <= _LONGEST:
         return line
     texts = {name: text for name in message.__struct_fields__ if isinstance(text := getattr(message, name), str)}

@@ -1,4 +1,5 @@
-"""The OpenAPI document of the routes: the body of a case, which FastAPI sees as bytes, and the shape of each answer."""
+"""The OpenAPI document of the routes: the body of a case, which FastAPI takes as bytes, and the schema of each
+answer."""
 
 import math
 from functools import cache
@@ -21,7 +22,7 @@ CASE_BODY: dict[str, Any] = {
         },
     }
 }
-"""Body of routes that take a case."""
+"""Request body of routes that take a case."""
 
 
 SWEEP_BODY: dict[str, Any] = {
@@ -30,14 +31,14 @@ SWEEP_BODY: dict[str, Any] = {
         "content": {"application/json": {"schema": {"$ref": "#/components/schemas/Wish"}}},
     }
 }
-"""Body of the route that takes a sweep."""
+"""Request body of the route that takes a sweep."""
 SEARCH_BODY: dict[str, Any] = {
     "requestBody": {
         "required": True,
         "content": {"application/json": {"schema": {"$ref": "#/components/schemas/Search"}}},
     }
 }
-"""Body of the route that takes the report of an adaptive sweep."""
+"""Request body of the route that takes the report of an adaptive sweep."""
 FILE_BODY: dict[str, Any] = {
     "parameters": [
         {
@@ -50,7 +51,7 @@ FILE_BODY: dict[str, Any] = {
         "content": {"application/octet-stream": {"schema": {"type": "string", "format": "binary"}}},
     },
 }  # fmt: skip
-"""Body of the route that takes a file."""
+"""Request body of the route that takes a file."""
 _JSON, _PROBLEM, _BYTES = "application/json", "application/problem+json", "application/octet-stream"
 _TEXT, _FILE = "text/plain", "*/*"
 ANSWERS: dict[tuple[str, str], dict[int, tuple[str, str]]] = {
@@ -97,7 +98,7 @@ ANSWERS: dict[tuple[str, str], dict[int, tuple[str, str]]] = {
     ("get", "/readyz"): {200: (_JSON, "Health"), 503: (_JSON, "Health")},
     ("get", "/metrics"): {200: (_TEXT, "")},
 }
-"""What each route answers where nothing is wrong: media type, and the shape where it is JSON of ours."""
+"""Answer of each route on success: status, media type, and schema if it is JSON of this server."""
 _OPEN = {"/v1/case.schema.json", "/healthz", "/readyz"}
 _REFUSALS = {
     400: "a parameter is wrong", 401: "no valid token", 403: "the token lacks the scope", 404: "there is none",
@@ -110,7 +111,7 @@ _REFUSALS = {
 
 
 def refusals(method: str, path: str) -> set[int]:
-    """The statuses other than success that a route may answer with."""
+    """Returns the error statuses of a route."""
     found = {400, 500, 503} | (set() if path in _OPEN else {401, 403}) | (set() if path == "/healthz" else {429})
     if "{" in path:
         found |= {404}
@@ -132,7 +133,7 @@ def refusals(method: str, path: str) -> set[int]:
 
 
 def install(app: FastAPI) -> None:
-    """Makes what ``app`` says of itself whole: the case, the shape of each answer, each status, the token."""
+    """Completes the OpenAPI document of ``app``: schema of a case, schema of each answer, each status, the token."""
     own = app.openapi
 
     @cache
@@ -155,7 +156,7 @@ def install(app: FastAPI) -> None:
 
 
 def _mark_null(properties: dict[str, dict[str, Any]]) -> None:
-    """JSON has no NaN: a number that is not known is null."""
+    """Marks numbers with default NaN as nullable: JSON has no NaN, an unknown number is null."""
     for schema in properties.values():
         default = schema.get("default")
         if isinstance(default, float) and math.isnan(default):

@@ -1,8 +1,8 @@
-"""The live page: its own files, and the two JavaScript libraries that it draws with, out of an installed wheel.
+"""The live page: its own files, and two JavaScript libraries from an installed wheel.
 
-three.js and ECharts come as ES modules inside the package ``nicegui``. Its metadata says where the files are; they are
-served, and the package is never imported: what it needs itself is not needed here. All files are read once, at the
-start: no address leads to a disk.
+three.js and ECharts are ES modules inside the package ``nicegui``. The metadata of the package has the paths of the
+files; the package is never imported, so its dependencies are not needed. All files are read once, at the start: no
+request opens a file.
 """
 
 import gzip
@@ -38,11 +38,11 @@ TESTED = {
         "f55227d12dac0eb037cae13b1992091746fc017a275748e4a1bebd0f6244e7e5",
     ),
 }
-"""Address below the version: file of the package, and its sha256 in the wheel of ``VERSION`` on PyPI."""
+"""Path in the address below the version -> path in the package, and its sha256 in the wheel of ``VERSION`` on PyPI."""
 _FOREVER = "public, max-age=31536000, immutable"
-"""Cached for a year, since the version is part of the address; RFC 9111 has no longer time."""
+"""Cached for a year, the longest time of RFC 9111: the version is part of the address."""
 _WORTH = 1 << 10
-"""Bytes from which a file is compressed. Chosen: the size of a packet."""
+"""Smallest size in bytes of a file that is compressed. Chosen: the size of a packet."""
 _TYPES = {
     ".js": "text/javascript", ".css": "text/css", ".html": "text/html", ".json": "application/json",
     ".svg": "image/svg+xml", ".png": "image/png",
@@ -57,13 +57,13 @@ class LibraryError(Exception):
 
 @dataclass(frozen=True)
 class Library:
-    """One file with its headers."""
+    """A file with its headers."""
 
     plain: bytes
 
     @cached_property
     def zipped(self) -> bytes:
-        """The compressed file, made at the first request."""
+        """Returns the compressed file; it is made at the first request."""
         return gzip.compress(self.plain, _LEVEL, mtime=0)
 
     @cached_property
@@ -71,12 +71,12 @@ class Library:
         return hashlib.sha256(self.plain).hexdigest()[:32]
 
     def tag(self, zipped: bool) -> str:
-        """The ETag of the plain or the compressed form."""
+        """Returns the ETag of the plain or the compressed form."""
         return f'"{self._digest}{"-gzip" if zipped else ""}"'
 
 
 def libraries() -> dict[str, Library]:
-    """The files of the libraries, by address. Raises LibraryError when the package is missing or has another
+    """Returns the files of the libraries by address. Raises LibraryError if the package is missing or has another
     version."""
     cure = f"pip install --no-deps {PACKAGE}=={VERSION}"
     try:
@@ -101,8 +101,8 @@ def _tested(path: Path, digest: str) -> Library:
 
 
 def install(app: FastAPI, web: Path, *, auth: bool) -> str:
-    """Mounts the page at ``/`` and the libraries at ``/lib``; returns what is wrong with the libraries, or an empty
-    text. Raises OSError where the page cannot be read.
+    """Mounts the page at ``/`` and the libraries at ``/lib``. Returns the problem with the libraries, or an empty
+    text. Raises OSError if the page cannot be read.
     """
     found: Mapping[str, Library] = {}
     problem = ""
@@ -125,16 +125,16 @@ def _is_shown(path: Path) -> bool:
 
 
 class _Files:
-    """Serves files from memory, by address: ``fresh`` ones, which a browser revalidates each time, since a server
-    may be a newer one, and files that never change.
+    """Serves files from memory by address. Browsers revalidate ``fresh`` files at each request, since the server may
+    be a newer version; the other files never change.
     """
 
     def __init__(self, fresh: Mapping[str, Library], lasting: Mapping[str, Library]) -> None:
         self._fresh, self._lasting = fresh, lasting
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Raises HTTPException 405 for other methods and 404 for other addresses: the mount sees every address
-        without a route.
+        """Raises HTTPException 405 for other methods and 404 for other addresses: every address without a route
+        arrives here.
         """
         address = scope["path"].removeprefix(scope["root_path"]).removeprefix("/")
         file, lasts = self._fresh.get(address) or self._lasting.get(address), address in self._lasting

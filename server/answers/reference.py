@@ -1,4 +1,4 @@
-"""The HTTP interface for people: docs/reference/http.md, made from what OpenAPI says of the routes.
+"""docs/reference/http.md, the reference of the HTTP interface, made from the OpenAPI document.
 
 ``python -m conoid.server.answers.reference`` prints the page.
 """
@@ -13,23 +13,23 @@ from . import openapi
 
 _HEAD = """# HTTP
 
-A server answers at `http://HOST:8750` without options. `make reference` makes this page from the routes;
-`GET /openapi.json` of a server has the same with the schema of each answer.
+A server listens at `http://HOST:8750` unless its options name another address. `make reference` makes this page from
+the routes; `GET /openapi.json` of a server returns the same content with the schema of each answer.
 
-- A request has the header `Authorization: Bearer TOKEN`, but for `/healthz`, `/readyz` and the JSON schema of a case.
-- An error is a JSON document of type `application/problem+json` (RFC 9457) with the problems of a case one by one.
+- A request has the header `Authorization: Bearer TOKEN`, except for `/healthz`, `/readyz`, the JSON schema of a case.
+- An error is a JSON document of type `application/problem+json` (RFC 9457); it lists every problem of a case.
 - A header `Idempotency-Key` makes a request safe to repeat: the same key and body give the same run.
 """
 _TITLES = (
     ("Cases", ("/v1/cases", "/v1/case.schema.json")), ("Runs", ("/v1/runs", "/v1/table")), ("Sweeps", ("/v1/sweeps",)),
     ("Files that cases name", ("/v1/files",)), ("The server", ("/",)),
 )  # fmt: skip
-"""A route stands below the first title that has a beginning of its path."""
+"""Titles with beginnings of paths: a route stands below the first title with a beginning of its path."""
 Operation = dict[str, Any]
 
 
 def page() -> str:
-    """The whole page."""
+    """Returns the whole page."""
     found: dict[str, list[str]] = {title: [] for title, _ in _TITLES}
     for path, operations in document()["paths"].items():
         title = next(title for title, starts in _TITLES if path.startswith(starts))
@@ -42,7 +42,7 @@ def page() -> str:
 
 
 def document() -> dict[str, Any]:
-    """The OpenAPI document of all routes, without a server."""
+    """Returns the OpenAPI document of all routes, without a server."""
     app = FastAPI(title="Conoid", version="1")
     for router in ROUTERS:
         app.include_router(router)

@@ -1,5 +1,6 @@
-"""Rows of the table of runs as they are sent. The values of a case are sent once for all runs of cases that are alike,
-and of each run what it has otherwise.
+"""Rows of the table of runs as they are sent.
+
+The values of similar cases are sent once for all their runs; a row has only values that differ from these.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -15,47 +16,48 @@ from conoid.cases.reference.key_units import unit_of_key
 from .card import Card
 
 MOST_BYTES = 4 << 20
-"""Of the rows of an answer. Chosen: 2,000 runs of a case with fifty results."""
+"""Largest size in bytes of the rows of an answer. Chosen: 2,000 runs of a case with fifty results."""
 _ALIKE = 0.8
-"""Of the keys of two cases that both must have for their runs to be compared value by value. Chosen."""
+"""Smallest share of common keys for which two cases are similar. Chosen."""
 _GROUPS = 50
-"""Of cases in an answer; what is like none of them has no values there. Chosen: 50 cases of 300 values are 0.6 MB."""
+"""Largest number of groups of similar cases in an answer; a case beyond it has no values. Chosen: 50 cases of 300
+values are 0.6 MB."""
 
 
 @dataclass
 class Group:
-    """Cases that are alike."""
+    """A group of similar cases."""
 
     values: dict[str, Scalar]
-    """Of the first of them."""
+    """Values of the first case of the group."""
     results: dict[str, str] = field(default_factory=dict)
-    """Units of the results of all of them, by name, in their order."""
+    """Units of the results of all runs of the group by name, in order."""
 
     def takes(self, keys: Mapping[str, Scalar]) -> bool:
-        """Whether a case with these keys is like the first."""
+        """Whether a case with these values is similar to the first case of the group."""
         both = len(self.values.keys() & keys.keys())
         return both >= _ALIKE * (len(self.values) + len(keys) - both)
 
     def shown(self) -> dict[str, Any]:
-        """As it is sent."""
+        """Returns the group as it is sent."""
         units = {key: unit for key in self.values if (unit := unit_of_key(key))}
         results = [{"name": name, "unit": unit} for name, unit in self.results.items()]
         return {"values": self.values, "units": units, "results": results}
 
 
 class Table:
-    """Is filled run by run, until it has ``MOST_BYTES``."""
+    """A table that is filled run by run up to ``MOST_BYTES``."""
 
     def __init__(self) -> None:
-        """No row yet."""
+        """Starts without rows."""
         self.groups: list[Group] = []
         self.rows: list[msgspec.Raw] = []
         self.pending = 0
-        """Runs without a card."""
+        """Number of runs whose card is not read yet."""
         self._bytes = 0
 
     def add(self, line: dict[str, Any], card: Card | None) -> bool:
-        """The row of a run with its ``line`` in a list; False where there is no room for it any more."""
+        """Adds the row of a run; ``line`` is its line in a list. Returns False if the answer is full."""
         row = msgspec.json.encode({**line, **self._of_card(card)})
         if self.rows and self._bytes + len(row) > MOST_BYTES:
             return False
@@ -86,18 +88,18 @@ class Table:
 
 
 def _others(common: Mapping[str, Scalar], values: Mapping[str, Scalar]) -> Iterator[tuple[str, Scalar | None]]:
-    """What differs from ``common``; None for a key that is not there."""
+    """Yields values that differ from ``common``; None for a key that is missing in ``values``."""
     for key in {**common, **values}:
         if common.get(key) != values.get(key):
             yield key, values.get(key)
 
 
 def short(ids: Sequence[str], least: int) -> dict[str, str]:
-    """The shortest beginning of each of the sorted ``ids`` that no other one of them has, of ``least`` letters."""
+    """Returns the shortest unique prefix of each of the sorted ``ids``, of at least ``least`` characters."""
     shared = [0, *starmap(_shared, pairwise(ids)), 0]
     return {each: each[: max(least, 1 + max(about))] for each, about in zip(ids, pairwise(shared), strict=True)}
 
 
 def _shared(one: str, other: str) -> int:
-    """How many letters two different ids have in common at their beginning."""
+    """Returns the number of equal characters at the beginning of two different ids."""
     return next((n for n, (a, b) in enumerate(zip(one, other, strict=False)) if a != b), min(len(one), len(other)))

@@ -1,4 +1,4 @@
-"""A history as it is sent: columns over the reports, thinned to as many as were asked for."""
+"""A history as it is sent: columns over the reports, reduced to the requested number of points."""
 
 import time
 from collections.abc import Sequence
@@ -14,9 +14,9 @@ from .history import History, Sample
 
 T = TypeVar("T")
 _NUMBERS = 100_000
-"""Of ranks, phases and times together that are sent, at most. Chosen: a megabyte."""
+"""Largest product of ranks, phases and times that are sent. Chosen: a megabyte."""
 _ANSWERS = 4
-"""Of a run that are kept, with as many numbers of points. Chosen."""
+"""Number of cached answers of a run, with different numbers of points. Chosen."""
 _progress = msgspec.json.Decoder(Progress)
 _load = msgspec.json.Decoder(Load)
 _counts = msgspec.json.Decoder(Counts)
@@ -24,7 +24,7 @@ _snapshot = msgspec.json.Decoder(Snapshot)
 
 
 def body(history: History, points: int) -> bytes:
-    """The whole answer, of a run that has ended made once; under the lock of the history."""
+    """Returns the whole answer. For a run that has ended it is made once. The caller holds the lock of the history."""
     last, known = history.answers.get(points, (-1, b""))
     if last == history.last and history.state.final:
         return known
@@ -54,7 +54,7 @@ def _body(history: History, points: int) -> bytes:
 
 
 def listed(history: History) -> list[msgspec.Raw]:
-    """The snapshots, as the journal tells of them."""
+    """Returns the messages about snapshots, by number."""
     return [msgspec.Raw(history.snapshots[n]) for n in sorted(history.snapshots)]
 
 
@@ -66,13 +66,13 @@ class _Report(msgspec.Struct, frozen=True):
 
     @property
     def counted(self) -> Counts | Snapshot | None:
-        """Whatever tells of the fragments of the latest state."""
-        told = [message for message in (self.counts, self.snapshot) if message is not None]
-        return max(told, key=lambda message: (_counted(message), message.seq)) if told else None
+        """Newest message with numbers of fragments."""
+        messages = [message for message in (self.counts, self.snapshot) if message is not None]
+        return max(messages, key=lambda message: (_counted(message), message.seq)) if messages else None
 
 
 def _read(sample: Sample) -> _Report | None:
-    """None where the line of the load is damaged; what else is damaged is left out."""
+    """Decodes a report; None if the line of the load is damaged. Other damaged lines are left out."""
     load = _sound(_load, sample.load)
     if load is None:
         return None
@@ -82,7 +82,7 @@ def _read(sample: Sample) -> _Report | None:
 
 
 def _sound(decoder: msgspec.json.Decoder[T], line: bytes) -> T | None:
-    """The message of a line; None where there is none, or where it is none."""
+    """Decodes a line; None for an empty or damaged line."""
     try:
         return decoder.decode(line) if line else None
     except DAMAGED:
@@ -90,7 +90,7 @@ def _sound(decoder: msgspec.json.Decoder[T], line: bytes) -> T | None:
 
 
 def _kept(history: History) -> list[Sample]:
-    """What is kept, and the newest."""
+    """Returns the kept reports and the newest one."""
     newest = history.newest
     if newest is None or (history.samples and history.samples[-1] is newest):
         return history.samples
@@ -98,13 +98,13 @@ def _kept(history: History) -> list[Sample]:
 
 
 def _spread(items: Sequence[Any], most: int) -> list[Any]:
-    """At most so many of them, at even distances, the last always."""
+    """Returns at most ``most`` evenly spaced items, always with the last one."""
     n, most = len(items), max(1, most)
     return list(items) if n <= most else [items[(k + 1) * n // most - 1] for k in range(most)]
 
 
 def _columns(reports: list[_Report], began: float) -> dict[str, list[Any]]:
-    """By name."""
+    """Returns the columns by name."""
     columns: dict[str, list[Any]] = {
         "t": [r.load.t for r in reports],
         "step": [r.load.step for r in reports],
@@ -125,24 +125,27 @@ def _columns(reports: list[_Report], began: float) -> dict[str, list[Any]]:
 
 
 def _counted(message: Counts | Snapshot) -> int:
-    """The step of the fragments that it tells of."""
+    """Returns the step at which the fragments of the message were counted."""
     return message.counted if isinstance(message, Counts) and message.counted >= 0 else message.step
 
 
-def _sizes(told: Counts | Snapshot | None) -> dict[str, Any]:
-    """How many fragments have which size, as these messages have it; ``t`` in s."""
-    return {"t": told.t, "smallest": told.smallest, "sizes": told.sizes} if told is not None else {}
+def _sizes(message: Counts | Snapshot | None) -> dict[str, Any]:
+    """Returns the size distribution of the fragments of a message; ``t`` in s."""
+    return {"t": message.t, "smallest": message.smallest, "sizes": message.sizes} if message is not None else {}
 
 
 def _parts(reports: list[_Report]) -> dict[str, dict[str, list[float | None]]]:
-    """By part and name, a number a report; empty where there is one part alone."""
-    told = [report.progress.parts if report.progress is not None else {} for report in reports]
-    names = {part: None for each in told for part in each}
-    return {part: {name: [getattr(each.get(part), name, None) for each in told] for name in OF_PARTS} for part in names}
+    """Returns energies by part and name, one value for each report; empty for a case with one part."""
+    parts = [report.progress.parts if report.progress is not None else {} for report in reports]
+    names = {part: None for each in parts for part in each}
+    return {
+        part: {name: [getattr(each.get(part), name, None) for each in parts] for name in OF_PARTS} for part in names
+    }
 
 
 def _once(reports: list[_Report]) -> list[_Report]:
-    """A run that has gone on from a checkpoint has told some times twice, and the later word counts."""
+    """Removes repeated times: a run that continued from a checkpoint reports some steps twice, and the later report
+    is kept."""
     kept: list[_Report] = []
     for report in reversed(reports):
         if not kept or report.load.step < kept[-1].load.step:
@@ -151,13 +154,14 @@ def _once(reports: list[_Report]) -> list[_Report]:
 
 
 def _shares(load: Load) -> dict[str, float]:
-    """Of the CPU time of all ranks, by phase."""
+    """Returns the share of each phase in the CPU time of all ranks."""
     total = sum(map(sum, load.phases.values()))
     return {name: sum(seconds) / total if total > 0.0 else 0.0 for name, seconds in load.phases.items()}
 
 
 def _ranks(loads: list[Load]) -> dict[str, Any]:
-    """CPU seconds of each rank and phase over the steps of a report, and of ``exchange`` the waiting."""
+    """Returns CPU seconds of each rank and phase over the steps of a report, and the waiting time within
+    ``exchange``."""
     names = {name: None for load in loads for name in load.phases}
     return {
         "t": [load.t for load in loads], "steps": [load.steps for load in loads],

@@ -1,8 +1,8 @@
 """Server-sent events of a run, from its journal.
 
-The stream follows the file, not Zenoh: the file is the truth and has every line, so a reader who connects late, or
-again, or reads slowly, gets each event exactly once and in order. The supervisor looks at the file every 20 ms anyway
-and rings a bell when it has grown; every stream then reads on from where it stands. Zenoh is for native clients.
+The stream reads the file, not Zenoh: the file has every line, so a client that connects late, reconnects or reads
+slowly gets each event exactly once and in order. The supervisor checks the file every 20 ms and wakes the streams
+when it has grown; each stream then reads on from its position. Native clients use Zenoh.
 """
 
 import time
@@ -15,17 +15,18 @@ from ..service import Service
 
 MEDIA_TYPE = "text/event-stream"
 KEEP_ALIVE = 15.0
-"""s of silence after which a comment is sent, so that proxies keep the connection."""
+"""Time in s without an event after which a comment is sent, so that proxies keep the connection."""
 HEADERS = {"Cache-Control": "no-store", "X-Accel-Buffering": "no"}
 
 
 def event(line: Line) -> bytes:
-    """One journal line as one event; its id is what ``Last-Event-ID`` resumes from."""
+    """Returns a journal line as an event; ``Last-Event-ID`` resumes from its id."""
     return b"id: %d\nevent: %s\ndata: %s\n\n" % (line.seq, line.type.encode(), line.raw)
 
 
 async def events(service: Service, may: Pass, run_id: str, path: Path, after: int) -> AsyncIterator[bytes]:
-    """Every event with ``seq`` above ``after``, those to come as well; ends when the run has ended, or ``may`` not."""
+    """Yields every event with ``seq`` above ``after``, including future ones; ends with the run or when ``may``
+    expires."""
     tail, silent = Tail(path, after), time.monotonic()
     with service.wakeups.listen(run_id) as listener:
         yield b"retry: 1000\n\n"

@@ -1,4 +1,4 @@
-"""A run as JSON. Times are Unix s unless their name says otherwise."""
+"""A run as JSON. Times are Unix s unless their name has another unit."""
 
 import base64
 import hashlib
@@ -19,24 +19,24 @@ from ..service import Service
 from .rows import short
 
 _SHORT = 7
-"""Letters of a short id, at least. Chosen: those of git."""
+"""Smallest length of a short id, in characters. Chosen: the length in git."""
 
 
 @dataclass(frozen=True)
 class Snapshot:
-    """A run at one moment, as it is sent."""
+    """The JSON of a run at one moment."""
 
     state: State
     body: bytes
 
     @property
     def etag(self) -> str:
-        """Changes when anything in the body does."""
+        """ETag that changes with any change of the body."""
         return f'"{hashlib.sha256(self.body).hexdigest()[:32]}"'
 
 
 def snapshot(service: Service, run: Run) -> Snapshot:
-    """Everything about a run: where it is, how far, and once it has ended the whole outcome."""
+    """Returns everything about a run: state, progress and, after its end, the outcome."""
     path = service.settings.runs / run.id
     made = _submission(path)
     progress = service.supervisor.progress(run.id)
@@ -53,7 +53,7 @@ def snapshot(service: Service, run: Run) -> Snapshot:
 
 
 def _submission(path: Path) -> folder.Submission | None:
-    """None where the file is gone or damaged: the state of the run is true all the same."""
+    """Returns None if the file is missing or damaged: the state of the run does not depend on it."""
     try:
         return folder.submission(path)
     except (OSError, msgspec.MsgspecError):
@@ -61,7 +61,7 @@ def _submission(path: Path) -> folder.Submission | None:
 
 
 def outcome(path: Path) -> Outcome | None:
-    """None where the file is gone, damaged, or locked away."""
+    """Returns None if the file is missing, damaged or not readable."""
     try:
         return folder.outcome(path)
     except OSError:
@@ -69,7 +69,7 @@ def outcome(path: Path) -> Outcome | None:
 
 
 def brief(service: Service, run: Run, labels: Mapping[str, str] | None = None) -> dict[str, Any]:
-    """A run's line in a list; its labels are read where they are not given."""
+    """Returns a run's line in a list; its labels are read from the folder if they are not given."""
     return {
         "id": run.id,
         "owner": run.owner,
@@ -90,7 +90,7 @@ def brief(service: Service, run: Run, labels: Mapping[str, str] | None = None) -
 
 
 def briefs(service: Service, runs: Sequence[Run]) -> list[dict[str, Any]]:
-    """Lines of a list, as the runs are now; the labels from the database, so that no file is read."""
+    """Returns the lines of a list with the present states; labels are from the database, so no file is read."""
     labels = service.store.labels([run.id for run in runs])
     shorts = short_ids(service, runs)
     return [
@@ -100,7 +100,7 @@ def briefs(service: Service, runs: Sequence[Run]) -> list[dict[str, Any]]:
 
 
 def short_ids(service: Service, runs: Sequence[Run]) -> dict[str, str]:
-    """The shortest beginning of the id of each of an owner's runs that no other run of the owner has, by its id."""
+    """Returns the shortest unique prefix of each run's id among the runs of the owner, by id."""
     if not runs:
         return {}
     ids = [run.id for run in runs]
@@ -108,12 +108,12 @@ def short_ids(service: Service, runs: Sequence[Run]) -> dict[str, str]:
 
 
 def to_cursor(run: Run) -> str:
-    """Where the next page begins; an opaque word for the client."""
+    """Returns the start of the next page as an opaque word for the client."""
     return base64.urlsafe_b64encode(run.id.encode()).decode().rstrip("=")
 
 
 def from_cursor(cursor: str) -> str:
-    """The id in a cursor. Raises ServiceError 400."""
+    """Returns the id in a cursor. Raises ServiceError 400."""
     try:
         run_id = base64.urlsafe_b64decode(cursor + "=" * (-len(cursor) % 4)).decode("ascii")
     except ValueError:

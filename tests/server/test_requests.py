@@ -18,6 +18,7 @@ from starlette.testclient import TestClient
 from conoid.cases.load import shipped_path
 from conoid.cases.reference.json_schema import json_schema
 from conoid.server.answers import reference
+from conoid.server.answers.schemas import ALL
 from conoid.server.app import ROUTERS, build_app, opened
 from conoid.server.errors import ServiceError
 from conoid.server.requests.connections import BODY
