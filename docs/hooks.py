@@ -1,7 +1,8 @@
-"""Hooks of the documentation site: links out of docs/, pages of notebooks, and a check that search finds every key."""
+"""Hooks of the documentation site: pages of notebooks and of the repository's root, links, mermaid, check of search."""
 
 import json
 import re
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -9,17 +10,35 @@ from mkdocs.exceptions import PluginError
 from mkdocs.structure.files import File, Files
 
 _OUTSIDE = re.compile(r"\[([^\]]+)\]\((?:\.\./)+(?:deploy|cases|tests|client|server|worker)[^)]*\)")
-_SCHEMA = Path(__file__).parents[1] / "cases" / "case.schema.json"
+_ROOT = Path(__file__).parents[1]
+_ROOT_PAGES = ("ARCHITECTURE.md", "CONVENTIONS.md", "CONTRIBUTING.md", "CHANGELOG.md")
+_SCHEMA = _ROOT / "cases" / "case.schema.json"
 
 
 def on_files(files: Files, *, config: Any) -> Files:
-    """Adds a page ``NAME.md`` for each notebook ``NAME.ipynb``, which stays beside it for download."""
+    """Adds pages of notebooks and of the repository's root, and the files of mermaid, from the package nicegui."""
     for file in [file for file in files if file.src_uri.endswith(".ipynb")]:
-        notebook = json.loads(Path(file.abs_src_path).read_text(encoding="utf-8"))
-        link = f"\n\n[Download this notebook]({Path(file.src_uri).name}).\n"
-        text = "\n\n".join(map(_cell, notebook["cells"])) + link
-        files.append(File.generated(config, file.src_uri.removesuffix(".ipynb") + ".md", content=text))
+        files.append(File.generated(config, file.src_uri.removesuffix(".ipynb") + ".md", content=_notebook(file)))
+    for page in _ROOT_PAGES:
+        text = (_ROOT / page).read_text(encoding="utf-8")
+        files.append(File.generated(config, f"project/{page.lower()}", content=_from_root(text)))
+    (nicegui,) = find_spec("nicegui").submodule_search_locations  # type: ignore[union-attr, misc]
+    for script in Path(nicegui).glob("elements/mermaid/dist/*.js"):
+        files.append(File.generated(config, f"assets/mermaid/{script.name}", abs_src_path=str(script)))
     return files
+
+
+def _notebook(file: File) -> str:
+    """A page of a notebook, with a link to the notebook itself."""
+    cells = json.loads(Path(file.abs_src_path or "").read_text(encoding="utf-8"))["cells"]
+    return "\n\n".join([*map(_cell, cells), f"[Download this notebook]({Path(file.src_uri).name}).\n"])
+
+
+def _from_root(text: str) -> str:
+    """The text of a page of the root with the links that it has below project/."""
+    pages = "|".join(page.removesuffix(".md") for page in _ROOT_PAGES)
+    text = re.sub(rf"\]\(({pages})\.md", lambda found: f"]({found[1].lower()}.md", text)
+    return re.sub(r"\]\((?!https?:|\w+\.md)(?:docs/)?", lambda found: "](../", text)
 
 
 def _cell(cell: dict[str, Any]) -> str:

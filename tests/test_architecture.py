@@ -180,6 +180,15 @@ def test_the_table_of_the_step_is_the_same_in_code_and_document() -> None:
     assert lines == [found[:2] for found in row.findall(document)]
 
 
+def test_the_tree_of_rooms_in_the_document_is_that_of_the_sources() -> None:
+    text = (ROOT / "ARCHITECTURE.md").read_text(encoding="utf-8").partition("## Rooms")[2].split("```")[1]
+    for house in HOUSES:
+        rooms = {path.name for path in (ROOT / house).iterdir() if path.is_dir() and path.name != "__pycache__"}
+        (part,) = re.findall(rf"^{house}/\n((?:  .*\n)+)", text, re.MULTILINE)
+        starts = [re.match(r"  ((?:\w+/,? )+)", line) for line in part.splitlines()]
+        assert rooms == {name for start in starts if start for name in re.findall(r"(\w+)/", start[1])}, house
+
+
 def test_the_contract_is_light() -> None:
     for path in SOURCES:
         if path.relative_to(ROOT).parts[0] == "cases":

@@ -48,7 +48,8 @@ def partial_schema() -> dict[str, Any]:
         if isinstance(node, list):
             return [relaxed(each) for each in node]
         if isinstance(node, dict):
-            return {key: relaxed(value) for key, value in node.items() if key != "required" or isinstance(value, dict)}
+            kept = {key: relaxed(value) for key, value in node.items() if key != "required" or isinstance(value, dict)}
+            return {"anyOf" if key == "oneOf" else key: value for key, value in kept.items()}
         return node
 
     schema: dict[str, Any] = relaxed(copy.deepcopy(json_schema()))
