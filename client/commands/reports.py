@@ -25,17 +25,19 @@ OutArgument = Annotated[Path, typer.Argument(metavar="OUT.png", help="The PNG, o
 
 
 def drawing(module: str) -> Any:
-    """``charts`` or ``curves``, which need matplotlib. Raises ViewError where it is missing."""
+    """Imports a module of the client that needs matplotlib, by its path. Raises ViewError without matplotlib."""
     try:
-        return importlib.import_module(f"..reports.{module}", __package__)
+        return importlib.import_module(f"..{module}", __package__)
     except ModuleNotFoundError as error:
+        if (error.name or "").startswith("conoid"):
+            raise
         raise ViewError(f"charts need the extra 'view' of conoid: {error}") from None
 
 
 @figures.command(name="energy")
 def energy_figure(source: SourceArgument, out: OutArgument, url: Url = None, token: Token = None) -> None:
     """Draw the energy ledger over time, also without its kinetic term, the residual, and each part's energy."""
-    curves = drawing("curves")
+    curves = drawing("reports.curves")
     with opened(source, url, token) as result, aloud(f"drawing {out}"):
         echo(curves.save(curves.energy(result.history), out))
 
@@ -43,7 +45,7 @@ def energy_figure(source: SourceArgument, out: OutArgument, url: Url = None, tok
 @figures.command(name="dt")
 def dt_figure(source: SourceArgument, out: OutArgument, url: Url = None, token: Token = None) -> None:
     """Draw the length of the time step, and what holds it down."""
-    curves = drawing("curves")
+    curves = drawing("reports.curves")
     with opened(source, url, token) as result, aloud(f"drawing {out}"):
         echo(curves.save(curves.steps(result.history), out))
 
@@ -51,7 +53,7 @@ def dt_figure(source: SourceArgument, out: OutArgument, url: Url = None, token: 
 @figures.command(name="fragments")
 def fragments_figure(source: SourceArgument, out: OutArgument, url: Url = None, token: Token = None) -> None:
     """Draw how many fragments there are over time, and how many of which mass in the end."""
-    curves = drawing("curves")
+    curves = drawing("reports.curves")
     with opened(source, url, token) as result, aloud(f"drawing {out}"):
         tables_of = [result.fragments_of(index) for index in result.fragment_tables]
         echo(curves.save(curves.fragments(tables_of), out))
@@ -69,7 +71,7 @@ def history_figure(
     token: Token = None,
 ) -> None:
     """Draw columns of history.csv over time, those of one unit in one panel."""
-    curves = drawing("curves")
+    curves = drawing("reports.curves")
     with opened(source, url, token) as result, aloud(f"drawing {out}"):
         echo(curves.save(curves.columns(result.history, column or ()), out))
 
@@ -110,7 +112,7 @@ def compare(
     with opened(a, url, token) as first, opened(b, url, token) as second, aloud("comparing the runs"):
         found = comparing.compare(first, second)
         if out is not None:
-            curves = drawing("curves")
+            curves = drawing("reports.curves")
             curves.save(curves.comparison(comparing.material(first, second, column or ())), out)
     if as_json:
         echo_json(found)
@@ -124,7 +126,7 @@ def compare(
 @figures.command(name="balance")
 def balance_figure(source: SourceArgument, out: OutArgument, url: Url = None, token: Token = None) -> None:
     """Draw the outside nodes of each rank with the cuts, and where the CPU time went."""
-    charts = drawing("charts")
+    charts = drawing("reports.charts")
     with opened(source, url, token) as result, aloud(f"drawing {out}"):
         name = str(result.case["name"])
         charts.balance(charts.course(result.messages), f"{name}, {result.folder.name}", name, out)

@@ -243,8 +243,8 @@ def sweep_plot(
         if (path := file_named(sweep)) is not None:
             made = columns_of(path)
             keys = [column.name for column in made if column.kind == KEY]
-            drawn = drawing("curves").save(
-                drawing("swept").figure(text_rows(to_csv(made)), keys, x, columns or ()), out
+            drawn = drawing("reports.curves").save(
+                drawing("sweeps.swept").figure(text_rows(to_csv(made)), keys, x, columns or ()), out
             )
         else:
             with connect(url, token) as session:

@@ -176,7 +176,7 @@ def test_without_gmsh_the_cure_is_named(monkeypatch: pytest.MonkeyPatch) -> None
 UNDER_LIMITS = """
 import resource, sys
 from pathlib import Path
-from conoid.cases.bodies import Box
+from conoid.cases.model.bodies import Box
 from conoid.worker.errors import MeshError
 from conoid.worker.mesh.build import build
 memory, cpu = (int(word) for word in sys.argv[1:])

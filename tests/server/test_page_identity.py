@@ -25,7 +25,7 @@ FOLLOWED = 20
 
 OFTEN = """
 import sys
-from conoid.worker import main as worker
+from conoid.worker.run import main as worker
 
 ready = worker.ready_kernels
 

@@ -29,7 +29,7 @@ QUESTION = Question(
 )  # fmt: skip
 TIMED = """
 import os, sys, time, msgspec
-from conoid.server import reading
+from conoid.server.intake import reading
 
 def timed(question):
     began = time.process_time()

@@ -83,7 +83,7 @@ def test_a_number_that_is_none_is_looked_for(place: Path, said: str) -> None:
 def test_an_sbatch_that_outlives_its_server_keeps_the_next_from_a_second(place: Path) -> None:
     found = commands(place, f"sleep 2; {ACCEPT}; echo 101")
     code = (
-        "from pathlib import Path; from conoid.cases import batch, slurm\n"
+        "from pathlib import Path; from conoid.cases.site import batch, slurm\n"
         f"job = batch.new_job('run', 2, ('a', batch.Profile()), ['true'], 0.0)\n"
         f"slurm.submit({found!r}, Path({str(place / 'run')!r}), job, batch.Profile())"
     )

@@ -9,7 +9,7 @@ import pytest
 GROWING = """
 import sys
 import numpy as np
-from conoid.worker import heap
+from conoid.worker.run import heap
 
 def resident():
     with open("/proc/self/statm") as file:
