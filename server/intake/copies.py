@@ -30,7 +30,7 @@ def of_owner(sent: Uploads, owner: str) -> Source:
 
 
 def of_run(folder: Path) -> Source:
-    """Copies of files of another run of the same user; raises ServiceError 409 where that run has lost one."""
+    """Copies of files of another run of the same user. Raises ServiceError 409 if that run has lost one."""
 
     def put(file: FileName, target: Path) -> None:
         try:
@@ -43,7 +43,7 @@ def of_run(folder: Path) -> Source:
 
 
 def fill(files: Sequence[FileName], source: Source, folder: Path) -> None:
-    """Gives a folder a copy of each file; they are on disk on return. Raises CaseError for missing files, OSError."""
+    """Adds a copy of each file to a folder; they are on disk on return. Raises CaseError for missing files, OSError."""
     place = folder / layout.FILES
     if files:
         place.mkdir(0o700)
@@ -63,8 +63,8 @@ def fill(files: Sequence[FileName], source: Source, folder: Path) -> None:
 
 @contextmanager
 def apart(runs: Path, files: Sequence[FileName], source: Source) -> Iterator[Path]:
-    """A temporary folder with the files, laid out as in the folder of a run. A server that was killed leaves it
-    behind; the next one removes it. Raises the errors of ``fill``.
+    """A temporary folder with the files, as in the folder of a run. If the server is killed, the next server removes
+    it. Raises the errors of ``fill``.
     """
     place = runs / f"{APART}{secrets.token_hex(8)}"
     place.mkdir(0o700)
@@ -77,5 +77,5 @@ def apart(runs: Path, files: Sequence[FileName], source: Source) -> Iterator[Pat
 
 
 def names_files(body: bytes) -> bool:
-    """Whether the text of a case may name files: it has a key ``path``, or escaped letters."""
+    """Whether the text of a case may name files: it contains a key ``path``, or escaped characters."""
     return _NAMING.search(body) is not None

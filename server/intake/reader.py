@@ -1,4 +1,4 @@
-"""Reads cases in separate processes with limits (``reading``), and decides whose turn it is."""
+"""Reads cases in separate processes with limits (``reading``), users in rotation."""
 
 import atexit
 import logging
@@ -21,36 +21,35 @@ from .reading import CPU, PID, WALL, Answer, Question, Reading, WrongCaseError
 
 _log = logging.getLogger("conoid.server")
 _LOAD = 30.0
-"""s within which the program must have loaded its modules. Chosen: it takes half a second."""
+"""Time in s in which the program must load its modules. Chosen: it takes half a second."""
 _FORK = 10.0
-"""s within which the program must have begun with a case; else it is replaced. Chosen: it takes 10 ms."""
+"""Time in s in which the program must begin with a case; else it is replaced. Chosen: it takes 10 ms."""
 _REST = 5.0
-"""s beyond ``WALL`` after which the server kills the process of a case. Chosen."""
+"""Time in s beyond ``WALL`` after which the server kills the process of a case. Chosen."""
 _WAITING = 100
-"""Waiting bodies of one owner. Chosen: each may have 1 MiB."""
+"""Largest number of waiting bodies of one owner. Chosen: each may have 1 MiB."""
 CASE, SWEEP, FILES = 120.0, 900.0, 300.0
-"""s within which a case, all cases of a sweep, and a case with files must be read, with the waiting for their turn.
-Chosen."""
+"""Longest time in s for a case, for all cases of a sweep, and for a case with files, with the waiting time. Chosen."""
 
 
 def pool(patience: float) -> ThreadPool:
-    """As many cases at a time as there are cores; one owner alone never takes the last place."""
+    """Returns a pool for as many cases at a time as there are cores; one owner alone never uses all threads."""
     places = max(2, usable_cores())
     return ThreadPool(each=places - 1, waiting=_WAITING, patience=patience, most=places)
 
 
 def surveyors() -> ThreadPool:
-    """One case with files of an owner at a time, and of all owners as many as there are cores."""
+    """Returns a pool for one case with files of an owner at a time, and of all owners as many as there are cores."""
     return ThreadPool(each=1, waiting=_WAITING, patience=FILES, most=max(2, usable_cores()))
 
 
 class Reader:
-    """A program that reads cases; it is started when it is first needed, and again where it has ended or hangs. For
-    any thread.
+    """A program that reads cases. It is started at the first case, and again if it has ended or hangs. For any
+    thread.
     """
 
     def __init__(self) -> None:
-        """Starts nothing yet."""
+        """Starts no program yet."""
         self._lock = threading.Lock()
         self._program: _Program | None = None
 
@@ -69,7 +68,7 @@ class Reader:
         return answer.reading
 
     def _ask(self, question: bytes) -> bytes:
-        """A connection to the program, or to the next one. Raises ServiceError 503."""
+        """Returns a connection to the program, or to a new one. Raises ServiceError 503."""
         error: OSError | None = None
         for _ in range(2):
             try:
@@ -90,7 +89,7 @@ class Reader:
             return self._program
 
     def close(self) -> None:
-        """Ends the program; cases that it has begun with are read to their end."""
+        """Ends the program; cases in work are read to their end."""
         with self._lock:
             if self._program is not None:
                 self._program.close()
@@ -98,10 +97,10 @@ class Reader:
 
 
 class _Program:
-    """A running program. It gets a connection for each case, and forks a process for it."""
+    """A running program. It receives a connection for each case, and forks a process for it."""
 
     def __init__(self) -> None:
-        """Raises OSError where it does not start."""
+        """Starts the program. Raises OSError."""
         self._control, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         with theirs:
             command = [sys.executable, "-m", "conoid.server.intake.reading"]
@@ -116,7 +115,7 @@ class _Program:
         self._control.settimeout(_FORK)
 
     def begun(self) -> tuple[socket.socket, int]:
-        """A connection to a process that waits for a case, and the number of the process. Raises OSError."""
+        """Returns a connection to a process that waits for a case, and its process number. Raises OSError."""
         ours, theirs = socket.socketpair()
         try:
             with theirs:
@@ -138,7 +137,7 @@ class _Program:
 
 
 def _answer(connection: socket.socket, pid: int, question: bytes) -> bytes:
-    """The answer of a process; empty where it reached its limits. Raises ServiceError 503."""
+    """Returns the answer of a process; empty if the process reached its limits. Raises ServiceError 503."""
     with connection:
         connection.settimeout(WALL + _REST)
         chunks = []
@@ -158,7 +157,7 @@ def _answer(connection: socket.socket, pid: int, question: bytes) -> bytes:
 
 @cache
 def the_reader() -> Reader:
-    """One connection for each process, which keeps nothing between two cases."""
+    """Connection of a client to one process, which keeps nothing between two cases."""
     made = Reader()
     atexit.register(made.close)
     return made

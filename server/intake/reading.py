@@ -1,9 +1,9 @@
 """``python -m conoid.server.intake.reading``: reads cases, each in a process of its own with limits.
 
-A body is somebody's text: what it costs to read is not known before. This program has everything loaded and forks for
-each case, so that one costs milliseconds, and a case that takes too long, or too much memory, ends its own process. Its
-standard input is a socket, which brings a connection for each case, and ends with the server. One thread, since a fork
-copies only that.
+The cost of reading a body is unknown beforehand. This program loads all modules once and forks for each case, so a
+case costs milliseconds, and a case that needs too much time or memory ends its own process. Standard input is a
+socket that carries a connection for each case, and ends with the server. The program has one thread, since a fork
+copies one thread only.
 """
 
 import os
@@ -32,34 +32,34 @@ from ..requests import limits
 from ..requests.limits import Limits
 
 CPU, WALL, MEMORY = 5, 20, 1 << 30
-"""s of CPU time, s on the clock, and bytes of memory that a case may take to be read. Chosen: the largest shipped case
+"""Limits for reading a case: s of CPU time, s of wall-clock time, bytes of memory. Chosen: the largest shipped case
 takes 0.1 s and 100 MB; a machine may be busy."""
 _NICE = 5
-"""Steps of priority below the server, which goes on answering. Chosen."""
+"""Priority below that of the server, so that the server can answer. Chosen."""
 _SHIPPED = "demo"
-"""Read once before all others. Chosen: small, with a material of the library."""
+"""A shipped case that is read before all others. Chosen: small, with a material of the library."""
 _MOST_FILES = 1000
-"""Files of a case with problems that are told of. Chosen."""
+"""Largest number of files that are listed of a case with problems. Chosen."""
 _UNREAD = "was not read yet: its run reads it"
 PID = 4
-"""Bytes of the number of a process, which it sends first."""
+"""Number of bytes of the process number, which each process sends first."""
 
 
 class Question(msgspec.Struct, frozen=True, kw_only=True):
-    """A body, its kind, and what is allowed."""
+    """A body, its type, and what it may use."""
 
     body: bytes
     json: bool
     limits: Limits
     survey: bytes | None = None
-    """The survey of the mesh files that the case names (conoid.cases.reading.survey); empty: it could not be made.
-    None: not made yet. Then a case with files is read and checked, and not estimated."""
+    """Survey of the mesh files that the case names (conoid.cases.reading.survey); empty: it could not be made. None:
+    not made yet; then a case with files is read and checked, but not estimated."""
     folder: str = ""
-    """Where these files are."""
+    """Folder of these files."""
 
 
 class FileName(msgspec.Struct, frozen=True, kw_only=True):
-    """A file that the case names, and the key of the table that does."""
+    """A file that the case names, and the key of the table with its name."""
 
     key: str
     path: str
@@ -67,23 +67,23 @@ class FileName(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class WrongCaseError(CaseError):
-    """A case with problems, and the files that it names all the same."""
+    """A case with problems, and the files that it names."""
 
     def __init__(self, problems: Iterable[Problem], files: Sequence[FileName]) -> None:
-        """Keeps both."""
+        """``problems`` of the case and its ``files``."""
         super().__init__(problems)
         self.files = files
 
 
 class Reading(msgspec.Struct, frozen=True, kw_only=True):
-    """A case that can be run here: what the server needs of it."""
+    """A case that can be run on this server, with the data that the server needs of it."""
 
     name: str
     title: str
     ranks: int
     threads: int
     profile: str
-    """Of a batch system, by the case; empty for the site's own."""
+    """Profile of a batch system that the case names; empty for the default of the site."""
     wall_time: float | None
     estimate: dict[str, int | float]
     resolved: bytes
@@ -93,16 +93,16 @@ class Reading(msgspec.Struct, frozen=True, kw_only=True):
     doubts: list[Problem]
     files: list[FileName] = []
     survey: bytes = b""
-    """What these hold, as JSON; empty where nothing has read them."""
+    """Survey of the files as JSON; empty if no survey was made."""
 
 
 class Answer(msgspec.Struct, frozen=True, kw_only=True):
-    """A reading, or every problem; ``crash`` is the traceback of a mistake of this program."""
+    """A reading, or every problem; ``crash`` is the traceback of an error in this program."""
 
     reading: Reading | None = None
     problems: list[Problem] = []
     files: list[FileName] = []
-    """Of a case with problems: the files that it names, as far as it could be read; ``sha256`` may be empty."""
+    """For a case with problems: the files that it names, as far as they could be read; ``sha256`` may be empty."""
     crash: str = ""
 
 
@@ -140,7 +140,7 @@ def _files(case: Case) -> list[FileName]:
 
 
 def _named(question: Question) -> list[FileName]:
-    """The files of a case that cannot be run; none where its text cannot be read."""
+    """Returns the files of a case with problems; none if its text cannot be read."""
     try:
         text = _text(question.body)
         return _names(json_data(text) if question.json else toml_data(text))[:_MOST_FILES]
@@ -153,12 +153,12 @@ def _names(data: Mapping[str, Any]) -> list[FileName]:
 
 
 def _weighed(case: Case, data: Mapping[str, Any], question: Question) -> tuple[dict[str, int | float], list[Problem]]:
-    """What the case needs, and what is odd about it. Raises CaseError where it cannot be run here."""
+    """Returns the needs and the warnings of a case. Raises CaseError if the case cannot be run on this server."""
     told = from_json(question.survey) if question.survey else Survey()
     if told.refused:
         raise CaseError(Problem("", "", line) for line in told.refused)
     expected = _estimate(case, question, told)
-    # Parts that touch are told of files alone: the others take seconds to find.
+    # Contact of parts is reported for files only: for other bodies the search takes seconds.
     unread = [problem((file.key, "path"), file.path, _UNREAD) for file in _files(case) if question.survey == b""]
     odd = [*unread, *bare_numbers(data), *warned(case, expected, told, told.touching)]
     return limits.figures(expected), odd
@@ -185,7 +185,7 @@ def _text(body: bytes) -> str:
 
 
 def main() -> int:
-    """Answers until standard input ends. Says that it is ready by one byte."""
+    """Answers until standard input ends. One byte reports that the program is ready."""
     signal.signal(signal.SIGCHLD, signal.SIG_IGN)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.nice(_NICE)
@@ -198,7 +198,7 @@ def main() -> int:
 
 
 def _next(control: socket.socket) -> bool:
-    """One case; False where there is none any more. A process that cannot be made is an empty answer."""
+    """Answers one case; False at the end of standard input. If no process can be forked, the answer is empty."""
     told, descriptors, _, _ = socket.recv_fds(control, 1, 1)
     for descriptor in descriptors:
         with socket.socket(fileno=descriptor) as connection, suppress(OSError):
@@ -208,14 +208,14 @@ def _next(control: socket.socket) -> bool:
 
 
 def _warm() -> None:
-    """Reads a shipped case: what is made at the first case (validators, the materials) is there in each fork then."""
+    """Reads a shipped case, so that each fork has what the first case makes (validators, materials)."""
     none = Limits(slots=1 << 20, elements=None, steps=None, memory=None, core_seconds=None, wall_time=None)
     told = read(Question(body=shipped_path(_SHIPPED).read_bytes(), json=False, limits=none))
     assert told.reading is not None, told
 
 
 def _child(connection: socket.socket) -> None:
-    """One case; leaves without the ceremonies of an interpreter, which belong to the parent."""
+    """Answers one case, then exits without the clean-up of the interpreter, which belongs to the parent."""
     code = 1
     try:
         _limit()

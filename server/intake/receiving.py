@@ -1,8 +1,9 @@
-"""Takes files in that users send: streamed to disk, from the byte on that is missing, verified before they are there.
+"""Receives uploaded files: streams them to disk, from the first missing byte, and verifies their sha256.
 
-A PUT with ``Content-Range: bytes FIRST-LAST/SIZE`` is a partial PUT of RFC 9110, 14.5: it goes on where the file ends
-here, as ``Upload-Offset`` (draft-ietf-httpbis-resumable-upload) says, which HEAD and every answer have. One without the
-header brings the file from its first byte on. What has arrived stays when a connection breaks, or the server is killed.
+A PUT with ``Content-Range: bytes FIRST-LAST/SIZE`` is a partial PUT of RFC 9110, 14.5. It continues at the end of
+the stored part, which ``Upload-Offset`` (draft-ietf-httpbis-resumable-upload) has in HEAD and in every answer. A PUT
+without the header sends the file from its first byte. Stored bytes are kept when a connection breaks or the server
+is killed.
 """
 
 import asyncio
@@ -62,7 +63,7 @@ class _Transfer:
 
 
 class Receiver:
-    """Used in the thread of the event loop; disks are used in the lane of the caller."""
+    """Receives files. Used in the thread of the event loop; files are written in threads of the user."""
 
     def __init__(self, sent: Uploads, pool: ThreadPool) -> None:
         """No connection sends yet."""
@@ -72,8 +73,8 @@ class Receiver:
     async def receive(
         self, request: Request, owner: str, sha256: str, check: Callable[[], Awaitable[None]]
     ) -> tuple[Upload, bool]:
-        """Receives the body; returns what is there then, and whether the file has become complete. ``check`` raises
-        where the right to send has ended. Raises ServiceError: 400, 408, 409, 411, 413, 415, 422, 429, 503, 507.
+        """Receives the body; returns the stored file, and whether it has become complete. ``check`` raises when the
+        token is no longer valid. Raises ServiceError: 400, 408, 409, 411, 413, 415, 422, 429, 503, 507.
         """
         span = span_of(request)
         place_of(request).lengthen()
@@ -108,7 +109,7 @@ class Receiver:
         return made
 
     def _opened(self, owner: str, sha256: str, span: Span) -> Part | Upload:
-        """The incomplete file, open at the first byte of the body; the complete file where it exists. Raises
+        """Returns the incomplete file, open at the first byte of the body, or the complete file if it exists. Raises
         ServiceError 409, 413, 429, 507, OSError.
         """
         known = self._sent.find(owner, sha256)
@@ -119,7 +120,7 @@ class Receiver:
     async def _taken(
         self, request: Request, transfer: _Transfer, part: Part, check: Callable[[], Awaitable[None]]
     ) -> None:
-        """Writes the body as it arrives; what has arrived stays, however it ends. Raises ServiceError 400, 401, 408,
+        """Writes the body as it arrives. Stored bytes are kept after any error. Raises ServiceError 400, 401, 408,
         409, OSError, and the errors of ``check``.
         """
         gathered, chunks = bytearray(), aiter(request.stream())
@@ -136,8 +137,8 @@ class Receiver:
                 await self._pool.run(part.write, bytes(gathered))
 
     async def _verify(self, owner: str, sha256: str, part: Part) -> None:
-        """Gives the verified file its name, on disk on return. Raises ServiceError 422 where the hash differs: then
-        the bytes are removed."""
+        """Gives the verified file its name, on disk on return. Raises ServiceError 422 if the hash differs; then the
+        bytes are removed."""
         total, offset = hashlib.sha256(), 0
         while offset < part.size:
             offset = await self._pool.run(_hashed, total, part, offset)

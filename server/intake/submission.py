@@ -1,4 +1,5 @@
-"""From a body to an accepted run: read, check, estimate, write to disk, and only then say yes."""
+"""Submission: from a body to an accepted run. It is read, checked, estimated and written to disk before it is
+acknowledged."""
 
 import hashlib
 import logging
@@ -33,36 +34,36 @@ from .uploads import Uploads
 
 _log = logging.getLogger("conoid.server")
 KINDS = {"application/toml": "case.toml", "application/json": "case.json"}
-"""Content types of a case, and the names under which they are kept."""
+"""Content types of a case, and the names of the stored files."""
 _LABEL = re.compile(r"([A-Za-z0-9._-]{1,63})=([^\x00-\x1f\x7f]{0,200})")
 _MOST_LABELS = 16
-"""Labels of a run. Chosen."""
+"""Largest number of labels of a run. Chosen."""
 _KEY = re.compile(r"[\x21-\x7e]{1,255}")
 
 
 @dataclass(frozen=True)
 class Wishes:
-    """What a submitter says of a run beside its case."""
+    """Parameters of a submission besides the case."""
 
     labels: Mapping[str, str] = field(default_factory=dict)
     profile: str = ""
-    """Of a batch system; empty: what the case names, or the site's default."""
+    """Profile of a batch system; empty: the profile of the case, or the default of the site."""
     priority: int = 0
-    """Among his own runs."""
+    """Priority among the runs of the owner."""
     restart: str = ""
-    """The run, his own, from whose newest checkpoint this one goes on."""
+    """Run of the same owner from whose newest checkpoint the new run continues."""
 
     @property
     def digest(self) -> str:
-        """Of all of them."""
+        """Hash of all these parameters."""
         return hashlib.sha256(msgspec.json.encode(self, order="sorted")).hexdigest()
 
 
 class Desk:
-    """Where cases are handed in. Methods may be called from any thread."""
+    """Accepts submissions. Methods may be called from any thread."""
 
     def __init__(self, settings: Settings, store: Store, supervisor: Supervisor, sent: Uploads) -> None:
-        """One desk a server: its lock is what makes two requests with one key one run. ``sent`` has users' files."""
+        """A server has one desk: its lock makes two requests with one key into one run. ``sent`` has uploaded files."""
         self._settings, self._store, self._supervisor, self._sent = settings, store, supervisor, sent
         self._reader, self._limits = the_reader(), limits.of(settings)
         self._lock = threading.Lock()
@@ -72,9 +73,9 @@ class Desk:
     def read(
         self, body: bytes, content_type: str, source: Source, surveys: dict[bytes, bytes] | None = None
     ) -> Reading:
-        """The case in ``body``, the files that it names included: they come from ``source``. ``surveys``: what files
-        hold that were read before, by the bodies that are made of them. Raises CaseError with every problem,
-        ServiceError 415, 422, 503.
+        """Reads the case in ``body`` with the files that it names, from ``source``. ``surveys``: content of files
+        that were read before, by the bodies made of them. Raises CaseError with every problem, ServiceError 415,
+        422, 503.
         """
         kind = _file_name(content_type)
         question = Question(body=body, json=kind == "case.json", limits=self._limits)
@@ -89,17 +90,17 @@ class Desk:
             raise WrongCaseError(error.problems, reading.files) from None
 
     def source(self, owner: str, restart: str = "") -> Source:
-        """Where the files that a case of an owner names come from: what he has sent, or the run that goes on."""
+        """Returns the source of the files that a case of an owner names: uploads, or the run that is continued."""
         return of_run(self._settings.runs / restart) if restart else of_owner(self._sent, owner)
 
     def submit(
         self, owner: str, body: bytes, content_type: str, key: str | None, wishes: Wishes | None = None,
         reading: Reading | None = None,
     ) -> dict[str, Any]:  # fmt: skip
-        """Accepts a run and returns its receipt: the same one for the same key and body. ``reading``: the case, where
-        it has been read already.
+        """Accepts a run and returns its receipt: the same one for the same key and body. ``reading``: the case, if it
+        has been read already. Raises ServiceError.
 
-        Raises ServiceError. The case and the first line of the journal are on disk when this returns.
+        The case and the first line of the journal are on disk on return.
         """
         if key is not None and not _KEY.fullmatch(key):
             raise ServiceError(
@@ -129,7 +130,7 @@ class Desk:
             )
 
     def check_room(self, owner: str, keys: Sequence[str]) -> None:
-        """Raises ServiceError 422, 429, 507 unless the owner may hand in a run for each of ``keys`` that has none."""
+        """Raises ServiceError 422, 429, 507 if the owner may not submit a run for each of ``keys`` without one."""
         more = sum(self._store.run_of_key(owner, key) is None for key in keys)
         if more:
             self._check_room(owner, more)
@@ -139,19 +140,18 @@ class Desk:
         limits.check_room(self._settings.runs, self._store.open_runs(owner), self._settings.caps, more)
 
     def runs_of(self, owner: str, keys: Sequence[str]) -> list[str]:
-        """The runs that were made with these idempotency keys."""
+        """Returns the runs that were made with these idempotency keys."""
         return [run_id for key in keys if (run_id := self._store.run_of_key(owner, key)) is not None]
 
     def take_back(self, run_id: str) -> None:
-        """Cancels a run; what keeps it from being cancelled is logged."""
+        """Cancels a run; an error is logged."""
         try:
             self._supervisor.cancel(run_id)
         except Exception as error:
             _log.error("run %s is not taken back: %s", run_id, words(error))
 
     def _profile(self, name: str, *, named: bool = False) -> str:
-        """The profile that is meant; empty where there is no batch system. ``named``: in the request, not in the case.
-
+        """Returns the profile of the run; empty without a batch system. ``named``: in the request, not in the case.
         Raises ServiceError 400.
         """
         site = self._settings.site
@@ -223,7 +223,7 @@ class Desk:
 
 
 def _surveyed(reading: Reading, place: Path, known: dict[bytes, bytes]) -> bytes:
-    """What the files of a case hold. They are read once for all cases that make the same bodies of them."""
+    """Returns the content of the files of a case. It is read once for all cases that make the same bodies of them."""
     case = msgspec.json.decode(reading.case)
     bodies = msgspec.json.encode([(part["mesh"], part["turn"]) for part in case["parts"]])
     if bodies not in known:
@@ -232,7 +232,7 @@ def _surveyed(reading: Reading, place: Path, known: dict[bytes, bytes]) -> bytes
 
 
 def labels_of(texts: Sequence[str]) -> dict[str, str]:
-    """The labels of ``NAME=VALUE``. Raises ServiceError 400."""
+    """Returns the labels of ``NAME=VALUE``. Raises ServiceError 400."""
     found = [_LABEL.fullmatch(word) for word in texts]
     if None in found or len(texts) > _MOST_LABELS:
         wrong = next((word for word, read in zip(texts, found, strict=True) if read is None), f"{len(texts)} of them")
@@ -249,7 +249,7 @@ def labels_of(texts: Sequence[str]) -> dict[str, str]:
 
 
 def receipt(made: Submission) -> dict[str, Any]:
-    """What the submitter is told; it does not depend on when it is asked."""
+    """Returns the answer to a submission; it does not depend on the time of the request."""
     return {
         "id": made.id, "owner": made.owner, "name": made.name, "title": made.title, "state": "accepted",
         "ranks": made.ranks, "threads": made.threads, "submitted": made.submitted, "estimate": made.estimate,

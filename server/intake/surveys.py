@@ -1,4 +1,4 @@
-"""Has the files of a case read before it is accepted, by a program of the worker, in a process with limits."""
+"""Survey of the files of a case before it is accepted: a program of the worker reads them in a process with limits."""
 
 import logging
 import os
@@ -15,8 +15,8 @@ from conoid.cases.reading import survey
 
 _log = logging.getLogger("conoid.server")
 CPU, WALL, MEMORY, FILE = 200, 240, 8 << 30, 4 << 30
-"""s of CPU time and on the clock, bytes of memory, and of a file that is written, of each process that reads files.
-Chosen: 16 MB of text (384,000 tets) take some 10 s; what takes longer is read by its run alone."""
+"""Limits of each process that reads files: s of CPU time and of wall-clock time, bytes of memory and of a written
+file. Chosen: 16 MB of text (384,000 tets) take some 10 s; a longer file is read by its run only."""
 _BOUND = """
 import os, resource, runpy, sys
 memory, cpu, file = map(int, sys.argv[1:4])
@@ -30,10 +30,10 @@ _SECRET = ("CONOID_DATABASE", "CONOID_TOKEN")
 
 
 def surveyed(case: Mapping[str, object], folder: Path) -> bytes:
-    """The survey of a case's mesh files in ``folder``, as JSON (conoid.cases.reading.survey). Blocks until it is made.
+    """Returns the survey of a case's mesh files in ``folder`` as JSON (conoid.cases.reading.survey). Blocks.
 
-    Empty where the files cannot be read here, or not within the limits: that is no reason to refuse a run, which has
-    limits of its own.
+    Empty if the files cannot be read here or not within the limits. The run is not refused for that: it has limits
+    of its own.
     """
     if not survey.installed():
         return b""

@@ -1,4 +1,4 @@
-"""A sweep as it is handed in: the case, the points, the limit; the case of each point."""
+"""Request for a sweep: the case, the points, the limit; the case of each point."""
 
 import json
 from typing import Any
@@ -12,7 +12,7 @@ from ..errors import ServiceError, invalid_case
 
 
 class Wish(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
-    """What is handed in: a case as plain data, the changes of each point, the limit."""
+    """A request: a case as plain data, the changes of each point, the largest number of runs at a time."""
 
     case: dict[str, Any]
     points: list[dict[str, Any]]
@@ -35,7 +35,7 @@ def wish_of(body: bytes) -> Wish:
 
 
 def changed(case: dict[str, Any], point: dict[str, Any], n: int) -> bytes:
-    """The case at point ``n``, as JSON. Raises ServiceError."""
+    """Returns the case at point ``n`` as JSON. Raises ServiceError."""
     try:
         return json.dumps(apply_overrides(case, point)).encode()
     except CaseError as error:
@@ -45,5 +45,5 @@ def changed(case: dict[str, Any], point: dict[str, Any], n: int) -> bytes:
 
 
 def at_point(n: int, error: CaseError) -> ServiceError:
-    """What is wrong at point ``n``."""
+    """Returns the error at point ``n``."""
     return invalid_case([Problem(each.key, each.value, f"{each.message} (point {n})") for each in error.problems])

@@ -1,9 +1,9 @@
-"""Sweeps: one case at many points, each a run of its own. A plain file a sweep, ``<runs>/sweeps/<id>.json``.
+"""Sweeps: one case at many points, each a run of its own. A sweep is one plain file, ``<runs>/sweeps/<id>.json``.
 
-The file is there before the first run is; each run has an idempotency key made of the sweep's id and its place. So a
-request that broke off is completed by sending it again, and makes no run twice. A server that was killed in the middle
-completes the sweep when it is started again, or takes it back where it has no key: until all runs are accepted none
-starts.
+The file is written before the first run is made, and the idempotency key of each run contains the id of the sweep
+and the number of the point. So an interrupted request is completed by sending it again, and no run is made twice. A
+server that was killed in the middle completes the sweep at its next start, or removes it if it has no key. No run
+starts before all runs are accepted.
 """
 
 import hashlib
@@ -29,28 +29,28 @@ from .sweep_request import Wish, at_point, changed, wish_of
 
 _log = logging.getLogger("conoid.server")
 _AGAIN = 2.0
-"""s after which a sweep that could not be completed is tried again. Chosen."""
+"""Time in s after which an incomplete sweep is tried again. Chosen."""
 _MOST_BYTES = 16 << 20
-"""Of all cases of a sweep together. Chosen: what is expanded in a second."""
+"""Largest number of values of all cases of a sweep. Chosen: they are expanded in a second."""
 _JSON = "application/json"
 _HASHES = re.compile(r"[0-9a-f]{64}")
 
 
 class Sweeps:
-    """May be used from any thread."""
+    """The sweeps of a server. Methods may be called from any thread."""
 
     def __init__(self, settings: Settings, desk: Desk) -> None:
         """Reads what is there."""
         self.plans, self._desk = Plans(settings), desk
         self._locks: dict[str, threading.Lock] = {}
-        """By owner: who hands in many points does not hold up others."""
+        """Locks by owner, so that a large sweep does not delay other users."""
         self._filling: set[str] = set()
         self._cancelled: set[str] = set()
         self._left = [plan for plan in self.plans if not plan.whole]
         self._filling |= {plan.id for plan in self._left}
 
     def complete(self) -> None:
-        """Goes on with the sweeps that an earlier server was killed in, in a thread; their runs wait meanwhile."""
+        """Completes the incomplete sweeps of an earlier server in a thread; their runs wait meanwhile."""
         for plan in self._left:
             runs = plan.earlier or self._desk.runs_of(plan.owner, plan.keys)
             self.plans.put(msgspec.structs.replace(plan, runs=runs))
@@ -66,8 +66,8 @@ class Sweeps:
                 time.sleep(_AGAIN)
 
     def _completed(self, plan: Plan) -> bool:
-        """False where it has to be tried again. A sweep that cannot be completed is taken back; so is one without a
-        key: whoever has handed it in got no answer, and hands in another one.
+        """Completes a sweep; False if it must be tried again. A sweep that cannot be completed is removed, and so is
+        one without a key: its sender got no answer and sends another one.
         """
         with self._locks.setdefault(plan.owner, threading.Lock()):
             there = self.plans.get(plan.id)
@@ -90,18 +90,18 @@ class Sweeps:
             return True
 
     def cancel(self, plan: Plan) -> list[str]:
-        """The runs that are there; of a sweep that is being handed in no other one follows."""
+        """Returns the runs of the sweep that exist. During a submission no other run of it can start."""
         if not plan.whole:
             self._cancelled.add(plan.id)
         return (self.plans.get(plan.id) or plan).runs
 
     def get(self, sweep_id: str, owner: str) -> Plan | None:
-        """The sweep, when it belongs to the owner."""
+        """Returns the sweep if it belongs to the owner."""
         plan = self.plans.get(sweep_id)
         return plan if plan is not None and plan.owner == owner else None
 
     def submit(self, owner: str, body: bytes, key: str | None) -> Plan:
-        """Accepts all runs of a sweep, or none. Raises ServiceError. The same key and body give the same sweep."""
+        """Accepts all runs of a sweep, or none. The same key and body give the same sweep. Raises ServiceError."""
         digest = hashlib.sha256(body).hexdigest()
         with self._locks.setdefault(owner, threading.Lock()):
             plan = self._earlier(owner, key, digest)
@@ -111,8 +111,8 @@ class Sweeps:
             return self._accepted(fresh)
 
     def again(self, plan: Plan, body: bytes, failed: Mapping[int, str]) -> Plan:
-        """Runs points again: those of ``failed``, by number, whose run is still the one that is given there. ``body``
-        is that of the sweep. Raises ServiceError; then the sweep is as it was.
+        """Repeats points: those of ``failed``, by number, whose present run is the given one. ``body`` is the
+        request of the sweep. Raises ServiceError; then the sweep is unchanged.
         """
         with self._locks.setdefault(plan.owner, threading.Lock()):
             plan = self.plans.get(plan.id) or plan
@@ -129,7 +129,7 @@ class Sweeps:
             return self._accepted(fresh)
 
     def _accepted(self, plan: Plan) -> Plan:
-        """The plan with the runs that it lacks, all of them or none. Raises ServiceError."""
+        """Returns the plan with its missing runs, all of them or none. Raises ServiceError."""
         cases = self._cases(plan)
         self._desk.check_room(plan.owner, [plan.keys[n] for n in plan.wanted])
         self.plans.write(plan)
@@ -143,12 +143,12 @@ class Sweeps:
             self._complete_later([plan])
             raise
         self._filling.discard(plan.id)
-        self._cancelled.discard(plan.id)  # Asked for when all runs were there: it has cancelled these.
+        self._cancelled.discard(plan.id)  # requested when all runs existed: the runs are cancelled
         return filled
 
     def held(self, need: Need, active: Iterable[Need]) -> str:
-        """Why a run waits for its sweep: for all its runs to be there, or for those that are ``active``. The label of
-        a run says which sweep is meant.
+        """Returns why a run waits for its sweep: until all runs exist, or for the ``active`` ones. The label of the
+        run has the id of the sweep.
         """
         plan = self.get(need.sweep, need.owner)
         if plan is None:
@@ -161,7 +161,7 @@ class Sweeps:
         return f"{own} runs of its sweep are running, as many as may at a time" if own >= plan.at_once else ""
 
     def needed(self) -> set[str]:
-        """The hashes that stand in sweeps which are being handed in: what may be the files of runs to come."""
+        """Returns the hashes in sweeps that are being accepted: they may name files of future runs."""
         plans = [plan for plan in self.plans if not plan.whole]
         return {
             word for plan in plans for word in _HASHES.findall(msgspec.json.encode([plan.case, plan.points]).decode())
@@ -175,7 +175,7 @@ class Sweeps:
         return found[0] if found else None
 
     def _cases(self, plan: Plan) -> dict[int, tuple[bytes, Reading]]:
-        """The case of each point that gets a run, and can be run. Raises ServiceError with what is wrong."""
+        """Returns the case of each point that gets a run. Raises ServiceError with the problems."""
         made = {n: changed(plan.case or {}, plan.points[n], n) for n in plan.wanted}
         if sum(map(len, made.values())) > _MOST_BYTES:
             raise ServiceError(413, "too_large", f"the cases have more than {size(_MOST_BYTES)} together")
@@ -209,8 +209,8 @@ class Sweeps:
         return plan
 
     def _take_back(self, plan: Plan) -> None:
-        """Cancels the runs that were refused in the middle, before any of them has started. Of a sweep that was to be
-        run again all else stays as it was.
+        """Cancels the runs of a refused sweep, before any of them has started. A sweep that was repeated otherwise
+        stays unchanged.
         """
         for run_id in self._desk.runs_of(plan.owner, [plan.keys[n] for n in plan.wanted]):
             self._desk.take_back(run_id)

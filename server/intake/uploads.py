@@ -30,12 +30,12 @@ from ..requests.limits import later
 FOLDER = "uploads"
 _PART = ".part"
 _SYNCED = 1 << 26
-"""Bytes after which what has arrived goes to disk. Chosen: a second of a slow disk, so that no write waits for more."""
+"""Bytes after which arrived data is flushed to disk. Chosen: a second of a slow disk, the longest delay of a write."""
 
 
 @dataclass(frozen=True)
 class Upload:
-    """A file of a user: ``size`` bytes, ``offset`` of which are there; ``asked`` in Unix s."""
+    """A file of a user: ``size`` bytes, of which ``offset`` have arrived; ``asked``: last request, Unix s."""
 
     sha256: str
     size: int
@@ -45,12 +45,12 @@ class Upload:
 
 
 class Part:
-    """A file on its way, open to be written. It is closed when nobody refers to it any more: a thread may still write
-    to a disk that hangs when its request has been given up.
+    """An incomplete file, open for writing. It is closed when its last reference is dropped: after its request was
+    given up a thread may still write to a hanging disk.
     """
 
     def __init__(self, path: Path, size: int, *, anew: bool) -> None:
-        """Raises OSError, also where a link lies there."""
+        """Opens the file. Raises OSError, also for a link."""
         flags = os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC | (os.O_TRUNC if anew else 0)
         self._fd = os.open(path, flags, 0o600)
         self.path, self.size = path, size
@@ -58,12 +58,12 @@ class Part:
         self._unsynced = 0
 
     def __del__(self) -> None:
-        """Closes it."""
+        """Closes the file."""
         with suppress(AttributeError):
             os.close(self._fd)
 
     def write(self, data: bytes) -> None:
-        """Puts bytes behind those that are there. Raises OSError."""
+        """Appends bytes. Raises OSError."""
         view = memoryview(data)
         while view:
             written = os.pwrite(self._fd, view, self.offset)
@@ -74,31 +74,32 @@ class Part:
             self.sync()
 
     def sync(self) -> None:
-        """What has arrived is on disk when this returns. Raises OSError."""
+        """Flushes the data to disk. Raises OSError."""
         os.fsync(self._fd)
         self._unsynced = 0
 
     def read(self, most: int, offset: int) -> bytes:
-        """Bytes that have arrived. Raises OSError."""
+        """Returns bytes that have arrived. Raises OSError."""
         return os.pread(self._fd, most, offset)
 
 
 class Uploads:
-    """May be used from any thread. Nothing is kept in memory: what lies in the folder is the truth."""
+    """Uploaded files. Methods may be called from any thread. There is no state in memory: the folder is read each
+    time."""
 
     def __init__(self, runs: Path, rules: Files, free_disk: int) -> None:
-        """Makes nothing yet. ``free_disk``: bytes of the disk that nobody's file may take."""
+        """Creates nothing yet. ``free_disk``: bytes of the disk that uploads may not use."""
         self._runs, self._folder, self._rules, self._free_disk = runs, runs / FOLDER, rules, free_disk
         self._locks: dict[str, threading.Lock] = {}
         self.left: Callable[[str], int | None] = lambda owner: None
-        """Bytes that an owner may have besides what he has; None: no limit but that of ``rules``."""
+        """Returns the bytes that an owner may still add; None: only the limit of ``rules``."""
 
     def _lock(self, owner: str) -> threading.Lock:
-        """By owner: nobody waits for the disk of another one's files."""
+        """Returns the lock of an owner, so that users do not wait for each other's files."""
         return self._locks.setdefault(owner, threading.Lock())
 
     def of(self, owner: str) -> list[Upload]:
-        """All files of an owner, by hash. Raises OSError."""
+        """Returns all files of an owner, by hash. Raises OSError."""
         try:
             with os.scandir(self._folder / owner) as entries:
                 found = [sent for entry in entries if (sent := _sent(entry)) is not None]
@@ -107,7 +108,7 @@ class Uploads:
         return sorted(found, key=lambda sent: sent.sha256)
 
     def find(self, owner: str, sha256: str) -> Upload | None:
-        """The file of an owner, whole or on its way; it is kept for a while from now on. Raises OSError."""
+        """Returns a file of an owner, complete or incomplete, and sets the time of its last request. Raises OSError."""
         with self._lock(owner):
             for path in self._paths(owner, sha256):
                 with suppress(FileNotFoundError):
@@ -117,13 +118,13 @@ class Uploads:
         return None
 
     def _paths(self, owner: str, sha256: str) -> list[Path]:
-        """Where the file may be: whole, and on its way."""
+        """Returns the paths that the file may have, complete and incomplete."""
         folder = self._folder / owner
         return [folder / sha256, *(p for p in folder.glob(f"{sha256}.*{_PART}") if _size_of(p.name) is not None)]
 
     def begin(self, owner: str, sha256: str, total: int, first: int | None = None) -> Part:
-        """Opens what is on its way, to go on with the byte ``first``, or from the beginning for None; the size of the
-        file counts from now on. Raises ServiceError 409, 413, 429, 507, OSError.
+        """Opens an incomplete file at the byte ``first``, or a new one for None. From now on the size of the file
+        counts. Raises ServiceError 409, 413, 429, 507, OSError.
         """
         path = self._folder / owner / f"{sha256}.{total}{_PART}"
         with self._lock(owner):
@@ -165,7 +166,7 @@ class Uploads:
             raise ServiceError(507, "disk_full", detail, retryable=True)
 
     def finish(self, owner: str, part: Part) -> None:
-        """The file of an owner is whole, and has been verified: it is there under its name, on disk, when this returns.
+        """Gives a complete and verified file its final name; it is on disk on return.
 
         Raises OSError.
         """
@@ -178,12 +179,12 @@ class Uploads:
             durable.sync_folder(whole.parent)
 
     def give(self, owner: str, sha256: str, target: Path) -> None:
-        """A second name of the file in the folder of a run. Raises FileNotFoundError, OSError."""
+        """Links the file into the folder of a run. Raises FileNotFoundError, OSError."""
         with self._lock(owner):
             give(self._folder / owner / sha256, target)
 
     def remove(self, owner: str, sha256: str) -> bool:
-        """Removes a file, whole or on its way; False where there is none. Runs keep theirs. Raises OSError."""
+        """Removes a file, complete or incomplete; False if there is none. Runs keep their own. Raises OSError."""
         with self._lock(owner):
             there = [path for path in self._paths(owner, sha256) if path.exists()]
             for path in there:
@@ -191,19 +192,19 @@ class Uploads:
         return bool(there)
 
     def purge(self, now: float, needed: Container[str] = ()) -> list[str]:
-        """Removes what no run has and nobody has asked for lately, but for the hashes that are ``needed``; returns
-        a line of each. A file that a run has as well takes no room here, and stays. Raises OSError.
+        """Removes files that no run uses and that were not requested lately, except the hashes in ``needed``;
+        returns a line for each. A file that a run also uses needs no space of its own, and stays. Raises OSError.
         """
         gone: list[str] = []
         for owner in self.owners():
             hashes = [sent.sha256 for sent in self.of(owner) if sent.sha256 not in needed]
             gone += [f"file {sha256} of {owner}" for sha256 in hashes if self._dropped(owner, sha256, now)]
             with self._lock(owner), suppress(OSError):
-                (self._folder / owner).rmdir()  # where it is empty
+                (self._folder / owner).rmdir()  # fails unless the folder is empty
         return gone
 
     def _dropped(self, owner: str, sha256: str, now: float) -> bool:
-        """Whether the file was old, and has been removed. Nobody can ask for it while it is looked at."""
+        """Whether the file was old and has been removed. The lock prevents requests meanwhile."""
         with self._lock(owner):
             for path in self._paths(owner, sha256):
                 with suppress(FileNotFoundError):
@@ -214,14 +215,14 @@ class Uploads:
         return True
 
     def owners(self) -> list[str]:
-        """Those who have sent something. Raises OSError."""
+        """Returns the users with uploads. Raises OSError."""
         try:
             return sorted(entry.name for entry in os.scandir(self._folder) if entry.is_dir(follow_symlinks=False))
         except FileNotFoundError:
             return []
 
     def weigh(self, owner: str) -> dict[tuple[int, int], int]:
-        """Bytes of each file of an owner, by device and inode: a run that has a link of one has the same."""
+        """Returns the bytes of each file of an owner by device and inode; a run with a link has the same inode."""
         found: dict[tuple[int, int], int] = {}
         with suppress(FileNotFoundError), os.scandir(self._folder / owner) as entries:
             for entry in entries:
@@ -238,8 +239,8 @@ def _wrong_offset(there: int, first: int | None) -> ServiceError:
 
 
 def give(source: Path, target: Path) -> None:
-    """A second name of a file that never changes, or a copy where the file system has no second names; on disk with its
-    folder. Raises FileNotFoundError, OSError.
+    """Links a file that never changes, or copies it if the file system has no links; on disk with its folder. Raises
+    FileNotFoundError, OSError.
     """
     try:
         os.link(source, target, follow_symlinks=False)
@@ -250,12 +251,12 @@ def give(source: Path, target: Path) -> None:
 
 
 def _want(path: Path, status: os.stat_result) -> None:
-    """The file is wanted now."""
+    """Sets the time of the last request to now."""
     os.utime(path, ns=(time.time_ns(), status.st_mtime_ns), follow_symlinks=False)
 
 
 def _sent(entry: "os.DirEntry[str]") -> Upload | None:
-    """None for what is no file of ours, or has gone."""
+    """Returns None for other files and for one that has been removed."""
     with suppress(FileNotFoundError):
         return _told(entry.name, entry.stat(follow_symlinks=False))
     return None
@@ -270,11 +271,11 @@ def _told(name: str, status: os.stat_result) -> Upload | None:
 
 
 def _asked(name: str, status: os.stat_result) -> float:
-    """When a file was last wanted, or some of it arrived."""
+    """Returns the time of the last request, or of the last arrived byte."""
     return max(status.st_atime, status.st_mtime) if name.endswith(_PART) else status.st_atime
 
 
 def _size_of(name: str) -> int | None:
-    """The size that a file will have, by the name of what has arrived; None for another name."""
+    """Returns the final size of an incomplete file by its name; None for another name."""
     size_, _, ending = name.partition(".")[2].partition(".")
     return int(size_) if size_.isdecimal() and f".{ending}" == _PART else None

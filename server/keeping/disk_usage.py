@@ -1,5 +1,6 @@
-"""How much runs and files have on disk. A file that a case names is one file on disk, however many runs have it: each
-user counts it once.
+"""Disk usage of runs and uploaded files.
+
+A file that a case names is one file on disk for all runs that use it; it counts once for each user.
 """
 
 import os
@@ -16,7 +17,8 @@ Copies = dict[tuple[int, int], int]
 
 
 def size(folder: Path) -> int:
-    """Bytes of all files but the copies of what the case names; one that goes away meanwhile has none."""
+    """Returns the bytes of all files except the copies of files that the case names. A file that disappears
+    meanwhile counts 0."""
     total = 0
     for place, folders, names in os.walk(folder):
         if place == os.fspath(folder) and layout.FILES in folders:
@@ -28,7 +30,7 @@ def size(folder: Path) -> int:
 
 
 def copies(folder: Path) -> Copies:
-    """Bytes of each file that the case names, by device and inode: several runs may have the same."""
+    """Returns the bytes of each file that the case names, by device and inode: several runs may share a file."""
     found: Copies = {}
     with suppress(FileNotFoundError, NotADirectoryError), os.scandir(folder / layout.FILES) as entries:
         for entry in entries:
@@ -40,35 +42,35 @@ def copies(folder: Path) -> Copies:
 
 @dataclass
 class DiskUsage:
-    """What was found at the last look. Not safe between threads."""
+    """Sizes at the last pass. Not safe between threads."""
 
     sizes: dict[str, int] = field(default_factory=dict)
-    """Bytes of the folder of each run, without its copies of files."""
+    """Bytes of the folder of each run, without the files that its case names."""
     files: dict[str, Copies] = field(default_factory=dict)
-    """These copies."""
+    """Files that the case of each run names."""
     owners: dict[str, str] = field(default_factory=dict)
-    """Of the runs."""
+    """Owner of each run."""
     sent: dict[str, Copies] = field(default_factory=dict)
-    """What each user has sent."""
+    """Uploaded files of each user."""
 
     def note(self, run: str, owner: str, its: int, copies: Copies) -> None:
-        """The size of a run's folder, and its copies."""
+        """Records the size of a run's folder and the files that its case names."""
         self.sizes[run], self.files[run], self.owners[run] = its, copies, owner
 
     def keep(self, there: Set[str], sent: dict[str, Copies]) -> None:
-        """Runs that are not there any more weigh nothing."""
+        """Drops runs without a folder, and records the uploaded files."""
         for run in self.sizes.keys() - there:
             self.drop(run)
         self.sent = sent
 
     def drop(self, run: str) -> None:
-        """A run whose folder is removed."""
+        """Drops a run whose folder is removed."""
         self.sizes.pop(run, None)
         self.files.pop(run, None)
         self.owners.pop(run, None)
 
     def by_owner(self) -> Counter[str]:
-        """Bytes of each user: of the folders of his runs, and of his files, each once."""
+        """Returns the bytes of each user: folders of runs, and files, each counted once."""
         found, files = Counter[str](), {owner: dict(copies) for owner, copies in self.sent.items()}
         for run, owner in self.owners.items():
             found[owner] += self.sizes[run]
@@ -77,10 +79,10 @@ class DiskUsage:
 
 
 class Left:
-    """What would be left of all users' bytes if runs went, one after the other."""
+    """The bytes that remain if runs are removed one after the other."""
 
     def __init__(self, weights: DiskUsage) -> None:
-        """All of it: ``total`` in bytes."""
+        """Starts with everything: ``total`` in bytes."""
         self._sizes, self._files = dict(weights.sizes), dict(weights.files)
         held = [*self._files.values(), *weights.sent.values()]
         self._names = Counter(inode for copies in held for inode in copies)
@@ -88,7 +90,7 @@ class Left:
         self.total = sum(self._sizes.values()) + sum(files.values())
 
     def drop(self, run: str) -> None:
-        """A run goes, and with it the files that nothing else has."""
+        """Subtracts a run, and the files that no other run and no user has."""
         self.total -= self._sizes.pop(run, 0)
         for inode, size in self._files.pop(run, {}).items():
             self._names[inode] -= 1

@@ -1,4 +1,4 @@
-"""Sizes and removal of the folders of runs and of the files that users have sent."""
+"""Removal of the folders of runs and of uploaded files, by age and size."""
 
 import logging
 import threading
@@ -29,23 +29,24 @@ requests cause. Chosen."""
 
 
 class Removal:
-    """A thread, with methods for any thread. Runs are measured where the site has [retention] or quota.output_bytes."""
+    """Measures and removes folders in a thread of its own; methods may be called from any thread. Folders are
+    measured if the site has [retention] or quota.output_bytes."""
 
     def __init__(
         self, settings: Settings, store: Store, lines: RemovedRuns, is_open: Callable[[str], bool], sent: Uploads
     ) -> None:
-        """``is_open``: whether a run has not ended for good."""
+        """``is_open``: whether a run may still change."""
         self._settings, self._store, self._lines, self._is_open, self._sent = settings, store, lines, is_open, sent
         self._rules = settings.site.retention
         asked = self._rules.oldest is not None or self._rules.bytes is not None
         self._weighs = asked or settings.site.quota.output_bytes is not None
         self.needed: Callable[[], Set[str]] = frozenset
-        """Hashes of files that may not be removed now."""
+        """Hashes of files that must not be removed now."""
         self._lock, self._asking = threading.Lock(), threading.Lock()
         self._asked_again = 0.0
         self._usage = DiskUsage()
         self._settled: set[str] = set()
-        """Runs whose size was read after their end."""
+        """Runs whose size was measured after their end."""
         self._kept: Counter[str] = Counter()
         self._leave = threading.Event()
         self._thread = threading.Thread(target=self._work, name="removal", daemon=True)
@@ -61,11 +62,12 @@ class Removal:
             self._thread.join(_PATIENCE)
 
     def kept(self, owner: str) -> int:
-        """Bytes of an owner's runs and files, at the last pass."""
+        """Returns the bytes of an owner's runs and files at the last pass."""
         return self._kept[owner]
 
     def kept_now(self, owner: str) -> int:
-        """The same; without the thread they are measured now, at most every ``_PATIENCE`` s. Raises SQLAlchemyError."""
+        """Returns the bytes of an owner's runs and files. Without the thread they are measured, at most every
+        ``_PATIENCE`` s. Raises SQLAlchemyError."""
         with self._asking:
             if not self._weighs and time.monotonic() >= self._asked_again:
                 with suppress(OSError):
@@ -85,7 +87,7 @@ class Removal:
             self._kept = self._usage.by_owner()
 
     def look(self) -> None:
-        """One pass over the files of users and over all folders. Raises OSError, SQLAlchemyError."""
+        """Makes one pass over the uploaded files and over all folders. Raises OSError, SQLAlchemyError."""
         for line in self._sent.purge(time.time(), self.needed()):
             _log.info("%s is removed: no run has it, and nobody has asked for it lately", line)
         if not self._weighs:
@@ -93,17 +95,17 @@ class Removal:
         paths, known = self._all()
         self._weigh(paths, known)
         for run, why in self._due([known[path.name] for path in paths], time.time()):
-            with suppress(FileNotFoundError):  # the owner has removed it meanwhile
+            with suppress(FileNotFoundError):  # the owner may have removed it at the same time
                 self.remove(run, why)
                 _log.info("run %s of %s is removed: %s", run.id, run.owner, why)
 
     def _all(self) -> tuple[list[Path], dict[str, Run]]:
-        """The folders of all runs in the database, and these."""
+        """Returns the folders of all runs in the database, and these runs by id."""
         known = {run.id: run for run in self._store.all()}
         return [path for path in folder.runs_in(self._settings.runs) if path.name in known], known
 
     def _weigh(self, paths: list[Path], known: dict[str, Run]) -> None:
-        """Reads the sizes of the folders that may have changed, and of the files of users."""
+        """Measures the folders that may have changed, and the uploaded files."""
         for path in paths:
             if path.name not in self._settled:
                 weighed = size(path), copies(path)
@@ -119,7 +121,7 @@ class Removal:
             self._kept = self._usage.by_owner()
 
     def _due(self, runs: list[Run], now: float) -> Iterator[tuple[Run, str]]:
-        """The runs to remove, oldest first, and the rule."""
+        """Yields the runs to remove, oldest first, with the rule."""
         left, most, oldest = Left(self._usage), self._rules.bytes, self._rules.oldest
         for run in sorted(runs, key=lambda run: run.finished):
             old = oldest is not None and now - run.finished > oldest

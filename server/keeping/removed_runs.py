@@ -38,9 +38,9 @@ class RemovedRun(msgspec.Struct, kw_only=True, frozen=True):
     message: str
     removed: float
     why: str
-    """Who or which rule has removed it."""
+    """Removed by this user or rule."""
     steps: int | None = None
-    """This time and the simulated time reached, s, are None where they are not known."""
+    """This number and the simulated time reached, s, are None where they are unknown."""
     time: float | None = None
     digest: str = ""
     bytes: int = 0
@@ -74,7 +74,7 @@ def of(run: Run, path: Path, why: str) -> RemovedRun:
 
 
 class RemovedRuns:
-    """The records of all removed runs, for any thread. Memory holds the place of each line alone."""
+    """The records of all removed runs, for any thread. Only the offset of each line is in memory."""
 
     def __init__(self, runs: Path) -> None:
         """Reads the file once; an incomplete last line is ignored. Raises OSError."""

@@ -1,10 +1,10 @@
-"""Whose turn it is, and for what the others wait: pure functions over what waits and what runs.
+"""Scheduling: which waiting runs start now, and the reason for which each of the others waits. Pure functions.
 
-The order: users whom the site gives a higher priority first, then by turns whoever has taken least for his share, and
-of one user the higher priority, then the earlier run. The first run that does not fit has a reservation: others pass it
-only where it starts no later for that. A run passes when it ends, by the limit that it is held to, before the large
-one can start by the estimates of what runs (Lifka, The ANL/IBM SP scheduling system, 1995: "EASY"); or when it fits
-beside it, in whichever order what runs may end.
+Order of the queue: users with a higher priority of the site first; then users with the least use for their share;
+among the runs of one user the higher priority, then the earlier run. The first run that does not fit has a
+reservation. A later run may start before it only if this does not delay it: if the later run ends, by its time
+limit, before the first one can start by the estimates of the running ones (Lifka, The ANL/IBM SP scheduling system,
+1995: "EASY"); or if both fit, in whichever order the running ones end.
 """
 
 import heapq
@@ -19,30 +19,31 @@ from conoid.cases.site.policy import Share
 from ..runs.events import Run
 
 _LEAST = 1.0
-"""Core-seconds that every run counts for in the order, where its estimate says less or nothing. Chosen."""
+"""Least core-seconds of a run in the order of the queue, for a smaller or missing estimate. Chosen."""
 
 
 @dataclass(frozen=True)
 class Need:
-    """What a run that waits asks for."""
+    """Request of a waiting run."""
 
     run: str
     owner: str
     cores: int
     memory: float = 0.0
-    """Bytes of all ranks, by the estimate; 0: not known."""
+    """Memory of all ranks by the estimate, bytes; 0: unknown."""
     seconds: float = 0.0
-    """That it is expected to take; 0: not known."""
+    """Expected duration, s; 0: unknown."""
     limit: float = math.inf
-    """s after which it is stopped for certain."""
+    """Duration after which the run is certainly stopped, s."""
     priority: int = 0
-    """Among the runs of its owner."""
+    """Priority among the runs of its owner."""
     sweep: str = ""
 
 
 @dataclass(frozen=True)
 class Busy:
-    """What a run that has its cores holds, and the Unix time at which it is expected to end; 0: any moment."""
+    """Cores and memory of a running run, and the Unix time of its expected end; 0: unknown, it may end at any
+    moment."""
 
     cores: int
     memory: float = 0.0
@@ -51,41 +52,42 @@ class Busy:
 
 @dataclass(frozen=True)
 class Room:
-    """Cores, and bytes of memory."""
+    """Cores, and memory in bytes."""
 
     cores: int
     memory: float = math.inf
 
     def fits(self, need: Need) -> bool:
-        """True when the run can have what it asks for."""
+        """True if the request fits."""
         return need.cores <= self.cores and need.memory <= self.memory
 
     def less(self, *taken: Need | Busy) -> "Room":
-        """What is left beside these."""
+        """Returns what is left besides these runs."""
         return Room(self.cores - sum(one.cores for one in taken), self.memory - sum(one.memory for one in taken))
 
 
 @dataclass
 class Plan:
-    """The runs that start now, in order, and for what each of the others waits."""
+    """Runs that start now, in order, and for each of the others the reason for which it waits."""
 
     start: list[str] = field(default_factory=list)
     why: dict[str, str] = field(default_factory=dict)
 
 
 def in_state(runs: Iterable[Run], state: State) -> list[Run]:
-    """The runs in ``state``, first come first."""
+    """Returns the runs in ``state``, oldest first."""
     return sorted((run for run in runs if run.state is state), key=lambda run: run.id)
 
 
 def stranded(runs: Iterable[Run], looked_after: Set[str]) -> list[str]:
-    """The runs that neither wait for their turn nor are looked after otherwise."""
+    """Returns the open runs that are neither in the queue nor supervised."""
     waits = {State.ACCEPTED, State.QUEUED}
     return [run.id for run in runs if run.state not in waits and run.id not in looked_after]
 
 
 def ordered(needs: Iterable[Need], taken: Mapping[str, float], users: Mapping[str, Share]) -> list[Need]:
-    """The queue, whose turn it is first; ``taken``: core-seconds of each owner so far, those of what runs included."""
+    """Returns the queue in the order of starting. ``taken``: core-seconds of each owner so far, with those of
+    running runs."""
     of_owner: dict[str, list[Need]] = {}
     for need in sorted(needs, key=lambda need: (-need.priority, need.run)):
         of_owner.setdefault(need.owner, []).append(need)
@@ -115,10 +117,10 @@ def plan(
     now: float,
     blocked: Callable[[Need, Sequence[Need]], str],
 ) -> Plan:
-    """What starts at the Unix time ``now``, out of ``room`` of which ``busy`` have a part; ``queue`` in its order.
+    """Plans the starts at the Unix time ``now``; ``busy`` runs use a part of ``room``, ``queue`` is in its order.
 
-    ``blocked`` says of a run, and of those that start before it, why it may not start whatever is free. Such a run
-    holds nobody up, and one that needs more than there is neither.
+    ``blocked`` returns the reason for which a run may not start, given the runs that start before it. A blocked run
+    delays no other one; neither does a run that needs more than ``room``.
     """
     made, starts, holds, first = Plan(), list[Need](), list(busy), None
     waits = 0
@@ -137,7 +139,7 @@ def plan(
 
 
 def _beyond(need: Need, room: Room) -> str:
-    """Why a run can never start; a server may have been started again with less."""
+    """Returns why a run can never start; a server may have been restarted with fewer cores."""
     if need.cores > room.cores:
         return f"it needs {counted(need.cores, 'slot')}, and this server has {room.cores}: it cannot start here"
     if need.memory > room.memory:
@@ -154,12 +156,12 @@ def _reason(need: Need, room: Room, free: Room, waits: int) -> str:
 
 
 def _passes(need: Need, first: Need, busy: Sequence[Busy], free: Room, now: float) -> bool:
-    """Whether ``need`` delays nothing for ``first``, which does not fit into what is ``free`` now."""
+    """Whether ``need`` can start without a delay of ``first``, which does not fit into ``free``."""
     return now + need.limit <= _earliest(first, busy, free, now) or _beside(need, first, busy, free)
 
 
 def _earliest(first: Need, busy: Sequence[Busy], free: Room, now: float) -> float:
-    """When ``first`` can start, Unix s: by the estimates of what runs; one that is overdue may end at any moment."""
+    """Returns the Unix time at which ``first`` can start by the estimates. An overdue run may end at any moment."""
     for one in sorted(busy, key=lambda one: one.ends):
         free = Room(free.cores + one.cores, free.memory + one.memory)
         if free.fits(first):
@@ -168,10 +170,11 @@ def _earliest(first: Need, busy: Sequence[Busy], free: Room, now: float) -> floa
 
 
 def _beside(need: Need, first: Need, busy: Sequence[Busy], free: Room) -> bool:
-    """Whether ``first`` has its cores at the same moment with ``need`` as without, in whichever order others end.
+    """Whether ``first`` can start at the same moment with ``need`` as without it, for every order of ends of the
+    others.
 
-    The cores that may come free are the sums over some of ``busy``: the least that lets ``first`` start must leave
-    enough for ``need``. Where memory holds ``first`` up, nobody passes in this way.
+    The numbers of cores that may become free are the sums over subsets of ``busy``. The smallest sum that lets
+    ``first`` start must leave enough cores for ``need``. If ``first`` waits for memory, the answer is no.
     """
     if free.memory - first.memory < need.memory:
         return False

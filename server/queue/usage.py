@@ -1,11 +1,11 @@
-"""Who has taken how much: core-seconds by owner, of which half is forgotten after each half-life."""
+"""Core-seconds that each owner has used. Past use decays: half of it is forgotten after each half-life."""
 
 from collections.abc import Iterable
 from typing import NamedTuple
 
 
 class Took(NamedTuple):
-    """What one run has taken; times are Unix s."""
+    """Use of cores by one run; times are Unix s."""
 
     owner: str
     cores: int
@@ -14,28 +14,28 @@ class Took(NamedTuple):
 
 
 class Usage:
-    """Belongs to the supervisor's thread; ``of`` may be asked from any."""
+    """Core-seconds by owner. Used in the supervisor's thread; ``of`` may be called from any thread."""
 
     def __init__(self, half_life: float) -> None:
-        """Nobody has taken anything. ``half_life`` in s."""
+        """Starts without use. ``half_life`` in s."""
         self._half_life = half_life
         self._taken: dict[str, tuple[float, float]] = {}
 
     def begin(self, known: Iterable[Took]) -> None:
-        """What is known of earlier runs, in whatever order."""
+        """Adds the use of earlier runs, in any order."""
         for took in sorted(known, key=lambda took: took.finished):
             self.add(took)
 
     def add(self, took: Took) -> None:
-        """A run has given its cores back."""
+        """Adds the use of a run that has released its cores."""
         seconds = took.cores * max(0.0, took.finished - took.started)
         self._taken[took.owner] = (self.of(took.owner, took.finished) + seconds, took.finished)
 
     def of(self, owner: str, now: float) -> float:
-        """Core-seconds that count at the Unix time ``now``."""
+        """Returns the core-seconds that count at the Unix time ``now``."""
         taken, at = self._taken.get(owner, (0.0, now))
         return float(taken * 0.5 ** (max(0.0, now - at) / self._half_life))
 
     def all(self, now: float) -> dict[str, float]:
-        """Of every owner."""
+        """Returns the core-seconds of every owner."""
         return {owner: self.of(owner, now) for owner in tuple(self._taken)}

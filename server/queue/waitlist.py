@@ -1,4 +1,4 @@
-"""The queue as the supervisor uses it: what each run needs, who has taken how much, and whose turn it is now."""
+"""The queue of the supervisor: the needs of each run, the use of each owner, and the runs that start now."""
 
 import math
 import time
@@ -20,25 +20,24 @@ from .scheduling import Busy, Need, Room
 from .usage import Took, Usage
 
 _REST = 1.0
-"""s after which the queue is looked at again though nothing is known to have changed: what was taken is forgotten with
-time, and what failed is tried again. Chosen."""
+"""Longest time in s between two schedulings: past use decays with time, and failed starts are tried again. Chosen."""
 
 
 @dataclass(frozen=True)
 class Held:
-    """What others say of runs that wait."""
+    """Conditions of other parts under which a run waits."""
 
     now: Callable[[str], bool]
-    """Whether a run is not to be tried again yet."""
+    """Whether the next try of the run is later."""
     sweep: Callable[[Need, Iterable[Need]], str]
-    """Why a run waits for others of its sweep, given those that have cores; empty when it does not."""
+    """Why a run waits for others of its sweep, given the runs with cores; empty if it does not."""
 
 
 class Waitlist:
-    """Belongs to the supervisor's thread; ``why`` and ``used`` may be asked from any."""
+    """The queue. Used in the supervisor's thread; ``why`` and ``used`` may be called from any thread."""
 
     def __init__(self, settings: Settings, queues: bool) -> None:
-        """``queues``: a batch system has a queue of its own, and counts memory itself."""
+        """``queues``: the launcher is a batch system with a queue of its own, which also allocates memory."""
         self._settings, self._queues = settings, queues
         self._rules, self._quota = settings.site.queue, settings.site.quota
         self.usage = Usage(self._rules.forgets)
@@ -47,11 +46,11 @@ class Waitlist:
         self._due = 0.0
 
     def changed(self) -> None:
-        """Something has happened that may decide whose turn it is."""
+        """Schedules again at the next call of ``turn``."""
         self._due = 0.0
 
     def settled(self, before: Run | None, after: Run) -> None:
-        """A run has made a step: what it has taken counts from the moment at which it has its cores no more."""
+        """Notes the step of a run. Its use of cores is added when it releases them."""
         self._due = 0.0
         if before is not None and before.started and (after.state.final or not after.started):
             self.usage.add(Took(before.owner, before.cores, before.started, after.finished or time.time()))
@@ -60,17 +59,18 @@ class Waitlist:
             self._why.pop(after.id, None)
 
     def why(self, run_id: str) -> str:
-        """What a run waits for by the last look; empty for one that does not wait."""
+        """Returns the reason for which a run waited at the last scheduling; empty for a run that does not wait."""
         return self._why.get(run_id, "")
 
     def used(self, owner: str, runs: Iterable[Run]) -> float:
-        """Core-seconds of an owner that count now, with those of what runs of ``runs``."""
+        """Returns the core-seconds of an owner that count now, with those of the running ones among ``runs``."""
         now = time.time()
         own = (run.cores * (now - run.started) for run in runs if run.owner == owner and run.started)
         return self.usage.of(owner, now) + sum(own)
 
     def turn(self, runs: Sequence[Run], active: Iterable[str], held: Held) -> list[str]:
-        """The runs that start now, in order; ``runs`` are open, ``active`` have cores or were handed over."""
+        """Returns the runs that start now, in order. ``runs`` are open; ``active`` runs have cores or were submitted
+        to a batch system."""
         if time.monotonic() < self._due:
             return []
         self._due = time.monotonic() + _REST
@@ -89,7 +89,7 @@ class Waitlist:
         return Room(self._settings.slots) if memory is None else Room(self._settings.slots, float(memory))
 
     def _taken(self, working: Iterable[tuple[Run, Need]], now: float) -> dict[str, float]:
-        """Core-seconds by owner; a run that works counts for what it is expected to take, or for more if it has."""
+        """Returns core-seconds by owner. A running run counts with its estimate, or with its use if that is larger."""
         taken = defaultdict(float, self.usage.all(now))
         for run, need in working:
             taken[run.owner] += run.cores * max(need.seconds, now - run.started if run.started else 0.0, 1.0)
@@ -114,7 +114,8 @@ class Waitlist:
         return blocked
 
     def _need(self, run: Run) -> Need:
-        """By the run's folder, read once; where that is damaged nothing is known but its cores."""
+        """Returns the needs by the run's folder, which is read once. If the folder is damaged, only the number of
+        cores is known."""
         if run.id not in self._needs:
             try:
                 made = folder.submission(self._settings.runs / run.id)
@@ -125,8 +126,10 @@ class Waitlist:
 
 
 def need_of(made: Submission, grace: float, room: float = math.inf) -> Need:
-    """What a submission asks for; ``grace``: s after its limit at which the run is ended by force at the latest. Bodies
-    that may break take memory as if they were dust, but for a run that would not fit into ``room``, bytes, for that.
+    """Returns the needs of a submission. ``grace``: time in s between its limit and the forced end.
+
+    For bodies that may break, the memory is that of all tets as separate fragments, unless the run would then not
+    fit into ``room`` bytes.
     """
     seconds = made.estimate.get("seconds", made.estimate.get("core_seconds", 0.0) / made.cores)
     limit = math.inf if made.wall_time is None else made.wall_time + 2.0 * grace
@@ -138,5 +141,5 @@ def need_of(made: Submission, grace: float, room: float = math.inf) -> Need:
 
 
 def _busy(run: Run, need: Need) -> Busy:
-    """One that has its cores: it ends when its estimate says so."""
+    """A running run with its expected end."""
     return Busy(run.cores, need.memory, run.started + need.seconds if run.started and need.seconds else 0.0)

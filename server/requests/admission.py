@@ -17,7 +17,7 @@ from .thread_pool import asking
 from .tokens import check_token
 
 ALIVE = "/healthz"
-"""/healthz: waits for its turn and for nothing else."""
+"""Address of /healthz: it waits for its turn, and for nothing else."""
 LOCAL_OWNER = "local"
 """Owner of all runs on a server without access control."""
 _SEEN = 1000
@@ -32,12 +32,12 @@ class Admission:
     def __init__(self, app: ASGIApp, service: Service) -> None:
         self._app, self._service = app, service
         self._seen: OrderedDict[bytes, tuple[float, Token]] = OrderedDict()
-        """By hash of a token: until when it is taken as valid; after that the database is asked, in the lane of its
-        owner."""
+        """By hash of a token: the time until which it counts as valid, and the token. After that the database is
+        read again, in a thread of its owner."""
         self._turns = RequestOrder()
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Answers 429 and 503 itself where a request is not let in."""
+        """Answers refused requests with 429 and 503."""
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
@@ -106,6 +106,6 @@ class Admission:
 
 
 def _address(scope: Scope) -> str:
-    """A name that no user can have: names of users have no blank."""
+    """Returns a name that no user can have: user names have no blank."""
     client = scope.get("client")
     return f"address {client[0]}" if client else "address"

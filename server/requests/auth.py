@@ -54,7 +54,7 @@ def unauthorized() -> ServiceError:
 
 
 def _same_machine_page(request: Request) -> None:
-    """Refuses requests of other web pages on a server without tokens: a page of another site could reach it through
+    """Refuses requests of other web pages on a server without tokens: a page of another site could send them through
     the user's browser."""
     host = request.url.hostname or ""
     if not loopback(host):
@@ -81,7 +81,7 @@ Submitter = Annotated[Identity, Depends(requires("submit"))]
 
 
 class Pass:
-    """Limits a long answer: to the life of its token, and to ``seconds`` where they are given."""
+    """Limits a long answer to the validity of its token, and to ``seconds`` if given."""
 
     def __init__(self, service: Service, identity: Identity, seconds: float | None = None) -> None:
         self._service, self._identity = service, identity
@@ -94,7 +94,7 @@ class Pass:
         return max(0.0, min(RECHECK, self._ends - time.monotonic()))
 
     async def holds(self) -> bool:
-        """False once the token has been revoked or the time is over."""
+        """False once the token is revoked or the time is over."""
         now = time.monotonic()
         if now >= self._ends:
             return False
@@ -104,7 +104,7 @@ class Pass:
         return await self._service.pool.run(self._valid)
 
     def _valid(self) -> bool:
-        """A database that does not answer does not end a stream."""
+        """Reads the token; if the database does not answer, the stream goes on."""
         token = self._identity.token
         try:
             return token is None or self._service.store.token(token.id) is not None

@@ -104,7 +104,7 @@ def _too_large(length: int) -> ServiceError:
 
 
 class Limits(msgspec.Struct, frozen=True):
-    """Needs of a case and their limits here; None: no cap."""
+    """Needs of a case and their limits on this server; None: no limit."""
 
     slots: int
     elements: int | None
@@ -115,19 +115,19 @@ class Limits(msgspec.Struct, frozen=True):
 
 
 def of(settings: Settings) -> Limits:
-    """The limits of a site."""
+    """Returns the limits of a site."""
     caps = settings.caps
     memory = min((most for most in (caps.memory, settings.site.queue.memory) if most is not None), default=None)
     return Limits(settings.slots, caps.elements, caps.steps, memory, caps.core_seconds, caps.wall_time)
 
 
 def check(case: Case, limits: Limits) -> list[Problem]:
-    """All problems of a valid case with the limits of this server."""
+    """Returns all problems of a valid case with the limits of this server."""
     return [*_cores(case, limits), *_files(case), *_time(case, limits)]
 
 
 def check_size(estimate: Estimate, caps: Limits) -> list[Problem]:
-    """All needs of the case that are above the limits; a need that is not known is no reason to refuse."""
+    """Returns all needs of the case above the limits; an unknown need is not refused."""
     needs = (
         ("parts", "elements", count, estimate.elements, caps.elements),
         ("run.end_time", "steps", count, estimate.steps, caps.steps),
@@ -151,7 +151,7 @@ def _cores(case: Case, settings: Limits) -> Iterator[Problem]:
 
 
 def _files(case: Case) -> Iterator[Problem]:
-    """Problems of files without a hash: a path is one of the machine on which the case was written."""
+    """Returns problems of files without a hash: their paths are those of the machine on which the case was written."""
     for file in files_of(case.model_dump(include={"parts"})):
         if file.sha256 is None:
             message = "this key is missing: a server finds a file by its hash; conoid submit and its like fill it in"
@@ -165,9 +165,8 @@ def _time(case: Case, caps: Limits) -> Iterator[Problem]:
 
 
 def figures(estimate: Estimate) -> dict[str, int | float]:
-    """The numbers of an estimate that are known: elements, nodes, dt, steps, memory_bytes, core_seconds, seconds
-    by the clock; dust_bytes
-    where something may break.
+    """Returns the known numbers of an estimate: elements, nodes, dt, steps, memory_bytes, core_seconds, seconds of
+    wall-clock time; dust_bytes for bodies that may break.
     """
     values = {
         "elements": estimate.elements,
@@ -183,27 +182,27 @@ def figures(estimate: Estimate) -> dict[str, int | float]:
 
 
 def wall_time(case: Case, caps: Limits) -> float | None:
-    """Seconds after which the run is stopped; None: never."""
+    """Returns the time in s after which the run is stopped; None: never."""
     cost = None if caps.core_seconds is None else caps.core_seconds / case.run.cores
     asked = [limit for limit in (case.run.max_wall_time, caps.wall_time, cost) if limit is not None]
     return min(asked) if asked else None
 
 
 def later(code: str, detail: str, hint: str | None = None) -> ServiceError:
-    """429: the user has as much as he may have; less, later."""
+    """Returns 429: the user has reached a limit that later requests may meet."""
     return ServiceError(429, code, detail, hint=hint, retryable=True, headers={"Retry-After": "60"})
 
 
 def check_output(kept: int, quota: Quota) -> None:
-    """Raises ServiceError 429 when the folders of the owner's runs, ``kept`` bytes, are as large as they may be."""
+    """Raises ServiceError 429 if the folders of the owner's runs, ``kept`` bytes, have reached their limit."""
     if quota.output_bytes is not None and kept >= quota.output_bytes:
         detail = f"your runs have {size(kept)} on disk; this server allows {size(quota.output_bytes)}: remove some"
         raise later("output_quota", detail)
 
 
 def check_room(runs: Path, open_runs: int, caps: Caps, more: int = 1) -> None:
-    """Raises ServiceError 429 when the owner would have too many open runs with so many ``more``, 422 when these alone
-    are too many, 507 when the disk is nearly full.
+    """Raises ServiceError 429 if the owner would have too many open runs with ``more`` runs, 422 if these alone are
+    too many, 507 if the disk is nearly full.
     """
     if more > max(1, caps.queued):
         raise ServiceError(422, "invalid_sweep", f"{more} points; this server allows {caps.queued} open runs of a user")

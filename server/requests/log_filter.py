@@ -5,11 +5,11 @@ import threading
 import time
 
 _MOST, _WINDOW = 20, 60.0
-"""Lines of one kind that are written in so many s. Chosen: enough to see the cause."""
+"""Largest number of lines of one kind in so many s. Chosen: enough to see the cause."""
 
 
 class FloodFilter(logging.Filter):
-    """For a handler. Lines of one kind come from one place in the source."""
+    """Filter for a handler of the log. Lines of one kind come from one line of the source."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -17,7 +17,7 @@ class FloodFilter(logging.Filter):
         self._seen: dict[tuple[str, int], tuple[float, int]] = {}
 
     def filter(self, record: logging.LogRecord) -> bool:
-        """False for a line above the limit; the next line that is written says how many were left out."""
+        """Returns False for a line above the limit. The next line that is written has the number of dropped ones."""
         place, now = (record.pathname, record.lineno), time.monotonic()
         with self._lock:
             since, count = self._seen.get(place, (now, 0))

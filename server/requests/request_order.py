@@ -1,8 +1,8 @@
-"""The order in which requests begin: one in each turn of the event loop, the users in rotation.
+"""Order in which requests begin: one in each turn of the event loop, users in rotation.
 
 An answer that computes nothing takes 0.5 to 0.8 ms of the event loop, and a GET that reads a file waits for the loop
-ten times. If all requests that have arrived began in one turn of the loop, a user with 40 connections would make each
-of these waits 20 ms or more for everybody else (docs/reference/load.md, "Beside an attacker").
+ten times. If all requests that have arrived began in one turn of the loop, a user with 40 connections would make
+each of these waits 20 ms or more for all other users (docs/reference/load.md, "Beside an attacker").
 """
 
 import asyncio
@@ -10,11 +10,11 @@ from collections import OrderedDict, deque
 
 
 class RequestOrder:
-    """Belongs to the event loop."""
+    """Queue of requests. Used in the thread of the event loop."""
 
     def __init__(self) -> None:
         self._lines: OrderedDict[str, deque[asyncio.Future[None]]] = OrderedDict()
-        """The requests that have not begun, by who has made them; the one whose turn is next stands first."""
+        """Requests that have not begun, by user; the user whose request begins next is first."""
         self._called = False
 
     async def wait(self, who: str) -> None:
@@ -28,7 +28,7 @@ class RequestOrder:
         await turn
 
     def _begin(self, loop: asyncio.AbstractEventLoop) -> None:
-        """Begins one request, and comes back in the next turn of the loop while others wait."""
+        """Begins one request; schedules itself for the next turn of the loop while others wait."""
         while self._lines:
             who, line = self._lines.popitem(last=False)
             turn = line.popleft()

@@ -1,7 +1,7 @@
-"""Threads for work that may block: the disk, the database, long computations. Each user has a few at a time.
+"""Threads for work that may block: disk, database, long computations. The number of threads is limited for each user.
 
 The event loop never waits for a disk. Work that takes too long is answered with 503; its thread stays in use until
-the work ends, so that a disk that hangs takes no more threads than are allowed.
+the work ends, so a disk that hangs cannot take more threads than the limit.
 """
 
 import asyncio
@@ -19,9 +19,10 @@ from ..errors import ServiceError
 P = ParamSpec("P")
 T = TypeVar("T")
 THREADS = 64
-"""Threads for all users. Chosen: a disk answers some ten requests at a time; a thread takes some 100 kB."""
+"""Largest number of threads for all users. Chosen: a disk answers some ten requests at a time; a thread takes some
+100 kB."""
 asking: ContextVar[str] = ContextVar("asking", default="nobody")
-"""The caller of the present request: the name of a user, or an address."""
+"""The user of the present request: a name, or an address."""
 
 
 @dataclass(eq=False)
@@ -34,11 +35,11 @@ class _Job:
 
 
 class ThreadPool:
-    """One lane for each user. Used in the thread of the event loop."""
+    """A pool of threads with a queue for each user. Used in the thread of the event loop."""
 
     def __init__(self, each: int, waiting: int, patience: float, most: int = THREADS) -> None:
-        """``each``: threads at a time, ``waiting``: waiting jobs, both of one user; ``most``: threads of all users;
-        ``patience``: s that a job may take with its waiting.
+        """``each``: threads of one user, ``waiting``: waiting jobs of one user; ``most``: threads of all users;
+        ``patience``: longest time in s of a job with its waiting.
         """
         self._each, self._waiting, self._patience, self._most = each, waiting, patience, most
         self._jobs: dict[str, deque[_Job]] = {}
@@ -47,8 +48,8 @@ class ThreadPool:
         self._threads = self._busy = 0
 
     async def run(self, work: Callable[P, T], *args: P.args, **words: P.kwargs) -> T:
-        """The result of ``work``, computed in a thread for the caller; raises its errors. Raises ServiceError 429
-        when too many jobs of the user wait, 503 when the work takes too long.
+        """Returns the result of ``work``, computed in a thread for the user; raises its errors. Raises ServiceError
+        429 if too many jobs of the user wait, 503 if the work takes too long.
         """
         who, loop = asking.get(), asyncio.get_running_loop()
         waiting = self._jobs.setdefault(who, deque())
@@ -71,14 +72,14 @@ class ThreadPool:
         return ServiceError(503, "unavailable", detail, retryable=True, headers={"Retry-After": "5"})
 
     def _forget(self, job: _Job) -> None:
-        """Gives a job up; one that has not begun is not started."""
+        """Removes a job from its queue. A job that has begun continues."""
         if not job.begun:
             self._jobs[job.who].remove(job)
             if not self._jobs[job.who]:
                 del self._jobs[job.who]
 
     def _begin(self) -> None:
-        """Gives jobs to threads, one user after the other."""
+        """Starts waiting jobs, users in rotation."""
         while self._busy < self._most:
             who = next((who for who, jobs in self._jobs.items() if jobs and self._taken[who] < self._each), None)
             if who is None:
@@ -96,7 +97,7 @@ class ThreadPool:
             self._handed.put(job)
 
     def _work(self) -> None:
-        """A daemon thread: one that hangs does not keep the server from ending."""
+        """Runs jobs. The thread is a daemon: one that hangs does not keep the server from ending."""
         while True:
             job = self._handed.get()
             value, error = None, None
@@ -117,17 +118,18 @@ class ThreadPool:
             del self._taken[job.who]
         if not job.done.done():
             job.done.set_result(value) if error is None else job.done.set_exception(error)
-            job.done.exception()  # read, since the caller may have left
+            job.done.exception()  # marks the error as read: the caller may have left
         self._begin()
 
 
 def busy(detail: str) -> ServiceError:
-    """429: too many requests of the same user are in progress."""
+    """Returns 429: too many requests of the same user are in progress."""
     return ServiceError(429, "busy", detail, retryable=True, headers={"Retry-After": "5"})
 
 
 def blocking(route: Callable[P, T]) -> Callable[P, Awaitable[T]]:
-    """Decorator for a route, or a dependency, that may block: it takes ``service`` and runs in the user's lane."""
+    """Decorator for a route, or a dependency, that may block: it takes ``service`` and runs in a thread of
+    ``service.pool``."""
 
     @wraps(route)
     async def run(*args: P.args, **words: P.kwargs) -> T:

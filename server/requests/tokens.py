@@ -21,7 +21,7 @@ _NOBODY = Token("", "", "0" * 64, frozenset(), 0.0)
 
 
 class TokenError(StartError):
-    """A token cannot be made, or ended; the text says why."""
+    """A token that cannot be made or revoked; the text is the reason."""
 
     exit_code = 2
 
@@ -38,7 +38,7 @@ def create_token(store: Store, owner: str, scopes: frozenset[str]) -> str:
 
 
 def check_token(store: Store, text: str) -> Token | None:
-    """The token that ``text`` is; None for anything else. Takes as long for a wrong id as for a wrong secret."""
+    """Returns the token of ``text``; None for any other text. A wrong id takes as long as a wrong secret."""
     prefix, _, rest = text.partition("_")
     token_id, _, secret = rest.partition("_")
     token = store.token(token_id) if prefix == _PREFIX else None

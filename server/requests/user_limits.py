@@ -1,6 +1,6 @@
-"""Limits of each user: requests in progress, and long answers.
+"""Limits for each user: requests in progress, and long answers.
 
-A request is in progress until its answer is sent, so this limits the bodies and answers in memory, too.
+A request is in progress until its answer is sent, so this also limits the bodies and answers in memory.
 """
 
 import asyncio

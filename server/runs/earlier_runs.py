@@ -1,4 +1,4 @@
-"""Runs of an earlier server: each folder is read once, and again where that failed."""
+"""Runs of an earlier server. Each folder is read once; a failed reading is repeated."""
 
 import logging
 from collections.abc import Callable
@@ -19,17 +19,17 @@ _log = logging.getLogger("conoid.server")
 
 
 class EarlierRuns:
-    """Used in the supervisor's thread."""
+    """Reads the runs of an earlier server. Used in the supervisor's thread."""
 
     def __init__(
         self, runs: Path, store: Store, index: Index, launcher: Launcher, found: Callable[[Left], None]
     ) -> None:
-        """``found`` takes each run that can be read, ended or not."""
+        """``found`` receives each run that can be read, ended or open."""
         self._runs, self._store, self._index, self._launcher, self._found = runs, store, index, launcher, found
         self._failed: dict[Path, str] = {}
 
     def all(self) -> None:
-        """Reads every run that is not known to have ended, also one whose folder is empty now. Raises OSError,
+        """Reads every run that is not known to have ended, including those with an empty folder. Raises OSError,
         SQLAlchemyError.
         """
         ended, known, last = self._store.ended(), self._store.open(), ""
@@ -49,16 +49,17 @@ class EarlierRuns:
                 self._store.relabel(run, pins.labels(self._runs / run.id))
 
     def again(self) -> None:
-        """Runs that could not be read."""
+        """Reads again the runs that could not be read."""
         for path in tuple(self._failed):
             self.take_up(path)
 
     def take_up(self, path: Path) -> None:
-        """An error is logged once; the run is read again with the next pass."""
+        """Reads a run. An error is logged once; the run is read again at the next pass."""
         self._take_up(path, lambda: self._store.get(path.name))
 
     def _take_up(self, path: Path, known_of: Callable[[], Run | None]) -> None:
-        """Writes the database only where it is behind the folder, so that a thousand runs do not wait for a disk."""
+        """Reads a run, and writes the database only if it is behind the folder: a thousand runs then cause no
+        writes."""
         told = self._failed.pop(path, "")
         try:
             known = known_of()

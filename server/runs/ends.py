@@ -1,4 +1,4 @@
-"""The end of a run as its files show it, for a worker that wrote no outcome: when it ended, and how far it had come."""
+"""End of a run without an outcome, from its files: time of the end, last step, energies."""
 
 import math
 from pathlib import Path
@@ -31,8 +31,8 @@ _said = msgspec.json.Decoder(_Said)
 
 
 def when(path: Path) -> float:
-    """Unix time, s, of the last sign of the run in ``path``: of the last message of its journal, or of its outcome
-    where there is no journal; 0 where neither can be read.
+    """Returns the Unix time in s of the last sign of the run in ``path``: of the last message of its journal, or of
+    its outcome without a journal; 0 if neither can be read.
     """
     try:
         return _said.decode(journal.last(path / layout.JOURNAL)).wall or _written(path)
@@ -48,8 +48,7 @@ def _written(path: Path) -> float:
 
 
 def so_far(outcome: Outcome, run: Run, path: Path) -> Outcome:
-    """``outcome`` with the last step, time and energies of the journal in ``path``, where a worker has begun to
-    step."""
+    """Returns ``outcome`` with the last step, time and energies of the journal in ``path``, if there is a step."""
     started, told, counts = _newest(path / layout.JOURNAL)
     if started is None:
         return outcome

@@ -10,7 +10,7 @@ from conoid.cases.run import Cause, State
 
 @dataclass(frozen=True)
 class Run:
-    """What the server knows of a run. Times are Unix s, 0 until they are known."""
+    """State of a run in the server. Times are Unix s, 0 while unknown."""
 
     id: str
     owner: str
@@ -23,11 +23,11 @@ class Run:
     started: float = 0.0
     finished: float = 0.0
     stopping_for: Cause | None = None
-    """Why a stop was asked for."""
+    """Reason of the requested stop."""
     threads: int = 1
     """Threads of each rank."""
     title: str = ""
-    """Of the case."""
+    """Title of the case."""
 
     @property
     def cores(self) -> int:
@@ -64,7 +64,7 @@ class WorkerWaits:
 
 @dataclass(frozen=True)
 class LaunchFailed:
-    """The worker could not be started, and will not be tried again."""
+    """The worker cannot be started and will not be tried again."""
 
     message: str
     cause: Cause = Cause.LAUNCH
@@ -109,7 +109,7 @@ class OutputOver:
 
 @dataclass(frozen=True)
 class GraceOver:
-    """The worker did not stop in the time it was given."""
+    """The worker did not stop within the grace period."""
 
 
 @dataclass(frozen=True)
@@ -123,7 +123,7 @@ class WorkerExited:
     disk_failed: bool = False
     """Whether the worker's disk is full, or it reported an error of its disk."""
     traces: str = ""
-    """The message that the worker left where it wrote no outcome."""
+    """Message of a worker that wrote no outcome."""
     reading: tuple[State, Cause, str] | None = None
     """The end as a batch system reports it, where there is no outcome."""
     at: float = 0.0
@@ -132,7 +132,7 @@ class WorkerExited:
 
 @dataclass(frozen=True)
 class Found:
-    """A server that starts has found a run that an earlier one left open."""
+    """A starting server has found an open run of an earlier server."""
 
     worker: Literal["none", "alive", "gone"]
     outcome: Outcome | None = None

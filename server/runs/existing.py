@@ -1,5 +1,5 @@
-"""Runs whose folder exists. A run that has ended and whose folder is gone, however it was removed, is in no list, no
-count and no sweep, and is answered with 410."""
+"""Runs whose folder exists. A run that has ended and has no folder, however it was removed, is in no list, no count
+and no sweep, and is answered with 410."""
 
 import errno
 import os
@@ -12,33 +12,34 @@ from ..database.identity import FILE
 from .events import Run
 
 _FRESH = 1.0
-"""s for which the list of folders is used: a run stays in lists at most so long after its folder was removed by
-hand. Chosen: 10,000 names take 5 ms."""
+"""Time in s for which the list of folders is used: a run without a folder stays in lists for at most this time.
+Chosen: reading 10,000 names takes 5 ms."""
 
 
 class ExistingRuns:
-    """For any thread. Reads the names in the folder of runs, never the folders of the runs one by one."""
+    """The names in the folder of runs. Methods may be called from any thread; the folders of the runs are not read."""
 
     def __init__(self, runs: Path) -> None:
         """Reads nothing yet."""
         self._runs, self._reading = runs, threading.Lock()
         self._names: set[str] = set()
         self._gone: set[str] = set()
-        """Runs that were looked up one by one and not found: each is looked up once."""
+        """Runs that were looked up singly and not found: each is looked up once."""
         self._read = -_FRESH
 
     def left(self, runs: Iterable[Run]) -> list[Run]:
-        """The runs without those that have ended and are gone, by a list at most ``_FRESH`` s old. Raises OSError."""
+        """Returns the runs without those that have ended and have no folder, by a list of at most ``_FRESH`` s.
+        Raises OSError."""
         self._refresh()
         return [run for run in runs if not (run.state.final and self._is_gone(run.id))]
 
     def gone(self, ended: Set[str]) -> set[str]:
-        """Those of the runs that have ended whose folder is gone. Raises OSError."""
+        """Returns those of the ended runs that have no folder. Raises OSError."""
         self._refresh()
         return {run_id for run_id in ended - self._names if self._is_gone(run_id)}
 
     def there(self, run_id: str) -> bool:
-        """Whether the run has its folder now. Raises OSError where the folder of all runs is missing."""
+        """Whether the folder of the run exists now. Raises OSError if the folder of all runs is missing."""
         if (self._runs / run_id).is_dir():
             return True
         self._require()
@@ -63,6 +64,7 @@ class ExistingRuns:
             self._reading.release()
 
     def _require(self) -> None:
-        """A folder without the server's file is another one, or its disk is not mounted: no run counts as removed."""
+        """Raises FileNotFoundError if the folder of all runs lacks the server's file: it is another folder or its
+        disk is not mounted, and no run counts as removed."""
         if not (self._runs / FILE).exists():
             raise FileNotFoundError(errno.ENOENT, "the folder of all runs is not there now", str(self._runs))

@@ -32,17 +32,17 @@ _NEW, _GONE = ".new-", ".gone-"
 APART = f"{_NEW}files-"
 """Beginnings of the names of temporary folders; a server removes them when it starts."""
 _TELLING = (layout.SUBMISSION, layout.JOURNAL, layout.WORKER)
-"""Files of which at least one stays where a run was, however much is damaged."""
+"""Files of a run. At least one of them exists in the folder of a run, even a damaged one."""
 _UNREADABLE = "outcome.unreadable.json"
 _TITLE = 200
 """Characters of a title in lists. Chosen: a line or two."""
 DAMAGED = (FileNotFoundError, IsADirectoryError, NotADirectoryError, PermissionError)
-"""Errors of the system for a file that is missing, is not a regular file (``whole.opened``), or is not readable."""
+"""Errors of the system for a file that is missing, not regular (``whole.opened``), or not readable."""
 _NO_FILE = (FileNotFoundError, IsADirectoryError, NotADirectoryError)
 
 
 class Copy(msgspec.Struct, kw_only=True, frozen=True):
-    """A file that the case names; the run has a copy of its own: ``files/<sha256>`` with the ending of its name."""
+    """A file that the case names. The run has a copy of its own: ``files/<sha256>`` with the ending of its name."""
 
     path: str
     """The name in the case."""
@@ -50,7 +50,7 @@ class Copy(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class Submission(msgspec.Struct, kw_only=True, frozen=True):
-    """submission.json: what the server needs when its database is lost. Times are Unix s."""
+    """submission.json: the data of a run that the server needs if its database is lost. Times are Unix s."""
 
     id: str
     owner: str
@@ -71,7 +71,7 @@ class Submission(msgspec.Struct, kw_only=True, frozen=True):
     priority: int = 0
     """Priority among the runs of its owner."""
     wishes_sha256: str = ""
-    """Hash of labels, profile and priority as they were given; empty in files of earlier servers."""
+    """Hash of labels, profile and priority as they were sent; empty in files of earlier servers."""
     threads: int = 1
     """Threads of each rank."""
     files: list[Copy] = []
@@ -109,7 +109,7 @@ def new_id() -> tuple[str, float]:
 
 
 def begin_after(run_id: str) -> None:
-    """Makes later ids sort after this one, whatever the clock shows."""
+    """Makes later ids sort after this one, whatever the time of the clock."""
     global _last_stamp
     stamp = 0
     for letter in run_id[:11]:
@@ -155,7 +155,7 @@ def discard(runs: Path, run_id: str) -> None:
 
 
 def purge(runs: Path, run_id: str) -> None:
-    """Removes the folder of a run: first its name, then file by file. Raises OSError."""
+    """Removes the folder of a run: renames it, then removes file by file. Raises OSError."""
     beside = runs / f"{_GONE}{run_id}"
     os.rename(runs / run_id, beside)
     durable.sync_folder(runs)
@@ -163,12 +163,12 @@ def purge(runs: Path, run_id: str) -> None:
 
 
 def runs_in(runs: Path) -> list[Path]:
-    """The folders of all runs, oldest first."""
+    """Returns the folders of all runs, oldest first."""
     return sorted(path for path in runs.iterdir() if is_id(path.name))
 
 
 def scan(runs: Path) -> Iterator[Path]:
-    """The folders of all runs, oldest first. Removes folders that a killed server left half made or half removed."""
+    """Returns the folders of all runs, oldest first. Removes incomplete folders of a killed server."""
     for path in sorted(runs.iterdir()):
         if path.name.startswith((_NEW, _GONE)):
             shutil.rmtree(path, ignore_errors=True)
@@ -229,7 +229,7 @@ def outcome(folder: Path) -> Outcome | None:
 
 
 def outcome_error(folder: Path) -> str:
-    """Why outcome.json cannot be read; empty when it can, or when it is missing."""
+    """Returns why outcome.json cannot be read; empty if it can be read or is missing."""
     try:
         outcome_from_json(whole.read(folder / layout.OUTCOME))
     except FileNotFoundError:
@@ -240,14 +240,14 @@ def outcome_error(folder: Path) -> str:
 
 
 def write_outcome(folder: Path, ended: Outcome) -> None:
-    """Writes outcome.json whole; a damaged one is kept beside it. Raises OSError."""
+    """Writes outcome.json completely or not at all; a damaged one is kept beside it. Raises OSError."""
     if outcome_error(folder):
         put_away(folder / layout.OUTCOME, folder / _UNREADABLE)
     durable.write(folder / layout.OUTCOME, outcome_to_json(ended))
 
 
 def put_away(path: Path, kept: Path | None = None) -> None:
-    """Frees the name of a file that is about to be written; a present one is renamed to ``kept``. Raises OSError."""
+    """Frees the name of a file that will be written; an existing one is renamed to ``kept``. Raises OSError."""
     if kept is not None and not kept.exists():
         os.replace(path, kept)
     elif path.is_dir():
@@ -257,7 +257,7 @@ def put_away(path: Path, kept: Path | None = None) -> None:
 
 
 def is_as_accepted(folder: Path, made: Submission) -> bool:
-    """Whether the case on disk is the one that was checked. Raises OSError."""
+    """Whether the case on disk is the checked one. Raises OSError."""
     return made.body_sha256 in {"", digest_of(made.case_file, whole.read(folder / made.case_file))}
 
 
@@ -272,7 +272,7 @@ def write_stop(folder: Path, why: Cause) -> None:
 
 
 def stop_asked(folder: Path) -> Cause | None:
-    """Why a stop was asked for; None without a request."""
+    """Returns the reason of the requested stop; None without a request."""
     try:
         return Cause(whole.read(folder / layout.STOP_REQUEST, 80).decode())
     except (OSError, ValueError):

@@ -1,4 +1,4 @@
-"""The database as an index over the folders of the runs, which may be behind them. Used by the supervisor."""
+"""The database as an index over the folders of the runs; its rows may be older than the folders."""
 
 import logging
 import time
@@ -19,7 +19,7 @@ class Index:
     """Used in the supervisor's thread."""
 
     def __init__(self, store: Store) -> None:
-        """All runs are saved."""
+        """Starts with all runs saved."""
         self._store, self._rests_until = store, 0.0
         self.unsaved: set[str] = set()
         """Runs that changed after they were saved."""
@@ -39,7 +39,7 @@ class Index:
         return True
 
     def add(self, run: Run, key: str | None, labels: Mapping[str, str]) -> None:
-        """Rows that cannot be written now keep their old values. Raises SQLAlchemyError."""
+        """Writes changed runs. Rows that cannot be written keep their old values. Raises SQLAlchemyError."""
         try:
             self._store.add(run, key, labels)
         except SQLAlchemyError:

@@ -15,11 +15,11 @@ from conoid.cases.run import Cause, State
 _CHUNK = 1 << 18
 """Bytes of one read: some hundred lines. Chosen."""
 DAMAGED = msgspec.MsgspecError, ValueError, RecursionError
-"""What msgspec raises for JSON that is damaged: a text that is no UTF-8, and lists within lists without end, too."""
+"""Errors of msgspec for damaged JSON: text that is not UTF-8, and lists that are nested too deeply, included."""
 
 
 class _Head(msgspec.Struct):
-    """The fields that the server reads of every line, whatever else a newer worker writes."""
+    """Fields that the server reads of every line; a newer worker may write others besides."""
 
     seq: int
     type: str
@@ -60,7 +60,7 @@ class Tail:
                 return lines
 
     def block(self, size: int) -> bytes:
-        """The next complete lines as they stand, about ``size`` bytes; empty when there are none."""
+        """Returns the next complete lines unchanged, about ``size`` bytes; empty without new lines."""
         chunk = self._chunk(size)
         self._offset += len(chunk)
         return chunk
@@ -165,8 +165,8 @@ def append(path: Path, status: Status) -> Status:
 
 
 def _mend(descriptor: int) -> int:
-    """The largest number of the last lines, however much damage follows; text after the last line feed is completed
-    or cut off.
+    """Returns the largest number of the last lines, even with damaged lines after it. Text after the last line feed
+    is completed or cut off.
     """
     window = _CHUNK
     while True:

@@ -46,7 +46,7 @@ def last_words(folder: Path, log: Path | None = None) -> str:
 
 
 def disk_failed(folder: Path) -> bool:
-    """Whether a rank reported an error of its disk, or could not since the log itself has no room."""
+    """Whether a rank reported an error of its disk, or the log itself has no room for such a report."""
     said = _tail(folder)
     if any(words in said for words in _COMPLAINTS):
         return True

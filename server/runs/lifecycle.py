@@ -36,14 +36,14 @@ from .events import (
 Next = tuple[Run, tuple[Action, ...]]
 
 _SIGKILL, _SIGTERM = 9, 15
-"""Numbers of signals on every POSIX system; this module imports nothing of the system."""
+"""Numbers of signals on every POSIX system. This module imports nothing of the system."""
 
 
 def advance(run: Run, event: Event, now: float) -> Next:
-    """The run after ``event`` at the Unix time ``now``, and the actions, in order.
+    """Returns the run after ``event`` at the Unix time ``now``, and the actions in order.
 
-    An event that has no meaning any more (a cancel of a finished run, a late timer) changes nothing. Every change of
-    state obeys ``FOLLOWERS`` of conoid.cases.run.
+    An event without meaning in the present state (a cancel of a finished run, a late timer) changes nothing. Every
+    change of state obeys ``FOLLOWERS`` of conoid.cases.run.
     """
     if run.state.final:
         return run, ()
@@ -125,7 +125,7 @@ def _cancel(run: Run, now: float, handed: bool) -> Next:
 
 
 def _stop(run: Run, why: Cause) -> Next:
-    """No line for the journal: the worker writes it now."""
+    """Changes the state without a line in the journal, which the worker writes now."""
     return replace(run, state=State.STOPPING, stopping_for=why), (Stop(why),)
 
 
@@ -140,12 +140,13 @@ def _exited(run: Run, event: WorkerExited, now: float) -> Next:
 
 
 def _at(run: Run, event: WorkerExited | Found, now: float) -> float:
-    """Time of the end: by the files where no server ran at that time."""
+    """Returns the time of the end: by the files, if no server ran at that time."""
     return max(event.at, run.started) if event.at else now
 
 
 def _renamed(run: Run, event: WorkerExited, outcome: Outcome) -> Outcome:
-    """A worker records that it was stopped, not by whom: without a request it is no cancel."""
+    """Returns the cause of a stop. A worker records that it was stopped, without a reason: without a request it is
+    no cancel."""
     if run.stopping_for is Cause.STORAGE:
         state, message = State.FAILED, "its output has passed what this server allows a run"
         return msgspec.structs.replace(outcome, state=state, cause=Cause.STORAGE, message=message)
@@ -165,7 +166,7 @@ def _readable(outcome: Outcome) -> bool:
 
 
 def _without_outcome(run: Run, event: WorkerExited) -> Outcome:
-    """The end of a worker without an outcome: the exit code is a hint, never a proof of success."""
+    """Returns the final state of a worker without an outcome. The exit code is a hint, never a proof of success."""
     state, cause, message = _reading_of(run, event)
     said = f"; {event.traces}" if event.traces else ""
     return Outcome(state=state, cause=cause, message=f"{message}{said}", ranks=run.ranks, threads=run.threads)

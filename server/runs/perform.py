@@ -33,7 +33,7 @@ class Performer:
         self.watches: dict[str, Watch] = {}
         """Running workers by run."""
         self.found: dict[str, Worker] = {}
-        """Workers of an earlier server, until they are adopted."""
+        """Workers of an earlier server that are not adopted yet."""
 
     def perform(self, run: Run, action: Action, now: float) -> None:
         """Performs one action of a step to ``run`` at the Unix time ``now``. Raises LaunchError, OSError and others."""
@@ -58,11 +58,12 @@ class Performer:
                 self._kill(run.id, path)
 
     def probe(self, run_id: str) -> None:
-        """Raises OSError when nothing of the run can be written now."""
+        """Checks that files of the run can be written. Raises OSError."""
         durable.probe(self._settings.runs / run_id)
 
     def gone(self, run_id: str) -> bool:
-        """Whether the run's folder is gone. False where the folder of all runs is another one: its disk is missing."""
+        """Whether the run's folder is missing. False if the folder of all runs is another one, because its disk is
+        missing."""
         try:
             same = os.stat(self._settings.runs).st_ino == self._root
             return same and not (self._settings.runs / run_id).is_dir()
@@ -85,7 +86,7 @@ class Performer:
         return True
 
     def _stop(self, run_id: str, path: Path, why: Cause) -> None:
-        """A full disk does not keep a run from being stopped: the request is in the database as well."""
+        """Records the request to stop. On a full disk it is in the database only."""
         try:
             folder.write_stop(path, why)
         except OSError as error:
@@ -134,7 +135,7 @@ class Performer:
 
 
 def _allowed(path: Path) -> float | None:
-    """Time limit of a run whose submission can be read; the worker keeps to its own in any case."""
+    """Returns the time limit of a run by its submission. The worker applies its own limit in any case."""
     try:
         return folder.submission(path).wall_time
     except (OSError, msgspec.MsgspecError):
@@ -142,7 +143,8 @@ def _allowed(path: Path) -> float | None:
 
 
 def of_launch(error: LaunchError) -> LaunchFailed | LaunchPutOff:
-    """An error that may pass delays the launch; a folder without a readable case is an error of its disk."""
+    """Whether the launch is delayed: by a passing error, or because the folder has no readable case, an error of its
+    disk."""
     if passing(error):
         return LaunchPutOff(f"the launch is tried again: {error}")
     return LaunchFailed(str(error), Cause.STORAGE if isinstance(error, DamagedError) else Cause.LAUNCH)

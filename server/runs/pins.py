@@ -1,4 +1,5 @@
-"""Runs that are kept for good: by the label ``keep``, or by the last request, a hidden file in the run's folder."""
+"""Runs that are kept permanently: by the label ``keep``, or by the last request, which is a hidden file in the run's
+folder."""
 
 from pathlib import Path
 
@@ -13,7 +14,7 @@ _PINNED, _YES, _NO = ".keep", "yes", "no"
 
 
 def pinned(folder: Path) -> bool:
-    """Whether the run is kept for good: by the last request, else by its label ``keep``."""
+    """Whether the run is kept permanently: by the last request, else by its label ``keep``."""
     if said := told(folder):
         return said == _YES
     try:
@@ -43,5 +44,5 @@ def labels(folder: Path) -> dict[str, str]:
 
 
 def pin(folder: Path, keep: bool) -> None:
-    """Keeps a run for good, or no longer. Raises OSError."""
+    """Keeps a run permanently, or no longer. Raises OSError."""
     durable.write(folder / _PINNED, (_YES if keep else _NO).encode())

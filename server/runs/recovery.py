@@ -21,7 +21,7 @@ _STOPPABLE = {State.QUEUED, State.STARTING, State.RUNNING, State.STOPPING}
 
 @dataclass(frozen=True)
 class Left:
-    """A run by its folder, its idempotency key, and the trace of its worker."""
+    """A run by its folder, its idempotency key, and the traces of its worker."""
 
     run: Run
     key: str | None
@@ -30,8 +30,8 @@ class Left:
 
 
 def look(path: Path, known: Run | None, launcher: Launcher) -> Left:
-    """Reads a run. ``known``: its row in the database, for what a damaged folder lacks. Raises OSError, and
-    ValueError when neither has the owner of the run.
+    """Reads a run. ``known``: its row in the database, which replaces damaged files. Raises OSError, and ValueError
+    if neither has the owner of the run.
     """
     made = _submission(path)
     if made is None and known is None:
@@ -55,7 +55,7 @@ def _submission(path: Path) -> Submission | None:
 
 
 def _outcome(path: Path) -> Outcome | None:
-    """The submission; None where it may not be read."""
+    """Returns the submission; None if it cannot be read."""
     try:
         return folder.outcome(path)
     except PermissionError:
@@ -78,15 +78,15 @@ def _as_accepted(known: Run | None) -> Run:
 
 
 def _fate(path: Path, trace: Trace) -> Literal["none", "alive", "gone"]:
-    """The process record; one that cannot be read is still a trace of a launch."""
+    """Returns the process record. An unreadable record is still a trace of a launch."""
     if trace.worker is not None:
         return "alive"
     return "gone" if trace.launched or folder.there(path / layout.WORKER) else "none"
 
 
 def _mended(run: Run, journal_there: bool, known: Run | None, path: Path, trace: Trace, queues: bool) -> Run:
-    """Status of a run whose journal is missing or behind the processes: a run that was started is never started
-    twice. One that a batch system ``queues`` may still wait for its cores.
+    """Returns the status of a run whose journal is missing or older than its processes. A run that was started is
+    never started twice; one that a batch system ``queues`` may still wait for its cores.
     """
     if not journal_there and known is not None:
         run = replace(known, message="") if known.state is not State.STOPPING else replace(run, state=State.STARTING)

@@ -1,4 +1,4 @@
-"""Restart: a new run that continues from a checkpoint of another one, and the files that it takes over."""
+"""Restart: a new run that continues from a checkpoint of another one, with links to the files of that run."""
 
 import json
 import os
@@ -15,7 +15,7 @@ from ..errors import ServiceError
 from .folder import outcome
 
 _TRIES = 5
-"""Times that the newest checkpoint is looked for. Chosen."""
+"""Number of tries to find a newest checkpoint that is not removed meanwhile. Chosen."""
 LABEL = "restart"
 """Label of the new run: the id of the other one."""
 
@@ -28,8 +28,8 @@ def body(case: Path, ranks: int | None, threads: int | None = None, max_steps: i
 
 
 def check(source: Path, max_steps: int | None) -> None:
-    """Raises ServiceError 409 where no step is left for a run that goes on from ``source``. ``max_steps``: None for
-    that of its case.
+    """Raises ServiceError 409 if no step remains for a run that continues ``source``. ``max_steps``: None for the
+    value of its case.
     """
     ended = outcome(source)
     spent = ended is not None and ended.cause == Cause.STEPS
@@ -42,9 +42,10 @@ def check(source: Path, max_steps: int | None) -> None:
 
 
 def fill(source: Path, folder: Path) -> None:
-    """Links the checkpoints of ``source`` into the new run, its frames and its history. The worker takes the newest
-    checkpoint whose files have their sha256, and cuts frames and history there. Raises ServiceError 409, 503,
-    OSError.
+    """Links the checkpoints, frames and history of ``source`` into the new run.
+
+    The worker takes the newest checkpoint whose files have their sha256, and cuts frames and history at its step.
+    Raises ServiceError 409, 503, OSError.
     """
     if not any(_taken(source, folder / layout.CHECKPOINTS) for _ in range(_TRIES)):
         detail = f"the checkpoints of run {source.name} are replaced faster than they can be taken over"
@@ -56,8 +57,8 @@ def fill(source: Path, folder: Path) -> None:
 
 
 def _taken(source: Path, target: Path) -> bool:
-    """Links every checkpoint with a whole manifest. False when they were removed meanwhile: a run that goes on keeps
-    its newest ones. Raises ServiceError 409 without any.
+    """Links every checkpoint with a complete manifest. Returns False if they were removed meanwhile: a running run
+    keeps only its newest ones. Raises ServiceError 409 without any checkpoint.
     """
     damaged: list[str] = []
     taken = 0
@@ -82,7 +83,7 @@ def _taken(source: Path, target: Path) -> bool:
 
 
 def _describe(place: Path, target: Path) -> None:
-    """Copies the two files that describe a damaged checkpoint, from which the worker writes a warning that it is
+    """Copies the two files that describe a damaged checkpoint; from these the worker writes the warning that it is
     skipped.
     """
     shutil.rmtree(target, ignore_errors=True)
@@ -92,7 +93,7 @@ def _describe(place: Path, target: Path) -> None:
 
 
 def _why(source: Path) -> str:
-    """Why the run has no checkpoint, and how to get one."""
+    """Returns why the run has no checkpoint, and how to get one."""
     ended = outcome(source)
     if ended is not None and ended.state == State.SUCCEEDED:
         return "one that has succeeded keeps none"

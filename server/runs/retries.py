@@ -9,17 +9,17 @@ from .events import Event
 
 _log = logging.getLogger("conoid.server")
 _AGAIN, _LONGEST = 1.0, 8.0
-"""s until a failed step is tried again: first, and at most; the delay doubles. Chosen."""
+"""Delay in s before a failed step is tried again: first, and at most; the delay doubles. Chosen."""
 _QUIET = 60.0
-"""s for which the same error of the same run is not logged again. Chosen."""
+"""Time in s for which the same error of the same run is not logged again. Chosen."""
 _PASSING = frozenset(
     {errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EROFS, errno.ESTALE, errno.EMFILE, errno.ENFILE, errno.ENOMEM,
      errno.EAGAIN}
 )  # fmt: skip
 _LASTING = 4.0
-"""s of delay from which an error of a run's own files counts as lasting. Chosen: the fourth try, after 7 s."""
+"""Delay in s from which an error of a run's own files counts as lasting. Chosen: the fourth try, after 7 s."""
 DAMAGE = frozenset({errno.EISDIR, errno.ENOTDIR, errno.EACCES, errno.EPERM, errno.ELOOP, errno.EROFS})
-"""Errors of one folder, which last although other folders can be written."""
+"""Errors of one folder that last although other folders can be written."""
 
 
 def passing(error: BaseException) -> bool:
@@ -31,7 +31,7 @@ def passing(error: BaseException) -> bool:
 
 
 def words(error: BaseException) -> str:
-    """The error in one line."""
+    """Returns the error in one line."""
     said = error.strerror if isinstance(error, OSError) else str(error)
     return (said or type(error).__name__).splitlines()[0]
 
@@ -46,10 +46,11 @@ class _Hold:
 
 
 class Retries:
-    """Used in the supervisor's thread; ``why`` may be called from any thread."""
+    """Failed steps and the times of their next try. Used in the supervisor's thread; ``why`` may be called from any
+    thread."""
 
     def __init__(self) -> None:
-        """No run waits."""
+        """Starts without failed steps."""
         self._retries: dict[str, _Hold] = {}
 
     def __len__(self) -> int:
@@ -57,14 +58,13 @@ class Retries:
         return len(self._retries)
 
     def put_off(self, run_id: str, error: Exception, event: Event | None = None) -> Exception:
-        """Schedules another try: of the step that the run waits for, or of ``event``, which is not sent again by
-        itself."""
+        """Schedules another try: of the step that the run waits for, or of ``event``, which occurs only once."""
         before = self._retries.get(run_id)
         self._hold(run_id, words(error), event or (before.event if before else None))
         return error
 
     def rest(self, run_id: str, why: str) -> None:
-        """The run is not started for a while."""
+        """Delays the start of the run."""
         self._hold(run_id, why, None)
 
     def _hold(self, run_id: str, why: str, event: Event | None) -> None:
@@ -81,7 +81,7 @@ class Retries:
         return hold is not None and hold.until > time.monotonic()
 
     def due(self) -> list[tuple[str, Event]]:
-        """The events whose time has come."""
+        """Returns the events whose next try is now."""
         now = time.monotonic()
         return [(run_id, hold.event) for run_id, hold in self._retries.items() if hold.event and hold.until <= now]
 
@@ -90,7 +90,7 @@ class Retries:
         return {run_id for run_id, hold in tuple(self._retries.items()) if hold.event is not None}
 
     def done(self, run_id: str, event: Event) -> None:
-        """The run has made a step; a scheduled event stays."""
+        """Removes the entry after a successful step; a different scheduled event stays."""
         hold = self._retries.get(run_id)
         if hold is not None and hold.event in (None, event):
             del self._retries[run_id]
@@ -101,7 +101,7 @@ class Retries:
         return hold is not None and hold.delay >= _LASTING
 
     def damaged(self, run_id: str, error: Exception) -> bool:
-        """Whether the error is of the run's own files, and lasts."""
+        """Whether the error is one of the run's own files, and lasts."""
         return isinstance(error, OSError) and error.errno in DAMAGE and self.lasts(run_id)
 
     def forget(self, run_id: str) -> None:

@@ -1,4 +1,5 @@
-"""Performs what ``lifecycle`` decides. One thread owns every open run, so that no two events ever meet."""
+"""The supervisor performs what ``lifecycle`` decides. One thread owns every open run, so events are processed one
+after the other."""
 
 import logging
 import queue
@@ -30,15 +31,15 @@ from .retries import Retries, words
 
 _log = logging.getLogger("conoid.server")
 _LOOK = 0.02
-"""s between two looks at the running workers: what a live event waits at most before it is passed on."""
+"""Time in s between two checks of the running workers: the longest delay of a live event."""
 _TIDY = 5.0
-"""s between two looks at the tokens."""
+"""Time in s between two checks of the tokens."""
 _AGAIN = 1.0
-"""s between two looks while something waits to be tried again."""
+"""Time in s between two checks while failed steps wait for their next try."""
 _GONE = "the folder of the run has been removed"
 _DAMAGED = "the folder of the run cannot be used"
 _ANSWER = 10.0
-"""s that the thread of the supervisor may take to answer. Chosen: it looks fifty times a second."""
+"""Time in s in which the supervisor's thread must answer. Chosen: it checks fifty times a second."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +49,7 @@ class _Cancel:
 
 
 class Supervisor:
-    """Its public methods may be called from any thread."""
+    """The supervisor of all open runs. Its public methods may be called from any thread."""
 
     def __init__(
         self,
@@ -58,7 +59,7 @@ class Supervisor:
         telemetry: Telemetry | None,
         ring: Callable[[str], None],
     ) -> None:
-        """``ring`` is called with a run's id when there is news of it."""
+        """``ring`` is called with the id of a run that has changed."""
         self._settings, self._store, self._launcher = settings, store, launcher
         self._telemetry, self._ring = telemetry, ring
         self._inbox: queue.SimpleQueue[_Cancel | None] = queue.SimpleQueue()
@@ -78,7 +79,7 @@ class Supervisor:
     # From any thread --------------------------------------------------------------------------------------------------
 
     def start(self) -> None:
-        """Takes up what an earlier server left, then begins to work. Raises OSError, SQLAlchemyError."""
+        """Reads the runs of an earlier server, then starts the thread. Raises OSError, SQLAlchemyError."""
         self._launcher.tidy()
         self._take_up()
         self._waitlist.usage.begin(self._store.taken())
@@ -91,7 +92,7 @@ class Supervisor:
         self._thread.join(_ANSWER)
 
     def end_all(self) -> None:
-        """Cancels every open run; returns when all have ended, or after twice the grace."""
+        """Cancels every open run. Returns when all have ended, or after twice the grace period."""
         deadline = time.monotonic() + 2 * self._settings.grace
         for run_id in tuple(self._open):
             self._inbox.put(_Cancel(run_id, Future()))
@@ -100,41 +101,42 @@ class Supervisor:
 
     @property
     def alive(self) -> bool:
-        """False when runs are not looked after any more."""
+        """False if the thread has ended: runs are not supervised."""
         return self._thread.is_alive()
 
     def admit(self, run: Run) -> None:
-        """A new run, which is on disk and in the store."""
+        """Adds a new run, which is on disk and in the store."""
         self._open[run.id] = run
         self._waitlist.changed()
         self._inbox.put(None)
 
     def cancel(self, run_id: str) -> None:
-        """Returns when the request is recorded. Raises TimeoutError, or what kept it from being recorded."""
+        """Requests a cancel. Returns when the request is recorded. Raises TimeoutError, or the error of the
+        recording."""
         asked = _Cancel(run_id, Future())
         self._inbox.put(asked)
         asked.done.result(_ANSWER)
 
     def current(self, run_id: str) -> Run | None:
-        """The run as it is now; None when it has ended or is not known."""
+        """Returns the present state of an open run; None for a run that has ended or is unknown."""
         return self._open.get(run_id)
 
     def is_open(self, run_id: str) -> bool:
-        """False once the run has ended and its last line stands in the journal."""
+        """False once the run has ended and its last line is in the journal."""
         run = self._open.get(run_id)
         return run is not None and not run.state.final
 
     def progress(self, run_id: str) -> Progress | None:
-        """The newest progress of a worker that lives."""
+        """Returns the newest progress of a running worker."""
         watch = self._watches.get(run_id)
         return None if watch is None else watch.progress
 
     def slots_used(self) -> int:
-        """Ranks that run now."""
+        """Returns the cores in use by runs."""
         return sum(run.cores for run_id in tuple(self._watches) if (run := self._open.get(run_id)))
 
     def reason(self, run_id: str) -> str:
-        """What a queued run waits for, and what a batch system has to say of any; else empty."""
+        """Returns what a queued run waits for, or the message of a batch system; else empty."""
         if why := self._retries.why(run_id):
             return f"tried again soon: {why}"
         watch = self._watches.get(run_id)
@@ -143,12 +145,14 @@ class Supervisor:
         return self._waitlist.why(run_id)
 
     def taken(self, owner: str) -> tuple[int, float]:
-        """Runs of an owner that have cores, or were handed over; his core-seconds that count in the queue."""
+        """Returns the number of an owner's runs with cores or in a batch system, and the owner's core-seconds that
+        count in the queue."""
         own = [run for run in tuple(self._open.values()) if run.owner == owner]
         return sum(run.id in self._watches for run in own), self._waitlist.used(owner, own)
 
     def stranded(self) -> list[str]:
-        """Open runs that have neither a watch nor a place in the queue nor a timer: none, at any time."""
+        """Returns open runs that have neither a watch nor a place in the queue nor a timer. There must be none at
+        any time."""
         looked_after = {*self._watches, *self._index.unsaved, *self._retries.timed()}
         return scheduling.stranded(tuple(self._open.values()), looked_after)
 
@@ -176,7 +180,7 @@ class Supervisor:
             self._tidy()
 
     def _answer(self) -> None:
-        """Takes what was asked; waits for it no longer than until the next look."""
+        """Processes the requests of other threads until the time of the next check."""
         try:
             asked = self._inbox.get(timeout=_LOOK if self._watches else _AGAIN if self._retries else _TIDY)
         except queue.Empty:
@@ -198,7 +202,7 @@ class Supervisor:
             self._ring(run_id)
 
     def _grant(self) -> None:
-        """Starts those whose turn it is. One that cannot be started now holds nobody up; nothing is announced that
+        """Starts the runs that the queue selects. A failed start delays no other run; nothing is announced that
         could not be written.
         """
         held = Held(self._retries.held, self.held_back)
@@ -211,11 +215,11 @@ class Supervisor:
                 self._apply(run_id, Granted(self._batch))
 
     def _apply(self, run_id: str, event: Event) -> Exception | None:
-        """One step of a run; what kept it from being made, if anything.
+        """Makes one step of a run; returns the error that prevented it, or None.
 
-        A step that fails (a full disk) changes nothing and comes up again: a run in the queue gets its turn again, a
-        worker's end is seen again, and what nobody would say again waits among the holds. What the first try did
-        write is found, so that nothing is done twice.
+        A step that fails (a full disk) changes nothing and is tried again: a run in the queue is selected again, the
+        end of a worker is detected again, and an event that occurs only once waits in ``retries``. The next try
+        finds what the first one wrote, so nothing is done twice.
         """
         before = self._open.get(run_id)
         if before is None:
@@ -239,7 +243,8 @@ class Supervisor:
         return None
 
     def _fail(self, run: Run, event: Event | None, error: Exception) -> Exception | None:
-        """A run whose folder is gone, or cannot be used while others can, has ended; any other is tried again."""
+        """Handles a failed step. A run without a folder, or whose folder alone cannot be used, has ended; any other
+        step is tried again."""
         if not isinstance(event, Broken):
             if self._hands.gone(run.id):
                 return self._apply(run.id, Broken(_GONE))
@@ -253,7 +258,7 @@ class Supervisor:
         return self._retries.put_off(run.id, error, event if isinstance(event, ONCE) else None)
 
     def _settle(self, run: Run) -> None:
-        """The step is made: memory first, then the database, then those who wait for news."""
+        """Completes a step: memory first, then the database, then the waiters for a change."""
         self._waitlist.settled(self._open.get(run.id), run)
         self._open[run.id] = run
         if run.state.final:
@@ -269,7 +274,7 @@ class Supervisor:
     # Housekeeping -----------------------------------------------------------------------------------------------------
 
     def _tidy(self) -> None:
-        """Does again what failed before, and lets the router know the tokens as they are."""
+        """Repeats failed steps, and gives the router the present tokens."""
         self._tidied = time.monotonic()
         self._earlier_runs.again()
         for run_id in tuple(self._index.unsaved):
@@ -287,7 +292,7 @@ class Supervisor:
                 _log.error("the router does not know the newest tokens: %s", error)
 
     def _take_up(self) -> None:
-        """Makes memory and database agree with the runs' folders, and goes on with what an earlier server left."""
+        """Makes memory and database agree with the runs' folders, and continues the runs of an earlier server."""
         self._earlier_runs.all()
         for run_id, run in self._store.open().items():
             if run_id not in self._open and self._hands.gone(run_id):
@@ -295,7 +300,7 @@ class Supervisor:
                 self._apply(run_id, Broken(_GONE))
 
     def _found(self, left: Left) -> None:
-        """A run that an earlier server has left; one that has ended is known here until the database knows it too."""
+        """Adds a run of an earlier server. One that has ended is kept in memory until the database has its end."""
         if left.worker is not None:
             self._hands.found[left.run.id] = left.worker
         if not left.run.state.final or left.run.id in self._index.unsaved:

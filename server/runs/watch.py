@@ -17,23 +17,23 @@ from . import ends, folder, journal, launcher_log
 from .events import Event, GraceOver, OutputOver, WallTimeOver, WorkerExited, WorkerRuns, WorkerStarts, WorkerWaits
 
 _FAREWELL = 10.0
-"""s that a worker may take to leave after it has said that it finished; its launcher may hang when a helper of it was
+"""Time in s in which a worker must exit after its last message; its launcher may hang if a helper process of it was
 killed from outside."""
 _PATIENCE = 1.0
-"""s between two looks at a worker that waits for its cores in a queue, of which there may be a thousand. Chosen."""
+"""Time in s between two checks of a worker in a queue, of which there may be a thousand. Chosen."""
 _WEIGHED = 5.0
-"""s between two looks at the size of a run's folder. Chosen: some hundred files take milliseconds."""
+"""Time in s between two measurements of a run's folder. Chosen: some hundred files take milliseconds."""
 
 _progress = msgspec.json.Decoder(Progress)
 _status = msgspec.json.Decoder(Status)
 
 
 class Watch:
-    """Looks at a worker a few dozen times a second; says what happened to it as events."""
+    """Checks a worker a few dozen times a second, and returns changes as events."""
 
     def __init__(self, run_folder: Path, worker: Worker, left: float | None, most: int | None = None) -> None:
-        """``left`` is the wall time, s, that the run may still take. It is measured by a clock that nobody sets.
-        ``most``: bytes that its folder may have.
+        """``left``: remaining wall time of the run in s, measured by the monotonic clock. ``most``: largest size of
+        its folder in bytes.
         """
         self._most, self._weigh_at = most, time.monotonic() + _WEIGHED
         self.worker, self._folder = worker, run_folder
@@ -44,11 +44,11 @@ class Watch:
         self._next, self._full = 0.0, False
         self.progress: Progress | None = None
         self.news = False
-        """True when the last look found new lines in the journal."""
+        """True if the last check found new lines in the journal."""
 
     def look(self) -> Iterator[Event]:
-        """What has happened since the last look. A disk that was full when the worker ended was full, also when the
-        end can be told only later. Raises OSError.
+        """Returns the events since the last check. A disk that was full at the end of the worker counts as full,
+        even if the end is reported later. Raises OSError.
         """
         now = time.monotonic()
         if self._phase == self.worker.phase() == "waits" and now < self._next:
@@ -79,7 +79,7 @@ class Watch:
                 yield OutputOver()
 
     def _turn(self) -> Iterator[Event]:
-        """Whether the worker has got its cores, or has to wait for them again."""
+        """Whether the worker has received its cores, or waits for them again."""
         phase, before = self.worker.phase(), self._phase
         self._phase = phase
         if phase == "waits":
@@ -88,7 +88,7 @@ class Watch:
             yield WorkerWaits() if phase == "waits" else WorkerStarts(self.worker.began())
 
     def stop(self, grace: float) -> None:
-        """Asks the worker to stop, and sets the time at which it is killed."""
+        """Requests the worker to stop, and sets the time of the kill."""
         self.worker.stop()
         self._kill_at = min(self._kill_at, time.monotonic() + grace)
 
@@ -97,7 +97,7 @@ class Watch:
         return f"{layout.OUTCOME}: {wrong}" if wrong else f"its last words: {last_words}" if last_words else ""
 
     def _read(self, now: float) -> bool:
-        """Takes in the new lines; True when the worker has just said that it runs."""
+        """Reads new lines of the journal; True if one of them reports that the worker runs."""
         runs, self.news = False, False
         while lines := self._tail.read():
             self.news = True
