@@ -22,8 +22,7 @@ from .settings import Caps, Settings, SettingsError, StartError, capped, command
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Exit code: 0; 2 for a wrong command line, 1 for anything else that failed, with one line that says what is
-    wrong."""
+    """Returns the exit code: 0; 2 for a wrong command line, 1 for any other failure, with one line for people."""
     options = _parser().parse_args(arguments)
     logging.basicConfig(format="%(asctime)s %(levelname)s %(message)s", level=logging.INFO)
     try:
@@ -92,7 +91,7 @@ def _token_commands(parser: argparse.ArgumentParser) -> None:
     adopt = first.add_parser("adopt", help="a folder that was moved or restored belongs to its database, here")
     adopt.add_argument("--runs", type=Path, default=argparse.SUPPRESS, help="folder of the server's runs")
     adopt.set_defaults(act=_adopt)
-    token = first.add_parser("token", help="who may use the server")
+    token = first.add_parser("token", help="users who may use the server")
     commands = token.add_subparsers(required=True, metavar="add|list|revoke")
     add = commands.add_parser("add", help="make a token and print it, once")
     add.add_argument("name", help="whose runs it is for")
@@ -148,7 +147,7 @@ def _serve(options: argparse.Namespace) -> None:
 
 
 def _check_programs(settings: Settings) -> None:
-    """Raises SettingsError where the launcher or the worker is no program."""
+    """Raises SettingsError if the launcher or the worker is not a program."""
     launcher = command(settings.mpiexec, "--mpiexec") if settings.mpiexec else ()
     for option, words in (("--mpiexec", launcher), ("--worker", settings.worker)):
         if words and shutil.which(words[0]) is None:
@@ -161,7 +160,7 @@ def _untouched(settings: Settings) -> bool:
 
 
 def _store(options: argparse.Namespace) -> Store:
-    """The database with the tokens. Raises SettingsError where it does not exist: ``--runs`` may name another
+    """Returns the database with the tokens. Raises SettingsError if it does not exist: ``--runs`` may name another
     folder."""
     settings = _settings(options)
     if _untouched(settings):
@@ -171,7 +170,8 @@ def _store(options: argparse.Namespace) -> Store:
 
 
 def _add(options: argparse.Namespace) -> None:
-    """Creates the folder and its database where they do not exist, as the server does, and reports a new database."""
+    """Adds a token. Creates the folder and its database like the server if they do not exist, and reports a new
+    database."""
     settings = _settings(options)
     new = _untouched(settings)
     os.umask(0o077)
@@ -186,7 +186,7 @@ def _add(options: argparse.Namespace) -> None:
 
 
 def _adopt(options: argparse.Namespace) -> None:
-    """Raises SettingsError where another server uses the folder, or where it does not exist."""
+    """Binds folder and database. Raises SettingsError if another server uses the folder, or if it does not exist."""
     settings = _settings(options)
     if not settings.runs.is_dir():
         raise SettingsError(f"--runs {settings.runs}: there is no such folder")

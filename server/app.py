@@ -1,4 +1,4 @@
-"""Builds the application out of the parts of the server."""
+"""The application: makes the parts of the server and the FastAPI application."""
 
 import asyncio
 from collections.abc import AsyncIterator, Iterator
@@ -70,7 +70,7 @@ _SAFE_HEADERS = {
 @contextmanager
 def opened(settings: Settings) -> Iterator[Service]:
     """Opens the parts of a server in order of dependence, the supervisor last, and closes them in reverse order;
-    workers go on. Raises StoreError, IdentityError, TelemetryError, OSError.
+    workers continue. Raises StoreError, IdentityError, TelemetryError, OSError.
     """
     settings.runs.mkdir(0o700, parents=True, exist_ok=True)
     with ExitStack() as stack:
@@ -131,13 +131,13 @@ def opened(settings: Settings) -> Iterator[Service]:
 
 
 def launcher_of(settings: Settings) -> Launcher:
-    """The launcher that the settings file of the site names."""
+    """Returns the launcher of the site's settings."""
     site = settings.site
     return SlurmLauncher(settings, site.slurm) if site.launcher == "slurm" and site.slurm else LocalLauncher(settings)
 
 
 def build_app(service: Service) -> FastAPI:
-    """The FastAPI application over open parts."""
+    """Returns the FastAPI application over open parts."""
 
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:

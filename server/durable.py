@@ -32,7 +32,7 @@ def probe(folder: Path) -> None:
 
 
 def write_new(path: Path, content: bytes) -> None:
-    """A file in a folder that nobody reads yet; the caller syncs the folder. Raises FileExistsError."""
+    """A file in a folder that no process reads yet; the caller syncs the folder. Raises FileExistsError."""
     with whole.named(path), open(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as file:
         file.write(content)
         file.flush()

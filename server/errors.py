@@ -1,4 +1,4 @@
-"""What the server answers when it cannot do what was asked: RFC 9457 problem+json, one shape for all.
+"""Refusals and failures of the server as RFC 9457 problem+json, one form for all.
 
 ::
 
@@ -31,7 +31,7 @@ _CODES = {400: "bad_request", 401: "unauthorized", 404: "not_found", 405: "metho
 
 
 class ServiceError(Exception):
-    """An answer other than success. ``detail`` is one line for people, ``code`` a word for programs."""
+    """An answer other than success. ``detail`` is one line for people, ``code`` a constant word for programs."""
 
     def __init__(
         self,
@@ -46,8 +46,8 @@ class ServiceError(Exception):
         headers: Mapping[str, str] | None = None,
         outcome: Mapping[str, Any] | None = None,
     ) -> None:
-        """``pointer``: a JSON pointer into the body, or the name of a parameter or header; ``outcome``: the kept
-        outcome of a run that has been removed.
+        """``pointer``: a JSON pointer into the body, or the name of a parameter or header; ``outcome``: the record
+        of a removed run.
         """
         super().__init__(detail)
         self.status, self.headers = status, dict(headers or {})
@@ -70,12 +70,12 @@ class ServiceError(Exception):
         self.body = body
 
     def response(self) -> Response:
-        """The answer as problem+json."""
+        """Returns the answer as problem+json."""
         return JSONResponse(self.body, self.status, self.headers, MEDIA_TYPE)
 
 
 def invalid_case(problems: Sequence[Problem]) -> ServiceError:
-    """422 with every problem; ``detail`` and ``pointer`` are the first one's."""
+    """Returns 422 with every problem; ``detail`` and ``pointer`` are those of the first one."""
     more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
     first = problems[0]
     return ServiceError(
@@ -84,19 +84,19 @@ def invalid_case(problems: Sequence[Problem]) -> ServiceError:
 
 
 def not_found(what: str) -> ServiceError:
-    """404, with the same text for a run that does not exist and for a run of another user."""
+    """Returns 404, with the same text for an unknown run and for a run of another user."""
     return ServiceError(404, "not_found", f"{what}: there is none")
 
 
 def entry(problem: Problem) -> dict[str, str]:
-    """A problem of a case as JSON."""
+    """Returns a problem of a case as JSON."""
     return {
         "key": problem.key, "value": problem.value, "message": problem.message, "pointer": json_pointer(problem.key),
     }  # fmt: skip
 
 
 def json_pointer(key: str) -> str:
-    """``parts[0].mesh.radius`` as ``#/parts/0/mesh/radius``; ``#`` for the whole body."""
+    """Returns ``parts[0].mesh.radius`` as ``#/parts/0/mesh/radius``; ``#`` for the whole body."""
     items = [item for item in re.split(r"[.\[\]]+", key) if item]
     return "#" + "".join(f"/{item}" for item in items)
 
@@ -127,8 +127,8 @@ async def _http_error(request: Request, error: Exception) -> Response:
 
 
 def allowed(app: FastAPI, path: str) -> str:
-    """The methods of all routes of a path; where several patterns match, of the longest one. Empty where none
-    matches.
+    """Returns the methods of all routes for a path, those of the longest pattern if several match; empty without a
+    match.
     """
     found: dict[str, set[str]] = {}
     for router in app.state.routers:
@@ -148,7 +148,7 @@ async def _parameter_error(_: Request, error: Exception) -> Response:
 
 
 async def _storage(request: Request, error: Exception) -> Response:
-    """The error for a file that cannot be read now, or is damaged."""
+    """Returns the error for a file that cannot be read now, or is damaged."""
     assert isinstance(error, OSError)
     _log.error("%s %s: %s", request.method, request.url.path, error)
     detail = f"a file of the run cannot be used: {error.strerror or error}"
@@ -156,14 +156,14 @@ async def _storage(request: Request, error: Exception) -> Response:
 
 
 async def _database(request: Request, error: Exception) -> Response:
-    """The error for a database that is locked by another process, full, or not reachable; the request may succeed
-    later."""
+    """Returns the error for a database that is locked by another process, full, or not reachable; the request may
+    succeed later."""
     _log.error("%s %s: the database cannot be used: %s", request.method, request.url.path, error)
     return database_away(error).response()
 
 
 def database_away(error: Exception) -> ServiceError:
-    """The status of a failed write: 507 where the disk is full, 503 otherwise."""
+    """Returns the status of a failed write: 507 for a full disk, 503 otherwise."""
     said = str(error).splitlines()[0]
     if "disk is full" in said:
         return ServiceError(507, "storage", "the disk of the server's database is full", retryable=True)
@@ -172,7 +172,7 @@ def database_away(error: Exception) -> ServiceError:
 
 
 async def _crash(request: Request, error: Exception) -> Response:
-    """500 for the caller; the traceback is in the server's log."""
+    """Returns 500; the traceback is in the server's log."""
     _log.error("%s %s failed", request.method, request.url.path, exc_info=error)
-    detail = "the server failed to answer; its log says why"
+    detail = "the server failed to answer; its log has the reason"
     return ServiceError(500, "internal", detail, retryable=True).response()

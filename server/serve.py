@@ -1,4 +1,4 @@
-"""The server as a process: one a folder of runs, its address in server.json, a clean end on SIGTERM."""
+"""The server as a process: one for each folder of runs, its address in server.json, a clean end after SIGTERM."""
 
 import asyncio
 import json
@@ -23,13 +23,13 @@ from .settings import Settings, StartError
 _log = logging.getLogger("conoid.server")
 ADDRESS_FILE = "server.json"
 _AGAIN = 5.0
-"""s after which an address that could not be written is written again. Chosen."""
+"""Time in s after which a failed write of the address is repeated. Chosen."""
 _SWITCH = 0.001
-"""s after which a thread that computes lets another one go on: the event loop has to wait so long for each lane that is
-busy, some times an answer. Chosen: a fifth of Python's own.
+"""Time in s after which a computing thread must let another one run: the event loop waits so long for each busy
+thread, several times an answer. Chosen: a fifth of Python's default.
 """
 _FAREWELL = 3
-"""s that open requests get when the server stops."""
+"""Time in s for open requests when the server stops."""
 
 
 class ServeError(StartError):
@@ -37,9 +37,8 @@ class ServeError(StartError):
 
 
 def serve(settings: Settings) -> None:
-    """Runs the server until SIGTERM or SIGINT. What it and its workers write is for their user alone.
-
-    Raises ServeError, and what ``opened`` raises.
+    """Runs the server until SIGTERM or SIGINT. Files of the server and its workers are readable for their user only.
+    Raises ServeError, and the errors of ``opened``.
     """
     os.umask(0o077)
     sys.setswitchinterval(_SWITCH)
@@ -62,8 +61,9 @@ def _answer(settings: Settings, listener: socket.socket) -> None:
 
 
 class _Server(uvicorn.Server):
-    """Writes its address once it answers, and ends open streams before it waits for open requests. On a full disk it
-    answers without server.json, so that runs can be read and removed, and writes it when there is room.
+    """Writes the address of the server once it answers, and ends open streams before it waits for open requests. On
+    a full disk it answers without server.json, so that runs can be read and removed, and writes the file when there
+    is room.
     """
 
     def __init__(self, service: Service) -> None:
@@ -101,7 +101,7 @@ class _Server(uvicorn.Server):
             await asyncio.sleep(_AGAIN)
 
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
-        """Remembers why the server ends."""
+        """Stores the reason of the end of the server."""
         self._why = signal.Signals(sig).name
         super().handle_exit(sig, frame)
 
@@ -115,7 +115,7 @@ class _Server(uvicorn.Server):
 
 
 def announce(service: Service, listener: socket.socket, page_problem: str | None) -> bytes:
-    """Prints one line, and with a page the address to open; None: there is no page. Returns what server.json has."""
+    """Prints one line and, with a page, the address to open; None: no page. Returns the content of server.json."""
     host, port = listener.getsockname()[:2]
     url = f"http://{f'[{host}]' if ':' in host else host}:{port}"
     endpoint = service.telemetry.local_endpoint if service.telemetry else None
@@ -132,13 +132,14 @@ def announce(service: Service, listener: socket.socket, page_problem: str | None
 
 
 def _leave(_signal: int, _frame: FrameType | None) -> None:
-    """uvicorn raises the signal again once it has shut down; then this ends the process with code 0."""
+    """uvicorn raises the signal again after its shutdown; this handler then ends the process with code 0."""
     raise SystemExit(0)
 
 
 @contextmanager
 def _listening(settings: Settings) -> Iterator[socket.socket]:
-    """Says TCP in so many words: asyncio switches Nagle's delay off, 40 ms an answer, only where it reads that."""
+    """Creates the socket with protocol TCP explicitly: asyncio disables Nagle's delay of 40 ms for an answer only
+    then."""
     family = socket.AF_INET6 if ":" in settings.host else socket.AF_INET
     with socket.socket(family, socket.SOCK_STREAM, socket.IPPROTO_TCP) as listener:
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)

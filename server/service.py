@@ -1,4 +1,4 @@
-"""What the routes work with, wired once in ``app``."""
+"""Parts of a running server, as the routes use them; ``app`` creates them."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -28,7 +28,7 @@ from .telemetry import Telemetry
 
 @dataclass(frozen=True)
 class Service:
-    """The parts of a server that is up."""
+    """The parts of a running server."""
 
     settings: Settings
     store: Store
@@ -42,13 +42,13 @@ class Service:
     user_limits: UserLimits
     downloads: Downloads
     pool: ThreadPool
-    """For the disk and the database."""
+    """Threads for the disk and the database."""
     readers: ThreadPool
-    """For cases that are read."""
+    """Threads that wait for the reading of cases."""
     surveyors: ThreadPool
-    """For cases that may name files, which are read for seconds; and for restarts, whose case may."""
+    """Threads for cases that may name files, whose reading takes seconds, and for restarts, whose case may."""
     sweepers: ThreadPool
-    """For sweeps, each of which is read for seconds: nobody who hands in a run waits for them."""
+    """Threads for sweeps, whose reading takes seconds: submissions of runs do not wait for these."""
     sweeps: Sweeps
     searches: Searches
     uploads: Uploads

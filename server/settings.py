@@ -1,4 +1,4 @@
-"""What a site decides: where runs live, how many cores they take, how workers are started, the caps."""
+"""Settings of a site: folder of runs, cores, start of workers, caps."""
 
 import ipaddress
 import os
@@ -13,14 +13,14 @@ from conoid.cases.estimates.cores import usable_cores
 from conoid.cases.site.batch import Site, SiteError, read_site
 
 WORKER = (sys.executable, "-m", "mpi4py", "-m", "conoid.worker")
-"""The worker's command after ``mpiexec -n N``; ``-m mpi4py`` makes one rank's exception end all ranks."""
+"""Command of the worker after ``mpiexec -n N``; with ``-m mpi4py`` an exception of one rank ends all ranks."""
 
 
 class StartError(Exception):
-    """The server, or a command of it, cannot do its work; the text is one line for people."""
+    """The server or a command cannot do its work; the text is one line for people."""
 
     exit_code = 1
-    """What the command ends with: 2 where it was asked for something wrong, 1 for the rest, as the client's do."""
+    """Exit code of the command: 2 for a wrong request, 1 for everything else, as for the client."""
 
 
 class SettingsError(StartError):
@@ -36,50 +36,50 @@ def memory_bytes() -> int:
 
 @dataclass(frozen=True)
 class Caps:
-    """The largest case that is accepted, by its estimate; None: no cap."""
+    """Largest case that is accepted, by its estimate; None: no cap."""
 
     elements: int | None = 100_000_000
     steps: int | None = 100_000_000
     memory: int | None = field(default_factory=memory_bytes)
-    """Bytes, of all ranks together."""
+    """Memory of all ranks together, bytes."""
     core_seconds: float | None = None
     wall_time: float | None = None
-    """s; a case that asks for less is stopped at its own ``run.max_wall_time``."""
+    """Wall time of a run in s. A case with a smaller ``run.max_wall_time`` is stopped at that time."""
     queued: int = 1000
-    """Open runs of one owner."""
+    """Number of open runs of one owner."""
     output_bytes: int | None = None
-    """Of a run's folder; a run that goes beyond is stopped."""
+    """Bytes of a run's folder; a larger run is stopped."""
     free_disk: int = 1 << 30
-    """Bytes that must be free under the runs' folder before a run is accepted."""
+    """Bytes that must be free on the disk of the runs' folder before a run is accepted."""
 
 
 @dataclass(frozen=True)
 class Settings:
-    """Everything that ``python -m conoid.server`` can be told. Raises SettingsError when it does not fit together."""
+    """All options of ``python -m conoid.server``. Raises SettingsError if they do not fit together."""
 
     runs: Path
     host: str = "127.0.0.1"
     port: int = 8750
-    """0: any free port."""
+    """Port of HTTP; 0: any free port."""
     zenoh_port: int | None = 7447
-    """0: any free port; None: no Zenoh router, clients watch over SSE."""
+    """Port of Zenoh; 0: any free port; None: no Zenoh router, clients follow runs over SSE."""
     slots: int = field(default_factory=usable_cores)
-    """Cores that all runs together may take at a time; a run takes its ranks times its threads."""
+    """Largest number of cores that all runs together use at a time; a run uses its ranks times its threads."""
     auth: bool = True
     web: Path | None = None
     """Folder of the live page, served at ``/``."""
     database: str = ""
     """SQLAlchemy URL; empty: SQLite in the runs' folder."""
     mpiexec: str = ""
-    """A site's own launcher; empty: the one beside this Python, then the one in PATH."""
+    """Launcher of the site; empty: the one beside this Python, else the one in PATH."""
     worker: tuple[str, ...] = WORKER
     grace: float = 30.0
-    """s between the request to stop and the kill."""
+    """Time in s between the request to stop and the kill."""
     end_runs: bool = False
     """Cancel all runs when the server stops; otherwise workers go on, and the next server adopts them."""
     caps: Caps = field(default_factory=Caps)
     site: Site = field(default_factory=Site)
-    """Who starts the runs, and which profiles of a batch system there are."""
+    """Site settings: launcher, and profiles of batch systems."""
 
     def __post_init__(self) -> None:
         if not self.auth and not loopback(self.host):
@@ -98,17 +98,17 @@ class Settings:
 
     @property
     def database_url(self) -> str | URL:
-        """The URL in use; a path with ``%``, ``?`` or ``#`` is none as text."""
+        """Returns the URL in use. As text, a path with ``%``, ``?`` or ``#`` would be misread."""
         return self.database or URL.create("sqlite", database=str(self.database_file))
 
     @property
     def database_file(self) -> Path:
-        """The database where no URL names another one."""
+        """Returns the file of the default database."""
         return self.runs / "server.sqlite"
 
 
 def loopback(host: str) -> bool:
-    """True when ``host`` can be reached from this machine only."""
+    """True if ``host`` can be reached from this machine only."""
     if host == "localhost":
         return True
     try:

@@ -1,8 +1,9 @@
-"""The Zenoh router inside the server: workers publish to it, native clients subscribe to it. The only zenoh module.
+"""The Zenoh router inside the server: workers publish to it, native clients subscribe to it.
 
-Every token is a Zenoh user of its own and hears its owner's runs; every owner has one more user for his workers, who
-may publish there. Zenoh reads users and rules once, so the session is closed and opened again when the tokens change;
-its clients connect again by themselves and refill what they missed from the journal.
+This is the only module that imports zenoh. Every token is a Zenoh user of its own and may subscribe to its owner's
+runs; every owner has one more user for the workers, which may publish there. Zenoh reads users and rules once, so
+the session is closed and opened again when the tokens change; clients reconnect by themselves and read missed
+messages from the journal.
 """
 
 import hashlib
@@ -34,9 +35,9 @@ from .settings import StartError, loopback
 _log = logging.getLogger("conoid.server")
 _SECRET, _USERS = "server.secret", ".zenoh-users"
 _HANDSHAKE = 3000
-"""ms in which a connection must have said who it is. Chosen: it takes two round trips."""
+"""Time in ms in which a connection must authenticate. Chosen: it takes two round trips."""
 _SECRET_BYTES, _SECRET_MOST = 32, 1 << 16
-"""Of the secret: at least, and what is read of a longer one."""
+"""Length of the secret in bytes: at least, and the part that is read of a longer file."""
 _HEARS = ["put", "delete", "reply", "declare_queryable", "liveliness_token"]
 _ASKS = ["declare_subscriber", "query", "liveliness_query", "declare_liveliness_subscriber"]
 _ANSWERS = ["query", "declare_subscriber"]
@@ -48,7 +49,7 @@ class TelemetryError(StartError):
 
 @dataclass(frozen=True)
 class Reader:
-    """What a client needs to subscribe; ``user`` is empty when the router asks for none."""
+    """Access for a client; ``user`` is empty for a router without access control."""
 
     port: int
     prefix: str
@@ -62,16 +63,15 @@ class Telemetry:
     def __init__(
         self, runs: Path, host: str, port: int, tokens: Iterable[Token] | None, nodes: Slurm | None = None
     ) -> None:
-        """``tokens`` is None for a router without access control; ``nodes``: where it listens for those of a cluster.
-        On a full disk there is no router until ``follow`` can open one.
-
-        Raises TelemetryError, OSError where the secret cannot be made.
+        """``tokens`` is None for a router without access control; ``nodes``: endpoints for the nodes of a cluster.
+        On a full disk there is no router until ``follow`` can open one. Raises TelemetryError, OSError if the secret
+        cannot be made.
         """
         self._runs, self._host, self._nodes = runs, host, nodes
         self.port = port or _free_port(host)
         self._secret = _read_secret(runs)
         self._places = raise_limit()
-        """Sessions, and connections that have not said who they are, at a time."""
+        """Largest number of sessions, and of connections that have not authenticated, at a time."""
         self._lock = threading.Lock()
         self._tokens = None if tokens is None else frozenset((token.id, token.owner) for token in tokens)
         self._session: zenoh.Session | None = None
@@ -82,12 +82,12 @@ class Telemetry:
 
     @property
     def local_endpoint(self) -> str:
-        """Where the workers of this machine connect."""
+        """Endpoint for the workers of this machine."""
         host = self._host if loopback(self._host) else _local(self._host)
         return f"tcp/{_bracketed(host)}:{self.port}"
 
     def worker(self, owner: str, run: str) -> Access:
-        """The credentials of a worker."""
+        """Returns the credentials of a worker."""
         prefix = keys.run_prefix(owner, run)
         if self._tokens is None:
             return Access(self.local_endpoint, prefix)
@@ -95,7 +95,7 @@ class Telemetry:
         return Access(self.local_endpoint, prefix, user, self._password(user))
 
     def reader(self, owner: str, token: Token | None) -> Reader:
-        """The credentials of a client; the router knows them when this returns. Raises TelemetryError."""
+        """Returns the credentials of a client, which are valid when this returns. Raises TelemetryError."""
         prefix = keys.owner_prefix(owner)
         if self._tokens is None or token is None:
             return Reader(self.port, prefix, "", "")
@@ -104,12 +104,12 @@ class Telemetry:
         return Reader(self.port, prefix, token.id, self._password(token.id))
 
     def follow(self, tokens: Iterable[Token]) -> None:
-        """Opens the router again when the tokens have changed."""
+        """Opens the router again if the tokens have changed."""
         if self._tokens is not None:
             self.admit({(token.id, token.owner) for token in tokens})
 
     def admit(self, tokens: Iterable[tuple[str, str]]) -> None:
-        """Lets exactly these (token id, owner) in. Raises TelemetryError; the next call tries again."""
+        """Admits exactly these (token id, owner). Raises TelemetryError; the next call tries again."""
         with self._lock:
             wanted = frozenset(tokens)
             if wanted == self._tokens and self._session is not None:
@@ -122,7 +122,7 @@ class Telemetry:
                 raise TelemetryError(f"the Zenoh router cannot be opened: {error.filename}: {error.strerror}") from None
 
     def publish(self, owner: str, status: Status) -> None:
-        """Tells the subscribers; the journal has it already, so a loss here loses nothing."""
+        """Publishes a message. The journal has it already, so a lost sample loses no data."""
         key = keys.message_key(keys.run_prefix(owner, status.run), status.channel)
         with self._lock:
             try:
@@ -145,7 +145,7 @@ class Telemetry:
         return hmac.new(self._secret, user.encode(), hashlib.sha256).hexdigest()
 
     def _open(self) -> zenoh.Session:
-        """Raises TelemetryError, OSError where the file of its users cannot be written."""
+        """Opens a session. Raises TelemetryError, OSError if the file of users cannot be written."""
         users = self._runs / _USERS
         config = zenoh.Config()
         for key, value in self._config(users).items():
@@ -186,7 +186,8 @@ class Telemetry:
 
 
 def access_rules(tokens: Iterable[tuple[str, str]]) -> dict[str, Any]:
-    """Zenoh's access control: each owner's tokens hear his keys, his workers' user publishes there, nothing else."""
+    """Returns Zenoh's access control: tokens of an owner may subscribe to the owner's keys, the user of the owner's
+    workers may publish there, nothing else is allowed."""
     readers: dict[str, list[str]] = {}
     for token, owner in tokens:
         readers.setdefault(owner, []).append(token)
@@ -225,8 +226,8 @@ def _worker_user(owner: str) -> str:
 
 
 def _read_secret(runs: Path) -> bytes:
-    """The bytes from which all passwords follow, made at the first start. Raises TelemetryError for a file that others
-    can read, or that anybody could guess; OSError where it cannot be made.
+    """Returns the secret from which all passwords follow; it is made at the first start. Raises TelemetryError for a
+    file that others can read or that is too short; OSError if it cannot be made.
     """
     path = runs / _SECRET
     remedy = "remove it, and the server makes a new one; whoever watches a run asks for a new password by himself"

@@ -79,7 +79,7 @@ def _look(runs: Path, store: Store) -> Pair:
 
 
 def _wrong(found: Pair) -> str:
-    """Why the two do not belong together; empty when they do, or can be bound."""
+    """Returns the reason for which the two do not belong together; empty if they do, or can be bound."""
     if found.folder is not None and found.folder.place != found.place:
         return f"this folder is a copy of {found.folder.place}, or was moved from there"
     if found.database is None:

@@ -102,7 +102,7 @@ class Answer(msgspec.Struct, frozen=True, kw_only=True):
     reading: Reading | None = None
     problems: list[Problem] = []
     files: list[FileName] = []
-    """For a case with problems: the files that it names, as far as they could be read; ``sha256`` may be empty."""
+    """Files of a case with problems: those that it names, as far as they could be read; ``sha256`` may be empty."""
     crash: str = ""
 
 

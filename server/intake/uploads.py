@@ -1,13 +1,13 @@
-"""The files that users have sent: plain files in ``<runs>/uploads/<owner>/``, each under its sha256.
+"""Uploaded files: plain files in ``<runs>/uploads/<owner>/``, each under its sha256.
 
 ::
 
-    <sha256>              whole: it has this hash, and never changes
-    <sha256>.<size>.part  on its way: its length says how much has arrived of so many bytes
+    <sha256>              complete: the content has this hash, and never changes
+    <sha256>.<size>.part  incomplete: its length is the number of arrived bytes, of ``size``
 
-Each user has files of his own, and everything here is asked with the name of a user: nobody finds out what another
-one has sent. A run gets a second name of each file in its own folder (``give``): what is removed here stays there. A
-file was last wanted at its time of access, which is set whenever somebody asks for it.
+Each user has separate files, and every request names its user, so the uploads of other users cannot be found out. A
+run gets a hard link of each file in its own folder (``give``), which stays when the upload is removed. The time of
+access of a file is the time of its last request; it is set explicitly.
 """
 
 import os

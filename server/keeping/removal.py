@@ -89,7 +89,7 @@ class Removal:
     def look(self) -> None:
         """Makes one pass over the uploaded files and over all folders. Raises OSError, SQLAlchemyError."""
         for line in self._sent.purge(time.time(), self.needed()):
-            _log.info("%s is removed: no run has it, and nobody has asked for it lately", line)
+            _log.info("%s is removed: no run uses it, and it was not requested lately", line)
         if not self._weighs:
             return
         paths, known = self._all()

@@ -33,7 +33,7 @@ class Access:
 
 @dataclass(frozen=True)
 class Job:
-    """What a launcher starts."""
+    """A run or job that a launcher has started."""
 
     run: str
     ranks: int

@@ -18,7 +18,7 @@ class Taker(Protocol):
 
 
 class Accounting:
-    """For use from any thread."""
+    """Queries of the accounting database. Methods may be called from any thread."""
 
     def __init__(self, place: str = "") -> None:
         """``place``: the folder of Slurm's commands. The thread starts with the first job."""

@@ -171,7 +171,7 @@ class LocalWorker:
         return processes.start_time(self.process.pid) == self.process.started
 
     def phase(self) -> Phase:
-        """It has its cores from the start."""
+        """Always True: a local run has its cores from the start."""
         return "runs"
 
     def began(self) -> float:

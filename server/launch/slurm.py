@@ -68,7 +68,7 @@ class SlurmLauncher:
         return Trace(self._take(run, SlurmWorker(folder, record, self._site, accounting=self._accounting)), True, False)
 
     def tidy(self) -> None:
-        """Nothing to do: Slurm cleans its nodes."""
+        """Does nothing: Slurm cleans its nodes."""
 
     def _words(self, job: Job) -> list[str]:
         words = [*self._worker, str(job.case), "--out", str(job.folder), "--run", job.run, "--ranks", str(job.ranks)]
@@ -103,7 +103,7 @@ class SlurmLauncher:
             time.sleep(self._site.poll)
 
     def _round(self) -> None:
-        """Gets one list for all runs, then does what is due with each."""
+        """Gets one list for all runs, then performs the next action of each."""
         with self._lock:
             self._workers = {run: worker for run, worker in self._workers.items() if not worker.over}
             workers = list(self._workers.items())

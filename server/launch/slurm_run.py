@@ -85,7 +85,7 @@ class SlurmWorker:
         return entry.start if entry is not None and entry.state not in slurm.PENDING else 0.0
 
     def note(self) -> str:
-        """Why it waits, or since when Slurm does not answer."""
+        """Reason for which the job waits, or the time since which Slurm does not answer."""
         entry, number = self._entry, self._job.job
         if self._away:
             last = f"; job {number} was {entry.state.lower()} then" if entry else ""
@@ -130,8 +130,8 @@ class SlurmWorker:
         self._away, self._why = self._away or time.monotonic(), why
 
     def turn(self, entries: list[Entry], arrays: Set[str] = frozenset()) -> None:
-        """Does what is due. ``entries``: the jobs of this name in Slurm's list; ``arrays``: the ids of all arrays with
-        a task in the list. Raises SlurmError, OSError.
+        """Performs the next action. ``entries``: the jobs of this name in Slurm's list; ``arrays``: the ids of all
+        arrays with a task in the list. Raises SlurmError, OSError.
 
         A controller that has crashed may have lost the start of a job, which then waits for ever.
         """

@@ -30,7 +30,7 @@ class Held:
     now: Callable[[str], bool]
     """Whether the next try of the run is later."""
     sweep: Callable[[Need, Iterable[Need]], str]
-    """Why a run waits for others of its sweep, given the runs with cores; empty if it does not."""
+    """Reason for which a run waits for others of its sweep, given the runs with cores; empty if it does not."""
 
 
 class Waitlist:

@@ -49,7 +49,7 @@ async def check_query(request: Request) -> None:
             detail = f"{name} = {shown(request.query_params[name])}: it has one value, and is given {values} times"
             raise ServiceError(422, "bad_parameter", detail, pointer=name)
         if name not in known:
-            detail = f"{name[:80]}: {request.url.path} knows no such parameter; {allowed(name, known)}"
+            detail = f"{name[:80]}: {request.url.path} has no such parameter; {allowed(name, known)}"
             raise ServiceError(400, "bad_parameter", detail, pointer=name[:80])
 
 

@@ -17,7 +17,7 @@ SCOPES = {
 _PREFIX = "conoid"
 _OWNER = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,62}")
 _NOBODY = Token("", "", "0" * 64, frozenset(), 0.0)
-"""No digest is all zeros, so nobody has this token; comparing with it takes as long as with any other."""
+"""No digest is all zeros, so no user has this token; comparing with it takes as long as with any other."""
 
 
 class TokenError(StartError):

@@ -1,1 +1,1 @@
-"""What can be asked, a file a noun."""
+"""Routes of the HTTP interface, one module for each subject."""

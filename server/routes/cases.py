@@ -1,4 +1,4 @@
-"""Cases: the check before anything runs, and the gallery that comes with Conoid."""
+"""Cases: the check before submission, and the shipped cases."""
 
 import json
 from functools import cache
@@ -30,8 +30,8 @@ async def validate(
     body: Body,
     content_type: Annotated[str, Header(include_in_schema=False)] = "",
 ) -> dict[str, Any]:
-    """Whether the case could be submitted: every problem at once, or warnings, estimate, the case with all defaults,
-    and what the files that it names hold; in both cases ``files``, those that it names.
+    """Checks a case without submitting it. Returns every problem, or warnings, estimate, the case with all defaults,
+    and the content of the files that it names; in both cases ``files``, the list of these files.
     """
     try:
         pool, desk = service.surveyors if names_files(body) else service.readers, service.desk
@@ -53,21 +53,21 @@ async def validate(
 @router.get("/v1/case.schema.json")
 @blocking
 def schema(service: ServiceOf) -> Response:
-    """The JSON schema of a case: the file that the first line of a shipped case names. Asks for no token."""
+    """Returns the JSON schema of a case, which the first line of a shipped case names. No token is needed."""
     return Response(_schema(), media_type="application/schema+json")
 
 
 @router.get("/v1/cases")
 @blocking
 def gallery(service: ServiceOf, identity: Reader) -> Response:
-    """The shipped cases."""
+    """Returns the shipped cases."""
     return Response(_gallery(), media_type="application/json")
 
 
 @router.get("/v1/cases/{name}")
 @blocking
 def shipped_case(service: ServiceOf, identity: Reader, name: str) -> Response:
-    """The TOML of a shipped case, ready to be changed and submitted."""
+    """Returns the TOML of a shipped case, ready to be changed and submitted."""
     path = shipped().get(name)
     if path is None:
         raise not_found(f"case {name[:80]!r}")
@@ -77,7 +77,7 @@ def shipped_case(service: ServiceOf, identity: Reader, name: str) -> Response:
 @router.get("/v1/cases/{name}/files/{file}")
 @blocking
 def shipped_file(service: ServiceOf, identity: Reader, name: str, file: str) -> Response:
-    """A file that a shipped case names."""
+    """Returns a file that a shipped case names."""
     path = shipped().get(name)
     if path is None or file not in {named.path for named in files_of(read_data(path))}:
         raise not_found(f"file {file[:80]!r} of case {name[:80]!r}")
@@ -91,7 +91,7 @@ def _schema() -> str:
 
 @cache
 def _gallery() -> bytes:
-    """Made once: what comes with Conoid does not change while a server runs."""
+    """Returns the shipped cases. Computed once: they do not change while a server runs."""
     cases = {name: read_case(path) for name, path in shipped().items()}
     entries = [
         {"name": name, "title": case.title, "description": case.description, "url": f"/v1/cases/{name}"}

@@ -1,4 +1,4 @@
-"""What a run has said and says: replay and live stream, from the journal."""
+"""Events of a run from its journal: past events, and a live stream."""
 
 from typing import Annotated
 
@@ -20,7 +20,8 @@ router = APIRouter()
 After = Annotated[int, Query(ge=0, description="the seq of the last event that is known")]
 
 _PAGE = 1 << 20
-"""Bytes of the events of one answer, or one event. Chosen: the answers of a user are in memory until they are sent."""
+"""Largest size in bytes of the events of one answer, which has at least one event. Chosen: the answers of a user are
+in memory until they are sent."""
 Seconds = Annotated[
     float | None, Query(ge=0, le=86400, allow_inf_nan=False, description="s after which the answer ends; none: never")
 ]
@@ -31,8 +32,8 @@ Seconds = Annotated[
 def replay(
     run: OwnedRun, service: ServiceOf, after: After = 0, limit: Annotated[int, Query(ge=1, le=10_000)] = 1000
 ) -> Response:
-    """The events with ``seq`` above ``after``, oldest first, ``limit`` at most and about 1 MiB; ``last`` is the seq to
-    go on from, ``more`` says whether there are more already."""
+    """Returns the events with ``seq`` above ``after``, oldest first, at most ``limit`` and about 1 MiB. ``last``:
+    seq for the next request; ``more``: true if more events exist now."""
     path = service.settings.runs / run.id / layout.JOURNAL
     found: list[journal.Line] = []
     size = 0
@@ -45,7 +46,7 @@ def replay(
 
 
 def _page(found: list[journal.Line], after: int, *, more: bool) -> Response:
-    """The lines go out as they stand in the journal."""
+    """Returns the lines unchanged, as they are in the journal."""
     last = found[-1].seq if found else after
     body = b'{"events":[%s],"last":%d,"more":%s}' % (
         b",".join(line.raw for line in found),
@@ -65,9 +66,8 @@ async def follow(
     last_event_id: Annotated[str | None, Header(json_schema_extra={"pattern": "^[0-9]{1,18}$"})] = None,
     seconds: Seconds = None,
 ) -> Response:
-    """Server-sent events: first those after ``Last-Event-ID`` (or ``after``), then the new ones until the run ends.
-
-    A reader who has everything of a run that has ended gets 204, which tells a browser not to connect again.
+    """Sends server-sent events: those after ``Last-Event-ID`` (or ``after``), then the new ones until the run ends.
+    If the run has ended and no event is left, the answer is 204, after which a browser does not reconnect.
     """
     if last_event_id:
         if not last_event_id.isdecimal() or len(last_event_id) > 18:

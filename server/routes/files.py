@@ -1,4 +1,4 @@
-"""A run's folder, to list and to download."""
+"""Files of a run's folder: list and download."""
 
 import os
 from dataclasses import asdict
@@ -16,7 +16,7 @@ from .runs import OwnedRun
 
 
 class _AnyPath(PathConvertor):
-    """The rest of an address, line feeds too: names of files have them."""
+    """Convertor for the rest of an address, line feeds included: names of files may contain them."""
 
     regex = "(?s:.*)"
 
@@ -24,19 +24,20 @@ class _AnyPath(PathConvertor):
 register_url_convertor("path", _AnyPath())
 router = APIRouter()
 _BEFORE = 5
-"""Slashes of an address before the name of a file."""
+"""Number of slashes in an address before the name of a file."""
 
 
 @router.get("/v1/runs/{run_id}/files")
 @blocking
 def listing(run: OwnedRun, service: ServiceOf) -> dict[str, Any]:
-    """Every file of the run: path, size in bytes, time of the last change. HEAD of a file gives its sha256."""
+    """Returns every file of the run: path, size in bytes, time of the last change. HEAD of a file returns its
+    sha256."""
     entries = download.listing(service.settings.runs / run.id)
     return {"files": [_line(run, entry) for entry in entries]}
 
 
 def _line(run: Run, entry: download.Entry) -> dict[str, Any]:
-    """Bytes of a name that are no UTF-8 are shown as ``\\xff``; the url has every name as it is."""
+    """Returns a name as text. Bytes that are not UTF-8 are shown as ``\xff``; the url has the exact name."""
     name = os.fsencode(entry.path)
     return {
         **asdict(entry), "path": name.decode(errors="backslashreplace"),
@@ -46,6 +47,7 @@ def _line(run: Run, entry: download.Entry) -> dict[str, Any]:
 
 @router.get("/v1/runs/{run_id}/files/{path:path}")
 async def content(request: Request, run: OwnedRun, path: str, service: ServiceOf) -> Response:
-    """One file, whole or a Range of it; ETag, and in Repr-Digest its sha256, unless it is large and its run goes on."""
+    """Sends one file, whole or a Range of it, with ETag and, in Repr-Digest, its sha256. A large file of an open run
+    has no Repr-Digest."""
     relative = os.fsdecode(unquote_to_bytes(request.scope["raw_path"]).split(b"/", _BEFORE)[-1])
     return await service.downloads.respond(request, service.settings.runs / run.id, relative, run.state.final)

@@ -1,4 +1,4 @@
-"""For those who watch the server itself."""
+"""Health and metrics of the server."""
 
 from typing import Annotated, Any
 
@@ -16,13 +16,13 @@ router = APIRouter()
 
 @router.get("/healthz")
 async def alive() -> dict[str, str]:
-    """The process answers, whatever it waits for."""
+    """Returns 200 if the process answers."""
     return {"status": "ok"}
 
 
 @router.get("/readyz")
 async def ready(service: ServiceOf) -> Response:
-    """Runs can be taken and looked after: 200, or 503 with what is wrong."""
+    """Returns 200 if runs can be accepted and supervised, else 503 with the failed checks."""
     checks = {"supervisor": service.supervisor.alive, **await service.readiness.checks()}
     body: dict[str, Any] = {"status": "ok" if all(checks.values()) else "unavailable", "checks": checks}
     return JSONResponse(body, 200 if all(checks.values()) else 503)
@@ -33,6 +33,6 @@ async def ready(service: ServiceOf) -> Response:
 def metrics(
     request: Request, service: ServiceOf, identity: Annotated[Identity, Depends(requires("metrics"))]
 ) -> Response:
-    """Runs, slots, answers and their times in the text form that Prometheus reads."""
+    """Returns runs, slots, numbers and durations of answers in the text form of Prometheus."""
     found: Metrics = request.app.state.metrics
     return Response(found.text(), media_type=CONTENT_TYPE_PLAIN_0_0_4)

@@ -1,4 +1,4 @@
-"""The history of a run, thinned: what a page draws before it follows the stream."""
+"""History of a run, with a limited number of points. A page draws it before it follows the stream."""
 
 from typing import Annotated
 
@@ -26,10 +26,10 @@ def history(
     points: Annotated[int, Query(ge=1, le=4096, description="reports, at most")] = 1000,
     if_none_match: Known = "",
 ) -> Response:
-    """The reports of a run, thinned to ``points``: ``series`` by name over ``t`` (step, dt, counts, imbalance, each
-    term of the energy, and as ``share_...`` the phases of the step), ``ranks`` with CPU seconds by phase and rank, all
-    cuts (``balance``) and ``snapshots``, the ``log`` and its ``warnings``, ``state``, and ``elapsed`` wall time in s.
-    The stream goes on from ``last``.
+    """Returns the reports of a run, reduced to ``points``: ``series`` by name over ``t`` (step, dt, counts,
+    imbalance, each term of the energy, shares of the phases of a step as ``share_...``), ``ranks`` with CPU seconds
+    by phase and rank, all balance events (``balance``) and ``snapshots``, the ``log`` and its ``warnings``,
+    ``state``, and ``elapsed`` wall time in s. The stream continues after ``last``.
     """
     found = service.histories.of(service.settings.runs / run.id / layout.JOURNAL)
     with found.lock:
@@ -46,10 +46,10 @@ def columns(
     points: Annotated[int, Query(ge=1, le=8192, description="lines, about as many at most")] = 1000,
     if_none_match: Known = "",
 ) -> Response:
-    """history.csv: of each column of numbers the unit and the last, least and greatest value (``columns``), and the
-    ``values`` of those that are named, with t in s. Where there are more than ``points`` ``lines``, groups of them are
-    two lines each: of every column the least and the greatest value, in the order in which they come. ``behind``: the
-    file is long and not all of it has been read, the next answer has more. No column while there is no file.
+    """Returns history.csv: unit, last value, minimum and maximum of each column of numbers (``columns``), and the
+    ``values`` of the named columns, with t in s. A file with more ``lines`` than ``points`` is reduced: each group
+    of lines becomes two values of each column, its minimum and maximum in the order of their occurrence. ``behind``:
+    the file is long, and the next answer has more of it. A run without the file has no columns.
     """
     found = service.histories.of(service.settings.runs / run.id / layout.JOURNAL)
     with found.lock:
@@ -58,7 +58,7 @@ def columns(
 
 
 def _columns(found: Columns, names: list[str], points: int) -> bytes:
-    """Raises ServiceError 400 for a name that no column has."""
+    """Raises ServiceError 400 for an unknown name of a column."""
     known = found.units
     if known and (strange := next((name for name in names if name not in known and name != "*"), None)):
         detail = f"name = {strange[:80]!r}: columns of numbers are: {', '.join(known)}"

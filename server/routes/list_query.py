@@ -1,4 +1,4 @@
-"""Which runs a request asks for: the parameters that lists of runs have in common."""
+"""Parameters that lists of runs have in common."""
 
 from typing import Annotated
 
@@ -11,7 +11,7 @@ from ..errors import ServiceError
 from ..intake.submission import labels_of
 
 _MOST_WORDS, _LONGEST = 8, 200
-"""Words that are looked for, and characters of all of them. Chosen."""
+"""Largest number of words in a search, and of their characters. Chosen."""
 
 
 def chosen(
@@ -25,7 +25,7 @@ def chosen(
     since: Annotated[float | None, Query(allow_inf_nan=False, description="submitted then or later, Unix s")] = None,
     until: Annotated[float | None, Query(allow_inf_nan=False, description="submitted before, Unix s")] = None,
 ) -> Chosen:
-    """What a request asks for. Raises ServiceError 400."""
+    """Returns the filters of a request. Raises ServiceError 400."""
     words = text.split()
     if len(words) > _MOST_WORDS:
         raise ServiceError(400, "bad_parameter", f"text has {len(words)} words; allowed: {_MOST_WORDS}", pointer="text")

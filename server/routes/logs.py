@@ -1,4 +1,4 @@
-"""What the ranks wrote for people."""
+"""Log files of the ranks and of the launcher."""
 
 import time
 from collections.abc import AsyncIterator
@@ -23,9 +23,10 @@ router = APIRouter()
 _CHUNK = 1 << 16
 """Bytes of a log that are sent at once. Chosen."""
 ALIVE = b"\0"
-"""Is sent while a followed log is silent, so that proxies keep the connection; no byte of a log that is followed."""
+"""Byte that is sent while a followed log is silent, so that proxies keep the connection. The text of a log does not
+contain it."""
 _LOOK = 0.25
-"""s between two looks at a log that is being followed."""
+"""Time in s between two reads of a followed log."""
 Rank = Annotated[str, PathParameter(pattern="^([0-9]{1,5}|launcher)$", description="a rank, or 'launcher'")]
 
 
@@ -39,9 +40,8 @@ async def log(
     follow: bool = False,
     seconds: Seconds = None,
 ) -> Response:
-    """The log of one rank, or of the launcher; Range as for files. ``follow`` goes on until the run has ended, and is
-    nothing more where it has; after each 15 s without news a byte 0 is sent, which is no part of the log: text has
-    none.
+    """Sends the log of one rank, or of the launcher; Range as for files. With ``follow`` the answer continues until
+    the run has ended. After each 15 s without new text a byte 0 is sent, which is not part of the log.
     """
     folder = service.settings.runs / run.id
     relative = f"{layout.LOGS}/{layout.LAUNCHER_LOG if rank == 'launcher' else f'rank-{rank}.log'}"
@@ -55,7 +55,7 @@ async def log(
 
 
 async def _follow(service: Service, may: Pass, run_id: str, folder: Path, relative: str) -> AsyncIterator[bytes]:
-    """The log's bytes as they come, without bytes 0, and such a byte while it is silent; it need not exist yet."""
+    """Yields new bytes of the log without bytes 0, and a byte 0 while it is silent. The log need not exist yet."""
     offset, spoke = 0, time.monotonic()
     with service.wakeups.listen(run_id) as listener:
         while await may.holds():

@@ -1,4 +1,4 @@
-"""Who asks, and what this server offers them."""
+"""The user of the request, and what the server offers."""
 
 from typing import Annotated, Any
 
@@ -18,8 +18,8 @@ router = APIRouter()
 @router.get("/v1/me")
 @blocking
 def me(request: Request, service: ServiceOf, identity: Annotated[Identity, Depends(identify)]) -> dict[str, Any]:
-    """Name and scopes; how to subscribe over Zenoh (null: not possible); slots, caps, requests and long answers at a
-    time, quota and what is used of it.
+    """Returns name and scopes; access to Zenoh (null: none); slots, caps, limits of requests and long answers, quota
+    and its use.
     """
     caps = service.settings.caps
     return {
@@ -45,7 +45,7 @@ def me(request: Request, service: ServiceOf, identity: Annotated[Identity, Depen
 
 
 def _quota(service: Service) -> dict[str, float | None]:
-    """What one user may take; null: no limit."""
+    """Returns the quota of one user; null: no limit."""
     quota = service.settings.site.quota
     named = {name: getattr(quota, name) for name in quota.__struct_fields__}
     files = service.settings.site.files
@@ -66,7 +66,7 @@ def _used(service: Service, owner: str) -> dict[str, float]:
 
 
 def _zenoh(request: Request, service: Service, identity: Identity) -> dict[str, Any] | None:
-    """The endpoint is at the host name by which the client has reached this server, if Zenoh listens there."""
+    """Returns the Zenoh endpoint, at the host name by which the client has reached this server; null without Zenoh."""
     host = request.url.hostname or "127.0.0.1"
     hidden = loopback(service.settings.host) and not loopback(host)
     if service.telemetry is None or hidden or not identity.allows("read"):

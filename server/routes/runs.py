@@ -1,4 +1,4 @@
-"""Runs: submit, list, look at, cancel, ask for a checkpoint or a snapshot."""
+"""Runs: submit, list, show, cancel; request a checkpoint or a snapshot."""
 
 import json
 import time
@@ -33,11 +33,11 @@ router = APIRouter()
 Body = Annotated[bytes, Depends(read_body)]
 _MOST_RANKS = _MOST_THREADS = 1_000_000
 _MOST_STEPS = 2**53
-"""That a number may be; the server has its own limit. Chosen."""
+"""Largest value of a number in a request; the server has a lower limit of its own. Chosen."""
 _LAST = "z" * 22
-"""Behind the beginning of an id: no id that begins so comes after it."""
+"""Text after a prefix of an id that sorts after every id with this prefix."""
 MAX_WAIT = 60.0
-"""s that ``?wait=`` may ask for."""
+"""Largest value of ``?wait=`` in s."""
 
 
 @router.post("/v1/runs", status_code=202, openapi_extra=openapi.CASE_BODY)
@@ -51,7 +51,7 @@ async def submit(
     profile: Annotated[str, Query(description="of the site's batch system; the site's default when empty")] = "",
     priority: Annotated[int, Query(ge=-PRIORITY, le=PRIORITY, description="among your own runs")] = 0,
 ) -> Response:
-    """Takes a case as TOML or JSON. The same Idempotency-Key and body give the same run and the same answer."""
+    """Submits a case as TOML or JSON. The same Idempotency-Key and body give the same run and the same answer."""
     wishes = Wishes(labels_of(label or ()), profile, priority)
     pool = service.surveyors if names_files(body) else service.readers
     receipt = await pool.run(service.desk.submit, identity.owner, body, content_type, idempotency_key, wishes)
@@ -71,8 +71,8 @@ def page(
     limit: Annotated[int, Query(ge=1, le=500)] = 50,
     prefix: Annotated[str, Query(pattern="^[0-9a-z]{0,22}$", description="the beginning of their ids")] = "",
 ) -> dict[str, Any]:
-    """Own runs, newest first, without those whose folder has been removed; ``next`` is the cursor of the following
-    page, null on the last.
+    """Returns the user's runs, newest first, without those whose folder has been removed. ``next``: cursor of the
+    next page, null on the last page.
     """
     runs = listed(service, identity.owner, chosen, cursor, limit + 1, prefix)
     following = view.to_cursor(runs[limit - 1]) if len(runs) > limit else None
@@ -80,14 +80,15 @@ def page(
 
 
 def listed(service: Service, owner: str, chosen: Chosen, cursor: str | None, most: int, prefix: str = "") -> list[Run]:
-    """At most so many of an owner's runs that are there, newest first, from the cursor on. Raises ServiceError 400."""
+    """Returns at most ``limit`` runs of an owner that have a folder, newest first, after the cursor. Raises
+    ServiceError 400."""
     before = view.from_cursor(cursor) if cursor is not None else prefix + _LAST if prefix else None
     pages = _pages(service, owner, chosen, before, most)
     return list(islice(takewhile(lambda run: run.id.startswith(prefix), pages), most))
 
 
 def _pages(service: Service, owner: str, chosen: Chosen, before: str | None, size: int) -> Iterator[Run]:
-    """The runs of an owner that are there, newest first, so many at a time from the store."""
+    """Yields the runs of an owner that have a folder, newest first, in blocks from the store."""
     while some := service.store.page(owner, chosen, before, size):
         yield from service.existing.left(some)
         if len(some) < size:
@@ -97,7 +98,8 @@ def _pages(service: Service, owner: str, chosen: Chosen, before: str | None, siz
 
 @blocking
 def owned_run(run_id: str, service: ServiceOf, identity: Reader) -> Run:
-    """The run, when it belongs to who asks. Raises ServiceError 404 alike for no run and for somebody else's."""
+    """Returns the run if it belongs to the user. Raises the same ServiceError 404 for an unknown run and for a run
+    of another user."""
     return find(service, identity, run_id)
 
 
@@ -105,8 +107,8 @@ OwnedRun = Annotated[Run, Depends(owned_run)]
 
 
 def find(service: Service, identity: Identity, run_id: str) -> Run:
-    """The run as it is now. Raises ServiceError 404, 410 when it has ended and its folder is gone, and OSError when the
-    folder of all runs is not there.
+    """Returns the present state of the run. Raises ServiceError 404; 410 if it has ended and has no folder; OSError
+    if the folder of all runs is missing.
     """
     run = (service.supervisor.current(run_id) or service.store.get(run_id)) if folder.is_id(run_id) else None
     if run is None or run.owner != identity.owner:
@@ -117,7 +119,7 @@ def find(service: Service, identity: Identity, run_id: str) -> Run:
 
 
 def _gone(service: Service, run: Run) -> ServiceError:
-    """410 with what is kept of the run."""
+    """Returns 410 with the record of a removed run."""
     line = service.removed_runs.get(run.id)
     why = f" ({line.why})" if line is not None else ""
     return ServiceError(
@@ -134,8 +136,8 @@ async def show(
     identity: Reader,
     wait: Annotated[float, Query(ge=0, le=MAX_WAIT)] = 0.0,
 ) -> Response:
-    """The run. With ``wait``, the answer comes when its state has changed, or, when If-None-Match is sent, when
-    anything has; at most so many seconds later. A run that has ended is answered at once."""
+    """Returns the run. With ``wait``, the answer is sent when its state has changed, or, with If-None-Match, when
+    anything of it has changed, and at the latest after so many seconds. A run that has ended is answered at once."""
     known = request.headers.get("if-none-match")
     first = await service.pool.run(view.snapshot, service, run)
     if wait > 0.0 and not first.state.final:
@@ -162,7 +164,7 @@ async def show(
 @router.delete("/v1/runs/{run_id}", status_code=204)
 @blocking
 def purge(run_id: str, service: ServiceOf, identity: Submitter) -> Response:
-    """Removes everything of a run that has ended; from then on it is answered with 410. There is no way back."""
+    """Removes a run that has ended, with all its files. Afterwards it is answered with 410. This cannot be undone."""
     run = find(service, identity, run_id)
     if not run.state.final or service.supervisor.current(run.id) is not None:
         raise ServiceError(409, "not_ended", f"run {run.id} is {run.state.value}; a run that has ended can be removed")
@@ -179,14 +181,14 @@ def purge(run_id: str, service: ServiceOf, identity: Submitter) -> Response:
 @router.post("/v1/runs/{run_id}:keep")
 @blocking
 def keep(run_id: str, service: ServiceOf, identity: Submitter) -> Response:
-    """Keeps the run for good: no rule of the site removes it, only its owner does."""
+    """Keeps the run permanently: no rule of the site removes it, only its owner can."""
     return _pin(service, find(service, identity, run_id), True)
 
 
 @router.post("/v1/runs/{run_id}:release")
 @blocking
 def release(run_id: str, service: ServiceOf, identity: Submitter) -> Response:
-    """The rules of the site may remove the run again, also one that was handed in with the label ``keep``."""
+    """Allows the rules of the site to remove the run, even one that was submitted with the label ``keep``."""
     return _pin(service, find(service, identity, run_id), False)
 
 
@@ -202,14 +204,14 @@ def _pin(service: Service, run: Run, keep: bool) -> Response:
 @router.post("/v1/runs/{run_id}:cancel", status_code=202)
 @blocking
 def cancel(run_id: str, service: ServiceOf, identity: Submitter) -> Response:
-    """Stops a run: at its next step, or hard when it does not. Asking again changes nothing."""
+    """Stops a run at its next step, or kills it if it does not stop. A repeated request changes nothing."""
     run = find(service, identity, run_id)
     ask_to_stop(service, run.id)
     return Response(view.snapshot(service, find(service, identity, run_id)).body, 202, media_type="application/json")
 
 
 def ask_to_stop(service: Service, run_id: str) -> None:
-    """Raises ServiceError 503 when the request could not be recorded."""
+    """Requests the stop. Raises ServiceError 503 if the request cannot be recorded."""
     try:
         service.supervisor.cancel(run_id)
     except Exception as error:
@@ -229,8 +231,9 @@ async def restart(
     profile: Annotated[str, Query(description="of the site's batch system")] = "",
     priority: Annotated[int, Query(ge=-PRIORITY, le=PRIORITY, description="among your own runs")] = 0,
 ) -> Response:
-    """A new run of the same case that goes on from the newest checkpoint of this one, and ends with the same answer.
-    This one stays as it is. One that has used up run.max_steps needs a larger max_steps: 409 without."""
+    """Starts a new run of the same case that continues from the newest checkpoint of this run, with the same final
+    answer. This run is not changed. A run that has reached run.max_steps needs a larger max_steps: without it the
+    answer is 409."""
     run = await service.pool.run(find, service, identity, run_id)
     wishes = Wishes({restarts.LABEL: run.id}, profile, priority, run.id)
     numbers = ranks, threads, max_steps
@@ -256,20 +259,21 @@ def _restarted(
 @router.post("/v1/runs/{run_id}:checkpoint", status_code=202)
 @blocking
 def checkpoint(run_id: str, service: ServiceOf, identity: Submitter) -> Response:
-    """Asks the worker for a checkpoint; the journal tells of it when it is on disk. Asking again changes nothing."""
+    """Requests a checkpoint; a message of the journal reports it when it is on disk. A repeated request changes
+    nothing."""
     return _ask(service, find(service, identity, run_id), layout.CHECKPOINT_REQUEST, "keeps one")
 
 
 @router.post("/v1/runs/{run_id}:snapshot", status_code=202)
 @blocking
 def snapshot(run_id: str, service: ServiceOf, identity: Submitter) -> Response:
-    """Asks the worker for a snapshot of the fragments; the journal tells of it when it is on disk, with the cause
-    "asked for". Asking again before then changes nothing."""
+    """Requests a snapshot of the fragments; a message of the journal reports it when it is on disk, with the cause
+    "asked for". A repeated request before that changes nothing."""
     return _ask(service, find(service, identity, run_id), layout.SNAPSHOT_REQUEST, "makes one")
 
 
 def _ask(service: Service, run: Run, request: str, words: str) -> Response:
-    """Leaves a request where the worker looks for it. Raises ServiceError 409, 503."""
+    """Writes a request file that the worker reads. Raises ServiceError 409, 503."""
     if run.state is not State.RUNNING:
         raise ServiceError(409, "not_running", f"run {run.id} is {run.state.value}; a run that is running {words}")
     try:

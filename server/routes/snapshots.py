@@ -32,7 +32,7 @@ _decode = msgspec.json.Decoder(Snapshot).decode
 @router.get("/v1/runs/{run_id}/snapshots")
 @blocking
 def listing(run: OwnedRun, service: ServiceOf, if_none_match: Known = "") -> Response:
-    """The snapshots that the journal tells of: n, step, t in s, bytes, triangles, fragments, sha256 and more."""
+    """Returns the snapshots in the journal: n, step, t in s, bytes, triangles, fragments, sha256 and more."""
     found = service.histories.of(service.settings.runs / run.id / layout.JOURNAL)
     with found.lock:
         found.catch_up()
@@ -44,14 +44,14 @@ def listing(run: OwnedRun, service: ServiceOf, if_none_match: Known = "") -> Res
 async def content(
     request: Request, run: OwnedRun, service: ServiceOf, n: Number, if_none_match: Known = ""
 ) -> Response:
-    """One snapshot, as docs/reference/snapshots.md has it; its ETag is its sha256, and it never changes."""
+    """Returns one snapshot in the form of docs/reference/snapshots.md. Its ETag is its sha256; it never changes."""
     told = await service.pool.run(_told, service, run, n)
     return await _sent(request, service, run, told.path, told.sha256, if_none_match)
 
 
 @router.get("/v1/runs/{run_id}/snapshots/{n}/tets", responses=_BYTES, response_class=Response)
 async def tets(request: Request, run: OwnedRun, service: ServiceOf, n: Number, if_none_match: Known = "") -> Response:
-    """All tets of a snapshot, for sections, packed by gzip; 404 where it has none."""
+    """Returns all tets of a snapshot for sections, compressed by gzip; 404 if it has none."""
     told = await service.pool.run(_told, service, run, n)
     if not told.tets:
         raise not_found(f"the tets of snapshot {n} of run {run.id}")
@@ -62,8 +62,8 @@ async def tets(request: Request, run: OwnedRun, service: ServiceOf, n: Number, i
 @router.get("/v1/runs/{run_id}/fragments/{label}")
 @blocking
 def fragment(run: OwnedRun, service: ServiceOf, label: Label, if_none_match: Known = "") -> Response:
-    """The course of a fragment over the snapshots of a run, over 200 of them at most: n, t in s, mass in kg, speed in
-    m/s, size in m, tets.
+    """Returns the history of a fragment over at most 200 snapshots of a run: n, t in s, mass in kg, speed in m/s,
+    size in m, tets.
     """
     folder = service.settings.runs / run.id
     found = service.histories.of(folder / layout.JOURNAL)
@@ -74,7 +74,7 @@ def fragment(run: OwnedRun, service: ServiceOf, label: Label, if_none_match: Kno
 
 
 async def _sent(request: Request, service: Service, run: Run, path: str, tag: str, known: str) -> Response:
-    """A file that never changes; its ETag is the ``tag``."""
+    """Returns a file that never changes; ``tag`` is its ETag."""
     headers = {"ETag": f'"{tag}"', "Cache-Control": "private, max-age=31536000, immutable"}
     if download.is_known(headers["ETag"], known):
         return Response(status_code=304, headers=headers)
@@ -82,7 +82,7 @@ async def _sent(request: Request, service: Service, run: Run, path: str, tag: st
 
 
 def _told(service: Service, run: Run, n: int) -> Snapshot:
-    """What the journal tells of a snapshot. Raises ServiceError 404."""
+    """Returns the message of the journal about a snapshot. Raises ServiceError 404."""
     found = service.histories.of(service.settings.runs / run.id / layout.JOURNAL)
     with found.lock:
         if n not in found.snapshots:

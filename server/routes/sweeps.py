@@ -1,4 +1,4 @@
-"""Sweeps: hand in, look at, cancel, and the table of what came out."""
+"""Sweeps: submit, show, cancel, repeat, and the table of results."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -30,7 +30,7 @@ Body = Annotated[bytes, Depends(read_body)]
 async def submit(
     service: ServiceOf, identity: Submitter, body: Body, idempotency_key: Annotated[str | None, Header()] = None
 ) -> Response:
-    """Takes a case and the points at which it is to be run; all runs are accepted, or none."""
+    """Submits a case and the points at which it is run. All runs are accepted, or none."""
     plan = await service.sweepers.run(service.sweeps.submit, identity.owner, body, idempotency_key)
     shown = await service.pool.run(_shown, service, plan)
     return JSONResponse(shown, 202, {"Location": f"/v1/sweeps/{plan.id}"})
@@ -38,10 +38,10 @@ async def submit(
 
 @router.put("/v1/sweeps/adaptive/{name}", openapi_extra=openapi.SEARCH_BODY)
 async def report(service: ServiceOf, identity: Submitter, name: str, body: Body) -> dict[str, Any]:
-    """Keeps the report of an adaptive sweep, whose client decides the points and hands them in as runs; the first
-    report of a ``name`` (16 to 64 hexadecimal digits) makes the sweep. Runs of others are left out of it. The newest
-    100 adaptive sweeps of a user are kept. ``stop``: the sweep was cancelled here, and the command that ``began`` then
-    is to hand in no further point.
+    """Stores the report of an adaptive sweep, whose client chooses the points and submits them as runs. The first
+    report of a ``name`` (16 to 64 hexadecimal digits) creates the sweep. Runs of other users are ignored. The newest
+    100 adaptive sweeps of a user are kept. ``stop``: the sweep was cancelled on the server, and the command that
+    ``began`` at that time must submit no further point.
     """
     plan = await service.pool.run(service.searches.report, identity.owner, name, body)
     stop = plan.search is not None and plan.cancelled == plan.search.began
@@ -56,7 +56,8 @@ def page(
     before: Annotated[str, Query(description="the id of a sweep: those older than it")] = "",
     limit: Annotated[int, Query(ge=1, le=500)] = 50,
 ) -> dict[str, Any]:
-    """Own sweeps, newest first; ``next`` is the ``before`` of the following page, null on the last."""
+    """Returns the user's sweeps, newest first. ``next``: parameter ``before`` of the next page, null on the last
+    page."""
     plans = [plan for plan in service.sweeps.plans.of(identity.owner) if not before or plan.id < before]
     following = plans[limit - 1].id if len(plans) > limit else None
     return {"sweeps": [_brief(service, plan) for plan in plans[:limit]], "next": following}
@@ -65,14 +66,14 @@ def page(
 @router.get("/v1/sweeps/{sweep_id}")
 @blocking
 def show(service: ServiceOf, identity: Reader, sweep_id: str) -> dict[str, Any]:
-    """The sweep: how many of its runs are in each state, and each point with its run."""
+    """Returns the sweep: number of its runs in each state, and each point with its run."""
     return _shown(service, find(service, identity, sweep_id))
 
 
 @router.get("/v1/sweeps/{sweep_id}/table")
 @blocking
 def table(service: ServiceOf, identity: Reader, sweep_id: str) -> Response:
-    """A line a point as CSV: what was changed, the state of the run, and its results as far as it has any."""
+    """Returns CSV with one line for each point: changed values, state of the run, results as far as they exist."""
     plan = find(service, identity, sweep_id)
     points = [_point(service, values, run) for values, run in _pairs(service, plan)]
     return Response(to_csv(points_table(points)), media_type="text/csv; charset=utf-8")
@@ -80,14 +81,14 @@ def table(service: ServiceOf, identity: Reader, sweep_id: str) -> Response:
 
 @router.post("/v1/sweeps/{sweep_id}:cancel", status_code=202)
 async def cancel(service: ServiceOf, identity: Submitter, sweep_id: str) -> dict[str, Any]:
-    """Cancels every run of the sweep that has not ended. Asking again changes nothing."""
+    """Cancels every open run of the sweep. A repeated request changes nothing."""
     return await service.sweepers.run(_cancelled, service, identity, sweep_id)
 
 
 @router.post("/v1/sweeps/{sweep_id}:again", status_code=202, openapi_extra=openapi.SWEEP_BODY)
 async def again(service: ServiceOf, identity: Submitter, sweep_id: str, body: Body) -> Response:
-    """Runs the points again whose runs have ended without success, or were removed. The request is that with which the
-    sweep was handed in. Asking again changes nothing while these runs go on.
+    """Repeats the points whose runs have ended without success or were removed. The body is the original request of
+    the sweep. A repeated request changes nothing while these runs are open.
     """
     plan = await service.pool.run(find, service, identity, sweep_id)
     if plan.search is not None:
@@ -98,7 +99,7 @@ async def again(service: ServiceOf, identity: Submitter, sweep_id: str, body: Bo
 
 
 def _failed(service: Service, plan: Plan) -> dict[int, str]:
-    """The points without a run that has succeeded, or may still, and their runs of now."""
+    """Returns the points without a successful or open run, with their present runs."""
     good = {run.id for _, run in _pairs(service, plan) if not run.state.final or run.state is State.SUCCEEDED}
     return {n: run_id for n, run_id in enumerate(plan.runs) if run_id not in good}
 
@@ -114,7 +115,7 @@ def _cancelled(service: Service, identity: Identity, sweep_id: str) -> dict[str,
 
 
 def find(service: Service, identity: Identity, sweep_id: str) -> Plan:
-    """The sweep, when it belongs to who asks. Raises ServiceError 404."""
+    """Returns the sweep if it belongs to the user. Raises ServiceError 404."""
     plan = service.sweeps.get(sweep_id, identity.owner)
     if plan is None:
         raise not_found(f"sweep {sweep_id[:40]!r}")
@@ -122,7 +123,7 @@ def find(service: Service, identity: Identity, sweep_id: str) -> Plan:
 
 
 def _pairs(service: Service, plan: Plan) -> list[tuple[dict[str, Any], Run]]:
-    """Each point with its run; without those whose folder has been removed, or of which nothing is known any more."""
+    """Returns each point with its run, without runs that were removed or are unknown."""
     kept = service.store.some(plan.runs)
     found = [run for run_id in plan.runs if (run := service.supervisor.current(run_id) or kept.get(run_id))]
     left = {run.id: run for run in service.existing.left(found)}

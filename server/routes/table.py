@@ -1,4 +1,4 @@
-"""The table of runs: what a page needs of many runs at once."""
+"""The table of runs: all data of many runs that the page shows in one list."""
 
 from dataclasses import replace
 from typing import Annotated, Any
@@ -32,12 +32,12 @@ def table(
     sweep: Annotated[str, Query(description="id of a sweep: the runs of its points")] = "",
     if_none_match: Annotated[str, Header(alias="If-None-Match")] = "",
 ) -> Response:
-    """Own runs, newest first, with title, progress, the values of their cases and their results.
+    """Returns the user's runs, newest first, with title, progress, values of their cases and results.
 
-    ``cases`` has the values of cases that are alike once, with their units; ``case`` of a run is its place there, and
-    ``values`` what it has otherwise (null: it has no such key). ``results`` of a run stand in the order of those of its
-    case; null before its end, and while they are not read yet (``pending`` runs of this page: ask again). ``next`` is
-    the cursor of the following page, null on the last. An answer has at most 500 runs and about 4 MB.
+    ``cases``: groups of similar cases with common values and units. ``case`` of a run: index of its group; ``values``:
+    values that differ from those of the group (null: the key is missing). ``results`` of a run are in the order of
+    those of its group; null before its end, and while they are not read yet (``pending`` runs of this page: repeat the
+    request). ``next``: cursor of the next page, null on the last page. An answer has at most 500 runs and about 4 MB.
     """
     asked = replace(chosen, changed=changed, runs=find(service, identity, sweep).runs if sweep else None)
     runs = listed(service, identity.owner, asked, cursor, limit + 1)

@@ -48,7 +48,7 @@ def fill(source: Path, folder: Path) -> None:
     Raises ServiceError 409, 503, OSError.
     """
     if not any(_taken(source, folder / layout.CHECKPOINTS) for _ in range(_TRIES)):
-        detail = f"the checkpoints of run {source.name} are replaced faster than they can be taken over"
+        detail = f"the checkpoints of run {source.name} are replaced faster than they can be linked"
         raise ServiceError(503, "unavailable", detail, retryable=True)
     for name, copy in ((layout.FRAMES, _link), (fragments.FOLDER, _copy)):
         if (source / name).is_dir():

@@ -397,7 +397,7 @@ def test_an_unknown_parameter_is_told_what_is_known(server: Running) -> None:
     """A state that is misspelt would else list all runs."""
     told = refusal(server.ann.http.get("/v1/runs?stat=failed"), 400, "bad_parameter")
     allowed = "case, cursor, label, limit, prefix, since, state, text, until"
-    assert told["detail"] == f"stat: /v1/runs knows no such parameter; allowed: {allowed}; did you mean 'state'?"
+    assert told["detail"] == f"stat: /v1/runs has no such parameter; allowed: {allowed}; did you mean 'state'?"
 
 
 @pytest.mark.parametrize(
