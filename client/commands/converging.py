@@ -114,7 +114,10 @@ def _write(book: Book, quantity: str | None, out: Path | None) -> None:
     if out is not None:
         save_text(out / "converge.md", text)
         save_text(out / "converge.json", converged.to_json(book, quantity))
-        drawing("reports.curves").save(drawing("studies.pareto").figure(book), out / "converge.png")
+        with drawing():
+            from ..reports.curves import save
+            from ..studies.pareto import figure
+        save(figure(book), out / "converge.png")
     echo(text, nl=False)
 
 

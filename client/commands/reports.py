@@ -1,8 +1,9 @@
 """Commands that tell and draw what a run has said of itself, and what two runs have."""
 
-import importlib
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -24,10 +25,11 @@ figures = typer.Typer(no_args_is_help=True, help="Charts from what a run has tol
 OutArgument = Annotated[Path, typer.Argument(metavar="OUT.png", help="The PNG, or SVG, or PDF.")]
 
 
-def drawing(module: str) -> Any:
-    """Imports a module of the client that needs matplotlib, by its path. Raises ViewError without matplotlib."""
+@contextmanager
+def drawing() -> Iterator[None]:
+    """Imports of modules that need matplotlib stand in it. Raises ViewError where matplotlib is missing."""
     try:
-        return importlib.import_module(f"..{module}", __package__)
+        yield
     except ModuleNotFoundError as error:
         if (error.name or "").startswith("conoid"):
             raise
@@ -37,7 +39,8 @@ def drawing(module: str) -> Any:
 @figures.command(name="energy")
 def energy_figure(source: SourceArgument, out: OutArgument, url: Url = None, token: Token = None) -> None:
     """Draw the energy ledger over time, also without its kinetic term, the residual, and each part's energy."""
-    curves = drawing("reports.curves")
+    with drawing():
+        from ..reports import curves
     with opened(source, url, token) as result, aloud(f"drawing {out}"):
         echo(curves.save(curves.energy(result.history), out))
 
@@ -45,7 +48,8 @@ def energy_figure(source: SourceArgument, out: OutArgument, url: Url = None, tok
 @figures.command(name="dt")
 def dt_figure(source: SourceArgument, out: OutArgument, url: Url = None, token: Token = None) -> None:
     """Draw the length of the time step, and what holds it down."""
-    curves = drawing("reports.curves")
+    with drawing():
+        from ..reports import curves
     with opened(source, url, token) as result, aloud(f"drawing {out}"):
         echo(curves.save(curves.steps(result.history), out))
 
@@ -53,7 +57,8 @@ def dt_figure(source: SourceArgument, out: OutArgument, url: Url = None, token: 
 @figures.command(name="fragments")
 def fragments_figure(source: SourceArgument, out: OutArgument, url: Url = None, token: Token = None) -> None:
     """Draw how many fragments there are over time, and how many of which mass in the end."""
-    curves = drawing("reports.curves")
+    with drawing():
+        from ..reports import curves
     with opened(source, url, token) as result, aloud(f"drawing {out}"):
         tables_of = [result.fragments_of(index) for index in result.fragment_tables]
         echo(curves.save(curves.fragments(tables_of), out))
@@ -71,7 +76,8 @@ def history_figure(
     token: Token = None,
 ) -> None:
     """Draw columns of history.csv over time, those of one unit in one panel."""
-    curves = drawing("reports.curves")
+    with drawing():
+        from ..reports import curves
     with opened(source, url, token) as result, aloud(f"drawing {out}"):
         echo(curves.save(curves.columns(result.history, column or ()), out))
 
@@ -112,7 +118,8 @@ def compare(
     with opened(a, url, token) as first, opened(b, url, token) as second, aloud("comparing the runs"):
         found = comparing.compare(first, second)
         if out is not None:
-            curves = drawing("reports.curves")
+            with drawing():
+                from ..reports import curves
             curves.save(curves.comparison(comparing.material(first, second, column or ())), out)
     if as_json:
         echo_json(found)
@@ -126,7 +133,8 @@ def compare(
 @figures.command(name="balance")
 def balance_figure(source: SourceArgument, out: OutArgument, url: Url = None, token: Token = None) -> None:
     """Draw the outside nodes of each rank with the cuts, and where the CPU time went."""
-    charts = drawing("reports.charts")
+    with drawing():
+        from ..reports import charts
     with opened(source, url, token) as result, aloud(f"drawing {out}"):
         name = str(result.case["name"])
         charts.balance(charts.course(result.messages), f"{name}, {result.folder.name}", name, out)

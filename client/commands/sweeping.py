@@ -243,9 +243,10 @@ def sweep_plot(
         if (path := file_named(sweep)) is not None:
             made = columns_of(path)
             keys = [column.name for column in made if column.kind == KEY]
-            drawn = drawing("reports.curves").save(
-                drawing("sweeps.swept").figure(text_rows(to_csv(made)), keys, x, columns or ()), out
-            )
+            with drawing():
+                from ..reports.curves import save
+                from ..sweeps.sweep_plot import figure
+            drawn = save(figure(text_rows(to_csv(made)), keys, x, columns or ()), out)
         else:
             with connect(url, token) as session:
                 drawn = session.find_sweep(sweep).plot(out, columns or (), x)
