@@ -158,9 +158,9 @@ def of_words(text: Text) -> Iterator[tuple[int, str, str]]:
 
 
 def of_lengths(source: str) -> Iterator[tuple[int, str, str]]:
-    """Lines of a page over the limit, except tables and addresses."""
+    """Lines of a page over the limit, except tables, pictures and addresses."""
     for number, line in enumerate(source.splitlines(), 1):
-        if len(line) > LONGEST_LINE and not line.startswith("|") and "://" not in line:
+        if len(line) > LONGEST_LINE and not line.startswith(("|", "![")) and "://" not in line:
             yield number, f"{len(line)} columns", line[:90]
 
 
