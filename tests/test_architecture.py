@@ -137,7 +137,7 @@ def test_a_numeric_constant_says_where_it_comes_from() -> None:
 PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md")])
 KNOWN = [f"/{name_of(path)}" for path in [*SOURCES, *TESTS]]
 MODULE_IN_PROSE = re.compile(rf"`((?:{'|'.join(HOUSES)}|tests)(?:/\w+)+)`")
-PATTERNS = {"cases/laws/NAME.py", "worker/materials/NAME.py"}
+PATTERNS = {"cases/laws/NAME.py", "worker/materials/NAME.py", "server/routes/NAME.py", "tests/worker/test_NAME.py"}
 
 
 def prose(path: Path) -> Iterator[str]:
