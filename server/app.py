@@ -14,6 +14,7 @@ from .answers.cards import Cards
 from .answers.download import Downloads
 from .answers.history import Histories
 from .answers.metrics import Metrics, Timed
+from .answers.reports import reporters
 from .database import identity
 from .database.store import Store
 from .intake import reader
@@ -33,7 +34,7 @@ from .requests.admission import Admission
 from .requests.head_requests import HeadRequests
 from .requests.thread_pool import ThreadPool
 from .requests.user_limits import UserLimits
-from .routes import cases, events, files, health, history, logs, me, runs, snapshots, table, uploads
+from .routes import cases, events, files, health, history, logs, me, reports, runs, snapshots, table, uploads
 from .routes import sweeps as sweep_routes
 from .runs.existing import ExistingRuns
 from .runs.supervisor import Supervisor
@@ -52,6 +53,7 @@ ROUTERS = (
     sweep_routes.router,
     logs.router,
     files.router,
+    reports.router,
     uploads.router,
     me.router,
     health.router,
@@ -120,6 +122,7 @@ def opened(settings: Settings) -> Iterator[Service]:
             readers=reader.pool(reader.CASE),
             surveyors=reader.surveyors(),
             sweepers=reader.pool(reader.SWEEP),
+            reporters=reporters(),
             sweeps=sweeps,
             searches=Searches(sweeps.plans, store),
             uploads=uploads,

@@ -49,6 +49,8 @@ class Service:
     """Threads for cases that may name files, whose reading takes seconds, and for restarts, whose case may."""
     sweepers: ThreadPool
     """Threads for sweeps, whose reading takes seconds: submissions of runs do not wait for these."""
+    reporters: ThreadPool
+    """Threads for reports of runs, which take minutes."""
     sweeps: Sweeps
     searches: Searches
     uploads: Uploads

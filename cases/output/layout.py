@@ -14,6 +14,7 @@
       job.json, job.sh       the job of a batch system that runs it (cases/site/batch.py); stop.request ends it for good
       files/<sha256>.inp     the run's own copies of the files that its case names (cases/reading/files.py)
       log/rank-0.log         one a rank            log/launcher.log
+      report.html            the run in one file (report.py), where a server was asked for it
       outcome.json           written last
 """
 

@@ -84,9 +84,11 @@ def _regular(handle: int, path: str | Path, mode: str) -> FileIO:
     return FileIO(handle, mode)
 
 
-def read(path: str | Path, most: int = MOST) -> bytes:
-    """The bytes of a regular file that has at most ``most``. Raises IsADirectoryError for anything else, OSError."""
-    with opened(path) as file:
+def read(path: str | Path, most: int = MOST, *, links: bool = True) -> bytes:
+    """The bytes of a regular file that has at most ``most``; ``links`` as for ``opened``. Raises IsADirectoryError for
+    anything else, OSError.
+    """
+    with opened(path, links=links) as file:
         left = _size(file, path, most)
         pieces = []
         while left > 0 and (piece := file.read(left)):

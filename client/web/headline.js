@@ -16,9 +16,10 @@ export class Headline {
     this.progress = h("div.progress");
     this.buttons = ["checkpoint", "snapshot", "cancel"].map((verb) =>
       h(verb === "cancel" ? "button.stop" : "button.quiet", { type: "button", "data-verb": verb, onclick: () => ask(verb) }, verb[0].toUpperCase() + verb.slice(1)));
+    this.report = h("button.quiet", { type: "button", hidden: "", title: "the whole run in one HTML file, made by the server", onclick: () => ask("report") }, "Report");
     this.again = h("a.button", { href: `#/new?from=${encodeURIComponent(run)}` }, "Open the case");
     this.element = h("header.head", {},
-      h("div.run-head", {}, h("div.titles", {}, this.title, this.sub), h("div.side", {}, this.link, this.state, this.buttons, this.again)),
+      h("div.run-head", {}, h("div.titles", {}, this.title, this.sub), h("div.side", {}, this.link, this.state, this.buttons, this.report, this.again)),
       this.progress, this.told);
   }
 
@@ -35,6 +36,8 @@ export class Headline {
     const told = [!over && live.message, live.state === "queued" && info.reason, notice].filter(Boolean).join(" · ");
     say(this.told, told);
     this.told.hidden = !told;
+    this.report.hidden = !over;
+    this.report.disabled = busy.has("report");
     for (const button of this.buttons) {
       button.hidden = !state || over || (button.dataset.verb !== "cancel" && state !== "running");
       button.disabled = kind !== "live" || busy.has(button.dataset.verb);

@@ -1,6 +1,6 @@
 // The page of one run: everything on it follows from the run's history and messages.
 
-import { call, messages, refused } from "./api.js";
+import { call, download, messages, refused } from "./api.js";
 import { Body } from "./body.js";
 import { Cards } from "./cards.js";
 import { counted, fixed, h, percent, words } from "./figures.js";
@@ -147,7 +147,25 @@ export class RunPage {
     if (this.live.state === "queued" && this.ticks % QUEUE_EVERY === 0) this.readInfo();
   }
 
+  // Made by the server where it has none yet, then saved here.
+  async saveReport() {
+    this.busy.add("report");
+    this.notice = "The server makes the report; this may take a minute.";
+    this.later();
+    try {
+      const { url, size } = await call(`${this.path}:report`, { method: "POST" });
+      await download(url.replace(/^\//, ""), `${this.info.name || "run"}-${this.live.run.slice(0, 9)}.html`, size, () => {});
+      this.notice = "The report is saved.";
+      if (this.files.known) this.files.read();
+    } catch (error) {
+      this.notice = `No report: ${error.message}`;
+    }
+    this.busy.delete("report");
+    this.later();
+  }
+
   async ask(verb) {
+    if (verb === "report") return this.saveReport();
     if (verb === "cancel" && !confirm("Cancel this run?")) return;
     this.busy.add(verb);
     this.later();
@@ -159,7 +177,7 @@ export class RunPage {
       this.notice = error.message;
     }
     if (!this.cancelling) this.busy.delete(verb);
-    this.later();
+    return this.later();
   }
 
   // There is no such run, or there is no more of it than what the server tells.

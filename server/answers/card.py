@@ -95,7 +95,9 @@ def _title(path: Path) -> str:
 
 def _values(path: Path) -> dict[str, Scalar]:
     try:
-        case: dict[str, Any] = msgspec.json.decode(whole.read(path / layout.RESOLVED_CASE, _MOST_BYTES), type=dict)
+        case: dict[str, Any] = msgspec.json.decode(
+            whole.read(path / layout.RESOLVED_CASE, _MOST_BYTES, links=False), type=dict
+        )
         return flat(case, _KEYS, _LETTERS)
     except (OSError, *DAMAGED):
         return {}

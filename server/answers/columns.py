@@ -28,6 +28,8 @@ _BLOCK = 1 << 20
 """Bytes of one read. Chosen."""
 _AT_ONCE = 32
 """Largest number of blocks that are read for one answer: some 100,000 lines, half a second. Chosen."""
+_MOST_COLUMNS = 4000
+"""Largest number of columns that are read, the first ones. Chosen: a case with a thousand probes has some more."""
 _TEXT = frozenset({"limiter"})
 """Columns of text."""
 csv.field_size_limit(1 << 30)
@@ -101,7 +103,7 @@ class Columns:
         pairs = [history.split(name) for name in names]
         self._width = len(names)
         places = {name: k for k, (name, _) in reversed([*enumerate(pairs)]) if name not in _TEXT}
-        self._places = sorted(places.values())  # the first of several columns with the same name
+        self._places = sorted(places.values())[:_MOST_COLUMNS]  # the first of several columns with the same name
         self.units = dict(pairs[k] for k in self._places)
         number = len(self._places)
         self._kept = [array("d") for _ in range(number)]

@@ -126,11 +126,15 @@ class Downloads:
             raise
 
     async def whole(
-        self, request: Request, folder: Path, relative: str, headers: Mapping[str, str], media_type: str
+        self, request: Request, folder: Path, relative: str, size: int, headers: Mapping[str, str], media_type: str
     ) -> Response:
-        """Sends a file that never changes, with headers of the caller. Raises ServiceError 404, 429, 503."""
+        """Sends a file that never changes and has ``size`` bytes, with headers of the caller. Raises ServiceError 404,
+        also for a file of another size: it is damaged, and a browser would keep it; 429, 503.
+        """
         file, state = await self._pool.run(_opened, folder, relative)
         try:
+            if state[-1] != size:
+                raise ServiceError(404, "damaged", f"{relative} has {state[-1]} bytes, and had {size} when it was made")
             if state[-1] > _SMALL:
                 place_of(request).lengthen()
             return _FileResponse(self._pool, file, 0, state[-1], 200, {**headers, "Content-Type": media_type})

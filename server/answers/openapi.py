@@ -70,6 +70,7 @@ ANSWERS: dict[tuple[str, str], dict[int, tuple[str, str]]] = {
     ("post", "/v1/runs/{run_id}:cancel"): {202: (_JSON, "RunStatus")},
     ("post", "/v1/runs/{run_id}:restart"): {202: (_JSON, "Receipt")},
     ("post", "/v1/runs/{run_id}:checkpoint"): {202: (_JSON, "RunStatus")},
+    ("post", "/v1/runs/{run_id}:report"): {200: (_JSON, "Report")},
     ("post", "/v1/runs/{run_id}:snapshot"): {202: (_JSON, "RunStatus")},
     ("get", "/v1/runs/{run_id}/events"): {200: (_JSON, "EventPage")},
     ("get", "/v1/runs/{run_id}/stream"): {200: ("text/event-stream", ""), 204: ("", "")},
@@ -105,7 +106,8 @@ _REFUSALS = {
     408: "the body did not arrive in time", 409: "not in this state", 410: "the run's folder has been removed",
     411: "the length is missing", 413: "the body is too large", 415: "not a type of a case",
     416: "no such range", 422: "the case is wrong",
-    429: "too many requests of the user are in progress or wait", 500: "the server failed", 503: "not now",
+    429: "too many requests of the user are in progress or wait", 500: "the server failed", 501: "packages are missing",
+    503: "not now",
     507: "the disk is full",
 }  # fmt: skip
 
@@ -125,6 +127,8 @@ def refusals(method: str, path: str) -> set[int]:
         found |= {409}
     if path.endswith(":restart"):
         found |= {409, 415, 422, 429, 507}
+    if path.endswith(":report"):
+        found |= {409, 501, 507}
     if path.endswith((":keep", ":release")):
         found |= {507}
     if path.endswith(("{path}", "{rank}")):

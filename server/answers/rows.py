@@ -16,7 +16,7 @@ from conoid.cases.reference.key_units import unit_of_key
 from .card import Card
 
 MOST_BYTES = 4 << 20
-"""Largest size in bytes of the rows of an answer. Chosen: 2,000 runs of a case with fifty results."""
+"""Largest size in bytes of the rows and cases of an answer. Chosen: 2,000 runs of a case with fifty results."""
 _ALIKE = 0.8
 """Smallest share of common keys for which two cases are similar. Chosen."""
 _GROUPS = 50
@@ -58,11 +58,14 @@ class Table:
 
     def add(self, line: dict[str, Any], card: Card | None) -> bool:
         """Adds the row of a run; ``line`` is its line in a list. Returns False if the answer is full."""
+        groups = len(self.groups)
         row = msgspec.json.encode({**line, **self._of_card(card)})
-        if self.rows and self._bytes + len(row) > MOST_BYTES:
+        size = len(row) + sum(len(msgspec.json.encode(group.values)) for group in self.groups[groups:])
+        if self.rows and self._bytes + size > MOST_BYTES:
+            del self.groups[groups:]
             return False
         self.pending += card is None
-        self._bytes += len(row)
+        self._bytes += size
         self.rows.append(msgspec.Raw(row))
         return True
 

@@ -135,8 +135,12 @@ class Desk:
         if more:
             self._check_room(owner, more)
 
-    def _check_room(self, owner: str, more: int = 1) -> None:
+    def check_output(self, owner: str) -> None:
+        """Raises ServiceError 429 where the runs of the owner have as many bytes as they may."""
         limits.check_output(self.kept(owner), self._settings.site.quota)
+
+    def _check_room(self, owner: str, more: int = 1) -> None:
+        self.check_output(owner)
         limits.check_room(self._settings.runs, self._store.open_runs(owner), self._settings.caps, more)
 
     def runs_of(self, owner: str, keys: Sequence[str]) -> list[str]:

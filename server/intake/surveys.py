@@ -1,10 +1,6 @@
 """Survey of the files of a case before it is accepted: a program of the worker reads them in a process with limits."""
 
 import logging
-import os
-import signal
-import subprocess
-import sys
 from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
@@ -13,20 +9,12 @@ import msgspec
 
 from conoid.cases.reading import survey
 
+from ..launch import bounded
+from ..launch.bounded import Bounds
+
 _log = logging.getLogger("conoid.server")
-CPU, WALL, MEMORY, FILE = 200, 240, 8 << 30, 4 << 30
-"""Limits of each process that reads files: s of CPU time and of wall-clock time, bytes of memory and of a written
-file. Chosen: 16 MB of text (384,000 tets) take some 10 s; a longer file is read by its run only."""
-_BOUND = """
-import os, resource, runpy, sys
-memory, cpu, file = map(int, sys.argv[1:4])
-for which, most in ((resource.RLIMIT_AS, memory), (resource.RLIMIT_CPU, cpu), (resource.RLIMIT_FSIZE, file)):
-    resource.setrlimit(which, (most, most))
-os.nice(5)
-del sys.argv[1:]
-runpy.run_module(%r, run_name="__main__", alter_sys=True)
-"""
-_SECRET = ("CONOID_DATABASE", "CONOID_TOKEN")
+BOUNDS = Bounds(cpu=200, wall=240, memory=8 << 30, file=4 << 30)
+"""Chosen: 16 MB of text (384,000 tets) take some 10 s; a longer file is read by its run only."""
 
 
 def surveyed(case: Mapping[str, object], folder: Path) -> bytes:
@@ -37,26 +25,10 @@ def surveyed(case: Mapping[str, object], folder: Path) -> bytes:
     """
     if not survey.installed():
         return b""
-    limits = [str(most) for most in (MEMORY, CPU, FILE)]
-    command = [sys.executable, "-c", _BOUND % survey.PROGRAM, *limits]
-    env = {name: value for name, value in os.environ.items() if name not in _SECRET}
-    pipe = subprocess.PIPE
-    with subprocess.Popen(
-        command, stdin=pipe, stdout=pipe, stderr=pipe, env=env, cwd=folder, start_new_session=True
-    ) as child:
-        try:
-            told, said = child.communicate(survey.question(dict(case), folder), timeout=WALL)
-        except subprocess.TimeoutExpired:
-            os.killpg(child.pid, signal.SIGKILL)
-            told, said = b"", f"not ready after {WALL} s".encode()
-    return _checked(told, said, child.returncode)
-
-
-def _checked(told: bytes, said: bytes, code: int) -> bytes:
+    ended = bounded.run(survey.PROGRAM, BOUNDS, question=survey.question(dict(case), folder), folder=folder)
     with suppress(ValueError, msgspec.MsgspecError):
-        if code == 0:
-            survey.from_json(told)
-            return told
-    last = said.decode("utf-8", "replace").strip().splitlines()[-1:]
-    _log.warning("the files of a case have not been read: %s", last[0] if last else f"code {code}")
+        if ended.code == 0:
+            survey.from_json(ended.told)
+            return ended.told
+    _log.warning("the files of a case have not been read: %s", ended.why)
     return b""

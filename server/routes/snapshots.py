@@ -46,7 +46,7 @@ async def content(
 ) -> Response:
     """Returns one snapshot in the form of docs/reference/snapshots.md. Its ETag is its sha256; it never changes."""
     told = await service.pool.run(_told, service, run, n)
-    return await _sent(request, service, run, told.path, told.sha256, if_none_match)
+    return await _sent(request, service, run, told.path, told.bytes, told.sha256, if_none_match)
 
 
 @router.get("/v1/runs/{run_id}/snapshots/{n}/tets", responses=_BYTES, response_class=Response)
@@ -56,7 +56,7 @@ async def tets(request: Request, run: OwnedRun, service: ServiceOf, n: Number, i
     if not told.tets:
         raise not_found(f"the tets of snapshot {n} of run {run.id}")
     path = str(Path(told.path).with_suffix(layout.TETS_SUFFIX))
-    return await _sent(request, service, run, path, f"{told.sha256}-tets", if_none_match)
+    return await _sent(request, service, run, path, told.tets, f"{told.sha256}-tets", if_none_match)
 
 
 @router.get("/v1/runs/{run_id}/fragments/{label}")
@@ -73,12 +73,14 @@ def fragment(run: OwnedRun, service: ServiceOf, label: Label, if_none_match: Kno
     return download.tagged(msgspec.json.encode(fragment_history.course(folder, told, label)), if_none_match)
 
 
-async def _sent(request: Request, service: Service, run: Run, path: str, tag: str, known: str) -> Response:
-    """Returns a file that never changes; ``tag`` is its ETag."""
+async def _sent(
+    request: Request, service: Service, run: Run, path: str, size: int, tag: str, known: str
+) -> Response:  # fmt: skip
+    """Returns a file that never changes and has ``size`` bytes; ``tag`` is its ETag."""
     headers = {"ETag": f'"{tag}"', "Cache-Control": "private, max-age=31536000, immutable"}
     if download.is_known(headers["ETag"], known):
         return Response(status_code=304, headers=headers)
-    return await service.downloads.whole(request, service.settings.runs / run.id, path, headers, _TYPE)
+    return await service.downloads.whole(request, service.settings.runs / run.id, path, size, headers, _TYPE)
 
 
 def _told(service: Service, run: Run, n: int) -> Snapshot:

@@ -190,7 +190,7 @@ def there(path: Path) -> bool:
 def submission(folder: Path) -> Submission:
     """Reads submission.json. Raises OSError, or msgspec.MsgspecError when it is damaged."""
     try:
-        return _submission.decode(whole.read(folder / layout.SUBMISSION))
+        return _submission.decode(whole.read(folder / layout.SUBMISSION, links=False))
     except (UnicodeDecodeError, RecursionError) as error:
         raise msgspec.DecodeError(str(error)) from None
 
@@ -223,7 +223,7 @@ def _after(told: Run, status: Status) -> Run:
 def outcome(folder: Path) -> Outcome | None:
     """The outcome of outcome.json; None when it is missing or damaged."""
     try:
-        return outcome_from_json(whole.read(folder / layout.OUTCOME))
+        return outcome_from_json(whole.read(folder / layout.OUTCOME, links=False))
     except (*_NO_FILE, msgspec.MsgspecError, UnicodeDecodeError, RecursionError):
         return None
 
@@ -231,7 +231,7 @@ def outcome(folder: Path) -> Outcome | None:
 def outcome_error(folder: Path) -> str:
     """Returns why outcome.json cannot be read; empty if it can be read or is missing."""
     try:
-        outcome_from_json(whole.read(folder / layout.OUTCOME))
+        outcome_from_json(whole.read(folder / layout.OUTCOME, links=False))
     except FileNotFoundError:
         return ""
     except (*_NO_FILE, PermissionError, msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
@@ -258,7 +258,7 @@ def put_away(path: Path, kept: Path | None = None) -> None:
 
 def is_as_accepted(folder: Path, made: Submission) -> bool:
     """Whether the case on disk is the checked one. Raises OSError."""
-    return made.body_sha256 in {"", digest_of(made.case_file, whole.read(folder / made.case_file))}
+    return made.body_sha256 in {"", digest_of(made.case_file, whole.read(folder / made.case_file, links=False))}
 
 
 def digest_of(case_file: str, body: bytes) -> str:
@@ -274,7 +274,7 @@ def write_stop(folder: Path, why: Cause) -> None:
 def stop_asked(folder: Path) -> Cause | None:
     """Returns the reason of the requested stop; None without a request."""
     try:
-        return Cause(whole.read(folder / layout.STOP_REQUEST, 80).decode())
+        return Cause(whole.read(folder / layout.STOP_REQUEST, 80, links=False).decode())
     except (OSError, ValueError):
         return None
 
@@ -282,7 +282,7 @@ def stop_asked(folder: Path) -> Cause | None:
 def process(folder: Path) -> Process | None:
     """The process that was started for the run; None before that."""
     try:
-        return _process.decode(whole.read(folder / layout.WORKER))
+        return _process.decode(whole.read(folder / layout.WORKER, links=False))
     except (*DAMAGED, msgspec.MsgspecError):
         return None
 

@@ -14,6 +14,10 @@ from conoid.cases.run import Cause, State
 
 _CHUNK = 1 << 18
 """Bytes of one read: some hundred lines. Chosen."""
+_LONGEST = 16 << 20
+"""Bytes of a line that is read; a longer one is passed over. Chosen: the report of 10,000 ranks has 2 MB."""
+_PASSED = 256 << 20
+"""Bytes of such a line that are passed over at a time. Chosen: 0.1 s from memory."""
 DAMAGED = msgspec.MsgspecError, ValueError, RecursionError
 """Errors of msgspec for damaged JSON: text that is not UTF-8, and lists that are nested too deeply, included."""
 
@@ -45,7 +49,7 @@ class Tail:
 
     def __init__(self, path: Path, after: int = 0) -> None:
         """Skips the lines whose ``seq`` is at most ``after``."""
-        self._path, self._after = path, after
+        self._path, self._after, self._passing = path, after, False
         self._offset = _line_before(path, after) if after else 0
 
     def read(self) -> list[Line]:
@@ -66,17 +70,32 @@ class Tail:
         return chunk
 
     def _chunk(self, size: int = _CHUNK) -> bytes:
-        """The next complete lines. A line longer than the chunk is read whole."""
+        """The next complete lines. One longer than the chunk is read whole, one longer than ``_LONGEST`` not at all."""
         try:
             with whole.opened(self._path, links=False) as file:
-                while True:
+                while not self._passing or self._pass_over(file.fileno()):
                     data = os.pread(file.fileno(), size, self._offset)
                     end = data.rfind(b"\n") + 1
                     if end or len(data) < size:
                         return data[:end]
-                    size *= 4
+                    self._passing = size >= _LONGEST
+                    size = min(4 * size, _LONGEST)
         except FileNotFoundError:
-            return b""
+            pass
+        return b""
+
+    def _pass_over(self, descriptor: int) -> bool:
+        """Goes to the end of a line that is too long; False where it goes on, or is passed over later."""
+        for _ in range(_PASSED // _LONGEST):
+            data = os.pread(descriptor, _LONGEST, self._offset)
+            end = data.find(b"\n") + 1
+            self._offset += end or len(data)
+            if end:
+                self._passing = False
+                return True
+            if len(data) < _LONGEST:
+                return False
+        return False
 
 
 def _line_before(path: Path, after: int) -> int:
@@ -136,16 +155,24 @@ def _status_in(raw: bytes) -> Status | None:
 
 def last(path: Path) -> bytes:
     """The last whole line, without the line feed; b"" where there is none. Raises OSError."""
+    with whole.opened(path, links=False) as file:
+        known = _last_lines(file.fileno(), os.fstat(file.fileno()).st_size)
+        return known[-1].raw if known else b""
+
+
+def _last_lines(descriptor: int, end: int) -> list[Line]:
+    """Lines before ``end``, the last of which is the last whole one there; none where there is no line. At most
+    ``_LONGEST`` bytes are in memory.
+    """
     window = _CHUNK
-    with whole.opened(path) as file:
-        size = os.fstat(file.fileno()).st_size
-        while True:
-            start = max(0, size - window)
-            raws = os.pread(file.fileno(), size - start, start).splitlines()
-            found = next((line.raw for raw in reversed(raws[1 if start else 0 :]) if (line := _line(raw))), b"")
-            if found or not start:
-                return found
-            window *= 4
+    while True:
+        start = max(0, end - window)
+        raws = os.pread(descriptor, end - start, start).splitlines()
+        known = [line for raw in raws[1 if start else 0 :] if (line := _line(raw))]
+        if known or not start:
+            return known
+        end -= window // 2 if window == _LONGEST else 0
+        window = min(4 * window, _LONGEST)
 
 
 def append(path: Path, status: Status) -> Status:
@@ -168,18 +195,23 @@ def _mend(descriptor: int) -> int:
     """Returns the largest number of the last lines, even with damaged lines after it. Text after the last line feed
     is completed or cut off.
     """
-    window = _CHUNK
-    while True:
-        size = os.fstat(descriptor).st_size
-        start = max(0, size - window)
-        data = os.pread(descriptor, size - start, start)
-        end = data.rfind(b"\n") + 1
-        torn = _line(data[end:]) if end or not start else None
-        known = [line.seq for raw in data[:end].splitlines() if (line := _line(raw))]
-        if torn is not None:
-            os.write(descriptor, b"\n")
-            return max(torn.seq, *known, 0)
-        if known or not start:
-            os.ftruncate(descriptor, start + end)
-            return max(known, default=0)
-        window *= 4
+    size = os.fstat(descriptor).st_size
+    end = _after_last_feed(descriptor, size)
+    torn = _line(os.pread(descriptor, size - end, end)) if size - end <= _LONGEST else None
+    known = max((line.seq for line in _last_lines(descriptor, end)), default=0)
+    if torn is not None:
+        os.write(descriptor, b"\n")
+        return max(torn.seq, known)
+    os.ftruncate(descriptor, end)
+    return known
+
+
+def _after_last_feed(descriptor: int, size: int) -> int:
+    """Where the text begins that no line feed ends."""
+    while size:
+        start = max(0, size - _CHUNK)
+        end = os.pread(descriptor, size - start, start).rfind(b"\n") + 1
+        if end:
+            return start + end
+        size = start
+    return 0

@@ -69,6 +69,21 @@ def test_a_link_in_place_of_a_history_is_not_followed(ended: tuple[Running, str]
     assert answer.json()["detail"] == "a file of the run cannot be used: is not a regular file"
 
 
+@pytest.mark.parametrize("name", [layout.OUTCOME, layout.SUBMISSION, layout.RESOLVED_CASE, layout.JOURNAL])
+def test_a_link_in_place_of_a_file_of_a_run_is_not_followed(server: Running, tmp_path: Path, name: str) -> None:
+    run = server.ann.submit(steps=1)
+    server.ann.wait_for(run)
+    path, other = server.ann.runs / run / name, tmp_path / "other"
+    other.write_bytes(path.read_bytes().replace(b"bar", b"secret").replace(b"A bar", b"secret").replace(b":3", b":77"))
+    path.unlink()
+    path.symlink_to(other)
+    for route in (*ROUTES, "/v1/runs/{0}:restart", f"/v1/runs/{{0}}/files/{name}"):
+        send = server.ann.http.post if route.endswith(":restart") else server.ann.http.get
+        told = send(route.format(run)).text
+        assert "secret" not in told, route
+        assert '"fragments":77' not in told, route
+
+
 @pytest.mark.parametrize(
     "line",
     [

@@ -165,6 +165,20 @@ def test_snapshots_are_listed_and_fetched_once(server: Running, run: str) -> Non
     assert server.ann.http.get(f"{place}/0", headers={"If-None-Match": '"other"'}).status_code == 200
 
 
+def test_a_snapshot_that_is_damaged_is_not_sent_to_be_kept(server: Running, run: str) -> None:
+    folder = server.ann.runs / run
+    write(folder, told(200))
+    (folder / layout.SNAPSHOTS).mkdir()
+    place = f"/v1/runs/{run}/snapshots/0"
+    for damaged in (b"9", b"", b"999"):
+        layout.snapshot(folder, 0).write_bytes(damaged)
+        answer = server.ann.http.get(place)
+        assert (answer.status_code, answer.json()["code"]) == (404, "damaged")
+        assert "immutable" not in answer.headers.get("cache-control", "")
+    layout.snapshot(folder, 0).write_bytes(b"99")
+    assert server.ann.http.get(place).content == b"99"
+
+
 def test_a_snapshot_that_the_journal_does_not_tell_of_is_not_there(server: Running, run: str) -> None:
     folder = server.ann.runs / run
     write(folder, told(150))

@@ -1,11 +1,13 @@
 """The journal's lines are never lost, never doubled, never torn."""
 
+import resource
 import threading
 from pathlib import Path
 
 import pytest
 
 from conoid.cases.messages import Status, from_json, to_json
+from conoid.server.runs import journal
 from conoid.server.runs.journal import Tail, append, lines, statuses
 
 
@@ -88,3 +90,28 @@ def test_reading_from_any_number_on(tmp_path: Path, monkeypatch: pytest.MonkeyPa
             file.write(to_json(Status(run="a", seq=seq, state="running", message="x" * length)) + b"\n")
     for after in range(last + 2):
         assert [line.seq for line in lines(path, after)] == list(range(after + 1, last + 1))
+
+
+@pytest.mark.parametrize("length", [3 * journal._CHUNK, 2 * journal._LONGEST + 5, 5 * journal._LONGEST])
+@pytest.mark.parametrize("ends", [True, False])
+def test_a_line_without_end_is_never_read_as_a_whole(tmp_path: Path, length: int, ends: bool) -> None:
+    path = tmp_path / "journal.jsonl"
+    first = append(path, status("first"))
+    with path.open("ab") as file:
+        file.truncate(path.stat().st_size + length)
+        file.seek(0, 2)
+        file.write(b"\n" * ends + (to_json(Status(run="a", seq=9, state="running")) + b"\n") * ends)
+    tail, most = Tail(path), _most_memory()
+    found = [line.seq for _ in range(8) for line in tail.read()]
+    assert found == [first.seq, *([9] if ends else [])]
+    assert journal.last(path) == (path.read_bytes().splitlines()[-1] if ends else to_json(first))
+    with path.open("ab") as file:
+        file.write(b"\n")
+    assert append(path, status("last")).seq == (10 if ends else 2)
+    assert [line.seq for _ in range(8) for line in tail.read()] == [10 if ends else 2]
+    assert _most_memory() - most < 6 * journal._LONGEST
+
+
+def _most_memory() -> int:
+    """Bytes that this process has had in memory at most."""
+    return 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss

@@ -10,8 +10,7 @@ from typing import Any
 import pytest
 
 from conoid.cases.output import history, layout
-from conoid.client.reports import report
-from conoid.client.result import Result
+from conoid.cases.output import report as form
 
 from .chromium import Browser, Page, program
 from .visitor import SHOWN, Site, demo, facts, number, sign_in, violations
@@ -214,9 +213,19 @@ def test_everybody_can_use_it(site: Site, browser: Browser, watched: tuple[str, 
 
 
 def test_a_report_needs_no_server(site: Site, browser: Browser, watched: tuple[str, Page], tmp_path: Path) -> None:
-    site.kill()
+    run, asks = watched
+    press = "[...document.querySelectorAll('.run-head button')].find(({ innerText }) => innerText === 'Report').click()"
+    asks.go(f"{site.url}#/runs/{run}")
+    asks.wait("document.querySelector('.run-head .pill.succeeded')")
+    asks.evaluate(press)
+    asks.wait("document.querySelector('.told').innerText === 'The report is saved.'", 300.0)
     out = tmp_path / "report.html"
-    report.write(Result.open(site.runs / watched[0]), out, [])
+    out.write_bytes((site.runs / run / form.NAME).read_bytes())
+    site.kill()
+    dark = browser.page(390, 844, dark=True)
+    dark.go(out.as_uri())
+    assert violations(dark) == []
+    dark.close()
     page = browser.page()
     page.go(out.as_uri())
     last = int(page.wait(SHOWN))

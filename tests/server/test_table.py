@@ -107,6 +107,19 @@ def test_pages_are_whole_and_none_is_larger_than_is_allowed(server: Running, mon
     assert server.ann.http.get("/v1/table", params={"limit": 501}).status_code == 400
 
 
+def test_cases_that_are_like_no_other_count_for_the_size_of_an_answer() -> None:
+    sizes = []
+    for begin in range(0, 500, 100):
+        made, n = rows.Table(), begin
+        while n < 500 and made.add({"id": str(n)}, card.Card(values={f"key{n}.{k}": "x" * 200 for k in range(1000)})):
+            n += 1
+        body = msgspec.json.encode({"runs": made.rows, "cases": [group.shown() for group in made.groups]})
+        sizes.append(len(body))
+        assert n > begin
+        assert len(made.groups) == n - begin
+    assert max(sizes) < 2 * rows.MOST_BYTES
+
+
 def test_a_removed_run_is_in_no_table(server: Running) -> None:
     kept, gone = (server.ann.submit(steps=1) for _ in range(2))
     for run in (kept, gone):

@@ -1,0 +1,16 @@
+"""A run as one HTML file: made by a program of the client, kept in the run's folder by a server."""
+
+import importlib.util
+
+PROGRAM = "conoid.client.reports"
+"""The program: ``python -m conoid.client.reports FOLDER OUT``, one run a process."""
+NAME = "report.html"
+"""In the folder of a run."""
+
+
+_NEEDS = "conoid.client", "h5py", "matplotlib", "pyvista"
+
+
+def missing() -> list[str]:
+    """The packages that it lacks here; none: it can be started."""
+    return [name for name in _NEEDS if importlib.util.find_spec(name) is None]

@@ -1,0 +1,66 @@
+"""The report of a run that has ended: made once, by a program with limits, and kept in the run's folder."""
+
+import logging
+import os
+import tempfile
+import uuid
+from pathlib import Path
+
+from conoid.cases.output import report
+from conoid.cases.reading import whole
+
+from ..errors import ServiceError
+from ..launch import bounded
+from ..launch.bounded import Bounds
+from ..requests.thread_pool import ThreadPool
+
+_log = logging.getLogger("conoid.server")
+_BOUNDS = Bounds(cpu=300, wall=300, memory=8 << 30, file=64 << 20)
+"""Chosen: the report of a run of 600,000 tets takes 40 s and 2 GB, and is 5 MB."""
+_PATIENCE, _WAITING = 900.0, 8
+"""s that a user waits, behind the reports of others, and reports that may wait. Chosen."""
+_LEFT = ".*report-*"
+"""What is being made, and what a server that was killed has left."""
+
+
+def reporters() -> ThreadPool:
+    """One report at a time, of all users."""
+    return ThreadPool(each=1, waiting=_WAITING, patience=_PATIENCE, most=1)
+
+
+def made(path: Path) -> int:
+    """The bytes of the report of the run in ``path``, which is made where there is none. Blocks. Raises ServiceError
+    501 without the packages for drawing, 500 where it cannot be made, 507.
+    """
+    target = path / report.NAME
+    try:
+        with whole.opened(target, links=False) as there:
+            return os.fstat(there.fileno()).st_size
+    except OSError:
+        pass
+    if lacking := report.missing():
+        detail = f"this server lacks {', '.join(lacking)}: pip install 'conoid[client,view]' there"
+        raise ServiceError(501, "no_drawing", detail, hint=f"conoid report {path.name}")
+    for left in path.glob(_LEFT):
+        left.unlink(missing_ok=True)
+    beside = path / f".report-{uuid.uuid4().hex}.html"
+    try:
+        _make(path, beside)
+        beside.replace(target)
+        return target.stat().st_size
+    except OSError as error:
+        raise ServiceError(507, "storage", f"the report cannot be kept: {error.strerror}", retryable=True) from error
+    finally:
+        beside.unlink(missing_ok=True)
+
+
+def _make(path: Path, out: Path) -> None:
+    """Raises ServiceError 500."""
+    with tempfile.TemporaryDirectory(prefix="conoid-report-") as folder:
+        ended = bounded.run(
+            report.PROGRAM, _BOUNDS, [str(path), str(out)], folder=Path(folder), LP_NUM_THREADS="1",
+            OMP_NUM_THREADS="1", TMPDIR=folder,
+        )  # fmt: skip
+    if ended.code or not out.is_file():
+        _log.warning("the report of run %s was not made: %s", path.name, ended.why)
+        raise ServiceError(500, "no_report", f"the report was not made: {ended.why[:300]}")
