@@ -188,8 +188,9 @@ def test_the_lowest_corner_of_a_flake_meets_what_it_enters(height: float, own: b
     v[4:, 2] = -0.05
     sums, faces = np.zeros((8, normals.COLUMNS), np.int64), (FACES + 4).astype(np.int32)
     normals.add(sums, normals.shares(x, faces, SIZE), faces)
-    part = np.array([0] * 4 + [0 if own else 1] * 4)
-    met = node_face(x, v, FACE, every_pair(np.array([4]), 1), 1.0, part, normals=normals.means(sums))
+    part, every, means = np.array([0] * 4 + [0 if own else 1] * 4), np.arange(8, dtype=np.int32), np.zeros((8, 12))
+    normals.means(means, every, sums, every)
+    met = node_face(x, v, FACE, every_pair(np.array([4]), 1), 1.0, part, normals=means)
     assert many(met) == 1
 
 

@@ -8,10 +8,12 @@ import pytest
 from conoid.cases.load import parse_case, read_data
 from conoid.worker import simulation, step
 from conoid.worker.accounts.digest import digest
+from conoid.worker.contact.broad_phase.deviation import Deviation
 from conoid.worker.contact.broad_phase.pairs import PairTable
 from conoid.worker.contact.broad_phase.reference_motion import Lines, ReferenceMotion
 from conoid.worker.contact.narrow_phase.tables import ContactRows, EdgeTable, FaceTable, Pairs, SlotTable, Step
 from conoid.worker.parallel.comm import SerialComm
+from conoid.worker.parallel.team import team
 
 from ..worker.meshes import Floats
 from .bodies import Flags, Indices
@@ -183,7 +185,9 @@ class Shards:
             for table in tables:
                 table.node_face.wake()
                 table.edge_edge.wake()
-        self.reference.measure(self.x, self.v, self.faces, self.edges)
+        Deviation(team(1)).measure(
+            self.reference, self.x, self.v, self.faces, self.edges, np.ones(len(self.x), bool)
+        )  # fmt: skip
 
 
 def equal(one: list[ContactRows], two: list[ContactRows]) -> bool:
@@ -362,10 +366,15 @@ def test_a_line_begins_anew_where_its_slot_is_with_the_mean_velocity_since() -> 
 
 def test_how_far_a_slot_leaves_its_line_is_the_larger_of_the_steps_beginning_and_end() -> None:
     x, course = np.zeros((3, 3)), np.tile([1.0, 0.0, 0.0], (3, 1))
-    lines = Lines(x, course)
     now = np.array([[2.0, 0.0, 0.0], [2.0, 0.3, 0.0], [2.0, 0.0, 0.4]])
-    lines.measure(now, np.array([[1.0, 0.0, 0.0], [1.0, -1.0, 0.0], [1.0, 0.0, 1.0]]), 2.0, 0.5)
-    assert lines.left == pytest.approx([0.0, 0.3, 0.9])
+    v, corners = np.array([[1.0, 0.0, 0.0], [1.0, -1.0, 0.0], [1.0, 0.0, 1.0]]), np.array([[0, 1, 2]], np.int32)
+    motion = ReferenceMotion(x, course, 1, 1, np.zeros(3), np.inf)
+    motion.advance(2.0)
+    motion.advance(0.3, 0.2)
+    most = Deviation(team(1)).measure(motion, now, v, corners, corners[:, :2].copy(), np.array([True, True, False]))
+    for lines in (motion.searched, motion.short):
+        assert lines.left == pytest.approx([0.0, 0.3, 0.9])
+    assert (most, motion.faces[0], motion.edges[0]) == pytest.approx((0.3, 0.9, 0.3))
 
 
 def test_lines_are_taken_over_by_other_slots() -> None:

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from conoid.worker.contact.broad_phase import registration
+from conoid.worker.contact.broad_phase.deviation import Deviation
 from conoid.worker.contact.narrow_phase.tables import DEEP, DEEP_SELF
 from conoid.worker.contact.scene import layout
 from conoid.worker.contact.scene.near_surface import NearSurface, Rules
@@ -20,6 +21,7 @@ from conoid.worker.contact.scene.scene import Scene
 from conoid.worker.contact.surface.records import OPEN, Edges, Faces
 from conoid.worker.model.state import Ints
 from conoid.worker.parallel.comm import SerialComm
+from conoid.worker.parallel.team import team
 
 from ..worker.meshes import Floats
 from .bodies import Flags, Indices, nodes_of, rotation
@@ -52,6 +54,7 @@ class World:
         self.deep = edge_depths(self.x, self.edges)
         self.here = self.draw.uniform(size=SHARDS) < 0.8
         self.shown = self.draw.uniform(size=SHARDS) < 0.6
+        self.deviation = Deviation(team(1))
         self.registered, self.carried, self.opened, self.near = 0, 0, 0, np.zeros(2, int)
         self.scene = self.search(None)
 
@@ -78,8 +81,13 @@ class World:
         now.slots.on_surface[:] = np.repeat(self.shown, 4)[nodes]
         now.enliven(np.flatnonzero(now.faces.exposed).astype(np.int32))
         registration.register_new(now)
-        now.reference.measure(now.surface_nodes.x, now.surface_nodes.v, now.faces.corners, now.edges.corners)
+        self.measure(now)
         return now
+
+    def measure(self, now: Scene) -> None:
+        """How far everything has left its lines."""
+        of, faces, edges = now.surface_nodes, now.faces.corners, now.edges.corners
+        self.deviation.measure(now.reference, of.x, of.v, faces, edges, now.slots.tracked)
 
     @staticmethod
     def rows(shards: "np.ndarray", many: int) -> "np.ndarray":
@@ -120,10 +128,10 @@ class World:
         now, of = self.scene, self.scene.surface_nodes
         of.x[:], of.v[:] = self.x[of.id], self.v[of.id]
         now.reference.advance(dt)
-        now.reference.measure(of.x, of.v, now.faces.corners, now.edges.corners)
+        self.measure(now)
         due = now.reference.farthest(now.slots.tracked) > 0.5 * SKIN * (1.0 if self.registered % 3 else 0.6)
         if due or now.pending:
-            registration.renew(now, of.x, of.v, due)
+            registration.renew(now, of.x, of.v, due, self.deviation)
             self.registered += 1
 
     def step(self, number: int) -> None:

@@ -1,13 +1,15 @@
-"""Zones of a surface_nodes: boxes with about as many nodes; and a step by many threads is that by one, to the bit."""
+"""Zones: boxes with about as many nodes each; and a step by many threads is that by one, to the bit."""
 
+from itertools import pairwise
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
+from conoid.worker.contact.solver.slot_numbers import mark
 from conoid.worker.contact.solver.solver import ActiveSet
-from conoid.worker.contact.solver.zones import Zones
+from conoid.worker.contact.solver.zones import Zones, sets, tasks
 from conoid.worker.parallel.team import team
 
 from .kernels import Solver, network
@@ -45,6 +47,24 @@ def test_one_thread_has_one_zone() -> None:
     zones = Zones(1)
     assert zones.many == 1
     assert not zones.of(nodes_of(np.zeros((7, 3)))).any()
+
+
+def test_sets_of_one_colour_share_no_node() -> None:
+    """Every contact is of one set, and most are of those of the zones."""
+    draw, nodes = np.random.default_rng(3), 600
+    x = np.sort(draw.uniform(size=(nodes, 3)), axis=0)
+    zones = Zones(2)
+    rows = np.minimum(np.arange(nodes)[:, None] + draw.integers(0, 30, (nodes, 4)), nodes - 1).astype(np.int32)
+    every, many = np.arange(nodes, dtype=np.int32), np.zeros((1, 2 * sets(zones.many)), np.int64)
+    of, touched, shared = np.zeros(nodes, np.int32), np.zeros(nodes, np.uint8), np.zeros(nodes, np.uint8)
+    mark(touched, of, rows, every, zones.of(nodes_of(x)), shared, many, 0, 0, nodes)
+    _, (inner, starts) = tasks(zones.many)
+    assert np.array_equal(np.sort(inner[:, 0]), sets(zones.many) + np.arange(sets(zones.many)))
+    assert many[0, : sets(zones.many)].sum() == 0
+    for first, last in pairwise(starts.tolist()):
+        seen = np.concatenate([np.unique(rows[of == k]) for k, _ in inner[first:last]])
+        assert len(seen) == len(np.unique(seen))
+    assert nodes // 2 < many[0, inner[: zones.many, 0]].sum() < nodes
 
 
 @pytest.mark.parametrize("threads", [2, 5])

@@ -163,7 +163,7 @@ class Exterior:
         """
         place = scene.own.place[local]
         local, place = local[place >= 0], place[place >= 0]
-        scene.slots.normals[place] = normals.means(self._moments[local])
+        normals.means(scene.slots.normals, place, self._moments, local.astype(np.int32, copy=False))
         scene.slots.on_surface[place] = self.surface.flags[local]
         return np.asarray(place)
 

@@ -39,7 +39,7 @@ _SURFACE, _LISTED, _TESTED, _ACTIVE = 9.0, 0.1, 3.0, 4.0
 """Cost of a step for a surface node (searches and registrations, averaged), a listed pair, a tested pair or crack,
 and an active contact: 450, 3, 150 and 200 ns, from the profile of the shattering bar to 40 us on one rank, in units
 of 50 ns."""
-_FORESIGHT = 8
+_FORESIGHT = 32
 """Steps between two checks of the crack widths."""
 
 

@@ -9,8 +9,9 @@ from ..parallel.team import TASK
 from .narrow_phase import closing_speed, corner_contact, cracks, edge_edge, node_face
 from .narrow_phase.corner_contact import NARROW
 from .narrow_phase.tables import CONTACT_ROWS, EDGES, FACES, PAIRS, SLOTS, STEP
-from .solver import impulse_work, loading, restitution, slot_numbers, sweeps
+from .solver import impulse_work, loading, restitution, slot_numbers, stops, sweeps
 from .solver.active import CONTACTS, KEPT, LOADED, NODES
+from .solver.stops import BRACED
 from .surface.families import CORNERS
 
 PAIRS_OF_A_TASK = 1024
@@ -35,18 +36,21 @@ SORT = _N1, _N2, _F1, _I2, _N1, _N1, _N2, _N1
 LOAD = NODES, _N1, _F2, _F2, _F1
 WEIGH = NODES, CONTACTS, LOADED
 RESUME = NODES, CONTACTS, LOADED, KEPT, _F, _F
-SWEEP = NODES, CONTACTS, LOADED, _F, _F, _F
-GIVE = NODES, _F, types.boolean
+SWEEP = NODES, CONTACTS, LOADED, _F, _I1, _F
+GIVE = NODES, _F, _I1
+BRACE = NODES, BRACED, _I1
 STORE = KEPT, LOADED, _N1
 COST = types.int64[:, :, ::1], LOADED, NODES, _F2, _N1, _F, types.boolean
 LEAVE = _F2, types.int64[:, :, ::1], _I2, _I2, NODES, _N1, _N1, _N1, types.boolean[::1]
 BOOK = _F1, _F1, _N1, _N1, _F2, _I2, _F2, _F
 TAKE = _F2, _F2, _N1, _F2, _F2, _N1
+BOUND = _F2, _F2
 _due_faces, _node_face, _edge_edge = reader(*DUE_FACES), reader(*NODE_FACE), reader(*EDGE_EDGE)
 _across, _entering, _approach = reader(*ACROSS), reader(*ENTERING), reader(*APPROACH)
 _rebound, _mark, _sort, _load, _weigh = reader(*REBOUND), reader(*MARK), reader(*SORT), reader(*LOAD), reader(*WEIGH)
 _resume, _sweep, _give, _store, _cost = reader(*RESUME), reader(*SWEEP), reader(*GIVE), reader(*STORE), reader(*COST)
-_leave, _book, _take = reader(*LEAVE), reader(*BOOK), reader(*TAKE)
+_brace, _leave, _book, _take = reader(*BRACE), reader(*LEAVE), reader(*BOOK), reader(*TAKE)
+_bound = reader(*BOUND)
 
 
 @njit(TASK, cache=True)
@@ -146,7 +150,8 @@ def resume(table, first, stop, thread):  # type: ignore[no-untyped-def]
 @njit(TASK, cache=True)
 def sweep(table, first, stop, thread):  # type: ignore[no-untyped-def]
     """``loading.load`` and ``sweeps.sweep`` of a range of sets of contacts."""
-    active, contacts, loaded, fastest, ahead, scale = _sweep(table)
+    active, contacts, loaded, fastest, turn, scale = _sweep(table)
+    ahead = sweeps.momentum(turn[0], turn[1])
     for k in range(first, stop):
         loading.load(loaded, contacts, active, fastest, k)
         sweeps.sweep(active, loaded, ahead, scale, k)
@@ -154,9 +159,17 @@ def sweep(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def give(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``sweeps.give``."""
-    active, scale, last = _give(table)
-    sweeps.give(active, scale, last, first, stop)
+    """``sweeps.give``; ``turn`` (2,): which sweep it is, and of how many."""
+    active, scale, turn = _give(table)
+    sweeps.give(active, scale, turn[0] + 1 == turn[1], first, stop)
+
+
+@njit(TASK, cache=True)
+def brace(table, first, stop, thread):  # type: ignore[no-untyped-def]
+    """``stops.stop``, and the end of a sweep."""
+    active, braced, turn = _brace(table)
+    stops.stop(active, braced)
+    turn[0] += 1
 
 
 @njit(TASK, cache=True)
@@ -198,6 +211,13 @@ def take(table, first, stop, thread):  # type: ignore[no-untyped-def]
     """``slot_numbers.take``."""
     x, v, slots, node_x, node_v, local = _take(table)
     slot_numbers.take(x, v, slots, node_x, node_v, local, first, stop)
+
+
+@njit(TASK, cache=True)
+def bound(table, first, stop, thread):  # type: ignore[no-untyped-def]
+    """``closing_speed.bound``."""
+    box, v = _bound(table)
+    closing_speed.bound(box, first // SLOTS_OF_A_TASK, v, first, stop)
 
 
 @njit("int64(int32[::1], int64, int64[::1], int64[::1])", cache=True)

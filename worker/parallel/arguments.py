@@ -71,7 +71,7 @@ class Arguments:
                 raise ValueError("an array of a table must be in C order")
             if value.ndim != kind.ndim or value.dtype != self._dtypes[k]:
                 raise ValueError(f"an array of a table is {value.dtype} with {value.ndim} axes instead of {kind}")
-            words[at] = _address(value)
+            words[at] = address_of(value)
             for length in value.shape:
                 at += 1
                 words[at] = length
@@ -88,7 +88,7 @@ def _dtype(kind: Any) -> np.dtype[Any]:
     return np.dtype(str(kind.dtype).replace("boolean", "bool"))
 
 
-def _address(array: Any) -> int:
+def address_of(array: Any) -> int:
     """Return the address of the first item: ``array.ctypes.data`` in half the time, by numpy's array interface for
     C.
     """

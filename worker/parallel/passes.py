@@ -7,7 +7,7 @@ import numpy as np
 from ..kernels.jit import Kernel
 from ..model.state import Ints
 from .arguments import Arguments
-from .team import Team
+from .team import Stage, Team
 
 NODES_OF_A_TASK = 4096
 """Nodes of a task. Chosen: 10 us of work, against 2 us for a region of threads."""
@@ -32,6 +32,10 @@ class Ranges:
         """Run over the range from 0 to ``n``, with the arguments at the address ``table``."""
         if n:
             self._team.run(kernel, table, self._cut(n), self._starts)
+
+    def stage(self, kernel: Kernel, table: int, n: int) -> Stage:
+        """The same as a stage of a program, until another range is asked for."""
+        return Stage(kernel, table, self._cut(n), self._starts)
 
     def many(self, n: int) -> int:
         """Return the number of tasks of the range from 0 to ``n``."""
@@ -60,6 +64,10 @@ class Pass:
         """Run over the range from 0 to ``n``; ``values``: the arguments."""
         if n:
             self._ranges.run(self._kernel, self._arguments.set(*values), n)
+
+    def stage(self, n: int, *values: Any) -> Stage:
+        """The same as a stage of a program, until other arguments or another range are asked for."""
+        return self._ranges.stage(self._kernel, self._arguments.set(*values), n)
 
     def many(self, n: int) -> int:
         """Return the number of tasks of the range from 0 to ``n``."""

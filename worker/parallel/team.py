@@ -15,6 +15,8 @@ there are tasks.
 
 import ctypes
 import threading
+from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cache
 from typing import Protocol
 
@@ -22,9 +24,10 @@ import numpy as np
 
 from ..kernels.jit import Kernel, njit
 from ..model.state import Ints
+from .arguments import address_of
 from .words import SECOND, TASK, add, call_task, load, now, sched_yield, sem_post, sem_wait, swap, word_at
 
-__all__ = ["TASK", "Team", "team"]
+__all__ = ["TASK", "Stage", "Team", "team"]
 
 
 _NEXT, _DONE, _ASLEEP, _KERNEL, _TABLE, _TASKS, _MOST, _WITHIN, _CLOCK, _SEMAPHORE, _THREADS = (
@@ -33,6 +36,9 @@ _NEXT, _DONE, _ASLEEP, _KERNEL, _TABLE, _TASKS, _MOST, _WITHIN, _CLOCK, _SEMAPHO
 """Offsets in a job's words; words that several threads write have a cache line of their own. _MOST: how many threads
 may work; _WITHIN: time in regions so far, ns; _CLOCK: two words for reading the clock. From _THREADS on a line for
 each thread: its time in tasks, ns, and words for the clock."""
+_STAGE = 5
+"""Words of a stage: addresses of its kernel, of the table of arguments, of the tasks and of the starts of colours, and
+the number of colours."""
 _BITS, _MASK = 20, (1 << 20) - 1
 """Bits of the next task in the word _NEXT; the number of tasks is above them."""
 _LINE = 8
@@ -95,13 +101,14 @@ def _help(job, semaphore, thread):  # type: ignore[no-untyped-def]
             idle = 0
 
 
-@njit("void(int64[::1], int64, int64, int64, int64, int64[::1])", cache=True)
-def _ask(job, semaphore, kernel, table, tasks, starts):  # type: ignore[no-untyped-def]
-    """Run the tasks of one colour after the other; return when all are done."""
-    begin = now(job, _CLOCK)
-    for colour in range(len(starts) - 1):
-        many = starts[colour + 1] - starts[colour]
-        job[_KERNEL], job[_TABLE], job[_TASKS] = kernel, table, tasks + 16 * starts[colour]
+@njit("void(int64[::1], int64, int64[::1])", cache=True)
+def _share(job, semaphore, stage):  # type: ignore[no-untyped-def]
+    """Run the tasks of a stage, one colour after the other; return when all are done."""
+    kernel, table, tasks, starts = stage[0], stage[1], stage[2], stage[3]
+    for colour in range(stage[4]):
+        first = word_at(starts, colour)
+        many = word_at(starts, colour + 1) - first
+        job[_KERNEL], job[_TABLE], job[_TASKS] = kernel, table, tasks + 16 * first
         swap(job, _DONE, 0)
         swap(job, _NEXT, many << _BITS)
         if many > 1:
@@ -113,16 +120,38 @@ def _ask(job, semaphore, kernel, table, tasks, starts):  # type: ignore[no-untyp
             polls += 1
             if polls > _POLLS:
                 sched_yield()
-    job[_WITHIN] += now(job, _CLOCK) - begin
 
 
-@njit("void(int64[::1], int64, int64, int64[:, ::1])", cache=True)
-def _alone(job, kernel, table, tasks):  # type: ignore[no-untyped-def]
-    """Run all tasks, one after the other."""
+@njit("void(int64[::1], int64, int64[:, ::1], int64)", cache=True)
+def _ask(job, semaphore, stages, rounds):  # type: ignore[no-untyped-def]
+    """Run all stages, one after the other, ``rounds`` times."""
     begin = now(job, _CLOCK)
-    for k in range(len(tasks)):
-        call_task(kernel, table, tasks[k, 0], tasks[k, 1], 0)
+    for _ in range(rounds):
+        for k in range(len(stages)):
+            _share(job, semaphore, stages[k])
     job[_WITHIN] += now(job, _CLOCK) - begin
+
+
+@njit("void(int64[::1], int64[:, ::1], int64)", cache=True)
+def _alone(job, stages, rounds):  # type: ignore[no-untyped-def]
+    """Run the same on one thread."""
+    begin = now(job, _CLOCK)
+    for _ in range(rounds):
+        for s in range(len(stages)):
+            kernel, table, tasks, starts = stages[s, 0], stages[s, 1], stages[s, 2], stages[s, 3]
+            for k in range(word_at(starts, 0), word_at(starts, stages[s, 4])):
+                call_task(kernel, table, word_at(tasks, 2 * k), word_at(tasks, 2 * k + 1), 0)
+    job[_WITHIN] += now(job, _CLOCK) - begin
+
+
+@dataclass(frozen=True)
+class Stage:
+    """A pass of a program: the arguments of ``Team.run``."""
+
+    kernel: Kernel
+    table: int
+    tasks: Ints
+    starts: Ints
 
 
 class Timed(Protocol):
@@ -152,6 +181,8 @@ class Team:
         self._job: Ints = room[-(room.ctypes.data // room.itemsize) % _LINE :][:size]
         self._job[_MOST] = threads
         self._words = self._job.data
+        self._stage = np.zeros((1, _STAGE), np.int64)
+        self._one = self._stage[0].data
         self._semaphore = int(self._job[_SEMAPHORE:].ctypes.data)
         ctypes.CDLL(None).sem_init(ctypes.c_void_p(self._semaphore), 0, 0)
         for thread in range(1, threads):
@@ -183,10 +214,32 @@ class Team:
         """
         if self.projecting is not None:
             self._words[_WITHIN] += self.projecting.run(kernel, table, tasks, starts)
-        elif self._words[_MOST] == 1:
-            _alone(self._job, kernel.address, table, tasks)
+            return
+        one = self._one
+        one[0], one[1], one[2] = kernel.address, table, address_of(tasks)
+        one[3], one[4] = address_of(starts), len(starts) - 1
+        self._do(self._stage, 1)
+
+    def repeat(self, stages: Sequence[Stage], rounds: int) -> None:
+        """Run all ``stages``, one after the other, ``rounds`` times, in one call: threads stay awake, and no Python
+        runs in between. A kernel that needs the number of the round keeps it in its table.
+        """
+        if self.projecting is not None:
+            for _ in range(rounds):
+                for each in stages:
+                    self.run(each.kernel, each.table, each.tasks, each.starts)
+            return
+        words = [
+            (each.kernel.address, each.table, address_of(each.tasks), address_of(each.starts), len(each.starts) - 1)
+            for each in stages
+        ]
+        self._do(np.array(words), rounds)
+
+    def _do(self, stages: Ints, rounds: int) -> None:
+        if self._words[_MOST] == 1:
+            _alone(self._job, stages, rounds)
         else:
-            _ask(self._job, self._semaphore, kernel.address, table, tasks.ctypes.data, starts)
+            _ask(self._job, self._semaphore, stages, rounds)
 
 
 @cache

@@ -47,12 +47,6 @@ class Lines:
         for name in ("x", "course", "since"):
             getattr(self, name)[here] = getattr(old, name)[there]
 
-    def measure(self, x: Floats, v: Floats, t: float, dt: float) -> None:
-        """Computes the distances of the slots from their lines in a step ``dt`` from ``t`` on: positions ``x`` and
-        velocities ``v`` before contact, (slots, 3) each.
-        """
-        _leave(self.left, self.x, self.course, x, v, t, dt)
-
     def begin_anew(self, some: "np.ndarray", x: Floats, t: float) -> None:
         """Begins new lines for ``some`` (slots,), from ``x`` (slots, 3) at time ``t`` on."""
         _begin_anew(some, self.x, self.course, self.since, x, t)
@@ -100,17 +94,9 @@ class ReferenceMotion:
         """Begins a step ``dt``; distances are measured to ``beyond`` its end, s."""
         self.t, self.end, self.beyond = self.end, self.end + dt, beyond
 
-    def measure(self, x: Floats, v: Floats, faces: Indices, edges: Indices) -> None:
-        """Computes the distances from the lines in the step and ``beyond``: see Lines."""
-        dt = self.end - self.t + self.beyond
-        self.searched.measure(x, v, self.t, dt)
-        self.short.measure(x, v, self.t, dt)
-        _largest(self.faces, faces, 3, self.short.left)
-        _largest(self.edges, edges, 2, self.short.left)
-
     def farthest(self, some: Flags) -> float:
         """Largest distance of ``some`` (slots,) from their lines of the search in the step, m."""
-        return float(self.searched.left[some].max(initial=0.0))
+        return float(farthest(self.searched.left, some, 0, len(some)))
 
     def begin_anew(self, some: "np.ndarray", x: Floats) -> None:
         """Begins new lines of the search for ``some`` (slots,), from ``x`` (slots, 3) on."""
@@ -131,9 +117,12 @@ class ReferenceMotion:
         return np.asarray(self.searched.x + self.t * self.searched.course)
 
 
-@njit(f"void({_V1}, {_V2}, {_V2}, {_V2}, {_V2}, float64, float64)", cache=True)
-def _leave(left, line, course, x, v, t, dt):  # type: ignore[no-untyped-def]
-    for a in range(len(left)):
+@njit(f"void({_V1}, {_V2}, {_V2}, {_V2}, {_V2}, float64, float64, int64, int64)", cache=True)
+def leave(left, line, course, x, v, t, dt, first, stop):  # type: ignore[no-untyped-def]
+    """How far the slots from ``first`` to ``stop`` leave their lines in a step ``dt`` from ``t`` on: positions ``x``
+    and velocities ``v`` before contact, (slots, 3) each.
+    """
+    for a in range(first, stop):
         now, then = 0.0, 0.0
         for i in range(3):
             off = x[a, i] - line[a, i] - t * course[a, i]
@@ -143,9 +132,19 @@ def _leave(left, line, course, x, v, t, dt):  # type: ignore[no-untyped-def]
         left[a] = np.sqrt(max(now, then))
 
 
-@njit(f"void({_V1}, {_N2}, int64, {_V1})", cache=True)
-def _largest(out, corners, many, left):  # type: ignore[no-untyped-def]
-    for f in range(len(out)):
+@njit(f"float64({_V1}, boolean[::1], int64, int64)", cache=True)
+def farthest(left, some, first, stop):  # type: ignore[no-untyped-def]
+    """The largest of what ``some`` (slots,) of the slots from ``first`` to ``stop`` leave their lines, m."""
+    most = 0.0
+    for a in range(first, stop):
+        most = max(most, left[a] if some[a] else 0.0)
+    return most
+
+
+@njit(f"void({_V1}, {_N2}, int64, {_V1}, int64, int64)", cache=True)
+def largest(out, corners, many, left, first, stop):  # type: ignore[no-untyped-def]
+    """The largest of what the first ``many`` corners of the rows from ``first`` to ``stop`` leave their lines."""
+    for f in range(first, stop):
         most = 0.0
         for k in range(many):
             most = max(most, left[corners[f, k]])

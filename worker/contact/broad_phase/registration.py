@@ -15,6 +15,7 @@ from ...model.state import Flags, Floats, Indices, Ints
 from ..narrow_phase.tables import DEEP, DEEP_SELF
 from ..scene.scene import Scene
 from . import search, swept_filter
+from .deviation import Deviation
 from .search import Primitives
 
 _PARTLY = 0.5
@@ -45,10 +46,10 @@ def register_new(scene: Scene) -> None:
     _register(scene)
 
 
-def renew(scene: Scene, x: Floats, v: Floats, strayed: bool) -> None:
+def renew(scene: Scene, x: Floats, v: Floats, strayed: bool, deviation: Deviation) -> None:
     """Registers everything new and, with ``strayed``, begins new lines for the slots that have departed from theirs.
 
-    ``x``, ``v`` (slots, 3): at the beginning of the step, v before contact.
+    ``x``, ``v`` (slots, 3): at the beginning of the step, v before contact; ``deviation``: measures the distances.
     """
     off = scene.settle_live()
     if strayed:
@@ -57,11 +58,12 @@ def renew(scene: Scene, x: Floats, v: Floats, strayed: bool) -> None:
         scene.faces.new |= off[scene.faces.corners[:, :3]].any(axis=1)
         scene.edges.new |= off[scene.edges.corners[:, :2]].any(axis=1)
     scene.reference.begin_anew(off, x)
-    scene.reference.measure(x, v, scene.faces.corners, scene.edges.corners)
+    measured = scene.reference, x, v, scene.faces.corners, scene.edges.corners, scene.slots.tracked
+    deviation.measure(*measured)
     knocked = off & (scene.reference.searched.left > 0.5 * scene.rules.skin)
     if knocked.any():
         scene.reference.aim(knocked, x, v)
-        scene.reference.measure(x, v, scene.faces.corners, scene.edges.corners)
+        deviation.measure(*measured)
     _register(scene)
 
 

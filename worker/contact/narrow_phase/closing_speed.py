@@ -3,19 +3,32 @@
 import numpy as np
 
 from ...kernels.jit import njit, types
+from ...model.state import Floats
 from .tables import CONTACT_ROWS, FACES, PAIRS, STEP, altitude
 
 _F = types.float64
 
 
-@njit("float64(float64[:, ::1])", cache=True)
-def spread(v):  # type: ignore[no-untyped-def]
-    """Upper bound of the difference of any two of the velocities ``v`` (n, 3), m/s: the diagonal of their box."""
-    low, high = np.full(3, np.inf), np.full(3, -np.inf)
-    for a in range(len(v)):
+@njit("void(float64[:, ::1], int64, float64[:, ::1], int64, int64)", cache=True)
+def bound(box, row, v, first, stop):  # type: ignore[no-untyped-def]
+    """Sets a ``row`` of ``box`` to the lowest of the velocities ``v`` (n, 3) from ``first`` to ``stop``, and minus the
+    highest.
+    """
+    for i in range(6):
+        box[row, i] = np.inf
+    for a in range(first, stop):
         for i in range(3):
-            low[i], high[i] = min(low[i], v[a, i]), max(high[i], v[a, i])
-    return np.sqrt(((high - low) ** 2).sum()) if len(v) > 0 else 0.0
+            box[row, i], box[row, 3 + i] = min(box[row, i], v[a, i]), min(box[row, 3 + i], -v[a, i])
+
+
+def spread(boxes: Floats) -> float:
+    """Upper bound of the difference of any two velocities in the ``boxes`` (k, 6) of ``bound``, m/s: the diagonal of
+    the box of all.
+    """
+    if not len(boxes):
+        return 0.0
+    least = boxes.min(axis=0)
+    return float(np.sqrt(((least[:3] + least[3:]) ** 2).sum()))
 
 
 @njit(_F(STEP, types.int32[:, ::1], types.int64, types.int64), cache=True)

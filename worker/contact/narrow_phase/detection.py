@@ -10,6 +10,7 @@ from ...parallel.passes import Pass
 from ...parallel.team import Team
 from .. import tasks
 from ..broad_phase import registration
+from ..broad_phase.deviation import Deviation
 from ..exterior import Exterior
 from ..scene.scene import Scene
 from ..surface.families import Corners
@@ -62,12 +63,11 @@ class Ahead:
     rebound: float
     """See tables.Step."""
 
-    def beyond(self, v: Floats) -> float:
-        """Returns the longest step that may follow if any of the velocities ``v`` (slots, 3) may close a distance of
-        FAST of a face in it; else 0. No slower pair bounds a step, so that ranks with slow nodes only need no data
-        of others.
+    def beyond(self, fastest: float) -> float:
+        """Returns the longest step that may follow if velocities that differ by up to ``fastest``, m/s, may close a
+        distance of FAST of a face in it; else 0. No slower pair bounds a step, so that ranks with slow nodes only need
+        no data of others.
         """
-        fastest = spread(v)
         return self.most if fastest * self.most > FAST * self.size else 0.0
 
 
@@ -88,6 +88,8 @@ class Detection:
         self._approach = Pass(team, tasks.approach, *tasks.APPROACH, size=some)
         self._across = Pass(team, tasks.across_cracks, *tasks.ACROSS, size=CRACKS_OF_A_TASK)
         self._entering = Pass(team, tasks.entering_nodes, *tasks.ENTERING, size=FAMILIES_OF_A_TASK)
+        self._bound = Pass(team, tasks.bound, *tasks.BOUND, size=SLOTS_OF_A_TASK)
+        self._deviation = Deviation(team)
         self._scratch = StepRoom()
         self._rows_of_corner = 1
         """Rows for each corner of a narrow side, in the mean of a task."""
@@ -115,14 +117,13 @@ class Detection:
         ``together``: whether any rank registers slots that have departed.
         """
         surface_nodes, reference = now.surface_nodes, now.reference
-        beyond = ahead.beyond(surface_nodes.v)
+        beyond = ahead.beyond(self._spread(surface_nodes.v))
         reference.advance(ahead.dt, beyond)
         if redraw:
             reference.shorten(surface_nodes.x)
             now.node_face.wake()
             now.edge_edge.wake()
-        reference.measure(surface_nodes.x, surface_nodes.v, now.faces.corners, now.edges.corners)
-        stray = _renewed(now, together)
+        stray = self._renewed(now, together)
         step = Step.of(surface_nodes.x, surface_nodes.v, surface_nodes.part, mu, give, ahead.dt, self._scratch)
         step = step.followed(beyond, FAST * ahead.size, ahead.rebound, now.face_table(), self._scratch)
         if self.tied is not None:
@@ -136,6 +137,27 @@ class Detection:
         now.faces.fresh[:], now.edges.fresh[:], now.slots.fresh[:] = False, False, False
         self.found = Detected(_KINEMATIC * limit, opening, stray)
         return self.found
+
+    def _spread(self, v: Floats) -> float:
+        """Upper bound of the difference of any two of the velocities ``v`` (slots, 3), m/s."""
+        boxes = self._scratch.of("boxes", self._bound.many(len(v)), np.float64, 6)
+        self._bound.run(len(v), boxes, v)
+        return spread(boxes)
+
+    def _renewed(self, now: Scene, together: bool) -> bool:
+        """Registers what has to be; returns whether a slot will depart too far in the next step, by linear
+        extrapolation.
+        """
+        of, reference = now.surface_nodes, now.reference
+        most, before = 0.5 * now.rules.skin, reference.strayed
+        reference.strayed = self._deviation.measure(
+            reference, of.x, of.v, now.faces.corners, now.edges.corners, now.slots.tracked
+        )  # fmt: skip
+        due = reference.strayed > (_JOIN if together else 1.0) * most
+        if due or now.pending:
+            registration.renew(now, of.x, of.v, due, self._deviation)
+            before = reference.strayed = reference.farthest(now.slots.tracked)
+        return 2.0 * reference.strayed - before > most
 
     def _nodes_and_faces(self, now: Scene, step: Step) -> float:
         """Adds node-face contacts; returns the largest speed over the altitude of a tet, 1/s."""
@@ -202,15 +224,3 @@ class Detection:
                 break
             self._rows_of_corner *= 2
         now.active.collect(kind, each * begins, counts)
-
-
-def _renewed(now: Scene, together: bool) -> bool:
-    """Registers what has to be; returns whether a slot will depart too far in the next step, by linear
-    extrapolation."""
-    reference, most, before = now.reference, 0.5 * now.rules.skin, now.reference.strayed
-    reference.strayed = reference.farthest(now.slots.tracked)
-    due = reference.strayed > (_JOIN if together else 1.0) * most
-    if due or now.pending:
-        registration.renew(now, now.surface_nodes.x, now.surface_nodes.v, due)
-        before = reference.strayed = reference.farthest(now.slots.tracked)
-    return 2.0 * reference.strayed - before > most

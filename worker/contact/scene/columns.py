@@ -168,7 +168,8 @@ class SceneEdges:
         rank: Ints,
     ) -> "SceneEdges":  # fmt: skip
         """Returns the columns with nothing in the broad phase yet."""
-        meets = np.asarray((opened.min(axis=1, initial=OPEN) >= AGED) & (opened.max(axis=1, initial=0) == OPEN))
+        one, two = opened.T
+        meets = np.asarray((np.minimum(one, two) >= AGED) & (np.maximum(one, two) == OPEN))
         return cls(
             corners, sides, faces, lengths, opened, meets, sharp, own, rank, *np.zeros((3, len(corners)), bool)
         )  # fmt: skip

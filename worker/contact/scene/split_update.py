@@ -150,7 +150,7 @@ class SplitUpdate:
         some = edges.live[rows] & ~gone & self._meets(old[:, 0])
         if some.any():
             rows, old = rows[some], old[some]
-            order = np.argsort(edges.names[rows])
+            order = np.lexsort(edges.sides[rows].T[::-1])
             rows, old = rows[order], old[order]
             found = split_pairs.apart_from_edges(old, edges.corners[rows], family.first, edges.own[rows])
             self._scene.edge_edge.add(rows[found].astype(np.int32))

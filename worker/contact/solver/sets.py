@@ -4,7 +4,7 @@ from ...kernels.jit import Kernel
 from ...model.state import Ints
 from ...parallel.arguments import Arguments
 from ...parallel.passes import Pass
-from ...parallel.team import Team
+from ...parallel.team import Stage, Team
 from .. import tasks
 from ..tasks import CONTACTS_OF_A_TASK, SLOTS_OF_A_TASK
 from . import zones
@@ -22,15 +22,18 @@ class Sets:
         self.sweep, self.store = Arguments(*tasks.SWEEP), Arguments(*tasks.STORE)
         self.cost = Arguments(*tasks.COST)
 
-    @property
-    def alone(self) -> bool:
-        """Whether the rank has one thread."""
-        return self._team.threads == 1
-
     def run(self, kernel: Kernel, table: int) -> None:
         """Runs ``kernel`` over all contacts; ``table``: its arguments."""
         self._team.run(kernel, table, *self._border)
         self._team.run(kernel, table, *self._inner)
+
+    def inner(self, kernel: Kernel, table: int) -> Stage:
+        """Returns the work on contacts without shared slots as a stage of a program."""
+        return Stage(kernel, table, *self._inner)
+
+    def repeat(self, stages: list[Stage], rounds: int) -> None:
+        """Runs a program: see ``Team.repeat``."""
+        self._team.repeat(stages, rounds)
 
     def complete(self, kernel: Kernel, table: int, shared: ActiveSum, words: Ints, first: int, columns: int) -> None:
         """Runs ``kernel`` over all contacts and completes ``columns`` columns of ``words`` over the ranks. Contacts
@@ -54,4 +57,5 @@ class Slots:
         self.sort = Pass(team, tasks.sort, *tasks.SORT, size=some)
         self.load = Pass(team, tasks.load, *tasks.LOAD, size=of_slots)
         self.give = Pass(team, tasks.give, *tasks.GIVE, size=of_slots)
+        self.brace = Pass(team, tasks.brace, *tasks.BRACE, size=1)
         self.leave = Pass(team, tasks.leave, *tasks.LEAVE, size=of_slots)

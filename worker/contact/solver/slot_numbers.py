@@ -47,20 +47,26 @@ def mark(touched, set_of, nodes, found, zone, shared, many, task, first, stop): 
     """Writes the set of each contact ``found`` from ``first`` to ``stop``, and the number ``many`` (tasks, sets) of
     this task in each set.
 
-    Contacts with all nodes in one ``zone`` (surface_nodes,) form the set of that zone, all others the last set. The
+    A contact belongs to the smallest box (zones.py) with all its nodes; ``zone`` (surface_nodes,): of each node. The
     sets come twice: first those of contacts with a ``shared`` (surface_nodes,) node, then those of contacts without.
     ``nodes`` (room, 4); ``touched`` (surface_nodes,): set to 1 for all nodes of the contacts.
     """
     sets = many.shape[1] // 2
+    zones = (sets + 1) // 2
     for q in range(first, stop):
         p = found[q]
-        at, border, other = zone[nodes[p, 0]], False, False
+        at, border = zones + zone[nodes[p, 0]], False
         for k in range(2 if nodes[p, 1] == nodes[p, 2] else 4):
             a = nodes[p, k]
             touched[a] = 1
             border |= shared[a] != 0
-            other |= zone[a] != at
-        set_of[q] = (0 if border else sets) + (sets - 1 if other else at)
+            box = zones + zone[a]
+            while box != at:
+                if box > at:
+                    box >>= 1
+                else:
+                    at >>= 1
+        set_of[q] = (0 if border else sets) + sets - at
         many[task, set_of[q]] += 1
 
 

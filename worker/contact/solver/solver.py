@@ -12,7 +12,7 @@ from .. import tasks
 from ..books import Books
 from ..narrow_phase.rows import ActiveRows
 from ..surface.records import SurfaceNodes
-from . import impulse_work, slot_numbers, stops, sweeps
+from . import impulse_work, slot_numbers, stops, zones
 from .active import IMPULSE, PUSH, PUSH_T, ActiveContacts, ActiveNodes, Kept, Loaded
 from .sets import Sets, Slots
 from .shared_sums import ActiveSum
@@ -63,6 +63,8 @@ class ActiveSet:
         self._zones, self._passes = Zones(team.threads), Slots(team)
         self._sets, self._room = Sets(team, self._zones.many), _Room(0, 0, 0, self._zones.many)
         self._scratch = Scratch()
+        self._turn = np.zeros(2, np.int64)
+        """Number of the sweep, and of all sweeps of the step."""
 
     def go_on(self, scale: float, sides: Floats) -> None:
         """Sets the scale, and the ``sides`` of the stops, after a restart or a cut."""
@@ -82,6 +84,7 @@ class ActiveSet:
         room = self._room
         self._number(rows, self._zones.of(surface_nodes))
         self._fastest = self._loaded(surface_nodes)
+        self._turn[:] = 0
         stops.find(
             room.braced,
             room.active,
@@ -145,25 +148,29 @@ class ActiveSet:
         self._sets.complete(tasks.resume, table, self._sum, room.active.moving_words, IMPULSE, 3)
         if self._bodies is not None:
             self._bodies.give(room.active)
-        self._passes.give.run(len(self.places), room.active, self.scale, False)
+        self._passes.give.run(len(self.places), room.active, self.scale, self._turn)
         stops.stop(room.active, room.braced)
 
     def sweep(self, many: int) -> None:
-        """Runs ``many`` sweeps."""
-        room, scale, bodies = self._room, self.scale, self._bodies
-        if self._sets.alone and not len(self._sum.shared) and (bodies is None or not bodies.active):
-            sweeps.sweep_all(
-                room.active, room.loaded, self._contacts, room.braced, len(self.places), self._fastest, scale, many
-            )  # fmt: skip
+        """Runs ``many`` sweeps, in one call if no other rank and no rigid body takes part."""
+        room, n, turn, bodies, sets, passes = (
+            self._room, len(self.places), self._turn, self._bodies, self._sets, self._passes,
+        )  # fmt: skip
+        turn[:] = 0, many
+        table = sets.sweep.set(room.active, self._contacts, room.loaded, self._fastest, turn, self.scale)
+        give, brace = (room.active, self.scale, turn), (room.active, room.braced, turn)
+        if not len(self._sum.shared) and (bodies is None or not bodies.active):
+            if not n:
+                return
+            stages = [sets.inner(tasks.sweep, table), passes.give.stage(n, *give), passes.brace.stage(1, *brace)]
+            sets.repeat(stages, many)
             return
-        for k in range(many):
-            ahead = sweeps.momentum(k, many)
-            table = self._sets.sweep.set(room.active, self._contacts, room.loaded, self._fastest, ahead, scale)
-            self._sets.complete(tasks.sweep, table, self._sum, room.active.moving_words, IMPULSE, 3)
+        for _ in range(many):
+            sets.complete(tasks.sweep, table, self._sum, room.active.moving_words, IMPULSE, 3)
             if bodies is not None:
                 bodies.give(room.active)
-            self._passes.give.run(len(self.places), room.active, scale, k + 1 == many)
-            stops.stop(room.active, room.braced)
+            passes.give.run(n, *give)
+            passes.brace.run(1, *brace)
 
     def cost(self, books: Books, before: Floats, part: Indices) -> None:
         """Books the energy that the impulses take from the bodies, and the impulses between parts if a probe needs
@@ -232,4 +239,4 @@ class _Room:
         self.places, self.slot = np.empty((2, nodes + 1), np.int32)
         self.touched, self.shared = np.zeros((2, nodes), np.uint8)
         self.active, self.braced = ActiveNodes.of(nodes), Braced.room(many * nodes)
-        self.loaded = Loaded.of(contacts, 2 * (of + 1))
+        self.loaded = Loaded.of(contacts, 2 * zones.sets(of))

@@ -37,8 +37,7 @@ from .active import (  # fmt: skip
     WANTED,
     V,
 )
-from .loading import SHARES, load
-from .stops import BRACED, stop
+from .loading import SHARES
 
 _PAIR, _CRACK = 0.8, 1.0
 """Share of the stored normal impulse in the warm start. Node-face pairs: the whole of it lags behind and adds
@@ -172,18 +171,6 @@ def give(active, scale, last, first, stop):  # type: ignore[no-untyped-def]
                 total[s, TOTAL + i] += j
                 words[s, IMPULSE + i] = 0
             path[s] += length
-
-
-@njit(types.void(NODES, LOADED, CONTACTS, BRACED, _I, _F, _F, _I), cache=True)
-def sweep_all(active, loaded, contacts, braced, n, fastest, scale, many):  # type: ignore[no-untyped-def]
-    """Runs ``many`` sweeps (``load``, ``sweep``, ``give``, ``stop``) of all sets and ``n`` slots, none of them
-    shared."""
-    for k in range(many):
-        for each in range(len(loaded.many)):
-            load(loaded, contacts, active, fastest, each)
-            sweep(active, loaded, momentum(k, many), scale, each)
-        give(active, scale, k + 1 == many, 0, n)
-        stop(active, braced)
 
 
 @njit(types.void(KEPT, LOADED, _ROWS, _I), cache=True)

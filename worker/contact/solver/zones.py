@@ -1,8 +1,12 @@
 """Zones: boxes in space whose contacts different threads sweep at the same time.
 
-Every surface node belongs to the zone in which it enters the scene. Contacts with all nodes in one zone are a set;
-sets of two zones have no node in common. All other contacts, across the borders of zones, are one more set, which is
-swept after the others. With one thread there is one zone. No bit of the answer depends on zones.
+Every surface node belongs to the zone in which it enters the scene. Zones come from halving larger boxes, and a contact
+belongs to the smallest box with all its nodes. The contacts of a box are a set. Boxes that have been halved equally
+often have no node in common, so different threads sweep their sets: first those of the zones, then those across the
+border of two zones, and so on up to the one across the border of the first two halves. With one thread there is one
+zone. No bit of the answer depends on zones.
+
+Box 1 has all nodes, its halves are the boxes 2 and 3, and those of box k are 2 k and 2 k + 1; the zones are the last.
 """
 
 import numpy as np
@@ -10,6 +14,8 @@ import numpy as np
 from ...model.state import Floats, Indices, Ints
 from ..surface.records import SurfaceNodes
 
+_SAMPLE = 8192
+"""Number of nodes by which boxes are halved: a sample of more."""
 _PER_THREAD = 4
 """Zones per thread: contacts are not spread evenly, and a thread that has finished its zones takes one of another
 thread. Chosen.
@@ -36,7 +42,7 @@ class Zones:
         """(surface_nodes,) the zone of each node."""
         if surface_nodes is not self._surface_nodes:
             self._surface_nodes, self._zone = surface_nodes, np.zeros(0, np.int32)
-            self._divide(surface_nodes.x)
+            self._divide(surface_nodes.x[:: 1 + surface_nodes.n // _SAMPLE])
         if len(self._zone) < surface_nodes.n:
             self._zone = np.concatenate([self._zone, self._located(surface_nodes.x[len(self._zone) :])])
         return self._zone
@@ -59,10 +65,18 @@ class Zones:
         return (part - (self.many - 1)).astype(np.int32)
 
 
+def sets(zones: int) -> int:
+    """Number of sets of contacts with a node that other ranks share, and of those without; the set of box k is number
+    ``sets(zones) - k`` of them.
+    """
+    return 2 * zones - 1
+
+
 def tasks(zones: int) -> tuple[tuple[Ints, Ints], tuple[Ints, Ints]]:
     """Tasks and starts, for a team, of the sets of contacts with a node that other ranks share, and of the sets
-    without: every zone, and then the contacts across zones.
+    without: every zone, then every larger box, boxes of one size at the same time.
     """
-    first = np.arange(zones + 1)
-    border, starts = np.column_stack([first, first + 1]), np.array([0, zones, zones + 1])
-    return (border, starts), (border + zones + 1, starts)
+    first = np.arange(sets(zones))
+    border = np.column_stack([first, first + 1])
+    starts = np.cumsum([0, *(zones >> k for k in range(zones.bit_length()))])
+    return (border, starts), (border + sets(zones), starts)

@@ -36,10 +36,17 @@ def moments(model: Model, planes: Flags, size: float, neighbours: list[Neighbour
     return sums
 
 
-def means(sums: Ints) -> Floats:
-    """(n, COLUMNS) area-weighted means of n, n n and the directions to the faces; zero for a node without faces."""
-    area = sums[:, 3:6].sum(axis=1)
-    return np.asarray(sums / np.where(area > 0, area, 1)[:, None])
+@njit("void(float64[:, ::1], int32[::1], int64[:, ::1], int32[::1])", cache=True)
+def means(out, place, sums, nodes):  # type: ignore[no-untyped-def]
+    """Sets ``out`` (slots, COLUMNS) at ``place`` (k,) to the area-weighted means of n, n n and the directions to the
+    faces of the ``nodes`` (k,), by their ``sums`` (nodes, COLUMNS); zero for a node without faces.
+    """
+    for k in range(len(nodes)):
+        a, s = nodes[k], place[k]
+        area = sums[a, 3] + sums[a, 4] + sums[a, 5]
+        area = area if area > 0 else 1
+        for i in range(COLUMNS):
+            out[s, i] = sums[a, i] / area
 
 
 def shares(x: Floats, faces: Indices, size: float) -> Ints:

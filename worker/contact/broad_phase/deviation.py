@@ -1,0 +1,59 @@
+"""How far slots, faces and edges leave their reference motions in a step: passes that the threads of a rank share."""
+
+import numpy as np
+
+from ...kernels.jit import njit, types
+from ...model.growing import Scratch
+from ...model.state import Flags, Floats, Indices
+from ...parallel.arguments import reader
+from ...parallel.passes import Pass
+from ...parallel.team import TASK, Team
+from .reference_motion import ReferenceMotion, farthest, largest, leave
+
+_SLOTS, _ROWS = 4096, 8192
+"""Slots of a task, and faces or edges. Chosen: 20 us of work each, against 2 us for a region of threads."""
+_F, _I, _F1, _F2, _N2 = types.float64, types.int64, types.float64[::1], types.float64[:, ::1], types.int32[:, ::1]
+_LINE = _F1, _F2, _F2
+_LEAVE = *_LINE, *_LINE, _F2, _F2, _F, _F, types.boolean[::1], _F1
+_LARGEST = _F1, _N2, _I, _F1
+_leave, _largest = reader(*_LEAVE), reader(*_LARGEST)
+
+
+@njit(TASK, cache=True)
+def _slots(table, first, stop, thread):  # type: ignore[no-untyped-def]
+    """``reference_motion.leave`` of both kinds of lines, and ``farthest`` of the searched ones."""
+    left, line, course, near, short, mean, x, v, t, dt, tracked, most = _leave(table)
+    leave(left, line, course, x, v, t, dt, first, stop)
+    leave(near, short, mean, x, v, t, dt, first, stop)
+    most[first // _SLOTS] = farthest(left, tracked, first, stop)
+
+
+@njit(TASK, cache=True)
+def _corners(table, first, stop, thread):  # type: ignore[no-untyped-def]
+    """``reference_motion.largest``."""
+    out, corners, many, left = _largest(table)
+    largest(out, corners, many, left, first, stop)
+
+
+class Deviation:
+    """Measures it for the scenes of a rank, one after the other."""
+
+    def __init__(self, team: Team) -> None:
+        self._slots = Pass(team, _slots, *_LEAVE, size=_SLOTS)
+        self._faces, self._edges = (Pass(team, _corners, *_LARGEST, size=_ROWS) for _ in range(2))
+        self._scratch = Scratch()
+
+    def measure(
+        self, motion: ReferenceMotion, x: Floats, v: Floats, faces: Indices, edges: Indices, tracked: Flags
+    ) -> float:  # fmt: skip
+        """Set how far slots at ``x`` (slots, 3) with velocities before contact ``v`` (slots, 3), and what has them as
+        corners, leave their lines in the step and ``motion.beyond``; return the most of any of ``tracked`` (slots,)
+        from the line that is searched, m.
+        """
+        n, dt, searched, short = len(x), motion.end - motion.t + motion.beyond, motion.searched, motion.short
+        most = self._scratch.of("most", self._slots.many(n), np.float64)
+        lines = searched.left, searched.x, searched.course, short.left, short.x, short.course
+        self._slots.run(n, *lines, x, v, motion.t, dt, tracked, most)
+        self._faces.run(len(faces), motion.faces, faces, 3, short.left)
+        self._edges.run(len(edges), motion.edges, edges, 2, short.left)
+        return float(most.max(initial=0.0))
