@@ -1,4 +1,4 @@
-"""The way in: TOML or JSON text becomes a Case, or a CaseError that says everything that is wrong at once."""
+"""Reading of cases: TOML or JSON text becomes a Case, or a CaseError with every error."""
 
 import copy
 import json
@@ -27,15 +27,16 @@ __all__ = [
 _KEY = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*(?:\[\d{1,6}\])*(?:\.[A-Za-z_][A-Za-z0-9_-]*(?:\[\d{1,6}\])*)*")
 _ITEM = re.compile(r"([A-Za-z_][A-Za-z0-9_-]*)|\[(\d+)\]")
 _DEEPEST = 32
-"""Words of a dotted key in TOML, whose cost grows with their square. Chosen: a case has 6."""
+"""Largest number of words of a dotted key in TOML, whose cost grows with their square. Chosen: keys of a case have
+up to 6."""
 _DEEP = re.compile(rf"""(?<![\w"'.-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){{{_DEEPEST}}}""", re.ASCII)
 _MARK = "\ufeff"
-"""What some editors begin a file in UTF-8 with."""
+"""Byte order mark that some editors write at the start of a file in UTF-8."""
 _LINE = re.compile(r"\(at line (\d+), column \d+\)")
 
 
 def parse_case(data: Mapping[str, Any]) -> Case:
-    """The case in plain data, as TOML or JSON gives it. Raises CaseError with every problem."""
+    """Returns the case of plain data, as TOML or JSON gives it. Raises CaseError with every problem."""
     if not isinstance(data, Mapping):
         raise CaseError([problem((), data, "a case is a table of keys")])
     read, problems = read_references(data)
@@ -52,22 +53,22 @@ def parse_case(data: Mapping[str, Any]) -> Case:
 
 
 def parse_toml(text: str) -> Case:
-    """The case in TOML text. Raises CaseError; for broken TOML it names the line."""
+    """Returns the case of a TOML text. Raises CaseError; for broken TOML with the line."""
     return parse_case(toml_data(text))
 
 
 def parse_json(text: str | bytes) -> Case:
-    """The case in JSON text. Raises CaseError; for broken JSON it names the line."""
+    """Returns the case of a JSON text. Raises CaseError; for broken JSON with the line."""
     return parse_case(json_data(text))
 
 
 def read_case(path: Path) -> Case:
-    """The case in a file that ends in .toml or .json. Raises CaseError."""
+    """Returns the case of a file that ends in .toml or .json. Raises CaseError."""
     return parse_case(read_data(path))
 
 
 def read_data(path: Path) -> dict[str, Any]:
-    """The plain data in a file that ends in .toml or .json, before any check. Raises CaseError."""
+    """Returns the plain data of a file that ends in .toml or .json, before any check. Raises CaseError."""
     if path.suffix not in {".toml", ".json"}:
         raise CaseError([Problem("case", shown(str(path)), "a case file ends in .toml or .json")])
     try:
@@ -80,7 +81,7 @@ def read_data(path: Path) -> dict[str, Any]:
 
 
 def toml_data(text: str) -> dict[str, Any]:
-    """The tables in TOML text. Raises CaseError that names the line."""
+    """Returns the tables of a TOML text. Raises CaseError with the line."""
     if _DEEP.search(text):
         raise CaseError([Problem("", "", f"a key of more than {_DEEPEST} words with dots between")])
     try:
@@ -94,7 +95,7 @@ def toml_data(text: str) -> dict[str, Any]:
 
 
 def json_data(text: str | bytes) -> dict[str, Any]:
-    """The object in JSON text; a repeated key is an error. Raises CaseError that names the line."""
+    """Returns the object of a JSON text; a repeated key is an error. Raises CaseError with the line."""
     try:
         bare = text.removeprefix(_MARK) if isinstance(text, str) else text.removeprefix(_MARK.encode())
         data = json.loads(bare, object_pairs_hook=_no_repeats)
@@ -118,7 +119,7 @@ def json_data(text: str | bytes) -> dict[str, Any]:
 
 
 class _RepeatedKeyError(ValueError):
-    """A key stands twice in a JSON object."""
+    """A key that is repeated in a JSON object."""
 
 
 def _no_repeats(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
@@ -147,11 +148,11 @@ Overrides = Iterable[str] | Mapping[str, Any]
 
 
 def apply_overrides(data: Mapping[str, Any], overrides: Overrides) -> dict[str, Any]:
-    """A copy of ``data`` with assignments such as ``run.ranks=2`` or ``parts[0].mesh.element_size=0.5 mm``.
+    """Returns a copy of ``data`` with assignments such as ``run.ranks=2`` or ``parts[0].mesh.element_size=0.5 mm``.
 
-    The value of an assignment is read as TOML where it is TOML and as text otherwise; one by key is taken as it is, a
-    mapping key by key. Tables that are missing on the way are made; list items must exist. Raises CaseError with every
-    assignment that cannot be made, and with every key that has two: which of them was meant, nobody knows.
+    The value of an assignment is read as TOML where it is valid TOML, otherwise as text; a value by key is used
+    unchanged, a mapping key by key. Missing tables are added; list items must exist. Raises CaseError with every
+    assignment that cannot be made, and with every key that has two values.
     """
     if isinstance(overrides, str) or not isinstance(overrides, Iterable):
         message = "write a list of assignments, such as ['run.ranks=2'], or values by key, such as {'run.ranks': 2}"
@@ -176,7 +177,7 @@ def apply_overrides(data: Mapping[str, Any], overrides: Overrides) -> dict[str, 
 
 
 def _assignments(overrides: Overrides, path: str = "") -> Iterator[tuple[str, str, Any]]:
-    """Key, value as it is shown, and value; Ellipsis where none is written."""
+    """Key, value as text for messages, and value; Ellipsis for an assignment without a value."""
     if isinstance(overrides, Mapping):
         for name, value in overrides.items():
             key = f"{path}.{name}" if path else str(name)
@@ -230,19 +231,20 @@ def _entry(target: Any, item: int | str) -> Any:
 
 
 def resolved_json(case: Case) -> bytes:
-    """The case with every default filled in, in SI, with every material that its parts use; ends in a line feed."""
+    """Returns the case as JSON with every default, in SI units, with every material of its parts; ends in a line
+    feed."""
     used = {part.material: material(case, part.material) for part in case.parts}
     full = case.model_copy(update={"materials": {**case.materials, **used}})
     return full.model_dump_json(indent=2).encode() + b"\n"
 
 
 def shipped() -> dict[str, Path]:
-    """The cases that come with Conoid, by name."""
+    """The shipped cases: name to file."""
     return {path.stem: path for path in sorted((Path(__file__).parent / "shipped").glob("*.toml"))}
 
 
 def shipped_path(name: str) -> Path:
-    """The file of a shipped case. Raises CaseError with the nearest names."""
+    """Returns the file of a shipped case. Raises CaseError with the nearest names."""
     known = shipped()
     if name not in known:
         raise CaseError([Problem("case", shown(name), f"no shipped case of this name; {nearest(name, known)}")])

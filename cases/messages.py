@@ -1,7 +1,7 @@
-"""What a run says while it lives: the lines of journal.jsonl and the samples on Zenoh are these same messages.
+"""The messages of a run: lines of journal.jsonl, and samples on Zenoh and SSE.
 
-Every message is numbered by ``seq`` (1, 2, 3 ... per run, no holes), so a reader sees a gap and refills it from the
-journal. JSON in the journal and on SSE, MessagePack on Zenoh. A reader ignores fields that it does not know.
+``seq`` numbers the messages of a run 1, 2, 3 ... without gaps, so a reader detects a missing message and reads it
+from the journal. JSON in the journal and on SSE, MessagePack on Zenoh. A reader ignores unknown fields.
 """
 
 from typing import ClassVar
@@ -9,14 +9,14 @@ from typing import ClassVar
 import msgspec
 
 VERSION = 1
-"""Of the format of messages; a reader of another one may refuse them."""
+"""Version of the format of messages; a reader may refuse another one."""
 
 
 class Message(msgspec.Struct, tag_field="type", tag=str.lower, kw_only=True, frozen=True):
-    """The envelope. ``wall`` is Unix time in s, ``t`` simulated time in s."""
+    """Envelope of all messages. ``wall`` is Unix time in s, ``t`` simulated time in s."""
 
     channel: ClassVar[str] = "event"
-    """Which class of Zenoh key the message is published under (cases/output/keys.py)."""
+    """Class of the Zenoh key under which the message is published (cases/output/keys.py)."""
 
     run: str
     seq: int = 0
@@ -27,7 +27,7 @@ class Message(msgspec.Struct, tag_field="type", tag=str.lower, kw_only=True, fro
 
 
 class Status(Message, frozen=True):
-    """The run has changed its state, or ``message`` says what it does in it."""
+    """A change of the state of the run, or the activity within a state (``message``)."""
 
     channel: ClassVar[str] = "state"
     state: str
@@ -36,7 +36,7 @@ class Status(Message, frozen=True):
 
 
 class Started(Message, frozen=True):
-    """The mesh stands and the first step is about to begin. ``setup`` is s since the worker's start."""
+    """Size of the model, before the first step. ``setup``: time since the start of the worker, s."""
 
     ranks: int
     elements: int
@@ -45,14 +45,13 @@ class Started(Message, frozen=True):
     setup: float
     parts: dict[str, int]
     threads: int = 1
-    """Of each rank."""
+    """Tets of each rank."""
 
 
 class Energy(msgspec.Struct, kw_only=True, frozen=True):
-    """The ledger, J: what is there and what was lost = initial + external, up to the residual.
-
-    There: kinetic, elastic, cohesive. Lost: plastic, viscous, contact, friction, eroded, fracture,
-    stepping. Both: averaging.
+    """The energy ledger, J. Existing and dissipated energy = initial + external, up to the residual. Existing:
+    kinetic, elastic, cohesive. Dissipated: plastic, viscous, contact, friction, eroded, fracture, stepping. Both:
+    averaging.
     """
 
     kinetic: float
@@ -60,35 +59,35 @@ class Energy(msgspec.Struct, kw_only=True, frozen=True):
     plastic: float
     viscous: float
     contact: float
-    """By impulses where bodies meet each other or a wall, without friction."""
+    """Dissipated by contact impulses between bodies and with walls, without friction."""
     friction: float = 0.0
     eroded: float = 0.0
-    """Elastic energy of tets that were taken out, and kinetic energy of nodes that left with them."""
+    """Elastic energy of deleted tets, and kinetic energy of nodes deleted with them."""
     fracture: float = 0.0
-    """By cohesive facets and by tied bonds, for good."""
+    """Dissipated by cohesive facets and tied bonds."""
     cohesive: float = 0.0
-    """What the closing of cohesive facets would give back."""
+    """Stored in cohesive facets; released when they close."""
     stepping: float = 0.0
-    """By time steps of unequal length, an error of the method; below zero where they have given energy."""
+    """Dissipated by time steps of unequal length, an error of the method; negative where they have added energy."""
     averaging: float = 0.0
-    """By pressures that are averaged over nodes: what their differences store, and what is lost where neighbours yield
-    or tear at different times; ``nodal`` and ``split`` alone."""
+    """Work of averaged nodal pressures: stored in pressure differences between tets and nodes, and dissipated where
+    neighbours yield or fail at different times; ``nodal`` and ``split`` only."""
     external: float
     initial: float
     residual: float
-    """|sum of all lines - initial - external| over the largest energy that came in; dimensionless."""
+    """|sum of all lines - initial - external| over the largest energy that has entered; dimensionless."""
 
 
 class PartEnergy(msgspec.Struct, kw_only=True, frozen=True):
-    """Of one part, J. The sums over all parts are those of the ledger, but for what has left with eroded tets."""
+    """Energies of one part, J. The sums over all parts are those of the ledger, without deleted tets."""
 
     kinetic: float
     internal: float
-    """Work of stress and of bulk viscosity in the tets that are there: elastic, plastic, viscous and averaging."""
+    """Work of stress and bulk viscosity in the present tets: elastic, plastic, viscous and averaging."""
 
 
 class Progress(Message, frozen=True):
-    """How far the run is. ``eta`` is wall time left, s; ``limiter`` says what holds the time step down."""
+    """Progress of the run. ``eta``: estimated remaining wall time, s; ``limiter``: what limits the time step."""
 
     end_time: float
     dt: float
@@ -97,19 +96,18 @@ class Progress(Message, frozen=True):
     energy: Energy
     updates_per_second: float
     parts: dict[str, PartEnergy] = {}
-    """Empty where there is one part alone."""
+    """Energies of each part; empty with a single part."""
     worst_residual: float | None = None
-    """The largest of any ledger line so far, of which some lie between two messages."""
+    """Largest residual of all ledger lines so far, of which some lie between two messages."""
     sampled: float | None = None
-    """Simulated time of the line of the history that has ``energy``, ``parts`` and ``probes``, s."""
+    """Simulated time of the history line with ``energy``, ``parts`` and ``probes``, s."""
     probes: dict[str, float | None] = {}
-    """By name, in SI; None where a probe has no value."""
+    """Values of the probes by name, in SI units; None for a probe without a value."""
 
 
 class Load(Message, frozen=True):
-    """CPU seconds per rank and phase since the last Load message, max/mean of the work, and what each rank has sent.
-
-    Lists have one number a rank.
+    """Load of the ranks since the last Load message: CPU seconds per rank and phase, maximum over mean of the work,
+    and communication. Lists have one number per rank.
     """
 
     channel: ClassVar[str] = "load"
@@ -117,32 +115,31 @@ class Load(Message, frozen=True):
     imbalance: float
     steps: int = 0
     waiting: list[float] = []
-    """Of ``exchange``: CPU seconds in calls that wait for other ranks."""
+    """Share of ``exchange``: CPU seconds in calls that wait for other ranks."""
     messages: list[int] = []
-    """To single ranks."""
+    """Messages to single ranks."""
     bytes: list[int] = []
-    """Of these messages."""
+    """Bytes of these messages."""
     collectives: list[int] = []
     """Calls in which all ranks take part."""
     collective_bytes: list[int] = []
-    """That the rank puts into them."""
+    """Bytes that the rank contributes to them."""
     outside: list[int] = []
-    """Nodes of the surface that each rank owns."""
+    """Surface nodes that each rank owns."""
     serial: list[float] = []
-    """Wall time in which one thread of the rank works, s, but for the waiting."""
+    """Wall time in which a single thread of the rank works, s, without waiting for other ranks."""
     parallel: list[float] = []
     """Wall time in regions, whose tasks the threads of the rank share, s."""
     helped: list[float] = []
-    """That all threads of the rank but the first have done tasks, together, s."""
+    """Working time of all threads of the rank except the first, together, s."""
     threads: int = 1
-    """Of each rank."""
+    """Threads of each rank."""
     projected: dict[int, dict[str, list[float]]] = {}
-    """By number of threads: the CPU seconds of each phase without the waiting, as they would be with so many."""
+    """By number of threads: estimated CPU seconds of each phase with so many threads, without waiting."""
 
 
 class Counts(Message, frozen=True):
-    """How large the model is now. ``shared`` is the number of nodes on more than one rank, ``particles`` of those
-    that have lost all their tets and fly on."""
+    """Present size of the model. ``shared``: nodes on more than one rank; ``particles``: free nodes, without tets."""
 
     channel: ClassVar[str] = "counts"
     elements: int
@@ -152,58 +149,57 @@ class Counts(Message, frozen=True):
     elements_per_rank: list[int]
     particles: int = 0
     facets: int = 0
-    """That have broken."""
+    """Broken facets."""
     smallest: int = 0
-    """Where ``sizes`` begins."""
+    """Exponent of the first class of ``sizes``."""
     sizes: list[int] = []
-    """How many fragments are as long as 2^((smallest + i) / 2) m, and shorter than the next; empty where nothing can
+    """Numbers of fragments by length, from 2^((smallest + i) / 2) m to the next class; empty where no facet can
     break."""
     counted: int = -1
-    """Step of the state whose ``fragments`` and ``sizes`` these are, the present one or one not long before; -1 where
-    that is not known."""
+    """Step of the state of ``fragments`` and ``sizes``: the present one or an earlier one; -1 if unknown."""
 
 
 class Balance(Message, frozen=True):
-    """Tets have moved to other ranks."""
+    """A new decomposition: tets have moved to other ranks."""
 
     channel: ClassVar[str] = "load"
     cause: str
     before: dict[str, list[float]]
-    """CPU seconds a step, by phase, one number a rank, over the last Load before."""
+    """Load before the decomposition: CPU seconds per step, by phase, one number per rank, of the last Load message."""
     predicted: list[float]
-    """What each rank has from now on of what was divided: CPU seconds a step, outside nodes, or tets."""
+    """Share of each rank in the balanced quantity: CPU seconds per step, outside nodes, or tets."""
     tets: int
     nodes: int
-    """Moved to other ranks."""
+    """Tets that have moved to other ranks."""
     cost: float
-    """Wall time, s."""
+    """Wall time of the decomposition, s."""
     saved: float
-    """By the cuts before, s: what steps would have taken with the imbalance from before each, less what they took."""
+    """Wall time saved by the decompositions before, s: estimate with the imbalance from before each, less the time
+    used."""
 
 
 class Groups(Message, frozen=True):
-    """What each of some parts of the mesh costs since the last Groups message, on any number of ranks.
-
-    The parts are neighbours at the start and stay together. The first message of a worker knows no loads: all are 0.
+    """Cost of groups of tets since the last Groups message, on any number of ranks. Tets of a group are neighbours
+    at the start and stay together. The first message of a worker has no loads yet: all are 0.
     """
 
     channel: ClassVar[str] = "load"
     load: list[int]
-    """CPU time, ns a step."""
+    """CPU time of each group, ns per step."""
     outside: list[int]
-    """Nodes of the surface."""
+    """Surface nodes of each group."""
     rank: int = 0
-    """CPU time of a rank whatever it has, ns a step."""
+    """CPU time of a rank without any group, ns per step."""
     centres: list[tuple[float, float, float]] = []
-    """At the start, m. This and the next in the first message only."""
+    """Centres at the start, m. This field and the next are in the first message only."""
     tets: list[int] = []
-    """At the start."""
+    """Tets at the start."""
     cost: float = 0.0
-    """What a cut is taken to cost before there has been one, wall time, s."""
+    """Assumed cost of a decomposition before the first one, wall time, s."""
 
 
 class Checkpoint(Message, frozen=True):
-    """The complete state is on disk; ``path`` is relative to the run's folder, ``seconds`` wall time."""
+    """A complete checkpoint is on disk. ``path`` is relative to the run's folder, ``seconds`` wall time."""
 
     path: str
     bytes: int
@@ -212,45 +208,46 @@ class Checkpoint(Message, frozen=True):
 
 
 class Frame(Message, frozen=True):
-    """A frame was written; ``path`` is relative to the run's folder."""
+    """A frame is on disk. ``path`` is relative to the run's folder."""
 
     index: int
     path: str
 
 
 class Snapshot(Message, frozen=True):
-    """A snapshot of the fragments (cases/output/snapshot.py) is in the run's folder. ``step`` and ``t`` are its own."""
+    """A snapshot of the fragments (cases/output/snapshot.py) is in the run's folder. ``step`` and ``t`` are those of
+    the snapshot."""
 
     channel: ClassVar[str] = "fragments"
     n: int
     path: str
-    """Relative to the run's folder."""
+    """Path relative to the run's folder."""
     bytes: int
     triangles: int
     fragments: int
     sha256: str
     cause: str = ""
-    """``run.snapshots``, ``asked for``, ``start`` or ``end``."""
+    """Reason of the snapshot: ``run.snapshots``, ``asked for``, ``start`` or ``end``."""
     dropped: int = 0
-    """That were due since the one before and were not made."""
+    """Scheduled snapshots since the one before that were not made."""
     smallest: int = 0
-    """Where ``sizes`` begins."""
+    """Exponent of the first class of ``sizes``."""
     sizes: list[int] = []
-    """How many fragments are as long as 2^((smallest + i) / 2) m, and shorter than the next."""
+    """Numbers of fragments by length, from 2^((smallest + i) / 2) m to the next class."""
     tets: int = 0
-    """Bytes of its file of all tets; 0 where it has none."""
+    """Bytes of its file of all tets; 0 without one."""
     fields: dict[str, list[float]] = {}
-    """Of each field its least value, what 0.5 % and what 99.5 % of the triangles are below, and its largest."""
+    """Of each field: minimum, 0.5 % and 99.5 % quantiles over the triangles, maximum."""
 
 
 class Fragments(Snapshot, tag="snapshot", kw_only=True, frozen=True):
-    """The same on Zenoh, with the snapshot itself."""
+    """The message of a snapshot with the snapshot itself, on Zenoh."""
 
     blob: bytes
 
 
 class Log(Message, frozen=True):
-    """A line for people."""
+    """A line for the user."""
 
     channel: ClassVar[str] = "log"
     level: str
@@ -278,35 +275,35 @@ _fragments = msgspec.msgpack.Decoder(Fragments)
 
 
 def to_json(message: AnyMessage) -> bytes:
-    """One journal line, without the line feed."""
+    """Returns a journal line without the line feed."""
     return _to_json.encode(message)
 
 
 def to_msgpack(message: AnyMessage | Fragments) -> bytes:
-    """The payload of a Zenoh sample."""
+    """Returns the payload of a Zenoh sample."""
     return _to_msgpack.encode(message)
 
 
 def with_blob(message: Snapshot, blob: bytes) -> Fragments:
-    """The message of a snapshot with its bytes."""
+    """Returns the message of a snapshot with its bytes."""
     return Fragments(**msgspec.structs.asdict(message), blob=blob)
 
 
 def without_blob(message: Fragments) -> Snapshot:
-    """The message alone."""
+    """Returns the message without the snapshot."""
     return Snapshot(**{name: getattr(message, name) for name in Snapshot.__struct_fields__})
 
 
 def from_json(line: bytes | str) -> AnyMessage:
-    """Raises msgspec.ValidationError for what is not a message, msgspec.DecodeError for what is not JSON."""
+    """Reads a journal line. Raises msgspec.ValidationError for another content, msgspec.DecodeError for broken JSON."""
     return _from_json.decode(line)
 
 
 def from_msgpack(payload: bytes) -> AnyMessage:
-    """Raises as ``from_json`` does."""
+    """Reads a Zenoh sample. Raises as ``from_json`` does."""
     return _from_msgpack.decode(payload)
 
 
 def fragments_from_msgpack(payload: bytes) -> Fragments:
-    """A sample of the class ``fragments``. Raises as ``from_json`` does."""
+    """Reads a Zenoh sample of the class ``fragments``. Raises as ``from_json`` does."""
     return _fragments.decode(payload)

@@ -1,4 +1,4 @@
-"""outcome.json: the last file a run writes, and the only proof that it ended."""
+"""outcome.json: the last file that a run writes, and the only proof of its end."""
 
 import math
 from typing import Any
@@ -9,7 +9,7 @@ from .messages import Energy
 
 
 class Check(msgspec.Struct, kw_only=True, frozen=True):
-    """One line of ``[[reference]]``, measured."""
+    """The measured value of a ``[[reference]]``."""
 
     name: str
     value: float
@@ -21,7 +21,7 @@ class Check(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class Measured(msgspec.Struct, kw_only=True, frozen=True):
-    """What a probe has measured: at the end, and the extremes of all lines of the history (NaN: not known)."""
+    """Values of a probe: the last one, and the extremes over all lines of the history (NaN: unknown)."""
 
     name: str
     value: float
@@ -31,7 +31,7 @@ class Measured(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class Made(msgspec.Struct, kw_only=True, frozen=True):
-    """The most that a line of the ledger has made, a share of the largest energy until then, at ``time``, s."""
+    """The largest energy that a ledger line has created, over the largest energy until then, at ``time``, s."""
 
     line: str
     share: float
@@ -39,30 +39,30 @@ class Made(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class Compressed(msgspec.Struct, kw_only=True, frozen=True):
-    """The highest compression in a part without a law of compressive failure (worker/elements/crushing.py)."""
+    """The largest compression of a part without a law of compressive failure (worker/elements/crushing.py)."""
 
     part: str
     times: float
-    """How many times that of Griffith's criterion (compression.py)."""
+    """Compression over the limit of Griffith's criterion (cases/warnings/compression.py)."""
     most: float
-    """The largest pressure on any plane, Pa; tension is below zero."""
+    """Largest principal pressure, Pa; negative in tension."""
     least: float
-    """The smallest, Pa."""
+    """Smallest principal pressure, Pa."""
     tets: int
-    """The most tets of the part that were beyond the criterion at once, of all lines of the history."""
+    """Largest number of tets of the part beyond the criterion at the same time, of all history lines."""
     tet: int
-    """The one with the hardest."""
+    """The tet with the largest compression."""
     x: float
-    """The place at that time, m."""
+    """Position of the tet at that time, m."""
     y: float
     z: float
     time: float
-    """s."""
+    """Simulated time, s."""
 
 
 class Sharing(msgspec.Struct, kw_only=True, frozen=True):
-    """Of what the regions of rank 0 were made, and what it was taken to cost to share them (worker/parallel/
-    projecting.py); times in s.
+    """Statistics of the regions of rank 0, and the assumed cost of sharing them among threads
+    (worker/parallel/projecting.py); times in s.
     """
 
     steps: int
@@ -70,18 +70,17 @@ class Sharing(msgspec.Struct, kw_only=True, frozen=True):
     colours: int
     tasks: int
     turn: float
-    """Of a colour."""
+    """Cost of a colour."""
     call: float
-    """Of a thread that sleeps, by its caller."""
+    """Cost for the caller of waking a sleeping thread."""
     wake: float
-    """Until it works."""
+    """Time until the woken thread works."""
 
 
 class Outcome(msgspec.Struct, kw_only=True, frozen=True):
-    """How a run ended; times in s, energies in J.
-
-    A count that is not known is None, another number NaN: null in the file. A run that was lost, or that never started,
-    knows no more than its journal has told (server/runs/ends.py).
+    """The end of a run; times in s, energies in J. An unknown count is None, another unknown number NaN: null in the
+    file. The outcome of a run that was lost, or never started, has only what its journal contains
+    (server/runs/ends.py).
     """
 
     state: str
@@ -91,78 +90,79 @@ class Outcome(msgspec.Struct, kw_only=True, frozen=True):
     time: float = math.nan
     ranks: int = 1
     threads: int = 1
-    """Of each rank."""
+    """Threads of each rank."""
     elapsed: float = math.nan
     setup: float = math.nan
-    """s from the worker's start to its first step."""
+    """Time from the start of the worker to its first step, s."""
     cpu: float = math.nan
-    """CPU s of all ranks and their threads together, in the step loop; of threads, while they work."""
+    """CPU time of all ranks and their threads in the step loop, s; of threads while they work."""
     digest: str = ""
-    """sha256 over node and tet state in global-id order: equal for any number of ranks."""
+    """SHA-256 of the state of nodes and tets in the order of global ids: equal for any number of ranks."""
     elements: int | None = None
     eroded: int | None = None
-    """Tets that have left."""
+    """Number of deleted tets."""
     eroded_mass: float = math.nan
-    """kg; of nodes that have left with the last of their tets."""
+    """Mass of nodes deleted with the last of their tets, kg."""
     nodes_initial: int | None = None
     nodes: int | None = None
     fragments: int | None = None
     broken: int | None = None
-    """Facets that have broken."""
+    """Number of broken facets."""
     inside: int | None = None
-    """Nodes that end inside of another body or fragment or, without tets, of their own part, deeper than 0.05 of the
-    typical size of a face."""
+    """Nodes that end inside another body or fragment (free nodes: also inside their own part), deeper than 0.05 of
+    the typical face size."""
     deepest: float = math.nan
-    """How deep the deepest of them is that has not gone through the outermost tets, in typical sizes of a face."""
+    """Depth of the deepest of them that has not passed the outermost tets, over the typical face size."""
     overlapping: int | None = None
-    """Tets at surfaces that end with more than a tenth of their volume in other bodies or fragments."""
+    """Surface tets that end with more than a tenth of their volume in other bodies or fragments."""
     overlap: float = math.nan
-    """What these bodies and fragments have in common, of the volume of all tets at surfaces."""
+    """Common volume of these bodies and fragments over the volume of all surface tets."""
     rebalances: int | None = None
     balancing_cost: float = math.nan
-    """s; of all cuts."""
+    """Wall time of all decompositions, s."""
     balancing_saved: float = math.nan
-    """s: what steps would have taken with the imbalance from before each cut, less what they took."""
+    """Wall time saved by the decompositions, s: estimate with the imbalance from before each, less the time used."""
     energy: Energy | None = None
     worst_residual: float = math.nan
-    """The largest energy residual of any ledger line of the run."""
+    """Largest energy residual of all ledger lines of the run."""
     made: list[Made] = []
-    """What lines of the ledger have made (``run.made_limit``), the worst first; none that has made nothing."""
+    """Energy created by ledger lines (``run.made_limit``), the largest first; only lines that have created any."""
     compressed: list[Compressed] = []
-    """Of each part that breaks in tension alone and has been under compression, the hardest first."""
+    """Of each part that breaks in tension only and was compressed: the largest compression, the largest first."""
     phases: dict[str, list[float]] = {}
-    """CPU seconds per phase, one number a rank; of its first thread."""
+    """CPU seconds per phase, one number per rank; of its first thread."""
     serial: dict[str, list[float]] = {}
-    """Of the wall time of each phase, s, one number a rank: what one thread of the rank did alone, but for the waiting
-    for other ranks. It limits what more threads can gain. Other programs on the same cores make it larger."""
+    """Serial wall time of each phase, s, one number per rank: work of a single thread of the rank, without waiting
+    for other ranks. It limits the gain of more threads. Other programs on the same cores increase it."""
     parallel: dict[str, list[float]] = {}
-    """The rest of it: in regions, whose tasks the threads of a rank share; with one thread, what more could share."""
+    """Parallel wall time of each phase, s: in regions, whose tasks the threads of a rank share; with one thread, the
+    time that more threads could share."""
     projected: dict[int, dict[str, list[float]]] = {}
-    """By number of threads: seconds per phase, without the waiting, that each rank would take with so many threads; of
-    a run that was asked for it (docs/performance/scaling.md)."""
+    """By number of threads: estimated seconds per phase and rank with so many threads, without waiting; only of a
+    run with this option (docs/performance/scaling.md)."""
     sharing: "Sharing | None" = None
-    """Of what these follow."""
+    """The measurements from which these estimates follow."""
     helped: list[float] = []
-    """s that all threads of a rank but its first have done tasks, together; at most threads - 1 times ``parallel``."""
+    """Working time of all threads of the rank except the first, together, s; at most threads - 1 times ``parallel``."""
     without: list[str] = []
-    """Stages that the case does not have (cases/estimates/stages.py): none of its phases has computed them."""
+    """Stages that the case does not have (cases/estimates/stages.py); no phase has computed them."""
     peak_memory: list[int] = []
-    """Largest resident memory, bytes, one number a rank."""
+    """Largest resident memory, bytes, one number per rank."""
     element_updates_per_second: float = math.nan
-    """Per CPU-second and core."""
+    """Steps of a tet per CPU second and core."""
     reference: list[Check] = []
     probes: list[Measured] = []
-    """The last value of each probe, the smallest and the largest."""
+    """Last, smallest and largest value of each probe."""
     warnings: list[str] = []
 
 
 def known(value: float | None) -> float | None:
-    """A number of an outcome; None where it is not known."""
+    """A number of an outcome; None if unknown."""
     return None if value is None or math.isnan(value) else value
 
 
 def last_message(outcome: Outcome) -> dict[str, Any]:
-    """The fields of the message that tells of the outcome (messages.Finished): 0 for what is not known."""
+    """Returns the fields of the message of the outcome (messages.Finished); 0 for unknown values."""
     steps = outcome.steps or 0
     return {
         "step": steps, "t": known(outcome.time) or 0.0, "state": outcome.state, "digest": outcome.digest,
@@ -171,14 +171,13 @@ def last_message(outcome: Outcome) -> dict[str, Any]:
 
 
 def to_json(outcome: Outcome) -> bytes:
-    """Indented, for people too."""
+    """Returns the outcome as indented JSON."""
     return msgspec.json.format(msgspec.json.encode(outcome), indent=2)
 
 
 def from_json(text: bytes | str) -> Outcome:
-    """Raises msgspec.ValidationError or msgspec.DecodeError.
-
-    JSON has no NaN: a number that was none was written as null, and is read back as NaN.
+    """Reads an outcome. Raises msgspec.ValidationError or msgspec.DecodeError. JSON has no NaN: it is written as
+    null and read back as NaN.
     """
     data = msgspec.json.decode(text)
     if isinstance(data, dict):

@@ -4,7 +4,7 @@ from enum import StrEnum
 
 
 class State(StrEnum):
-    """Where a run is. The later members are final."""
+    """State of a run. The later members are final."""
 
     ACCEPTED = "accepted"
     QUEUED = "queued"
@@ -19,7 +19,7 @@ class State(StrEnum):
 
     @property
     def final(self) -> bool:
-        """True when nothing can happen to the run any more."""
+        """Whether the state cannot change any more."""
         return self in FINAL
 
 
@@ -33,11 +33,11 @@ FOLLOWERS: dict[State, frozenset[State]] = {
     State.STOPPING: FINAL,
     **dict.fromkeys(FINAL, frozenset()),
 }
-"""Which states may follow a state; a final one has none. A job of a batch system that is interrupted waits again."""
+"""The states that may follow each state; none for a final one. An interrupted job of a batch system waits again."""
 
 
 class Cause(StrEnum):
-    """Why a run ended as it did: a closed list."""
+    """Cause of the end of a run: a closed list."""
 
     INPUT = "input"
     MESH = "mesh"
@@ -46,7 +46,7 @@ class Cause(StrEnum):
     MEMORY = "memory"
     WALLTIME = "walltime"
     STEPS = "steps"
-    """``run.max_steps`` is used up before ``run.end_time``."""
+    """``run.max_steps`` was reached before ``run.end_time``."""
     PREEMPTED = "preempted"
     NODE = "node"
     LAUNCH = "launch"
@@ -56,7 +56,7 @@ class Cause(StrEnum):
 
 
 class ExitCode:
-    """Exit codes of ``python -m conoid.worker``; the outcome file decides, the code is a hint."""
+    """Exit codes of ``python -m conoid.worker``. The outcome file is decisive, the code is a hint."""
 
     SUCCEEDED = 0
     CRASHED = 1
@@ -64,4 +64,4 @@ class ExitCode:
     PHYSICS = 3
     INTERRUPTED = 4
     STORAGE = 5
-    """A file could not be written: the disk is full, or fails."""
+    """A file could not be written: the disk is full or defective."""

@@ -1,4 +1,4 @@
-"""The suite of hard cases: which there are, and whether a run of one ended well."""
+"""The suite of hard cases: its table, and the check of a run of one."""
 
 import math
 import tomllib
@@ -13,8 +13,8 @@ from .outcome import Outcome
 
 _TABLE = Path(__file__).with_name("hard.toml")
 RESIDUAL, DRIFT = 0.01, 1e-9
-"""Largest energy residual, and drift of the momentum over the sum of |m v| of the parts, of a case that ended well.
-Chosen: gates of the catalogue are 1 % and 1e-10 of a single body; sums of impulses are rounded."""
+"""Largest energy residual, and largest drift of the momentum over the sum of |m v| of the parts, of a correct run.
+Chosen: the limits of the catalogue are 1 %, and 1e-10 for a single body; sums of impulses are rounded."""
 
 
 @dataclass(frozen=True)
@@ -24,17 +24,17 @@ class Hard:
     name: str
     rows: tuple[str, ...]
     case: str
-    """Of a shipped case, or of a file in cases/hard."""
+    """Name of a shipped case, or of a file in cases/hard."""
     changes: tuple[str, ...] = ()
     limit: float = RESIDUAL
-    """Of the energy residual."""
+    """Limit of the energy residual."""
     refused: str = ""
-    """The line of the energy that is known to make more than ``run.made_limit``: that ends the run. Without it the run
-    has to succeed."""
+    """The ledger line that creates more than ``run.made_limit``, as is known, which ends the run. Without it the run
+    must succeed."""
 
     @property
     def path(self) -> Path:
-        """Of the case file."""
+        """Path of the case file."""
         return shipped().get(self.case, _TABLE.parent / "hard" / f"{self.case}.toml")
 
 
@@ -51,12 +51,12 @@ def suite() -> list[Hard]:
 
 
 def is_free(case: Case) -> bool:
-    """Whether nothing from outside pushes it, so that its momentum stays, with that of nodes that have left."""
+    """Whether no external force acts on the scene, so that its momentum, with that of deleted nodes, is constant."""
     return not case.boundaries
 
 
 def drift(case: Case, momenta: Sequence[tuple[float, float, float]]) -> float:
-    """Largest change of the momentum of a free case, over the sum of sqrt(2 m E) of its parts; NaN for no motion."""
+    """Largest change of the momentum of a free case, over the sum of sqrt(2 m E) of its parts; NaN without motion."""
     brought = [part.bulk for part in estimate(case).parts if part.bulk is not None]
     scale = math.fsum(math.sqrt(2.0 * bulk.mass * bulk.energy) for bulk in brought)
     if not momenta or scale == 0.0:
@@ -65,7 +65,7 @@ def drift(case: Case, momenta: Sequence[tuple[float, float, float]]) -> float:
 
 
 def faults(hard: Hard, outcome: Outcome, drifted: float | None) -> list[str]:
-    """What is wrong with a run of it; nothing where it ended well."""
+    """Yields the errors of a run of the case; none of a correct run."""
     found = []
     if hard.refused:
         if outcome.cause != "energy" or f"the line {hard.refused} of the energy" not in outcome.message:

@@ -26,7 +26,7 @@ Dimension = tuple[int, int, int, int]
 _LENGTH, _MASS, _TIME, _TEMPERATURE = (1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1)
 _FORCE, _STRESS, _ENERGY, _POWER = (1, 1, -2, 0), (-1, 1, -2, 0), (2, 1, -2, 0), (2, 1, -3, 0)
 _NONE, _FREQUENCY = (0, 0, 0, 0), (0, 0, -1, 0)
-"""Dimensions by their exponents of m, kg, s, K."""
+"""Dimensions: exponents of m, kg, s, K."""
 
 _ONE, _KILO, _MEGA, _GIGA = Fraction(1), Fraction(1000), Fraction(10**6), Fraction(10**9)
 _CENTI, _MILLI, _MICRO = Fraction(1, 100), Fraction(1, 1000), Fraction(1, 10**6)
@@ -65,29 +65,30 @@ KINDS: dict[Dimension, str] = {
     (2, 0, 0, 0): "an area", (0, 1, -2, 0): "an energy per area",
     (2, 1, 0, 0): "a moment of inertia",
 }  # fmt: skip
-"""What a quantity of a dimension is called."""
+"""Name of the quantity of each dimension."""
 
 _QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)\s*(.*?)\s*")
 NUMBER = r"^\s*[+-]?(\d+\.?\d*|\.\d+)"
-"""How the text of a quantity begins, for the JSON schema."""
+"""Start of the text of a quantity, as a pattern for the JSON schema."""
 _FACTOR = re.compile(r"\s*([*/·]?)\s*([A-Za-zµ%]+|1)(?:\^([+-]?\d))?")
 QUANTITY = "the quantity's"
-"""Stands for the unit of a number whose unit another key decides."""
+"""Placeholder for the unit of a number whose unit another key determines."""
 _LONGEST = 80
-"""Characters of a quantity that are read: longer than any number with its unit. Chosen, so that a text that is no
-quantity costs no time."""
+"""Largest number of characters of a quantity: more than any number with its unit has. Chosen, so that other text
+costs no time."""
 LARGEST = 1e30
-"""Of a quantity in SI units, and one over it the smallest. Chosen: energies of any such mass and speed are numbers."""
+"""Largest quantity in SI units; its inverse is the smallest one. Chosen: the energy of any such mass and speed is a
+finite number."""
 
 
 _WRITTEN = str.maketrans({
     "\N{GREEK SMALL LETTER MU}": "\N{MICRO SIGN}", "\N{SUPERSCRIPT TWO}": "^2", "\N{SUPERSCRIPT THREE}": "^3",
 })  # fmt: skip
-"""What else is read: keyboards have a Greek mu for the sign of micro, documents have raised exponents."""
+"""Other spellings that are accepted: the Greek mu for the micro sign, and raised exponents."""
 
 
 def parse_unit(text: str) -> tuple[Fraction, Dimension]:
-    """Exact factor to SI and dimension of a unit such as ``kg/m^3``. Raises ValueError."""
+    """Returns the exact factor to SI and the dimension of a unit such as ``kg/m^3``. Raises ValueError."""
     text = text.translate(_WRITTEN)
     factor, dimension, position = _ONE, [0, 0, 0, 0], 0
     while position < len(text):
@@ -106,9 +107,10 @@ def parse_unit(text: str) -> tuple[Fraction, Dimension]:
 
 
 def parse_quantity(value: object, unit: str) -> float:
-    """The SI value of ``value``, a number (already SI) or text with a unit of the same dimension as ``unit``.
+    """Returns the SI value of ``value``, a number (already SI) or text with a unit of the same dimension as ``unit``.
 
-    Raises ValueError for a wrong dimension, an unknown unit, NaN, infinity, and what is beyond LARGEST either way.
+    Raises ValueError for another dimension, an unknown unit, NaN, infinity, and values beyond LARGEST or below its
+    inverse.
     """
     if isinstance(value, bool) or not isinstance(value, int | float | str):
         raise ValueError(f"expected a quantity in {unit or 'plain numbers'}, got {value!r}")
@@ -119,8 +121,8 @@ def parse_quantity(value: object, unit: str) -> float:
 
 
 def written(value: object) -> tuple[str, str] | None:
-    """Number and unit of a quantity as they are written, the unit empty where there is none; None of what is no
-    quantity. Whether there is such a unit is not asked.
+    """Returns number and unit of a quantity as they are written, the unit empty if there is none; None for other
+    text. Does not check that the unit exists.
     """
     if isinstance(value, bool) or not isinstance(value, int | float | str):
         return None
@@ -129,7 +131,7 @@ def written(value: object) -> tuple[str, str] | None:
 
 
 def usable(number: float, what: str = "it") -> float:
-    """The number, if it is not beyond LARGEST either way; ``what`` says so. Raises ValueError."""
+    """Returns the number if it is within LARGEST and its inverse. Raises ValueError; ``what``: the words for it."""
     if number and not 1.0 / LARGEST <= abs(number) <= LARGEST:
         raise ValueError(f"{what} is not between {1.0 / LARGEST:g} and {LARGEST:g}")
     return number
@@ -157,7 +159,8 @@ def _read_text(text: str, unit: str) -> float:
 
 
 def kind_of(unit: str) -> str:
-    """``a length, in a unit such as 'm'``: what a quantity in ``unit`` is, for an error message."""
+    """Returns the words for a quantity in ``unit``, such as ``a length, in a unit such as 'm'``, for an error
+    message."""
     kind = "an angle" if unit == "rad" else KINDS.get(parse_unit(unit)[1], "a quantity")
     return f"{kind}, in a unit such as {unit!r}" if unit else kind
 
@@ -171,12 +174,12 @@ def _reader(unit: str) -> BeforeValidator:
 
 @dataclass(frozen=True)
 class Written:
-    """In the JSON schema: a number, or text with a unit; ``unit`` is the SI unit that a bare number is taken in."""
+    """Addition to the JSON schema of a key: a number, or text with a unit; ``unit``: the SI unit of a bare number."""
 
     unit: str
 
     def __get_pydantic_json_schema__(self, core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        """What pydantic asks an annotation for."""
+        """The JSON schema with the addition; pydantic calls this method."""
         return {**handler(core), "type": ["number", "string"], "unit": self.unit}
 
 

@@ -18,7 +18,7 @@ from .problems import ConoidError, shown
 Widths = tuple[int, ...]
 
 _STANDARD, _I10, _LONG = 0, 10, 20
-"""Least width of a field in the three formats (the manual, "General card format")."""
+"""Smallest width of a field in the three formats (the manual, "General card format")."""
 _SUFFIXES = {"+": _LONG, "%": _I10, "-": _STANDARD}
 _KEYWORD = re.compile(r"\*\s*([A-Za-z0-9_\-/&.]*[A-Za-z0-9_/&.])\s*([+%-])?\s*(.*)", re.ASCII)
 _REMARK = re.compile(r"\(.*\)")
@@ -29,33 +29,33 @@ _PARAMETER = re.compile(r"([IiRrCc])\s*([A-Za-z_][A-Za-z0-9_]*)", re.ASCII)
 
 
 class CardError(ConoidError, ValueError):
-    """A deck cannot be followed; one line, which begins with the place in it."""
+    """An error in a deck: one line, which begins with its place."""
 
 
 class Card(NamedTuple):
     """A line of a deck that is neither a keyword nor a comment."""
 
     number: int
-    """Of the line in its file."""
+    """Number of the line in its file."""
     text: str
-    """Without its end."""
+    """The line without its end."""
 
 
 @dataclass(frozen=True)
 class Block:
-    """A keyword and its cards, empty ones among them."""
+    """A keyword and its cards, including empty ones."""
 
     name: str
-    """In upper case, without ``*``: ``ELEMENT_SOLID``, ``SET_NODE_LIST_TITLE``."""
+    """Name in upper case, without ``*``: ``ELEMENT_SOLID``, ``SET_NODE_LIST_TITLE``."""
     number: int
     """Line of the keyword in its file."""
     file: str = ""
-    """The included file as the deck names it; empty for the deck itself."""
+    """Name of the included file in the deck; empty for the deck itself."""
     cards: list[Card] = field(default_factory=list)
     least: int = _STANDARD
-    """Least width of a field: 0, 10 or 20."""
+    """Smallest width of a field: 0, 10 or 20."""
     remark: str = ""
-    """What stands in brackets behind the keyword: ``ten nodes format``."""
+    """The text in brackets behind the keyword: ``ten nodes format``."""
     parameters: Mapping[str, str] = field(default_factory=dict)
     """Values of ``*PARAMETER`` by name, in lower case."""
 
@@ -64,7 +64,7 @@ class Block:
         return (card for card in self.cards if card.text.strip())
 
     def parted(self, options: Collection[str]) -> tuple[str, frozenset[str]]:
-        """The name without those of ``options`` that stand at its end, and these: ``("SET_NODE", {"TITLE"})``."""
+        """Returns the name without those of ``options`` at its end, and these: ``("SET_NODE", {"TITLE"})``."""
         name, found = self.name, set[str]()
         while (last := name.rpartition("_"))[2] in options and last[0]:
             name = last[0]
@@ -72,23 +72,23 @@ class Block:
         return name, frozenset(found)
 
     def place(self, number: int | None = None) -> str:
-        """``line 7`` or ``'sub/mesh.k', line 7``: of a card, or of the keyword."""
+        """Returns the place of a card, or of the keyword: ``line 7`` or ``'sub/mesh.k', line 7``."""
         return placed(self.file, self.number if number is None else number)
 
     def error(self, card: Card | None, text: str) -> CardError:
-        """What is wrong with a card, or with the keyword, as an error to raise."""
+        """Returns the error at a card, or at the keyword."""
         return CardError(f"{self.place(card.number if card else None)}: {text}")
 
     def fields(self, card: Card, *widths: int) -> list[str]:
-        """The fields of a card without outer blanks, parameters replaced; empty where the card ends before them.
+        """Returns the fields of a card without outer blanks, with parameters replaced; empty fields beyond its end.
 
-        Raises CardError for a card that has more, and for a parameter that is not defined.
+        Raises CardError for a card with more fields, and for an undefined parameter.
         """
         found = self._between_commas(card, widths) if "," in card.text else self._cut(card, widths)
         return [self._valued(card, item) for item in found] if "&" in card.text else found
 
     def whole(self, card: Card, item: str, what: str) -> int:
-        """A whole number; 0 for an empty field. Raises CardError, which names the field by ``what``."""
+        """Reads a whole number; 0 for an empty field. Raises CardError; ``what``: the name of the field in it."""
         if not item:
             return 0
         if not _WHOLE.fullmatch(item):
@@ -96,7 +96,7 @@ class Block:
         return int(item.partition(".")[0])
 
     def real(self, card: Card, item: str, what: str) -> float:
-        """A number, also ``1.5-3`` and ``1D5``; 0 for an empty field. Raises CardError."""
+        """Reads a number, also ``1.5-3`` and ``1D5``; 0 for an empty field. Raises CardError."""
         if not item:
             return 0.0
         found = _REAL.fullmatch(item)
@@ -140,26 +140,26 @@ def _crossed(card: Card) -> str:
 
 
 def placed(file: str, number: int) -> str:
-    """``line 7`` or ``'sub/mesh.k', line 7``."""
+    """Returns ``line 7`` or ``'sub/mesh.k', line 7``."""
     return f"{shown(file)}, line {number}" if file else f"line {number}"
 
 
 class Deck:
-    """The keywords of a deck and of the files that it includes, read once from its start."""
+    """The keywords of a deck and of the files that it includes, read once from the start."""
 
     def __init__(self, path: Path, without: Collection[str] = ()) -> None:
-        """Opens nothing yet. ``without``: keywords whose cards are not kept."""
+        """Opens no file yet. ``without``: keywords whose cards are not kept."""
         self._without = without
         self.included = Included(path)
         """The files that have been read; the deck itself is the first."""
         self.followed: list[Block] = []
-        """What ``blocks`` has not given so far: ``*COMMENT``, ``*INCLUDE``, ``*PARAMETER`` and ``*END``."""
+        """The keywords that ``blocks`` has not yielded so far: ``*COMMENT``, ``*INCLUDE``, ``*PARAMETER`` and
+        ``*END``."""
         self._parameters: dict[str, str] = {}
 
     def blocks(self) -> Iterator[Block]:
-        """Every keyword up to ``*END`` but ``*COMMENT``, ``*INCLUDE`` and ``*PARAMETER``, which are followed, in order.
-
-        Raises CardError; OSError where the deck itself cannot be opened.
+        """Yields every keyword up to ``*END``, except ``*COMMENT``, ``*INCLUDE`` and ``*PARAMETER``, which are
+        processed in order. Raises CardError; OSError where the deck itself cannot be opened.
         """
         return self._of(self.included.start(), "", _STANDARD)
 
@@ -183,7 +183,7 @@ class Deck:
                 yield block
 
     def _plain(self, path: Path, file: str, standing: int) -> Iterator[Block]:
-        """The keywords of one file; ``standing``: the least width of a field where a keyword has no suffix."""
+        """Yields the keywords of one file; ``standing``: smallest width of a field of a keyword without suffix."""
         block: Block | None = None
         for number, text in _text(path, file):
             if text.startswith("*"):
@@ -231,7 +231,8 @@ class Deck:
 
 
 def _formatted(block: Block, rest: str) -> Block:
-    """``*KEYWORD``: ``LONG=Y`` and ``LONG=K`` mean long input, ``LONG=S`` standard input and long output."""
+    """Returns the width of ``*KEYWORD``: ``LONG=Y`` and ``LONG=K`` mean long input, ``LONG=S`` standard input and
+    long output."""
     found = {word.upper(): letter.upper() for word, letter in _SETTING.findall(rest)}
     if found.get("LONG", "S") not in "YKS" or found.get("I10", "Y") not in "YN":
         raise block.error(None, f"*KEYWORD {rest}: expected LONG = Y, K or S, and I10 = Y or N")
@@ -241,7 +242,7 @@ def _formatted(block: Block, rest: str) -> Block:
 
 
 def _names(block: Block) -> Iterator[tuple[str, int]]:
-    """File names and their lines; one that ends with `` +`` goes on in the next line."""
+    """Yields file names and their lines; a name that ends with `` +`` continues in the next line."""
     whole, first = "", 0
     for card in block.filled():
         first = first if whole else card.number
@@ -256,7 +257,7 @@ def _names(block: Block) -> Iterator[tuple[str, int]]:
 
 
 def _text(path: Path, file: str) -> Iterator[tuple[int, str]]:
-    """The lines that are no comments."""
+    """Yields the lines that are not comments."""
     try:
         for number, text in lines(path):
             if not text.startswith("$"):

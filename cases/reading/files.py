@@ -1,8 +1,8 @@
-"""The files that a case names: where it names them, by which path and hash, and where a run finds them.
+"""The files that a case names: path and hash, and the place of the file for a run.
 
-Every table below ``parts[].mesh`` that has a ``path`` names a file; ``sha256`` beside it says which bytes are meant.
-The path leads to the file on the machine of who has written the case. A run of a server, or of ``conoid batch``, has
-copies of its own in its folder, under their hashes: there the path is a name and nothing more.
+Every table below ``parts[].mesh`` that has a ``path`` names a file; ``sha256`` beside it is the hash of its content.
+The path is valid on the machine of the case's author. A run of a server, or of ``conoid batch``, has its own copies
+in its folder, named by their hashes; there the path is only a name.
 """
 
 import re
@@ -14,9 +14,9 @@ from typing import Any
 from ..output import layout
 
 HASH = re.compile(r"[0-9a-f]{64}")
-"""A sha256 as it is written in names and addresses."""
+"""A SHA-256 hash as it is written in names and addresses."""
 _ENDING = re.compile(r"\.[a-z0-9]{1,8}")
-"""Of a file's name, by which its format is known."""
+"""Ending of a file's name, which gives its format."""
 
 
 @dataclass(frozen=True)
@@ -29,12 +29,13 @@ class Named:
 
     @property
     def copy(self) -> str:
-        """The name of the copy in a run's folder; empty where the case has no hash of the file."""
+        """Name of the copy in a run's folder; empty where the case has no hash of the file."""
         return copy_of(self.path, self.sha256)
 
 
 def files_of(case: Mapping[str, Any]) -> list[Named]:
-    """All files that a case in plain data names, in its order. What is no table, list or text is passed over."""
+    """Returns all files that a case in plain data names, in its order. Ignores values that are not tables, lists or
+    text."""
     parts = case.get("parts")
     meshes = ((n, part.get("mesh")) for n, part in enumerate(_listed(parts)) if isinstance(part, Mapping))
     return [file for n, mesh in meshes for file in _below(mesh, ("parts", n, "mesh"))]
@@ -56,7 +57,7 @@ def _listed(value: Any) -> list[Any]:
 
 
 def copy_of(path: str, sha256: str | None) -> str:
-    """The name of the copy of a file: its hash, and how the name in the case ends. Empty without a hash."""
+    """Returns the name of the copy of a file: its hash and the ending of its name. Empty without a hash."""
     if sha256 is None or not HASH.fullmatch(sha256.lower()):
         return ""
     ending = PurePath(path).suffix.lower()
@@ -64,10 +65,10 @@ def copy_of(path: str, sha256: str | None) -> str:
 
 
 def located(path: str, sha256: str | None, folder: Path) -> Path:
-    """Where a run whose case is in ``folder`` finds a file that the case names.
+    """Returns the path of a file for a run whose case is in ``folder``.
 
-    In the folder of a run of a server that is the run's own copy and nothing else, so that no case reads a path of the
-    server; elsewhere the copy where there is one, else ``path``, from the folder on.
+    In the folder of a run of a server it is the run's own copy, so that no case reads another path of the server;
+    elsewhere the copy if there is one, otherwise ``path``, relative to the folder.
     """
     copy = folder / layout.FILES / (copy_of(path, sha256) or "none")
     return copy if (folder / layout.SUBMISSION).exists() or copy.exists() else folder / path

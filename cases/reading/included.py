@@ -1,4 +1,4 @@
-"""The files of a deck: itself and those that it includes, all below its folder."""
+"""The files of a deck: the deck itself and the files that it includes, all below its folder."""
 
 import io
 from collections.abc import Callable, Iterator
@@ -8,38 +8,38 @@ from typing import Self
 from . import whole
 
 _DEEPEST, _MOST = 8, 1000
-"""Includes within each other, and in all. Chosen: decks of whole vehicles have some hundred, three deep."""
+"""Largest depth of includes, and largest number of files. Chosen: decks of whole vehicles have some hundred files,
+three deep."""
 _UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 LONGEST = 4096
-"""Characters of a line of cards. Chosen: the longest format has 200."""
+"""Largest number of characters of a line of cards. Chosen: the longest format has 200."""
 LONGEST_LINE = 65_536
-"""Characters of a line of values between commas. Chosen: Abaqus has 256, programs that write sets in one line some
-thousand."""
+"""Largest number of characters of a line of values between commas. Chosen: Abaqus has 256, programs that write sets
+in one line some thousand."""
 
 
 class Included:
-    """The files of a deck: which have been read, and which are being read."""
+    """The files of a deck: those that have been read, and those that are being read."""
 
     def __init__(self, path: Path) -> None:
-        """``path``: of the deck."""
+        """``path``: path of the deck."""
         self.files: list[Path] = []
-        """Every file that has been begun, once, in order."""
+        """Every file that has been opened, once, in order."""
         self.followed: list[Line] = []
-        """The lines that have made others be included."""
+        """The lines that have included other files."""
         self._path = path
         self._open: list[Path] = []
         self._count = 0
 
     def start(self) -> Path:
-        """Begins with the deck itself; its path."""
+        """Opens the deck itself; returns its path."""
         self._open = [self._path.resolve()]
         self.files = [self._open[0]]
         return self._path
 
     def enter(self, name: str, including: Path) -> Path:
-        """Begins with a file that ``including`` names, from the folder of the deck on, else from its own.
-
-        Raises ValueError where there is none, it is not below the folder of the deck, or it includes itself.
+        """Opens a file that ``including`` names, relative to the folder of the deck, otherwise to its own. Raises
+        ValueError where it does not exist, is not below the folder of the deck, or includes itself.
         """
         folder = self._path.resolve().parent
         places = [(start / name.replace("\\", "/")) for start in (folder, including.resolve().parent)]
@@ -62,7 +62,7 @@ class Included:
         return there[0]
 
     def follow(self, name: str, including: Path, line: "Line") -> Path:
-        """``enter``, which a ``line`` asks for. Raises ValueError, with that line."""
+        """Calls ``enter`` for the file that a ``line`` includes. Raises ValueError, with that line."""
         self.followed.append(line)
         try:
             return self.enter(name, including)
@@ -70,17 +70,17 @@ class Included:
             raise ValueError(f"line {line}: {error}") from None
 
     def leave(self) -> None:
-        """Ends with the file that was entered last."""
+        """Closes the file that was opened last."""
         self._open.pop()
 
 
 class Line(int):
-    """The number of a line in its file; as text ``7``, or ``7 of mesh.inc`` where that is not the deck itself."""
+    """Number of a line in its file; as text ``7``, or ``7 of mesh.inc`` for an included file."""
 
     file: str
 
     def __new__(cls, number: int, file: str = "") -> Self:
-        """``file``: as the deck names it, empty for the deck itself."""
+        """``file``: name of the file in the deck, empty for the deck itself."""
         made = super().__new__(cls, number)
         made.file = file
         return made
@@ -91,19 +91,21 @@ class Line(int):
 
 
 def own(line: int) -> int:
-    """The number of a line of the deck itself; 0 for one of a file that it includes."""
+    """The number of a line of the deck itself; 0 for a line of an included file."""
     return 0 if getattr(line, "file", "") else int(line)
 
 
 def flattened(deck: Included, named: Callable[[str], str | None], longest: int = LONGEST) -> Iterator[tuple[Line, str]]:
-    """The lines of a deck, those of what it includes in their places; ``named``: the file that a line includes, None
-    for any other line; ``longest``: characters of a line, at most. Raises ValueError, OSError.
+    """Yields the lines of a deck, with those of included files in their places.
+
+    ``named``: returns the file that a line includes, None for any other line; ``longest``: largest number of
+    characters of a line. Raises ValueError, OSError.
     """
     return _flat(deck, deck.start(), "", named, longest)
 
 
 def included_by(text: str) -> str | None:
-    """The file that a line ``#include mesh.inc`` of a Radioss deck names; None for any other line."""
+    """Returns the file that a line ``#include mesh.inc`` of a Radioss deck names; None for any other line."""
     word, _, name = text.strip().partition(" ")
     return name.strip().strip('"') if word.lower() == "#include" and name.strip() else None
 
@@ -120,9 +122,8 @@ def _flat(
 
 
 def lines(path: Path, longest: int = LONGEST) -> Iterator[tuple[int, str]]:
-    """Lines of a text file with their numbers, without their ends; UTF-8 where a line is that, else Latin-1.
-
-    Raises ValueError for what is no text, OSError where there is no regular file.
+    """Yields the lines of a text file with their numbers, without their ends; UTF-8 if valid, otherwise Latin-1.
+    Raises ValueError for a file that is not text, OSError where there is no regular file.
     """
     with whole.opened(path) as raw, io.BufferedReader(raw) as data:
         if data.peek(2)[:2] in _UTF_16:

@@ -28,12 +28,13 @@ _UTF_8 = b"\xef\xbb\xbf"
 
 
 class InpError(ConoidError, ValueError):
-    """An input file cannot be followed; one line, with the number of the line in the file."""
+    """An error in an input file: one line, with the number of the line in the file."""
 
 
 @dataclass(frozen=True)
 class Block:
-    """A keyword line: its word in upper case without blanks or hyphens, parameters as (word, value or None), number."""
+    """A keyword line: word in upper case without blanks or hyphens, parameters as (word, value or None), line
+    number."""
 
     word: str
     parameters: list[tuple[str, str | None]]
@@ -41,16 +42,16 @@ class Block:
 
 
 class Source:
-    """The lines of a file, read once from its start: a block, then its data lines."""
+    """The lines of a file, read once from the start: a block, then its data lines."""
 
     def __init__(self, path: Path) -> None:
         """Opens ``path``. Raises InpError for a file that is not text."""
         self.included = Included(path)
-        """The files that are read: the first is ``path``, the others what it includes (``*INCLUDE, INPUT=``)."""
+        """The files that are read: the first is ``path``, the others are included (``*INCLUDE, INPUT=``)."""
         self._ahead: tuple[int, str] | None = None
 
     def blocks(self) -> Iterator[Block]:
-        """Every keyword line; data lines that were not read are passed over. Raises InpError."""
+        """Yields every keyword line; data lines that were not read are skipped. Raises InpError."""
         self._lines = self._useful(self.included.start(), "")
         for number, text in self.data():
             if text.strip():
@@ -65,7 +66,7 @@ class Source:
                 pass
 
     def data(self) -> Iterator[tuple[int, str]]:
-        """(line number, text) of the data lines up to the next keyword; empty ones are among them."""
+        """Yields (line number, text) of the data lines up to the next keyword, including empty ones."""
         if self._ahead is not None:
             return
         for number, text in self._lines:
@@ -75,12 +76,12 @@ class Source:
             yield number, text
 
     def filled(self) -> Iterator[tuple[int, str]]:
-        """The data lines that are not empty."""
+        """Yields the data lines that are not empty."""
         return ((number, text) for number, text in self.data() if text.strip())
 
     def _useful(self, path: Path, name: str) -> Iterator[tuple[int, str]]:
-        """Lines that are no comments, those of included files in their places; ``name``: how the deck names the file,
-        empty for the deck itself.
+        """Yields lines that are not comments, those of included files in their places; ``name``: name of the file in
+        the deck, empty for the deck itself.
         """
         for line, text in _read(path, name):
             if (wanted := included_by(text)) is None:
@@ -94,7 +95,7 @@ class Source:
             self.included.leave()
 
     def _continued(self, text: str) -> str:
-        """A keyword line with the lines that continue it."""
+        """Returns a keyword line joined with its continuation lines."""
         whole = text.strip()
         while whole.endswith(","):
             more = next(self.data(), None)
@@ -105,7 +106,7 @@ class Source:
 
 
 def _read(path: Path, name: str) -> Iterator[tuple[int, str]]:
-    """Lines of a file that are no comments."""
+    """Yields the lines of a file that are not comments."""
     with path.open("rb") as start:
         if start.read(2) in _UTF_16:
             raise InpError("the file is UTF-16; save it as UTF-8 text")
@@ -125,7 +126,7 @@ def _read(path: Path, name: str) -> Iterator[tuple[int, str]]:
 
 
 def included_by(text: str) -> str | None:
-    """The file that a line ``*INCLUDE, INPUT=mesh.inc`` names; None for any other line."""
+    """Returns the file that a line ``*INCLUDE, INPUT=mesh.inc`` names; None for any other line."""
     if not _INCLUDE.match(text):
         return None
     values = [value.strip() for word, _, value in (item.partition("=") for item in fields(text)[1:])
@@ -134,7 +135,7 @@ def included_by(text: str) -> str | None:
 
 
 def _decoded(text: str) -> str:
-    """UTF-8 where it is that, else Latin-1."""
+    """Decodes UTF-8 if valid, otherwise Latin-1."""
     try:
         return text.encode("latin-1").decode("utf-8")
     except UnicodeDecodeError:
@@ -155,7 +156,7 @@ def _parameter(item: str) -> tuple[str, str | None]:
 
 
 def fields(text: str) -> list[str]:
-    """The fields between commas, without outer blanks; a comma in quotation marks divides nothing."""
+    """Returns the fields between commas, without outer blanks; a comma in quotation marks does not separate."""
     if '"' not in text:
         return [item.strip() for item in text.split(",")]
     found, at = [], 0
@@ -169,7 +170,8 @@ def fields(text: str) -> list[str]:
 
 
 def numbers(line: int, text: str) -> list[float]:
-    """The numbers of a data line; 0 for an empty field, none for the one after a last comma. Raises InpError."""
+    """Returns the numbers of a data line; 0 for an empty field, none for the field after a last comma. Raises
+    InpError."""
     if _NUMBERS.fullmatch(text):
         try:
             items = text.translate(_D).split(",")
@@ -184,14 +186,14 @@ def numbers(line: int, text: str) -> list[float]:
 
 
 def whole(line: int, item: str) -> int:
-    """The number of a node or of an element. Raises InpError."""
+    """Returns the number of a node or element. Raises InpError."""
     if not _WHOLE.fullmatch(item) or not int(item):
         raise InpError(f"line {line}: {shortened(item)} is not a number of a node or element; the first one is 1")
     return int(item)
 
 
 def wholes(line: int, items: list[str]) -> list[int]:
-    """The numbers of nodes or elements in several fields. Raises InpError."""
+    """Returns the numbers of nodes or elements in several fields. Raises InpError."""
     if _WHOLES.fullmatch(",".join(items)):
         with suppress(ValueError):
             found = [int(item) for item in items]
@@ -201,11 +203,11 @@ def wholes(line: int, items: list[str]) -> list[int]:
 
 
 def is_whole(item: str) -> bool:
-    """Whether a field is a number of a node or of an element."""
+    """Whether a field is the number of a node or element."""
     return _WHOLE.fullmatch(item) is not None
 
 
 def shortened(text: str) -> str:
-    """A line in quotation marks, as messages show it."""
+    """Returns a line in quotation marks, for messages."""
     bare = text.strip()
     return repr(bare if len(bare) <= _LONGEST else f"{bare[:_LONGEST]}...")

@@ -14,8 +14,8 @@ from .similar import nearest
 
 PATH = Path(__file__).parents[1] / "materials.toml"
 Confidence = Literal["paper", "read", "derived", "memory", "assumed"]
-"""How sure a constant is: in the paper this work starts from; read in the source named; computed from other constants;
-remembered from the literature and not read again; chosen without evidence for this alloy."""
+"""Confidence of a constant: given in the paper that this work starts from; read in the named source; computed from
+other constants; remembered from the literature and not read again; chosen without evidence for this alloy."""
 CONFIDENCES: tuple[str, ...] = get_args(Confidence)
 
 
@@ -27,12 +27,12 @@ def library() -> dict[str, Material]:
 
 @cache
 def sources() -> dict[str, str]:
-    """What the source keys of the library stand for."""
+    """The sources by their keys in the library."""
     return dict(tomllib.loads(PATH.read_text(encoding="utf-8"))["sources"])
 
 
 def provenance(name: str) -> dict[str, tuple[str, str]]:
-    """``{"elastic.young": ("read", "uintah"), ...}``: confidence and source key of each constant of a material."""
+    """Confidence and source key of each constant of a material: ``{"elastic.young": ("read", "uintah"), ...}``."""
     return {key: (confidence, source) for key, (_, confidence, source) in _entries(_tables()[name], "")}
 
 
@@ -46,11 +46,11 @@ class Constant:
     source: str
     """A key of the sources."""
     cited: str
-    """What it stands for."""
+    """The source."""
 
 
 def constants(name: str) -> list[Constant]:
-    """Every constant of a material of the library. Raises CaseError with the nearest names."""
+    """Returns every constant of a material of the library. Raises CaseError with the nearest names."""
     if name not in library():
         raise CaseError([problem(("material",), name, f"unknown material; {nearest(name, sorted(library()))}")])
     return [
@@ -60,7 +60,8 @@ def constants(name: str) -> list[Constant]:
 
 
 def material(case: Case, name: str) -> Material:
-    """The material ``name``: the case's own first, then the library's. Raises CaseError with the nearest names."""
+    """Returns the material ``name``: that of the case, otherwise that of the library. Raises CaseError with the
+    nearest names."""
     known = {**library(), **case.materials}
     if name not in known:
         raise CaseError([problem(("material",), name, f"unknown material; {nearest(name, sorted(known))}")])
@@ -73,7 +74,7 @@ def _tables() -> dict[str, dict[str, Any]]:
 
 
 def _values(table: dict[str, Any]) -> dict[str, Any]:
-    """The table with each ``[value, confidence, source]`` replaced by its value."""
+    """Returns the table with each ``[value, confidence, source]`` replaced by its value."""
     return {key: _value(entry) for key, entry in table.items()}
 
 
@@ -84,7 +85,7 @@ def _value(entry: Any) -> Any:
 
 
 def _entries(table: dict[str, Any], prefix: str) -> Iterator[tuple[str, list[Any]]]:
-    """Dotted keys, and value, confidence and source key of each constant in a table."""
+    """Yields the dotted key, and value, confidence and source key of each constant in a table."""
     for key, entry in table.items():
         if isinstance(entry, dict):
             yield from _entries(entry, f"{prefix}{key}.")

@@ -1,4 +1,4 @@
-"""What is wrong with a case, one clear line each, under the keys that the user wrote."""
+"""Errors of a case: one line each, under the keys that the user wrote."""
 
 import re
 from collections.abc import Iterable, Iterator, Mapping
@@ -16,14 +16,14 @@ Location = tuple[int | str, ...]
 
 _DISCRIMINATORS = ("kind", "shape", "model")
 _LONGEST = 80
-"""Characters of a value that are shown: a line of a terminal. Chosen."""
+"""Largest number of characters of a value in a message: a line of a terminal. Chosen."""
 _MOST = 100
-"""Problems that are told at once: more than anybody mends at once. Chosen."""
+"""Largest number of problems reported at once: more than a user corrects at once. Chosen."""
 
 
 @dataclass(frozen=True)
 class Problem:
-    """One error: the key as the user wrote it, its value as text (empty when there is none), what is allowed."""
+    """One error: the key as the user wrote it, its value as text (empty if there is none), the allowed values."""
 
     key: str
     value: str
@@ -36,11 +36,11 @@ class Problem:
 
 
 class ConoidError(Exception):
-    """Base of what a user of Conoid catches."""
+    """Base class of the errors that a user of Conoid catches."""
 
 
 class CaseError(ConoidError, ValueError):
-    """A case cannot be used; ``problems`` says everything that is wrong, its text one line each."""
+    """A case is not valid; ``problems`` lists every error, the text has one line for each."""
 
     def __init__(self, problems: Iterable[Problem]) -> None:
         """Keeps at most a hundred problems, in the order given."""
@@ -48,23 +48,23 @@ class CaseError(ConoidError, ValueError):
         super().__init__("\n".join(str(problem) for problem in self.problems))
 
     def __reduce__(self) -> tuple[type["CaseError"], tuple[tuple[Problem, ...]]]:
-        """Made again from its problems, not from its text, where it was sent to another process."""
+        """Pickles the problems, not the text."""
         return CaseError, (self.problems,)
 
 
 def problem(location: Location, value: object, message: str) -> Problem:
-    """A problem at ``location``; ``value`` is shown as written, shortened; Ellipsis shows nothing."""
+    """Returns the problem at ``location``; ``value`` is shown as written, shortened; Ellipsis for no value."""
     return Problem(dotted(location), "" if value is ... else shown(value), message)
 
 
 def dotted(location: Location) -> str:
-    """``("parts", 0, "mesh")`` as ``parts[0].mesh``."""
+    """Returns ``("parts", 0, "mesh")`` as ``parts[0].mesh``."""
     text = "".join(f"[{item}]" if isinstance(item, int) else f".{item}" for item in location)
     return text.removeprefix(".")
 
 
 def shown(value: object) -> str:
-    """A value as text of at most 80 characters, on one line."""
+    """Returns a value as text of at most 80 characters, on one line."""
     if isinstance(value, int) and not isinstance(value, bool) and abs(value) >= 10**_LONGEST:
         return "a whole number of more than 80 digits"
     if isinstance(value, Mapping | list | tuple):
@@ -74,9 +74,8 @@ def shown(value: object) -> str:
 
 
 def from_pydantic(error: ValidationError, data: Mapping[str, Any]) -> list[Problem]:
-    """The errors of ``error`` under the keys of ``data``, without pydantic's own words where ours are clearer.
-
-    At most a hundred, since looking for a similar name takes time.
+    """Returns the errors of ``error`` under the keys of ``data``, in our own words where they are clearer. At most a
+    hundred, since the search for similar names takes time.
     """
     details = error.errors(include_url=False, include_context=True)
     places = [detail["loc"] for detail in details]
@@ -85,7 +84,7 @@ def from_pydantic(error: ValidationError, data: Mapping[str, Any]) -> list[Probl
 
 
 def _follows_from_others(detail: ErrorDetails, places: Iterable[Location]) -> bool:
-    """A list whose entries are in error is called too short as well; ``places``: of all errors."""
+    """Whether pydantic reports a list as too short only because its entries are in error; ``places``: of all errors."""
     own = detail["loc"]
     return detail["type"] == "too_short" and any(len(other) > len(own) and other[: len(own)] == own for other in places)
 
@@ -142,7 +141,7 @@ def _list_wanted(location: Location, lengths: set[int]) -> str:
 
 
 def _written(location: Location, data: Any) -> Location:
-    """The location without the union tags that pydantic puts in it."""
+    """Returns the location without the union tags that pydantic adds."""
     kept: list[int | str] = []
     for item in location:
         if isinstance(data, Mapping) and item in _values(data):
@@ -167,12 +166,12 @@ def _step(data: Any, item: int | str) -> Any:
 
 
 def _keys(location: Location) -> list[str]:
-    """The keys that the model at a pydantic location knows."""
+    """Returns the keys of the model at a pydantic location."""
     return sorted({key for model in _models_at(location) for key in model.model_fields})
 
 
 def _lengths(location: Location) -> set[int]:
-    """How long a list at a pydantic location may be; none where the list is as long as one likes."""
+    """Returns the largest length of a list at a pydantic location; None without a limit."""
     fields = [
         model.model_fields[str(location[-1])]
         for model in _models_at(location[:-1])
@@ -183,7 +182,7 @@ def _lengths(location: Location) -> set[int]:
 
 
 def _tags(location: Location) -> list[str]:
-    """The values that the discriminator of the union at a pydantic location may have."""
+    """Returns the values that the discriminator of the union at a pydantic location can have."""
     return [tag for model in _models_at(location) for tag in _tags_of(model)]
 
 
@@ -195,7 +194,7 @@ def _tags_of(model: type[BaseModel]) -> Iterator[str]:
 
 
 def _models_at(location: Location) -> list[type[BaseModel]]:
-    """The models that may stand at a pydantic location (several for a union that has not been decided)."""
+    """Returns the models that are possible at a pydantic location (several for a union that is not decided)."""
     models: list[type[BaseModel]] = [Case]
     named = False
     for item in location:

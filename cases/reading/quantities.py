@@ -1,4 +1,4 @@
-"""The unit of every number that a run measures, and the reading of ``[[reference]]`` values in it."""
+"""The unit of every measured number of a run, and the reading of ``[[reference]]`` values."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -20,29 +20,30 @@ FIELD_UNITS: dict[str, str] = {
     "centre_velocity_z": "m/s", "residual_velocity": "m/s", "residual_mass": "kg", "fragment_velocity": "m/s",
     "fragment_mass": "kg", "penetration": "m", "hole_diameter": "m", "hole_width": "m", "cone_angle": "",
 }  # fmt: skip
-"""Unit of every field that a probe reads."""
+"""Unit of every field of a probe."""
 
 QUANTITY_UNITS: dict[str, str] = {
     "extent": "m", "radius": "m", "plastic_strain_max": "", "temperature_max": "K", "speed_mean": "m/s",
     "stress_max": "Pa", "contact_time": "s", "contact_loss": "", "penetration": "m", "worst_residual": "",
 }  # fmt: skip
-"""Unit of every reference quantity that does not read a probe."""
+"""Unit of every reference quantity that does not use a probe."""
 
 
 def unit_of(quantity: str, field: str | None = None) -> str:
-    """The unit of a reference quantity; ``field`` is that of its probe. Raises KeyError for an unknown one."""
+    """Returns the unit of a reference quantity; ``field``: field of its probe. Raises KeyError for an unknown one."""
     return FIELD_UNITS[field or ""] if quantity.startswith("probe_") else QUANTITY_UNITS[quantity]
 
 
 def unit_of_reference(data: Mapping[str, Any], location: Location) -> str:
-    """The unit of ``value`` or ``tolerance`` of a reference of a valid case, at ``("reference", 0, "value")``."""
+    """Returns the unit of ``value`` or ``tolerance`` of a reference of a valid case, at ``("reference", 0,
+    "value")``."""
     return _unit(data["reference"][location[1]], data)
 
 
 def read_references(data: Mapping[str, Any]) -> tuple[dict[str, Any], list[Problem]]:
-    """``data`` with values and tolerances such as ``"21.47 mm"`` turned into SI, and what could not be read.
+    """Returns ``data`` with values and tolerances such as ``"21.47 mm"`` in SI units, and the errors.
 
-    What cannot be read is replaced by 1.0, so that each problem is told once.
+    A value that cannot be read is replaced by 1.0, so that each error is reported once.
     """
     listed = data.get("reference")
     if not isinstance(listed, Sequence) or isinstance(listed, str):

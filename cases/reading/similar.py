@@ -1,18 +1,19 @@
-"""Names near a misspelt one, for the end of a message."""
+"""Names similar to a misspelt one, for the end of a message."""
 
 import difflib
 from collections.abc import Iterable
 
 _LONGEST = 80
-"""Characters of a word that are compared. Chosen: more than any name has that is known."""
+"""Characters of a word that are compared. Chosen: more than any allowed name has."""
 _CUTOFF, _MOST = 0.6, 3
-"""Likeness from which on a name is near (difflib's own), and how many are told. Chosen."""
+"""Similarity from which a name is suggested (default of difflib), and number of suggestions. Chosen."""
 _PART = 3
-"""Letters of a name that have to be written to mean it. Chosen: fewer are in too many names."""
+"""Smallest number of letters that suggest a name by its start. Chosen: fewer are in too many names."""
 
 
 def close(word: str, known: Iterable[str]) -> list[str]:
-    """Names that may have been meant, the likeliest first: capitals, blanks, ``-`` and ``_`` make no difference."""
+    """Returns the names that may be meant, the most similar first: capitals, blanks, ``-`` and ``_`` make no
+    difference."""
     names: dict[str, str] = {}
     for name in known:
         names.setdefault(_plain(name), name)
@@ -23,26 +24,27 @@ def close(word: str, known: Iterable[str]) -> list[str]:
 
 
 def meant(word: object, known: Iterable[str]) -> str:
-    """``; did you mean 'mises'?`` for the end of a message that has the known names; nothing where none is near."""
+    """Returns ``; did you mean 'mises'?`` for the end of a message that lists the allowed names; empty without a
+    similar one."""
     found = close(word, known) if isinstance(word, str) else []
     return f"; {_asked(found)}" if found else ""
 
 
 def allowed(word: object, known: Iterable[str]) -> str:
-    """``allowed: mises, pressure; did you mean 'mises'?`` for the end of a message."""
+    """Returns ``allowed: mises, pressure; did you mean 'mises'?`` for the end of a message."""
     names = list(known)
     return f"allowed: {', '.join(names) or 'none'}{meant(word, names)}"
 
 
 def nearest(word: str, known: Iterable[str]) -> str:
-    """``did you mean 'radius'?`` or the list of the known names, for the end of a message."""
+    """Returns ``did you mean 'radius'?``, or the list of allowed names, for the end of a message."""
     names = list(dict.fromkeys(known))
     found = close(word, names)
     return _asked(found) if found else f"known: {choices(names)}"
 
 
 def choices(names: Iterable[str]) -> str:
-    """``'a', 'b'``: the allowed words, in the order given."""
+    """Returns the allowed words as ``'a', 'b'``, in the order given."""
     return ", ".join(repr(name) for name in names) or "none"
 
 

@@ -1,4 +1,5 @@
-"""What the mesh files of a case hold: read by a program of the worker, told to whoever checks the case."""
+"""The survey of the mesh files of a case, made by a program of the worker, for the checks and the estimate of the
+case."""
 
 import importlib.util
 from pathlib import Path
@@ -12,30 +13,30 @@ from ..shapes.placed import Bulk
 from ..warnings.touching import Touch
 
 PROGRAM = "conoid.worker.scene.survey"
-"""The program that reads mesh files, one case a process."""
+"""The program that reads mesh files, one process per case."""
 
 
 def installed() -> bool:
-    """Whether it can be started here."""
+    """Whether the program can be started on this machine."""
     return all(importlib.util.find_spec(name) is not None for name in ("conoid.worker", "numpy"))
 
 
 class Question(msgspec.Struct, kw_only=True, frozen=True):
-    """A case, as plain data, and the folder in which relative paths of its mesh files start."""
+    """A case, as plain data, and the folder to which the paths of its mesh files are relative."""
 
     case: dict[str, Any]
     folder: str
 
 
 class Surveyed(msgspec.Struct, kw_only=True, frozen=True):
-    """One part whose mesh is from a file, where it is at the start. SI units."""
+    """One part with a mesh from a file, in its initial place. SI units."""
 
     part: int
-    """Its number in the case."""
+    """Index of the part in the case."""
     elements: int
     nodes: int
     faces: int
-    """Of its surface."""
+    """Number of nodes of its surface."""
     step_length: float
     """Smallest 1 / sqrt(sum |grad N|^2) of its tets, m."""
     altitude: float
@@ -43,53 +44,54 @@ class Surveyed(msgspec.Struct, kw_only=True, frozen=True):
     mass: float
     low: Vector
     high: Vector
-    """Corners of the box round it."""
+    """Corners of its bounding box."""
     momentum: Vector
     energy: float
-    """Kinetic, without jitter."""
+    """Kinetic energy, without jitter."""
     speed: float
-    """The largest of a node."""
+    """Largest speed of a node."""
     notes: list[str]
-    """What of the file is not in the mesh, or is taken otherwise than one might think."""
+    """Contents of the file that are not in the mesh, or are interpreted in an unusual way."""
 
     @property
     def bulk(self) -> Bulk:
-        """What it brings along, as of a part that is generated."""
+        """Mass, bounding box, momentum, energy and speed of the part, as of a generated one."""
         return Bulk(self.mass, self.low, self.high, self.momentum, self.energy, self.speed)
 
 
 class Survey(msgspec.Struct, kw_only=True, frozen=True):
-    """What the mesh files of a case hold, and every reason why a run of it would be refused, a line each."""
+    """The contents of the mesh files of a case, and every reason for which a run of it would be refused, a line
+    each."""
 
     parts: list[Surveyed] = []
     loads: list[Load] = []
-    """Of the tractions and prescribed velocities that are for parts from mesh files alone."""
+    """Loads of tractions and prescribed velocities that act on parts from mesh files only."""
     refused: list[str] = []
     touching: list[Touch] = []
-    """Of the pairs of parts at least one of which has a mesh from a file."""
+    """Pairs of touching parts, at least one of which has a mesh from a file."""
     told: list[str] = []
-    """Warnings that the meshes themselves give rise to, a line each, as a run gives them."""
+    """Warnings about the meshes, a line each, as a run gives them."""
 
     def of(self, part: int) -> Surveyed | None:
-        """What is known of part ``part``; None where its mesh is generated, or was not read."""
+        """Returns the survey of part ``part``; None where its mesh is generated, or was not read."""
         return next((each for each in self.parts if each.part == part), None)
 
 
 def question(case: dict[str, Any], folder: Path) -> bytes:
-    """What the program reads on its standard input."""
+    """Returns the standard input of the program."""
     return msgspec.json.encode(Question(case=case, folder=str(folder.resolve())))
 
 
 def read_question(data: bytes) -> Question:
-    """The same, read. Raises msgspec.MsgspecError."""
+    """Reads the standard input of the program. Raises msgspec.MsgspecError."""
     return msgspec.json.decode(data, type=Question)
 
 
 def to_json(survey: Survey) -> bytes:
-    """What the program writes on its standard output."""
+    """Returns the standard output of the program."""
     return msgspec.json.encode(survey)
 
 
 def from_json(data: bytes) -> Survey:
-    """The same, read. Raises msgspec.MsgspecError."""
+    """Reads the standard output of the program. Raises msgspec.MsgspecError."""
     return msgspec.json.decode(data, type=Survey)

@@ -1,4 +1,5 @@
-"""Files that are there whole or not at all, and files that somebody else may have put there."""
+"""Reading and writing of complete files: atomic replacement, and safe opening of files that another user may have
+placed."""
 
 import errno
 import os
@@ -9,17 +10,18 @@ from io import BytesIO, FileIO, TextIOWrapper
 from pathlib import Path
 
 MOST = 256 << 20
-"""Bytes of a file that is read as a whole. Chosen: a case, an outcome and a manifest have some MB at most."""
+"""Largest size of a file that is read as a whole, bytes. Chosen: a case, an outcome and a manifest have some MB at
+most."""
 _NO_LINK = getattr(os, "O_NOFOLLOW", 0)
 _AT_ONCE = getattr(os, "O_NONBLOCK", 0)
-"""A pipe that nobody writes to is opened without waiting."""
+"""Flags with which a pipe without a writer is opened without blocking."""
 _NO_FILE = frozenset({errno.ELOOP, errno.ENXIO, errno.ENODEV, errno.EOPNOTSUPP})
-"""What open(2) says of a link to itself, of a socket, and of a device without a driver."""
+"""Errors of open(2) for a link to itself, a socket, and a device without a driver."""
 
 
 @contextmanager
 def named(path: str | Path) -> Iterator[None]:
-    """An OSError of the block names ``path`` where it names no file: write(2) and fsync(2) know none."""
+    """Adds ``path`` to an OSError of the block without a file name: write(2) and fsync(2) do not set it."""
     try:
         yield
     except OSError as error:
@@ -29,8 +31,8 @@ def named(path: str | Path) -> Iterator[None]:
 
 
 def write(path: Path, content: bytes, mode: int = 0o644) -> None:
-    """Written beside, flushed to disk, renamed; what a full disk cuts off is removed. Raises OSError, also where a link
-    lies beside.
+    """Replaces a file atomically: writes beside it, flushes to disk, renames; removes an incomplete file. Raises
+    OSError, also where a link lies beside it.
     """
     beside = path.with_name(f"{path.name}.part")
     flags = os.O_WRONLY | os.O_CREAT | os.O_TRUNC | _NO_LINK
@@ -47,16 +49,16 @@ def write(path: Path, content: bytes, mode: int = 0o644) -> None:
 
 
 def touch(path: Path) -> None:
-    """An empty file, where there is none. Raises OSError, also for a link, whose target is left alone."""
+    """Creates an empty file if there is none. Raises OSError, also for a link, whose target is not changed."""
     os.close(os.open(path, os.O_WRONLY | os.O_CREAT | _NO_LINK | _AT_ONCE, 0o666))
 
 
 def opened(path: str | Path, *, folder: int | None = None, links: bool = True) -> FileIO:
-    """A regular file, unbuffered, to read; ``folder``: the descriptor of the directory that ``path`` is relative to;
-    ``links``: whether the file may be a symbolic link.
+    """Opens a regular file for reading, unbuffered.
 
-    A pipe, a socket or a device would keep the reader waiting, or never end: each is refused as a directory is, with
-    IsADirectoryError. Raises OSError.
+    ``folder``: descriptor of the directory to which ``path`` is relative; ``links``: whether the file may be a
+    symbolic link. A pipe, a socket or a device could block the reader, or never end: each is refused like a
+    directory, with IsADirectoryError. Raises OSError.
     """
     try:
         handle = os.open(path, os.O_RDONLY | os.O_CLOEXEC | _AT_ONCE | (0 if links else _NO_LINK), dir_fd=folder)
@@ -66,9 +68,8 @@ def opened(path: str | Path, *, folder: int | None = None, links: bool = True) -
 
 
 def appended(path: str | Path, mode: int = 0o666) -> FileIO:
-    """A regular file, unbuffered, to read and to append to; made where there is none.
-
-    Raises IsADirectoryError for a pipe, a socket or a device, OSError.
+    """Opens a regular file, unbuffered, for reading and appending; creates it if there is none. Raises
+    IsADirectoryError for a pipe, a socket or a device, OSError.
     """
     try:
         handle = os.open(path, os.O_RDWR | os.O_APPEND | os.O_CREAT | os.O_CLOEXEC | _AT_ONCE, mode)
@@ -85,8 +86,9 @@ def _regular(handle: int, path: str | Path, mode: str) -> FileIO:
 
 
 def read(path: str | Path, most: int = MOST, *, links: bool = True) -> bytes:
-    """The bytes of a regular file that has at most ``most``; ``links`` as for ``opened``. Raises IsADirectoryError for
-    anything else, OSError.
+    """Returns the bytes of a regular file of at most ``most`` bytes; ``links`` as for ``opened``.
+
+    Raises IsADirectoryError for anything else, OSError.
     """
     with opened(path, links=links) as file:
         left = _size(file, path, most)
@@ -98,12 +100,12 @@ def read(path: str | Path, most: int = MOST, *, links: bool = True) -> bytes:
 
 
 def read_text(path: str | Path) -> str:
-    """The text, in UTF-8, of such a file; line ends become line feeds. Raises UnicodeDecodeError besides."""
+    """Returns the text of such a file in UTF-8, with line feeds as line ends. Raises UnicodeDecodeError besides."""
     return TextIOWrapper(BytesIO(read(path)), encoding="utf-8").read()
 
 
 def check(path: str | Path, most: int = MOST) -> None:
-    """Raises what ``read`` would raise."""
+    """Raises the errors that ``read`` would raise."""
     with opened(path) as file:
         _size(file, path, most)
 
