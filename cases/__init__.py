@@ -1,1 +1,2 @@
-"""The contract: what a case is, what a run says, what a run leaves. Standard library, pydantic and msgspec only."""
+"""The contract between client, server and worker: models of a case, messages of a run, files of a run. Uses the
+standard library, pydantic and msgspec only."""

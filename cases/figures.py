@@ -1,4 +1,4 @@
-"""Numbers and times as people read them: ``33.7 µs``, ``1.24 M``, ``2 min 05 s``. The only module that words them.
+"""Numbers and times in words for users: ``33.7 µs``, ``1.24 M``, ``2 min 05 s``. All houses use this module.
 
 ``client/web/figures.js`` does the same for the page; ``tests/figures.json`` has inputs and texts that hold for both.
 """
@@ -9,11 +9,11 @@ from datetime import datetime
 from decimal import ROUND_HALF_UP, Decimal
 
 _Ladder = Sequence[tuple[float, str]]
-"""Factors and the units that they make, from the largest: a value gets the first one whose factor it reaches."""
+"""Factors and their units, the largest first: a value gets the first one whose factor it reaches."""
 _UP: _Ladder = ((1e12, "T"), (1e9, "G"), (1e6, "M"), (1e3, "k"))
 _DOWN: _Ladder = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"), (1e-12, "p"))
 _PREFIXED = ("m", "g", "J", "Pa", "N", "W", "B", "Hz", "m/s", "N s", "N m", "J/m^2", "B/s")
-"""Units that take every prefix of SI. What is not here takes none: it has one already, or a power, or is no unit."""
+"""Units that accept every SI prefix. Other units have a prefix already, or a power, or are no units."""
 _LADDERS: dict[str, _Ladder] = {
     **{unit: [(factor, prefix + unit) for factor, prefix in (*_UP, *_DOWN)] for unit in _PREFIXED},
     "s": [(factor, f"{prefix}s") for factor, prefix in _DOWN],
@@ -22,65 +22,67 @@ _LADDERS: dict[str, _Ladder] = {
     "m^3": [(1e-3, "m^3"), (1e-12, "mm^3"), (1e-18, "µm^3")],
 }
 _WORTH = {"m^2": 1.0, "mm^2": 1e-6, "µm^2": 1e-12, "m^3": 1.0, "mm^3": 1e-9, "µm^3": 1e-18}
-"""Of a unit whose factor in its ladder is only the value from which on it is used."""
+"""Threshold, not factor, of some units in these tables: the value from which the unit is used."""
 _PLAIN = 1e-3, 5
-"""A number is written without a power of ten from here on, below so many digits before the point. Chosen."""
+"""Exponents between which a number is written without a power of ten: at most so many digits before the point.
+Chosen."""
 _MOST = 1e12
-"""From which on a whole number is written with its power of ten. Chosen: nobody reads five groups of digits."""
+"""Value from which a whole number is written with a power of ten. Chosen: five groups of digits are hard to read."""
 _MOST_HOURS = 10_000
-"""From which on minutes are left out. Chosen: a year."""
+"""Value from which minutes are omitted. Chosen: a year."""
 UNKNOWN = "–"
-"""What is written for a number that is not known."""
+"""Text of an unknown number."""
 
 
 # Numbers with a unit --------------------------------------------------------------------------------------------------
 
 
 def si(value: float | None, unit: str = "", digits: int = 3) -> str:
-    """``value`` with ``digits`` significant digits and its unit, which gets the prefix of SI that fits where it takes
-    one; without a unit there is no prefix. A dash when it is not known.
+    """Returns ``value`` with ``digits`` significant digits and its unit, with a fitting SI prefix if the unit
+    accepts one; a number without a unit has no prefix. A dash for an unknown value.
     """
     return alike([value], unit, digits)[0]
 
 
 def exact(value: float | None, unit: str = "", digits: int = 6) -> str:
-    """Likewise, without zeros at the end."""
+    """As ``si``, without zeros at the end."""
     return _trimmed(si(value, unit, digits))
 
 
 def alike(values: Iterable[float | None], unit: str = "", digits: int = 3) -> list[str]:
-    """Values that belong together, such as a column of a table: all have the prefix of the largest magnitude."""
+    """Returns the texts of values that belong together, such as a column of a table: all have the prefix of the
+    largest magnitude."""
     known = [math.nan if value is None else float(value) for value in values]
     worth, name = _unit(known, unit, digits)
     return [_with(_number(value / worth, digits), name) if not math.isnan(value) else UNKNOWN for value in known]
 
 
 def exacts(values: Iterable[float | None], unit: str = "", digits: int = 6) -> list[str]:
-    """Likewise, without zeros at the end."""
+    """As ``si_all``, without zeros at the end."""
     return [_trimmed(text) for text in alike(values, unit, digits)]
 
 
 def vector(values: Iterable[float | None], unit: str = "", digits: int = 3, between: str = ", ") -> str:
-    """Components that belong together, with their unit once: ``1, 200 mm``."""
+    """Returns the components of a vector, with their unit once: ``1, 200 mm``."""
     return vectors([values], unit, digits, between)[0]
 
 
 def vectors(rows: Iterable[Iterable[float | None]], unit: str = "", digits: int = 3, between: str = ", ") -> list[str]:
-    """Likewise of several, such as a column of a table: all have one prefix."""
+    """Returns the texts of several vectors, such as a column of a table: all have the same prefix."""
     known = [[math.nan if value is None else float(value) for value in row] for row in rows]
     worth, name = _unit([value for row in known for value in row], unit, digits)
     return [_with(between.join(_trimmed(_number(value / worth, digits)) for value in row), name) for row in known]
 
 
 def large(value: float | None) -> str:
-    """A number without a unit, with k, M, G or T where it is large: ``1.24 M``. Never with a small prefix."""
+    """Returns a number without a unit, with k, M, G or T if large: ``1.24 M``. Never with a small prefix."""
     known = math.nan if value is None else float(value)
     worth, name = _step(abs(known), (*_UP, (1.0, "")), 3)
     return _with(_number(known / worth, 3), name)
 
 
 def _unit(values: Sequence[float], unit: str, digits: int) -> tuple[float, str]:
-    """What the unit of all values is worth, and its name."""
+    """Returns the factor of the unit of all values, and its name."""
     most = max((abs(value) for value in values if math.isfinite(value)), default=0.0)
     if unit not in _LADDERS or most == 0.0:
         return 1.0, unit
@@ -89,7 +91,7 @@ def _unit(values: Sequence[float], unit: str, digits: int) -> tuple[float, str]:
 
 
 def _step(most: float, ladder: _Ladder, digits: int) -> tuple[float, str]:
-    """The first step that ``most`` reaches when it is rounded; the last where it reaches none."""
+    """Returns the first step that ``most`` reaches after rounding; the last one if it reaches none."""
     return next((step for step in ladder if most >= step[0] * (1.0 - 0.5 * 10.0**-digits)), ladder[-1])
 
 
@@ -101,30 +103,31 @@ def _with(text: str, unit: str) -> str:
 
 
 def number(value: float | None) -> str:
-    """Six significant digits, for tables; a dash when it is not known."""
+    """Returns six significant digits, for tables; a dash for an unknown value."""
     return exact(value)
 
 
 def rough(value: float | None) -> str:
-    """Two significant digits and the power of ten, for residuals; a dash when it is not known."""
+    """Returns two significant digits and the power of ten, for residuals; a dash for an unknown value."""
     if value is None or not math.isfinite(value) or value == 0.0:
         return _number(math.nan if value is None else value, 2)
     return _power(value, 2)
 
 
 def fixed(value: float | None, decimals: int = 2) -> str:
-    """So many decimals, for ratios; a dash when it is not known."""
+    """Returns a fixed number of decimals, for ratios; a dash for an unknown value."""
     return UNKNOWN if value is None or not math.isfinite(value) else _fixed(value, decimals)
 
 
 def percent(share: float | None, decimals: int = 1) -> str:
-    """``12.3 %`` of a share."""
+    """Returns a share as ``12.3 %``."""
     text = fixed(None if share is None else 100.0 * share, decimals)
     return text if text == UNKNOWN else f"{text} %"
 
 
 def count(value: float | None) -> str:
-    """A whole number with spaces between thousands: ``12 400``, from 10^12 on ``2.40e21``; a dash when not known."""
+    """Returns a whole number with spaces between thousands: ``12 400``, from 10^12 on ``2.40e21``; a dash for an
+    unknown value."""
     if value is None or not math.isfinite(value):
         return UNKNOWN
     if abs(value) >= _MOST:
@@ -133,7 +136,7 @@ def count(value: float | None) -> str:
 
 
 def counted(value: float | None, noun: str, plural: str = "") -> str:
-    """``1 fragment``, ``12 400 fragments``; ``plural`` where it is not the noun with an s."""
+    """Returns ``1 fragment``, ``12 400 fragments``; ``plural`` if it is not the noun with an s."""
     return f"{count(value)} {noun if value == 1 else plural or f'{noun}s'}"
 
 
@@ -143,12 +146,12 @@ def crew(ranks: int, threads: int = 1) -> str:
 
 
 def size(value: float | None) -> str:
-    """Bytes: ``38.2 GB``."""
+    """Returns a number of bytes: ``38.2 GB``."""
     return si(value, "B")
 
 
 def _number(value: float, digits: int) -> str:
-    """``digits`` significant digits, with a power of ten where the number is very small or large (_PLAIN)."""
+    """Returns ``digits`` significant digits, with a power of ten for very small or large numbers (_PLAIN)."""
     if not math.isfinite(value):
         return UNKNOWN if math.isnan(value) else "∞" if value > 0 else "-∞"
     if value == 0.0:
@@ -160,7 +163,7 @@ def _number(value: float, digits: int) -> str:
 
 
 def _fixed(value: float, decimals: int) -> str:
-    """Rounded half away from zero, as the page does it."""
+    """Rounds half away from zero, as JavaScript's toFixed on the page."""
     if abs(value) >= 1e20:
         return _power(value, 3)
     text = f"{Decimal(value).quantize(Decimal(1).scaleb(-decimals), ROUND_HALF_UP):f}"
@@ -178,13 +181,13 @@ def _power(value: float, digits: int) -> str:
 
 
 def _trimmed(text: str) -> str:
-    """Without zeros behind the point at the end of the number."""
+    """Removes zeros behind the point at the end of the number."""
     digits, power, unit = _parts(text)
     return f"{digits.rstrip('0').rstrip('.') if '.' in digits else digits}{power}{unit}"
 
 
 def _parts(text: str) -> tuple[str, str, str]:
-    """Digits, the power of ten with its e, the unit with its space."""
+    """Returns the digits, the power of ten with its e, and the unit with its space."""
     shown, space, unit = text.partition(" ")
     digits, e, power = shown.partition("e")
     return digits, e + power, space + unit
@@ -194,7 +197,7 @@ def _parts(text: str) -> tuple[str, str, str]:
 
 
 def duration(seconds: float | None) -> str:
-    """Wall time: ``0.4 s``, ``42 s``, ``2 min 05 s``, ``3 h 04 min``; a dash when it is not known."""
+    """Returns a wall time: ``0.4 s``, ``42 s``, ``2 min 05 s``, ``3 h 04 min``; a dash for an unknown value."""
     if seconds is None or not math.isfinite(seconds) or seconds < 0:
         return UNKNOWN
     if seconds < 9.95:
@@ -210,17 +213,17 @@ def duration(seconds: float | None) -> str:
 
 
 def clock(wall: float) -> str:
-    """The time of day of a Unix time, in the local zone: ``14:03:27``."""
+    """Returns the time of day of a Unix time, in the local zone: ``14:03:27``."""
     return _moment(wall, "%H:%M:%S")
 
 
 def day(wall: float) -> str:
-    """Date and time of a Unix time, in the local zone: ``21 Nov 14:03``, of another year ``2025-11-21``."""
+    """Returns date and time of a Unix time, in the local zone: ``21 Nov 14:03``, of another year ``2025-11-21``."""
     return _moment(wall, "%d %b %H:%M" if _moment(wall, "%Y") == f"{datetime.now().year}" else "%Y-%m-%d")
 
 
 def _moment(wall: float, form: str) -> str:
-    """A dash for a time that no calendar has."""
+    """Returns a dash for a time outside the calendar."""
     try:
         return datetime.fromtimestamp(wall).strftime(form)
     except (OverflowError, OSError, ValueError):

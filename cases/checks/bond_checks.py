@@ -1,4 +1,4 @@
-"""What the models cannot check one by one in bonds: parts that must be there, keys that go together, meshes."""
+"""Checks of bonds that the models cannot make: existing parts, keys that need each other, meshes."""
 
 from collections.abc import Iterator
 
@@ -13,13 +13,13 @@ from ..reading.similar import choices, nearest
 
 
 def check_bonds(case: Case) -> Iterator[Problem]:
-    """Every problem of the bonds of a case."""
+    """Yields every problem of the bonds of a case."""
     found = list(_each(case))
     yield from found or (*_wearing(case), *_pulled(case))
 
 
 def _each(case: Case) -> Iterator[Problem]:
-    """Those of one bond, or of two of the same parts."""
+    """Yields the problems of one bond, and of two bonds of the same parts."""
     parts = {part.name: part for part in case.parts}
     for i, bond in enumerate(case.bond):
         location: Location = ("bond", i)
@@ -38,7 +38,7 @@ def _each(case: Case) -> Iterator[Problem]:
 
 
 def _wearing(case: Case) -> Iterator[Problem]:
-    """Parts that erode in a body of which another part breaks."""
+    """Yields a problem for parts that erode in a body with another part that fractures."""
     breaks = breakable(case)
     for k, _, one, other in shared_bonds(case):
         worn = [case.parts[i].name for i in (one, other) if case.parts[i].erosion is not None and breaks[i]]
@@ -51,7 +51,8 @@ def _wearing(case: Case) -> Iterator[Problem]:
 
 
 def _pulled(case: Case) -> Iterator[Problem]:
-    """Gravity on some parts of a body alone: a node of the interface has one acceleration for all of its mass."""
+    """Yields a problem for gravity on a part of a body only: a node of the interface has one acceleration for all of
+    its mass."""
     body = bodies(case)
     for k, spec in enumerate(case.boundaries):
         if isinstance(spec, Gravity) and spec.parts:
@@ -90,7 +91,7 @@ def _twice(case: Case, number: int) -> Iterator[Problem]:
 
 
 def _meshes(one: Part, other: Part, breaks: bool, location: Location) -> Iterator[Problem]:
-    """Parts whose meshes cannot have nodes in common, or that cannot come apart."""
+    """Yields a problem for parts whose meshes cannot have common nodes, or that cannot separate."""
     names, pair = f"{one.name}, {other.name}", (one.mesh, other.mesh)
     way = "set kind = 'tied'"
     loose = [part.name for part in (one, other) if isinstance(part.mesh, Loose)]

@@ -1,4 +1,5 @@
-"""What the models cannot check of boundaries: parts that must exist, boxes that hold something, walls in front."""
+"""Checks of boundaries that the models cannot make: existing parts, boxes that contain something, walls in front of
+parts."""
 
 import itertools
 import math
@@ -17,12 +18,12 @@ from ..warnings.idle import idle
 from .drives import clash
 
 ROUNDING = 1e-9
-"""Of a length or a time: two numbers that agree to this were meant to be equal. Chosen far above the rounding of
-units (1e-16) and far below any tolerance of a drawing."""
+"""Relative tolerance of two lengths or times that are meant to be equal. Chosen: far above the rounding of units
+(1e-16) and far below any tolerance of a drawing."""
 
 
 def check_boundaries(case: Case) -> Iterator[Problem]:
-    """Problems of the boundaries of a case, in the order of their keys."""
+    """Yields the problems of the boundaries of a case, in the order of their keys."""
     names = [part.name for part in case.parts]
     for i, boundary in enumerate(case.boundaries):
         for j, name in enumerate(boundary.parts):
@@ -39,8 +40,8 @@ def check_boundaries(case: Case) -> Iterator[Problem]:
 
 
 def _out_of_reach(case: Case, number: int) -> Iterator[Problem]:
-    """A plane or a box off all bodies that it is for, and a traction inside of them; what lies between nodes of a body
-    the worker finds.
+    """Yields a problem for a plane or a box outside of all its bodies, and for a traction inside of them; the worker
+    checks boxes between the nodes of a body.
     """
     boundary = case.boundaries[number]
     parts = [part for part in case.parts if not boundary.parts or part.name in boundary.parts]
@@ -86,7 +87,7 @@ def _meet(box: list[tuple[float, float]], body: tuple[Vector, Vector]) -> bool:
 
 
 def _surrounds(body: Placed, box: list[tuple[float, float]]) -> bool:
-    """Whether a box lies in a body, as far as its corners tell: they do where it has neither hole nor slit."""
+    """Whether a box lies in a body, tested at its corners, which is exact for bodies without hole and slit."""
     if isinstance(body.mesh, Tube) or (isinstance(body.mesh, Box | Plate) and body.mesh.slit is not None):
         return False
     first, second, third = box
@@ -94,7 +95,7 @@ def _surrounds(body: Placed, box: list[tuple[float, float]]) -> bool:
 
 
 def _comes(case: Case, part: Part, axis: int, way: float) -> bool:
-    """Whether a part moves along ``axis`` to where it comes by going the ``way``, m, as far as that can be said."""
+    """Whether a part moves along ``axis`` to its target by the displacement ``way``, m, as far as that is known."""
     pulls = [boundary.acceleration[axis] for boundary in case.boundaries if isinstance(boundary, Gravity)]
     unknown = part.spin is not None or part.stretch is not None or part.jitter > 0.0
     driven = any(isinstance(boundary, Prescribed | Rotation | Traction) for boundary in case.boundaries)
@@ -102,7 +103,7 @@ def _comes(case: Case, part: Part, axis: int, way: float) -> bool:
 
 
 def _two_drives(case: Case) -> Iterator[Problem]:
-    """Two boundaries that drive the whole of a part, each in its own way; the worker looks at the nodes of boxes."""
+    """Yields a problem for two boundaries that drive a whole part differently; the worker checks the nodes of boxes."""
     drives = [(i, each) for i, each in enumerate(case.boundaries) if isinstance(each, Rotation) or _whole(each)]
     drives = [(i, each) for i, each in drives if getattr(each, "on", None) is None]
     names = [part.name for part in case.parts]
@@ -164,14 +165,14 @@ def _box(boundary: Prescribed | Traction, location: Location) -> Iterator[Proble
 
 
 def ordered(low: tuple[float, ...], high: tuple[float, ...], location: Location) -> Iterator[Problem]:
-    """Corners of a box of which ``high`` is below ``low``."""
+    """Yields a problem for corners of a box of which ``high`` is below ``low``."""
     for d, (a, b) in enumerate(zip(low, high, strict=True)):
         if a > b:
             yield problem((*location, "high", d), b, f"must not be below low[{d}], {a}")
 
 
 def check_walls(case: Case) -> Iterator[Problem]:
-    """Walls of one name, without a normal, or in front of which a part does not start."""
+    """Yields a problem for walls of the same name, without a normal, or with a part behind them at the start."""
     walls = [(i, boundary) for i, boundary in enumerate(case.boundaries) if isinstance(boundary, Wall)]
     seen: set[str] = set()
     for i, wall in walls:
@@ -185,7 +186,7 @@ def check_walls(case: Case) -> Iterator[Problem]:
 
 
 def _shape(wall: Wall, location: Location) -> Iterator[Problem]:
-    """Keys of a wall that its shape needs, or does not have."""
+    """Yields the keys of a wall that its shape needs, or does not have."""
     needed = {"plane": ("normal",), "cylinder": ("axis", "radius"), "sphere": ("radius",)}[wall.shape]
     for key in ("normal", "axis", "radius"):
         value = getattr(wall, key)

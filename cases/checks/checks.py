@@ -1,4 +1,5 @@
-"""What the models cannot check one by one: names that must exist, sizes that must fit, planes that must be there."""
+"""Checks between the keys of a case, which the models cannot make: existing names, sizes that fit, needed planes of
+symmetry."""
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -40,13 +41,13 @@ NEEDED: dict[str, frozenset[str]] = {
     "penetration": frozenset({"part", "axis"}),
     "worst_residual": frozenset(),
 }
-"""The keys that each reference quantity needs; the others of part, probe and axis are refused."""
+"""Keys that each reference quantity needs; the others of part, probe and axis are refused."""
 
 Read = TypeVar("Read", bound=BaseModel)
 
 
 def check(case: Case) -> list[Problem]:
-    """Every cross-field problem of a case, in the order of its keys."""
+    """Yields every problem between keys of a case, in the order of its keys."""
     checks: tuple[Callable[[Case], Iterable[Problem]], ...] = (
         _materials, _parts, _overlaps, _sectors, check_boundaries, check_ons, check_walls, check_bonds, check_rigid,
         _contact, check_probes, _fields, _references,
@@ -55,7 +56,7 @@ def check(case: Case) -> list[Problem]:
 
 
 def check_parts(data: Mapping[str, Any]) -> Iterator[Problem]:
-    """What can be said of the parts of a case whose other keys are wrong: materials, sizes, overlap."""
+    """Yields the problems of the parts of a case with errors in other keys: materials, sizes, overlap."""
     listed, own = data.get("parts"), data.get("materials")
     known = {*library(), *(own if isinstance(own, Mapping) else ())}
     parts: list[tuple[int, Part]] = []
@@ -73,7 +74,7 @@ def check_parts(data: Mapping[str, Any]) -> Iterator[Problem]:
 
 
 def _tied(bonds: object) -> dict[frozenset[str], float]:
-    """The names that bonds name: how far these overlap is asked once the case is read."""
+    """Names in bonds: their overlap is checked after the case has been read."""
     listed = bonds if isinstance(bonds, list | tuple) else ()
     names = [each.get("parts") for each in listed if isinstance(each, Mapping)]
     pairs = [pair for pair in names if isinstance(pair, list | tuple) and all(isinstance(name, str) for name in pair)]
@@ -126,7 +127,7 @@ def _parts(case: Case) -> Iterator[Problem]:
 
 
 def _erosion(spec: Erosion, name: str, law: Strength | None, location: Location) -> Iterator[Problem]:
-    """Limits that nothing of the material can ever reach."""
+    """Yields a problem for limits that the material can never reach."""
     if law is None and spec.plastic_strain is not None:
         message = f"{name} is elastic (no table strength) and never strains plastically; remove the key"
         yield problem((*location, "plastic_strain"), spec.plastic_strain, message)
@@ -153,7 +154,7 @@ def _fracture(part: Part, made: Material, location: Location) -> Iterator[Proble
 
 
 def _sectors(case: Case) -> Iterator[Problem]:
-    """The planes along which a half or quarter body was cut need their symmetry boundary."""
+    """Yields a problem for each plane of a half or quarter body without a boundary ``symmetry``."""
     for i, part in enumerate(case.parts):
         mesh = part.mesh
         for d, at in _cuts(mesh):
@@ -166,7 +167,7 @@ def _sectors(case: Case) -> Iterator[Problem]:
 
 
 def _cuts(mesh: Mesh) -> Iterator[tuple[int, float]]:
-    """The planes at which a body is cut: their directions, and where they stand, m."""
+    """Planes at which a body is cut: directions and coordinates, m."""
     if isinstance(mesh, Solid):
         yield from ((d, mesh.centre[d]) for d in cut_by(mesh.sector, mesh.axis))
     elif not isinstance(mesh, Measured):

@@ -1,17 +1,17 @@
-"""What drives nodes: which components a boundary prescribes, and where two boundaries prescribe different ones."""
+"""Prescribed motion: the components that a boundary prescribes, and conflicts between two boundaries."""
 
 from ..model.boundaries import Boundary, Course, Prescribed, Rotation
 from ..model.tables import Axis
 from ..shapes.geometry import AXES, across
 
 Motion = tuple[object, ...]
-"""What a component of the velocity is over time: motions that are equal as tuples are one."""
+"""Motion of a component over time; two motions are the same if the tuples are equal."""
 REST: Motion = (0.0,)
-"""The motion of a component that stays zero."""
+"""Motion of a component that stays zero."""
 
 
 def motions(boundary: Boundary) -> dict[Axis, Motion]:
-    """The motion of each component that a boundary prescribes; none where it drives nothing."""
+    """Returns the motion of each component that a boundary prescribes; empty without prescribed motion."""
     if isinstance(boundary, Prescribed):
         given = {axis: getattr(boundary, axis) for axis in AXES}
         return {axis: _straight(speed, boundary.course) for axis, speed in given.items() if speed is not None}
@@ -21,7 +21,7 @@ def motions(boundary: Boundary) -> dict[Axis, Motion]:
 
 
 def clash(one: Boundary, other: Boundary) -> tuple[Axis, ...]:
-    """The components that both prescribe, and not alike: a node cannot follow both."""
+    """Returns the components that both prescribe differently: a node cannot follow both."""
     first, second = motions(one), motions(other)
     return tuple(axis for axis in AXES if axis in first and axis in second and first[axis] != second[axis])
 
@@ -31,7 +31,7 @@ def _straight(speed: float, course: Course) -> Motion:
 
 
 def _round(boundary: Rotation, axis: Axis) -> Motion:
-    """Along the line that a body turns about nothing moves."""
+    """Returns the motion of a rotation; along its axis it is zero."""
     i, j = across(axis)
     rate = boundary.spin.rate
     return (boundary.spin.centre, rate) if rate[i] or rate[j] else REST

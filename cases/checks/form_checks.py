@@ -1,4 +1,4 @@
-"""What the models cannot check one by one in a form: sizes that must fit."""
+"""Checks of a shape that its model cannot make: sizes that fit each other."""
 
 from collections.abc import Iterator
 
@@ -8,12 +8,12 @@ from ..reading.problems import Location, Problem, problem
 from ..shapes.profile import tangent
 
 _LEAST = 1e-6
-"""Of the radius of a body: what is smaller, and not 0, is a slip. Chosen: no element is so small."""
+"""Smallest size over the radius of a body; a smaller one, except 0, is an error. Chosen: no element is so small."""
 _ROUNDED = "shank", "tip_radius", "meplat", "top_radius", "inner_radius", "radius"
 
 
 def check_form(form: Model, location: Location) -> Iterator[Problem]:
-    """Every problem of the sizes of a form that stands at ``location``."""
+    """Yields every problem of the sizes of a shape at ``location``."""
     yield from _slips(form, location)
     if isinstance(form, BoxForm):
         for d in (d for d in range(3) if form.low[d] >= form.high[d]):
@@ -31,7 +31,7 @@ def check_form(form: Model, location: Location) -> Iterator[Problem]:
 
 
 def _slips(form: Model, location: Location) -> Iterator[Problem]:
-    """Lengths that may be 0 and are nearly that."""
+    """Yields lengths that may be 0 and are nearly 0."""
     if not isinstance(form, ConeForm | OgiveForm | RingSectorForm):
         return
     most = max(form.radius, form.top_radius) if isinstance(form, ConeForm) else form.radius
@@ -42,7 +42,7 @@ def _slips(form: Model, location: Location) -> Iterator[Problem]:
 
 
 def _ogive(form: OgiveForm, location: Location) -> Iterator[Problem]:
-    """The first thing that is wrong with an ogive."""
+    """Yields the first error of an ogive."""
     for key, value, message in (*_nose(form), *_tip(form)):
         yield problem((*location, key), value, message)
         return

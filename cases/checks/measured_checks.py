@@ -1,4 +1,4 @@
-"""What the models cannot check one by one in a body whose mesh tells its sizes, and the files that it names."""
+"""Checks of a body with measured sizes (combination, CAD, STL, mesh file), and of the files that it names."""
 
 from collections.abc import Iterator
 
@@ -9,14 +9,14 @@ from ..reading.problems import Location, Problem, problem
 from .form_checks import check_form
 
 _DEEPEST, _MOST = 8, 200
-"""How deep combinations may lie in one another, and shapes of all of them. Chosen: more than anybody writes."""
+"""Largest depth of nested combinations, and largest number of shapes in all. Chosen: more than any user writes."""
 
 File = MeshFile | CadForm | Stl
-"""What names a file by ``path`` and ``sha256``."""
+"""Models that name a file by ``path`` and ``sha256``."""
 
 
 def files_in(mesh: Mesh) -> Iterator[tuple[Place, File]]:
-    """Every file that a mesh names, and where below the mesh."""
+    """Yields every file that a mesh names, and its place below the mesh."""
     if isinstance(mesh, File):
         yield (), mesh
     elif isinstance(mesh, CombinedForm):
@@ -24,7 +24,7 @@ def files_in(mesh: Mesh) -> Iterator[tuple[Place, File]]:
 
 
 def check_measured(mesh: Measured, location: Location) -> Iterator[Problem]:
-    """Every problem of a mesh that stands at ``location``."""
+    """Yields every problem of a mesh at ``location``."""
     if isinstance(mesh, Meshed):
         yield from check_grading(mesh, location)
     if isinstance(mesh, MeshFile):
@@ -58,7 +58,7 @@ def _path(file: File, wanted: str, location: Location) -> Iterator[Problem]:
 
 
 def check_grading(mesh: Primitive | Meshed, location: Location) -> Iterator[Problem]:
-    """Every problem of the grading of a mesh."""
+    """Yields every problem of the grading of a mesh."""
     if mesh.grading is None:
         return
     grading, location = mesh.grading, (*location, "grading")

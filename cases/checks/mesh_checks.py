@@ -1,4 +1,4 @@
-"""What the models cannot check one by one in a mesh: sizes that must fit, slits on planes of nodes."""
+"""Checks of a mesh that its model cannot make: sizes that fit, slits on planes of nodes."""
 
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -15,7 +15,7 @@ from .measured_checks import check_grading, check_measured, files_in
 
 
 def check_mesh(mesh: Mesh, location: Location) -> Iterator[Problem]:
-    """Every problem of a mesh that stands at ``location``."""
+    """Yields every problem of a mesh at ``location``."""
     if isinstance(mesh, Measured):
         yield from check_measured(mesh, location)
         return
@@ -41,7 +41,7 @@ def check_mesh(mesh: Mesh, location: Location) -> Iterator[Problem]:
 
 
 def missing_files(parts: Iterable[Mesh], folder: Path) -> Iterator[Problem]:
-    """Files of the ``parts`` that are not where the case says, from its ``folder`` on."""
+    """Yields a problem for each file of the ``parts`` that does not exist, relative to the ``folder`` of the case."""
     for i, mesh in enumerate(parts):
         for place, file in files_in(mesh):
             path = located(file.path, file.sha256, folder)

@@ -1,4 +1,4 @@
-"""Sets of mesh files that boundaries and probes are on: by which they are told apart, and which parts they are of."""
+"""Sets of mesh files that boundaries and probes select by the key ``on``: their numbers and their parts."""
 
 from collections.abc import Iterator
 
@@ -9,11 +9,11 @@ from ..model.schema import Case, Part
 from ..reading.problems import Location, Problem, problem
 
 MOST = 62
-"""Sets that a case may be on: a node has a bit for each in a whole number of 64."""
+"""Largest number of sets of a case: a node has a bit for each in a whole number of 64 bits."""
 
 
 def ons(case: Case) -> list[tuple[Location, Prescribed | Rotation | Traction | Probe]]:
-    """The boundaries and probes that are on a set, and where they stand in the case."""
+    """Returns the boundaries and probes with a set, and their locations in the case."""
     boundaries: list[tuple[Location, Prescribed | Rotation | Traction | Probe]] = [
         (("boundaries", i), each)
         for i, each in enumerate(case.boundaries)
@@ -23,23 +23,23 @@ def ons(case: Case) -> list[tuple[Location, Prescribed | Rotation | Traction | P
 
 
 def bits(case: Case) -> dict[str, int]:
-    """A number for each set that the case is on, from 0."""
+    """Returns a number for each set of the case, from 0."""
     return {name: bit for bit, name in enumerate(dict.fromkeys(each.on or "" for _, each in ons(case)))}
 
 
 def named(spec: Prescribed | Rotation | Traction | Probe) -> tuple[str, ...]:
-    """The parts that a boundary or a probe names."""
+    """Returns the parts that a boundary or a probe names."""
     return (spec.part,) if isinstance(spec, Probe) else spec.parts
 
 
 def parts(case: Case, spec: Prescribed | Rotation | Traction | Probe) -> list[Part]:
-    """Those whose sets may be meant: the ones that are named, else all that have a mesh from a file."""
+    """Returns the parts whose sets are meant: those that are named, otherwise all with a mesh from a file."""
     names = named(spec)
     return [part for part in case.parts if (part.name in names if names else isinstance(part.mesh, MeshFile))]
 
 
 def check_ons(case: Case) -> Iterator[Problem]:
-    """A problem for each that is on a set and for a part without one; sets are of mesh files alone."""
+    """Yields a problem for each boundary or probe with a set of a part that has none; only mesh files have sets."""
     for location, spec in ons(case):
         generated = [part.name for part in parts(case, spec) if not isinstance(part.mesh, MeshFile)]
         if generated:

@@ -1,4 +1,4 @@
-"""Primitives that overlap before anything is meshed."""
+"""Overlap of primitives, before meshes are made."""
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
@@ -15,21 +15,22 @@ from ..shapes.placed import Placed, lattice
 from ..shapes.profile import Revolved, profile
 
 _POINTS = 12
-"""Points a direction at which two bodies are looked at, in the box that both reach into. Chosen: thinner slices than a
-twelfth of that box are left to the worker, which looks at the nodes."""
+"""Sampling points per direction in the box that two bodies have in common. Chosen: thinner slices than a twelfth of
+that box are found by the worker, which checks the nodes."""
 _PAIRS = 32
-"""Pairs of bodies that are looked at. Chosen: a second at most; the worker looks at all."""
+"""Largest number of pairs of bodies that are checked. Chosen: a second at most; the worker checks all."""
 _TOUCH = 1e-9
-"""Of the size of a body: what reaches no further into another touches it. Far above rounding, far below any gap."""
+"""Depth of contact without overlap, over the size of a body. Far above rounding, far below any gap."""
 
 
 def overlaps(
     parts: Iterable[tuple[int, Part]], contact: Contact | None, tied: Mapping[frozenset[str], float]
 ) -> Iterator[Problem]:
-    """A problem for each of the numbered ``parts`` that overlaps an earlier one which it meets. ``tied``: how far parts
-    that a tied bond joins may overlap, m, by their names: their nodes are moved onto each other's faces.
+    """Yields a problem for each of the numbered ``parts`` that overlaps an earlier one with which it is in contact.
 
-    Curved bodies count as far as no facet of their mesh can cut them off; loose tets and mesh files do not count.
+    ``tied``: allowed overlap of parts with a tied bond, m, by their names: their nodes are moved onto each other's
+    faces. Curved bodies are reduced by what the facets of their mesh can cut off; loose tets and mesh files are
+    ignored.
     """
     if contact is None or contact.overlap != "refuse":
         return
@@ -51,7 +52,7 @@ def overlaps(
 
 
 def bond_gaps(case: Case) -> dict[frozenset[str], float]:
-    """How far two parts may overlap that a tied bond joins, m, by their names: by its gap."""
+    """Returns the allowed overlap of two parts with a tied bond, m, by their names: the gap of the bond."""
     sizes = {part.name: getattr(part.mesh, "element_size", math.inf) for part in case.parts}
     found = dict[frozenset[str], float]()
     for bond in case.bond:
@@ -62,9 +63,9 @@ def bond_gaps(case: Case) -> dict[frozenset[str], float]:
 
 
 def grazes(case: Case) -> Iterator[Problem]:
-    """A doubt for each part that fills the hole of another but for what facets may cut off the tube there: two circles
-    of one radius become polygons that overlap. Of one body they have facets in common, and what is tied is moved onto
-    the other's.
+    """Yields a warning for each part that fills the hole of another within the facets of the tube: two circles of
+    the same radius become polygons that overlap. Parts of one body have these facets in common, and tied nodes are
+    moved onto the faces.
     """
     contact, body = case.contact, bodies(case)
     if contact is None or contact.overlap != "refuse":
@@ -94,7 +95,7 @@ def grazes(case: Case) -> Iterator[Problem]:
 
 
 def _core(mesh: Generated) -> Generated:
-    """A body without what facets of the size of its elements may cut off its curved surface."""
+    """Returns a body reduced by what facets of its element size can cut off its curved surface."""
     if not isinstance(mesh, Cylinder | Tube | Sphere):
         return mesh
     left = max(0.5 * mesh.radius, mesh.radius - _cut_off(mesh.radius, mesh.element_size))
@@ -102,19 +103,20 @@ def _core(mesh: Generated) -> Generated:
 
 
 def _rim(mesh: Generated) -> float:
-    """What facets may cut off a body whose curved surface is no cylinder or ball, m."""
+    """Returns the largest depth that facets can cut off a body with a curved surface other than a cylinder or a
+    sphere, m."""
     if isinstance(mesh, RingSector):
         return _cut_off(mesh.radius, mesh.element_size)
     return _cut_off(profile(mesh).widest(), mesh.element_size) if isinstance(mesh, Revolved) else 0.0
 
 
 def _cut_off(radius: float, size: float) -> float:
-    """What a chord of this ``size`` cuts off a circle, m: h^2 / 8 R, the height of the arc."""
+    """Returns the height of the arc over a chord of this ``size``, m: h^2 / 8 R."""
     return size**2 / (8.0 * radius)
 
 
 def _common(one: tuple[Vector, Vector], other: tuple[Vector, Vector]) -> tuple[Vector, Vector] | None:
-    """The box that two bodies with these corners reach into."""
+    """Returns the common box of two bodies with these corners."""
     (low, high), (low2, high2) = one, other
     (a, b, c), (d, e, f) = map(max, low, low2), map(min, high, high2)
     size = max(y - x for x, y in zip(low + low2, high + high2, strict=True))
@@ -122,14 +124,14 @@ def _common(one: tuple[Vector, Vector], other: tuple[Vector, Vector]) -> tuple[V
 
 
 def _round(point: Vector, margin: float) -> Iterator[Vector]:
-    """Six points round one: where bodies that are turned touch, rounding puts the one between them into both."""
+    """Returns six points around one: where turned bodies touch, rounding puts the middle point into both."""
     x, y, z = point
     for off in (-margin, margin):
         yield from ((x + off, y, z), (x, y + off, z), (x, y, z + off))
 
 
 def _depth(one: Placed, other: Placed, low: Vector, high: Vector) -> float:
-    """The thinnest extent, m, of what both hold of a box; 0 when that is nothing."""
+    """Returns the smallest extent, m, of the common volume of both in a box; 0 without one."""
     both = [point for point in lattice(low, high, _POINTS) if one.holds(point) and other.holds(point)]
     margin = _TOUCH * max(b - a for body in (one, other) for a, b in zip(*body.bounds(), strict=True))
     margin = max(margin, _rim(one.mesh), _rim(other.mesh))

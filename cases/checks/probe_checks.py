@@ -1,4 +1,4 @@
-"""What the models cannot check of probes: parts and walls that must exist, keys that a field needs or does not use."""
+"""Checks of probes that the models cannot make: existing parts and walls, keys that a field needs or does not use."""
 
 from collections.abc import Iterator
 
@@ -20,13 +20,13 @@ _USED: dict[str, tuple[str, ...]] = {
     "at": _HOLES,
     "centre": (*_HOLES, "cone_angle"),
 }
-"""Which fields a key is of."""
+"""Fields for which a key is allowed."""
 _NEEDED: dict[str, tuple[str, ...]] = {"beyond": BEYOND, "axis": SHAPES, "at": _HOLES}
-"""Which fields need a key."""
+"""Fields for which a key is required."""
 
 
 def check_probes(case: Case) -> Iterator[Problem]:
-    """Problems of the probes of a case, in the order of their keys."""
+    """Yields the problems of the probes of a case, in the order of their keys."""
     parts, names = {part.name: part for part in case.parts}, [probe.name for probe in case.probes]
     for i, probe in enumerate(case.probes):
         location = ("probes", i)
@@ -50,7 +50,7 @@ def check_probes(case: Case) -> Iterator[Problem]:
 
 
 def _keys(probe: Probe, location: Location) -> Iterator[Problem]:
-    """Keys that the field of a probe needs, and those that it does not use."""
+    """Yields keys that the field of a probe needs, and keys that it does not use."""
     field = kind(probe.field)
     for key, fields in _USED.items():
         if field not in fields and getattr(probe, key) is not None:
@@ -64,7 +64,7 @@ def _keys(probe: Probe, location: Location) -> Iterator[Problem]:
 
 
 def _pushes(case: Case, number: int, probe: Probe) -> Iterator[Problem]:
-    """A push of a wall or of a part that is not there, or of what cannot push."""
+    """Yields a problem for the force of a wall or part that does not exist, or cannot push."""
     location, names = ("probes", number), [wall.name for _, wall in case.boundaries_of(Wall)]
     if probe.field.startswith("wall_"):
         if not names:

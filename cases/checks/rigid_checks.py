@@ -1,4 +1,5 @@
-"""What the models cannot check one by one of rigid parts: what they cannot do, and what acts on some of them only."""
+"""Checks of rigid parts that the models cannot make: keys that have no effect on them, and boundaries on some of
+their nodes."""
 
 from collections.abc import Iterator
 
@@ -9,7 +10,7 @@ from .on import parts
 
 
 def check_rigid(case: Case) -> Iterator[Problem]:
-    """Problems of the rigid parts of a case, and of what acts on them."""
+    """Yields the problems of the rigid parts of a case, and of the boundaries on them."""
     for i in case.rigid:
         part = case.parts[i]
         yield from _part(part, ("parts", i))

@@ -1,4 +1,4 @@
-"""Whether bodies that fly at the start meet anything before the end: a place in other units makes them miss it."""
+"""Warnings about bodies that move at the start and meet nothing before the end, as after an error of a length unit."""
 
 import math
 from collections.abc import Iterator
@@ -13,10 +13,10 @@ Bounds = tuple[Vector, Vector]
 
 
 def strangers(case: Case) -> Iterator[Problem]:
-    """A warning for each part that flies, and meets nothing before ``run.end_time`` although there is something.
+    """Yields a warning for each moving part that meets no other before ``run.end_time``.
 
-    Nothing is said of a case with mesh files, with bodies that turn or stretch, or where more than walls and planes of
-    symmetry acts on nodes; nor of a part that others may reach which run into each other before the end.
+    No warning for a case with mesh files, with bodies that turn or stretch, or with other boundaries than walls and
+    planes of symmetry; nor for a part that can be hit by other parts which collide before the end.
     """
     walls = [boundary for boundary in case.boundaries if isinstance(boundary, Wall) and boundary.plain]
     others = [boundary for boundary in case.boundaries if not isinstance(boundary, Symmetry) and boundary not in walls]
@@ -41,8 +41,8 @@ def strangers(case: Case) -> Iterator[Problem]:
 
 
 def _way(case: Case, i: int, times: list[float]) -> float:
-    """How far part ``i``, which meets others at ``times``, may be away at the end if one runs into it, m: it may leave
-    with its own speed and twice that at which they meet. Minus infinity where none does.
+    """Returns the largest distance of part ``i`` at the end, m, after collisions at ``times``: it can leave with its
+    own speed plus twice the speed of the collision. Minus infinity without a collision.
     """
     own, end = case.parts[i].velocity, case.run.end_time
     speeds = [math.dist(own, each.velocity) for each, when in zip(case.parts, times, strict=True) if when < end]
@@ -51,7 +51,7 @@ def _way(case: Case, i: int, times: list[float]) -> float:
 
 
 def _gap(box: Bounds, other: Bounds) -> float:
-    """How far apart two boxes are, m."""
+    """Returns the distance of two boxes, m."""
     return math.hypot(*(max(a - high, low - b, 0.0) for low, high, a, b in zip(*box, *other, strict=True)))
 
 
@@ -62,7 +62,7 @@ def _box(part: Part) -> Bounds | None:
 
 
 def _meeting(box: Bounds, other: Bounds, part: Part, met: Part) -> float:
-    """When the boxes round two bodies touch that fly on, s; infinity when they never do."""
+    """Returns the time at which the bounding boxes of two moving bodies touch, s; infinity if never."""
     begin, end = 0.0, math.inf
     for low, high, a, b, v, w in zip(*box, *other, part.velocity, met.velocity, strict=True):
         speed = v - w
@@ -75,7 +75,7 @@ def _meeting(box: Bounds, other: Bounds, part: Part, met: Part) -> float:
 
 
 def _arrival(part: Part, wall: Wall) -> float:
-    """When a body that flies on reaches a wall, s; infinity when it never does."""
+    """Returns the time at which a moving body reaches a wall, s; infinity if never."""
     if wall.parts and part.name not in wall.parts:
         return math.inf
     way = wall.normal or wall.point

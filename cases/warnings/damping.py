@@ -8,11 +8,12 @@ from ..reading.library import material
 from ..reading.problems import Problem, problem
 
 WORDS = "damps elastic motion (a free ball of 6,400 tets loses 15 % of its energy in ten periods)"
-"""tests/verification/test_pressure_modes.py; why: docs/theory/elements.md, Pressure forms."""
+"""Measured in tests/verification/test_pressure_modes.py; explanation: docs/theory/elements.md, Pressure forms."""
 
 
 def damped(case: Case) -> Iterator[Problem]:
-    """A warning where a part with the form ``split`` may stay elastic: without strength, or no impact makes it flow."""
+    """Yields a warning where a part with the form ``split`` may stay elastic: without strength, or without an impact
+    that makes it yield."""
     if case.numerics.pressure != "split":
         return
     parts = zip(case.parts, impact_speeds(case), strict=True)

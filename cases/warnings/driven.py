@@ -1,4 +1,4 @@
-"""Where prescribed motion leads a body through something that cannot hold it: a wall, or another driven body."""
+"""Warnings about prescribed motion that leads a body through a wall, or through another driven body."""
 
 import math
 from collections.abc import Iterator
@@ -15,29 +15,30 @@ from ..shapes.loaded import near
 from ..shapes.placed import Placed
 
 _TIMES = 200
-"""Times up to the end at which is looked. Chosen: a millisecond for the way of a body."""
+"""Number of times up to the end that are checked. Chosen: a millisecond for the path of a body."""
 _MOST = 200
-"""Driven bodies, and pairs of them, that are looked at. Chosen: a second at most."""
+"""Largest number of driven bodies, and of pairs of them, that are checked. Chosen: a second at most."""
 _TOUCH = 1e-9
-"""Of the size of a body: what goes no further into another touches it. Far above rounding, far below any gap."""
+"""Depth of contact without a warning, over the size of a body. Far above rounding, far below any gap."""
 
 
 class Driven(NamedTuple):
     """A body that a boundary drives."""
 
     number: int
-    """Of the boundary."""
+    """Number of the boundary."""
     drive: Prescribed
     part: Part
     mesh: Generated
     ways: list[Vector]
-    """How far its driven nodes have come by and by, m; along what nothing drives they fly on."""
+    """Displacement of its driven nodes at each time, m; components without drive continue at the initial velocity."""
 
 
 def passing(case: Case) -> Iterator[Problem]:
-    """A warning for each boundary that drives nodes behind a wall, or a body into one that another boundary drives.
+    """Yields a warning for each boundary that drives nodes behind a wall, or a body into one that another boundary
+    drives.
 
-    Nothing is said of boundaries that rotate, of mesh files, and of bodies that are turned, turn or stretch.
+    No warning for rotations, for mesh files, and for bodies that are turned, rotate or stretch.
     """
     driven = list(islice(_driven(case), _MOST))
     told: set[int] = set()
@@ -58,7 +59,7 @@ def _through_walls(case: Case, driven: list[Driven]) -> Iterator[tuple[int, str]
 
 
 def _behind(body: Driven, point: Vector, way: Vector) -> float:
-    """How far behind a wall the nodes come that are driven, m; minus infinity where there are none."""
+    """Returns the largest depth of driven nodes behind a wall, m; minus infinity without such nodes."""
     length, drive = math.hypot(*way), body.drive
     normal = way[0] / length, way[1] / length, way[2] / length
     low, high = _bounds(body.mesh)
@@ -74,7 +75,7 @@ def _behind(body: Driven, point: Vector, way: Vector) -> float:
 
 
 def _through_bodies(case: Case, driven: list[Driven]) -> Iterator[tuple[int, str]]:
-    """Bodies that meet along an axis on which each has a drive of its own."""
+    """Yields bodies that collide along an axis on which each is driven."""
     if case.contact is None:
         return
     meeting = [each for each in driven if not case.contact.parts or each.part.name in case.contact.parts]
@@ -92,7 +93,7 @@ def _through_bodies(case: Case, driven: list[Driven]) -> Iterator[tuple[int, str
 
 
 def _enter(one: tuple[Vector, Vector], other: tuple[Vector, Vector], way: Vector, its: Vector, axes: set[int]) -> bool:
-    """Whether boxes that were apart along one of the ``axes`` have come into each other on their ways."""
+    """Whether boxes that were separate along one of the ``axes`` overlap on their paths."""
     (low, high), (low2, high2) = one, other
     margin = _TOUCH * max(b - a for a, b in zip(low + low2, high + high2, strict=True))
     apart = any(min(high[d], high2[d]) - max(low[d], low2[d]) <= margin for d in axes)
@@ -136,7 +137,7 @@ def _way(drives: list[Prescribed], direction: int, time: float, speed: float) ->
 
 
 def _integral(course: Course, time: float) -> float:
-    """Of the factor of a course from 0 to a time, s."""
+    """Integral of the factor of a course from 0 to a time, s."""
     if not course:
         return time
     times = sorted({0.0, time, *(t for t, _ in course if 0.0 < t < time)})

@@ -1,4 +1,4 @@
-"""Boundaries that act on nothing, before there is a mesh."""
+"""Boundaries without effect, found before there is a mesh."""
 
 from collections.abc import Iterator
 
@@ -12,7 +12,8 @@ from ..shapes.region import Region
 
 
 def idle(case: Case, number: int) -> Iterator[Problem]:
-    """An error for a boundary in whose box no node, or no face, of structured blocks lies that are not turned."""
+    """Yields an error for a boundary whose box contains no node, or no face, of structured blocks that are not
+    turned."""
     spec = case.boundaries[number]
     assert isinstance(spec, Prescribed | Traction)
     if all(_empty(part, spec) for part in parts_of(case, spec)):
@@ -22,7 +23,7 @@ def idle(case: Case, number: int) -> Iterator[Problem]:
 
 
 def _empty(part: Part, spec: Traction | Prescribed) -> bool:
-    """Whether a boundary is sure to find nothing of a part in its box."""
+    """Whether a boundary certainly has no effect on a part in its box."""
     if isinstance(part.mesh, Measured):
         return False
     body, region = Placed(part.mesh, part.turn), Region.of(spec)
@@ -33,7 +34,7 @@ def _empty(part: Part, spec: Traction | Prescribed) -> bool:
 
 
 def unloaded(case: Case) -> Iterator[Problem]:
-    """A warning for each boundary in whose region no face or node seems to lie."""
+    """Yields a warning for each boundary whose region seems to contain no face or node."""
     for load in loads(case):
         if load.faces == 0 or load.nodes == 0:
             what = "face" if load.faces == 0 else "node"

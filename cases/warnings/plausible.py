@@ -1,6 +1,5 @@
-"""What a valid case makes a reader doubt: bare numbers where a unit was expected, and what a slip of units makes.
-
-Warnings, never errors: each says what a value was taken for, or what is odd about it.
+"""Warnings about a valid case: numbers without a unit, and values outside the usual range, as after an error of a
+unit.
 """
 
 import math
@@ -28,10 +27,10 @@ from .reach import cut_bodies, scant_probes
 from .stiff import stiff
 
 DAY = 86_400.0
-"""Core seconds. Chosen: who wants more than a day knows it."""
+"""Core time from which a warning is given, core seconds. Chosen: a day."""
 FEW_STEPS = 10
-"""Chosen: a wave takes two steps or so through a tet; what ends before it has crossed five shows nothing. A slip of the
-unit of a mesh file is the commonest cause."""
+"""Smallest number of time steps without a warning. Chosen: a wave crosses a tet in about two steps; a run that ends
+before it has crossed five tets has no result. The usual cause is a wrong unit of a mesh file."""
 LIKELY: dict[str, tuple[float, float, str]] = {
     "density": (10.0, 23_000.0, "kg/m^3: foams have 10, osmium has 22,590"),
     "wave speed": (20.0, 20_000.0, "m/s: soft rubber has 30, diamond has 18,000"),
@@ -43,25 +42,25 @@ LIKELY: dict[str, tuple[float, float, str]] = {
     "extent": (1e-6, 100.0, "m"),
     "bulk modulus, density c0^2, over that of elastic,": (0.5, 2.0, "both are of one solid at rest"),
 }
-"""Between what a quantity of any solid lies, and the ends as people know them (handbooks)."""
+"""Usual ranges of quantities of solids, with known materials near the ends (handbooks)."""
 SHOCKING = 0.1
-"""Of the wave speed, for what is met and has the linear pressure: where one body hits another of its kind at this
-speed, u = v / 2, the pressure is some 7 % too low, and 13 % where the other body does not yield. A shock has
-p = density (c0 + s u) u, with s near 1.5 for metals (1.2 to 1.9 in materials.toml), the linear pressure -K ln J makes
-it density (c0 + u / 4) u."""
+"""Share of the wave speed from which an impact on a material with linear pressure gives a warning: at this speed of
+an impact between two bodies of the same material, u = v / 2, the pressure is some 7 % too low, and 13 % where the
+other body does not yield. A shock has p = density (c0 + s u) u, with s near 1.5 for metals (1.2 to 1.9 in
+materials.toml); the linear pressure -K ln J gives density (c0 + u / 4) u."""
 STIFFENING, LINEAR_STIFFENING = 1.5, 0.25
-"""Of the speed of a shock by the speed u of the matter behind it: s of metals, and what the linear pressure has."""
+"""Slope of the shock speed over the particle speed u: s of metals, and the value of the linear pressure."""
 _UNLIKE = 1000.0
-"""Between the largest and the smallest part. Chosen: millimetres taken for metres."""
+"""Largest ratio of the sizes of two parts without a warning. Chosen: millimetres taken for metres."""
 
 
 def doubts(data: Mapping[str, Any], case: Case, expected: Estimate) -> list[Problem]:
-    """Every warning: ``data`` is the case as it was written, ``expected`` its estimate."""
+    """Yields every warning: ``data`` is the case as it was written, ``expected`` its estimate."""
     return [*bare_numbers(data), *oddities(case, expected)]
 
 
 def oddities(case: Case, expected: Estimate) -> list[Problem]:
-    """Those that do not depend on how the case is written."""
+    """Yields the warnings that do not depend on how the case is written."""
     return [
         *_effort(case, expected),
         *_materials(case),
@@ -83,7 +82,7 @@ def oddities(case: Case, expected: Estimate) -> list[Problem]:
 
 
 def bare_numbers(data: Mapping[str, Any]) -> list[Problem]:
-    """Numbers other than 0 where a unit was expected: one line a key, which says what they were taken for."""
+    """Yields a warning for each key with numbers other than 0 without a unit, with the unit that was assumed."""
     whole = _schema()
     return list(_bare((), data, whole, whole, data))
 
@@ -108,7 +107,7 @@ def _bare(location: Location, value: Any, schema: Schema, whole: Schema, data: M
 
 
 def _is(schema: Schema, value: Mapping[str, Any]) -> bool:
-    """Whether a table is of the kind that a schema describes."""
+    """Whether a table is of the variant that a schema describes."""
     consts = {key: each["const"] for key, each in schema["properties"].items() if "const" in each}
     return all(value.get(key) == const for key, const in consts.items())
 
@@ -128,7 +127,7 @@ def _taken(location: Location, value: Any, schema: Schema, data: Mapping[str, An
 
 
 def _bare_number(value: Any) -> bool:
-    """Whether a value is a number without a unit, other than 0, also one that is written as text."""
+    """Whether a value is a number without a unit, other than 0, also as text."""
     try:
         return not isinstance(value, bool) and float(value) != 0.0
     except (TypeError, ValueError):
@@ -209,7 +208,8 @@ def _bodies(case: Case, expected: Estimate) -> Iterator[Problem]:
 
 
 def _shocks(case: Case) -> Iterator[Problem]:
-    """A warning for each material that is met too fast for its linear pressure, at the part that is met fastest."""
+    """Yields a warning for each material that is hit too fast for its linear pressure, at the part that is hit
+    fastest."""
     met: dict[str, tuple[float, int]] = {}
     for i, (part, speed) in enumerate(zip(case.parts, impact_speeds(case), strict=True)):
         fastest, _ = met.get(part.material, (0.0, i))
@@ -228,7 +228,7 @@ def _shocks(case: Case) -> Iterator[Problem]:
 
 
 def linear_error(c0: float, u: float) -> float:
-    """By what share the linear pressure is below that of a shock with the speed ``u``, m/s, of the matter behind it;
-    ``c0`` is the bulk speed of sound, m/s.
+    """Returns the share by which the linear pressure is below that of a shock with the particle speed ``u``, m/s;
+    ``c0`` is the bulk sound speed, m/s.
     """
     return (STIFFENING - LINEAR_STIFFENING) * u / (c0 + STIFFENING * u)

@@ -1,4 +1,5 @@
-"""What a plane of symmetry or the box of a probe reaches of a body, where that is valid and hardly meant."""
+"""Warnings about planes of symmetry inside a body and about probe boxes smaller than a tet: both are valid and
+rarely intended."""
 
 import math
 from collections.abc import Iterator
@@ -12,14 +13,16 @@ from ..shapes.geometry import index, volume
 from ..shapes.placed import Placed
 
 _TOUCH = 1e-9
-"""Of the size of a body: a plane that is no deeper in it lies on its surface. Far above rounding, far below any tet."""
+"""Depth of a plane that counts as lying on the surface, over the size of a body. Far above rounding, far below any
+tet."""
 _FEWEST = 1.0
-"""Tets that the box of a probe should hold, by its volume. Chosen: below it a mesh may have none there."""
+"""Smallest number of tets that the box of a probe should contain, by its volume. Chosen: with fewer a mesh may have
+none there."""
 
 
 def cut_bodies(case: Case) -> Iterator[Problem]:
-    """A warning for each plane of symmetry that goes through a body, of which both sides are there; none for bodies
-    that are turned, of which only a box round them is known.
+    """Yields a warning for each plane of symmetry that passes through a body with both sides modelled; none for
+    turned bodies, of which only a bounding box is known.
     """
     for number, plane in case.boundaries_of(Symmetry):
         d = index(plane.axis)
@@ -37,7 +40,7 @@ def cut_bodies(case: Case) -> Iterator[Problem]:
 
 
 def scant_probes(case: Case, expected: Estimate) -> Iterator[Problem]:
-    """A warning for each probe whose box is smaller than a tet; none for mesh files and where sizes differ."""
+    """Yields a warning for each probe whose box is smaller than a tet; none for mesh files and graded meshes."""
     sizes = {part.name: (part, size) for part, size in zip(case.parts, expected.parts, strict=True)}
     for i, probe in enumerate(case.probes):
         part, size = sizes[probe.part]

@@ -1,4 +1,4 @@
-"""Which parts could be rigid: what strains them is a small share of the energy beside all that they meet."""
+"""Warnings about parts that could be rigid: their deformation absorbs a small share of the energy of an impact."""
 
 import math
 from collections.abc import Iterator
@@ -11,12 +11,13 @@ from ..reading.problems import Problem, problem
 from .compression import impact_stresses
 
 STIFF = 20.0
-"""Times the impedance of all others. Chosen: of the energy that an impact sends into two bodies the stiffer one has the
-share of the softer one's impedance in the sum of both, 5 % then."""
+"""Ratio of the impedance of a part to that of all others. Chosen: of the energy that an impact puts into two bodies
+the stiffer one absorbs the share of the softer one's impedance in the sum of both, 5 % then."""
 
 
 def stiff(case: Case, expected: Estimate) -> Iterator[Problem]:
-    """A warning for each part that could be rigid, with what that would save; none that yields, breaks or erodes."""
+    """Yields a warning for each part that could be rigid, with the saving; none for parts that yield, break or
+    erode."""
     if case.contact is None or len(case.parts) < 2:
         return
     made = [material(case, part.material) for part in case.parts]
@@ -32,7 +33,7 @@ def stiff(case: Case, expected: Estimate) -> Iterator[Problem]:
 
 
 def _saves(i: int, expected: Estimate) -> str:
-    """What a rigid part would save."""
+    """Returns the words for the saving of a rigid part."""
     mine, others = expected.parts[i], [part.dt for j, part in enumerate(expected.parts) if j != i]
     tets = f"{100.0 * mine.elements / expected.elements:.0f} %" if mine.elements and expected.elements else "a share"
     told = f"would save {tets} of the tets"

@@ -1,4 +1,4 @@
-"""Bodies whose surfaces coincide at the start, without a gap: parts without a bond are not joined."""
+"""Warnings about bodies whose surfaces coincide at the start: parts without a bond are not joined."""
 
 import itertools
 import math
@@ -16,17 +16,18 @@ from ..shapes.placed import Placed
 from ..shapes.sheets import sheets
 
 NEAR = 1e-6
-"""Of the size of a body: faces nearer than this coincide. Chosen: far above rounding, below any gap."""
+"""Largest distance of coincident faces, over the size of a body. Chosen: far above rounding, below any gap."""
 _FINEST = 40
-"""Patches along a side of a surface, at most. Chosen: a tenth of a second for a body."""
+"""Largest number of patches along a side of a surface. Chosen: a tenth of a second for a body."""
 _PAIRS = 32
-"""Pairs of bodies that are looked at. Chosen: a second or two at most."""
+"""Largest number of pairs of bodies that are checked. Chosen: a second or two at most."""
 _LEAST = 1e-3
-"""Of the surface of the smaller body: less is an edge or a corner, found by rounding. Chosen."""
+"""Smallest touching area over the surface of the smaller body: less is an edge or a corner, found by rounding.
+Chosen."""
 
 
 class Touch(msgspec.Struct, kw_only=True, frozen=True):
-    """Two parts, by number, that touch over about ``area``, m^2."""
+    """Two parts, by index, that touch over about ``area``, m^2."""
 
     one: int
     other: int
@@ -34,7 +35,7 @@ class Touch(msgspec.Struct, kw_only=True, frozen=True):
 
 
 def touching(case: Case) -> list[Touch]:
-    """The pairs of generated bodies that touch and have no bond; loose tets and mesh files are left out."""
+    """Returns the pairs of generated bodies that touch and have no bond; without loose tets and mesh files."""
     bodies = [
         (i, Placed(part.mesh, part.turn))
         for i, part in enumerate(case.parts)
@@ -46,13 +47,13 @@ def touching(case: Case) -> list[Touch]:
 
 
 def bonded(case: Case, one: int, other: int) -> bool:
-    """Whether two parts, by number, have a bond."""
+    """Whether two parts, by index, have a bond."""
     names = {case.parts[one].name, case.parts[other].name}
     return any(set(bond.parts) == names for bond in case.bond)
 
 
 def apart(case: Case, touches: Iterable[Touch]) -> Iterator[Problem]:
-    """A warning for each two parts that touch and that no contact keeps apart: nothing acts between them."""
+    """Yields a warning for two parts that touch without contact between them: no force acts between them."""
     for touch in touches:
         names = [case.parts[i].name for i in (touch.one, touch.other)]
         if case.contact is not None and (not case.contact.parts or set(names) <= set(case.contact.parts)):
@@ -65,13 +66,13 @@ def apart(case: Case, touches: Iterable[Touch]) -> Iterator[Problem]:
 
 
 def size(body: Placed) -> float:
-    """The largest extent of a body, m."""
+    """Returns the largest extent of a body, m."""
     low, high = body.bounds()
     return max(b - a for a, b in zip(low, high, strict=True))
 
 
 def _reach(one: Placed, other: Placed) -> bool:
-    """Whether the boxes round two bodies touch."""
+    """Whether the bounding boxes of two bodies touch."""
     margin = NEAR * max(size(one), size(other))
     return all(
         a - margin <= d and c - margin <= b
@@ -80,7 +81,8 @@ def _reach(one: Placed, other: Placed) -> bool:
 
 
 def _common(one: Placed, other: Placed) -> float:
-    """Area, m^2, of the first body's surface that lies on that of the second: of patches as large as elements."""
+    """Returns the area, m^2, of the first body's surface that lies on that of the second, summed over patches as
+    large as elements."""
     margin = NEAR * min(size(one), size(other))
     low, high = other.bounds()
     area = whole = 0.0
@@ -100,7 +102,7 @@ def _common(one: Placed, other: Placed) -> float:
 
 
 def _ends(one: Placed, other: Placed, point: Vector, normal: Vector, step: float) -> bool:
-    """Whether the second body begins where the first ends: ``step`` times the normal of a point from it."""
+    """Whether the second body begins at the surface of the first: ``step`` along the normal from a point."""
     for sign in (-1.0, 1.0):
         own = _moved(point, normal, -sign * step)
         far = _moved(point, normal, sign * step)

@@ -1,4 +1,4 @@
-"""Which parts of a run that has ended could have been rigid: they stayed elastic, with little strain and energy."""
+"""Notes on parts of a finished run that could have been rigid: they stayed elastic, with little strain and energy."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -8,27 +8,28 @@ from ..model.rigid import Rigid
 from ..model.schema import Case
 
 STRAIN = 1e-3
-"""Of a part, at most. Chosen: half of the yield strain of a hard steel; what it strains moves its surface by so much of
-its size."""
+"""Largest strain of a part. Chosen: half of the yield strain of a hard steel; it moves the surface by this share of
+the part's size."""
 SHARE = 0.05
-"""Of the largest energies in the tets of all parts. Chosen: what stiff.STIFF leaves to the stiffer of two bodies."""
+"""Largest share of a part in the energies of all parts. Chosen: the share of the stiffer of two bodies by
+stiff.STIFF."""
 
 
 @dataclass(frozen=True)
 class Strained:
-    """What a part has gone through."""
+    """Largest strain and energy of a part in a run."""
 
     elements: int
     strain: float
-    """sqrt(2 U / (E V)) of the largest energy U in its tets: the root of the mean square of the strain, at most."""
+    """sqrt(2 U / (E V)) of the largest energy U in its tets: upper bound of the root mean square of the strain."""
     share: float
-    """Of that energy in the sum of those of all parts."""
+    """Share of that energy in the sum over all parts."""
     plastic: bool
-    """Whether one of its tets has yielded or left."""
+    """Whether one of its tets has yielded or was deleted."""
 
 
 def could_be_rigid(case: Case, found: Sequence[Strained], limiter: str) -> Iterator[str]:
-    """A line for each part that could be rigid, with what that would save; ``limiter``: what holds the step down."""
+    """Yields a line for each part that could be rigid, with the saving; ``limiter``: what limits the time step."""
     if case.contact is None or len(case.parts) < 2:
         return
     every = sum(part.elements for part in found)

@@ -1,4 +1,4 @@
-"""What is odd about a case and its meshes, one list for whoever checks it and for whoever runs it."""
+"""All warnings about a case and its meshes, for ``validate``, the server and the run."""
 
 from collections.abc import Iterable
 
@@ -11,8 +11,8 @@ from .touching import Touch, apart
 
 
 def warned(case: Case, expected: Estimate, survey: Survey, touches: Iterable[Touch]) -> list[Problem]:
-    """Every warning that does not depend on how the case is written (``plausible.bare_numbers``): ``expected`` is its
-    estimate, ``survey`` what its mesh files hold, ``touches`` are the parts whose surfaces coincide.
+    """Returns every warning that does not depend on how the case is written (``plausible.bare_numbers``):
+    ``expected``: its estimate, ``survey``: that of its mesh files, ``touches``: the parts whose surfaces coincide.
     """
     return [
         *_notes(case, survey),
@@ -23,7 +23,7 @@ def warned(case: Case, expected: Estimate, survey: Survey, touches: Iterable[Tou
 
 
 def _notes(case: Case, survey: Survey) -> list[Problem]:
-    """What of the files is not in the meshes."""
+    """Yields the notes on contents of the files that are not in the meshes."""
     return [
         problem(("parts", each.part, "mesh", "path"), getattr(case.parts[each.part].mesh, "path", ...), note)
         for each in survey.parts
