@@ -45,7 +45,7 @@ def si(value: float | None, unit: str = "", digits: int = 3) -> str:
 
 
 def exact(value: float | None, unit: str = "", digits: int = 6) -> str:
-    """As ``si``, without zeros at the end."""
+    """Returns the text of ``si`` without zeros at the end."""
     return _trimmed(si(value, unit, digits))
 
 
@@ -58,7 +58,7 @@ def alike(values: Iterable[float | None], unit: str = "", digits: int = 3) -> li
 
 
 def exacts(values: Iterable[float | None], unit: str = "", digits: int = 6) -> list[str]:
-    """As ``si_all``, without zeros at the end."""
+    """Returns the texts of ``si_all`` without zeros at the end."""
     return [_trimmed(text) for text in alike(values, unit, digits)]
 
 

@@ -44,7 +44,7 @@ def _wearing(case: Case) -> Iterator[Problem]:
         worn = [case.parts[i].name for i in (one, other) if case.parts[i].erosion is not None and breaks[i]]
         if worn:
             message = (
-                f"{choices(worn)}: a part that erodes cannot be of one body with parts or bonds that break; remove "
+                f"{choices(worn)}: a part that erodes cannot form one body with parts or bonds that break; remove "
                 "erosion or fracture, or set kind = 'tied'"
             )
             yield problem(("bond", k, "parts"), _both(case.bond[k]), message)
@@ -60,7 +60,7 @@ def _pulled(case: Case) -> Iterator[Problem]:
             left = [part.name for part, of in zip(case.parts, body, strict=True)
                     if of in some and part.name not in spec.parts]  # fmt: skip
             if left:
-                message = f"bonds make one body of these and {choices(left)}, with nodes in common; name all"
+                message = f"these parts and {choices(left)} are one body with common nodes; name all of them"
                 yield problem(("boundaries", k, "parts"), ", ".join(spec.parts), message)
 
 
@@ -78,7 +78,7 @@ def _keys(bond: Bonded, location: Location) -> Iterator[Problem]:
     normal, shear = bond.energies
     if (normal > 0.0) != (shear > 0.0):
         key, value = ("shear_energy", shear) if shear == 0.0 else ("energy", normal)
-        message = "energy and shear_energy are both 0, and the bond lets go at once, or both above 0"
+        message = "give energy and shear_energy both above 0, or both 0"
         yield problem((*location, key), value, message)
 
 
@@ -86,7 +86,7 @@ def _twice(case: Case, number: int) -> Iterator[Problem]:
     bond = case.bond[number]
     for k, earlier in enumerate(case.bond[:number]):
         if sorted(earlier.parts) == sorted(bond.parts):
-            message = f"bond[{k}] is of these parts; keep one of the two"
+            message = f"bond[{k}] joins the same parts; keep one of the two"
             yield problem(("bond", number, "parts"), _both(bond), message)
 
 
@@ -96,22 +96,22 @@ def _meshes(one: Part, other: Part, breaks: bool, location: Location) -> Iterato
     way = "set kind = 'tied'"
     loose = [part.name for part in (one, other) if isinstance(part.mesh, Loose)]
     if loose:
-        yield problem(location, names, f"{choices(loose)}: loose tets share no node with other parts; {way}")
+        yield problem(location, names, f"{choices(loose)}: single tets have no nodes in common with other parts; {way}")
     elif isinstance(one.mesh, MeshFile) or isinstance(other.mesh, MeshFile):
         if not all(isinstance(mesh, MeshFile) for mesh in pair):
-            message = f"a mesh of a file and one that is generated have no nodes in common; {way}"
+            message = f"a mesh from a file and a generated mesh have no nodes in common; {way}"
             yield problem(location, names, message)
     elif one.mesh.generator != other.mesh.generator:
-        yield problem(location, names, f"their meshes have two generators; give both the same, or {way}")
+        yield problem(location, names, f"their meshes have different generators; use the same for both, or {way}")
     elif one.mesh.generator == "structured" and not all(isinstance(mesh, Box | Plate) for mesh in pair):
-        message = f"structured meshes have nodes in common where both are boxes or plates; use gmsh, or {way}"
+        message = f"only structured meshes of boxes and plates have nodes in common; use gmsh, or {way}"
         yield problem(location, names, message)
     elif any(isinstance(mesh, Stl) for mesh in pair):
-        message = f"the surface of an STL file is meshed alone; take both from one STEP or mesh file, or {way}"
+        message = f"a body from an STL file is meshed separately; take both from one STEP or mesh file, or {way}"
         yield problem(location, names, message)
     worn = [part.name for part in (one, other) if part.erosion is not None]
     if breaks and worn:
         message = f"{choices(worn)}: a part that erodes cannot have a bond that breaks; remove erosion or strength"
         yield problem(location, names, message)
     if one.turn != other.turn:
-        yield problem(location, names, f"their turns differ, and their nodes do not stay together; {way}")
+        yield problem(location, names, f"their turns differ, so their nodes would separate; {way}")

@@ -57,7 +57,9 @@ def _out_of_reach(case: Case, number: int) -> Iterator[Problem]:
             _comes(case, part, d, boundary.at - low[d]) for part, (low, _) in zip(parts, bodies, strict=True)
         ):
             reach = f"{min(low[d] for low, _ in bodies):g} and {max(high[d] for _, high in bodies):g} m"
-            message = f"nothing lies on this plane or flies at it: the bodies are between {reach} along {boundary.axis}"
+            message = (
+                f"no body lies on this plane or moves towards it: the bodies are between {reach} along {boundary.axis}"
+            )
             yield problem(("boundaries", number, "at"), f"{boundary.at:g} m", message)
     elif isinstance(boundary, Prescribed | Traction) and boundary.low is not None and boundary.high is not None:
         box = list(zip(boundary.low, boundary.high, strict=True))
@@ -72,11 +74,9 @@ def _out_of_reach(case: Case, number: int) -> Iterator[Problem]:
                 for pick, corners in zip((min, max), zip(*bodies, strict=True), strict=True)
             )
             reach = " to ".join(f"({', '.join(f'{x:g}' for x in corner)})" for corner in (low, high))
-            yield problem(
-                ("boundaries", number), ..., f"the box misses all bodies that it is for; they are in {reach} m"
-            )
+            yield problem(("boundaries", number), ..., f"the box contains none of its bodies, which are in {reach} m")
         elif isinstance(boundary, Traction) and all(_surrounds(body, wider) for body in reached.values()):
-            message = f"the box lies inside of {choices(reached)}; tractions act on surfaces"
+            message = f"the box lies inside {choices(reached)}; tractions act on surfaces"
             yield problem(("boundaries", number), ..., message)
         else:
             yield from idle(case, number)
@@ -112,7 +112,7 @@ def _two_drives(case: Case) -> Iterator[Problem]:
         axes = clash(first, second)
         if shared and axes:
             what = f"the velocity of part {shared[0]!r} along {choices(axes)}"
-            message = f"prescribes {what}, and so does boundaries[{i}] in another way; keep one of the two"
+            message = f"prescribes {what}, which boundaries[{i}] prescribes differently; keep one of the two"
             yield problem(("boundaries", j), ..., message)
 
 
@@ -122,7 +122,7 @@ def _whole(boundary: object) -> bool:
 
 def _prescribed(boundary: Prescribed, location: Location) -> Iterator[Problem]:
     if boundary.x is None and boundary.y is None and boundary.z is None:
-        yield problem(location, ..., "prescribes nothing; give one or more of x, y, z")
+        yield problem(location, ..., "needs at least one of x, y, z")
     yield from _box(boundary, location)
     yield from _course(boundary, location)
 
@@ -135,13 +135,13 @@ def _gravity(boundary: Gravity, location: Location) -> Iterator[Problem]:
 
 def _traction(boundary: Traction, location: Location) -> Iterator[Problem]:
     if (boundary.stress is None) == (boundary.pressure is None):
-        yield problem(location, ..., "give either stress or pressure")
+        yield problem(location, ..., "needs either stress or pressure")
     elif boundary.stress is not None and not any(boundary.stress):
         yield problem((*location, "stress"), "0, 0, 0", "must not be zero")
     elif boundary.pressure == 0.0:
         yield problem((*location, "pressure"), 0, "must not be zero")
     if boundary.follows and boundary.pressure is None:
-        yield problem((*location, "follows"), True, "a pressure follows the surface, a stress does not; give pressure")
+        yield problem((*location, "follows"), True, "needs pressure; a stress cannot follow the surface")
     if (round_ := boundary.cylinder) is not None and round_.inner_radius > round_.radius:
         message = f"must not be above radius, {round_.radius:g} m"
         yield problem((*location, "cylinder", "inner_radius"), f"{round_.inner_radius:g} m", message)
@@ -159,7 +159,7 @@ def _course(boundary: Prescribed | Gravity | Traction | Wall, location: Location
 
 def _box(boundary: Prescribed | Traction, location: Location) -> Iterator[Problem]:
     if (boundary.low is None) != (boundary.high is None):
-        yield problem(location, ..., "give both low and high, or neither for all of the parts")
+        yield problem(location, ..., "needs both low and high, or neither for the whole parts")
     elif boundary.low is not None and boundary.high is not None:
         yield from ordered(boundary.low, boundary.high, location)
 
@@ -177,7 +177,7 @@ def check_walls(case: Case) -> Iterator[Problem]:
     seen: set[str] = set()
     for i, wall in walls:
         if wall.name in seen:
-            yield problem(("boundaries", i, "name"), wall.name, "an earlier wall has this name; give each its own")
+            yield problem(("boundaries", i, "name"), wall.name, "an earlier wall has this name; use different names")
         seen.add(wall.name)
         yield from _shape(wall, ("boundaries", i))
         yield from _course(wall, ("boundaries", i))
@@ -197,7 +197,7 @@ def _shape(wall: Wall, location: Location) -> Iterator[Problem]:
         elif isinstance(value, tuple) and not any(value):
             yield problem((*location, key), "0, 0, 0", "must not be zero")
     if wall.shape == "plane" and wall.side == "inside":
-        yield problem((*location, "side"), wall.side, "a plane has no inside; turn its normal round")
+        yield problem((*location, "side"), wall.side, "a plane has no inside; reverse its normal")
     if wall.course and wall.mass is not None:
         yield problem((*location, "course"), ..., "a wall with a mass is free; remove course or mass")
     elif wall.course and not any(wall.velocity):
@@ -213,5 +213,5 @@ def _behind(case: Case, number: int, point: Vector, way: Vector, parts: tuple[st
             continue
         depth = level - lowest_along(part.mesh, normal)
         if depth > GENERATED * max(abs(x) for corner in Placed(part.mesh).bounds() for x in corner):
-            message = f"part {part.name!r} starts {depth:g} m behind this wall; move it, or turn the normal round"
+            message = f"part {part.name!r} starts {depth:g} m behind this wall; move it, or reverse the normal"
             yield problem(("boundaries", number), ..., message)

@@ -98,9 +98,11 @@ def _materials(case: Case) -> Iterator[Problem]:
         if made.strength is not None:
             for key in ("eos", "spall"):
                 if made.strength.own_pressure and getattr(made, key) is not None:
-                    yield problem(("materials", name, key), ..., f"{made.strength.model} has its own; remove the key")
+                    yield problem(("materials", name, key), ..., f"{made.strength.model} contains it; remove the key")
             if made.strength.linear_pressure and made.eos is not None:
-                yield problem(("materials", name, "eos"), ..., "what dilates has the linear pressure; remove the table")
+                yield problem(
+                    ("materials", name, "eos"), ..., "dilation_angle needs the linear pressure; remove the table eos"
+                )
             for key, value, message in made.strength.problems():
                 yield problem(("materials", name, "strength", key), value, message)
 
@@ -123,16 +125,18 @@ def _parts(case: Case) -> Iterator[Problem]:
         yield from _fracture(part, known[part.material], ("parts", i, "fracture"))
         sector = getattr(part.mesh, "sector", "full")
         if part.turn is not None and sector != "full":
-            yield problem(("parts", i, "turn"), ..., f"a {sector} of a body cannot be turned; model all of it")
+            yield problem(("parts", i, "turn"), ..., f"a {sector} body cannot be turned; use sector = 'full'")
 
 
 def _erosion(spec: Erosion, name: str, law: Strength | None, location: Location) -> Iterator[Problem]:
     """Yields a problem for limits that the material can never reach."""
     if law is None and spec.plastic_strain is not None:
-        message = f"{name} is elastic (no table strength) and never strains plastically; remove the key"
+        message = f"{name} is elastic (no table strength) and has no plastic strain; remove the key"
         yield problem((*location, "plastic_strain"), spec.plastic_strain, message)
     if spec.damage is not None and not (law is not None and law.counts_damage):
-        message = f"{name} counts no damage; allowed with johnson_holmquist, and with johnson_cook with a table damage"
+        message = (
+            f"{name} has no damage; use strength.model = 'johnson_holmquist', or 'johnson_cook' with a table damage"
+        )
         yield problem((*location, "damage"), spec.damage, message)
 
 
@@ -141,14 +145,16 @@ def _fracture(part: Part, made: Material, location: Location) -> Iterator[Proble
     if spec is None:
         return
     if made.brittle is None:
-        message = f"{part.material} cannot break: it has no table brittle with a tensile strength and a fracture energy"
+        message = (
+            f"{part.material} cannot fracture: it has no table brittle with a tensile strength and a fracture energy"
+        )
         yield problem(location, ..., message)
     elif made.brittle.scatter is not None and made.brittle.scatter.minimum >= made.brittle.strength:
         message = f"must be below the strength, {made.brittle.strength:g} Pa"
         where = ("materials", part.material, "brittle", "scatter", "minimum")
         yield problem(where, made.brittle.scatter.minimum, message)
     if spec.model == "cohesive" and spec.shear_weight == 0.0:
-        yield problem((*location, "shear_weight"), 0.0, "must be above 0 with model = 'cohesive', which shears too")
+        yield problem((*location, "shear_weight"), 0.0, "must be above 0 with model = 'cohesive', which includes shear")
     if part.erosion is not None:
         yield problem(location, ..., "a part cannot erode and fracture; remove erosion or fracture")
 
@@ -198,11 +204,11 @@ def _contact(case: Case) -> Iterator[Problem]:
     for i, pair in enumerate(contact.pairs):
         one, other = pair.parts
         if one == other and one in names and one not in case.self_contact:
-            message = "a part that does not meet itself; name it in contact.self_contact"
+            message = "this part has no self-contact; name it in contact.self_contact"
             yield problem(("contact", "pairs", i, "parts"), f"{one}, {other}", message)
         for k, earlier in enumerate(contact.pairs[:i]):
             if sorted(earlier.parts) == sorted(pair.parts):
-                message = f"contact.pairs[{k}] is of these parts; keep one of the two"
+                message = f"contact.pairs[{k}] has the same parts; keep one of the two"
                 yield problem(("contact", "pairs", i, "parts"), f"{one}, {other}", message)
 
 
@@ -250,14 +256,14 @@ def _fields(case: Case) -> Iterator[Problem]:
     fields = case.run.fields
     for k, name in enumerate(fields):
         if name in fields[:k]:
-            yield problem(("run", "fields", k), name, "is there twice; remove one of them")
+            yield problem(("run", "fields", k), name, "is listed twice; remove one of them")
     if "contact_pressure" in fields and not (case.in_contact or case.boundaries_of(Wall)):
         location = ("run", "fields", fields.index("contact_pressure"))
-        yield problem(location, "contact_pressure", "nothing of the case meets anything, no part and no wall")
+        yield problem(location, "contact_pressure", "the case has neither contact between parts nor a wall")
 
 
 def _unique(names: list[str], key: str) -> Iterator[Problem]:
     for i, name in enumerate(names):
         if name in names[:i]:
             first = dotted((key, names.index(name)))
-            yield problem((key, i, "name"), name, f"{first} has this name; give each its own")
+            yield problem((key, i, "name"), name, f"{first} has this name; use different names")

@@ -37,7 +37,7 @@ def _slips(form: Model, location: Location) -> Iterator[Problem]:
     most = max(form.radius, form.top_radius) if isinstance(form, ConeForm) else form.radius
     for key in _ROUNDED:
         if 0.0 < getattr(form, key, 0.0) < _LEAST * most:
-            message = f"less than a millionth of the radius, {most:g} m; set 0, or a length that elements can have"
+            message = f"is below a millionth of the radius, {most:g} m; use 0, or a length that elements can resolve"
             yield problem((*location, key), getattr(form, key), message)
 
 
@@ -50,21 +50,20 @@ def _ogive(form: OgiveForm, location: Location) -> Iterator[Problem]:
 
 def _nose(form: OgiveForm) -> Iterator[tuple[str, object, str]]:
     if form.crh is None and form.nose is None:
-        yield "crh", ..., "this key is missing, or nose: at least one of them is needed"
+        yield "crh", ..., "needs at least one of crh and nose"
     elif form.nose is not None and form.nose < form.radius:
         yield "nose", form.nose, f"must not be below the radius, {form.radius:g} m, which makes a hemisphere"
     elif form.nose is not None and form.crh is not None:
         least = tangent(form.nose, form.radius)
         if form.crh < least * (1.0 - 1e-12):
-            message = (
-                f"must not be below {least:.12g}, the tangent ogive of this nose: it would bulge beyond the calibre"
-            )
+            wide = "that of the tangent ogive of this nose: the nose would be wider than the shank"
+            message = f"must not be below {least:.12g}, {wide}"
             yield "crh", form.crh, message
 
 
 def _tip(form: OgiveForm) -> Iterator[tuple[str, object, str]]:
     if form.tip_radius and form.meplat:
-        yield "meplat", form.meplat, "the tip is round (tip_radius) or flat; remove one of them"
+        yield "meplat", form.meplat, "allowed is either tip_radius or meplat; remove one of them"
     elif form.meplat >= 2.0 * form.radius:
         yield "meplat", form.meplat, f"must be below the diameter, {2.0 * form.radius:g} m"
     elif form.tip_radius >= form.radius:

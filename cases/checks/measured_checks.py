@@ -40,10 +40,10 @@ def check_measured(mesh: Measured, location: Location) -> Iterator[Problem]:
 def _combination(mesh: CombinedForm, location: Location) -> Iterator[Problem]:
     found = list(leaves(mesh))
     if len(found) > _MOST:
-        yield problem((*location, "of"), ..., f"{len(found)} shapes in all are too many; allowed: up to {_MOST}")
+        yield problem((*location, "of"), ..., f"{len(found)} shapes in all; allowed: up to {_MOST}")
         return
     if max(depth for _, depth, _ in found) > _DEEPEST:
-        yield problem((*location, "of"), ..., f"combinations lie more than {_DEEPEST} deep in one another")
+        yield problem((*location, "of"), ..., f"combinations are nested more than {_DEEPEST} deep")
         return
     for place, _, each in found:
         if isinstance(each, CadForm):

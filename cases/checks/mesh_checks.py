@@ -21,7 +21,7 @@ def check_mesh(mesh: Mesh, location: Location) -> Iterator[Problem]:
         return
     yield from check_grading(mesh, location)
     if mesh.grading is not None and mesh.generator == "structured":
-        message = "the structured generator has one element size; remove grading, or use gmsh"
+        message = "needs generator = 'gmsh'; the structured generator has one element size"
         yield problem((*location, "grading"), ..., message)
     wrong = list(check_form(mesh, location))
     yield from wrong
@@ -34,7 +34,7 @@ def check_mesh(mesh: Mesh, location: Location) -> Iterator[Problem]:
         if away:
             return
     if not isinstance(mesh, Loose) and mesh.element_size > thinnest(mesh) * (1 + 1e-9):
-        message = f"must not be above the smallest extent of what is modelled, {thinnest(mesh):g} m"
+        message = f"must not be above the smallest extent of the modelled part, {thinnest(mesh):g} m"
         yield problem((*location, "element_size"), mesh.element_size, message)
     elif isinstance(mesh, Box | Plate):
         yield from _slit(mesh, (*location, "slit"))
@@ -54,7 +54,7 @@ def _slit(mesh: Box | Plate, location: Location) -> Iterator[Problem]:
     if slit is None:
         return
     if mesh.generator != "structured":
-        yield problem(location, ..., "only the structured generator makes slits; set generator = 'structured'")
+        yield problem(location, ..., "needs generator = 'structured'")
         return
     rows = grid(mesh)
     if not (_between(rows[index(slit.axis)], slit.at) and _on_plane(rows[index(slit.axis)], slit.at)):
@@ -70,12 +70,12 @@ def _slit(mesh: Box | Plate, location: Location) -> Iterator[Problem]:
                 message = f"must be a plane of nodes, or outside the body; {_planes(mesh, AXES[d])}"
                 yield problem((*location, key, k), x, message)
     if 0 in slit_lines(mesh):
-        yield problem(location, ..., "is outside the body, or too narrow: no node lies within its border")
+        yield problem(location, ..., "is outside the body or too narrow: no node lies inside its border")
 
 
 def _planes(mesh: Box | Plate, axis: Axis) -> str:
     row = grid(mesh)[index(axis)]
-    return f"they stand every {row.spacing:g} m from {axis} = {row.start:g} m"
+    return f"they are {row.spacing:g} m apart, from {axis} = {row.start:g} m"
 
 
 def _between(row: Row, x: float) -> bool:

@@ -43,12 +43,18 @@ def check_ons(case: Case) -> Iterator[Problem]:
     for location, spec in ons(case):
         generated = [part.name for part in parts(case, spec) if not isinstance(part.mesh, MeshFile)]
         if generated:
-            yield problem((*location, "on"), spec.on, f"a mesh from a file has sets; that of {generated[0]!r} is not")
+            yield problem(
+                (*location, "on"),
+                spec.on,
+                f"only meshes from files have sets; the mesh of {generated[0]!r} is generated",
+            )
         elif not parts(case, spec):
-            yield problem((*location, "on"), spec.on, "a mesh from a file has sets; no part of the case has one")
+            yield problem((*location, "on"), spec.on, "only meshes from files have sets; no part of the case has one")
         if isinstance(spec, Probe) and kind(spec.field) in (*PUSHES, *FRAGMENTS, *SHAPES):
             yield problem(
-                (*location, "on"), spec.on, f"is of means and sums alone; {spec.field!r} is neither; remove on"
+                (*location, "on"),
+                spec.on,
+                f"is allowed with means and sums only; remove on, or use another field than {spec.field!r}",
             )
     if len(bits(case)) > MOST:
-        yield problem(("boundaries",), ..., f"they and the probes are on {len(bits(case))} sets; allowed are {MOST}")
+        yield problem(("boundaries",), ..., f"boundaries and probes use {len(bits(case))} sets; allowed: up to {MOST}")

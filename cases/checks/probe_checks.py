@@ -31,13 +31,13 @@ def check_probes(case: Case) -> Iterator[Problem]:
     for i, probe in enumerate(case.probes):
         location = ("probes", i)
         if (first := names.index(probe.name)) < i:
-            yield problem((*location, "name"), probe.name, f"probes[{first}] has this name; give each its own")
+            yield problem((*location, "name"), probe.name, f"probes[{first}] has this name; use different names")
         if probe.name in COLUMNS:
             message = f"is a column of every history.csv; allowed: any name but {choices(COLUMNS)}"
             yield problem((*location, "name"), probe.name, message)
         yield from _keys(probe, location)
         if (probe.low is None) != (probe.high is None):
-            yield problem(location, ..., "low and high go together; give both, or none for the whole part")
+            yield problem(location, ..., "needs both low and high, or neither for the whole part")
         elif probe.low is not None and probe.high is not None:
             yield from ordered(probe.low, probe.high, location)
         if probe.part not in parts:
@@ -45,7 +45,7 @@ def check_probes(case: Case) -> Iterator[Problem]:
             continue
         yield from _pushes(case, i, probe)
         if probe.field == "cone_angle" and not (damageable(case) or case.erodes):
-            yield problem((*location, "field"), probe.field, "nothing of the case is damaged, fractures or erodes")
+            yield problem((*location, "field"), probe.field, "the case has neither damage, fracture nor erosion")
         yield from _box(parts[probe.part], probe, location)
 
 
@@ -60,7 +60,7 @@ def _keys(probe: Probe, location: Location) -> Iterator[Problem]:
             yield problem((*location, key), ..., f"this key is missing; {field} needs it")
     whole = (*PUSHES, *SHAPES, "fragment_velocity", "fragment_mass")
     if field in whole and (probe.low is not None or probe.high is not None):
-        yield problem(location, ..., f"{field} is that of the whole part; remove low and high")
+        yield problem(location, ..., f"{field} is measured on the whole part; remove low and high")
 
 
 def _pushes(case: Case, number: int, probe: Probe) -> Iterator[Problem]:

@@ -15,13 +15,13 @@ def check_rigid(case: Case) -> Iterator[Problem]:
         part = case.parts[i]
         yield from _part(part, ("parts", i))
         if case.contact is not None and part.name in (case.contact.self_contact or ()):
-            message = f"{part.name!r} is rigid and cannot meet itself; remove it"
+            message = f"{part.name!r} is rigid and cannot have self-contact; remove it"
             yield problem(("contact", "self_contact"), part.name, message)
     yield from _boundaries(case)
     rigid = [case.parts[i].name for i in case.rigid]
     for k, bond in enumerate(case.bond):
         for name in (name for name in bond.parts if name in rigid):
-            yield problem(("bond", k, "parts"), name, "is rigid; bonds hold deformable parts")
+            yield problem(("bond", k, "parts"), name, "is rigid; only deformable parts can be bonded")
 
 
 def _part(part: Part, location: Location) -> Iterator[Problem]:
@@ -29,7 +29,7 @@ def _part(part: Part, location: Location) -> Iterator[Problem]:
         if getattr(part, key) is not None:
             yield problem((*location, key), ..., "a rigid part has no stress and no strain; remove this key or rigid")
     if part.jitter > 0.0:
-        yield problem((*location, "jitter"), part.jitter, "a rigid part moves as one; remove this key or rigid")
+        yield problem((*location, "jitter"), part.jitter, "a rigid part has no jitter; remove this key or rigid")
     spec = part.rigid
     if spec is None:
         return
@@ -49,7 +49,9 @@ def _boundaries(case: Case) -> Iterator[Problem]:
         if not held:
             continue
         if isinstance(boundary, Traction):
-            message = f"acts on the rigid part {held[0]!r}, which takes no traction; name the other parts in parts"
+            message = (
+                f"acts on the rigid part {held[0]!r}, on which tractions are not allowed; name the other parts in parts"
+            )
             yield problem(("boundaries", k), ..., message)
         elif on_set:
             message = f"drives a set of the rigid part {held[0]!r}; drive all of it, without on"

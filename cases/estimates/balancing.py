@@ -1,4 +1,4 @@
-"""When to cut a mesh anew for its ranks: the rules by which a run decides, and its replay under another policy."""
+"""Load balance: the criteria for a new decomposition of the mesh, used by a run and by the replay of its loads."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -7,53 +7,54 @@ from itertools import pairwise
 from ..model.schema import Balance
 
 WORK = ("elements", "nodes", "contact", "fracture")
-"""Phases of a step that ranks share; the others wait or write."""
+"""Phases of a step whose work is distributed over the ranks; the others wait or write."""
 MOVED = ("elements", "nodes", "contact")
-"""Those whose work goes where tets go. Fracture is many small things on every rank that has a facet to break, however
-many break there.
+"""Phases whose work moves with tets. Fracture consists of many small tasks on every rank that has a facet to break,
+for any number of such facets.
 """
 
 
 def lost(loads: Sequence[float]) -> float:
-    """How much longer the most loaded rank takes than it would with equal loads."""
+    """Returns the time of the most loaded rank beyond the mean."""
     return max(loads) - sum(loads) / len(loads)
 
 
 def imbalance(loads: Sequence[float]) -> float:
-    """Largest load over the mean."""
+    """Returns the largest load over the mean."""
     mean = sum(loads) / len(loads)
     return max(loads) / mean if mean > 0.0 else 1.0
 
 
 @dataclass
 class Guard:
-    """The outside nodes of one rank against those that it had at the last cut (the paper's trigger, its fig. 9)."""
+    """Number of outside nodes of a rank compared with that at the last decomposition (the paper's criterion, its
+    fig. 9)."""
 
     alpha: float
     at_cut: int | None = None
 
     def grown(self, outside: int) -> bool:
-        """Whether a rank that has so many ``outside`` nodes has more than it may."""
+        """Whether the number of ``outside`` nodes has grown beyond the limit."""
         if self.at_cut is None:
             self.at_cut = outside
         return outside > self.alpha * self.at_cut
 
 
 _MOMENTS = 32
-"""So many moments of a stretch of steps are remembered, at most. Chosen."""
+"""Largest number of stored moments of a stretch of steps. Chosen."""
 
 
 @dataclass
 class Stretch:
-    """The work of each rank since the last cut."""
+    """The work of each rank since the last decomposition."""
 
     _moments: list[tuple[int, list[float]]] = field(default_factory=list)
-    """Steps and work of each rank, s, from the cut up to the end of each of some windows."""
+    """Steps and work of each rank, s, from the decomposition up to the end of each of some windows."""
     _apart: float = 0.0
-    """Steps between two of them, but for the last."""
+    """Steps between two stored moments, except the last."""
 
     def add(self, loads: Sequence[float], steps: int) -> None:
-        """Takes the ``loads`` of all ranks, s a step, over some steps."""
+        """Adds the ``loads`` of all ranks, s per step, over some steps."""
         before = self.work or [0.0] * len(loads)
         now = self.steps + steps, [w + steps * load for w, load in zip(before, loads, strict=True)]
         if len(self._moments) > 1 and self.steps - self._moments[-2][0] < self._apart:
@@ -64,17 +65,17 @@ class Stretch:
 
     @property
     def steps(self) -> int:
-        """How many."""
+        """Number of steps."""
         return self._moments[-1][0] if self._moments else 0
 
     @property
     def work(self) -> list[float]:
-        """Of each rank, s; what ranks lose to each other in turn no cut would mend."""
+        """Work of each rank, s. Waiting that alternates between ranks is not counted as imbalance."""
         return self._moments[-1][1] if self._moments else []
 
     @property
     def halves(self) -> tuple[float, float]:
-        """The imbalance of the first half of the steps, and of what came after it."""
+        """Imbalance of the first half of the steps, and of the rest."""
         if not self._moments:
             return 1.0, 1.0
         half, moments = 0.5 * self.steps, [(0, [0.0] * len(self.work)), *self._moments]
@@ -86,39 +87,40 @@ class Stretch:
 
 @dataclass
 class Trigger:
-    """Whether a cut is due, by the policy of a case; the same on all ranks."""
+    """The decision for a new decomposition, by the policy of a case; the same on all ranks."""
 
     spec: Balance
     cost: float
-    """Of the last cut, s; at first of what takes as long."""
+    """Cost of the last decomposition, s; at first that of a comparable operation."""
     step: int = 0
-    """Of the last cut."""
+    """Step of the last decomposition."""
     stretch: Stretch = field(default_factory=Stretch)
-    """Since then."""
+    """Work since then."""
     fruitless: int = 0
-    """Cuts in a row that saved less than they cost: each doubles what has to be lost before the next."""
+    """Consecutive decompositions that saved less than they cost: each doubles the loss required for the next."""
 
     def look(self, loads: Sequence[float], steps: int) -> None:
-        """Takes the ``loads`` of all ranks, s a step, over some steps."""
+        """Adds the ``loads`` of all ranks, s per step, over some steps."""
         self.stretch.add(loads, steps)
 
     @property
     def lost(self) -> float:
-        """To imbalance since the last cut, s."""
+        """Time lost by imbalance since the last decomposition, s."""
         return lost(self.stretch.work) if self.stretch.steps else 0.0
 
     @property
     def bearable(self) -> float:
-        """What may be lost before the next cut, s."""
+        """Loss that triggers the next decomposition, s."""
         return self.cost * 2.0**self.fruitless
 
     @property
     def half_way(self) -> bool:
-        """Whether half of that is."""
+        """Whether half of that loss is reached."""
         return self.lost > 0.5 * self.bearable
 
     def cause(self, step: int, grown: bool) -> str | None:
-        """Why to cut before ``step``, if so; ``grown``: whether a rank has more outside nodes than it may."""
+        """Returns the reason for a decomposition before ``step``, empty for none; ``grown``: whether the outside
+        nodes of a rank have grown beyond the limit."""
         spec = self.spec
         if spec.policy == "never" or step == self.step:
             return None
@@ -129,8 +131,8 @@ class Trigger:
         return "time lost exceeds the cost" if self.lost > self.bearable else None
 
     def settle(self, step: int, cost: float, paid: bool = True) -> None:
-        """Begins to count anew after a cut before ``step`` that took ``cost``, s; ``paid``: whether the one before
-        has saved what it cost.
+        """Resets the counters after a decomposition before ``step`` that took ``cost``, s; ``paid``: whether the one
+        before has saved its cost.
         """
         self.fruitless = 0 if paid else self.fruitless + 1
         self.step, self.cost, self.stretch = step, cost, Stretch()

@@ -1,7 +1,7 @@
-"""How long a case takes by the clock on its ranks and threads, from the core time of its stages.
+"""Estimate of the wall time of a case on its ranks and threads, from the core time of its stages.
 
-An estimate with assumptions that are told with it: what threads share, and how efficient ranks and threads are. On few
-cores they were measured; on many, threads were only projected (docs/performance/scaling.md).
+The assumptions are part of the answer: the share of the threads, and the efficiency of ranks and threads. They were
+measured on few cores; on many, threads were only projected (docs/performance/scaling.md).
 """
 
 from collections.abc import Mapping
@@ -11,32 +11,33 @@ from ..model.schema import Case
 from .stages import AVERAGED, STATE, STRENGTH, TETS
 
 SHARED = (TETS, AVERAGED, STRENGTH, STATE)
-"""Stages whose passes the threads of a rank share. The others are taken to be done by one of them."""
+"""Stages whose passes the threads of a rank share. The others are assumed to run on one of them."""
 _RANKS = 0.4
-"""R ranks are as fast as R to this power: 66 % efficient for 2, 44 % for 4, 19 % for 16. By the clock 2 were 62 to 72 %
-efficient, 4 were 54 %, 16 were 14 to 18 %, in scenes of 47,000 to 147,000 tets (docs/performance/scaling.md)."""
+"""Exponent of the speed of R ranks, R^p: 66 % efficient for 2, 44 % for 4, 19 % for 16. Measured wall time: 2 ranks
+62 to 72 % efficient, 4 54 %, 16 14 to 18 %, in scenes of 47,000 to 147,000 tets (docs/performance/scaling.md)."""
 _THREAD = 0.15
-"""What each further thread costs all of them: T threads are T / (1 + 0.15 (T - 1)) as fast as one in what they share,
-87 % efficient for 2, 69 % for 4, 31 % for 16. Assumed: docs/performance/scaling.md, Threads, has what was projected."""
+"""Cost of each further thread for all of them: T threads are T / (1 + 0.15 (T - 1)) as fast as one in shared passes,
+87 % efficient for 2, 69 % for 4, 31 % for 16. Assumed; docs/performance/scaling.md, Threads, has the projections."""
 
 
 @dataclass(frozen=True)
 class ClockTime:
-    """s by the clock with a core for each thread, and what was assumed."""
+    """Wall time, s, with one core for each thread, and the assumptions."""
 
     seconds: float
     breaking: float
-    """That come on top where what may break breaks as far as it may."""
+    """Additional wall time, s, if everything that can break breaks as far as it can."""
     shared: float
     """Share of the core time that the threads of a rank share."""
     ranks: float
-    """Efficiency of the ranks, 1 of one."""
+    """Efficiency of the ranks, 1 for one rank."""
     threads: float
-    """Efficiency of the threads in what they share."""
+    """Efficiency of the threads in shared passes."""
 
 
 def clock_time(case: Case, costs: Mapping[str, float], breaking: float) -> ClockTime:
-    """Of a case whose stages cost so many core-seconds, and its ``breaking`` so many besides."""
+    """Returns the wall time of a case whose stages cost so many core seconds, and its ``breaking`` so many in
+    addition."""
     ranks, threads = case.run.ranks, case.run.threads
     total = sum(costs.values())
     shared = sum(costs.get(stage, 0.0) for stage in SHARED)

@@ -1,7 +1,7 @@
-"""What a case will cost, before anything runs: tets, time step, steps, memory, core time.
+"""Estimate of the cost of a case before a run: tets, time step, steps, memory, core time.
 
-An estimate, not a promise: counts are exact for the structured generator and within about 10 % for gmsh; steps within a
-factor of two; core time as good as the constants below, which were measured on one machine.
+Numbers of tets are exact for the structured generator and within about 10 % for gmsh, steps within a factor of two;
+core time depends on the constants below, which were measured on one machine.
 """
 
 import math
@@ -24,91 +24,89 @@ from .shrinkage import shrinkage
 from .stages import AVERAGED, CONTACT, STATE, STEPS, STRENGTH, TETS
 
 NANOSECONDS = {"tet": 80.0, "nodal": 45.0, "split": 90.0, "eos": 15.0}
-"""Core time per tet and step: what every tet takes, and what each feature adds; laws say theirs (cases/laws). Measured
-at 10,000 to 750,000 tets."""
+"""Core time per tet and step: for every tet, and for each feature; laws of strength have their own (cases/laws).
+Measured at 10,000 to 750,000 tets."""
 FACE_NANOSECONDS = {"contact": 50.0, "erosion": 1400.0}
-"""Core time per face of the surface and step; the second where parts erode, stay in touch and are searched often."""
+"""Core time per surface face and step; the second value where parts erode, stay in contact and are searched often."""
 STEP_OVERHEAD = 0.3e-3
-"""Core seconds that a rank takes for a step besides its tets."""
+"""Core seconds of a rank per step, in addition to its tets."""
 START = 2.0
 """Core seconds of a rank before its first step, with a warm kernel cache."""
 
 BROKEN_NANOSECONDS = 15_000.0
-"""Core time per tet and step of a body that has turned to dust whose pieces touch each other: 3 to 14 us in the ten
-hard cases that break without being driven (docs/verification/accuracy.md: CPU s less what an estimate has without dust,
-by steps and tets that may break), 10 to 20 us in a plate of glass under an eroding cylinder, on aluminium, with
-friction. It is 7 us a broken facet, of which dust has two a tet."""
+"""Core time per tet and step of a body that has turned to dust whose pieces touch each other. Measured: 3 to 14 us
+in the ten hard cases that break without being driven (docs/verification/accuracy.md: CPU s less the estimate without
+dust, by steps and tets that can break), 10 to 20 us in a glass plate under an eroding cylinder, on aluminium, with
+friction. It is 7 us per broken facet; dust has two of them per tet."""
 PRESSED_NANOSECONDS = 26_000.0
-"""The same of dust that is held together and pressed, where every tet meets all round it and sweeps are many: a plug of
-glass under a ram (tests/bench/press.py) took 17,000 to 20,000 on one rank, a block of 3,600 tets between walls, into
-which a ram goes by a fifth and by a third of its height, 18,000 and 26,000 (by hand); less where it gives way."""
+"""The cost of dust that is enclosed and pressed, where every tet is in contact on all sides and sweeps are many.
+Measured: a plug of glass under a ram (tests/bench/press.py) 17,000 to 20,000 on one rank; a block of 3,600 tets
+between walls, compressed by a ram to four fifths and two thirds of its height, 18,000 and 26,000; less where it can
+move aside."""
 BREAKING_OVERHEAD = 2e-3
-"""Core seconds that a rank takes for a step in which something breaks, however little: 1 to 4 ms in twelve scenes of
-150 to 24,000 tets."""
+"""Core seconds of a rank per step in which any facet breaks: 1 to 4 ms in twelve scenes of 150 to 24,000 tets."""
 
 RIGID_STEPS = 1000.0
-"""Steps of a run of rigid parts alone, where spin does not ask for more (worker/rigid/stage.py)."""
+"""Steps of a run with rigid parts only, unless spin needs more (worker/rigid/stage.py)."""
 
 RANK_BYTES = 280_000_000
-"""Memory of a rank without a mesh: the interpreter, the libraries and the kernels of a body alone. Rank 0, which has
-all files, takes 260 MB, and 300 where pyarrow writes a history as Parquet as well; the others take 240."""
+"""Memory of a rank without a mesh: interpreter, libraries and the kernels of a single body. Rank 0, which writes all
+files, uses 260 MB, and 300 MB where pyarrow also writes a history as Parquet; the other ranks use 240 MB."""
 STAGE_BYTES = {"contact": 20_000_000, "fracture": 30_000_000}
-"""What the kernels and tables of a stage take of a rank besides: bar_on_bar had 276 MB in all, the tile of
-docs/tutorial/first_case.md before it breaks 301 MB."""
+"""Additional memory of a rank for kernels and tables of a stage: bar_on_bar used 276 MB in all, the tile of
+docs/tutorial/first_case.md before fracture 301 MB."""
 TET_BYTES = {"tet": 330, "nodal": 110, "split": 140, "strength": 50, "facets": 130}
-"""Memory a tet, its share of the nodes included, at its peak while the model is set up (docs/performance/bench.md)."""
+"""Memory per tet with its share of the nodes, at the peak during the setup of the model (docs/performance/bench.md)."""
 DUST_BYTES = 20_000
-"""Memory a tet besides, of a body that has turned to dust: copies of nodes, surface, candidate pairs and tables that
-they are made of. Measured are peaks of a rank where half of the facets were broken, less what it takes before: 12 to 16
-kB in glass_steel_demo and glass_ball_cohesive, 15 and 20 kB in tiles of 16,800 and 4,200 tets
-(docs/tutorial/first_case.md), 18 kB in cases/hard/wedge_glass.toml; bars of glass of which a quarter of the facets was
-broken, glass_steel_bar with 9,000 and 39,000 tets, had 7 and 5 kB."""
+"""Additional memory per tet of a body that has turned to dust: copies of nodes, surface, candidate pairs and their
+tables. Measured as the peak of a rank with half of the facets broken, less its memory before: 12 to 16 kB in
+glass_steel_demo and glass_ball_cohesive, 15 and 20 kB in tiles of 16,800 and 4,200 tets
+(docs/tutorial/first_case.md), 18 kB in cases/hard/wedge_glass.toml; glass bars with a quarter of the facets broken,
+glass_steel_bar with 9,000 and 39,000 tets, had 7 and 5 kB."""
 FILE_BYTES = {".msh": 42, ".inp": 48}
-"""Bytes of a text mesh file a tet, its share of the node lines included."""
+"""Bytes per tet of a mesh file in text, with its share of the node lines."""
 
 
 @dataclass(frozen=True)
 class PartEstimate:
-    """One part; None where a mesh file does not tell."""
+    """Estimate of a part; None where a mesh file is not known."""
 
     name: str
     elements: int | None
     nodes: int | None
     dt: float | None
-    """The time step its smallest tet allows at the start, s; infinite of a rigid part."""
+    """Stable time step of its smallest tet at the start, s; infinite for a rigid part."""
     bulk: Bulk | None = None
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """The whole case; None where a part's mesh file does not tell."""
+    """Estimate of the case; None where the mesh file of a part is not known."""
 
     elements: int | None
     nodes: int | None
     dt: float | None
-    """The first time step, s."""
+    """First time step, s."""
     steps: int | None
     memory_bytes: int | None
-    """Of all ranks together, while nothing breaks."""
+    """Memory of all ranks together, without fracture."""
     core_seconds: float | None
     """CPU time of all ranks together, s."""
     clock: ClockTime | None
-    """What its ranks and threads take by the clock."""
+    """Wall time on its ranks and threads."""
     costs: dict[str, float]
     """Its share of each stage of the case (cases/estimates/stages.py), s; empty where unknown. Breakage costs more, by
     an amount that cannot be estimated."""
     breaking: float
-    """CPU time, s, that comes on top where the parts that fracture break as far as they may; 0 where none does."""
+    """Additional CPU time, s, if the parts that can fracture break as far as they can; 0 without fracture."""
     dust_bytes: int
-    """Memory of all ranks that comes on top there."""
+    """Additional memory of all ranks in this case."""
     parts: tuple[PartEstimate, ...]
 
 
 def estimate(case: Case, folder: Path | None = None, survey: Survey = Survey()) -> Estimate:  # noqa: B008
-    """What ``case`` costs; relative paths of mesh files start in ``folder`` (without one no file is looked
-    at), ``survey`` has what was read of them.
-
-    Raises CaseError, unknown material.
+    """Returns the estimate of ``case``. Relative paths of mesh files start in ``folder`` (without it no file is
+    read); ``survey``: the survey of the mesh files. Raises CaseError for an unknown material.
     """
     known = [survey.of(index) for index in range(len(case.parts))]
     sizes = [_size(part, folder, found) for part, found in zip(case.parts, known, strict=True)]
@@ -138,12 +136,12 @@ def estimate(case: Case, folder: Path | None = None, survey: Survey = Survey()) 
 
 
 def _at_most(case: Case, dt: float | None) -> float | None:
-    """A step where only rigid parts are, s: a run has so many at least."""
+    """Time step with rigid parts only, s: a run has at least a fixed number of steps."""
     return case.run.end_time / RIGID_STEPS if dt == math.inf else dt
 
 
 def _size(part: Part, folder: Path | None, found: Surveyed | None) -> MeshSize | int | None:
-    """What is known of a part's mesh: sizes, the number of tets only, or nothing."""
+    """Returns what is known of a part's mesh: sizes, only the number of tets, or nothing."""
     if found is not None:
         return MeshSize(found.elements, found.nodes, found.step_length)
     if not isinstance(part.mesh, Measured):
@@ -173,7 +171,7 @@ def _part(case: Case, part: Part, size: MeshSize | int | None, found: Surveyed |
 
 
 def _viscous_factor(case: Case) -> float:
-    """The linear bulk viscosity takes its share of the time step."""
+    """Reduction of the time step by the linear bulk viscosity."""
     viscosity = case.numerics.viscosity
     linear = viscosity.linear if viscosity is not None else 0.0
     return linear + math.hypot(1.0, linear)
@@ -197,7 +195,8 @@ def _tet_bytes(case: Case, part: Part) -> int:
 
 
 def _costs(case: Case, parts: tuple[PartEstimate, ...], steps: int | None, faces: int) -> dict[str, float]:
-    """Core seconds by stage, of mesh files with so many ``faces``; none where a mesh file does not tell the tets."""
+    """Returns core seconds by stage, for mesh files with so many ``faces``; empty where the number of tets is
+    unknown."""
     if steps is None or any(size.elements is None for size in parts):
         return {}
     found = {STEPS: steps * case.run.ranks * STEP_OVERHEAD + case.run.ranks * START}
@@ -209,8 +208,8 @@ def _costs(case: Case, parts: tuple[PartEstimate, ...], steps: int | None, faces
 
 
 def _breaking(case: Case, parts: tuple[PartEstimate, ...], steps: int | None) -> float:
-    """Core seconds of fracture, and of the contact of what has come apart, at most; what flies is taken to break as far
-    as its motion can break it, what is driven to become dust and to be pressed.
+    """Returns the largest core time of fracture, and of contact between fragments, s. A part that moves freely is
+    assumed to break as far as its motion can break it; a driven part is assumed to become dust and to be pressed.
     """
     pressed = case.in_contact and driven_together(case)
     dust = 0.0
@@ -223,11 +222,12 @@ def _breaking(case: Case, parts: tuple[PartEstimate, ...], steps: int | None) ->
 
 
 def broken_share(case: Case, part: Part, speed: float) -> float:
-    """Of the facets of a part, those that may break where it meets others at a ``speed``, m/s, at most: fragments are
-    as large as the kinetic energy of their stretching can pay for in cracks, s^3 = 24 G / (density rate^2), Grady 1982
-    (J. Appl. Phys. 53, 322), and facets lie one element from each other. The rate is that of its stretch or of its
-    spin, the speed by the length of the part, or what strains the part to its strength while a wave goes through it.
-    1 of mesh files.
+    """Returns the largest share of the facets of a part that can break in an impact at ``speed``, m/s.
+
+    Fragments are as large as the kinetic energy of their stretching can pay for in crack surface: s^3 = 24 G /
+    (density rate^2), Grady 1982 (J. Appl. Phys. 53, 322); facets are one element apart. The rate is that of its
+    stretch or spin, the speed over the length of the part, or the rate that strains the part to its strength while a
+    wave crosses it. 1 for mesh files.
     """
     made, body = material(case, part.material), bounds(part.mesh)
     if made.brittle is None or body is None or isinstance(part.mesh, Measured):
@@ -240,13 +240,13 @@ def broken_share(case: Case, part: Part, speed: float) -> float:
 
 
 def _tets_that_break(case: Case, parts: tuple[PartEstimate, ...]) -> int:
-    """As far as mesh files tell."""
+    """Returns the number of tets of the parts that fracture, as far as mesh files are known."""
     pairs = zip(parts, case.parts, strict=True)
     return sum(size.elements or 0 for size, part in pairs if part.fracture is not None)
 
 
 def _contact(case: Case, faces: int) -> float:
-    """Nanoseconds of contact in a step; ``faces``: of the parts from mesh files, as far as they are known."""
+    """Returns the nanoseconds of contact per step; ``faces``: of the parts from mesh files, as far as known."""
     if not case.in_contact:
         return 0.0
     faces += sum(surface_faces(part.mesh) for part in case.parts if not isinstance(part.mesh, Measured))
@@ -254,7 +254,7 @@ def _contact(case: Case, faces: int) -> float:
 
 
 def _nanoseconds(case: Case, part: Part) -> dict[str, float]:
-    """Of a tet and a step, by stage."""
+    """Returns nanoseconds per tet and step, by stage."""
     if part.rigid is not None:
         return {}
     made = material(case, part.material)

@@ -1,4 +1,4 @@
-"""How fast bodies meet, and what that asks of contact."""
+"""Impact speeds of the parts, and the numerical parameters of contact that depend on them."""
 
 import itertools
 import math
@@ -15,25 +15,25 @@ from ..shapes.geometry import Vector
 from ..shapes.placed import Placed, driven, velocity
 
 FEW, MANY, FULL, MOST = 5, 10, 40, 80
-"""Sweeps of contact in a step: the fewest, also where bodies meet fast, also for rubble that is driven and with
-restitution, and the most; what more are good for: docs/theory/contact.md, "Contact", "Driven rubble", "Sweeps by need"
-and "Restitution"."""
+"""Sweeps of contact per step: minimum, minimum at high impact speed, minimum for driven rubble and with restitution,
+and maximum. Reasons: docs/theory/contact.md, "Contact", "Driven rubble", "Sweeps by need" and "Restitution"."""
 FAST = 0.2
-"""Of the wave speed of what is met: above it there are MANY sweeps. Chosen: below half of where few were too few for
-columns of metal (docs/theory/contact.md, "Plates under 100 GPa")."""
+"""Share of the wave speed of the target from which there are MANY sweeps. Chosen: below half of the speed at which
+few sweeps failed for columns of metal (docs/theory/contact.md, "Plates under 100 GPa")."""
 PRESSING = 0.1
-"""Of the same: above it flat surfaces buckle. Chosen: half of where irregular plates of copper lost their pressure
-(docs/theory/contact.md, "Ridges under pressure")."""
+"""Share of the wave speed from which flat surfaces buckle. Chosen: half of the speed at which irregular copper
+plates lost their pressure (docs/theory/contact.md, "Ridges under pressure")."""
 
 
 def wave_speed(made: Material) -> float:
-    """Speed of plane waves at rest, m/s: sqrt((K + 4 G / 3) / density), K from the equation of state where given."""
+    """Returns the speed of plane waves at rest, m/s: sqrt((K + 4 G / 3) / density), K from the equation of state if
+    given."""
     return math.sqrt((made.bulk + 4.0 / 3.0 * made.elastic.shear) / made.density)
 
 
 def impact_speeds(case: Case, walls: bool = True) -> list[float]:
-    """The largest speed, m/s, at which each part may meet another part, or a wall where ``walls`` count: by the bounds
-    of their velocities, so up to sqrt(3) times what it is where a body turns.
+    """Returns the largest speed, m/s, at which each part can hit another part, or a wall if ``walls``. From the
+    bounds of the velocities, so up to sqrt(3) times too large where a body rotates.
     """
     bounds = [velocities(case, part) for part in case.parts]
     there = Counter(bounds)
@@ -46,13 +46,13 @@ def impact_speeds(case: Case, walls: bool = True) -> list[float]:
 
 
 def apart(low: Vector, high: Vector, low2: Vector, high2: Vector) -> float:
-    """The largest distance of a point of one box from a point of another."""
+    """Returns the largest distance of a point of one box from a point of another."""
     return math.hypot(*(max(b - c, d - a) for a, b, c, d in zip(low, high, low2, high2, strict=True)))
 
 
 def velocities(case: Case, part: Part) -> tuple[Vector, Vector]:
-    """Bounds of the velocities, m/s, that nodes of a part start with or are driven with; a mesh file neither turns nor
-    stretches here.
+    """Returns bounds of the velocities, m/s, of the nodes of a part at the start or as prescribed; without spin and
+    stretch of a mesh file.
     """
     if isinstance(part.mesh, Measured):
         found = [part.velocity]
@@ -86,7 +86,7 @@ def _shifted(vector: Sequence[float], by: float) -> Vector:
 
 
 def _fast(case: Case, share: float) -> bool:
-    """Whether two parts meet at more than a ``share`` of the wave speed of one of them."""
+    """Whether two parts collide at more than a ``share`` of the wave speed of one of them."""
     speeds = impact_speeds(case, walls=False)
     return any(
         speed > share * wave_speed(material(case, part.material))
@@ -95,9 +95,10 @@ def _fast(case: Case, share: float) -> bool:
 
 
 def pressed(case: Case) -> list[bool]:
-    """Which parts are pressed together with others beyond their strength: flat surfaces buckle there. All are where two
-    parts meet at more than PRESSING of the wave speed of one of them; else those that flow, and do not break, where an
-    impact on their like has more than their flow stress: density c v / 2.
+    """Returns the parts that are pressed together beyond their strength, so that flat surfaces buckle.
+
+    All parts where two collide at more than PRESSING of the wave speed of one of them; otherwise parts that yield
+    without fracture, where an impact on the same material exceeds their flow stress: density c v / 2.
     """
     if _fast(case, PRESSING):
         return [True] * len(case.parts)
@@ -108,13 +109,13 @@ def pressed(case: Case) -> list[bool]:
 
 
 def flows(made: Material, speed: float) -> bool:
-    """Whether an impact on its like at ``speed``, m/s, has more than its flow stress."""
+    """Whether an impact on the same material at ``speed``, m/s, exceeds its flow stress."""
     return made.strength is not None and 0.5 * made.density * wave_speed(made) * speed > made.strength.flow_stress()
 
 
 def driven_together(case: Case) -> bool:
-    """Whether parts may meet, or walls, while a motion or a traction drives something: it presses for as long as it
-    lasts, where what flies presses until it has stopped.
+    """Whether contact is possible while a motion or a traction drives a part: a drive presses for its whole
+    duration, an impact only until the bodies have stopped.
     """
     if case.boundaries_of(Traction):
         return len(case.parts) > 1 or bool(case.boundaries_of(Wall))
@@ -123,14 +124,14 @@ def driven_together(case: Case) -> bool:
 
 
 class Sweeps(NamedTuple):
-    """Bounds of the sweeps over the active contacts of a step; the first step has the least."""
+    """Bounds of the sweeps over the active contacts of a step; the first step has the minimum."""
 
     least: int
     most: int
 
 
 def sweeps(case: Case) -> Sweeps:
-    """What ``contact.sweeps`` says; or, from what the scene asks for on, as many as the step before needed."""
+    """Returns ``contact.sweeps``; if absent, the bounds of the adaptive number from the properties of the scene."""
     assert case.contact is not None
     if case.contact.sweeps is not None:
         return Sweeps(case.contact.sweeps, case.contact.sweeps)

@@ -1,4 +1,4 @@
-"""How many tets and nodes the generators will make of a primitive, and the step length of its worst tet."""
+"""Estimates of the mesh of a primitive: number of tets, nodes and faces, and the step length of its worst tet."""
 
 import math
 from collections.abc import Callable
@@ -34,23 +34,27 @@ REGULAR = 6**-0.5
 WORST_UNSTRUCTURED = 0.68
 """Step length of the worst tet of gmsh over that of a regular tet: 0.64 to 0.74 for the bodies of the fit."""
 SHARP, BLUNT = 1.3, 0.9
-"""The same at the tip of a cone or an ogive, at most: the first times the tangent of half its angle; where the tip is
-cut off, or round, the second times its radius over h. Cones of half an angle of 9 and 27 degrees had 0.16 to 0.25 and
-0.40 to 0.68, tips of a radius of h/4 and h/2 0.20 to 0.24 and 0.20 to 0.64, wholes and sectors."""
+"""The step length at the tip of a cone or an ogive, at most: the first value times the tangent of half its angle;
+with a flat or round tip, the second times its radius over h. Measured: cones of half an angle of 9 and 27 degrees
+0.16 to 0.25 and 0.40 to 0.68, tips of a radius of h/4 and h/2 0.20 to 0.24 and 0.20 to 0.64, full bodies and
+sectors."""
 WORST_CYLINDER, WORST_TUBE = 0.81, 0.78
-"""The same for structured cylinders cut into 6, and tubes."""
+"""The step length of structured cylinders cut into 6, and of tubes."""
 WORST_FIVE = 0.54
-"""The same for structured cylinders cut into 5, times the cells along the radius: they flatten on the diagonal."""
+"""The step length of structured cylinders cut into 5, times the cells along the radius: they flatten on the
+diagonal."""
 WORST_SHARD = 1.7
-"""What the worst shard loses of its step length over how far nodes are moved: 1.5 to 1.9 among 1,000 and 10,000."""
+"""Reduction of the step length of the worst shard over the displacement of its nodes: 1.5 to 1.9 among 1,000 and
+10,000."""
 
 _LATTICE = 20
-"""Points a direction at which a graded size is averaged over a body. Chosen: 8,000 points in all."""
+"""Sampling points per direction for the mean of a graded size. Chosen: 8,000 points in all."""
 
 
 @dataclass(frozen=True)
 class MeshSize:
-    """Counts, and the step length, m, of the worst tet: the stable time step is this over the wave speed."""
+    """Numbers of tets and nodes, and the step length, m, of the worst tet: the stable time step is this over the
+    wave speed."""
 
     elements: int
     nodes: int
@@ -58,7 +62,7 @@ class MeshSize:
 
 
 def mesh_size(mesh: Generated) -> MeshSize:
-    """The size of the mesh of a primitive: exact counts for the structured generator, estimates for gmsh."""
+    """Returns the size of the mesh of a primitive: exact numbers for the structured generator, estimates for gmsh."""
     if not isinstance(mesh, Sphere | Revolved | RingSector) and mesh.generator == "structured":
         return _structured(mesh)
     per_volume, per_surface = _mean_powers(mesh)
@@ -69,7 +73,7 @@ def mesh_size(mesh: Generated) -> MeshSize:
 
 
 def _worst(mesh: Generated) -> float:
-    """Step length of the worst tet of gmsh over that of a regular tet."""
+    """Returns the step length of the worst tet of gmsh over that of a regular tet."""
     if not isinstance(mesh, Revolved):
         return WORST_UNSTRUCTURED
     at_tips = [SHARP * slope if radius == 0.0 else BLUNT * radius / mesh.element_size for radius, slope in tips(mesh)]
@@ -77,13 +81,13 @@ def _worst(mesh: Generated) -> float:
 
 
 def surface_faces(mesh: Generated) -> int:
-    """How many faces the surface of a primitive has, cuts of its sector included: an estimate."""
+    """Returns the estimated number of surface faces of a primitive, with the cuts of its sector."""
     return round(FACES_PER_SURFACE * surface(mesh) * _mean_powers(mesh)[1])
 
 
 @lru_cache(maxsize=4096)
 def _mean_powers(mesh: Generated) -> tuple[float, float]:
-    """Means over the volume of 1 / h^3 and 1 / h^2 for the element size h, which grading makes vary."""
+    """Returns means over the volume of 1 / h^3 and 1 / h^2 for the element size h of a graded mesh."""
     if mesh.grading is None:
         return mesh.element_size**-3, mesh.element_size**-2
     graded = size_at(mesh, mesh.grading)
@@ -99,7 +103,7 @@ def _lattice(mesh: Generated) -> list[tuple[float, float, float]]:
 
 
 def size_at(mesh: Generated, grading: Grading) -> Callable[[Vector], float]:
-    """The element size, m, at a point of a primitive that is graded: to be asked of many points."""
+    """Returns the function of the element size, m, at a point of a graded primitive; built once for many points."""
     size, near, more = mesh.element_size, grading.near, grading.far_size - mesh.element_size
     width, origin, radius = grading.far - grading.near, grading.origin, grading.radius
 
@@ -127,7 +131,7 @@ def _structured(mesh: Box | Plate | Cylinder | Tube | TwoTets | Shards) -> MeshS
 
 @dataclass(frozen=True)
 class Row:
-    """The planes of nodes of the structured generator across one direction: ``start`` and ``spacing`` in m."""
+    """Planes of nodes of the structured generator across one direction: ``start`` and ``spacing`` in m."""
 
     start: float
     spacing: float
@@ -140,14 +144,14 @@ class Row:
 
 
 def grid(mesh: Box | Plate) -> list[Row]:
-    """The planes of nodes across x, y and z."""
+    """Planes of nodes across x, y and z."""
     low, high = bounds(mesh) or ((0.0,) * 3, (0.0,) * 3)
     counts = [_divisions(b - a, mesh.element_size) for a, b in zip(low, high, strict=True)]
     return [Row(a, (b - a) / n, n) for a, b, n in zip(low, high, counts, strict=True)]
 
 
 def slit_lines(mesh: Box | Plate) -> tuple[int, int]:
-    """How many lines of nodes of a slit are doubled, in the two directions across its axis; 0, 0 without a slit."""
+    """Numbers of lines of doubled nodes of a slit, in the two directions across its axis; 0, 0 without a slit."""
     if mesh.slit is None:
         return 0, 0
     rows = [grid(mesh)[d] for d in across(mesh.slit.axis)]
@@ -159,7 +163,7 @@ def slit_lines(mesh: Box | Plate) -> tuple[int, int]:
 
 
 def _doubled(row: Row, low: float, high: float) -> int:
-    """How many planes lie between two places: a border on the surface of the body counts, one inside does not."""
+    """Number of planes between two places: a border on the surface of the body counts, one inside does not."""
     first = 0 if low <= 0 else math.floor(low) + 1
     last = row.cells if high >= row.cells else math.ceil(high) - 1
     return last - first + 1
@@ -194,7 +198,7 @@ def _structured_tube(mesh: Tube) -> MeshSize:
 
 
 def _cell_step(cell: list[float]) -> float:
-    """Step length of a tet that a box-shaped cell is cut into: 1 / sqrt(2 sum 1 / a^2), for every cut."""
+    """Step length of a tet of a cut box-shaped cell: 1 / sqrt(2 sum 1 / a^2), for every way of cutting."""
     return 1.0 / math.sqrt(2.0 * sum(1.0 / length**2 for length in cell))
 
 

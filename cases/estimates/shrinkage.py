@@ -1,4 +1,4 @@
-"""How much shorter than the first time step the mean one is: impact and pressure flatten tets and make waves faster."""
+"""Reduction of the mean time step below the first one: impact and pressure flatten tets and make waves faster."""
 
 import math
 from collections.abc import Sequence
@@ -14,24 +14,23 @@ from ..shapes.geometry import AXES, bounds
 from .impact import wave_speed
 
 DEEPEST, DEEPEST_ERODING = 12.0, 4.0
-"""The mean time step of a crushed body is never taken to be smaller than the initial one over this: the flattest tets
-of a part that erodes leave."""
+"""Largest reduction of the time step of a crushed body: the flattest tets of a part that erodes are deleted."""
 FOOT, SLENDER = 0.9, 4.5
-"""See shrinkage."""
+"""Constant of ``shrinkage``."""
 CROSSINGS = 2.0
-"""For so many times as long as a part takes to cross its own extent at the speed of an impact it is shocked. Measured:
-the step of two balls of copper of 1 mm that meet at 10 km/s (cases/hard/head_on_10km.toml) is short for 0.2 us."""
+"""Duration of a shock in a part, over its extent divided by the impact speed. Measured: the step of two copper balls
+of 1 mm that collide at 10 km/s (cases/hard/head_on_10km.toml) is short for 0.2 us."""
 
 
 def shrinkage(case: Case, part: Part, speed: float) -> float:
-    """Initial over mean time step of a part that is met at a ``speed``, m/s: impact flattens the tets, and compression
-    makes waves faster.
+    """Returns the initial over the mean time step of a part that is hit at a ``speed``, m/s: impact flattens the tets,
+    and compression makes waves faster.
 
-    Free to flow, a metal that stops from the speed v takes the strain density v^2 / (2 yield stress) in the mean, and
-    its foot, which is about as long as wide, what the whole length takes: the mean step falls as exp(k strain) with
-    k = 0.9 length / width, at most 4 (``slenderness``). Measured: square bars that are 1, 2 and 4 times as long as wide
-    have k up to 0.9, 1.8 and 2.8, less where they harden much (``python -m tests.bench.flattening``), Taylor bars of
-    copper and steel 4. Held on all sides, it is compressed by a shock.
+    A metal that can flow and stops from the speed v takes the mean strain density v^2 / (2 yield stress); its foot,
+    about as long as wide, takes the strain of the whole length: the mean step falls as exp(k strain) with k = 0.9
+    length / width, at most 4 (``slenderness``). Measured: square bars that are 1, 2 and 4 times as long as wide have
+    k up to 0.9, 1.8 and 2.8, less with strong hardening (``python -m tests.bench.flattening``), Taylor bars of
+    copper and steel 4. A part that is enclosed is compressed by a shock.
     """
     made = material(case, part.material)
     deepest = DEEPEST if part.erosion is None else DEEPEST_ERODING
@@ -48,9 +47,9 @@ def shrinkage(case: Case, part: Part, speed: float) -> float:
 
 
 def _shocked(case: Case, part: Part, made: Material, speed: float, flattened: float) -> float:
-    """With what flattens it, and for as long as a part crosses itself with what makes its waves faster: matter behind a
-    shock moves at u = speed / 2, and waves there go about 2 S u faster than c0. Meanwhile a tet that erodes flattens
-    up to the strain at which it leaves; later those are gone.
+    """Returns the reduction for a part that an impact shocks or flattens. Material behind a shock moves at u = speed
+    / 2, and waves there are about 2 S u faster than c0, while the part crosses its own extent. During this time a
+    tet that erodes flattens up to its limit strain; later such tets are deleted.
     """
     body = None if isinstance(part.mesh, Measured) else bounds(part.mesh)
     if part.erosion is None:
@@ -71,9 +70,11 @@ def _on_part(case: Case, part: Part) -> list[Traction]:
 
 
 def _imploded(case: Case, part: Part, made: Material, load: Traction) -> float:
-    """Of a tube under a ``load`` on its outside, where that is above what a tube of its strength holds,
-    Y ln(outer / inner radius): the wall moves inwards as one that is free, its area stays, and what is at the bore
-    takes the strain ln(first / present radius) round it. A bore that closes flattens its tets without end.
+    """Returns the reduction for a tube under an external ``load`` above its collapse pressure, Y ln(outer / inner
+    radius).
+
+    The wall moves inwards freely at constant area; material at the bore takes the hoop strain ln(first / present
+    radius). A bore that closes flattens its tets without limit.
     """
     tube, flow = part.mesh, made.strength.flow_stress() if made.strength is not None else math.inf
     if not isinstance(tube, Tube) or load.pressure is None or not _outside(tube, load.cylinder):
@@ -87,19 +88,19 @@ def _imploded(case: Case, part: Part, made: Material, load: Traction) -> float:
 
 
 def _outside(tube: Tube, region: Around | None) -> bool:
-    """Whether a region has the outside of a tube, and not its bore."""
+    """Whether a region contains the outside of a tube, and not its bore."""
     return region is not None and tube.inner_radius < region.inner_radius <= tube.radius <= region.radius
 
 
 def _moved(course: Course, until: float) -> float:
-    """The way, s^2, on which the factor of a course brings what it moves by 1 m/s^2."""
+    """Displacement, s^2, per acceleration of 1 m/s^2 with the factor of a course."""
     times = [until * n / 100 for n in range(101)]
     factors = [_factor(course, time) for time in times]
     return sum((until - time) * factor for time, factor in zip(times, factors, strict=True)) * until / 100
 
 
 def _factor(course: Course, time: float) -> float:
-    """Of a force at a time: linear between the pairs, constant before and after them."""
+    """Factor of a force at a time: linear between the pairs, constant before and after them."""
     if not course or time <= course[0][0]:
         return course[0][1] if course else 1.0
     for (start, low), (end, high) in pairwise(course):
@@ -109,8 +110,8 @@ def _factor(course: Course, time: float) -> float:
 
 
 def slenderness(case: Case) -> float:
-    """The largest length over width of the parts, 1 to SLENDER: the longest extent over the mean of the other two. What
-    is slender strains what it meets, too. SLENDER where a part is a mesh file.
+    """Returns the largest length over width of the parts, 1 to SLENDER: the longest extent over the mean of the
+    other two; SLENDER with a mesh file. A slender part also strains the part that it hits.
     """
     most = 1.0
     for part in case.parts:
@@ -123,7 +124,7 @@ def slenderness(case: Case) -> float:
 
 
 def _confined(case: Case, part: Part) -> bool:
-    """Whether planes of symmetry hold a part on both sides in two directions."""
+    """Whether planes of symmetry confine a part on both sides in two directions."""
     body = None if isinstance(part.mesh, Measured) else bounds(part.mesh)
     if body is None:
         return False

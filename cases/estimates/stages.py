@@ -1,4 +1,4 @@
-"""The stages of a case: what a step may do, and which of it a scene needs. What it does not need is not computed."""
+"""The stages of a case: the operations of a time step that its scene needs. Other stages are not computed."""
 
 from ..model.boundaries import Wall
 from ..model.joined import cohesive
@@ -8,11 +8,11 @@ from ..reading.library import material
 TETS, STEPS, AVERAGED, STRENGTH, STATE, CONTACT = (
     "tets", "start and steps", "averaged pressure", "strength", "equation of state", "contact",
 )  # fmt: skip
-"""Names of those whose cost can be told before a run (cases/estimates/estimate.py); every case has the first two."""
+"""Stages whose cost is estimated before a run (cases/estimates/estimate.py); every case has the first two."""
 
 
 def stages(case: Case) -> dict[str, bool]:
-    """Which of the stages that a case may do without it has, by name. Raises CaseError, unknown material."""
+    """Returns which optional stages a case has, by name. Raises CaseError for an unknown material."""
     made = [material(case, part.material) for part in case.parts if part.rigid is None]
     contact = case.contact if case.in_contact else None
     rubbing = [wall.friction for _, wall in case.boundaries_of(Wall)]
@@ -35,5 +35,5 @@ def stages(case: Case) -> dict[str, bool]:
 
 
 def without(case: Case) -> list[str]:
-    """The names of those that it does not have."""
+    """Names of the optional stages that the case does not have."""
     return [name for name, there in stages(case).items() if not there]

@@ -1,9 +1,9 @@
-"""Checkpoints on disk: which ones a run's folder has, and which of them are whole (docs/reference/checkpoints.md).
+"""Checkpoints in a run's folder, and the check that they are complete (docs/reference/checkpoints.md).
 
 ::
 
-    checkpoints/000001200/ rank-0.h5 ...     what each rank keeps
-                           manifest.json     step, time, the case, what all ranks share, bytes and sha256 of each file
+    checkpoints/000001200/ rank-0.h5 ...     state of each rank
+                           manifest.json     step, time, case, state common to all ranks, bytes and sha256 of each file
                            manifest.sha256   of manifest.json
 """
 
@@ -19,15 +19,16 @@ from ..reading import whole
 from . import layout
 
 FORMAT = 18
-"""Of the files; 17 has the compression that brittle parts have met, and the heat that eroded. Others are not read."""
+"""Version of the files; 17 added the compression of brittle parts and the heat of deleted tets. Other versions are
+not read."""
 MANIFEST, SEAL = "manifest.json", "manifest.sha256"
 _FILE = re.compile(r"rank-[0-9]+\.h5")
 _PIECE = 1 << 24
-"""Bytes that are hashed at once."""
+"""Bytes that are hashed at a time."""
 
 
 class DamagedError(ValueError):
-    """A checkpoint that is not whole; the text says why, in one line."""
+    """A damaged or incomplete checkpoint; the text gives the reason, in one line."""
 
 
 class File(msgspec.Struct, frozen=True):
@@ -39,7 +40,7 @@ class File(msgspec.Struct, frozen=True):
 
 
 class Manifest(msgspec.Struct, frozen=True):
-    """What is in a checkpoint; ``t`` in s."""
+    """The content of a checkpoint; ``t`` in s."""
 
     format: int
     step: int
@@ -47,11 +48,11 @@ class Manifest(msgspec.Struct, frozen=True):
     case: dict[str, Any]
     files: list[File]
     known: dict[str, Any]
-    """What all ranks share; arrays as ``{"dtype", "values"}``."""
+    """State common to all ranks; arrays as ``{"dtype", "values"}``."""
 
 
 def found(folder: Path) -> list[Path]:
-    """The checkpoints of the run in ``folder``, the latest first; nothing is read."""
+    """Returns the checkpoints of the run in ``folder``, the latest first, without reading them."""
     try:
         places = [p for p in (folder / layout.CHECKPOINTS).iterdir() if _numbered(p.name) and p.is_dir()]
     except (FileNotFoundError, NotADirectoryError):
@@ -64,13 +65,13 @@ def _numbered(name: str) -> bool:
 
 
 def sealed(manifest: Manifest) -> tuple[bytes, bytes]:
-    """The contents of the two files that describe a checkpoint."""
+    """Returns the contents of the two files that describe a checkpoint."""
     text = json.dumps(msgspec.to_builtins(manifest)).encode()
     return text, f"{hashlib.sha256(text).hexdigest()}\n".encode()
 
 
 def manifest_of(place: Path) -> Manifest:
-    """The manifest of a checkpoint whose files are there with the right size. Raises DamagedError."""
+    """Returns the manifest of a checkpoint whose files exist with the right size. Raises DamagedError."""
     try:
         text = whole.read(place / MANIFEST)
         seal = whole.read(place / SEAL, 80)
@@ -100,7 +101,7 @@ def _check(place: Path, made: Manifest) -> None:
 
 
 def check_bytes(place: Path, made: Manifest) -> None:
-    """Raises DamagedError unless each file has its sha256."""
+    """Checks the sha256 of each file. Raises DamagedError."""
     for file in made.files:
         try:
             digest = sha256(place / file.name)
@@ -111,7 +112,7 @@ def check_bytes(place: Path, made: Manifest) -> None:
 
 
 def sha256(path: Path) -> str:
-    """Of a regular file. Raises OSError."""
+    """Returns the sha256 of a regular file. Raises OSError."""
     h = hashlib.sha256()
     with whole.opened(path) as file:
         while piece := file.read(_PIECE):

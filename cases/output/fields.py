@@ -1,6 +1,4 @@
-"""Which fields of frames a case has, of those that not every case has: ``damage``, ``fragment``, and those that
-``run.fields`` asks for.
-"""
+"""The optional fields of frames that a case has: ``damage``, ``fragment``, and those of ``run.fields``."""
 
 from ..model.joined import cohesive
 from ..model.schema import Case
@@ -8,19 +6,19 @@ from ..reading.library import material
 
 
 def counting(case: Case) -> set[int]:
-    """The parts of a case whose material's law counts damage."""
+    """Indices of the parts of a case whose material has a law with damage."""
     laws = [material(case, part.material).strength for part in case.parts]
     return {i for i, law in enumerate(laws) if law is not None and law.counts_damage}
 
 
 def damageable(case: Case) -> bool:
-    """Whether anything is damaged: by its law, by cohesive facets that let go, or on the way to a strain of erosion."""
+    """Whether the case has damage: of a law, of cohesive facets, or on the way to the erosion strain."""
     strained = any(part.erosion is not None and part.erosion.plastic_strain is not None for part in case.parts)
     return bool(cohesive(case)) or strained or bool(counting(case))
 
 
 def lacking(case: Case) -> set[str]:
-    """Those of them that no frame of the case has."""
+    """The optional fields that no frame of the case has."""
     asked = {name: name in case.run.fields for name in ("density", "strain_rate", "contact_pressure")}
     there = {"damage": damageable(case), "fragment": case.fractures, **asked}
     there["effective_strain"] = "strain" in case.run.fields

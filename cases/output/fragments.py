@@ -1,9 +1,9 @@
-"""Fragments of a frame as a table in a run's folder, and what is said of many of them: N(m), laws of size, shares.
+"""The table of the fragments of a frame, and its statistics: N(m), laws of size, shares.
 
 ::
 
-    <run>/fragments/fragments_0012.csv   one line a fragment, those of frame 12
-    <run>/fragments/genealogy.csv        one line a new fragment: frame, parent, child, tets
+    <run>/fragments/fragments_0012.csv   one line per fragment of frame 12
+    <run>/fragments/genealogy.csv        one line per new fragment: frame, parent, child, tets
 """
 
 import csv
@@ -26,13 +26,13 @@ COLUMNS: dict[str, str] = {
     **{f"high_{i}": "m" for i in _AXES},
     "extent": "m", "new_surface": "m^2",
 }  # fmt: skip
-"""Columns and their units. ``label`` is the number of the fragment, from 0 on: the largest piece of a fragment that
-breaks keeps it, by tets, and the others get new ones; angular momentum and inertia are about the centre;
-translation, rotation and deformation share the kinetic energy; ``extent`` is the longest side of the box from low to
-high; ``new_surface`` is the initial area of broken faces, both sides of a crack."""
+"""Columns and their units. ``label``: number of the fragment, from 0: the largest piece of a fragment that breaks,
+by tets, keeps it, the others get new ones. Angular momentum and inertia are about the centre. Translation, rotation
+and deformation are shares of the kinetic energy. ``extent``: longest side of the box from low to high.
+``new_surface``: initial area of broken faces, both sides of a crack."""
 _WHOLE = ("label", "tets", "nodes")
 DUST = 10
-"""Tets: a fragment of fewer has no shape of its own and is counted as dust."""
+"""Number of tets below which a fragment has no shape of its own and counts as dust."""
 
 
 def path(folder: Path, index: int) -> Path:
@@ -55,7 +55,7 @@ def header() -> list[str]:
 
 
 def read(table: Path) -> list[dict[str, float | int | str]]:
-    """The lines of a table, by the names of ``COLUMNS``. Raises ValueError for a file of other columns."""
+    """Returns the lines of a table, by the names of ``COLUMNS``. Raises ValueError for a file with other columns."""
     with table.open(newline="", encoding="utf-8") as file:
         lines = list(csv.reader(file))
     if not lines or lines[0] != header():
@@ -71,7 +71,8 @@ def _value(name: str, text: str) -> float | int | str:
 
 @dataclass(frozen=True)
 class Fit:
-    """A law with its most likely parameter: of laws fitted to the same values, the larger likelihood fits better."""
+    """A distribution with its maximum-likelihood parameter: of distributions fitted to the same values, the larger
+    likelihood fits better."""
 
     law: str
     """``rayleigh``, ``exponential`` or ``power``."""
@@ -82,10 +83,11 @@ class Fit:
 
 
 def fits(values: Sequence[float]) -> list[Fit]:
-    """Rayleigh, exponential and power law by maximum likelihood; none for fewer than two distinct positive values.
+    """Returns Rayleigh, exponential and power law by maximum likelihood; empty for fewer than two distinct positive
+    values.
 
-    Densities x / s^2 exp(-x^2 / 2 s^2), exp(-x / mu) / mu, and (a - 1) / x_0 (x / x_0)^-a above x_0, the smallest value
-    there is. The last has in x_0 a second parameter.
+    Densities x / s^2 exp(-x^2 / 2 s^2), exp(-x / mu) / mu, and (a - 1) / x_0 (x / x_0)^-a above x_0, the smallest
+    value, which is a second parameter of the last.
     """
     n = len(values)
     if n < 2 or min(values) <= 0.0 or min(values) == max(values):
@@ -103,21 +105,21 @@ def fits(values: Sequence[float]) -> list[Fit]:
 
 @dataclass(frozen=True)
 class Summary:
-    """What a table says as a whole; dust is in the masses, not in the laws."""
+    """Statistics of a table; dust is in the masses, not in the distributions."""
 
     fragments: int
     dust: int
     dust_share: float
-    """Of the mass."""
+    """Share of the mass."""
     largest_share: float
-    """Of the mass."""
+    """Share of the mass."""
     sizes: list[Fit]
-    """Laws of the extent."""
+    """Distributions of the extent."""
     masses: list[Fit]
 
 
 def summary(tets: Sequence[int], masses: Sequence[float], extents: Sequence[float]) -> Summary:
-    """Of the columns of one table, kg and m."""
+    """Returns the statistics of the columns of one table, kg and m."""
     whole = [k for k, count in enumerate(tets) if count >= DUST]
     total = math.fsum(masses)
     dust = math.fsum(m for m, count in zip(masses, tets, strict=True) if count < DUST)

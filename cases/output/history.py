@@ -1,4 +1,4 @@
-"""The columns of history.csv, and how they are written: ``t [s]`` with a unit, ``step`` without."""
+"""The columns of history.csv: ``t [s]`` with a unit, ``step`` without."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -10,31 +10,31 @@ LEDGER: dict[str, str] = {name: "" if name == "residual" else "J" for name in En
 MOMENTA: dict[str, str] = {
     **{f"momentum_{axis}": "kg m/s" for axis in "xyz"}, **{f"angular_momentum_{axis}": "kg m^2/s" for axis in "xyz"},
 }  # fmt: skip
-"""The second about the origin."""
+"""The angular momentum is about the origin."""
 COLUMNS: dict[str, str] = {**CLOCK, **LEDGER, **MOMENTA}
-"""Columns and units of every run; those of its parts follow, and then those of its probes."""
+"""Columns and units of every run, followed by those of its parts and of its probes."""
 OF_PARTS = PartEnergy.__struct_fields__
-"""What is told of each part, J."""
+"""Energies of each part, J."""
 _HEADER = re.compile(r"(.*?)(?: \[([^\]]*)\])?")
 
 
 def of_parts(parts: Sequence[str]) -> dict[str, str]:
-    """Columns and units of the parts: ``kinetic.bar``. None where there is one part alone: it is the whole."""
+    """Columns and units of the parts: ``kinetic.bar``. Empty with a single part, which is the whole."""
     return {f"{name}.{part}": "J" for part in parts for name in OF_PARTS} if len(parts) > 1 else {}
 
 
 def part_of(column: str) -> tuple[str, str] | None:
-    """What a column tells of which part; None for those that are of none. A name of a probe has no point."""
+    """Energy and part of a column; None for a column that is not of a part. The name of a probe has no point."""
     name, point, part = column.partition(".")
     return (name, part) if point and name in OF_PARTS else None
 
 
 def header(columns: Mapping[str, str]) -> list[str]:
-    """The first line of a table with these columns and units."""
+    """Returns the first line of a table with these columns and units."""
     return [f"{name} [{unit}]" if unit else name for name, unit in columns.items()]
 
 
 def split(text: str) -> tuple[str, str]:
-    """Name and unit of a column as it is written; the unit is empty where there is none."""
+    """Returns name and unit of a column as it is written; the unit is empty if there is none."""
     found = _HEADER.fullmatch(text)
     return (found[1], found[2] or "") if found is not None else (text, "")

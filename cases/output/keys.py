@@ -1,7 +1,7 @@
-"""Zenoh key expressions, built in one place: ``conoid/v1/<owner>/<run>/<class>``.
+"""Zenoh key expressions: ``conoid/v1/<owner>/<run>/<class>``.
 
-The owner stands in the key so that access rules are per user. A chunk that starts with ``@`` would be invisible
-to wildcards, so the version is a plain ``v1``.
+The key contains the owner so that access rules are per user. The version is a plain ``v1``, because wildcards do not
+match a chunk that starts with ``@``.
 """
 
 import re
@@ -18,27 +18,27 @@ def _chunk(text: str) -> str:
 
 
 def run_prefix(owner: str, run: str) -> str:
-    """``conoid/v1/<owner>/<run>``: everything a run says lies below it."""
+    """Prefix of all keys of a run: ``conoid/v1/<owner>/<run>``."""
     return f"{ROOT}/{_chunk(owner)}/{_chunk(run)}"
 
 
 def message_key(prefix: str, kind: str) -> str:
-    """The key of a message class below a run's prefix. Raises ValueError for an unknown class."""
+    """Returns the key of a message class below a run's prefix. Raises ValueError for an unknown class."""
     if kind not in CLASSES:
         raise ValueError(f"unknown message class {kind!r}; known: {', '.join(CLASSES)}")
     return f"{prefix}/{kind}"
 
 
 def everything(prefix: str) -> str:
-    """All messages of a run, or of an owner when given the owner's prefix."""
+    """Returns the key expression of all messages of a run; with the prefix of an owner, of all runs of the owner."""
     return f"{prefix}/**"
 
 
 def alive(prefix: str) -> str:
-    """The liveliness token that stands while the run's worker lives."""
+    """Returns the key of the liveliness token that exists as long as the worker of the run."""
     return f"{prefix}/alive"
 
 
 def owner_prefix(owner: str) -> str:
-    """``conoid/v1/<owner>``."""
+    """Prefix of all keys of an owner: ``conoid/v1/<owner>``."""
     return f"{ROOT}/{_chunk(owner)}"

@@ -1,20 +1,20 @@
-"""Names in a run's folder: plain files that stay complete without the server.
+"""The files in a run's folder: plain files, complete without the server.
 
 ::
 
     <runs>/<id>/
-      case.toml | case.json  as submitted          case.resolved.json  every default filled in, SI
-      submission.json        who submitted it, when, with which key        worker.json  the process that runs it
-      journal.jsonl          every event, one JSON line each, with seq: the truth
-      history.csv            time history: clock, ledger, probes; history.parquet at the end, where pyarrow is there
-      frames/000012.vtkhdf   one file a frame      frames/frames.vtkhdf.series  for ParaView
-      snapshots/000012.snap  surface and table of the fragments (snapshot.py); snapshot.request asks for one
-      snapshots/000012.tets  all tets in few bytes, for sections; not of every snapshot
-      checkpoints/000001200/ complete state, by global ids; checkpoint.request asks for one
-      job.json, job.sh       the job of a batch system that runs it (cases/site/batch.py); stop.request ends it for good
+      case.toml | case.json  as submitted          case.resolved.json  with every default, in SI units
+      submission.json        user, time and key of the submission          worker.json  the process that runs it
+      journal.jsonl          every message, one JSON line each, numbered by seq
+      history.csv            time history: clock, ledger, probes; history.parquet at the end, if pyarrow is installed
+      frames/000012.vtkhdf   one file per frame    frames/frames.vtkhdf.series  for ParaView
+      snapshots/000012.snap  surface and table of the fragments (snapshot.py); snapshot.request requests one
+      snapshots/000012.tets  all tets, compressed, for sections; not for every snapshot
+      checkpoints/000001200/ complete state, by global ids; checkpoint.request requests one
+      job.json, job.sh       the job of a batch system that runs it (cases/site/batch.py); stop.request ends it
       files/<sha256>.inp     the run's own copies of the files that its case names (cases/reading/files.py)
-      log/rank-0.log         one a rank            log/launcher.log
-      report.html            the run in one file (report.py), where a server was asked for it
+      log/rank-0.log         one per rank          log/launcher.log
+      report.html            the run in one file (report.py), on request to a server
       outcome.json           written last
 """
 
@@ -29,11 +29,11 @@ FRAMES = "frames"
 FRAME_SERIES = "frames.vtkhdf.series"
 CHECKPOINTS = "checkpoints"
 CHECKPOINT_REQUEST = "checkpoint.request"
-"""Whoever makes this file asks the worker for a checkpoint; the worker takes it away."""
+"""Request for a checkpoint; the worker removes the file."""
 SNAPSHOTS = "snapshots"
 TETS_SUFFIX = ".tets"
 SNAPSHOT_REQUEST = "snapshot.request"
-"""Whoever makes this file asks the worker for a snapshot; the worker takes it away."""
+"""Request for a snapshot; the worker removes the file."""
 FILES = "files"
 LOGS = "log"
 LAUNCHER_LOG = "launcher.log"
@@ -41,21 +41,21 @@ SUBMISSION = "submission.json"
 """Written by the server only, as is ``worker.json``: a run without a server has neither."""
 WORKER = "worker.json"
 JOB = "job.json"
-"""Written by who hands the run to a batch system: the server, or the command line."""
+"""Written at the submission to a batch system, by the server or the command line."""
 JOB_SCRIPT = "job.sh"
 ACCESS = ".telemetry.json"
-"""Hidden, for its owner alone: where the ranks of a job publish, and as whom."""
+"""Hidden file, readable by its owner only: address and token with which the ranks of a job publish."""
 STOP_REQUEST = "stop.request"
-"""Whoever makes this file asks the run to stop for good; it stays. The server writes the cause into it, as a word.
-A stop without it is an interruption to a job."""
+"""Request to stop the run finally; the file stays. The server writes the cause into it, as a word. Without it the
+stop of a job is an interruption."""
 INTERRUPTED = "interrupted.json"
-"""The outcome so far of a run that was interrupted and is to go on."""
+"""Preliminary outcome of a run that was interrupted and will continue."""
 ARRAYS = ".arrays"
-"""Beside the folders of the runs: a folder for each job array, with its script and the list of its runs."""
+"""Folder beside the folders of the runs: one folder per job array, with its script and the list of its runs."""
 ARRAY = "folders.json"
 """The run's folder of each task, in order."""
 LOCK = ".lock"
-"""Held by rank 0 while it writes into the folder."""
+"""Lock that rank 0 holds while it writes into the folder."""
 
 
 def frame(folder: Path, index: int) -> Path:
@@ -79,7 +79,7 @@ def snapshot_tets(folder: Path, n: int) -> Path:
 
 
 def share(folder: Path, n: int, rank: int) -> Path:
-    """What ``rank`` gives for snapshot ``n``; it is there until the snapshot is made."""
+    """Path of the contribution of ``rank`` to snapshot ``n``; it exists until the snapshot is made."""
     return folder / SNAPSHOTS / f".{n:06d}.{rank}"
 
 
@@ -89,5 +89,5 @@ def rank_log(folder: Path, rank: int) -> Path:
 
 
 def claim(folder: Path, job_name: str) -> Path:
-    """Made by the first job of that name that starts; holds its number. A second one ends."""
+    """Path of the file that the first job of that name creates, with its number. A second job of that name ends."""
     return folder / f".claim-{job_name}"

@@ -1,6 +1,6 @@
-"""The table of a sweep: a line a point, a column a key that was changed, a fact of the run or a result.
+"""The table of a sweep: one line per point, one column per changed key, property of the run or result.
 
-Values are numbers, and the unit of a column stands beside its name. Server, client and page have the same table.
+Values are numbers; the unit of a column stands beside its name. Server, client and page use the same table.
 """
 
 import csv
@@ -23,21 +23,21 @@ from ..units import parse_unit, written
 from .history import header
 
 Cell = int | float | str | None
-"""None: not known."""
+"""Value of a cell; None if unknown."""
 Named = tuple[str, str]
-"""The name of a column and its unit, which is empty where there is none."""
+"""Name of a column and its unit; the unit is empty if there is none."""
 _VERDICTS = "no", "yes"
 KEY, RUN, RESULT = "key", "run", "result"
 
 _COUNTS = ("fragments", "broken", "eroded")
 _COSTS = {"time": "s", "elapsed": "s", "cpu": "s", "steps": "", "elements": "", "nodes": ""}
 _FORMULA = re.compile(r"[=@\t\r]|[+-](?!(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?( [^\W\d][\w*/^ -]*)?$)")
-"""The beginning of a text that a spreadsheet computes. A number with a sign, and perhaps a unit, is not one."""
+"""Start of a text that a spreadsheet would compute. A number with a sign, and perhaps a unit, does not match."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Point:
-    """What was changed, by key, the run, and its ``results``, which are none before its end."""
+    """A point of a sweep: the changed keys, the run, and its ``results``, empty before its end."""
 
     values: Mapping[str, Any]
     run: str = ""
@@ -56,12 +56,12 @@ class Column(msgspec.Struct, kw_only=True, frozen=True):
 
     @property
     def title(self) -> str:
-        """With the unit in brackets, as the header has it."""
+        """The name with the unit in brackets, as in the header."""
         return header({self.name: self.unit})[0]
 
 
 def table(points: Sequence[Point]) -> list[Column]:
-    """The columns: keys, run, results. A result that no run has makes no column."""
+    """Returns the columns: keys, run, results. A result that no run has gets no column."""
     keys = dict.fromkeys(key for point in points for key in point.values)
     return [
         *(_key(key, [point.values.get(key) for point in points]) for key in keys),
@@ -82,8 +82,8 @@ def _results(points: Sequence[Point]) -> list[Column]:
 
 
 def results(ended: Outcome | None) -> dict[Named, Cell]:
-    """What a run has as results, by name and unit: references, the last value of each probe, its smallest and its
-    largest, counts, terms of the energy, cost.
+    """Returns the results of a run, by name and unit: references, the last, smallest and largest value of each
+    probe, counts, terms of the energy, cost.
     """
     if ended is None:
         return {}
@@ -102,7 +102,7 @@ def results(ended: Outcome | None) -> dict[Named, Cell]:
 
 
 def names(case: Case) -> dict[str, str]:
-    """The results that are numbers of a run of a case, each with its unit."""
+    """Returns the numerical results of a run of a case, with units."""
     probes = [Measured(name=probe.name, value=0.0, unit=FIELD_UNITS[probe.field]) for probe in case.probes]
     fields = {probe.name: probe.field for probe in case.probes}
     checks = [
@@ -116,7 +116,7 @@ def names(case: Case) -> dict[str, str]:
 
 
 def _references(ended: Outcome) -> dict[Named, Cell]:
-    """Value and verdict of each; those of one title are numbered."""
+    """Value and verdict of each reference; references with the same title are numbered."""
     found: dict[Named, Cell] = {}
     for n, check in enumerate(ended.reference):
         before = sum(each.name == check.name for each in ended.reference[:n])
@@ -137,14 +137,15 @@ def _probes(ended: Outcome) -> dict[Named, Cell]:
 
 
 def _key(key: str, values: Sequence[Any]) -> Column:
-    """Numbers in the unit that they are written in, where all are quantities of one kind; else as they are written."""
+    """Returns numbers in the unit in which they are written, if all are quantities of one kind; otherwise as they
+    are written."""
     unit, numbers = in_one_unit(key, values)
     return Column(name=key, unit=unit, kind=KEY, values=numbers)
 
 
 def in_one_unit(key: str, values: Sequence[Any]) -> tuple[str, list[Cell]]:
-    """The unit of a column of values of a key, and the values in it: that of the first value which is written with one,
-    else that in which a bare number of the key is taken. What is no number, or of several kinds, stays text.
+    """Returns the unit of the values of a key, and the values in it: the unit of the first value that is written
+    with one, otherwise that of a bare number. Values of several kinds, or without a number, stay text.
     """
     texts: list[Cell] = [None if value is None else _text(value) for value in values]
     read = {n: written(value) for n, value in enumerate(values) if value is not None}
@@ -162,7 +163,7 @@ def in_one_unit(key: str, values: Sequence[Any]) -> tuple[str, list[Cell]]:
 
 
 def _scale(unit: str, target: str) -> Fraction:
-    """What ``unit`` is of ``target``; a bare number is in SI. Raises ValueError."""
+    """Returns the factor of ``unit`` over ``target``; a bare number is in SI. Raises ValueError."""
     factor, dimension = parse_unit(unit)
     whole, kind = parse_unit(target)
     if unit and dimension != kind:
@@ -183,7 +184,7 @@ def _text(value: Any) -> str:
 
 
 def to_csv(columns: Sequence[Column]) -> str:
-    """With a line of names and units; what is not known is empty."""
+    """Returns the table as CSV, with a line of names and units; unknown values are empty."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(safe(column.title) for column in columns)
@@ -192,10 +193,11 @@ def to_csv(columns: Sequence[Column]) -> str:
 
 
 def rows(columns: Sequence[Column]) -> Iterable[tuple[Cell, ...]]:
-    """The lines of the table."""
+    """Yields the lines of the table."""
     return zip(*(column.values for column in columns), strict=True)
 
 
 def safe(value: Cell) -> Cell:
-    """A value of a CSV table. A text that a spreadsheet would compute gets an apostrophe, which makes it a text."""
+    """Returns the value of a CSV table. A text that a spreadsheet would compute gets an apostrophe, which keeps it a
+    text."""
     return f"'{value}" if isinstance(value, str) and _FORMULA.match(value) else value

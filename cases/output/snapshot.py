@@ -1,12 +1,12 @@
-"""A snapshot of the fragments of a run as one block of bytes: in the run's folder, over Zenoh and over HTTP the same.
+"""A snapshot of the fragments of a run as one block of bytes, the same in the run's folder, over Zenoh and over HTTP.
 
 ::
 
     bytes  0 to  7    CONOSNAP
            8 to 11    version, uint32
           12 to 15    H, the length of the header, uint32
-          16 to 16+H  the header, JSON, filled up with spaces
-          from there  the arrays, each at a multiple of 8, where the header says; little-endian
+          16 to 16+H  the header, JSON, padded with spaces
+          from there  the arrays, each at a multiple of 8 given in the header; little-endian
 
 Vertices belong to one fragment each, so that fragments can be drawn apart. ``docs/reference/snapshots.md`` has the
 arrays.
@@ -19,17 +19,17 @@ import msgspec
 
 MAGIC = b"CONOSNAP"
 VERSION = 1
-"""Of the layout; a reader of another one refuses it."""
+"""Version of the layout; a reader refuses another one."""
 TYPES = {"uint8": "B", "uint16": "H", "uint32": "I", "int64": "q", "float32": "f", "float64": "d"}
 """Types of arrays, and their letters in Python's ``struct``."""
 REST = -1
-"""``fragment_id`` of the last row, where it is the sum of all fragments that have no row of their own."""
+"""``fragment_id`` of the last row, if it is the sum of all fragments without a row of their own."""
 FIELD = "field:"
-"""What the names of the arrays of fields begin with."""
+"""Prefix of the names of field arrays."""
 _START = 16
 """Bytes before the header."""
 _FAR = 1 << 40
-"""An offset with more digits than any: its header is the longest."""
+"""An offset with more digits than any other: its header is the longest."""
 
 
 class Field(msgspec.Struct, kw_only=True, frozen=True):
@@ -41,7 +41,7 @@ class Field(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class Array(msgspec.Struct, kw_only=True, frozen=True):
-    """An array; ``offset`` counts from the beginning of the blob."""
+    """An array; ``offset`` counts from the beginning of the block."""
 
     dtype: str
     shape: list[int]
@@ -49,7 +49,7 @@ class Array(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class Header(msgspec.Struct, kw_only=True, frozen=True):
-    """What a snapshot says before its arrays. ``t`` in s, ``box`` in m."""
+    """The header of a snapshot. ``t`` in s, ``box`` in m."""
 
     n: int
     step: int
@@ -59,12 +59,12 @@ class Header(msgspec.Struct, kw_only=True, frozen=True):
     ranks: int
     parts: list[str]
     tets: int
-    """Of the whole model."""
+    """Number of tets of the whole model."""
     surface_triangles: int
-    """Before some were merged or left out."""
+    """Number of fragments before some were merged or omitted."""
     fragments_total: int
     fragments_listed: int
-    """Rows of the table but the last, where that is the rest."""
+    """Rows of the table except the last one, if that is the sum of the others."""
     fields: dict[str, Field]
     arrays: dict[str, Array] = {}
 
@@ -82,7 +82,7 @@ _decoder = msgspec.json.Decoder(Header)
 
 
 def pack(header: Header, columns: Mapping[str, Column]) -> bytes:
-    """The blob; ``header.arrays`` is filled in here."""
+    """Returns the block of bytes; fills in ``header.arrays``."""
     places = {name: Array(dtype=c.dtype, shape=list(c.shape), offset=_FAR) for name, c in columns.items()}
     room = _rounded(len(_told(header, places)))
     blob, size = [], _START + room
@@ -96,8 +96,8 @@ def pack(header: Header, columns: Mapping[str, Column]) -> bytes:
 
 
 def header_of(blob: bytes | memoryview, size: int | None = None) -> Header:
-    """The header of a blob, or of its beginning if ``size`` says how many bytes all of it has. Raises ValueError for
-    what is no snapshot, or not whole.
+    """Returns the header of a block, or of its beginning if ``size`` gives the number of all its bytes. Raises
+    ValueError for other data, or an incomplete block.
     """
     data = memoryview(blob)
     size = len(data) if size is None else size
@@ -117,7 +117,7 @@ def header_of(blob: bytes | memoryview, size: int | None = None) -> Header:
 
 
 def view(blob: bytes | memoryview, array: Array) -> memoryview:
-    """One array of a blob, flat, without a copy; for machines that are little-endian themselves."""
+    """Returns one array of a block, flat, without a copy; on little-endian machines."""
     flat: memoryview = memoryview(blob)[array.offset : array.offset + size_of(array)]
     return flat.cast(TYPES[array.dtype])  # type: ignore[call-overload, no-any-return]
 

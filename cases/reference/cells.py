@@ -1,4 +1,4 @@
-"""The row of a key on the page of the reference: value, default and meaning as text of a Markdown table."""
+"""Rows of keys in the reference: value, default and meaning as text of a Markdown table."""
 
 import json
 import re
@@ -13,19 +13,19 @@ BAR = r"\|"
 
 
 class Cells:
-    """Rows of the keys of a schema; ``paths``: the path of the table of each definition, by its id."""
+    """Rows of the keys of a schema. ``paths``: path of the table of each definition, by its id."""
 
     def __init__(self, whole: Schema, paths: Mapping[int, str]) -> None:
         self._whole, self._paths = whole, paths
 
     def row(self, key: str, schema: Schema, required: bool) -> str:
-        """The row of a key: ``| key | value | default | meaning |``."""
+        """Returns the row of a key: ``| key | value | default | meaning |``."""
         default = "required" if required else _default(schema)
         cells = (f"`{key}`", self._value(schema), default, " ".join(schema["description"].split()))
         return f"| {' | '.join(cell.replace('|', BAR) for cell in cells)} |"
 
     def _value(self, schema: Schema) -> str:
-        """The values that a key accepts, in words."""
+        """Returns the accepted values of a key in words."""
         return " or ".join(dict.fromkeys(self._one(variant) for variant in variants(schema))) or "nothing"
 
     def _one(self, schema: Schema) -> str:
@@ -39,7 +39,7 @@ class Cells:
         return self._several(meant) or _scalar(meant)
 
     def _several(self, schema: Schema) -> str:
-        """A list, or tables by name; empty for a single value."""
+        """Returns the words for a list, or for tables by name; empty for a single value."""
         if "prefixItems" in schema:
             return _fixed([self._value(each) for each in schema["prefixItems"]])
         if "items" in schema:
@@ -51,7 +51,7 @@ class Cells:
 
 
 def link(path: str) -> str:
-    """The path of a table, with a link to its section."""
+    """Returns the path of a table as a link to its section."""
     return f"[`{path}`](#{re.sub(r'[^a-z0-9_-]', '', path.lower())})"
 
 
@@ -104,5 +104,5 @@ def _range(schema: Schema) -> str:
 
 
 def _bound(value: float) -> str:
-    """A bound in few digits: a full turn has seventeen."""
+    """Returns a bound in few digits: a full turn has seventeen."""
     return f"{value:.6g}" if isinstance(value, float) and not value.is_integer() else f"{value}"

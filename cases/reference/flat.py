@@ -7,12 +7,12 @@ from typing import Any
 Scalar = bool | int | float | str
 """A value of a key."""
 _UNTOLD = frozenset({"name", "title", "description", "reference"})
-"""Keys of a case that change no answer."""
+"""Keys of a case without an effect on the answer."""
 
 
 def flat(case: dict[str, Any], most: int, longest: int) -> dict[str, Scalar]:
-    """The values of the keys that a case has, by key, ``most`` of them; texts of at most ``longest`` characters. What
-    changes no answer is left out: names, descriptions, references.
+    """Returns the values of the keys of a case, by key, at most ``most`` of them; texts of at most ``longest``
+    characters. Omits keys without an effect on the answer: names, descriptions, references.
     """
     told = ((key, value) for key, value in case.items() if key not in _UNTOLD)
     pairs = (pair for key, value in told for pair in _scalars(key, value))

@@ -1,4 +1,4 @@
-"""The unit in which a bare number of a key of a case is taken: that of the model behind the key."""
+"""The SI unit of a bare number of a key of a case, from the model behind the key."""
 
 import re
 from collections.abc import Iterator
@@ -12,7 +12,7 @@ _STEP = re.compile(r"([^.\[\]]+)|\[(\d+)\]")
 
 @lru_cache(256)
 def unit_of_key(key: str) -> str:
-    """``m/s`` of ``parts[0].velocity[2]``; empty where a number has no unit, or another key decides which."""
+    """Returns ``m/s`` for ``parts[0].velocity[2]``; empty where a number has no unit, or another key determines it."""
     whole = _schema()
     found = [definition(whole, whole)]
     for name, index in _STEP.findall(key):

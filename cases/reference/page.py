@@ -59,7 +59,7 @@ _SEVERAL = 4
 
 
 def page() -> str:
-    """The whole page."""
+    """Returns the whole page."""
     text = "\n".join([_head(), *_Page(json_schema()).chapters()])
     return re.sub(r"docs/([a-z]+/[a-z_]+\.md)", r"[\1](../\1)", text)
 
@@ -71,7 +71,7 @@ def _head() -> str:
 
 
 def _chapter(path: str) -> str:
-    """The chapter of a table."""
+    """Returns the chapter of a table."""
     begun = [(len(start), title) for title, starts in _CHAPTERS.items() for start in starts if _below(path, start)]
     return max(begun)[1]
 
@@ -88,7 +88,7 @@ class _Page:
         self._cells = Cells(whole, {id(table.schema): table.path for table in self._tables})
 
     def chapters(self) -> Iterator[str]:
-        """Each chapter with its sections."""
+        """Yields each chapter with its sections."""
         groups: dict[str, list[Table]] = {}
         for table in self._tables:
             groups.setdefault(table.path, []).append(table)
@@ -99,14 +99,14 @@ class _Page:
                     yield from self._variants(group) if group[0].key else self._section(group[0])
 
     def _section(self, table: Table) -> Iterator[str]:
-        """The section of a table without variants."""
+        """Yields the section of a table without variants."""
         if table.path:
             yield f"### {table.title}\n"
         yield from _text(table)
         yield _grid(self._rows(table).values())
 
     def _variants(self, group: list[Table]) -> Iterator[str]:
-        """The sections of a table with variants: first the keys of several, then each with the keys of its own."""
+        """Yields the sections of a table with variants: first the common keys, then each variant with its own keys."""
         key = group[0].key
         yield f"### `{group[0].path}`\n"
         yield f"`{key}` selects one of these tables: {', '.join(f'`{each.value}`' for each in group)}.\n"
@@ -124,7 +124,7 @@ class _Page:
             yield "\n".join([f"| {key} | keys of its own | described at |", "|---|---|---|", *known, ""])
 
     def _shared(self, group: list[Table], common: list[str]) -> str:
-        """The grid of common rows, with a column of the variants that have them."""
+        """Returns the grid of common keys, with a column of the variants that have them."""
         lines = []
         for line in common:
             values = [each.value for each in group if line in self._own(each).values()]
@@ -132,14 +132,14 @@ class _Page:
         return _grid(lines, f"with {group[0].key}")
 
     def _variant(self, table: Table, own: dict[str, str]) -> Iterator[str]:
-        """The section of a variant, with the keys of its own."""
+        """Yields the section of a variant, with its own keys."""
         yield f"#### {table.title}\n"
         yield from _text(table)
         if own:
             yield _grid(own.values())
 
     def _same(self, table: Table, own: dict[str, str]) -> Table | None:
-        """The table of the same shape, kind or model nearer to the top of the case, if it has all of these rows."""
+        """Returns the table of the same shape, kind or model with a shorter path, if it has all of these rows."""
         for each in self._tables:
             same = (each.key, each.value) == (table.key, table.value) and len(each.path) < len(table.path)
             if same and own.items() <= self._rows(each).items():
@@ -147,23 +147,23 @@ class _Page:
         return None
 
     def _own(self, table: Table) -> dict[str, str]:
-        """The rows of a variant, without that of the key that selects it."""
+        """Returns the rows of a variant, without that of the key that selects it."""
         return {name: line for name, line in self._rows(table).items() if name != table.key}
 
     def _rows(self, table: Table) -> dict[str, str]:
-        """The row of each key."""
+        """Returns the row of each key."""
         required = table.schema.get("required", ())
         return {key: self._cells.row(key, each, key in required) for key, each in table.schema["properties"].items()}
 
 
 def _common(variants: list[dict[str, str]]) -> list[str]:
-    """Rows that all variants have in common, or several of them."""
+    """Returns the rows that all variants have in common, or several of them."""
     lines = [line for rows in variants for line in rows.values()]
     return [line for line in dict.fromkeys(lines) if lines.count(line) >= max(2, min(_SEVERAL, len(variants)))]
 
 
 def _which(values: list[str], every: list[str]) -> str:
-    """Names of variants, in few words."""
+    """Returns names of variants, in few words."""
     others = [value for value in every if value not in values]
     if not others:
         return "all"
@@ -171,13 +171,13 @@ def _which(values: list[str], every: list[str]) -> str:
 
 
 def _text(table: Table) -> Iterator[str]:
-    """Description and example of a table."""
+    """Yields description and example of a table."""
     yield f"{table.schema['description']}\n"
     if table.title in EXAMPLES:
         yield f"```toml\n{EXAMPLES[table.title]}```\n"
 
 
 def _grid(rows: Iterable[str], last: str = "") -> str:
-    """A Markdown table of keys; ``last``: title of a fifth column."""
+    """Returns a Markdown table of keys; ``last``: title of a fifth column."""
     titles = ["key", "value", "default", "meaning", *([last] if last else [])]
     return "\n".join([f"| {' | '.join(titles)} |", f"|{'---|' * len(titles)}", *rows, ""])

@@ -11,9 +11,8 @@ _TAGS = ("shape", "kind", "model")
 
 @dataclass(frozen=True)
 class Table:
-    """A table of the case: its path, such as ``parts[].mesh``, and its schema.
-
-    Of a table with variants also the key that selects one, ``shape``, and its value, ``box``.
+    """A table of the case: its path, such as ``parts[].mesh``, and its schema; for a variant also the key that
+    selects it (``shape``) and its value (``box``).
     """
 
     path: str
@@ -29,7 +28,7 @@ class Table:
 
 
 def tables(whole: Schema) -> list[Table]:
-    """Every table of a case in the order of the keys, each with the shortest of its paths."""
+    """Returns every table of a case in the order of the keys, each with the shortest of its paths."""
     found: dict[int, Table] = {}
     _collect(found, Table("", whole), whole)
     return list(found.values())
@@ -47,7 +46,7 @@ def _collect(found: dict[int, Table], table: Table, whole: Schema) -> None:
 
 
 def _tables_in(path: str, schema: Schema, whole: Schema) -> Iterator[tuple[str, Schema]]:
-    """The tables that the value of a key is or contains, with their paths."""
+    """Yields the tables in the value of a key, with their paths."""
     for variant in variants(schema):
         meant = definition(variant, whole)
         if "properties" in meant:
@@ -59,6 +58,6 @@ def _tables_in(path: str, schema: Schema, whole: Schema) -> Iterator[tuple[str, 
 
 
 def _tag(schema: Schema) -> tuple[str, str]:
-    """The key that selects this variant, and its value; empty without variants."""
+    """Returns the key that selects this variant, and its value; empty without variants."""
     values = ((key, schema["properties"].get(key, {}).get("const")) for key in _TAGS)
     return next(((key, value) for key, value in values if value is not None), ("", ""))

@@ -1,6 +1,6 @@
-"""Combinations of shapes before they are meshed: which points they hold, in which box they lie, their size, about.
+"""Combinations of shapes before they are meshed: points inside, bounding box, approximate size.
 
-Exact for points; volumes by points of a lattice. What has solids of a CAD file is known when that is read.
+Exact for points; volumes by points of a lattice. Unknown for solids of a CAD file, until the file is read.
 """
 
 import math
@@ -28,10 +28,10 @@ Bounds = tuple[Vector, Vector]
 Inside = Callable[[Vector], bool]
 
 WORST = 0.45
-"""Step length of the worst tet of gmsh over that of a regular tet, where a combination has no edges shorter than an
+"""Step length of the worst tet of gmsh over that of a regular tet, for a combination without edges shorter than an
 element: 0.3 to 0.7 in 40 of the combinations of tests/mesh/test_combinations.py."""
 _LATTICE = 12
-"""Points a direction at which a combination is looked at. Chosen: 1,728 points, volumes within some per cent."""
+"""Sampling points per direction of a combination. Chosen: 1,728 points, volumes within some per cent."""
 _BULKY = 1.5
 """Surface of a combination over that of a cube of its volume. Chosen."""
 _BODIES: dict[str, type[Model]] = {
@@ -41,8 +41,8 @@ _BODIES: dict[str, type[Model]] = {
 
 
 def box_of(form: CombinedForm | Operand) -> Bounds | None:
-    """Corners of a box that holds a form, m: of an operand before it is turned; None where a CAD file decides. The low
-    corner of an intersection that is empty may be above the high one."""
+    """Returns the corners of a bounding box of a form, m: of an operand before it is turned; None for a CAD file.
+    The low corner of an empty intersection can be above the high one."""
     if isinstance(form, CadForm):
         return None
     if not isinstance(form, CombinedForm):
@@ -64,7 +64,7 @@ def box_of(form: CombinedForm | Operand) -> Bounds | None:
 
 
 def _unturned(form: Operand) -> bool:
-    """Whether the box of an operand is where the operand is: a combination within is turned as a whole."""
+    """Whether the box of an operand contains it in its place: a combination inside it is turned as a whole."""
     return not isinstance(form, CombinedForm) or form.turn is None
 
 
@@ -74,7 +74,7 @@ def _placed(form: Operand) -> Placed:
 
 
 def inside(form: CombinedForm | Operand) -> Inside | None:
-    """Whether a point, m, lies in a form: to be asked of many points; None where a CAD file decides."""
+    """Returns the test whether a point, m, lies in a form; built once for many points. None for a CAD file."""
     if isinstance(form, CadForm):
         return None
     if not isinstance(form, CombinedForm):
@@ -101,7 +101,7 @@ def _joined(form: CombinedForm, known: list[Inside]) -> Inside:
 
 
 def modelled(mesh: Combination) -> Bounds | None:
-    """The box round what is modelled of a combination, m, as far as ``box_of`` knows it."""
+    """Returns the bounding box of the modelled part of a combination, m, as far as ``box_of`` has it."""
     box = box_of(mesh)
     if box is None:
         return None
@@ -112,13 +112,13 @@ def modelled(mesh: Combination) -> Bounds | None:
 
 
 def cut_by(sector: str, axis: Axis) -> tuple[int, ...]:
-    """The directions across ``axis`` in which a sector keeps the positive side alone."""
+    """Returns the directions across ``axis`` in which a sector keeps the positive side only."""
     return across(axis)[: {"full": 0, "half": 1, "quarter": 2}[sector]]
 
 
 @lru_cache(maxsize=256)
 def combined_size(mesh: Combination) -> MeshSize | None:
-    """About how large the mesh of a combination will be; None where a CAD file decides, or nothing seems to be left."""
+    """Returns the approximate size of the mesh of a combination; None for a CAD file, or for an empty combination."""
     box, holds = modelled(mesh), inside(mesh)
     if box is None or holds is None or any(a >= b for a, b in zip(*box, strict=True)):
         return None

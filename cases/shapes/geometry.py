@@ -1,4 +1,4 @@
-"""Sizes of the mesh primitives, by formula: bounds, volume, thinnest extent, reach along a direction."""
+"""Dimensions of the mesh primitives, by formula: bounds, volume, thinnest extent, reach along a direction."""
 
 import math
 from collections.abc import Callable
@@ -38,7 +38,7 @@ def centre(mesh: Generated) -> Vector:
 
 
 def whole_bounds(mesh: Generated) -> tuple[Vector, Vector]:
-    """Lowest and highest coordinates of the whole body, m, whatever sector of it is modelled."""
+    """Lowest and highest coordinates of the whole body, m, for any sector."""
     if isinstance(mesh, Box):
         return mesh.low, mesh.high
     if isinstance(mesh, Sphere):
@@ -63,7 +63,7 @@ def height(mesh: Plate | Cylinder | Tube | Revolved | RingSector) -> float:
 
 
 def _reach(mesh: Plate | Cylinder | Tube | Revolved | RingSector) -> tuple[tuple[float, float], tuple[float, float]]:
-    """How far the whole body goes from its base in the two directions across its axis, m."""
+    """Reach of the whole body from its base in the two directions across its axis, m."""
     if isinstance(mesh, RingSector):
         return ring.extremes(mesh, whole=True)
     if isinstance(mesh, Plate):
@@ -84,12 +84,13 @@ def _two_tets(mesh: TwoTets, i: int, j: int) -> tuple[Vector, Vector]:
 
 
 def altitude(mesh: TwoTets) -> float:
-    """How far the free corners are from the common face, m."""
+    """Distance of the free corners from the common face, m."""
     return mesh.element_size * math.sqrt(2.0 / 3.0)
 
 
 def side_areas(mesh: TwoTets) -> tuple[float, ...]:
-    """Areas of the six exposed faces of two tets, m^2: the edges of the common face look along 60, 180 and 300 deg."""
+    """Areas of the six exposed faces of two tets, m^2: the outward normals of the edges of the common face are at
+    60, 180 and 300 deg."""
     edge, off = mesh.element_size, altitude(mesh) * math.tan(mesh.lean)
     feet = [edge / math.sqrt(12.0) + sign * off * share for sign in (-1.0, 1.0) for share in (0.5, -1.0, 0.5)]
     return tuple(0.5 * edge * math.hypot(altitude(mesh), foot) for foot in feet)
@@ -101,12 +102,12 @@ def pitch(mesh: Shards) -> float:
 
 
 def tets(mesh: TwoTets | Shards) -> int:
-    """How many tets a body has that is given tet by tet."""
+    """Number of tets of a body that is given tet by tet."""
     return 2 if isinstance(mesh, TwoTets) else math.prod(mesh.count)
 
 
 def bounds(mesh: Mesh) -> tuple[Vector, Vector] | None:
-    """Lowest and highest coordinates of what is modelled, m; None where only the mesh tells."""
+    """Lowest and highest coordinates of the modelled part, m; None for bodies with measured sizes."""
     if isinstance(mesh, Measured):
         return None
     low, high = map(list, whole_bounds(mesh))
@@ -119,7 +120,7 @@ def bounds(mesh: Mesh) -> tuple[Vector, Vector] | None:
 
 
 def volume(mesh: Generated) -> float:
-    """Volume of what is modelled, m^3; of shards before their nodes are moved."""
+    """Volume of the modelled part, m^3; of shards before their nodes are moved."""
     if isinstance(mesh, Box):
         low, high = bounds(mesh) or ((0.0,) * 3, (0.0,) * 3)
         return math.prod(max(0.0, b - a) for a, b in zip(low, high, strict=True))
@@ -139,7 +140,7 @@ def volume(mesh: Generated) -> float:
 
 
 def surface(mesh: Generated) -> float:
-    """Surface of what is modelled, m^2, the cut faces of a sector and both sides of a slit included."""
+    """Surface of the modelled part, m^2, with the cut faces of a sector and both sides of a slit."""
     if isinstance(mesh, Box | Plate):
         low, high = bounds(mesh) or ((0.0,) * 3, (0.0,) * 3)
         a, b, c = (y - x for x, y in zip(low, high, strict=True))
@@ -170,7 +171,7 @@ def _ring_surface(mesh: RingSector) -> float:
 
 
 def slit_extents(mesh: Box | Plate) -> tuple[float, float]:
-    """How far the slit of a body reaches in it along the two directions across the slit's axis, m; 0 without one."""
+    """Reach of the slit in its body along the two directions across the slit's axis, m; 0 without one."""
     if mesh.slit is None:
         return 0.0, 0.0
     low, high = bounds(mesh) or ((0.0,) * 3, (0.0,) * 3)
@@ -182,7 +183,7 @@ def slit_extents(mesh: Box | Plate) -> tuple[float, float]:
 
 
 def holds(mesh: Generated, point: Vector) -> bool:
-    """Whether ``point`` lies inside what is modelled; inside its bounds where it is given tet by tet."""
+    """Whether ``point`` lies inside the modelled part; inside its bounds if it is given tet by tet."""
     low, high = bounds(mesh) or ((0.0,) * 3, (0.0,) * 3)
     if not all(a <= x <= b for a, x, b in zip(low, point, high, strict=True)):
         return False
@@ -190,7 +191,7 @@ def holds(mesh: Generated, point: Vector) -> bool:
 
 
 def round_part(mesh: Generated) -> Callable[[Vector], bool]:
-    """Whether a point that lies inside the bounds of a body lies inside the body: to be asked of many points."""
+    """Returns the test whether a point inside the bounds of a body lies inside the body; built once for many points."""
     if isinstance(mesh, Box | Plate | TwoTets | Shards):
         return lambda point: True
     if isinstance(mesh, Sphere):
@@ -211,8 +212,8 @@ def _in_ring(mesh: RingSector, x: float, y: float) -> bool:
 
 
 def thinnest(mesh: Generated) -> float:
-    """The smallest extent of the body, m: the wall of a tube, the diameter of a ball, the larger end of a cone, the
-    outer arc of a ring sector."""
+    """The smallest extent of the body, m: wall of a tube, diameter of a sphere, larger end of a cone, outer arc of a
+    ring sector."""
     low, high = bounds(mesh) or ((0.0,) * 3, (0.0,) * 3)
     extents = [b - a for a, b in zip(low, high, strict=True)]
     if isinstance(mesh, RingSector):
@@ -223,8 +224,8 @@ def thinnest(mesh: Generated) -> float:
 
 
 def lowest_along(mesh: Generated, normal: Vector) -> float:
-    """The smallest value of ``normal . x`` over the whole body, m, for a unit normal; over its bounds where it is given
-    tet by tet, and of a ring sector."""
+    """The smallest value of ``normal . x`` over the whole body, m, for a unit normal; over its bounds if it is given
+    tet by tet, and for a ring sector."""
     if isinstance(mesh, Box | RingSector | TwoTets | Shards):
         return sum(min(n * a, n * b) for n, a, b in zip(normal, *whole_bounds(mesh), strict=True))
     start = _dot(normal, centre(mesh))

@@ -1,4 +1,5 @@
-"""What tractions act on and what boxes hold before there is a mesh: areas, faces and nodes, by the shapes of bodies."""
+"""Estimates of the faces on which tractions act, and of the nodes in a box, from the shapes of bodies, before there
+is a mesh."""
 
 import itertools
 import math
@@ -17,46 +18,46 @@ from .region import Region, slack
 from .sheets import sheets
 
 _FINEST = 60
-"""Patches along a side of a surface, at most. Chosen: a tenth of a second for a body."""
+"""Largest number of patches along a side of a surface. Chosen: a tenth of a second for a body."""
 _MOST = 20
-"""Bodies that are gone through for a boundary. Chosen: two seconds at most."""
+"""Largest number of bodies per boundary. Chosen: two seconds at most."""
 _POINTS = 100_000
-"""Nodes of a turned grid that are gone through. Chosen: half a second."""
+"""Largest number of nodes of a turned grid. Chosen: half a second."""
 _LATTICE = 20
-"""Points a direction at which a body is looked at in a box. Chosen: 8,000 points in all."""
+"""Sampling points per direction of a body in a box. Chosen: 8,000 points in all."""
 _FACETS, _CURVED, _FLAT = 0.3, 0.02, 1e-6
-"""Of an area, what facets may have less than the surface that they stand for, and patches less or more: the square of
-the size of an element by the radius times the first (a chord 1.3 times as long as an element and the end of a cylinder:
-a sixth of it squared), and the second; the third of flat faces. Chosen, but for the sixth (geometry)."""
+"""Relative errors of an area: facets may have less area than the surface, and patches less or more. Curved faces: the
+first value times the square of the element size over the radius (a chord 1.3 times as long as an element and the end
+of a cylinder: a sixth of it squared), plus the second; flat faces: the third. Chosen, except the sixth (geometry)."""
 _CORNERS = 4.0
-"""Faces of curved and unstructured meshes that may be in a region although no patch is, by the square of the size of an
-element. Chosen."""
+"""Area of the faces of curved and unstructured meshes that can be in a region without any patch, over the square of the
+element size. Chosen."""
 _FACTOR, _NODES = 3.0, 10
-"""Between an estimate of nodes and their number, and nodes more. Chosen: in a layer of an unstructured mesh are a third
-to three times as many as in the volume of a layer."""
+"""Ratio of an estimated number of nodes to the real one, and additional nodes. Chosen: a layer of an unstructured
+mesh has a third to three times as many as the volume of a layer has."""
 
 
 @dataclass(frozen=True)
 class Load:
-    """What a boundary acts on, about: a traction on faces, a prescribed velocity on nodes. None where a mesh file or
-    loose tets do not tell, and for the other kind of boundary.
+    """The approximate load of a boundary: faces of a traction, nodes of a prescribed velocity. None with a mesh file
+    or loose tets, and for the other kind of boundary.
     """
 
     boundary: int
-    """Number of the boundary."""
+    """Index of the boundary."""
     area: float | None = None
-    """m^2."""
+    """Loaded area, m^2."""
     faces: int | None = None
     spread: float = 0.0
-    """By how much the area of the faces of a mesh may be another, m^2."""
+    """Uncertainty of the area of the mesh's faces, m^2."""
     nodes: int | None = None
     fewest: int = 0
-    """Of them, those in a box that is not widened by half an element on all sides."""
+    """Nodes in a box that is not widened by half an element on all sides."""
     exact: bool = False
-    """Whether nodes, or faces of a mesh that was read, are counted and not estimated."""
+    """Whether nodes, or faces of a mesh file, are counted, not estimated."""
 
     def agrees(self, nodes: int, faces: int, area: float) -> bool:
-        """Whether a mesh has about as much: ``nodes`` that are driven, or ``faces`` with an ``area``, m^2."""
+        """Whether a mesh has approximately this load: ``nodes`` that are driven, or ``faces`` with an ``area``, m^2."""
         if self.area is not None and faces:
             return abs(area - self.area) <= self.spread
         if self.nodes is None or faces:
@@ -66,7 +67,7 @@ class Load:
         return self.fewest <= _FACTOR * nodes + _NODES and nodes <= _FACTOR * self.nodes + _NODES
 
     def words(self) -> str:
-        """``about 32 faces, 4 mm^2``."""
+        """The load in words: ``about 32 faces, 4 mm^2``."""
         if self.area is not None:
             return f"{'' if self.exact else 'about '}{self.faces} faces, {1e6 * self.area:.6g} mm^2"
         if self.nodes is not None:
@@ -75,7 +76,8 @@ class Load:
 
 
 def loads(case: Case, counted: Sequence[Load] = ()) -> list[Load]:
-    """Of each traction and each prescribed velocity of a case; ``counted``: in meshes that have been read."""
+    """Returns the load of each traction and each prescribed velocity of a case; ``counted``: those in meshes that
+    have been read."""
     known = {load.boundary: load for load in counted}
     return [known.get(load.boundary, load) for load in _loads(case)]
 
@@ -87,14 +89,14 @@ def _loads(case: Case) -> list[Load]:
 
 
 def parts_of(case: Case, spec: Traction | Prescribed) -> list[Part]:
-    """Those that a boundary is for: where it is on a set and names none, all that have a mesh from a file."""
+    """Returns the parts of a boundary: with a set and without names, all with a mesh from a file."""
     if spec.on is not None and not spec.parts:
         return [part for part in case.parts if isinstance(part.mesh, MeshFile)]
     return [part for part in case.parts if not spec.parts or part.name in spec.parts]
 
 
 def near(body: Placed) -> float:
-    """How far outside of a region what belongs to a body is still in it, m; see ``region.slack``."""
+    """Tolerance of the border of a region for nodes of a body, m; see ``region.slack``."""
     reach = max(abs(x) for corner in body.bounds() for x in corner)
     return slack(body.mesh, body.mesh.element_size, reach)
 
@@ -112,8 +114,8 @@ def _meets(region: Region, body: Placed) -> bool:
 
 
 def _reached(case: Case, spec: Traction | Prescribed) -> list[Placed] | None:
-    """The bodies of a boundary into which its box reaches; None where a mesh file, loose tets or too many bodies do not
-    tell.
+    """Returns the bodies of a boundary that reach into its box; None with a mesh file, loose tets or too many
+    bodies.
     """
     region, found = Region.of(spec), list[Placed]()
     for part in parts_of(case, spec):
@@ -139,7 +141,7 @@ def _acted_on(case: Case, number: int, spec: Traction) -> Load:
 
 
 def _faces(body: Placed, region: Region) -> tuple[float, float, float]:
-    """Area, m^2, and faces that a region has of a body, and by how much the area may be another."""
+    """Returns area, m^2, and number of faces of a body in a region, and the uncertainty of the area."""
     mesh = body.mesh
     if region.everything:
         return surface(mesh), surface_faces(mesh), _facets(mesh) * surface(mesh)
@@ -148,8 +150,8 @@ def _faces(body: Placed, region: Region) -> tuple[float, float, float]:
 
 
 def planes_of(body: Placed, region: Region) -> list[int] | None:
-    """How many planes of nodes across x, y and z a box holds of a block of cubes that is neither turned nor slit; None
-    of other bodies and regions.
+    """Returns the numbers of planes of nodes across x, y and z of a block of cubes in a box, for blocks neither
+    turned nor slit; None for other bodies and regions.
     """
     mesh, margin = body.mesh, near(body)
     if not isinstance(mesh, Box | Plate) or not _regular(mesh) or mesh.slit is not None or body.turn is not None:
@@ -165,7 +167,8 @@ def planes_of(body: Placed, region: Region) -> list[int] | None:
 
 
 def block_faces(body: Placed, region: Region) -> tuple[float, int] | None:
-    """Area, m^2, and faces that a box holds of such a block; None of other bodies and regions, and without a face."""
+    """Returns area, m^2, and number of faces of such a block in a box; None for other bodies and regions, and
+    without a face."""
     planes, mesh, margin = planes_of(body, region), body.mesh, near(body)
     if planes is None or not isinstance(mesh, Box | Plate) or region.low is None or region.high is None:
         return None
@@ -182,8 +185,8 @@ def block_faces(body: Placed, region: Region) -> tuple[float, int] | None:
 
 
 def _inside(body: Placed, region: Region) -> tuple[float, float, float]:
-    """Area, m^2, and faces of a body whose corners are in a region, of patches as large as elements; and by how much
-    the area may be another: by that of patches on the border of the region, and of facets.
+    """Returns area, m^2, and number of faces of a body with all corners in a region, as patches of the element size;
+    and the uncertainty of the area from patches on the border of the region and from facets.
     """
     mesh, margin = body.mesh, near(body)
     area, rim = 0.0, 0.0
@@ -204,7 +207,7 @@ def _inside(body: Placed, region: Region) -> tuple[float, float, float]:
 
 
 def _on_rim(corners: list[list[int]], i: int, j: int) -> bool:
-    """Whether a patch of a sheet has a neighbour that is not wholly in."""
+    """Whether a patch of a sheet has a neighbour that is not completely inside."""
     return any(count < 4 for row in corners[max(i - 1, 0) : i + 2] for count in row[max(j - 1, 0) : j + 2])
 
 
@@ -214,7 +217,7 @@ def _regular(mesh: Generated) -> bool:
 
 
 def _facets(mesh: Generated) -> float:
-    """Of the area of a body, what facets may have less or more than it."""
+    """Relative uncertainty of the area of a body by its facets."""
     if not isinstance(mesh, Cylinder | Tube | Sphere | Revolved | RingSector):
         return _FLAT
     radius = profile(mesh).widest() if isinstance(mesh, Revolved) else mesh.radius
@@ -241,7 +244,7 @@ def _held(case: Case, number: int, spec: Prescribed) -> Load:
 
 
 def _nodes(body: Placed, region: Region) -> tuple[int, int, bool]:
-    """How many nodes a region has of a body, at least and at most, and whether they are counted."""
+    """Returns the smallest and largest number of nodes of a body in a region, and whether they are exact."""
     if region.everything:
         every = mesh_size(body.mesh).nodes
         return every, every, _counted(body.mesh)
@@ -255,7 +258,7 @@ def _counted(mesh: Generated) -> bool:
 
 
 def _grid_nodes(body: Placed, region: Region) -> int | None:
-    """The nodes of a block of cubes in a box; None for other meshes, and for turned ones of many nodes."""
+    """Returns the nodes of a block of cubes in a box; None for other meshes, and for turned ones of many nodes."""
     if (planes := planes_of(body, region)) is not None:
         return math.prod(planes)
     mesh, margin = body.mesh, near(body)
@@ -269,12 +272,13 @@ def _grid_nodes(body: Placed, region: Region) -> int | None:
 
 
 def _between(body: Placed, region: Region) -> tuple[int, int]:
-    """About how many nodes a body has in a box, and in the same half an element wider on all sides."""
+    """Returns the approximate number of nodes of a body in a box, and in the box widened by half an element on all
+    sides."""
     return _about(body, region, 0.0), _about(body, region, 0.5 * body.mesh.element_size)
 
 
 def _about(body: Placed, region: Region, wider: float) -> int:
-    """The nodes of a body in a box that is ``wider``, m, on all sides, by the volume that the body has in it."""
+    """Returns the number of nodes of a body in a box ``wider``, m, on all sides, from the volume of the body in it."""
     assert region.low is not None
     assert region.high is not None
     bottom, top = body.bounds()

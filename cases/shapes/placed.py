@@ -1,4 +1,4 @@
-"""Bodies where they are at the start, turned as their part says: which points they hold, how they move."""
+"""Bodies in their initial place, turned as their part requires: points inside, mass and motion."""
 
 import itertools
 import math
@@ -10,7 +10,7 @@ from . import geometry
 from .geometry import Generated, Vector, across, index
 
 LATTICE = 20
-"""Points a direction at which a body is looked at. Chosen: 8,000 points in all, moments of inertia within 1 %."""
+"""Sampling points per direction of a body. Chosen: 8,000 points in all, moments of inertia within 1 %."""
 
 
 @dataclass(frozen=True)
@@ -21,22 +21,22 @@ class Placed:
     turn: Turn | None = None
 
     def holds(self, point: Vector) -> bool:
-        """Whether ``point``, m, lies in what is modelled."""
+        """Whether ``point``, m, lies in the modelled part."""
         return geometry.holds(self.mesh, _turned(point, self.turn, -1.0))
 
     def turned(self, point: Vector) -> Vector:
-        """Where a point of the body as its mesh has it is, m."""
+        """Returns the position, m, of a point of the mesh of the body."""
         return _turned(point, self.turn)
 
     def bounds(self) -> tuple[Vector, Vector]:
-        """Lowest and highest coordinates, m; of a turned body those of the box round it."""
+        """Lowest and highest coordinates, m; of a turned body those of its bounding box."""
         low, high = geometry.bounds(self.mesh) or ((0.0,) * 3, (0.0,) * 3)
         corners = [_turned((x, y, z), self.turn) for x, y, z in itertools.product(*zip(low, high, strict=True))]
         (a, b, c), (d, e, f) = ([pick(each) for each in zip(*corners, strict=True)] for pick in (min, max))
         return (a, b, c), (d, e, f)
 
     def points(self) -> list[Vector]:
-        """Points that fill the body evenly; its centre when it is too thin for the lattice."""
+        """Points that fill the body evenly; its centre if it is too thin for the lattice."""
         low, high = geometry.bounds(self.mesh) or ((0.0,) * 3, (0.0,) * 3)
         inside = [point for point in lattice(low, high, LATTICE) if geometry.holds(self.mesh, point)]
         return [_turned(point, self.turn) for point in inside or [geometry.centre(self.mesh)]]
@@ -61,7 +61,7 @@ def _turned(point: Vector, turn: Turn | None, sense: float = 1.0) -> Vector:
 
 
 def driven(case: Case, part: Part) -> Part:
-    """A part as it moves where a boundary turns it."""
+    """Returns a part with the initial motion of a boundary that rotates it."""
     for _, boundary in case.boundaries_of(Rotation):
         if boundary.on is None and (not boundary.parts or part.name in boundary.parts):
             return part.model_copy(update={"velocity": (0.0, 0.0, 0.0), "spin": boundary.spin, "stretch": None})
@@ -69,7 +69,7 @@ def driven(case: Case, part: Part) -> Part:
 
 
 def velocity(part: Part, point: Vector) -> Vector:
-    """The velocity, m/s, of a part at ``point``, m, at the start, without its jitter."""
+    """Returns the velocity, m/s, of a part at ``point``, m, at the start, without its jitter."""
     x, y, z = part.velocity
     if part.spin is not None:
         a, b, c = part.spin.rate
@@ -83,30 +83,30 @@ def velocity(part: Part, point: Vector) -> Vector:
 
 @dataclass(frozen=True)
 class Bulk:
-    """What a part brings along at the start, of what is modelled of it."""
+    """Mass, box and motion of the modelled part of a body at the start."""
 
     mass: float
-    """kg."""
+    """Mass, kg."""
     low: Vector
     high: Vector
-    """Its corners, m."""
+    """Corners of its bounding box, m."""
     momentum: Vector
-    """N s."""
+    """Momentum, N s."""
     energy: float
-    """Kinetic, J, without jitter."""
+    """Kinetic energy, J, without jitter."""
     speed: float
-    """The largest, m/s."""
+    """Largest speed, m/s."""
 
     @property
     def extent(self) -> Vector:
-        """Along x, y, z, m."""
+        """Extents along x, y, z, m."""
         a, b, c = (high - low for low, high in zip(self.low, self.high, strict=True))
         return a, b, c
 
 
 def bulk(part: Part, mesh: Generated, density: float) -> Bulk:
-    """What ``part`` with the generated ``mesh`` brings along, with the mass that is given for it; motion
-    other than of the whole from points inside.
+    """Returns mass, box and motion of ``part`` with the generated ``mesh`` and its mass; motion other than uniform
+    translation from points inside.
     """
     given = part.rigid.mass if part.rigid is not None else None
     body, mass = Placed(mesh, part.turn), given or density * geometry.volume(mesh)
@@ -121,8 +121,8 @@ def bulk(part: Part, mesh: Generated, density: float) -> Bulk:
 
 
 def with_inertia(part: Part, mass: float, middle: Vector) -> tuple[Vector, float] | None:
-    """Momentum and kinetic energy of a rigid part whose inertia is given, at the start; None for any other part.
-    ``middle``: its centre of mass, where none is given.
+    """Returns momentum and kinetic energy of a rigid part with given inertia at the start; None for any other part.
+    ``middle``: its centre of mass, if none is given.
     """
     rigid = part.rigid
     if rigid is None or rigid.inertia is None:

@@ -1,7 +1,7 @@
-"""Outlines of bodies of revolution: the radius over the height, and by formula what the body has of it.
+"""Outlines of bodies of revolution: the radius over the height, with volume, area and other integrals by formula.
 
-Heights z run along the axis from the low end of the body, radii r from the axis. An outline is a row of lines and arcs
-from one end to the other; a flat face closes an end whose radius is not 0.
+Heights z run along the axis from the low end of the body, radii r from the axis. An outline is a sequence of lines
+and arcs from one end to the other; a flat face closes an end whose radius is not 0.
 """
 
 import math
@@ -11,7 +11,7 @@ from ..model.bodies import Cone, Hemisphere, Ogive, SphericalCap
 from ..model.forms import BallPiece, ConeForm, OgiveForm
 
 _TIP = 1e-7
-"""Of the height: the end of an arc on the axis has a radius below it, the root of rounding."""
+"""Largest radius of the end of an arc on the axis, over the height: the root of rounding."""
 
 Revolved = Cone | Ogive | Hemisphere | SphericalCap
 RevolvedForm = ConeForm | OgiveForm | BallPiece
@@ -19,7 +19,7 @@ RevolvedForm = ConeForm | OgiveForm | BallPiece
 
 @dataclass(frozen=True)
 class Line:
-    """From (z0, r0) to (z1, r1), z0 below z1."""
+    """A line from (z0, r0) to (z1, r1), z0 below z1."""
 
     z0: float
     r0: float
@@ -31,7 +31,7 @@ class Line:
         return self.r0 + (self.r1 - self.r0) * (z - self.z0) / (self.z1 - self.z0)
 
     def volume(self) -> float:
-        """Of the frustum, m^3."""
+        """Volume of the frustum, m^3."""
         return math.pi / 3.0 * (self.z1 - self.z0) * (self.r0**2 + self.r0 * self.r1 + self.r1**2)
 
     def side(self) -> float:
@@ -51,11 +51,11 @@ class Line:
         return min(along * self.z0 - out * self.r0, along * self.z1 - out * self.r1)
 
     def length(self) -> float:
-        """m."""
+        """Height of the line, m."""
         return math.hypot(self.z1 - self.z0, self.r1 - self.r0)
 
     def mirrored(self, top: float) -> "Line":
-        """The same seen from the other end of a body of height ``top``, m."""
+        """The line seen from the other end of a body of height ``top``, m."""
         return Line(top - self.z1, self.r1, top - self.z0, self.r0)
 
 
@@ -112,11 +112,11 @@ class Arc:
         return min(*ends, *([along * self.zc - out * self.rc - self.radius * length] if inside else []))
 
     def length(self) -> float:
-        """m."""
+        """Height of the arc, m."""
         return self.radius * self._angle()
 
     def mirrored(self, top: float) -> "Arc":
-        """The same seen from the other end of a body of height ``top``, m."""
+        """The arc seen from the other end of a body of height ``top``, m."""
         return Arc(top - self.z1, top - self.z0, top - self.zc, self.rc, self.radius)
 
     def _rise(self, u: float) -> float:
@@ -142,12 +142,12 @@ class Profile:
 
     @property
     def height(self) -> float:
-        """m."""
+        """Height of the body, m."""
         return self.segments[-1].z1
 
     @property
     def ends(self) -> tuple[float, float]:
-        """Radii of the flat faces at the low and the high end, m; 0 where there is none."""
+        """Radii of the flat faces at the low and the high end, m; 0 if there is none."""
         low, high = (r if r > _TIP * self.height else 0.0 for r in (self.segments[0].r0, self.segments[-1].r1))
         return low, high
 
@@ -156,11 +156,11 @@ class Profile:
         return next((each for each in self.segments if z <= each.z1), self.segments[-1]).at(z)
 
     def volume(self) -> float:
-        """m^3."""
+        """Volume, m^3."""
         return math.fsum(each.volume() for each in self.segments)
 
     def surface(self) -> float:
-        """With the flat faces, m^2."""
+        """Surface with the flat faces, m^2."""
         return math.fsum([*(each.side() for each in self.segments), *(math.pi * r**2 for r in self.ends)])
 
     def section(self) -> float:
@@ -177,7 +177,7 @@ class Profile:
 
 
 def profile(mesh: RevolvedForm) -> Profile:
-    """The outline of a body. Its sizes fit, as ``form_checks`` finds."""
+    """Returns the outline of a body, whose sizes fit (``form_checks``)."""
     if isinstance(mesh, ConeForm):
         return Profile((Line(0.0, mesh.radius, mesh.length, mesh.top_radius),))
     found = _ogive(mesh) if isinstance(mesh, OgiveForm) else (_cap(mesh),)
@@ -186,8 +186,8 @@ def profile(mesh: RevolvedForm) -> Profile:
 
 
 def tips(mesh: RevolvedForm) -> list[tuple[float, float]]:
-    """Of both ends of a body the radius, m, of a flat or a round tip, 0 of a sharp one; and the slope of the outline
-    there, of meaning for a sharp one.
+    """Returns for both ends of a body the radius, m, of a flat or a round tip, 0 of a sharp one; and the slope of
+    the outline there, used for a sharp tip.
     """
     outline = profile(mesh)
     small = 1e-4 * outline.height
@@ -203,8 +203,8 @@ def _cap(mesh: BallPiece) -> Arc:
 
 
 def arc_of(mesh: OgiveForm) -> Arc:
-    """The arc of the sharp nose, which begins at height 0: through (0, R) and (L, 0), with its centre on the far side
-    of the axis. A tangent ogive has it at the height 0: L^2 = radius^2 - (radius - R)^2.
+    """Returns the arc of the sharp nose, which begins at height 0: through (0, R) and (L, 0), with its centre beyond
+    the axis. For a tangent ogive the centre is at height 0: L^2 = radius^2 - (radius - R)^2.
     """
     if mesh.nose is None or mesh.crh is None:
         radius = (mesh.nose**2 + mesh.radius**2) / (2.0 * mesh.radius) if mesh.nose else arc_radius(mesh)
@@ -226,7 +226,7 @@ def arc_radius(mesh: OgiveForm) -> float:
 
 
 def nose_length(mesh: OgiveForm) -> float:
-    """Length of the nose to its sharp tip, m; D sqrt(crh - 1/4) of a tangent ogive."""
+    """Length of the nose to its sharp tip, m; D sqrt(crh - 1/4) for a tangent ogive."""
     return mesh.nose or 2.0 * mesh.radius * math.sqrt((mesh.crh or 0.5) - 0.25)
 
 
@@ -243,8 +243,8 @@ def _ogive(mesh: OgiveForm) -> tuple[Segment, ...]:
 
 
 def _rounded(nose: Arc, tip: float) -> tuple[Arc, Arc]:
-    """The nose with a ball of radius ``tip`` within it that touches the arc: its centre is on the axis, as far from the
-    centre of the arc as their radii differ.
+    """Returns the nose with a ball of radius ``tip`` inside that touches the arc: its centre is on the axis, and its
+    distance from the centre of the arc is the difference of the radii.
     """
     centre = nose.zc + math.sqrt(max(0.0, (nose.radius - tip) ** 2 - nose.rc**2))
     touch = centre + (centre - nose.zc) * tip / (nose.radius - tip)

@@ -1,7 +1,7 @@
-"""Regions of a case: the box of a boundary or a probe, what lies round a line, or what is in both.
+"""Regions of a case: the box of a boundary or a probe, a cylinder around a line, or their intersection.
 
-One tolerance decides for all of them, in ``validate`` and in the run, what lies on a border: ``slack``. All functions
-take numbers, or arrays of one shape.
+A single tolerance (``slack``) decides, in ``validate`` and in the run, which points on a border are inside. All
+functions accept numbers, or arrays of one shape.
 """
 
 from collections.abc import Iterable
@@ -14,17 +14,17 @@ from ..model.solids import Measured
 from ..model.tables import Point
 
 NEAR, MOST = 0.01, 0.1
-"""Of the shortest edge of a part: what lies no further outside of a border is in, and what no rounding exceeds. Chosen:
-far above the rounding of turns, of sums and of units, and that of files with six digits up to 2,000 edges from the
-origin; far below the distance between two layers of nodes."""
+"""Tolerance of a border, over the shortest edge of a part: points up to the first value outside count as inside;
+rounding never exceeds the second. Chosen: far above the rounding of turns, sums and units, and of files with six
+digits up to 2,000 edges from the origin; far below the distance between two layers of nodes."""
 GENERATED, FILE = 1e-9, 5e-6
-"""Of the largest coordinate of a part: rounding of the coordinates of a generated mesh, with what turns and sums add
-(1e-15) and far more; and of a file with six significant digits (half of 1e-5), which includes single precision (6e-8).
+"""Rounding of coordinates, over the largest coordinate of a part: of a generated mesh, far above the errors of turns
+and sums (1e-15); and of a file with six significant digits (half of 1e-5), which includes single precision (6e-8).
 """
 
 
 def rounding(mesh: Mesh, edge: float, reach: float) -> float:
-    """By how much, m, rounding may move a node of a part off the plane on which it is meant to be.
+    """Returns the distance, m, by which rounding may move a node of a part off its plane.
 
     ``edge``: shortest edge of the part, m; ``reach``: its largest coordinate, m.
     """
@@ -33,12 +33,13 @@ def rounding(mesh: Mesh, edge: float, reach: float) -> float:
 
 
 def slack(mesh: Mesh, edge: float, reach: float) -> float:
-    """How far outside of a border, m, a node or a centre of a tet may be and is still in; see ``rounding``."""
+    """Returns the distance outside of a border, m, up to which a node or the centre of a tet counts as inside; see
+    ``rounding``."""
     return max(NEAR * edge, rounding(mesh, edge, reach))
 
 
 class Region(NamedTuple):
-    """A box, a cylinder, or both; everything where neither is given."""
+    """A box, a cylinder, or their intersection; all space without either."""
 
     low: Point | None = None
     high: Point | None = None
@@ -46,17 +47,17 @@ class Region(NamedTuple):
 
     @classmethod
     def of(cls, spec: Prescribed | Traction | Probe) -> "Region":
-        """That of a boundary or a probe."""
+        """Returns the region of a boundary or a probe."""
         return cls(spec.low, spec.high, spec.cylinder if isinstance(spec, Traction) else None)
 
     @property
     def everything(self) -> bool:
-        """Whether nothing is outside."""
+        """Whether the region is all space."""
         return self == Region()
 
     def holds(self, point: Iterable[Any], slack: Any) -> Any:
-        """Whether a point, m, lies in it, or no further outside than ``slack``, m; of arrays (3, n) an array (n,), but
-        True of everything.
+        """Whether a point, m, lies in the region, or at most ``slack``, m, outside; for arrays (3, n) an array (n,),
+        but True for all space.
         """
         inside: Any = True
         x, y, z = point
@@ -66,7 +67,7 @@ class Region(NamedTuple):
 
 
 def _round(shell: Around, point: tuple[Any, Any, Any], slack: Any) -> Any:
-    """Whether points lie between two radii round a line; squares are compared, which arrays can do as well."""
+    """Whether points lie between two radii around a line; compares squares, which works for arrays too."""
     d = "xyz".index(shell.axis)
     p, q = (point[e] - shell.base[e] for e in ((d + 1) % 3, (d + 2) % 3))
     squared, inner, outer = p * p + q * q, shell.inner_radius - slack, shell.radius + slack

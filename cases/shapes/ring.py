@@ -1,11 +1,11 @@
-"""Which angles round its axis a ring sector has, of what is modelled of it."""
+"""The angles of a ring sector around its axis, as far as it is modelled."""
 
 import math
 
 from ..model.bodies import RingSector
 
 Angles = tuple[float, float]
-"""From and to, rad, from the first direction across the axis to the second."""
+"""Start and end, rad, from the first direction across the axis to the second."""
 
 _WINDOW: dict[str, Angles] = {"half": (-0.5 * math.pi, 0.5 * math.pi), "quarter": (0.0, 0.5 * math.pi)}
 """The angles that a sector keeps."""
@@ -15,7 +15,7 @@ _QUARTERS = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))
 
 
 def angles(mesh: RingSector) -> list[Angles]:
-    """The ranges of angles that are modelled: one, or two where a plane of the sector leaves both ends."""
+    """Returns the ranges of modelled angles: one, or two where a plane of the sector leaves both ends."""
     begin = math.remainder(mesh.start, 2.0 * math.pi)
     if mesh.sector == "full":
         return [(begin, begin + mesh.angle)]
@@ -26,18 +26,18 @@ def angles(mesh: RingSector) -> list[Angles]:
 
 
 def angle(mesh: RingSector) -> float:
-    """Sum of the angles that are modelled, rad."""
+    """Sum of the modelled angles, rad."""
     return math.fsum(b - a for a, b in angles(mesh))
 
 
 def holds_angle(mesh: RingSector, x: float, y: float) -> bool:
-    """Whether the direction of a point across the axis is one of those modelled."""
+    """Whether the direction of a point across the axis is modelled."""
     at = math.atan2(y, x)
     return any(a <= at + turn <= b for a, b in angles(mesh) for turn in (-2.0 * math.pi, 0.0, 2.0 * math.pi))
 
 
 def extremes(mesh: RingSector, whole: bool = False) -> tuple[Angles, Angles]:
-    """Lowest and highest of both coordinates across the axis, m, from the axis; ``whole``: of the full body."""
+    """Lowest and highest value of both coordinates across the axis, m, from the axis; ``whole``: of the full body."""
     begin = math.remainder(mesh.start, 2.0 * math.pi)
     ranges = [(begin, begin + mesh.angle)] if whole else angles(mesh)
     x, y = list[float](), list[float]()

@@ -1,4 +1,4 @@
-"""Surfaces of bodies as sheets: functions of two numbers from 0 to 1."""
+"""Surfaces of bodies as sheets: functions of two parameters from 0 to 1."""
 
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -9,9 +9,9 @@ from .geometry import Generated, Vector, across, bounds, centre, index
 from .profile import Revolved, Segment, profile
 
 Point = Callable[[float, float], Vector]
-"""The point of a surface at two numbers from 0 to 1."""
+"""The point of a surface at two parameters from 0 to 1."""
 Sheet = tuple[Point, float, float]
-"""A part of a surface, and about how long it is along both numbers, m."""
+"""A part of a surface, with its approximate lengths along both parameters, m."""
 
 
 def sheets(mesh: Generated) -> Iterator[Sheet]:
@@ -119,14 +119,14 @@ def _ball(mesh: Sphere, begin: float, end: float) -> Iterator[Sheet]:
 
 
 def _cut(begin: float, end: float) -> tuple[float, ...]:
-    """Shares of the way round at which a sector is cut; none of a whole body."""
+    """Positions around the axis, as shares of a turn, at which a sector is cut; empty for a whole body."""
     return () if end - begin == 2.0 else (0.0, 1.0)
 
 
 def _turning(
     mesh: Cylinder | Tube | Sphere | Revolved | RingSector, begin: float, end: float
 ) -> Callable[[float, float, float], Vector]:
-    """The point at a radius, a share of the way round and a height."""
+    """The point at a radius, a share of a turn and a height."""
     start, k, (i, j) = centre(mesh), index(mesh.axis), across(mesh.axis)
 
     def point(radius: float, u: float, height: float) -> Vector:

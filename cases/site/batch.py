@@ -1,17 +1,17 @@
-"""A run as a job of a batch system: the site's profiles, the record in the run's folder, the script, sbatch's words.
+"""A run as a job of a batch system: profiles of the site, record in the run's folder, script, arguments of sbatch.
 
 A site's settings file (its other tables are those of ``policy``)::
 
-    launcher = "slurm"                # who starts runs of the server: "local" (default) or "slurm"
+    launcher = "slurm"                # what starts runs of the server: "local" (default) or "slurm"
     [slurm]
-    default = "standard"              # the profile of those who name none
+    default = "standard"              # the profile of runs that name none
     router = "tcp/login1:7447"        # the server's Zenoh router as compute nodes reach it
     [slurm.profiles.standard]
     partition = "compute"
     time = "12 h"
     modules = ["gcc/13"]
 
-Users name a profile and add nothing to it: what a job runs is in ``job.json``, and the script only reads it.
+Users select a profile and cannot extend it: the command of a job is in ``job.json``, and the script only reads it.
 """
 
 import re
@@ -32,57 +32,58 @@ from . import policy
 
 
 class SiteError(Exception):
-    """The settings file cannot be used; the text is one line."""
+    """An error in the settings file; the text is one line."""
 
 
 class Profile(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
-    """One way of asking the batch system for cores."""
+    """A way of requesting cores from the batch system."""
 
     partition: str = ""
     account: str = ""
     qos: str = ""
     time: str = ""
-    """The time limit of a job, such as ``12 h``; empty: the partition's."""
+    """Time limit of a job, such as ``12 h``; empty: that of the partition."""
     modules: list[str] = []
-    """That ``module load`` gets."""
+    """Names that ``module load`` gets."""
     mpi: Literal["mpiexec", "srun"] = "mpiexec"
-    """What starts the ranks inside the job."""
+    """Command that starts the ranks inside the job."""
     mpiexec: str = ""
-    """A site's own; empty: the one that Conoid finds."""
+    """Path of a site's own mpiexec; empty: the one that Conoid finds."""
     lines: list[str] = []
-    """Of the script, before the run: what the site's MPI or file system needs."""
+    """Lines of the script before the run: what the site's MPI or file system needs."""
     options: list[str] = []
-    """Further words for sbatch."""
+    """Further arguments of sbatch."""
     notice: str = "120 s"
-    """How long before the time limit a run is told to keep its state. Chosen: some checkpoints of the largest runs."""
+    """Time before the time limit at which a run receives the signal to save its state. Chosen: some checkpoints of
+    the largest runs."""
 
 
 class Slurm(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
-    """A site's Slurm."""
+    """Settings of a site's Slurm."""
 
     profiles: dict[str, Profile]
     default: str = ""
-    """The profile of those who name none; empty: the first."""
+    """Profile of runs that name none; empty: the first."""
     bin: str = ""
     """Folder of sbatch, squeue, scancel, scontrol; empty: they are in PATH."""
     router: str = ""
-    """The server's Zenoh router as compute nodes reach it; empty: the address of this machine alone."""
+    """Address of the server's Zenoh router for compute nodes; empty: only that of this machine."""
     listen: str = ""
-    """Where the router listens for compute nodes besides, such as ``tls/0.0.0.0:7448``."""
+    """Additional address on which the router listens for compute nodes, such as ``tls/0.0.0.0:7448``."""
     certificate: str = ""
     key: str = ""
-    """Of the router; needed where it listens with TLS."""
+    """Certificate and key of the router; required with TLS."""
     authority: str = ""
-    """The certificate by which the nodes know the router: a file that they see."""
+    """Certificate by which the nodes verify the router: a file that they can read."""
     poll: float = 2.0
-    """s between two looks at the queue: one squeue for all runs. Chosen."""
+    """Seconds between two queries of the queue: one squeue for all runs. Chosen."""
     slots: int = 100_000
-    """Cores that the server hands over at a time, pending ones included. Chosen: Slurm has the limits."""
+    """Largest number of cores submitted at a time, with pending ones. Chosen: Slurm has the limits."""
 
 
 class Site(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
-    """What a site decides: how runs are started, and by ``policy`` when, how large, how long they are kept, and what
-    one user may hold of the server.
+    """Settings of a site: how runs are started, and in ``policy`` their order, size and retention, and the limits of
+    one user.
     """
 
     launcher: Literal["local", "slurm"] = "local"
@@ -97,55 +98,55 @@ class Site(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True
 
 _Name = Annotated[str, msgspec.Meta(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,127}\Z")]
 _Number = Annotated[str, msgspec.Meta(pattern=r"^([0-9]+(_[0-9]+)?)?\Z")]
-"""What stands in a record is given to commands: it can be none of their options."""
+"""Whether a value of a record is safe as an argument of commands: it cannot be one of their options."""
 
 
 class Job(msgspec.Struct, kw_only=True, frozen=True):
-    """job.json: what a job of the batch system runs. It is on disk before the batch system hears of it.
+    """job.json: the command of a job of the batch system. It is on disk before the submission to the batch system.
 
-    Who looks at a folder believes nothing in it but the name and the number: ``command`` and ``bin`` are for the job.
+    Readers of a folder use its name and number only, nothing else in it: ``command`` and ``bin`` are for the job.
     """
 
     run: str
     name: _Name
-    """Of the job; no other job has it, so that a job is found whose number nobody could note."""
+    """Name of the job; no other job has it, so that a job is found even if its number was not stored."""
     attempt: int
     ranks: int
     profile: str
     command: list[str]
-    """Starts the ranks, without ``--restart``."""
+    """Command that starts the ranks, without ``--restart``."""
     submitted: float
-    """Unix s."""
+    """Unix time, s."""
     notice: float
-    """s before the time limit at which the run is told."""
+    """Seconds before the time limit at which the run receives the signal."""
     bin: str = ""
     """Folder of Slurm's commands; empty: they are in PATH."""
     task: int | None = None
-    """Its place in an array, one job for several runs; None: a job of its own."""
+    """Index in an array, which is one job for several runs; None: a job of its own."""
     array: str = ""
-    """The folder of the array."""
+    """Folder of the array."""
     job: _Number = ""
-    """The number that the batch system gave; empty until it is known."""
+    """Number given by the batch system; empty until it is known."""
     accounting: dict[str, str] = {}
-    """What the batch system tells of a job that has ended."""
+    """State reported by the batch system for a job that has ended."""
     threads: int = 1
-    """Of each rank: cores that it gets."""
+    """Number of cores of each rank."""
 
     @property
     def key(self) -> str:
-        """No other run has it."""
+        """Unique name of the job."""
         return key_of(self.name, self.task)
 
 
 class Access(msgspec.Struct, kw_only=True, frozen=True):
-    """Where the ranks of a job publish, and as whom; in a hidden file that only its owner may read."""
+    """Address and token with which the ranks of a job publish; in a hidden file that only its owner can read."""
 
     endpoint: str
     prefix: str
     user: str = ""
     password: str = ""
     authority: str = ""
-    """Of the router's certificate, where it speaks TLS."""
+    """Certificate authority of the router, with TLS."""
 
 
 _job, _access = msgspec.json.Decoder(Job), msgspec.json.Decoder(Access)
@@ -156,7 +157,7 @@ _TEMPLATE = """#!/bin/bash
 
 
 def read_site(path: Path) -> Site:
-    """The settings file of a site. Raises SiteError."""
+    """Reads the settings file of a site. Raises SiteError."""
     try:
         site = msgspec.convert(tomllib.loads(whole.read_text(path)), Site)
         if site.slurm is not None:
@@ -184,7 +185,7 @@ def _check(slurm: Slurm) -> None:
 
 
 def profile_of(slurm: Slurm, name: str) -> tuple[str, Profile]:
-    """The profile of that name, or the default one. Raises ValueError with those that there are."""
+    """Returns the profile of that name, or the default one. Raises ValueError with the existing names."""
     chosen = name or slurm.default or next(iter(slurm.profiles))
     if chosen not in slurm.profiles:
         raise ValueError(f"profile = {chosen[:40]!r}: {allowed(chosen, slurm.profiles)}")
@@ -205,7 +206,7 @@ def new_job(
     place: str = "",
     threads: int = 1,
 ) -> Job:
-    """The record of an attempt that nobody has handed over yet."""
+    """Returns the record of an attempt that is not yet submitted."""
     word = re.sub(r"[^A-Za-z0-9_.-]", "_", run)[:60]
     return Job(
         run=run, name=f"conoid-{word}-{attempt}-{secrets.token_hex(4)}", attempt=attempt, ranks=ranks, threads=threads,
@@ -215,33 +216,33 @@ def new_job(
 
 
 def key_of(name: str, task: int | None) -> str:
-    """Of a job of that name, or of one task of an array of that name."""
+    """Returns the name of a job, or of one task of an array."""
     return name if task is None else f"{name}/{task}"
 
 
 def script(profile: Profile, python: str) -> str:
-    """The batch script: the site's lines, then the run. Nothing in it depends on the run or on its owner."""
+    """Returns the batch script: the site's lines, then the run. It does not depend on the run or its owner."""
     modules = [f"module load {shlex.quote(module)}" for module in profile.modules]
     lines = "".join(f"{line}\n" for line in [*modules, *profile.lines])
     return _TEMPLATE.format(lines=lines, python=shlex.quote(python))
 
 
 def sbatch_words(job: Job, profile: Profile, folder: Path) -> list[str]:
-    """The arguments of sbatch. TERM reaches the script alone ``notice`` before the limit; the script's program tells
-    the ranks.
+    """Returns the arguments of sbatch. The script alone receives TERM, ``notice`` before the limit; the script's
+    program signals the ranks.
     """
     return _words(job, profile, folder, f"{layout.LOGS}/{layout.LAUNCHER_LOG}")
 
 
 def array_words(job: Job, profile: Profile, tasks: Iterable[int]) -> list[str]:
-    """The arguments of sbatch for some tasks of an array, of which ``job`` is one."""
+    """Returns the arguments of sbatch for some tasks of an array, of which ``job`` is one."""
     folder = Path(job.array)
     return [f"--array={','.join(map(str, tasks))}", *_words(job, profile, folder, "%a.log")]
 
 
 def _words(job: Job, profile: Profile, folder: Path, log: str) -> list[str]:
-    """``log`` below ``folder``. Slurm replaces what follows a percent sign, and takes a backslash away, in the name of
-    the folder, too: where that has one, the job opens its log itself.
+    """Returns the path of ``log`` below ``folder`` for sbatch. Slurm replaces patterns with a percent sign and
+    removes backslashes, in the name of the folder too: for such a folder the job opens its log itself.
     """
     if set(str(folder)) & {"%", "\\"}:
         log = "/dev/null"
@@ -258,9 +259,10 @@ def _words(job: Job, profile: Profile, folder: Path, log: str) -> list[str]:
 
 
 def starter(profile: Profile, ranks: int, found: Callable[[], Sequence[str]], threads: int = 1) -> list[str]:
-    """What starts ``ranks`` ranks of so many ``threads`` inside a job, before the worker's command; ``found`` gives an
-    mpiexec where the profile has none of its own. PMI2 is what the wheel of MPICH speaks. srun takes neither number
-    from the job (srun(1)), and gives each rank cores of its own.
+    """Returns the command that starts ``ranks`` ranks of so many ``threads`` inside a job, before the worker's command.
+
+    ``found``: returns an mpiexec where the profile has none. The wheel of MPICH uses PMI2. srun takes neither number
+    from the job (srun(1)), and binds each rank to its own cores.
     """
     if profile.mpi == "srun":
         return ["srun", "--mpi=pmi2", f"--ntasks={ranks}", f"--cpus-per-task={threads}", "--cpu-bind=cores"]
@@ -268,7 +270,7 @@ def starter(profile: Profile, ranks: int, found: Callable[[], Sequence[str]], th
 
 
 def read_job(folder: Path) -> Job | None:
-    """The record in a run's folder; None when there is none. Raises OSError, msgspec.MsgspecError."""
+    """Reads the record in a run's folder; None if there is none. Raises OSError, msgspec.MsgspecError."""
     try:
         return _job.decode(whole.read(folder / layout.JOB))
     except FileNotFoundError:
@@ -276,7 +278,7 @@ def read_job(folder: Path) -> Job | None:
 
 
 def read_access(folder: Path) -> Access | None:
-    """Where the ranks publish; None: nowhere. Raises OSError, msgspec.MsgspecError."""
+    """Reads the address at which the ranks publish; None if there is none. Raises OSError, msgspec.MsgspecError."""
     try:
         return _access.decode(whole.read(folder / layout.ACCESS))
     except FileNotFoundError:
@@ -284,5 +286,5 @@ def read_access(folder: Path) -> Access | None:
 
 
 def to_json(record: Job | Access) -> bytes:
-    """As it stands in the folder."""
+    """The record as text, as in the folder."""
     return msgspec.json.format(msgspec.json.encode(record), indent=2)

@@ -1,13 +1,13 @@
-"""What a site decides about its queue, about what its users and their runs may take, and about how long runs are kept.
+"""Settings of a site: queue, quotas of users, limits of runs, retention of runs and files, limits of HTTP.
 
 Tables of a site's settings file::
 
     [queue]
-    half_life = "168 h"               # after which what a user has taken counts half
-    memory = 64_000_000_000           # bytes that all runs may need together
+    half_life = "168 h"               # after it the past usage of a user counts half
+    memory = 64_000_000_000           # bytes for all runs together
     [queue.users.ann]
-    share = 2.0                       # of what there is, against 1 of everybody else
-    priority = 1                      # before everybody whose number is lower
+    share = 2.0                       # relative to 1 of all other users
+    priority = 1                      # before all users with a lower one
     [quota]                           # of each user
     queued = 1000
     running = 20
@@ -19,12 +19,12 @@ Tables of a site's settings file::
     [retention]                       # of runs that have ended
     age = "2160 h"
     bytes = 4_000_000_000_000
-    [files]                           # that a user sends beside his cases
+    [files]                           # that a user uploads with cases
     size = 4_000_000_000
     bytes = 20_000_000_000
     number = 1000
     age = "24 h"
-    [http]                            # of each user, and of each address that sends no token
+    [http]                            # of each user, and of each address without a token
     requests = 16
     streams = 100
 """
@@ -38,21 +38,21 @@ PRIORITY = 100
 
 
 class Share(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
-    """What a site gives one user."""
+    """Settings of a site for one user."""
 
     share: float = 1.0
-    """How much of the machine, against those of other users."""
+    """Share of the machine, relative to that of other users."""
     priority: int = 0
-    """Runs of users with a higher one come first."""
+    """Runs of users with a higher priority start first."""
 
 
 class Queue(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
-    """Whose turn it is."""
+    """Settings of the queue."""
 
     half_life: str = "168 h"
-    """After which what a user has taken counts half. Chosen: a week."""
+    """Half-life of the usage of a user. Chosen: a week."""
     memory: int | None = None
-    """Bytes that all runs may need together, by their estimates; not given: what the machine has."""
+    """Memory for all runs together, bytes, by their estimates; absent: that of the machine."""
     users: dict[str, Share] = {}
 
     @property
@@ -61,46 +61,46 @@ class Queue(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tru
         return parse_quantity(self.half_life, "s")
 
     def of(self, owner: str) -> Share:
-        """What the site gives this user."""
+        """Returns the settings of this user."""
         return self.users.get(owner, Share())
 
 
 class Quota(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
-    """What one user may take; None: as much as there is."""
+    """Quota of a user; None: no limit."""
 
     queued: int | None = None
-    """Runs that have not ended; beyond it the server takes no more."""
+    """Largest number of runs that have not ended; further runs are refused."""
     running: int | None = None
-    """Runs at a time; the others wait."""
+    """Largest number of concurrent runs; the others wait."""
     core_seconds: float | None = None
-    """What was taken lately, each half-life counting half; beyond it runs wait."""
+    """Largest recent usage, halved after each half-life; beyond it runs wait."""
     output_bytes: int | None = None
-    """Of all folders of the user's runs; beyond it the server takes no more."""
+    """Largest size of all folders of the user's runs; beyond it further runs are refused."""
 
 
 class RunCaps(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
-    """What one run may take; None: what the server has by itself."""
+    """Limits of a run; None: the default of the server."""
 
     elements: int | None = None
     steps: int | None = None
     memory: int | None = None
     core_seconds: float | None = None
-    """By its estimate when it is handed in, and by the clock while it runs."""
+    """Core seconds, by the estimate at submission, and measured during the run."""
     wall_time: float | None = None
-    """s"""
+    """Wall time, s."""
     output_bytes: int | None = None
-    """Of its folder; a run that goes beyond is stopped, with its results so far."""
+    """Size of its folder; a larger run is stopped, and keeps its results so far."""
 
 
 class Retention(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
-    """How long runs that have ended are kept; those with the label ``keep`` are kept for good."""
+    """Retention of runs that have ended; runs with the label ``keep`` are kept without limit."""
 
     age: str = ""
-    """Since the end; empty: for ever."""
+    """Age since the end; empty: no limit."""
     bytes: int | None = None
-    """Of all folders together; the oldest go first. None: no limit."""
+    """Size of all folders together; the oldest are removed first. None: no limit."""
     every: str = "10 min"
-    """Between two looks. Chosen: reading the sizes of 10,000 folders takes seconds."""
+    """Time between two checks. Chosen: reading the sizes of 10,000 folders takes seconds."""
 
     @property
     def oldest(self) -> float | None:
@@ -109,22 +109,22 @@ class Retention(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields
 
     @property
     def rest(self) -> float:
-        """s between two looks."""
+        """Seconds between two checks."""
         return parse_quantity(self.every, "s")
 
 
 class Files(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
-    """What one user may send of files that his cases name."""
+    """Limits of the files that a user uploads with cases."""
 
     size: int = 4 << 30
     """Bytes of one file; a larger one is refused with 413. Chosen: ten million tets as text."""
     bytes: int = 16 << 30
-    """Of all of them, what is on its way included; beyond it 429. Chosen."""
+    """Bytes of all files, with uploads in progress; beyond it 429. Chosen."""
     number: int = 1000
-    """Of all of them; beyond it 429. Chosen: a look at so many takes some 10 ms."""
+    """Number of all files; beyond it 429. Chosen: listing so many takes some 10 ms."""
     age: str = "24 h"
-    """For which a file is kept that no run has and that nobody asks for. Chosen: a case follows its files in seconds,
-    and a transfer that broke off goes on the next morning."""
+    """Time for which a file without a run and without requests is kept. Chosen: a case follows its files within
+    seconds, and an interrupted upload can continue the next morning."""
 
     @property
     def oldest(self) -> float:
@@ -133,18 +133,19 @@ class Files(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tru
 
 
 class Http(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
-    """What one user may hold of the server at a time; so may an address whose requests have no valid token."""
+    """Limits of concurrent requests of one user; also of an address whose requests have no valid token."""
 
     requests: int = 16
     """Requests in progress: with their bodies, of 1 MiB at most, and answers in memory. Chosen."""
     waiting: int = 200
-    """Requests that wait for their turn; beyond it they are refused with 429. Chosen."""
+    """Waiting requests; beyond it they are refused with 429. Chosen."""
     streams: int = 100
     """Event streams, followed logs, waits for a change and downloads; beyond it 429. Chosen."""
     threads: int = 2
-    """Answers that are computed, or wait for the disk. Chosen: a server has 64 for all users, and one Python."""
+    """Answers that are computed, or wait for the disk. Chosen: a server has 64 for all users, and one Python
+    process."""
     patience: str = "20 s"
-    """After which a disk or a database that does not answer is answered with 503. Chosen."""
+    """Time after which a disk or database without response leads to 503. Chosen."""
 
     @property
     def seconds(self) -> float:
@@ -153,7 +154,7 @@ class Http(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True
 
 
 def check(queue: Queue, quota: Quota, caps: RunCaps, retention: Retention, http: Http, files: Files) -> None:
-    """Raises ValueError: the key, the value, what is allowed."""
+    """Checks the settings. Raises ValueError: the key, the value, what is allowed."""
     for key, text in (
         ("queue.half_life", queue.half_life), ("retention.every", retention.every), ("http.patience", http.patience),
         ("files.age", files.age),

@@ -1,7 +1,7 @@
-"""Slurm by its commands, with output for machines: hand a job over once, look at the queue, end jobs.
+"""Slurm through its commands with machine-readable output: submission without duplicates, queue, end of jobs.
 
-The controller writes a new job to disk some seconds after it has said yes, and a crash in between forgets it: a job is
-looked for before it is handed over again (``slurm_call``).
+The controller writes a new job to disk some seconds after its confirmation, and loses it in a crash before: a job is
+searched for before it is submitted again (``slurm_call``).
 """
 
 import fcntl
@@ -19,19 +19,18 @@ from .slurm_call import AwayError, LaterError, RefusedError, SlurmError, away, c
 
 PENDING = frozenset({"PENDING", "REQUEUED", "REQUEUE_HOLD", "REQUEUE_FED", "RESV_DEL_HOLD", "SPECIAL_EXIT"})
 NOT_LAUNCHED = "launch failed requeued held"
-"""Reason of a pending job, with spaces or underscores: its node did not start it, and Slurm waits for somebody to look
-at that."""
+"""Reason of a pending job, with spaces or underscores: its node failed to start it, and Slurm waits for an operator."""
 FINAL = frozenset(
     {"BOOT_FAIL", "CANCELLED", "COMPLETED", "DEADLINE", "FAILED", "NODE_FAIL", "OUT_OF_MEMORY", "PREEMPTED", "REVOKED",
      "TIMEOUT"}
 )  # fmt: skip
 """States of squeue(1); in all others a job has its cores."""
 _ONE_BY_ONE = 200
-"""Names that squeue is asked for at once. Chosen: 10 kB of its command line."""
+"""Largest number of names in one squeue command. Chosen: 10 kB of command line."""
 
 
 _NUMBER = re.compile(r"\d+(_\d+|_\[[^|]*\])?(\+\d+)?")
-"""Of a job, of a task of an array, of tasks that wait, of a part of a job of several."""
+"""Number of a job, of a task of an array, of waiting tasks, of a component of a heterogeneous job."""
 
 
 class Entry(NamedTuple):
@@ -40,21 +39,20 @@ class Entry(NamedTuple):
     job: str
     state: str
     start: float
-    """Unix s; of a pending job an estimate, 0 when there is none."""
+    """Unix time, s; an estimate for a pending job, 0 if unknown."""
     name: str
-    """Of the job; of a task of an array with its place, as ``batch.key_of`` has it."""
+    """Name of the job; for a task of an array with its index, as ``batch.key_of`` writes it."""
     reason: str
 
     @property
     def not_launched(self) -> bool:
-        """Whether it waits because a node did not start it."""
+        """Whether it waits because a node failed to start it."""
         return self.state in PENDING and self.reason.replace("_", " ").lower() == NOT_LAUNCHED
 
 
 def jobs(place: str, *names: str) -> list[Entry]:
-    """This user's jobs that Slurm remembers, of these names or all: other jobs may have names that break a list.
-
-    Raises AwayError, RefusedError.
+    """Returns this user's jobs that Slurm remembers, of these names or all. Names of other jobs may contain line
+    breaks. Raises AwayError, RefusedError.
     """
     found: list[Entry] = []
     words = ["squeue", "--noheader", "--array", "--states=all", f"--user={os.getuid()}", "--format=%i|%T|%S|%j|%r"]
@@ -68,8 +66,8 @@ def jobs(place: str, *names: str) -> list[Entry]:
 
 
 def _entries(lines: Sequence[str], names: Set[str]) -> list[Entry]:
-    """What is no line of a list makes the whole no list: a job that is not on it may be there all the same. A line that
-    another job's name has broken is none of these jobs; what follows it belongs to it.
+    """Reads squeue's list. An invalid line makes the whole list invalid, since a missing job may exist; a line
+    broken by another job's name is none of these jobs, and the text after it belongs to it.
     """
     found, broken = [], False
     for line in lines:
@@ -79,13 +77,13 @@ def _entries(lines: Sequence[str], names: Set[str]) -> list[Entry]:
         if own:
             found.append(Entry(row[0], row[1], _time(row[2]), _key(row[0], row[3]), row[4]))
         elif not head and not broken:
-            raise away("squeue", f"squeue has answered what is no list: {line.strip()[:60]!r}")
+            raise away("squeue", f"the output of squeue is not a list: {line.strip()[:60]!r}")
         broken = not own if head else broken
     return found
 
 
 def _key(job: str, name: str) -> str:
-    """A task of an array has a number such as 123_4."""
+    """Reads a number; a task of an array has one such as 123_4."""
     task = job.partition("_")[2]
     return batch.key_of(name, int(task) if task.isdigit() else None)
 
@@ -98,8 +96,8 @@ def _time(text: str) -> float:
 
 
 def details(place: str, job: str) -> dict[str, str]:
-    """Everything that the controller knows of a job; of a word that comes twice, the first: paths and comments come
-    last. Raises AwayError, RefusedError when it knows none.
+    """Returns all properties of a job from the controller; for a repeated word the first, since paths and comments
+    come last. Raises AwayError, RefusedError for an unknown job.
     """
     told = call(place, ["scontrol", "show", "job", "--oneliner", job])
     found: dict[str, str] = {}
@@ -110,7 +108,7 @@ def details(place: str, job: str) -> dict[str, str]:
 
 
 def accounting(place: str, job: str) -> dict[str, str]:
-    """What a job that has ended took, as the controller has it."""
+    """Returns the usage of a job that has ended, from the controller."""
     wanted = ("JobState", "ExitCode", "RunTime", "StartTime", "EndTime", "NodeList", "Restarts")
     with suppress(SlurmError):
         return {name: value for name, value in details(place, job).items() if name in wanted}
@@ -118,7 +116,7 @@ def accounting(place: str, job: str) -> dict[str, str]:
 
 
 def taken(place: str, job: str) -> dict[str, str]:
-    """What a job that has ended took, as the accounting database has it, where there is one."""
+    """Returns the usage of a job that has ended, from the accounting database, if there is one."""
     found: dict[str, str] = {}
     fields = ("State", "ExitCode", "Elapsed", "TotalCPU", "MaxRSS", "NodeList")
     with suppress(SlurmError):
@@ -129,10 +127,10 @@ def taken(place: str, job: str) -> dict[str, str]:
 
 
 def submit(place: str, folder: Path, job: Job, profile: Profile) -> str:
-    """The number of the one job for ``job``: of one that is there already, else of a new one.
+    """Returns the number of the single job for ``job``: an existing one, otherwise a new one.
 
-    sbatch holds a lock of the folder, even when who has started it dies; while it is held nobody submits.
-    Raises AwayError, LaterError, RefusedError, OSError.
+    sbatch holds a lock of the folder, even if the process that started it dies; while it is held no other process
+    submits. Raises AwayError, LaterError, RefusedError, OSError.
     """
     with open(folder / ".submit.lock", "a") as lock:
         try:
@@ -151,16 +149,16 @@ def submit(place: str, folder: Path, job: Job, profile: Profile) -> str:
 
 
 def _number(told: str) -> str:
-    """Of a new job, as ``sbatch --parsable`` says it. Raises AwayError."""
+    """Reads the number of a new job from ``sbatch --parsable``. Raises AwayError."""
     number = told.strip().partition(";")[0]
     if not number.isdecimal():
-        raise AwayError(f"sbatch has not said the number of the job, but {told.strip()[:60]!r}")
+        raise AwayError(f"sbatch has not printed the number of the job, but {told.strip()[:60]!r}")
     return number
 
 
 def submit_array(place: str, records: Sequence[Job], profile: Profile) -> dict[int, str]:
-    """The number of the one job of each task of an array: of those that are there already, and of a new array for
-    the others. The lock is the array's. Raises AwayError, RefusedError, OSError.
+    """Returns the number of the single job of each task of an array: of existing ones, and of a new array for the
+    others. The lock is that of the array. Raises AwayError, RefusedError, OSError.
     """
     with open(Path(records[0].array) / ".submit.lock", "a") as lock:
         try:
@@ -178,13 +176,14 @@ def submit_array(place: str, records: Sequence[Job], profile: Profile) -> dict[i
 
 
 def cancel(place: str, job: str) -> None:
-    """Ends a job, pending or not: TERM, and KILL a while later. Raises AwayError; one that has ended is none to end."""
+    """Ends a job, pending or not: TERM, and KILL some time later. Raises AwayError; a job that has ended is no
+    error."""
     with suppress(RefusedError):
         call(place, ["scancel", job])
 
 
 def notify(place: str, job: str) -> None:
-    """Ends the job when it is pending, else sends TERM to its script. Raises AwayError."""
+    """Ends the job if it is pending, otherwise sends TERM to its script. Raises AwayError."""
     with suppress(RefusedError):
         call(place, ["scancel", "--state=PENDING", job])
     with suppress(RefusedError):
@@ -192,25 +191,25 @@ def notify(place: str, job: str) -> None:
 
 
 def kill(place: str, job: str) -> None:
-    """Ends a job now. Raises AwayError."""
+    """Ends a job immediately. Raises AwayError."""
     with suppress(RefusedError):
         call(place, ["scancel", "--full", "--signal=KILL", job])
     cancel(place, job)
 
 
 def release(place: str, job: str) -> None:
-    """A job that is held may start again. Raises AwayError; one that is not held, or has ended, is none to release."""
+    """Releases a held job. Raises AwayError; a job that is not held, or has ended, is no error."""
     with suppress(RefusedError):
         call(place, ["scontrol", "release", job])
 
 
 def requeue(place: str, job: str) -> None:
-    """A running job waits for its turn again. Raises AwayError, RefusedError."""
+    """Puts a running job back into the queue. Raises AwayError, RefusedError."""
     call(place, ["scontrol", "requeue", job])
 
 
 def held(folder: Path) -> bool:
-    """True while a rank 0 writes into the run's folder, on whatever node."""
+    """Whether a rank 0 on any node writes into the run's folder."""
     try:
         with open(os.open(folder / layout.LOCK, os.O_RDONLY | os.O_NONBLOCK), "rb") as lock:
             fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
@@ -222,7 +221,7 @@ def held(folder: Path) -> bool:
 
 
 def begun(folder: Path, job: Job) -> str:
-    """The number of the job that has started under this name; empty when none has."""
+    """Returns the number of the job that has started under this name; empty if none has."""
     try:
         return layout.claim(folder, job.name).read_text()
     except FileNotFoundError:

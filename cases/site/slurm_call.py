@@ -1,8 +1,8 @@
-"""How a command of Slurm is called, with a limit of time, and what its failure means.
+"""Calls of Slurm commands with a time limit, and the classes of their failures.
 
-A command that fails says one of three things: RefusedError, the controller has read the request and will not have it;
-LaterError, it will not have it now; or AwayError, nobody knows. After that a job may be there all the same, so it is
-looked for before it is handed over again.
+A failed command raises one of three errors: RefusedError, the controller refuses the request; LaterError, it refuses
+for now; AwayError, the result is unknown. After the last one the job may exist all the same, so it is searched for
+before it is submitted again.
 """
 
 import os
@@ -12,52 +12,52 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 _LONGEST = {"squeue": 30.0, "sbatch": 30.0, "scancel": 15.0, "scontrol": 15.0, "sacct": 10.0}
-"""s that a command may take. Chosen: one to three times Slurm's own MessageTimeout."""
+"""Time limit of a command, s. Chosen: one to three times Slurm's own MessageTimeout."""
 _RESTS = 20.0
-"""s for which a command that took longer is not tried again, so that it holds up nobody else. Chosen."""
+"""Time, s, during which a command that exceeded its limit is not repeated, so that it does not delay others. Chosen."""
 _REFUSALS = (
     "invalid", "not permitted", "unspecified", "violates", "not available", "unrecognized", "denied", "more processors",
     "not supported", "exceeds", "disabled", "limit", "unknown", "ambiguous", "too ",
 )  # fmt: skip
-"""Words of sbatch's refusals, in its last line. What is none of these (a connection, a socket, munge) may be over in a
+"""Words of final refusals in the last line of sbatch. Other failures (connection, socket, munge) may be over in a
 minute."""
 _PASSING = (
     "submit limit", "submitjob", "not available now", "inactive", "is down", "drain", "temporarily", "try again",
     "standby", "maintenance", "i/o error writing", "maxjobs", "grpjobs", "perusers", "peruser", "peraccount",
 )  # fmt: skip
-"""Words of refusals that pass, anywhere in what sbatch says: limits by what else is in the queue, a partition that is
-not up (slurm_errno.c; reasons of squeue(1))."""
+"""Words of temporary refusals, anywhere in the output of sbatch: limits by other jobs in the queue, a partition that
+is not up (slurm_errno.c; reasons of squeue(1))."""
 _LASTING = ("perjob", "wall", "minc", "mintres", "pernode", "perminute")
-"""Words, in what sbatch says, of limits that this job will never keep."""
+"""Words in the output of sbatch for limits that this job always exceeds."""
 _PASSED_ON = (
     "PATH", "HOME", "USER", "LOGNAME", "SHELL", "LANG", "SLURM_CONF", "CONOID_CACHE_DIR", "MODULEPATH", "MODULESHOME",
     "LD_LIBRARY_PATH", "BASH_ENV", "MPI4PY_LIBMPI", "MPI4PY_MPIABI", "PYTHONPATH",
 )  # fmt: skip
-"""Variables that a job inherits from who hands it over. No token, database or default for sbatch is among them."""
+"""Variables that a job inherits from the process that submits it, without tokens, databases and defaults of sbatch."""
 
 
 class SlurmError(Exception):
-    """A command of Slurm failed; the text is one line."""
+    """A failed command of Slurm; the text is one line."""
 
 
 class AwayError(SlurmError):
-    """The controller was not reached, or not in time: nobody knows. ``command``: which one did not answer."""
+    """The controller was not reached, or not in time; the result is unknown. ``command``: the command without a
+    response."""
 
     command = ""
 
 
 class LaterError(SlurmError):
-    """The controller will not do it now: a limit of user, account or QOS is reached, or a partition is down."""
+    """The controller refuses for now: a limit of user, account or QOS is reached, or a partition is down."""
 
 
 class RefusedError(SlurmError):
-    """The controller will not do it."""
+    """The controller refuses."""
 
 
 def call(place: str, words: Sequence[str], keep: int | None = None) -> str:
-    """What a command of Slurm prints. ``place``: its folder, or empty; ``keep``: a file that it holds open.
-
-    Raises AwayError, or LaterError or RefusedError with what it said.
+    """Returns the output of a Slurm command. ``place``: its folder, or empty; ``keep``: a file that it keeps open.
+    Raises AwayError, LaterError or RefusedError with its message.
     """
     path, longest = str(Path(place) / words[0]) if place else words[0], _LONGEST[words[0]]
     if _hung.get(path, 0.0) > time.monotonic():
@@ -79,18 +79,18 @@ def call(place: str, words: Sequence[str], keep: int | None = None) -> str:
 
 
 _hung: dict[str, float] = {}
-"""Until when, by the clock that nobody sets, a command is not tried again."""
+"""Monotonic time until which a command is not repeated."""
 
 
 def away(command: str, why: str) -> AwayError:
-    """The error of a command that was not answered."""
+    """Returns the error of a command without a response."""
     error = AwayError(why)
     error.command = command
     return error
 
 
 def _failure(command: str, said: Sequence[str]) -> SlurmError:
-    """What a command means that has failed. sbatch names the limit in a line of its own, before the last one."""
+    """Returns the error of a failed command. sbatch names the limit in a line of its own, before the last one."""
     text, last = " ".join(said).lower(), said[-1][:300]
     named = said[-2].rpartition(": ")[2] if len(said) > 1 else ""
     told = f"{last} ({named[:100]})" if named and " " not in named else last
@@ -100,6 +100,6 @@ def _failure(command: str, said: Sequence[str]) -> SlurmError:
 
 
 def environment(base: Mapping[str, str]) -> dict[str, str]:
-    """For a command: what a job may inherit, and times as Unix s."""
+    """Environment of a command: variables that a job may inherit, and times as Unix time in s."""
     kept = {name: value for name, value in base.items() if name in _PASSED_ON or name.startswith("LC_")}
     return {**kept, "SLURM_TIME_FORMAT": "%s"}

@@ -54,8 +54,8 @@ def _through_walls(case: Case, driven: list[Driven]) -> Iterator[tuple[int, str]
             held = wall.plain and (not wall.parts or body.part.name in wall.parts)
             depth = _behind(body, wall.point, wall.normal or wall.point) if held else 0.0
             if depth > _TOUCH * _size(body.mesh):
-                message = f"nodes of {body.part.name!r} come {depth:.3g} m behind boundaries[{j}], a wall"
-                yield body.number, f"{message}; walls do not hold nodes that are driven"
+                message = f"nodes of {body.part.name!r} move {depth:.3g} m behind boundaries[{j}], a wall"
+                yield body.number, f"{message}; walls do not stop driven nodes"
 
 
 def _behind(body: Driven, point: Vector, way: Vector) -> float:
@@ -88,7 +88,7 @@ def _through_bodies(case: Case, driven: list[Driven]) -> Iterator[tuple[int, str
     for one, other, axes in islice(pairs, _MOST):
         boxes = _bounds(one.mesh), _bounds(other.mesh)
         if any(_enter(*boxes, *ways, axes) for ways in zip(one.ways, other.ways, strict=True)):
-            message = f"{other.part.name!r} comes into {one.part.name!r}, which boundaries[{one.number}] drives"
+            message = f"{other.part.name!r} moves into {one.part.name!r}, which boundaries[{one.number}] drives"
             yield other.number, f"{message}; contact does not change prescribed motion"
 
 

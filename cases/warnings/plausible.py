@@ -34,8 +34,8 @@ before it has crossed five tets has no result. The usual cause is a wrong unit o
 LIKELY: dict[str, tuple[float, float, str]] = {
     "density": (10.0, 23_000.0, "kg/m^3: foams have 10, osmium has 22,590"),
     "wave speed": (20.0, 20_000.0, "m/s: soft rubber has 30, diamond has 18,000"),
-    "yield stress over Young's modulus": (1e-6, 0.1, "crystals shear off at a tenth"),
-    "tensile strength over Young's modulus": (1e-7, 0.1, "atoms let go at a tenth"),
+    "yield stress over Young's modulus": (1e-6, 0.1, "ideal crystals yield at a tenth"),
+    "tensile strength over Young's modulus": (1e-7, 0.1, "ideal crystals break at a tenth"),
     "specific heat": (50.0, 15_000.0, "J/kg/K: tungsten has 134, hydrogen 14,300"),
     "fracture energy": (1e-2, 1e6, "J/m^2: glass has 8, tough steel 100,000"),
     "temperature": (100.0, 6_000.0, "K: 20 degrees Celsius are 293 K"),
@@ -147,7 +147,7 @@ def _effort(case: Case, expected: Estimate) -> Iterator[Problem]:
     if expected.steps is None or expected.core_seconds is None:
         return
     if expected.steps >= case.run.max_steps:
-        yield problem(("run", "max_steps"), case.run.max_steps, f"will be used up before run.end_time, {end:g} s")
+        yield problem(("run", "max_steps"), case.run.max_steps, f"will be reached before run.end_time, {end:g} s")
     if expected.core_seconds > DAY:
         hours = expected.core_seconds / 3600.0
         yield problem(where, f"{end:g} s", f"takes about {expected.steps:.2g} steps and {hours:.3g} hours of core time")
@@ -222,7 +222,7 @@ def _shocks(case: Case) -> Iterator[Problem]:
         if share > SHOCKING and not own:
             low = 100.0 * linear_error(math.sqrt(made.bulk / made.density), 0.5 * speed)
             shock = f"{low:.0f} % below that of a shock, density (c0 + s u) u, s = {STIFFENING:g}, u half that speed"
-            fast = f"may be met at {speed:.3g} m/s, {share:.2g} of its wave speed"
+            fast = f"may be hit at {speed:.3g} m/s, {share:.2g} of its wave speed"
             message = f"{fast}, without eos: linear pressure is some {shock}"
             yield problem(("parts", i, "material"), name, message)
 

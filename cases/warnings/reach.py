@@ -34,7 +34,7 @@ def cut_bodies(case: Case) -> Iterator[Problem]:
             low, high = (corner[d] for corner in Placed(part.mesh).bounds())
             if min(plane.at - low, high - plane.at) > _TOUCH * (high - low):
                 message = f"goes through part {part.name!r}, which lies between {low:g} and {high:g} m"
-                message = f"{message}: each side meets its own mirror image; model one of them"
+                message = f"{message}: each side is in contact with its own mirror image; model one side"
                 yield problem(("boundaries", number, "at"), f"{plane.at:g} m", message)
                 break
 

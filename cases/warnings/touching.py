@@ -59,8 +59,8 @@ def apart(case: Case, touches: Iterable[Touch]) -> Iterator[Problem]:
         if case.contact is not None and (not case.contact.parts or set(names) <= set(case.contact.parts)):
             continue
         message = (
-            f"{names[0]!r} and {names[1]!r} touch over about {1e6 * touch.area:.3g} mm^2 and do not meet in contact: "
-            "they are not joined, and pass through each other; a [[bond]] joins parts"
+            f"{names[0]!r} and {names[1]!r} touch over about {1e6 * touch.area:.3g} mm^2 without contact or bond: "
+            "they can pass through each other; a [[bond]] joins parts"
         )
         yield problem(("parts", touch.other, "mesh"), ..., message)
 

@@ -41,7 +41,7 @@ def could_be_rigid(case: Case, found: Sequence[Strained], limiter: str) -> Itera
             yield (
                 f"parts[{i}].rigid: {part.name!r} stayed elastic, with strains of {each.strain:.1g} or less (root of "
                 f"the mean square) and {100.0 * each.share:.1g} % of the energy of deformation; {way} would save "
-                f"{100.0 * each.elements / every:.0f} % of the tets{', which hold the time step down' if held else ''}"
+                f"{100.0 * each.elements / every:.0f} % of the tets{', which limit the time step' if held else ''}"
             )
 
 

@@ -32,14 +32,14 @@ def test_the_rod_is_sound() -> None:
         ([BOX, "parts[0].mesh.high[1]=0", "probes=[]"], "parts[0].mesh.high[1]", "must be above low[1]"),
         ([BOX, "parts[0].mesh.sector=half", "parts[0].mesh.low[0]=-1", "parts[0].mesh.high[0]=0", "probes=[]"],
          "parts[0].mesh.high[0]", "keeps the side x > 0"),
-        (["parts[0].mesh.element_size=4 mm"], "parts[0].mesh.element_size", "what is modelled, 0.003"),
+        (["parts[0].mesh.element_size=4 mm"], "parts[0].mesh.element_size", "the modelled part, 0.003"),
         ([TUBE, "parts[0].mesh.element_size=1.1 mm"], "parts[0].mesh.element_size", "0.001 m"),
         (["parts[0].mesh.grading={near=2, far=1, far_size=1}"], "parts[0].mesh.grading.near", "must be below far"),
         (["parts[0].mesh.grading={near=0, far=1, far_size='0.5 mm'}"], "parts[0].mesh.grading.far_size", "below the"),
         (["parts[0].mesh.grading={near=0, far=1, far_size=1}", "parts[0].mesh.generator=structured"],
-         "parts[0].mesh.grading", "remove grading, or use gmsh"),
-        ([SLIT, "probes=[]", "parts[0].mesh.generator=gmsh"], "parts[0].mesh.slit", "set generator = 'structured'"),
-        ([SLIT, "probes=[]", "parts[0].mesh.slit.at=3.1 mm"], "parts[0].mesh.slit.at", "every 0.0005 m from z = 0 m"),
+         "parts[0].mesh.grading", "needs generator = 'gmsh'"),
+        ([SLIT, "probes=[]", "parts[0].mesh.generator=gmsh"], "parts[0].mesh.slit", "needs generator = 'structured'"),
+        ([SLIT, "probes=[]", "parts[0].mesh.slit.at=3.1 mm"], "parts[0].mesh.slit.at", "0.0005 m apart, from z = 0 m"),
         ([SLIT, "probes=[]", "parts[0].mesh.slit.at=9 mm"], "parts[0].mesh.slit.at", "inside the body"),
         ([SLIT, "probes=[]", "parts[0].mesh.slit.high[1]=0.6 mm"], "parts[0].mesh.slit.high[1]", "or outside the body"),
         ([SLIT, "probes=[]", "parts[0].mesh.slit.low[1]=1 mm"], "parts[0].mesh.slit.high[1]", "must be above low[1]"),
@@ -62,27 +62,27 @@ def test_the_rod_is_sound() -> None:
         (["boundaries[0]={kind='traction', stress=[0, 0, 0]}"], "boundaries[0].stress", "must not be zero"),
         (["boundaries[0]={kind='symmetry', axis='z', at='40 mm'}"], "boundaries[0].at", "between 0 and 0.03 m along z"),
         (["boundaries[0]={kind='velocity', x=1, low=['4 mm', 0, 0], high=['5 mm', 1, 1]}"], "boundaries[0]",
-         "misses all bodies that it is for; they are in ("),
+         "contains none of its bodies, which are in ("),
         (["boundaries[0]={kind='traction', pressure=1, low=[0, 0, -2], high=[1, 1, -1]}"], "boundaries[0]",
-         "misses all bodies that it is for"),
+         "contains none of its bodies"),
         (["boundaries[0]={kind='traction', pressure=1, low=['1 mm', '1 mm', '9 mm'], high=['2 mm', '2 mm', '10 mm']}"],
-         "boundaries[0]", "the box lies inside of 'rod'; tractions act on surfaces"),
-        (["contact={pairs=[{parts=['rod', 'rod'], friction=0.1}]}"], "contact.pairs[0].parts", "does not meet itself"),
+         "boundaries[0]", "the box lies inside 'rod'; tractions act on surfaces"),
+        (["contact={pairs=[{parts=['rod', 'rod'], friction=0.1}]}"], "contact.pairs[0].parts", "has no self-contact"),
         (["contact.self_contact=['rod']",
           "contact.pairs=[{parts=['rod', 'rod'], friction=0.1}, {parts=['rod', 'rod'], friction=0.2}]"],
-         "contact.pairs[1].parts", "contact.pairs[0] is of these parts"),
-        (["boundaries[0]={kind='traction'}"], "boundaries[0]", "give either stress or pressure"),
-        (["boundaries[0]={kind='traction', stress=[0, 0, 1], pressure=1}"], "boundaries[0]", "give either stress or"),
+         "contact.pairs[1].parts", "contact.pairs[0] has the same parts"),
+        (["boundaries[0]={kind='traction'}"], "boundaries[0]", "needs either stress or pressure"),
+        (["boundaries[0]={kind='traction', stress=[0, 0, 1], pressure=1}"], "boundaries[0]", "needs either stress or"),
         (["boundaries[0]={kind='traction', pressure=0}"], "boundaries[0].pressure", "must not be zero"),
         (["boundaries[0]={kind='traction', pressure=1, course=[[0, 1], [1, 0], [1, 2]]}"], "boundaries[0].course[2][0]",
          "must be later than the time before it, 1 s"),
-        (["boundaries[0]={kind='traction', stress=[0, 0, 1], high=[0, 0, 0]}"], "boundaries[0]", "give both low and"),
+        (["boundaries[0]={kind='traction', stress=[0, 0, 1], high=[0, 0, 0]}"], "boundaries[0]", "needs both low and"),
         (["boundaries[0]={kind='traction', stress=[0, 0, 1], low=[0, 0, 1], high=[1, 1, 0]}"], "boundaries[0].high[2]",
          "below low[2]"),
         (["boundaries[0]={kind='traction', stress=[0, 0, 1], parts=['a']}"], "boundaries[0].parts[0]", "no part"),
         (["parts[0].jitter=-1"], "parts[0].jitter", "greater than or equal to 0"),
-        (["boundaries[0]={kind='velocity'}"], "boundaries[0]", "prescribes nothing"),
-        (["boundaries[0]={kind='velocity', x=1, low=[0, 0, 0]}"], "boundaries[0]", "give both low and high"),
+        (["boundaries[0]={kind='velocity'}"], "boundaries[0]", "needs at least one of x, y, z"),
+        (["boundaries[0]={kind='velocity', x=1, low=[0, 0, 0]}"], "boundaries[0]", "needs both low and high"),
         (["boundaries[0]={kind='velocity', x=1, low=[0, 0, 1], high=[1, 1, 0]}"], "boundaries[0].high[2]", "low[2]"),
         (["probes[0].wall=anvil"], "probes[0].wall", "stress_zz does not use this key; remove it"),
         (["probes[0].low[2]=17 mm"], "probes[0].high[2]", "must not be below low[2]"),
@@ -108,8 +108,8 @@ def test_the_rod_is_sound() -> None:
         (["parts[0].erosion={time_step=0}"], "parts[0].erosion.time_step", "greater than 0"),
         (["parts[0].erosion={nodes='keep'}"], "parts[0].erosion.nodes", "'strike', 'particles' or 'remove'"),
         (["parts[0].material=steel_42crmo4", "parts[0].erosion={damage=1}"], "parts[0].erosion.damage",
-         "allowed with johnson_holmquist, and with johnson_cook with a table damage"),
-        (["parts[0].erosion={damage=1}"], "parts[0].erosion.damage", "steel counts no damage"),
+         "'johnson_holmquist', or 'johnson_cook' with a table damage"),
+        (["parts[0].erosion={damage=1}"], "parts[0].erosion.damage", "steel has no damage"),
         (["probes[0].name=kinetic"], "probes[0].name", "allowed: any name but 'step', 't', 'dt'"),
         (["probes[0].name=dt"], "probes[0].name", "is a column of every history.csv"),
         (["probes[0].name=momentum_x"], "probes[0].name", "is a column of every history.csv"),
@@ -135,10 +135,10 @@ def test_names_are_unique() -> None:
     data["boundaries"].append({**data["boundaries"][0]})
     found = [(p.key, p.message) for p in problems(*_as_overrides(data))]
     assert found == [
-        ("parts[1].name", "parts[0] has this name; give each its own"),
+        ("parts[1].name", "parts[0] has this name; use different names"),
         ("parts[1].mesh", found[1][1]),
-        ("boundaries[3].name", "an earlier wall has this name; give each its own"),
-        ("probes[1].name", "probes[0] has this name; give each its own"),
+        ("boundaries[3].name", "an earlier wall has this name; use different names"),
+        ("probes[1].name", "probes[0] has this name; use different names"),
     ]
     assert "overlaps" in found[1][1]
 
@@ -263,7 +263,7 @@ SPIN = "{kind='rotation', spin={centre=[0, 0, 0], rate=[0, 0, '1000 rad/s']}}"
 )
 def test_a_part_has_one_drive_along_an_axis(first: str, second: str, axes: str) -> None:
     found = said(f"boundaries=[{first}, {second}]", "parts[0].mesh.sector=full")
-    message = f"prescribes the velocity of part 'rod' along {axes}, and so does boundaries[0] in another way"
+    message = f"prescribes the velocity of part 'rod' along {axes}, which boundaries[0] prescribes differently"
     assert found == {"boundaries[1]": f"{message}; keep one of the two"}
 
 

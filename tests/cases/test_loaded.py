@@ -90,7 +90,7 @@ def test_what_is_not_known_is_none() -> None:
 
 def test_a_region_without_a_face_is_doubted() -> None:
     (odd,) = unloaded(pressed(TUBE, {"cylinder": {"radius": 4e-3}}))
-    assert str(odd).startswith("boundaries[0]: no face of the bodies that it is for seems to lie in it")
+    assert str(odd).startswith("boundaries[0]: probably no face of its bodies lies in it")
     assert list(unloaded(pressed(TUBE, BORE))) == []
 
 

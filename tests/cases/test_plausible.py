@@ -143,7 +143,7 @@ def test_a_sound_scene_raises_no_doubt() -> None:
 @pytest.mark.parametrize(
     ("changes", "key", "message"),
     [
-        ({"run": {"end_time": "80 s"}}, "run.max_steps", "will be used up before run.end_time, 80 s"),
+        ({"run": {"end_time": "80 s"}}, "run.max_steps", "will be reached before run.end_time, 80 s"),
         ({"run": {"end_time": "8 s", "max_steps": 10**9}}, "run.end_time", "hours of core time"),
         ({"run": {"end_time": "10 ns"}}, "run.end_time", "is shorter than the first time step"),
         ({"ball": {"velocity": [0, 0, "-500 km/s"]}}, "parts[0].velocity", "faster than waves in steel, 5.86e+03 m/s"),
@@ -224,8 +224,8 @@ def test_a_drive_into_a_wall_is_told(drive: dict[str, Any], depth: str) -> None:
     part = drive["parts"][0]
     floor = FLOOR if part == "plate" else {**FLOOR, "point": [0, 0, "-3.5 mm"], "parts": ["ball"]}
     found = warned(floor, drive)["boundaries[1]"]
-    assert found.startswith(f": nodes of {part!r} come {depth}")
-    assert found.endswith("behind boundaries[0], a wall; walls do not hold nodes that are driven")
+    assert found.startswith(f": nodes of {part!r} move {depth}")
+    assert found.endswith("behind boundaries[0], a wall; walls do not stop driven nodes")
 
 
 @pytest.mark.parametrize(
@@ -259,7 +259,7 @@ def test_many_drives_of_many_bodies_cost_little_time() -> None:
 def test_two_driven_bodies_that_pass_through_each_other_are_told() -> None:
     ball = {"kind": "velocity", "parts": ["ball"], "z": "-500 m/s"}
     held = {"kind": "velocity", "parts": ["plate"], "x": 0, "y": 0, "z": 0}
-    message = "'ball' comes into 'plate', which boundaries[0] drives; contact does not change prescribed motion"
+    message = "'ball' moves into 'plate', which boundaries[0] drives; contact does not change prescribed motion"
     assert warned(held, ball) == {"boundaries[1]": f": {message}"}
     assert warned(held, {**ball, "z": "-99 m/s"}) == {}
     assert warned({**held, **BELOW}, ball) == {}
@@ -342,7 +342,7 @@ def test_a_plane_of_symmetry_through_a_body_is_told() -> None:
     plane = {"kind": "symmetry", "axis": "x"}
     assert told({**target(), "boundaries": [{**plane, "at": "1 mm", "parts": ["plate"]}]}) == {
         "boundaries[0].at": "'0.001 m': goes through part 'plate', which lies between -0.01 and 0.01 m: each side "
-        "meets its own mirror image; model one of them"
+        "is in contact with its own mirror image; model one side"
     }
     assert told({**target(), "boundaries": [{**plane, "at": "10 mm", "parts": ["plate"]}]}) == {}
 

@@ -56,15 +56,21 @@ INERTIA = "parts[0].rigid={{mass='4 g', inertia=[{}]}}"
     [
         ("parts[0].erosion={}", "parts[0].erosion: a rigid part has no stress"),
         ("parts[0].stretch={rate=[1, 0, 0]}", "parts[0].stretch: a rigid part has no stress"),
-        ("parts[0].jitter=1", "parts[0].jitter = 1.0: a rigid part moves as one"),
-        ("contact={self_contact=['ball']}", "contact.self_contact = 'ball': 'ball' is rigid and cannot meet itself"),
+        ("parts[0].jitter=1", "parts[0].jitter = 1.0: a rigid part has no jitter"),
+        (
+            "contact={self_contact=['ball']}",
+            "contact.self_contact = 'ball': 'ball' is rigid and cannot have self-contact",
+        ),
         ("parts[0].rigid={centre=[0, 0, 0]}", "parts[0].rigid.centre: needs rigid.inertia"),
         ("parts[0].rigid={mass='1 m'}", "a mass"),
         ("parts[0].rigid={mass=0}", "greater than 0"),
         (INERTIA.format("1, 1, -1, 0, 0, 0"), "must be positive definite"),
         (INERTIA.format("1, 1, 1, 0, 0, 1.1"), "must be positive definite"),
         (INERTIA.format("1, 1, 2.1, 0, 0, 0"), "above the sum of the other two"),
-        ("boundaries=[{kind='traction', pressure=1}]", "acts on the rigid part 'ball', which takes no traction"),
+        (
+            "boundaries=[{kind='traction', pressure=1}]",
+            "acts on the rigid part 'ball', on which tractions are not allowed",
+        ),
         ("boundaries=[{kind='velocity', x=0, low=[0, 0, 0], high=[1, 1, 1]}]", "drives a box of the rigid part 'ball'"),
         ("bond=[{kind='tied', parts=['ball', 'pad']}]", "bond[0].parts = 'ball': is rigid"),
         ("boundaries=[{kind='wall', point=[0, 0, -1]}]", "boundaries[0].normal: this key is missing; a plane needs"),
@@ -123,7 +129,7 @@ def test_a_part_that_stayed_elastic_could_have_been_rigid() -> None:
     (line,) = could_be_rigid(case, [ball, block], "stability: tet 7 of ball")
     assert line == (
         "parts[0].rigid: 'ball' stayed elastic, with strains of 0.0002 or less (root of the mean square) and 1 % of "
-        "the energy of deformation; rigid = true would save 60 % of the tets, which hold the time step down"
+        "the energy of deformation; rigid = true would save 60 % of the tets, which limit the time step"
     )
     for other in (replace(ball, plastic=True), replace(ball, strain=2e-3), replace(ball, share=0.1)):
         assert not list(could_be_rigid(case, [other, block], ""))

@@ -130,13 +130,17 @@ def test_half_and_quarter_are_shares_of_the_whole(name: str) -> None:
 @pytest.mark.parametrize(
     ("name", "change", "said"),
     [
-        ("tangent", {"crh": None}, "crh: this key is missing, or nose"),
+        ("tangent", {"crh": None}, "crh: needs at least one of crh and nose"),
         ("tangent", {"crh": None, "nose": 0.4}, "nose = 0.4: must not be below the radius, 0.5 m"),
-        ("tangent", {"crh": 1.0, "nose": 2.0}, "crh = 1.0: must not be below 4.25, the tangent ogive of this nose"),
+        (
+            "tangent",
+            {"crh": 1.0, "nose": 2.0},
+            "crh = 1.0: must not be below 4.25, that of the tangent ogive of this nose",
+        ),
         ("tangent", {"crh": 0.4}, "crh = 0.4: "),
-        ("tangent", {"shank": 1e-12}, "shank = 1e-12: less than a millionth of the radius, 0.5 m; set 0"),
+        ("tangent", {"shank": 1e-12}, "shank = 1e-12: is below a millionth of the radius, 0.5 m; use 0"),
         ("tangent", {"tip_radius": 0.5}, "tip_radius = 0.5: must be below the radius, 0.5 m"),
-        ("tangent", {"tip_radius": 0.1, "meplat": 0.1}, "meplat = 0.1: the tip is round"),
+        ("tangent", {"tip_radius": 0.1, "meplat": 0.1}, "meplat = 0.1: allowed is either tip_radius or meplat"),
         ("meplat", {"meplat": 1.0}, "meplat = 1.0: must be below the diameter, 1 m"),
         ("cone", {"radius": 0.0}, "top_radius = 0.0: must be above 0 where radius is 0"),
         ("cone", {"element_size": 1.1}, "element_size = 1.1: must not be above the smallest extent"),

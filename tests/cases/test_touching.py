@@ -46,8 +46,8 @@ def test_parts_that_touch_and_do_not_meet_are_a_doubt() -> None:
         assert (
             said
             == [
-                "'part0' and 'part1' touch over about 400 mm^2 and do not meet in contact: they are not joined, and "
-                "pass through each other; a [[bond]] joins parts"
+                "'part0' and 'part1' touch over about 400 mm^2 without contact or bond: they can pass through each "
+                "other; a [[bond]] joins parts"
             ]
             * doubtful
         )

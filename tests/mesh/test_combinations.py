@@ -169,10 +169,13 @@ def _nested(depth: int) -> dict[str, Any]:
     [
         ({"shape": "union", "of": [CORE]}, "parts[0].mesh.of: at least 2 are needed"),
         ({"shape": "union", "of": [CORE, {"shape": "blob"}]}, "parts[0].mesh.of[1].shape = 'blob': allowed: 'box'"),
-        ({"shape": "union", "of": [CORE, {**CORE, "crh": None}]}, "parts[0].mesh.of[1].crh: this key is missing"),
+        (
+            {"shape": "union", "of": [CORE, {**CORE, "crh": None}]},
+            "parts[0].mesh.of[1].crh: needs at least one of crh and nose",
+        ),
         ({"shape": "union", "of": [CORE, {**CORE, "sector": "half"}]}, "parts[0].mesh.of[1].sector: unknown key"),
-        (_nested(9), "parts[0].mesh.of: combinations lie more than 8 deep"),
-        ({"shape": "union", "of": [_nested(3)] * 60}, "parts[0].mesh.of: 240 shapes in all are too many"),
+        (_nested(9), "parts[0].mesh.of: combinations are nested more than 8 deep"),
+        ({"shape": "union", "of": [_nested(3)] * 60}, "parts[0].mesh.of: 240 shapes in all; allowed: up to 200"),
         ({"shape": "union", "of": [CORE, JACKET], "sector": "half"}, "parts[0].mesh.sector = 'half': needs a boundary"),
     ],
 )

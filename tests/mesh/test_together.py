@@ -84,7 +84,7 @@ def test_shapes_with_a_gap_and_shapes_that_overlap_are_refused() -> None:
         joined({**PLATE, "base": [0, 0, "5.5 mm"]}, PLATE)
     with pytest.raises(MeshError, match=r"^parts\[1\].mesh: overlaps parts\[0\].mesh, to which a bond joins it"):
         joined({**PLATE, "base": [0, 0, "4 mm"]}, PLATE)
-    with pytest.raises(CaseError, match=r"^bond\[0\].parts = .* the surface of an STL file is meshed alone"):
+    with pytest.raises(CaseError, match=r"^bond\[0\].parts = .* a body from an STL file is meshed separately"):
         joined({"shape": "stl", "path": "a.stl", "unit": "1 mm", "element_size": "1 mm"}, PLATE)
 
 

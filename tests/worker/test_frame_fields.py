@@ -143,8 +143,8 @@ def test_fields_that_cannot_be_are_refused() -> None:
         "name": "x", "run": {"end_time": 1e-6}, "parts": [{"name": "bar", "material": "copper", "mesh": bar}],
     }  # fmt: skip
     for fields, says in (
-        (["contact_pressure"], "nothing of the case meets anything"),
-        (["density", "density"], "is there twice"),
+        (["contact_pressure"], "the case has neither contact between parts nor a wall"),
+        (["density", "density"], "is listed twice"),
         (["densty"], "density"),
     ):
         with pytest.raises(CaseError, match=says):

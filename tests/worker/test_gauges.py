@@ -283,7 +283,7 @@ def test_the_heaviest_fragment_beyond_a_plane_is_found(ranks: int) -> None:
         ({"field": "contact_force_x", "by": "bar"}, "probes[0].by", "is the part itself"),
         ({"field": "contact_force_x", "by": "bat"}, "probes[0].by", "no part of this name"),
         ({"field": "momentum_x", "by": "bar"}, "probes[0].by", "momentum does not use this key"),
-        ({"field": "cone_angle", "axis": "z"}, "probes[0].field", "nothing of the case is damaged"),
+        ({"field": "cone_angle", "axis": "z"}, "probes[0].field", "the case has neither damage, fracture nor erosion"),
         ({"field": "penetration", "axis": "z", "low": [0, 0, 0], "high": [1, 1, 1]}, "probes[0]", "whole part"),
         ({"field": "wall_impulse_x"}, "probes[0].field", "the case has no wall"),
     ],

@@ -108,6 +108,7 @@ def test_generated_parts_have_no_sets(tmp_path: Path) -> None:
             probes=({"name": "p", "part": "bar", "field": "contact_force_x", "on": "TIP"},),
         )
     assert str(raised.value).splitlines() == [
-        "boundaries[0].on = 'CLAMP': a mesh from a file has sets; that of 'box' is not",
-        "probes[0].on = 'TIP': is of means and sums alone; 'contact_force_x' is neither; remove on",
+        "boundaries[0].on = 'CLAMP': only meshes from files have sets; the mesh of 'box' is generated",
+        "probes[0].on = 'TIP': is allowed with means and sums only; "
+        "remove on, or use another field than 'contact_force_x'",
     ]
