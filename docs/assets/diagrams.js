@@ -5,7 +5,7 @@ const diagrams = [...document.querySelectorAll("pre.diagram")].map((place) => ({
 
 async function draw() {
   const dark = document.body.dataset.mdColorScheme === "slate";
-  mermaid.initialize({ startOnLoad: false, theme: dark ? "dark" : "neutral", fontFamily: "inherit" });
+  mermaid.initialize({ startOnLoad: false, theme: dark ? "dark" : "neutral", fontFamily: getComputedStyle(document.body).fontFamily, sequence: { actorMargin: 20, width: 130 } });
   for (const [number, { place, text }] of diagrams.entries()) {
     const { svg } = await mermaid.render(`diagram${number}`, text);
     place.innerHTML = svg;
