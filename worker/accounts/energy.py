@@ -246,7 +246,7 @@ class Ledger:
         """Energy, J, that friction has taken, of contact and of boundaries."""
         work = self._contact.books.friction_work(told["friction"]) if self._contact is not None else 0.0
         if self._rigid is not None:
-            work += float(self._rigid.friction_loss.sum())
+            work += float(self._rigid.account.friction_loss.sum())
         return sum(told["boundaries"].tolist(), work)
 
     def _boundary_work(self) -> tuple[Floats, Floats]:

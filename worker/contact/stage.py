@@ -76,7 +76,8 @@ class Contact:
         largest, speed = extremes
         mass = part_pairs.lighter(self.searches.mu, model.nodes, self.exterior.motion.mobility, comm, rigid) or largest
         self.books = Books(model.nodes.n, case, mass * speed, mass * speed * speed, team)
-        self._active = ActiveSet(self.books.scale, Stops.of(case, model, comm), team, rigid)
+        bodies = rigid.contacts if rigid is not None else None
+        self._active = ActiveSet(self.books.scale, Stops.of(case, model, comm), team, bodies)
         self._scheme, self.sweep_count = _Scheme.of(case), SweepCount(sweeps(case))
         self.detection = Detection(team)
         self.limit = 0.0

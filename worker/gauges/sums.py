@@ -76,7 +76,7 @@ class NodeSums:
             body = int(rigid.of_part[self._scene.model.parts.index(probe.part)])
             whole = probe.low is None and probe.on is None and probe.beyond is None
             if body >= 0 and whole and kind(probe.field) != "mass":
-                found[k] = rigid.quantity(body, kind(probe.field), _AXES.find(probe.field[-1]), between)
+                found[k] = rigid.account.quantity(body, kind(probe.field), _AXES.find(probe.field[-1]), between)
         return found
 
     def _columns(self, probe: Probe, v: Floats) -> tuple[Floats, Floats]:

@@ -9,7 +9,7 @@ from .stage import Rigid
 
 def energy_of(rigid: Rigid | None, walls: Walls) -> float:
     """Returns the kinetic energy, J."""
-    return walls.kinetic() + (float(rigid.kinetic().sum()) if rigid is not None else 0.0)
+    return walls.kinetic() + (float(rigid.account.kinetic().sum()) if rigid is not None else 0.0)
 
 
 def add_undeformed(sums: Floats, of_parts: Floats, rigid: Rigid | None, walls: Walls) -> None:
@@ -19,14 +19,14 @@ def add_undeformed(sums: Floats, of_parts: Floats, rigid: Rigid | None, walls: W
     """
     if rigid is None and not walls.lightness.any():
         return
-    momenta = np.zeros(6) if rigid is None else rigid.momenta()
+    momenta = np.zeros(6) if rigid is None else rigid.account.momenta()
     if walls.lightness.any():
         sums[0] += walls.kinetic()
         momenta = momenta + walls.momenta()
     if rigid is not None:
-        kinetic = rigid.kinetic()
+        kinetic = rigid.account.kinetic()
         of_parts[rigid.bodies.part, 0] += kinetic
         sums[0] += kinetic.sum()
-        sums[1] += rigid.contact_loss.sum()
-        sums[2] += rigid.external_work.sum()
+        sums[1] += rigid.account.contact_loss.sum()
+        sums[2] += rigid.account.external_work.sum()
     sums[[3, 4, 5, 7, 8, 9]] += momenta
