@@ -2,16 +2,15 @@
 step (step.py) uses it.
 """
 
-import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Protocol
 
 import numpy as np
 
 from conoid.cases.model.schema import Case, Symmetry
-from conoid.cases.reading.library import material as find_material
 
+from . import scales
 from .accounts.energy import Ledger
 from .accounts.timers import Timers, worked
 from .bonds.interface import tied_pairs
@@ -23,23 +22,17 @@ from .boundaries.wall_shapes import Walls
 from .clock import Clock
 from .contact.narrow_phase.tied import Tied
 from .contact.stage import Contact
-from .elements.averages import Averages, volumes
-from .elements.averaging import AveragedElements
 from .elements.crushing import Crushing
 from .elements.forms import Elements
-from .elements.matter import pressure_place
+from .elements.selection import elements_of
 from .erosion import Erosion
 from .fracture.record import Record
 from .fracture.stage import Fracture
 from .gauges.gauge import Scene
 from .gauges.probes import Probes
-from .materials.elementary import power
-from .materials.law import BULK, DENSITY, SHEAR
-from .materials.models import eos_of, equation_of, parameters
 from .migration import model as model_of
 from .migration.parcel import Parcel
 from .migration.route import Arrived
-from .model.rows import MASS
 from .model.state import Floats, Model
 from .model.topology import KeptByNode
 from .motion import Leapfrog
@@ -47,16 +40,22 @@ from .parallel import fixed_point
 from .parallel.comm import Comm
 from .parallel.ownership import Neighbour
 from .parallel.passes import Ranges
-from .parallel.team import Team, team
+from .parallel.team import team
 from .reduction import StepReduction
-from .rigid.bodies import measured
-from .rigid.motion import Held
 from .rigid.stage import Rigid
+from .rigid.start import rigid_of
 from .scene import conditions, domain
 from .scene.assembly import Say, quiet
 
-_SMALLEST_STRAIN = 1e-12
-"""Strain whose forces the force quantum must still resolve. Chosen: its stress in steel is 0.2 Pa."""
+
+class Stage(Protocol):
+    """A part of the simulation with state by node, by tet or in rows of its own."""
+
+    def keep(self, parcel: Parcel) -> None:
+        """Adds its state to a parcel."""
+
+    def resume(self, parcel: Parcel) -> None:
+        """Restores its state from a parcel."""
 
 
 @dataclass
@@ -120,6 +119,12 @@ class Simulation:
         """All objects that have a ``last_push``."""
         return [*self.boundaries, *(each for each in (self.contact, self.rigid) if each is not None)]
 
+    @property
+    def stages(self) -> list[Stage]:
+        """The stages with state of their own, in the order in which it is restored."""
+        found = self.erosion, self.contact, self.bonds, self.elements, self.fracture, self.record
+        return [each for each in found if each is not None]
+
     def limiting_id(self) -> int:
         """Returns the id of the tet that limits the time step; of several the smallest. Collective."""
         mine = self.elements.limit_bits == fixed_point.bits_of(self.reduction.limit)
@@ -159,15 +164,9 @@ class Simulation:
 
     def free(self) -> None:
         """Frees all persistent messages."""
-        self.elements.free()
-        if self.fracture is not None:
-            self.fracture.free()
-        if self.contact is not None:
-            self.contact.free()
-        for bound in self.boundaries:
-            bound.free()
-        if self.bonds is not None:
-            self.bonds.free()
+        for each in (self.elements, self.fracture, self.contact, *self.boundaries, self.bonds):
+            if each is not None:
+                each.free()
 
     def next_scale(self) -> float:
         """Returns the quanta per newton for the next sum of forces."""
@@ -185,7 +184,7 @@ def build(case: Case, folder: Path, comm: Comm, say: Say = quiet) -> Simulation:
     walls = conditions.walls_of(case)
     scene = conditions.build(case, model, piece.loads, piece.neighbours, comm, walls)
     more = conditions.start(case, model, scene, comm)
-    rigid = _rigid(case, model, walls, comm)
+    rigid = rigid_of(case, model, walls, comm)
     timers = Timers(comm, team(case.run.threads))
     sim = _assemble(case, model, piece.neighbours, scene, (rigid, walls), piece.node_volume, comm, timers, piece.tied)
     sim.warnings = *piece.warnings, *more
@@ -193,28 +192,6 @@ def build(case: Case, folder: Path, comm: Comm, say: Say = quiet) -> Simulation:
     if sim.contact is not None:
         sim.contact.require_faces()
     return sim
-
-
-def _rigid(
-    case: Case, model: Model, walls: Walls, comm: Comm, known: dict[str, Any] | None = None
-) -> Rigid | None:  # fmt: skip
-    """Returns the rigid bodies of a case, or None: at the start, or with the state ``known`` of a parcel.
-    Collective. Raises InputError, on every rank alike, where a body starts behind a wall.
-    """
-    if not case.rigid:
-        return None
-    beside = conditions.bodies_beside(case, model, comm)
-    planes = np.array([index for index, _ in case.boundaries_of(Symmetry)], np.int64)
-    held = [Held.of(case, case.parts[index], planes[beside[:, index] != 0].tolist()) for index in case.rigid]
-    if known is None:
-        bodies = measured(case, model.nodes, held, comm)
-        rigid = Rigid(case, model.nodes, bodies, walls, beside, comm)
-        rigid.require_front(case, model.size)
-    else:
-        rigid = Rigid(case, model.nodes, Rigid.kept_bodies(known, held), walls, beside, comm)
-        rigid.resume(known)
-    rigid.begin(model.nodes)
-    return rigid
 
 
 def _assemble(
@@ -228,7 +205,7 @@ def _assemble(
     began, run, numerics, (rigid, moving) = worked(comm), case.run, case.numerics, undeformed
     threads = team(run.threads)
     clock = Clock(run.end_time, numerics.dt_safety, case.dt_growth, run.frames)
-    extremes = _extremes(model, comm)
+    extremes = scales.extremes(model, comm)
     contact, erosion = None, None
     if case.in_contact:
         contact = Contact(case, model, neighbours, scene, comm, clock, timers, threads, extremes[:2], rigid)
@@ -244,7 +221,7 @@ def _assemble(
     for bound in scene:
         bound.over = Ranges(threads)
         bound.measure(*extremes[:2])
-    elements = _elements(case, model, neighbours, scene, node_volume, comm, timers, threads)
+    elements = elements_of(case, model, neighbours, scene, node_volume, comm, timers, threads)
     fracture = None
     if case.fractures:
         by_node: list[KeptByNode] = [*scene, *(stage for stage in (erosion, contact, bonds) if stage is not None)]
@@ -258,7 +235,7 @@ def _assemble(
         clock=clock, ledger=ledger, probes=probes, timers=timers,
         record=Record(model, fracture, comm) if fracture is not None else None,
         crushing=Crushing.of(case, model, comm, clock, threads),
-        neighbours=neighbours, floor=_force_floor(model, comm),
+        neighbours=neighbours, floor=scales.force_floor(model, comm),
         reduction=StepReduction(comm.size, fractures=case.fractures, contact=contact is not None),
         assembled=float(comm.maximum(np.array([worked(comm) - began]))[0]),
     )  # fmt: skip
@@ -275,17 +252,8 @@ def keep(sim: Simulation) -> Parcel:
     }  # fmt: skip
     for index, bound in enumerate(sim.boundaries):
         bound.keep(parcel, f"boundary{index}")
-    if sim.erosion is not None:
-        sim.erosion.keep(parcel)
-    if sim.contact is not None:
-        sim.contact.keep(parcel)
-    if sim.bonds is not None:
-        sim.bonds.keep(parcel)
-    sim.elements.keep(parcel)
-    if sim.fracture is not None:
-        sim.fracture.keep(parcel)
-    if sim.record is not None:
-        sim.record.keep(parcel)
+    for stage in sim.stages:
+        stage.keep(parcel)
     if sim.crushing is not None:
         parcel.known["crushing"] = sim.crushing.keep()
     if sim.rigid is not None:
@@ -300,7 +268,7 @@ def resume(case: Case, arrived: Arrived, comm: Comm, timers: Timers) -> Simulati
     walls = conditions.walls_of(case)
     walls.resume(known["walls"])
     scene = conditions.build(case, model, conditions.loads(parcel), arrived.neighbours, comm, walls)
-    both = _rigid(case, model, walls, comm, known.get("rigid")), walls
+    both = rigid_of(case, model, walls, comm, known.get("rigid")), walls
     ones, none = np.ones(model.nodes.n), Pieces.none()
     sim = _assemble(case, model, arrived.neighbours, scene, both, ones, comm, timers, none)
     sim.reduction.resume(known["reduction"])
@@ -312,56 +280,8 @@ def resume(case: Case, arrived: Arrived, comm: Comm, timers: Timers) -> Simulati
         each.last_push = last_push
     for index, bound in enumerate(sim.boundaries):
         bound.resume(parcel, f"boundary{index}", sim.clock.dt)
-    if sim.erosion is not None:
-        sim.erosion.resume(parcel)
-    if sim.contact is not None:
-        sim.contact.resume(parcel)
-    if sim.bonds is not None:
-        sim.bonds.resume(parcel)
-    sim.elements.resume(parcel)
-    if sim.fracture is not None:
-        sim.fracture.resume(parcel)
-    if sim.record is not None:
-        sim.record.resume(parcel)
+    for stage in sim.stages:
+        stage.resume(parcel)
     if sim.crushing is not None:
         sim.crushing.resume(known["crushing"])
     return sim
-
-
-def _extremes(model: Model, comm: Comm) -> tuple[float, float, float]:
-    """Largest nodal mass, kg, largest of wave speed and velocity, m/s, and largest distance from the origin, m, of
-    all ranks.
-    """
-    speeds = [float(np.linalg.norm(model.nodes.v, axis=1).max(initial=0.0))]
-    for block in model.blocks:
-        p = block.params
-        speeds.append(math.sqrt((p[BULK] + 4.0 / 3.0 * p[SHEAR]) / p[DENSITY]))
-    mass, arm = model.nodes.mass.max(initial=0.0), np.linalg.norm(model.nodes.x, axis=1).max(initial=0.0)
-    largest, fastest, farthest = comm.maximum(np.array([mass, max(speeds), arm])).tolist()
-    return largest, fastest, farthest
-
-
-def _elements(
-    case: Case, model: Model, neighbours: list[Neighbour], scene: list[Boundary], node_volume: Floats, comm: Comm,
-    timers: Timers, threads: Team,
-) -> Elements:  # fmt: skip
-    form = case.numerics.pressure
-    if form == "standard":
-        return Elements(model, comm, neighbours, timers, threads)
-    materials = [find_material(case, part.material) for part in case.parts]
-    params = np.array([parameters(each, None) for each in materials])
-    kinds = np.array([pressure_place(eos_of(each), own) for each, own in zip(materials, params, strict=True)])
-    more = any(equation_of(each).averaged for each in materials)
-    averages, density = Averages.of(case, model, neighbours), [each.density for each in materials]
-    weight = 1.0 / volumes(averages, model.nodes, node_volume, density)
-    return AveragedElements(
-        model, comm, neighbours, timers, threads, averages, weight, params, kinds, scene, form == "split", more
-    )  # fmt: skip
-
-
-def _force_floor(model: Model, comm: Comm) -> float:
-    largest = 0.0
-    for block in model.blocks:
-        volume = float(block.row(MASS).max()) / float(block.params[0])
-        largest = max(largest, float(block.params[BULK]) * power(volume, 2.0 / 3.0))
-    return _SMALLEST_STRAIN * float(comm.maximum(np.array([largest]))[0])

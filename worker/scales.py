@@ -1,0 +1,39 @@
+"""Orders of magnitude of a model, which set the quanta of integer sums."""
+
+import math
+
+import numpy as np
+
+from .materials.elementary import power
+from .materials.law import BULK, DENSITY, SHEAR
+from .model.rows import MASS
+from .model.state import Model
+from .parallel.comm import Comm
+
+_SMALLEST_STRAIN = 1e-12
+"""Strain whose forces the force quantum must still resolve. Chosen: its stress in steel is 0.2 Pa."""
+
+
+def extremes(model: Model, comm: Comm) -> tuple[float, float, float]:
+    """Largest nodal mass, kg, largest of wave speed and velocity, m/s, and largest distance from the origin, m, of
+    all ranks.
+    """
+    speeds = [float(np.linalg.norm(model.nodes.v, axis=1).max(initial=0.0))]
+    for block in model.blocks:
+        p = block.params
+        speeds.append(math.sqrt((p[BULK] + 4.0 / 3.0 * p[SHEAR]) / p[DENSITY]))
+    mass, arm = model.nodes.mass.max(initial=0.0), np.linalg.norm(model.nodes.x, axis=1).max(initial=0.0)
+    largest, fastest, farthest = comm.maximum(np.array([mass, max(speeds), arm])).tolist()
+    return largest, fastest, farthest
+
+
+def force_floor(model: Model, comm: Comm) -> float:
+    """Returns the force, N, down to which the force quantum is refined: that of _SMALLEST_STRAIN on the largest tet.
+
+    Collective.
+    """
+    largest = 0.0
+    for block in model.blocks:
+        volume = float(block.row(MASS).max()) / float(block.params[0])
+        largest = max(largest, float(block.params[BULK]) * power(volume, 2.0 / 3.0))
+    return _SMALLEST_STRAIN * float(comm.maximum(np.array([largest]))[0])
