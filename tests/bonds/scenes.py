@@ -1,4 +1,4 @@
-"""Two blocks with meshes that do not match, bonded at z = 0, and what a run of them says."""
+"""Two blocks with non-matching meshes, bonded at z = 0, and the ledger of a run."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -32,7 +32,7 @@ EVERYWHERE = "low = [-1, -1, {low}]\nhigh = [1, 1, {high}]\n"
 
 
 def start(end: float, poisson: float = 0.0) -> str:
-    """Steel, and when the run ends, s."""
+    """Steel, and the end of the run, s."""
     return START.format(end=end, poisson=poisson)
 
 
@@ -56,19 +56,19 @@ element_size = {1e-3 * size}
 
 
 def moved(low: float, high: float, velocity: tuple[float, float, float], course: str = "") -> str:
-    """What lies between two heights, m, has a velocity, m/s."""
+    """Gives the nodes between two heights, m, a velocity, m/s."""
     x, y, z = velocity
     box = EVERYWHERE.format(low=low, high=high)
     return f'\n[[boundaries]]\nkind = "velocity"\n{box}x = {x}\ny = {y}\nz = {z}\n{course}\n'
 
 
 def built(text: str) -> Simulation:
-    """Ready for its first step, on one rank."""
+    """Returns the simulation before its first step, on one rank."""
     return simulation.build(load.parse_toml(text), Path(), SerialComm())
 
 
 def run(sim: Simulation, each: Callable[[], None] | None = None) -> Energy:
-    """The ledger at the end; ``each`` is called in every step, at time n."""
+    """Runs the case and returns the ledger at the end; ``each`` is called in every step, at time n."""
     step.prepare(sim)
     while True:
         before: np.ndarray = sim.model.nodes.v.copy()

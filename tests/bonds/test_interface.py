@@ -1,4 +1,4 @@
-"""What is tied at the start: areas and integrals to rounding, a constant stress between any meshes, gaps."""
+"""Tied interface at the start: areas and integrals to rounding, constant stress between any meshes, gaps."""
 
 import re
 from pathlib import Path
@@ -37,7 +37,7 @@ def test_the_pieces_of_a_face_add_up_to_it(seed: int) -> None:
     masters = Delaunay(plane).simplices.astype(np.int32)
     e, f = (plane[masters[:, k]] - plane[masters[:, 0]] for k in (1, 2))
     up = e[:, 0] * f[:, 1] - e[:, 1] * f[:, 0] > 0.0
-    masters[up] = masters[up][:, ::-1]  # they look down
+    masters[up] = masters[up][:, ::-1]  # they face each other
     corners = rng.uniform(-1.5, 1.5, (3, 2))
     d = corners[1:] - corners[0]
     corners = corners if d[0, 0] * d[1, 1] - d[0, 1] * d[1, 0] > 0.0 else corners[::-1]
@@ -80,8 +80,8 @@ def on_top(cells: tuple[int, int, int], seed: int, gap: float = 0.0) -> TetMesh:
 
 @pytest.mark.parametrize(("cells", "seed"), [((5, 7, 2), 1), ((3, 3, 1), 2), ((9, 4, 2), 3), ((4, 4, 2), 4)])
 def test_a_constant_stress_passes_between_any_two_meshes(cells: tuple[int, int, int], seed: int) -> None:
-    """The patch test: what the tied nodes pass on of a unit traction is what the faces of the others bear of it, and
-    a linear motion has no relative velocity.
+    """Patch test: the forces of a unit traction on the tied nodes equal those on the faces of the mortar side, and a
+    linear motion has no relative velocity.
     """
     one, other = block((4, 4, 2), shake=0.25, seed=seed + 10), on_top(cells, seed)
     rows, found, x, tets = rows_of(one, other)
@@ -106,8 +106,8 @@ def test_the_finer_surface_lies_on_the_other_one() -> None:
     assert len(np.unique(rows.node)) == 100
 
 
-def test_parts_that_overlap_by_more_than_the_gap_are_refused_and_nodes_that_are_left_out_counted() -> None:
-    """Facets of 2.5 mm cut 0.2 mm off the hole of a tube, where those of the rod in it are finer."""
+def test_overlaps_above_the_gap_are_refused_and_untied_nodes_counted() -> None:
+    """Facets of 2.5 mm cut 0.2 mm off the hole of a tube, which the finer facets of the rod in it resolve."""
     below = scenes.block("below", (0, 0, -4), (8, 8, 0), 2)
     above = scenes.block("above", (0, 0, -0.3), (8, 8, 4), 1.3)
     with pytest.raises(InputError, match=r"^bond\[0\].gap = 0.000\d* m: 'below' and 'above' overlap by 0.0003 m or"):
@@ -121,7 +121,7 @@ def test_parts_that_overlap_by_more_than_the_gap_are_refused_and_nodes_that_are_
     assert re.match(r"bond\[0\]: \d+ nodes of 'rod' are not tied: they lie up to 0.000\d* m inside 'tube', more", line)
 
 
-def test_what_is_too_far_is_refused_or_counted() -> None:
+def test_distances_above_the_gap_are_refused_or_counted() -> None:
     one = block((4, 4, 2))
     with pytest.raises(
         InputError, match=r"bond\[0\]\.gap = 0\.1\d* m: the nearest faces of 'below' and 'above' are 0.3"

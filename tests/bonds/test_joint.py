@@ -1,4 +1,4 @@
-"""Bodies that tied bonds hold together: waves, energy, momentum; joints that are torn, and what meets again."""
+"""Tied bodies: waves, energy, momentum; bonds that are torn, and contact afterwards."""
 
 from typing import Any
 
@@ -44,7 +44,7 @@ def plateau(told: np.ndarray) -> float:
 
 
 def arrival(told: np.ndarray) -> float:
-    """When half of the traction has come, s."""
+    """Time of half of the traction, s."""
     k = int(np.argmax(told[:, 1] > 50e6))
     return float(np.interp(50e6, told[k - 1 : k + 1, 1], told[k - 1 : k + 1, 0]))
 
@@ -91,8 +91,8 @@ def test_a_spinning_joint_keeps_its_momenta() -> None:
 @pytest.mark.parametrize(
     ("way", "energy"), [((0.0, 0.0, 5.0), 2000.0), ((5.0, 0.0, 0.0), 4000.0), ((3.0, 2.0, 3.6), 2670.0)]
 )
-def test_a_joint_that_is_torn_takes_its_energy(way: tuple[float, float, float], energy: float) -> None:
-    """Peeled off, sheared, and both: G A within 2 %."""
+def test_a_torn_joint_absorbs_its_energy(way: tuple[float, float, float], energy: float) -> None:
+    """In tension, in shear, and in both: G A within 2 %."""
     law = 'strength = "50 MPa"\nshear_strength = "70 MPa"\nenergy = "2 kJ/m^2"\nshear_energy = "4 kJ/m^2"\n'
     parts = block("below", (0, 0, -4), (8, 8, 0), 2) + block("above", (0, 0, 0), (8, 8, 4), 1.3)
     drives = moved(3.9e-3, 1, way) + moved(-1, -3.9e-3, (0.0, 0.0, 0.0))
@@ -106,11 +106,11 @@ def test_a_joint_that_is_torn_takes_its_energy(way: tuple[float, float, float], 
 
 
 @pytest.mark.parametrize("way", [(0.0, 0.0, 50.0), (50.0, 0.0, 0.0), (30.0, 20.0, 36.0)])
-def test_a_joint_that_opens_in_some_twenty_steps_takes_what_its_law_says(
+def test_a_joint_that_opens_in_twenty_steps_absorbs_the_energy_of_its_law(
     way: tuple[float, float, float], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The sum of 2 G(B) (1 - D) dD A over rows and steps, B the share of shear that a row has in a step: waves bend
-    blocks that are driven at this speed, so that a joint in shear is peeled as well.
+    """The sum of 2 G(B) (1 - D) dD A over rows and steps, B the share of shear of a row in a step: waves bend blocks
+    that are driven at this speed, so that a joint in shear also has tension.
     """
     taken = 0.0
     plain = bond_law.open_bonds
@@ -135,7 +135,7 @@ def test_a_joint_that_opens_in_some_twenty_steps_takes_what_its_law_says(
     assert end.fracture == pytest.approx(taken, rel=0.01)
 
 
-def test_what_was_torn_apart_meets_again() -> None:
+def test_a_torn_joint_is_in_contact_again() -> None:
     course = 'course = [["0 us", 1], ["6 us", 1], ["8 us", -2]]'
     parts = block("below", (0, 0, -6), (8, 8, 0), 2) + block("above", (0.7, 0.7, 0), (7.3, 7.3, 6), 1.3)
     law = 'strength = "30 MPa"\nenergy = "100 J/m^2"\n'

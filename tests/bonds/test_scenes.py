@@ -1,4 +1,4 @@
-"""Tied bonds in scenes of little else: no contact, an interface that erodes as a whole, two velocities at the start."""
+"""Tied bonds in minimal cases: no contact, an interface that erodes completely, two velocities at the start."""
 
 from pathlib import Path
 
@@ -41,14 +41,14 @@ def test_an_interface_that_has_eroded_ties_nothing() -> None:
 
 
 @pytest.mark.parametrize(("velocity", "told"), [("velocity = [0, 0, 3]", 1), ("", 0)])
-def test_bonded_parts_of_two_velocities_are_told(velocity: str, told: int) -> None:
+def test_bonded_parts_of_two_velocities_are_reported(velocity: str, told: int) -> None:
     found = assemble(load.parse_toml(joint(below=velocity)), Path()).warnings
     assert sum("'below' and 'above' start at two velocities where they are tied, up to 3" in w for w in found) == told
 
 
 @pytest.mark.parametrize("third", ["shared", "tied", ""])
 def test_three_parts_of_one_body_have_a_bond_at_each_interface(third: str) -> None:
-    """Two of them without one would come apart there, and not meet."""
+    """Two of them without a bond would separate there, without contact."""
     corners = {"a": ((0, 0, 0), (2, 1, 1)), "b": ((0, 0, 1), (1, 1, 2)), "c": ((1, 0, 1), (2, 1, 2))}
     blocks = "".join(block(name, *both, 0.5) for name, both in corners.items())
     bonds = [("a", "b", "shared"), ("b", "c", "shared"), *([("a", "c", third)] if third else [])]

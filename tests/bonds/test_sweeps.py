@@ -1,4 +1,4 @@
-"""The kernels of tied rows against plain numpy: the impulses that tie are those of the linear equations."""
+"""Kernels of tied rows against plain numpy: the impulses solve the linear equations."""
 
 import numpy as np
 import pytest
@@ -107,8 +107,8 @@ def test_a_bond_carries_what_its_ellipse_allows() -> None:
 
 @pytest.mark.parametrize(("share", "pulls"), [(0.0, [1]), (0.3, [1]), (1.0, [1]), (0.0, 40 * [1] + 30 * [-1])])
 def test_a_bond_that_is_opened_takes_its_energy(share: float, pulls: list[int]) -> None:
-    """Opened at one speed, of which ``share`` of the square is along the interface, it takes G per area in all; what
-    closes in between, and opens again, takes and gives nothing.
+    """Opened at one velocity with the ``share`` of its square along the interface, it absorbs G per area in all;
+    closing and opening again in between takes and releases no energy.
     """
     normal, shear, area, dt, energies = 3e6, 5e6, 2.0, 1e-3, (40.0, 90.0)
     some = layout(0, np.array([[normal, shear, *energies, 1.0]]))

@@ -1,20 +1,22 @@
-"""A bar that is stretched evenly and breaks, in one dimension and plain numpy: what fracture in tets is compared with.
+"""One-dimensional model of a bar that is stretched uniformly and breaks, in plain numpy: a reference for fracture in
+tets.
 
-Linear elements of length h with half of their mass at each end, and between every two an interface that may open. The
-ends of the bar are driven at the speeds of the even stretch: to the bar they are mirrors, and what is left at either
-end is half a fragment.
+Linear elements of length h with half of their mass at each end, and an interface between every two that may open. The
+ends of the bar are driven at the velocities of the uniform stretch: they act as mirrors, and the piece at either end is
+half a fragment.
 
 With D the largest opening d so far and S = strength (1 - D / critical), not below 0, the law is
 
-    T = S d / D              the linear law while D grows, the secant through the origin when the opening falls back
+    T = S d / D              linear while D grows, the secant through the origin for unloading
+
     T = min(S, S o / (D + a S))   where S a > 2 D, with 0 for o < 0
 
-The secant is as stiff as it likes to be: where it is too stiff for the step it is taken at the end of it. There the
-opening is o - a T, if o = d + dt w is what it would be without T (w: relative velocity after the kick of the elements),
-a = 2 dt^2 / m and m the mass of either side. D = 0 is an interface that has never opened and is rigid up to S. Faces
-that would still pass each other are brought to rest against each other by an impulse: no overlap.
+Where the secant is too stiff for an explicit step, the traction is taken at the end of the step (implicit). The opening
+is then o - a T, with o = d + dt w the opening without T (w: relative velocity after the kick of the elements), a = 2
+dt^2 / m and m the mass of either side. D = 0 is an interface that has never opened; it is rigid up to S. Faces that
+would pass each other are stopped by an impulse: no overlap.
 
-The energy taken by an interface is strength D / 2, or G_c when it has failed, and T d / 2 can be had back.
+The energy absorbed by an interface is strength D / 2, or G_c after failure; T d / 2 of it is recoverable.
 """
 
 from dataclasses import dataclass
@@ -75,27 +77,27 @@ class Bar:
 
 @dataclass(frozen=True)
 class Energies:
-    """J/m^2: of the cross-section."""
+    """Energies per cross-section, J/m^2."""
 
     kinetic: float
     elastic: float
     cohesive: float
-    """Taken by opening."""
+    """Energy absorbed by opening."""
     stored: float
-    """That open interfaces give back when they close."""
+    """Energy that open interfaces release when they close."""
     contact: float
     external: float
     initial: float
 
     @property
     def residual(self) -> float:
-        """What the lines do not close by, as a share of elastic, cohesive and contact energy."""
+        """Residual of the energy balance, as a share of elastic, cohesive and contact energy."""
         inside = self.kinetic + self.elastic + self.cohesive + self.stored + self.contact
         return (inside - self.initial - self.external) / (self.elastic + self.cohesive + self.contact)
 
 
 class Run:
-    """A bar in an even stretch at ``rate``, 1/s, that begins with the stress ``share`` of ``Bar.strength``.
+    """Bar with a uniform stretch rate ``rate``, 1/s, that starts with the stress ``share`` of ``Bar.strength``.
 
     ``kick`` and ``move`` are a step: leapfrog, velocities half a step behind or ahead of positions.
     """
@@ -134,12 +136,12 @@ class Run:
 
     @property
     def failed(self) -> int:
-        """Interfaces that are open for good."""
+        """Interfaces that have failed."""
         return int((self.largest >= self.critical).sum())
 
     @property
     def size(self) -> float:
-        """Mean size of the fragments in s_0; the two at the ends are halves."""
+        """Mean size of the fragments in s_0; the pieces at the two ends count as halves."""
         return self.bar.length / max(self.failed, 1) / self.bar.s_0
 
     @property
@@ -148,7 +150,7 @@ class Run:
 
     @property
     def _power(self) -> float:
-        """Of the ends, W/m^2."""
+        """Power of the driven ends, W/m^2."""
         stress = self.stress
         return float(stress[-1] * self.v[-1, 1] - stress[0] * self.v[0, 0])
 
@@ -177,7 +179,9 @@ class Run:
         self.deepest = max(self.deepest, float(-self.opening.min()))
 
     def energies(self) -> Energies:
-        """At time n, between ``kick`` and ``move``: of the impulses of this step only the first half has been spent."""
+        """Energies at time n, between ``kick`` and ``move``: only the first half of the impulses of this step has
+        done work.
+        """
         left = self.strength * np.maximum(1.0 - self.largest / self.critical, 0.0)
         opened = np.maximum(self.opening, 0.0)
         share = np.divide(opened, self.largest, out=np.zeros_like(opened), where=self.largest > 0.0)

@@ -1,4 +1,4 @@
-"""The facets of a mesh, by both of their sides."""
+"""Facets of a mesh, each with both of its sides."""
 
 import numpy as np
 

@@ -1,4 +1,6 @@
-"""Bonds that break: what it takes, in tension, in shear and in both; where a part fractures besides; any cut."""
+"""Bonds that break: energy in tension, shear and mixed mode; bonds of parts that fracture; independence of the
+partition.
+"""
 
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -21,10 +23,10 @@ BOND = {"strength": "20 MPa", "shear_strength": "30 MPa", "energy": "10 J/m^2", 
 
 
 class Ended(NamedTuple):
-    """What a run has left."""
+    """Results of a run."""
 
     spent: float
-    """Of energy in the bond, over its area, J/m^2."""
+    """Energy absorbed by the bond, over its area, J/m^2."""
     broken: int
     residual: float
     digest: str | None
@@ -33,7 +35,7 @@ class Ended(NamedTuple):
 
 
 def drawn(x: str, z: str) -> list[dict[str, Any]]:
-    """The lower end stands, the upper one is drawn; nothing moves along y."""
+    """Scene: the lower end is fixed, the upper one is driven; no motion along y."""
     below, above = [-1, -1, "0.1 mm"], [-1, -1, "5.9 mm"]
     return [
         {"kind": "velocity", "x": 0, "z": 0, "low": [-1, -1, -1], "high": [1, 1, below[2]]},
@@ -66,7 +68,7 @@ def _run(sim: Simulation, between: Any) -> Ended:
     )  # fmt: skip
 
 
-def test_a_bond_that_is_pulled_apart_takes_its_energy() -> None:
+def test_a_bond_in_tension_absorbs_its_energy() -> None:
     case = joint(("alumina", "steel"), BOND, boundaries=drawn("0 m/s", "2 m/s"), run={"end_time": "3 us"})
     (ended,) = on(1, case, PARTS, run)
     assert ended.spent == pytest.approx(10.0, rel=0.02)
@@ -75,11 +77,12 @@ def test_a_bond_that_is_pulled_apart_takes_its_energy() -> None:
 
 
 @pytest.mark.parametrize(("x", "z", "least", "most"), [(1.0, 0.0, 25.0, 25.0), (1.0, 1.0, 10.0, 25.0)])
-def test_a_bond_in_shear_takes_what_the_share_of_shear_makes_of_both_energies(
+def test_a_bond_in_mixed_mode_absorbs_energy_by_its_share_of_shear(
     x: float, z: float, least: float, most: float
 ) -> None:
-    """All nodes move along one line, so that no facet turns: then the traction that breaks a facet has one direction,
-    and w_n / 10 + w_s / 25 = 1 says what it takes, w_n and w_s the shares of the work of both modes."""
+    """All nodes move along one line, so that no facet rotates: the traction that breaks a facet has one direction,
+    and w_n / 10 + w_s / 25 = 1 gives the energy, with w_n and w_s the work in both modes.
+    """
     slide = {"kind": "velocity", "y": 0, "low": [-1, -1, -1], "high": [1, 1, 1]}
     if z == 0.0:
         slide["z"] = 0
@@ -94,7 +97,7 @@ def test_a_bond_in_shear_takes_what_the_share_of_shear_makes_of_both_energies(
 
 
 def _with_shares(sim: Simulation) -> tuple[Ended, float]:
-    """Besides, the mean energy by the tractions that have broken the facets."""
+    """Also returns the mean energy from the tractions that broke the facets."""
     found: list[float] = []
     assert sim.fracture is not None
     insertion = sim.fracture._insertion
@@ -129,8 +132,8 @@ def test_ranks_and_a_restart_change_no_bit_where_a_bond_breaks(form: Form, tmp_p
     assert again == one
 
 
-def test_a_bond_without_energy_lets_go_at_its_strength_and_one_without_strength_holds() -> None:
-    """Also where both of its parts break."""
+def test_a_bond_without_energy_breaks_at_its_strength_and_one_without_strength_holds() -> None:
+    """The same if both of its parts fracture."""
     keys: dict[str, Any] = {"boundaries": drawn("0 m/s", "2 m/s"), "run": {"end_time": "1.5 us"}}
     (ended,) = on(1, joint(("alumina", "steel"), {"strength": "20 MPa"}, **keys), PARTS, run)
     assert (ended.broken, ended.fragments, ended.spent) == (18, 2, 0.0)
@@ -143,14 +146,14 @@ def test_a_bond_without_energy_lets_go_at_its_strength_and_one_without_strength_
 
 
 def _torn(sim: Simulation) -> tuple[Ended, int]:
-    """Besides, how many facets between the two parts have broken."""
+    """Also returns the number of broken facets between the two parts."""
     ended = run(sim)
     first, block = sim.model.part_starts[1], sim.model.blocks[0]
     return ended, int((block.bond[block.across // 4 >= first] != 0).sum())
 
 
-def test_what_a_bond_has_let_go_meets_in_contact() -> None:
-    """Pulled apart and pushed back: the parts bear the pressure, and none goes into the other."""
+def test_parts_of_a_broken_bond_are_in_contact() -> None:
+    """Pulled apart and pushed back: contact transmits the pressure, without penetration."""
     course = [[0, 1], ["1.5 us", 1], ["1.6 us", -1], ["5 us", -1]]
     ends = drawn("0 m/s", "2 m/s")
     ends[1]["course"] = course

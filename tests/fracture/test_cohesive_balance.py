@@ -1,7 +1,7 @@
-"""Cohesive facets give back what they have taken, and no more, at steps near the stable one: bodies that break.
+"""Cohesive facets release no more energy than they absorbed, at time steps near the stable one, in bodies that break.
 
-A facet that is pushed back beyond where it broke let its neighbours have half of strength times offset: more than the
-energy of fracture where the offset is longer than the critical opening.
+Without unloading, a facet that closes beyond its initial opening would give its neighbours half of strength times
+offset: more than the fracture energy, if the offset is longer than the critical opening.
 """
 
 from dataclasses import dataclass
@@ -67,7 +67,7 @@ dt_safety = {safety}
 end_time = {end}
 frames = 0
 """
-"""A cube of stone between two plates of steel; ``across``: they also slide."""
+"""Scene: a cube of stone between two plates of steel; ``across``: the plates also slide."""
 
 BAR = """
 name = "bar"
@@ -95,7 +95,7 @@ dt_safety = {safety}
 end_time = {end}
 frames = 0
 """
-"""A bar of glass that is stretched; with free ``ends`` it closes again."""
+"""Scene: a bar of glass that is stretched; with free ``ends`` it closes again."""
 
 BLOCK = """
 name = "block"
@@ -126,11 +126,11 @@ dt_safety = {safety}
 end_time = 10e-6
 frames = 0
 """
-"""A block of tets of any shape that spins into a wall askew."""
+"""Scene: a block of random tets that spins into an oblique wall."""
 
 
 def cube(safety: float, half: float = 2e-3, across: float = 0.0, scatter: str = "", end: float = 8e-6) -> str:
-    """``half``: of its edge."""
+    """``half``: half of its edge."""
     gap, plate = 1e-5, 2e-3
     face = half + gap
     return CUBE.format(
@@ -155,18 +155,18 @@ SCENES = {
     "askew": lambda safety: BLOCK.format(safety=safety),
     "six": lambda safety: cube(safety, half=3e-3, end=20e-6),
 }
-"""By what the scene does; ``six`` is the first on a cube of 6 mm."""
+"""Scenes by their subject; ``six`` is the first one with a cube of 6 mm."""
 
 
 @dataclass
 class Account:
-    """Of a run, J."""
+    """Energies of a run, J."""
 
     fracture: float = 0.0
     least: float = 0.0
-    """Smallest of what closing would give back, as a share of what was lost until then."""
+    """Smallest recoverable energy, as a share of the energy dissipated so far."""
     given: float = 0.0
-    """Most that all facets together had given at any time, more than they had taken."""
+    """Largest energy that all facets together had released beyond what they absorbed, at any time."""
     residual: float = 0.0
     facets: int = 0
 
@@ -195,8 +195,8 @@ def account(text: str) -> Account:
         for safety, quick in ((0.9, name in ("crushed", "stretched", "askew")), (0.7, False), (0.4, False))
     ],
 )
-def test_facets_that_are_pushed_back_give_nothing_unpaid(name: str, safety: float) -> None:
-    """What is left over are pairs that contact has pushed back in a way that the step before did not show."""
+def test_closing_facets_release_no_more_than_they_absorbed(name: str, safety: float) -> None:
+    """The rest is due to pairs that contact pushed back differently than in the step before."""
     found = account(SCENES[name](safety))
     print(f"{name} {safety}: {found}")
     assert found.facets > 100

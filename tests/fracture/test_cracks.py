@@ -1,4 +1,4 @@
-"""Contact across fresh cracks: nothing is pushed out, what closes stops, and a search changes nothing of that."""
+"""Contact across new cracks: no spurious impulses, closing cracks stop, and a broad phase changes no contact."""
 
 from collections.abc import Callable, Iterator
 from unittest.mock import patch
@@ -31,7 +31,7 @@ HEIGHT = 2.0 * MM
 
 @pytest.fixture(autouse=True)
 def only_the_plane_breaks() -> Iterator[None]:
-    """Its facets have a strength of 1 Pa, all others hold."""
+    """Facets of the plane have a strength of 1 Pa, all others do not break."""
     weak = plane(mesh_of(), HEIGHT)[:, 0]
 
     def strengths(self: Toughness, ids: Ints, area: Floats) -> Floats:
@@ -60,7 +60,7 @@ def sides(sim: Simulation) -> Flags:
 
 
 def at_rest(sim: Simulation) -> Simulation:
-    """The block just after all of the plane has broken by a stress of a few Pa: without stress, force and motion."""
+    """The block just after the whole plane has broken at a stress of a few Pa: without stress, force and motion."""
     nodes = sim.model.nodes
     step.prepare(sim)
     first = sim.model.nodes_global
@@ -103,8 +103,8 @@ def ticks(sim: Simulation, steps: int, look: Callable[[], None] = lambda: None) 
 
 
 @pytest.mark.parametrize("searched", [False, True])
-def test_nothing_is_pushed_out(searched: bool) -> None:
-    """The gap is zero, to the bit, and what is at rest stays there."""
+def test_a_new_crack_makes_no_impulse(searched: bool) -> None:
+    """The gap is zero, to the bit, and a body at rest stays at rest."""
     sim = cracked()
     assert sim.contact is not None
     assert (gaps(sim) == 0.0).all()
@@ -117,7 +117,7 @@ def test_nothing_is_pushed_out(searched: bool) -> None:
 
 @pytest.mark.parametrize("searched", [False, True])
 def test_sides_that_close_stop(searched: bool) -> None:
-    """In the step itself, with the momentum of both; the gap never falls below nothing."""
+    """Stopped in the same step, with conserved momentum; the gap is never negative."""
     sim = cracked()
     assert sim.contact is not None
     nodes, above = sim.model.nodes, sides(sim)
@@ -132,8 +132,9 @@ def test_sides_that_close_stop(searched: bool) -> None:
 
 
 def test_a_crack_that_closes_acts_as_two_bodies_do() -> None:
-    """The same two halves as parts of their own, which meet by nodes and faces from the beginning: the same motion as
-    long as they touch, and with it the same momentum of each."""
+    """The same two halves as separate parts, in contact by nodes and faces from the start: the same motion while
+    they touch, and the same momentum of each.
+    """
     sim = cracked()
     above = sides(sim)
     half = block((3, 3, 2), MM, shake=0.0)
@@ -157,8 +158,9 @@ def test_a_crack_that_closes_acts_as_two_bodies_do() -> None:
 
 @pytest.mark.parametrize("friction", [0.0, 0.3])
 def test_sides_that_slide_rub(friction: float) -> None:
-    """Pressed and sheared, the sides lose mu times the impulse that presses them, and without friction nothing but what
-    the strain, v / c = 2e-4, turns the faces by."""
+    """Pressed and sheared, the sides lose mu times the normal impulse, and without friction only the part by the
+    rotation of faces by the strain, v / c = 2e-4.
+    """
     sim = cracked(friction=friction)
     assert sim.contact is not None
     nodes, above = sim.model.nodes, sides(sim)
@@ -174,7 +176,7 @@ def test_sides_that_slide_rub(friction: float) -> None:
 
 @pytest.mark.parametrize("friction", [0.0, 0.2])
 def test_cracks_close_alike_on_any_number_of_ranks(friction: float) -> None:
-    """Closing and sliding, through searches, to the bit."""
+    """Closing and sliding, with broad phases in between: bit-identical."""
 
     def work(sim: Simulation) -> tuple[list[float], int]:
         at_rest(sim)
@@ -196,7 +198,9 @@ def test_cracks_close_alike_on_any_number_of_ranks(friction: float) -> None:
 
 
 def test_an_open_crack_carries_nothing_and_is_surface_after_a_search() -> None:
-    """Halves that part fly on as they are; a search finds the new faces when they are wide enough for others."""
+    """Halves that separate move freely; the broad phase adds the new faces when they are wide enough for other
+    contacts.
+    """
     sim = cracked()
     assert sim.contact is not None
     nodes, above = sim.model.nodes, sides(sim)

@@ -1,4 +1,4 @@
-"""What breaks a facet: the traction of the two sides, the cheap test before it, strengths and the delay."""
+"""Fracture criterion: traction of the two sides, inexpensive test before it, strengths, delay."""
 
 import math
 from typing import Any
@@ -32,7 +32,7 @@ GLASS = materials.Material(
 )  # fmt: skip
 MANY = 100_000
 ROWS = np.array([[0, 5, 4], [5, 1, 3], [4, 3, 2]])
-"""Which row of the state is which component of the deviator."""
+"""Row of the state for each component of the deviator."""
 
 
 def effective(traction: Floats, normal: Floats, weight: float, friction: float) -> Floats:
@@ -47,7 +47,7 @@ def effective(traction: Floats, normal: Floats, weight: float, friction: float) 
 
 
 def marks(corners: Floats, rows: Floats, weakest: Floats, weight: float) -> Ints:
-    """(n, 4) what ``mark_hot`` says of tets ``corners`` (n, 4, 3) under ``rows`` (n, 7) of stress."""
+    """(n, 4) result of ``mark_hot`` for tets ``corners`` (n, 4, 3) under ``rows`` (n, 7) of stress."""
     n = len(corners)
     out = np.zeros((n, 4), np.int64)
     for start in range(0, n, CHUNK):
@@ -71,8 +71,10 @@ def stresses(rows: Floats) -> Floats:
 
 
 @pytest.mark.parametrize("weight", [0.0, 0.3, 1.0, 4.0])
-def test_what_passes_is_hot_on_a_side_at_least(weight: float) -> None:
-    """Of 100 000 pairs of tets under any stress; and where both sides have the same, hot is what passes in tension."""
+def test_a_facet_that_passes_is_overstressed_on_one_side_at_least(weight: float) -> None:
+    """Check 100 000 pairs of tets with random stresses; with equal stress in both, the marked faces are those that
+    pass in tension.
+    """
     random = np.random.default_rng([1, int(10 * weight)])
     corners = REGULAR + random.uniform(-0.3, 0.3, (MANY, 4, 3))
     mirrored = corners.copy()
@@ -102,7 +104,7 @@ def test_what_passes_is_hot_on_a_side_at_least(weight: float) -> None:
 
 
 def loaded_sim(sim: Simulation) -> Simulation:
-    """Random stresses, by the id of the tet; every face hot, and none too strong."""
+    """Random stresses, by the id of the tet; every face is marked, and all tractions are below the strength."""
     step.prepare(sim)
     for b in sim.model.blocks:
         for row in (*range(S_XX, S_XY + 1), PRESSURE, VISCOUS):
@@ -120,7 +122,9 @@ def loaded_sim(sim: Simulation) -> Simulation:
 
 
 def tractions(sim: Simulation) -> dict[int, list[float]]:
-    """Of the facets of which this rank has the side of smaller id, by that side: the traction and the effective one."""
+    """Returns, for facets whose side of smaller id is on this rank, the traction and the effective one, by that
+    side.
+    """
     assert sim.fracture is not None
     found: dict[int, list[float]] = {}
     initiation = sim.fracture.initiation
@@ -139,8 +143,8 @@ def case_of(**fracture: Any) -> schema.Case:
 
 @pytest.mark.parametrize("source", ["tets", "nodes"])
 def test_tractions_are_those_of_numpy_and_the_same_on_any_number_of_ranks(source: str) -> None:
-    """The mean of both sides, or of the three nodes by volume, without the viscous part, on the outward normal of the
-    tet of smaller id, once a facet.
+    """The mean of both sides, or of the three nodes by volume, without the viscous part, on the outward normal of
+    the tet of smaller id, once for each facet.
     """
     mesh, case = block((3, 3, 2), 1e-3, seed=2), case_of(delay=0.0, shear_weight=0.7, friction=0.4, traction=source)
     sim = loaded_sim(build(case, [mesh]))
@@ -208,7 +212,7 @@ def test_the_effective_traction_is_that_of_camacho_and_ortiz() -> None:
 
 
 def test_a_facet_that_is_only_pressed_never_breaks() -> None:
-    """Hydrostatic pressure, whatever its size; the form of the paper's eq. (1) squares the normal traction."""
+    """Hydrostatic pressure of any size; the paper's eq. (1) squares the normal traction."""
     corners = np.repeat(REGULAR[None], 5, axis=0)
     rows = np.zeros((5, 7))
     rows[:, PRESSURE] = 10.0 ** np.arange(5.0)
@@ -227,8 +231,8 @@ def tough(**changes: object) -> Toughness:
     return toughness(GLASS.model_copy(update={"brittle": brittle}), schema.Fracture(), 1e-3)
 
 
-def test_a_modulus_next_to_nothing_makes_facets_that_never_break() -> None:
-    """And some that break at once, without a word of numpy."""
+def test_a_tiny_modulus_makes_facets_that_never_break() -> None:
+    """Others break at once, without a warning of numpy."""
     found = tough(modulus=1e-3).strengths(np.arange(100), np.ones(100))
     assert 0.0 < found.min() < 1e-200
     assert np.inf in found
@@ -236,8 +240,8 @@ def test_a_modulus_next_to_nothing_makes_facets_that_never_break() -> None:
 
 @pytest.mark.parametrize("modulus", [2.0, 8.0, 30.0])
 @pytest.mark.parametrize("seed", [0, 5])
-def test_strengths_are_weibulls(modulus: float, seed: int) -> None:
-    """Kolmogorov and Smirnov's test on the ids of a mesh; the strengths of one seed say nothing of another's."""
+def test_strengths_have_the_weibull_distribution(modulus: float, seed: int) -> None:
+    """Test of Kolmogorov and Smirnov on the ids of a mesh; strengths of different seeds are independent."""
     ids = 4 * np.arange(20_000) + np.arange(20_000) % 4
     area = np.ones(len(ids))
     found = tough(modulus=modulus, seed=seed, minimum=10e6).strengths(ids, area)
@@ -247,8 +251,8 @@ def test_strengths_are_weibulls(modulus: float, seed: int) -> None:
     assert abs(float(np.corrcoef(stats.rankdata(found[1:]), stats.rankdata(found[:-1]))[0, 1])) < 0.03
 
 
-def test_large_facets_are_weaker_as_their_weakest_link() -> None:
-    """A facet of k areas is as strong as the weakest of k facets of one."""
+def test_large_facets_are_as_strong_as_their_weakest_part() -> None:
+    """A facet of k areas has the strength of the weakest of k facets of one area."""
     ids, k = np.arange(40_000), 16
     one = tough(modulus=4.0, area=1e-6).strengths(ids, np.full(len(ids), 1e-6)).reshape(-1, k).min(axis=1)
     large = tough(modulus=4.0, area=1e-6).strengths(ids[: len(one)] + 10**6, np.full(len(one), k * 1e-6))
@@ -256,8 +260,8 @@ def test_large_facets_are_weaker_as_their_weakest_link() -> None:
     assert np.median(large) == pytest.approx(60e6 * (math.log(2.0) / k) ** 0.25, rel=0.02)
 
 
-def test_strengths_do_not_know_of_order_or_ranks() -> None:
-    """By the id of the facet: both sides say the same, and every rank what one rank says."""
+def test_strengths_are_independent_of_order_and_ranks() -> None:
+    """Strength by the id of the facet: equal on both sides and on all ranks."""
     mesh, case = block((3, 3, 2), 1e-3, seed=2), case_of()
 
     def strengths(sim: Simulation) -> dict[int, float]:
@@ -308,7 +312,8 @@ def test_the_delay_is_that_of_the_paper(factor: float) -> None:
 
 def test_the_delay_comes_from_the_work_on_two_half_spaces() -> None:
     """An incident stress s above the strength opens a crack whose traction falls linearly with the opening d:
-    rho c d' / 2 = s - T(d) on each side. The opening 2 energy / strength is reached at the time of eq. (3)."""
+    rho c d' / 2 = s - T(d) on each side. The opening 2 energy / strength is reached at the time of eq. (3).
+    """
     made = toughness(GLASS, schema.Fracture(delay=1.0), 1e-3)
     impedance = math.sqrt(2500.0 * 72e9 * 0.78 / (1.22 * 0.56))
     strength, energy = 60e6, 20.0

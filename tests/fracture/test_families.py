@@ -1,5 +1,5 @@
-"""Pieces that have an edge or a node alone in common do not pass each other there, while the cracks round it are
-narrow, and are let past where they would not.
+"""Pieces that share only an edge or a node: they do not pass each other there while the cracks round it are narrow,
+and pass where their faces would not touch.
 """
 
 from collections.abc import Iterator, Sequence
@@ -53,7 +53,7 @@ def planes_that_break(mesh: TetMesh, axes: list[int]) -> Iterator[None]:
 
 @pytest.fixture
 def columns_come_apart() -> Iterator[None]:
-    """Four columns are left, each beside two and facing one across the edge in the middle."""
+    """Four columns remain, each beside two others and opposite one across the edge in the middle."""
     with planes_that_break(mesh_of(), [0, 2]):
         yield
 
@@ -74,8 +74,8 @@ def columns(sim: Simulation) -> Ints:
 
 
 def at_rest(sim: Simulation, axes: Sequence[int] = (0, 2)) -> Simulation:
-    """The block just after the planes of these ``axes`` have broken by a stress of a few Pa: without stress, force and
-    motion.
+    """The block just after the planes of these ``axes`` have broken at a stress of a few Pa: without stress, force
+    and motion.
     """
     nodes = sim.model.nodes
     step.prepare(sim)
@@ -96,14 +96,14 @@ def at_rest(sim: Simulation, axes: Sequence[int] = (0, 2)) -> Simulation:
 
 
 def meeting(sim: Simulation) -> Ints:
-    """Two columns that have the edge in common meet there at 4 m/s, the two others make way."""
+    """Two columns that share the edge collide there at 4 m/s, the two others move away."""
     which, speed = columns(sim), np.array([[1.0, 0.0, 1.0], [1.2, 0.0, -1.2], [-1.2, 0.0, 1.2], [-1.0, 0.0, -1.0]])
     sim.model.nodes.v[:] = speed[which] * 2.0
     return which
 
 
 def depth(sim: Simulation, which: Ints) -> float:
-    """How far the edge of one column has come into the one that it faces, m; one rank."""
+    """Penetration of the edge of one column into the opposite one, m; one rank."""
     nodes = sim.model.nodes
     edge = (nodes.x0[:, [0, 2]] == MIDDLE).all(axis=1)
     low, high = (nodes.x[edge & (which == k)][:, [0, 2]] for k in (0, 3))
@@ -113,8 +113,8 @@ def depth(sim: Simulation, which: Ints) -> float:
 
 @pytest.mark.usefixtures("columns_come_apart")
 @pytest.mark.parametrize("searched", [False, True])
-def test_what_has_an_edge_alone_in_common_does_not_pass(searched: bool) -> None:
-    """To a twentieth of the way that they would have gone, which five sweeps leave; momentum is exact."""
+def test_pieces_that_share_an_edge_do_not_pass_there(searched: bool) -> None:
+    """To a twentieth of the free penetration, which five sweeps leave; momentum is exact."""
     sim = at_rest(build(case_of(), [mesh_of()]))
     assert sim.contact is not None
     which, nodes = meeting(sim), sim.model.nodes
@@ -129,9 +129,9 @@ def test_what_has_an_edge_alone_in_common_does_not_pass(searched: bool) -> None:
     assert (nodes.mass[:, None] * nodes.v).sum(axis=0) == pytest.approx(before, abs=1e-12 * nodes.mass.sum())
 
 
-def test_what_passes_behind_a_node_is_not_held() -> None:
-    """Eight octants have a node in common. One leaves past its corner, below the plane of a side of the one that it
-    faces but behind all of its tets, while the others fly apart: nothing touches, nobody's velocity changes.
+def test_a_piece_that_passes_behind_a_node_is_free() -> None:
+    """Eight octants share a node. One moves past its corner, below the plane of a side of the opposite one but
+    behind all of its tets, while the others move apart: no contact, and no velocity changes.
     """
     mesh = mesh_of(4)
     with planes_that_break(mesh, [0, 1, 2]):
@@ -150,8 +150,8 @@ def test_what_passes_behind_a_node_is_not_held() -> None:
 
 
 @pytest.mark.usefixtures("columns_come_apart")
-def test_it_is_held_alike_on_any_number_of_ranks() -> None:
-    """Through searches, to the bit."""
+def test_contact_at_a_shared_edge_is_equal_on_any_number_of_ranks() -> None:
+    """With broad phases in between: bit-identical."""
 
     def work(sim: Simulation) -> list[float]:
         at_rest(sim)

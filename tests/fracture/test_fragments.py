@@ -1,4 +1,4 @@
-"""Fragments: found as scipy finds them, with the mass and motion of the nodes, and the same on any number of ranks."""
+"""Fragments: connectivity as by scipy, mass and motion of the nodes, independence of the number of ranks."""
 
 import itertools
 import math
@@ -30,7 +30,7 @@ RANKS = (1, 2, 3, 5)
 
 @dataclass
 class Body:
-    """A whole mesh with its bonds; the last part may have no table of faces at all."""
+    """A whole mesh with its bonds; the last part may have no table of faces."""
 
     x0: Floats
     x: Floats
@@ -42,12 +42,14 @@ class Body:
     bond: Ints
     held: Ints
     bare: int = -1
-    """A part whose block has neither faces nor bonds."""
+    """Part whose block has neither faces nor bonds."""
     gone: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
-    """Tets that have eroded, and are still named behind the faces of others."""
+    """Tets that have eroded, but are still named behind the faces of others."""
 
     def rank(self, owner: Ints, rank: int) -> tuple[Model, Ints]:
-        """What one of several ranks holds of it; ``owner`` (n,) of each tet. Every pair is held by one of its ranks."""
+        """Returns the part of the mesh on each of several ranks; ``owner`` (n,) of each tet. Every pair is given on
+        one of its ranks.
+        """
         mine = np.setdiff1d(np.flatnonzero(owner == rank), self.gone)
         ids = np.unique(self.tets[owner == rank])
         home = np.full(len(self.x), -1, np.int32)
@@ -87,7 +89,9 @@ class Body:
 
 
 def body(seed: int, cells: tuple[int, int, int] = (5, 4, 3), broken: float = 0.6, parts: int = 1) -> Body:
-    """Blocks of 1 mm cells side by side, 1 m from the origin, whose faces broke at random; a tenth of those hold."""
+    """Blocks of 1 mm cells side by side, 1 m from the origin, with randomly broken faces; a tenth of these are held
+    by a cohesive facet.
+    """
     random = np.random.default_rng(seed)
     x0, tets, part = np.zeros((0, 3)), np.zeros((0, 4), np.int64), np.zeros(0, np.int64)
     for index in range(parts):
@@ -110,7 +114,7 @@ def body(seed: int, cells: tuple[int, int, int] = (5, 4, 3), broken: float = 0.6
 
 
 def owners(b: Body, ranks: int, seed: int) -> Ints:
-    """Tets dealt out at random; with five ranks one has none."""
+    """Returns the tets distributed at random; with five ranks one has none."""
     return np.random.default_rng(seed).integers(0, ranks - (ranks == 5), len(b.tets))
 
 
@@ -169,8 +173,8 @@ def test_a_part_without_faces_is_one_fragment() -> None:
     assert len(np.unique(expected[b.part == 1])) == 1
 
 
-def test_what_has_eroded_joins_nothing() -> None:
-    """Faces and pairs that still name tets of no rank; no two fragments become one across them."""
+def test_eroded_tets_join_no_fragments() -> None:
+    """Faces and pairs that name removed tets connect no fragments."""
     b = body(29, broken=0.3)
     b.gone = np.random.default_rng(2).choice(len(b.tets), len(b.tets) // 3, replace=False)
     b.held = b.held[~np.isin(b.held, b.gone).all(axis=1)]
@@ -184,7 +188,7 @@ def test_what_has_eroded_joins_nothing() -> None:
 
 
 def test_chains_are_found_in_any_order_of_their_numbers() -> None:
-    """A path whose numbers are shuffled, rise and fall, or branch from the largest: what is slow for hooking."""
+    """Paths whose ids are shuffled, ascending or descending, or branch from the largest: slow cases for union-find."""
     n = 3000
     random = np.random.default_rng(0)
     comb = np.concatenate([np.arange(n // 2), np.arange(n // 2, n)[::-1]]).reshape(2, -1).T.reshape(-1)
@@ -261,7 +265,7 @@ def test_the_table_has_the_same_bits_on_any_number_of_ranks(tmp_path: Path) -> N
 
 
 def test_plain_sums_would_not_have_the_same_bits() -> None:
-    """The control: momentum of the largest fragment, summed rank by rank."""
+    """Control: the momentum of the largest fragment, summed in floating point rank by rank, depends on the ranks."""
     b = body(13, cells=(7, 5, 4), broken=0.62)
     labels = b.labels()
     largest = np.flatnonzero(labels == np.bincount(labels).argmax())
@@ -273,8 +277,8 @@ def test_plain_sums_would_not_have_the_same_bits() -> None:
     assert len(found) > 1
 
 
-def test_dust_keeps_its_digits_beside_a_large_body() -> None:
-    """A fragment of 1e-5 of the size: inertia 1e-25 of the other's, as exact as if it were alone."""
+def test_a_small_fragment_keeps_its_digits_beside_a_large_one() -> None:
+    """A fragment of 1e-5 of the size, with 1e-25 of the inertia of the other, has the same digits as alone."""
     large, small = body(1, cells=(3, 3, 3), broken=0.0), body(2, cells=(1, 1, 1), broken=0.0)
     place = np.array([0.3, 1.0, -0.7])
     for points in (small.x0, small.x):
@@ -294,7 +298,8 @@ def test_dust_keeps_its_digits_beside_a_large_body() -> None:
 
 def test_a_spinning_block_has_the_momentum_and_energy_of_its_lumped_masses() -> None:
     """Cubes of edge h, six tets each: the four nodes on a side of a cube have half of its mass, so that of m h^2 / 12
-    becomes m h^2 / 4, and four thirds of the corners' share lie along the diagonal, so the product is m h^2 / 12."""
+    becomes m h^2 / 4, and four thirds of the corners' share lie along the diagonal, so the product is m h^2 / 12.
+    """
     n, h, rho = (6, 4, 2), 2e-3, 2500.0
     mesh = block(n, h, shake=0.0)
     a, b, c = (h * k for k in n)
@@ -323,7 +328,7 @@ def test_a_spinning_block_has_the_momentum_and_energy_of_its_lumped_masses() -> 
 
 
 def test_the_largest_piece_of_a_fragment_keeps_its_number() -> None:
-    """Faces break and tets erode, four times: by a plain search, and alike on any number of ranks."""
+    """Faces break and tets erode, four times: against a plain search, and alike for any number of ranks."""
     b, random, gone = body(17, broken=0.3), np.random.default_rng(1), np.zeros(0, np.int64)
     known, following = np.full(len(b.tets), numbers.UNKNOWN), 0
     for _ in range(4):
@@ -356,7 +361,7 @@ def test_the_largest_piece_of_a_fragment_keeps_its_number() -> None:
 
 
 def plainly_numbered(before: Ints, labels: Ints, following: int) -> tuple[Ints, list[list[int]]]:
-    """As ``numbers.numbered`` says it, by dictionaries."""
+    """Reference of ``numbers.numbered``, by dictionaries."""
     common: dict[tuple[int, int], int] = {}
     for key in zip(before.tolist(), labels.tolist(), strict=True):
         common[key] = common.get(key, 0) + 1
@@ -372,7 +377,7 @@ def plainly_numbered(before: Ints, labels: Ints, following: int) -> tuple[Ints, 
 
 @pytest.mark.parametrize("ranks", [1, 3])
 def test_the_part_of_a_fragment_does_not_follow_from_its_number(ranks: int) -> None:
-    """A number that lasts says nothing of the tets: here they fall as those of the tets rise."""
+    """A persistent number does not determine tets: here the numbers decrease while those of the tets increase."""
     b = body(5, parts=3)
     of_tet, last = b.labels(), len(b.tets) + 1000
 

@@ -1,4 +1,4 @@
-"""What a part is told of its mesh and its step before it breaks."""
+"""Warnings about mesh and time step of a part that fractures."""
 
 import re
 from typing import Any
@@ -18,7 +18,7 @@ GLASS = materials.Material(
 
 
 def told(size: float, safety: float = 0.9, rate: float = 0.0, **spec: Any) -> list[str]:
-    """Of glass with tets of edge ``size``, m, drawn apart along x at a ``rate``, 1/s."""
+    """Returns the warnings for glass with tets of edge ``size``, m, stretched along x at a ``rate``, 1/s."""
     fracture = schema.Fracture(model="cohesive", **spec)
     stretch = {"rate": (rate, 0.0, -2.0 * rate)}
     pane = schema.Part.model_validate(
@@ -28,8 +28,8 @@ def told(size: float, safety: float = 0.9, rate: float = 0.0, **spec: Any) -> li
 
 
 @pytest.mark.parametrize("size", [0.6e-3, 0.7e-3, 1e-3, 1.23e-3, 2e-3, 3.1e-3])
-def test_a_zone_that_is_as_long_as_it_was_asked_to_be_is_resolved(size: float) -> None:
-    """To the last bits."""
+def test_a_cohesive_zone_of_the_requested_length_is_resolved(size: float) -> None:
+    """The ratio equals the requested one up to the last bits."""
     assert not [line for line in told(size, resolve="strength") if "resolved" in line]
 
 
@@ -51,8 +51,8 @@ def test_the_advice_on_the_step_helps() -> None:
     assert "no law can be followed" in told(5e-3, 1.05 * limit)[-1]
 
 
-def test_what_is_drawn_apart_opens_by_that_besides() -> None:
-    """Glass lets go at 4.3 m/s; at 64,000/s tets of 0.6 mm are drawn apart by 38 m/s."""
+def test_a_stretched_part_opens_by_its_rate_as_well() -> None:
+    """Glass opens at 4.3 m/s when it breaks; at 64,000/s tets of 0.6 mm are stretched by 38 m/s."""
     assert not [line for line in told(0.6e-3) if "no law" in line]
     [line] = [line for line in told(0.6e-3, rate=64e3) if "no law" in line]
     found = re.search(r"would open by (\S+) um in a step of (\S+) ns", line)
@@ -61,7 +61,7 @@ def test_what_is_drawn_apart_opens_by_that_besides() -> None:
     assert opening / step == pytest.approx(64e3 * 0.6e-3 + 60e6 / 14.2e6, rel=0.02)
 
 
-def test_a_line_names_all_parts_that_it_is_told_of_or_the_first_few() -> None:
+def test_a_warning_names_its_parts_or_the_first_few() -> None:
     bricks = [f"brick{k}" for k in range(8)]
     assert merged({"long": ["a", "b"], "wide": ["a"]}) == ["a, b: long", "a: wide"]
     assert merged({"long": bricks}) == ["brick0, brick1, brick2, brick3, brick4 and 3 more: long"]

@@ -1,4 +1,4 @@
-"""Node separation: pieces of stars as scipy finds them, and copies numbered alike on any number of ranks."""
+"""Node separation: pieces of stars as by scipy, and copies numbered alike for any number of ranks."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -41,7 +41,7 @@ STEPS = 40
 
 @pytest.mark.parametrize("seed", range(4))
 def test_pieces_are_those_of_scipy(seed: int) -> None:
-    """Of every node of a block whose facets broke at random, in three shares."""
+    """Check every node of a block with randomly broken facets, in three shares."""
     random = np.random.default_rng(seed)
     mesh = block((4, 3, 3), seed=seed)
     facets = inner(mesh)
@@ -81,7 +81,7 @@ def test_pieces_are_those_of_scipy(seed: int) -> None:
 
 @dataclass
 class Cracked:
-    """A whole mesh after some events."""
+    """Whole mesh after some events."""
 
     tets: Ints
     """(n, 4) global nodes."""
@@ -94,7 +94,9 @@ class Cracked:
 
 
 def expected_tets(mesh: TetMesh, events: Sequence[Ints]) -> tuple[Ints, list[int]]:
-    """Connectivity after some events, by plain search through sets; and how often each node of the end was a copy."""
+    """Returns the connectivity after some events, by a plain search through sets, and how often each final node was
+    a copy.
+    """
     tets, broken, n = mesh.tets.astype(np.int64), set[int](), len(mesh.points)
     depth = [0] * n
     behind = across(mesh.tets)
@@ -131,7 +133,7 @@ def case_of(**fracture: object) -> schema.Case:
 
 
 def arranged(model: Model) -> None:
-    """Velocities that tell nodes apart, and bonds."""
+    """Velocities that distinguish nodes, and bonds."""
     model.nodes.v[:] = np.sin(model.nodes.id[:, None] + np.arange(3.0))
     for b in model.blocks:
         b.bond = np.full((b.n, 4), INTACT, np.uint8)
@@ -159,7 +161,7 @@ def break_on(model: Model, separation: Separation, facets: Ints, comm: Comm) -> 
 
 
 def cracked(mesh: TetMesh, events: Sequence[Ints], ranks: int) -> Cracked:
-    """The mesh after some events, put together from the ranks, whose copies of a node must not differ."""
+    """Returns the mesh after some events, put together from the ranks; copies of a node must agree."""
     pieces = pieces_of(case_of(), [mesh], ranks)
 
     def work(comm: Comm) -> tuple[Model, list[Ints]]:
@@ -197,7 +199,7 @@ def cracked(mesh: TetMesh, events: Sequence[Ints], ranks: int) -> Cracked:
 
 
 def random_events(mesh: TetMesh, seed: int, shares: Sequence[float]) -> list[Ints]:
-    """Facets that break in one event after the other, these shares of all."""
+    """Shares of all facets that break in one event after the other."""
     facets = np.random.default_rng(seed).permutation(inner(mesh))
     ends = np.cumsum([0, *(int(share * len(facets)) for share in shares)])
     return [facets[a:b] for a, b in pairwise(ends)]
@@ -205,8 +207,8 @@ def random_events(mesh: TetMesh, seed: int, shares: Sequence[float]) -> list[Int
 
 @pytest.mark.parametrize("ranks", RANKS)
 @pytest.mark.parametrize("seed", [1, 2])
-def test_nodes_separate_as_by_hand_on_any_number_of_ranks(seed: int, ranks: int) -> None:
-    """Five events: nodes that split again, copies that split, and in the end no facet that holds."""
+def test_nodes_separate_as_in_a_plain_search_on_any_number_of_ranks(seed: int, ranks: int) -> None:
+    """Five events: nodes that separate again, copies that separate, and finally no intact facet."""
     mesh = block((3, 2, 2), seed=seed)
     events = random_events(mesh, seed, (0.35, 0.2, 0.15, 0.1, 0.1))
     events.append(inner(mesh)[~np.isin(inner(mesh)[:, 0], np.concatenate(events)[:, 0])])
@@ -220,7 +222,7 @@ def test_nodes_separate_as_by_hand_on_any_number_of_ranks(seed: int, ranks: int)
 
 @pytest.mark.parametrize("ranks", RANKS)
 def test_mass_and_momentum_stay(ranks: int) -> None:
-    """Of every node with its copies; a copy is where its parent is, and has the mass of its tets."""
+    """Check every node with its copies: a copy has the position of its parent, and the mass of its tets."""
     mesh = block((3, 2, 2), seed=3)
     events = random_events(mesh, 3, (0.5, 0.2))
     found, before = cracked(mesh, events, ranks), cracked(mesh, [], 1)
@@ -272,8 +274,8 @@ def test_a_sheet_through_the_body_cuts_it_in_two(ranks: int) -> None:
 
 
 @pytest.mark.parametrize("ranks", [1, 2, 3])
-def test_hinges_are_let_go(ranks: int) -> None:
-    """Two tets on a facet, and two more that hold to them by a node and by an edge only."""
+def test_hinges_separate(ranks: int) -> None:
+    """Two tets joined by a facet, and two more connected to them by a node and by an edge only."""
     points = np.array(
         [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), (0, 0, -1),
          (-1, 0, 0), (-1, -1, 0), (-1, 0, 1), (2, 1, 0), (2, 0, 1)], float,
@@ -289,9 +291,9 @@ def test_hinges_are_let_go(ranks: int) -> None:
     assert (found.tets[3] == mesh.tets[3]).sum() == 3
 
 
-def test_a_rank_without_touched_nodes_has_no_part_in_a_break() -> None:
-    """A facet breaks at one end of a bar: the rank at the other end sends nothing and waits for nobody; the maximum of
-    three words before, and that of one behind, are part of the reductions of this step and of the next.
+def test_a_rank_without_touched_nodes_does_not_communicate() -> None:
+    """A facet breaks at one end of a bar: the rank at the other end sends and receives nothing; the maximum of three
+    words before, and that of one after, are part of the reductions of this step and of the next.
     """
     mesh, ranks = block((2, 2, 12), shake=0.0), 3
     pieces, facets = pieces_of(case_of(), [mesh], ranks), plane(mesh, 1.0)
@@ -323,7 +325,7 @@ def pulled(**fracture: object) -> schema.Case:
 @pytest.mark.parametrize("model", ["instant", "cohesive"])
 @pytest.mark.parametrize("form", ["standard", "split"])
 def test_a_step_in_which_nothing_breaks_costs_no_collective_of_its_own(model: str, form: str) -> None:
-    """Faces are overstressed and their clocks run, but the reduction of the step says that nothing breaks."""
+    """Faces are overstressed and their clocks run; the reduction of the step contains that no facet breaks."""
     mesh = block((2, 2, 4), 1e-3, seed=5)
     case = pulled(model=model, delay=1e3)
     case = case.model_copy(update={"contact": None})
@@ -351,8 +353,8 @@ def test_a_step_in_which_nothing_breaks_costs_no_collective_of_its_own(model: st
 
 
 def test_a_break_costs_no_collective_of_its_own() -> None:
-    """Facets break in most steps, here or there, and fragments meet: those that break, and those that have copies of
-    their surface, tell each other, and nobody else waits.
+    """Facets break in most steps, on different ranks, and fragments collide: only the ranks with broken facets, or
+    with ghosts of their surface, communicate.
     """
     case = pulled(delay=0.2)
 
@@ -382,8 +384,8 @@ def test_a_break_costs_no_collective_of_its_own() -> None:
         assert set(counts) == {0}
 
 
-def test_what_is_kept_between_two_steps_has_all_nodes() -> None:
-    """Also those that have come far from rank 0 in the last step, of which no reduction has told it yet."""
+def test_a_parcel_between_two_steps_has_all_nodes() -> None:
+    """Including nodes that separated far from rank 0 in the last step, which no reduction has contained yet."""
     case = pulled(delay=0.2).model_copy(update={"contact": None})
 
     def work(sim: Simulation) -> tuple[bool, int]:
@@ -406,7 +408,7 @@ def test_what_is_kept_between_two_steps_has_all_nodes() -> None:
 @pytest.mark.parametrize("model", ["instant", "cohesive"])
 @pytest.mark.parametrize("form", ["standard", "split"])
 def test_forces_are_those_of_the_tets_after_every_event(model: str, form: str) -> None:
-    """In integers, on one, two and three ranks; momentum to round-off; and all ranks break the same."""
+    """In integers, on one, two and three ranks; momentum to round-off; and all ranks break the same facets."""
     mesh = block((2, 2, 4), 1e-3, seed=5)
     case = pulled(model=model, delay=0.2)
     case = case.model_copy(update={"numerics": case.numerics.model_copy(update={"pressure": form})})
@@ -443,7 +445,7 @@ def test_forces_are_those_of_the_tets_after_every_event(model: str, form: str) -
 
 
 def test_ranks_without_a_part_of_nodal_tractions_take_part_in_them() -> None:
-    """Two bars side by side, one with nodal tractions: of five ranks some hold the other one only."""
+    """Two bars side by side, one with nodal tractions: of five ranks some have only the other one."""
     motion = {"stretch": schema.Stretch(rate=(0.0, 0.0, 3e4), centre=(0.0, 0.0, 2e-3)), "jitter": 3.0}
     specs = [schema.Fracture(delay=0.2, traction=traction) for traction in ("nodes", "tets")]
     case = meeting_of([{**motion, "fracture": spec} for spec in specs], material=BRITTLE, end=1.0)

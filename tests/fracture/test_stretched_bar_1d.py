@@ -1,4 +1,6 @@
-"""The stretched bar in one dimension: its crack against a closed form, its ledger, and the sizes of its fragments."""
+"""Stretched bar in one dimension: its crack against a closed form, its energy balance, and the sizes of its
+fragments.
+"""
 
 import numpy as np
 import pytest
@@ -11,7 +13,7 @@ ENOUGH = 20.0
 
 
 def stretched(bar: Bar, x: float, end: float) -> Run:
-    """A bar at x times rate_0, after ``end`` t_0; its ledger has been looked at all the time."""
+    """A bar at x times rate_0, after ``end`` t_0; its energy balance is checked in every step."""
     run = Run(bar, x * bar.rate_0)
     worst = 0.0
     while run.t < end * bar.t_0:
@@ -44,7 +46,7 @@ def test_the_law_is_linear_and_comes_back_on_the_secant() -> None:
     assert stiff == pytest.approx(3.0 * 0.998 / 0.004 * (0.01 - 0.01 * stiff))
 
 
-def test_a_lone_crack_opens_as_waves_allow() -> None:
+def test_a_single_crack_opens_as_in_closed_form() -> None:
     """The stress far away rises as E rate t, and d / dt = 2 (stress far away - T) / (rho c), so that
 
     d = 2 c rate t_0^2 (exp(t / t_0) - 1 - t / t_0) and the interface fails when exp(tau) - 1 - tau = 1 / x.
@@ -71,7 +73,7 @@ def test_a_lone_crack_opens_as_waves_allow() -> None:
 
 
 def test_fragments_that_meet_do_not_overlap() -> None:
-    """Two halves meet at 1 m/s each: the stress becomes rho c v, and closing takes the energy of the two nodes."""
+    """Two halves collide at 1 m/s each: the stress becomes rho c v, and closing takes the energy of the two nodes."""
     bar = Bar(length=2.5e-3, elements=200)
     run = Run(bar, 0.0, share=0.0)
     run.largest[99] = run.critical[99]
@@ -97,7 +99,7 @@ def test_a_bar_breaks_into_fragments_of_the_published_size(x: float) -> None:
 
 @pytest.mark.parametrize("x", [0.1, 0.3, 1.0])
 def test_a_bar_of_even_strength_breaks_into_the_smaller_fragments_of_the_ring_of_the_literature(x: float) -> None:
-    """The other fit, of a ring of even strength, has 21 to 30 % more fragments than that of a scatter of 1 %."""
+    """The other fit, for a ring of uniform strength, has 21 to 30 % more fragments than that for a scatter of 1 %."""
     length = 60.0
     bar = Bar(length=length * Bar().s_0, elements=24 * 60, scatter=1e-5)
     size = stretched(bar, x, 35.0 if x < 0.2 else 20.0).size

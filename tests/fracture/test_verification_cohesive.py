@@ -1,8 +1,8 @@
-"""V24, H5: a cohesive facet driven by prescribed positions, against its law on paper.
+"""V24, H5: a cohesive facet driven by prescribed positions, against the closed form of its law.
 
-From the moment of insertion on the pairs of nodes open by ``u``. With e the offset, n the normal, b^2 = 1 / weight and
-D = |(e + u)| in the norm of the law, the traction is strength (1 - (D - |e|) / critical) in size, along
-<d_n> n + b^2 d_t, and what it has taken when D = |e| + critical is energy times area, whatever the way.
+After insertion the pairs of nodes open by ``u``. With e the offset, n the normal, b^2 = 1 / weight and D = |(e + u)|
+in the norm of the law, the traction is strength (1 - (D - |e|) / critical) in size, along <d_n> n + b^2 d_t, and the
+absorbed energy at D = |e| + critical is energy times area, for any path.
 """
 
 import math
@@ -71,16 +71,16 @@ class Facet:
 
     @property
     def work(self) -> float:
-        """Done so far, J."""
+        """Work done so far, J."""
         return sum(self.energies()[:2])
 
     def energies(self) -> tuple[float, float, float]:
-        """Lost for good, what closing would give back, and what it takes in the end, J."""
+        """Dissipated, recoverable and fracture energy, J."""
         sums = exact_sums(SerialComm(), self.cohesion.columns())
         return self.cohesion.energies(sums, self.cohesion.gone.total(SerialComm()))
 
     def open(self, u: Floats, turned: Floats | None = None) -> None:
-        """The far side stands ``u`` (3,), m, from the first; ``turned`` (3, 3): rotation of everything."""
+        """Moves the far side by ``u`` (3,), m, from the first; ``turned`` (3, 3): rotation of everything."""
         x = self.x0.copy()
         x[3:] += u
         self.cohesion.open(x if turned is None else np.ascontiguousarray(x @ turned.T))
@@ -117,7 +117,7 @@ def test_the_traction_at_insertion_is_that_before(angle: float, weight: float) -
 @pytest.mark.parametrize("weight", [1.0, 0.25])
 @pytest.mark.parametrize("insertion", [0.0, 45.0, 90.0])
 @pytest.mark.parametrize("angle", ANGLES)
-def test_tearing_takes_the_energy_whatever_the_direction(angle: float, insertion: float, weight: float) -> None:
+def test_failure_absorbs_the_fracture_energy_in_any_direction(angle: float, insertion: float, weight: float) -> None:
     """Also along another direction than that of the traction at insertion."""
     mixed = direction(math.radians(insertion))
     size = math.sqrt((mixed @ NORMAL) ** 2 + weight * (1.0 - (mixed @ NORMAL) ** 2))
@@ -136,7 +136,7 @@ def test_the_traction_falls_linearly_with_the_opening(angle: float) -> None:
 
 
 @pytest.mark.parametrize("angle", ANGLES)
-def test_a_facet_returns_on_the_secant_and_gives_back_what_lies_under_it(angle: float) -> None:
+def test_a_facet_unloads_along_the_secant_and_releases_the_energy_under_it(angle: float) -> None:
     way, most = direction(math.radians(angle)), 0.4 * CRITICAL
     facet = Facet(STRENGTH * way)
     e, top = facet.offset, 0.6 * STRENGTH
@@ -158,9 +158,9 @@ def test_a_facet_returns_on_the_secant_and_gives_back_what_lies_under_it(angle: 
     assert facet.work == pytest.approx(ENERGY * AREA, rel=1e-6)
 
 
-def test_what_is_lost_never_comes_back() -> None:
-    """A random walk of the opening, closing beyond the start included. A step that takes a facet further back than it
-    may go gives half of the traction it had, times the step; one across the bracket <d_n>, where the mean of two forces
+def test_dissipated_energy_never_decreases() -> None:
+    """A random walk of the opening, including closing beyond the start. A step that closes a facet further than
+    allowed releases half of its traction times the step; one across the bracket <d_n>, where the mean of two forces
     is not exact, stiffness times step^2 / 8.
     """
     random, u, lost, largest = np.random.default_rng(3), np.zeros(3), [0.0], 0.0
@@ -183,8 +183,8 @@ def test_what_is_lost_never_comes_back() -> None:
 
 
 @pytest.mark.parametrize("angle", ANGLES)
-def test_a_facet_that_is_pushed_back_beyond_the_start_lets_go(angle: float) -> None:
-    """In one step, far shorter than the offset: it gives half of the traction times the step, once; then nothing."""
+def test_a_facet_that_closes_beyond_its_start_is_unloaded(angle: float) -> None:
+    """In one step, far shorter than the offset: it releases half of the traction times the step, once; then nothing."""
     way, facet = direction(math.radians(angle)), Facet(STRENGTH * direction(math.radians(angle)))
     step = 1e-3 * facet.offset
     facet.open(-step * way)
@@ -204,10 +204,10 @@ def test_a_facet_that_is_pushed_back_beyond_the_start_lets_go(angle: float) -> N
 @pytest.mark.parametrize("stiffness", [STIFFNESS, 0.02 * STIFFNESS])
 @pytest.mark.parametrize("opened", [0.0, 0.3])
 @pytest.mark.parametrize("angle", ANGLES)
-def test_a_facet_that_has_let_go_takes_what_is_left_of_the_energy(
-    angle: float, opened: float, stiffness: float
-) -> None:
-    """Also where the offset is so long that its stiffness and strength would take more: then the strength is less."""
+def test_an_unloaded_facet_absorbs_the_rest_of_the_energy(angle: float, opened: float, stiffness: float) -> None:
+    """Also if the offset is so long that stiffness and strength would require more energy: then the strength is
+    lowered.
+    """
     way = direction(math.radians(angle))
     facet = Facet(STRENGTH * way, stiffness=stiffness)
     for share in [*np.linspace(0.0, opened, 301), *np.linspace(opened, -1e-3, 301)]:
@@ -225,7 +225,7 @@ def test_a_facet_that_turns_with_its_bodies_takes_the_same() -> None:
 
 
 def test_an_offset_across_the_opening_does_no_more_work_when_a_facet_turns_than_its_size_allows() -> None:
-    """Traction and opening are not along one line then: turning by an angle takes up to strength offset angle more."""
+    """Traction and opening are not collinear then: rotation by an angle adds at most strength offset angle."""
     facet = Facet(STRENGTH * direction(0.0))
     tear(facet, direction(math.pi / 2), turned=True)
     assert abs(facet.work - ENERGY * AREA) < STRENGTH * facet.offset * AREA
@@ -233,7 +233,7 @@ def test_an_offset_across_the_opening_does_no_more_work_when_a_facet_turns_than_
 
 @pytest.mark.parametrize("depth", [0.0, 0.3, 3.0])
 def test_under_pressure_only_shear_counts(depth: float) -> None:
-    """Sides that have passed each other slide: the traction lies in the facet, whatever the depth."""
+    """Sides that have passed each other slide: the traction is in the plane of the facet, for any depth."""
     shear = direction(math.pi / 2)
     facet = Facet(STRENGTH * shear)
     for share in np.linspace(0.1, 0.9, 9):
@@ -251,7 +251,7 @@ def test_a_facet_that_broke_under_pressure_holds_the_shear_that_friction_leaves(
 
 
 def test_one_pair_fails_after_the_other() -> None:
-    """Opened as a hinge about the first edge: only one of three pairs opens, and takes a third of the energy."""
+    """Opened as a hinge about the first edge: only one of three pairs opens, and absorbs a third of the energy."""
     facet = Facet(STRENGTH * NORMAL)
     x = facet.x0.copy()
     steps = 4000

@@ -1,6 +1,5 @@
-"""Cracks that run: never faster than surface waves (V27), their start and branches (E4), what they take (V28, V29).
-
-The slow tests are runs of the bench of cracks; its tables are in docs/performance/bench.md.
+"""Running cracks: slower than surface waves (V27), their start and branches (E4), their energy (V28, V29). The slow
+tests are runs of the crack benchmark; its tables are in docs/performance/bench.md.
 """
 
 import math
@@ -50,7 +49,7 @@ def test_a_tip_that_moves_evenly_has_its_speed_everywhere() -> None:
 
 
 def test_two_ways_with_solid_between_them_are_branches() -> None:
-    """From x = 16 on at 45 deg to either side; what stands aside in one place only is none."""
+    """From x = 16 on at 45 deg to either side; a deviation in one place only is no branch."""
     x = [*np.arange(0.5, 16.0), *np.arange(16.5, 40.0), *np.arange(16.5, 40.0), 8.5]
     y = [*np.zeros(16), *(np.arange(24) + 2.0), *(-np.arange(24) - 2.0), 9.0]
     crack = facets(x, y, x)
@@ -60,7 +59,7 @@ def test_two_ways_with_solid_between_them_are_branches() -> None:
 
 
 def test_facets_that_open_aside_and_ahead_of_the_tip_are_no_length() -> None:
-    """A crack that is straight as far as it goes has the area of a line, whatever has opened before its tip."""
+    """A crack that is straight has the area of a line, including openings ahead of its tip."""
     x = [*np.arange(0.5, 29.0), 31.5]
     crack = facets(x, [*np.zeros(29), 4.0], x)
     assert crack.straight > 1.1 * crack.area.sum()
@@ -70,8 +69,8 @@ def test_facets_that_open_aside_and_ahead_of_the_tip_are_no_length() -> None:
 
 @pytest.mark.parametrize("hole", [(10.5,), (10.5, 11.5), (10.5, 11.5, 12.5)])
 @pytest.mark.parametrize("end", [32.0, 40.0])
-def test_what_holds_behind_the_tip_is_missed(hole: tuple[float, ...], end: float) -> None:
-    """In a crack that is through, and in one that is not; where a whole bin holds as well."""
+def test_intact_facets_behind_the_tip_are_not_counted(hole: tuple[float, ...], end: float) -> None:
+    """In a complete crack, and in an incomplete one; also where a whole bin is intact."""
     x = [at for at in np.arange(0.5, end) if at not in hole]
     crack = facets(x, np.zeros(len(x)).tolist(), x)
     length = end if end == 40.0 else 18.0
@@ -111,7 +110,7 @@ def coarse() -> cracks.Run:
 
 
 def test_a_crack_in_a_strip_is_slower_than_surface_waves(coarse: cracks.Run) -> None:
-    """However hard it is driven: four times G_c at the end."""
+    """At any load: four times G_c at the end."""
     where, speed = coarse.crack.speeds()
     assert len(speed) >= 5
     assert 0.3 * cracks.rayleigh(coarse.made) < speed.max() < cracks.rayleigh(coarse.made)
@@ -141,8 +140,8 @@ def test_a_random_mesh_has_no_direction_and_no_flat_tets() -> None:
 
 @pytest.fixture(scope="module")
 def plates() -> list[cracks.Run]:
-    """Five meshes without directions: which of them branch is chance, so they are judged together. A step a hundredth
-    shorter moves the branches of one by 9 mm and 11 us (docs/performance/bench.md, Cracks).
+    """Five meshes without preferred directions: which of them branch is random, so they are judged together. A step
+    shorter by a hundredth moves the branches of one by 9 mm and 11 us (docs/performance/bench.md, Cracks).
     """
     return [cracks.watch(plan) for plan in cracks.RANDOM]
 
@@ -178,7 +177,7 @@ def test_branching_plates_are_no_faster_than_published(plates: list[cracks.Run])
 @pytest.mark.timeout(1200)
 @pytest.mark.xfail(strict=False, reason="by chance: fourteen of fifteen runs are at the edge after 74.3 +- 1.8 us")
 def test_branching_plates_are_at_the_edge_as_published(plates: list[cracks.Run]) -> None:
-    """In the mean after 75 to 80 us, with a deviation of no more than that."""
+    """On average after 75 to 80 us, with a deviation of no more than that."""
     edge = np.array([run.crack.passed(run.crack.end - 1.5 * FINE) for run in plates])
     print(f"at the edge after {edge.mean():.4g} s, standard deviation {edge.std():.2g} s")
     assert edge.std() < 5e-6
@@ -189,7 +188,7 @@ def test_branching_plates_are_at_the_edge_as_published(plates: list[cracks.Run])
 @pytest.mark.timeout(600)
 @pytest.mark.parametrize("plan", [*cracks.PLATES[1:4], *cracks.STRIPS], ids=lambda p: f"{p.case}, {p.name}")
 def test_no_crack_is_faster_than_surface_waves(plan: Plan) -> None:
-    """And what has come open is longer than a line, by less than 1.3."""
+    """The opened length exceeds that of a line by less than 30 %."""
     run = cracks.watch(plan)
     print(run.fastest, run.inflation, run.share)
     assert 0.4 < run.fastest[1] < 1.0
@@ -200,8 +199,8 @@ def test_no_crack_is_faster_than_surface_waves(plan: Plan) -> None:
 @pytest.mark.timeout(1200)
 @pytest.mark.parametrize("plans", cracks.ROWS, ids=lambda plans: plans[0].name)
 def test_no_crack_along_rows_of_facets_is_faster_than_surface_waves(plans: tuple[Plan, ...]) -> None:
-    """The same of the structured plates, whatever row the crack runs in: the bound of the speed holds for each of
-    seven steps, that of the length for their mean, since one of them varies by a tenth of it.
+    """The same for the structured plates, for any row of the crack: the bound of the speed holds for each of seven
+    steps, that of the length for their mean, since one of them varies by a tenth of it.
     """
     runs = [cracks.watch(plan) for plan in plans]
     inflation = np.array([run.inflation for run in runs])

@@ -1,4 +1,6 @@
-"""The paper's glass bar, coarse: unbroken it carries the stress of bar theory, broken it fails behind a front."""
+"""The paper's glass bar, with larger elements: unbroken, its stress is that of bar theory; broken, it fails behind a
+front.
+"""
 
 from pathlib import Path
 
@@ -27,7 +29,7 @@ def bar(end: str, breaks: bool) -> Simulation:
 
 
 @pytest.mark.slow
-def test_glass_that_does_not_break_carries_what_bar_theory_says() -> None:
+def test_unbroken_glass_has_the_stress_of_bar_theory() -> None:
     """v Zs Zg / (Zs + Zg) and v Zs / (Zs + Zg) with the impedances of bars, 2.10 GPa and 156.9 m/s: in the mean behind
     the front, within 2 %.
     """
@@ -50,7 +52,7 @@ def test_glass_that_does_not_break_carries_what_bar_theory_says() -> None:
 
 @pytest.mark.slow
 def test_the_front_of_failure_follows_the_wave_slows_down_and_the_glass_behind_swells() -> None:
-    """Between 0.4 and 1.0 of the speed of sound in the first half of the bar, never backwards, then slower; the glass
+    """Between 0.4 and 1.0 of the wave speed in the first half of the bar, never backwards, then slower; the glass
     behind it moves outwards.
     """
     sim = bar("32 us", breaks=True)

@@ -1,8 +1,8 @@
-"""V26: the stretched bar in three dimensions breaks into fragments of the published size, from slow to fast; the ring
-into as many as a bar in one dimension whose strengths scatter alike.
+"""V26: the stretched bar in three dimensions breaks into fragments of the published size, from low to high rates; the
+ring into as many as a one-dimensional bar with the same scatter of strengths.
 
-The step is small: what a facet is beyond its strength by when it breaks becomes its strength, and a stress that rises
-by more in a step than the strengths scatter makes them all alike.
+The time step is small: the traction above the strength when a facet breaks becomes its strength, and a stress that
+rises by more in a step than the strengths scatter would make them all equal.
 """
 
 from pathlib import Path
@@ -75,7 +75,9 @@ def test_a_bar_breaks_into_fragments_of_the_published_size(x: float, length: flo
 @pytest.mark.timeout(600)
 @pytest.mark.parametrize("x", [0.1, 0.3])
 def test_a_ring_breaks_into_as_many_fragments_as_a_bar_in_one_dimension(x: float) -> None:
-    """With the same Weibull strengths, within 15 %: a quarter of a ring of some 45 and 60 fragments scatters by 5 %."""
+    """With the same Weibull strengths, within 15 %: the number in a quarter of a ring with about 45 and 60 fragments
+    scatters by 5 %.
+    """
     expected = ring.AROUND / ring.bar_size(x, Bar(modulus=100.0), 24)
     found = ring.broken(ring.Plan(x, 0.05e-3, 100.0)).fragments
     print(f"x {x:g}: {found:.0f} fragments, {expected:.0f} in one dimension")

@@ -1,4 +1,4 @@
-"""H5, H20: after every event the mesh is what plain Python says it is, and forces and masses are where they belong."""
+"""H5, H20: after every event the mesh equals that of plain Python, and forces and masses belong to the right nodes."""
 
 from collections import Counter, defaultdict
 from pathlib import Path
@@ -45,7 +45,7 @@ def burst(model: str, form: str) -> Simulation:
 
 
 def components(tets: Ints, joined: list[tuple[int, int]]) -> int:
-    """Into how many pieces ``joined`` pairs connect ``tets``."""
+    """Returns the number of pieces into which ``joined`` pairs connect ``tets``."""
     root = {int(t): int(t) for t in tets}
 
     def find(t: int) -> int:
@@ -121,8 +121,9 @@ def test_a_shattering_block_stays_a_mesh(model: str) -> None:
 @pytest.mark.parametrize("form", ["standard", "nodal", "split"])
 @pytest.mark.parametrize("model", ["instant", "cohesive"])
 def test_forces_after_an_event_are_those_of_the_separated_mesh(model: str, form: str) -> None:
-    """What was handed over in integers is what a fresh sum over the new mesh gives, to the last quantum; and copies
-    and their parents together have the force that the parent had."""
+    """Forces transferred in integers equal a new sum over the separated mesh, to the last quantum; copies and
+    parents together have the force of the parent before.
+    """
     sim, seen, worst = burst(model, form), 0, 0.0
     origin: Ints = np.arange(sim.model.nodes.n)
 

@@ -1,4 +1,4 @@
-"""V24, H6, H8 in the whole solver: two tets torn apart, a facet that breathes, free tets that ring."""
+"""V24, H6, H8 in the whole solver: two tets pulled apart, a facet that opens and closes, free tets that oscillate."""
 
 import math
 from pathlib import Path
@@ -27,7 +27,7 @@ def shipped(name: str, *overrides: str) -> Simulation:
 
 
 def torn(lean: float, *overrides: str) -> Simulation:
-    """The shipped pair, drawn apart along a line that leans by ``lean``, rad."""
+    """The shipped pair, pulled apart along a line inclined by ``lean``, rad."""
     x, z = SPEED * math.sin(lean), SPEED * math.cos(lean)
     pull = [f"boundaries[{i}].{c}={s * v!r}" for i, s in ((0, 1.0), (1, -1.0)) for c, v in (("x", x), ("z", z))]
     stretch = f"parts[0].stretch.rate=[0,0,{z / HEIGHT!r}]"
@@ -38,8 +38,8 @@ def torn(lean: float, *overrides: str) -> Simulation:
     "lean", [0.0, 60.0, *(pytest.param(lean, marks=pytest.mark.slow) for lean in (15.0, 30.0, 45.0, 63.0))]
 )
 def test_tearing_two_tets_takes_the_fracture_energy(lean: float) -> None:
-    """From pure opening to mostly shear, as the whole ledger has it: of the area at which the facet broke, which is
-    that of the mesh but for elastic strain.
+    """From pure opening to mostly shear, by the ledger: with the area at which the facet broke, which is that of the
+    mesh except elastic strain.
     """
     sim, area = torn(math.radians(lean)), 0.0
     energies: list[Energy] = []
@@ -63,8 +63,10 @@ def test_tearing_two_tets_takes_the_fracture_energy(lean: float) -> None:
 
 
 @pytest.mark.parametrize("back", [0.0, 0.005, 0.02])
-def test_energy_that_a_facet_gives_unpaid_is_told(back: float) -> None:
-    """Of its energy, taken off its work halfway: the last word says how much, above a hundredth."""
+def test_energy_released_without_work_is_reported(back: float) -> None:
+    """A part of its energy is subtracted from its work halfway; the last message reports how much, above a
+    hundredth.
+    """
     sim, taken, area = torn(0.0), False, 0.0
 
     def look(sim: Simulation, before: Floats) -> None:
@@ -87,7 +89,7 @@ def test_energy_that_a_facet_gives_unpaid_is_told(back: float) -> None:
 
 
 def test_the_traction_follows_the_law_in_every_step() -> None:
-    """Each pair for itself: a third of the area times strength (1 - opening / critical), or the secant."""
+    """Check each pair: a third of the area times strength (1 - opening / critical), or the secant."""
     sim = torn(math.radians(30.0))
     worst, seen, top = 0.0, 0, np.zeros(3)
 
@@ -120,7 +122,7 @@ def test_the_traction_follows_the_law_in_every_step() -> None:
 
 
 def breathing(end: str, *sets: str) -> tuple[int, float, float]:
-    """How often the facet closed, the largest growth of the energy as a share of it, and the worst residual."""
+    """Returns how often the facet closed, the largest growth of the energy as a share of it, and the worst residual."""
     sim = shipped("breathing_facet", f"run.end_time={end}", "run.residual_limit=1", *sets)
     totals, closed = list[float](), list[bool]()
 
@@ -143,9 +145,9 @@ def breathing(end: str, *sets: str) -> tuple[int, float, float]:
     ("edges", "end", "least"),
     [("false", "0.3 ms", 30), pytest.param("false", "2 ms", 40, marks=pytest.mark.slow), ("true", "0.3 ms", 15)],
 )
-def test_a_facet_that_breathes_gains_no_energy(edges: str, end: str, least: int) -> None:
-    """Contact has taken all but a thousandth in some fifty closings, 0.1 ms, or in half of them where the edges of the
-    two tets, which hold each other as well, meet; nothing may grow from the rest.
+def test_a_facet_that_opens_and_closes_gains_no_energy(edges: str, end: str, least: int) -> None:
+    """Contact has dissipated all but a thousandth in about fifty closings, 0.1 ms, or in half of them if the edges
+    of the two tets, which also hold each other, touch; no growth from the rest.
     """
     cycles, growth, residual = breathing(end, f"contact.edges={edges}")
     print(f"{cycles} cycles, growth {growth:.2e}, residual {residual:.2e}")

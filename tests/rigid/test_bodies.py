@@ -1,4 +1,4 @@
-"""Rigid bodies in whole scenes: contact with all, walls, what holds and drives them; books that close."""
+"""Rigid bodies in whole cases: all contacts, walls, constraints and prescribed motion; energy and momentum balances."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -33,14 +33,14 @@ RIGID = schema.Rigid()
 def rigid_case(
     motions: Sequence[dict[str, Any]], boundaries: Sequence[schema.Boundary] = (), **keys: Any
 ) -> schema.Case:
-    """Bodies that meet, with these keys of parts, and boundaries."""
+    """A case of bodies in contact, with these keys of parts, and boundaries."""
     contact = keys.pop("contact", {})
     case = meeting_of(motions, contact, **keys)
     return case.model_copy(update={"boundaries": tuple(boundaries)})
 
 
 class Seen:
-    """What a run shows at each time."""
+    """Quantities of a run at each time."""
 
     def __init__(self, case: schema.Case, meshes: Sequence[TetMesh], steps: int = -1) -> None:
         self.energies: list[Energy] = []
@@ -66,7 +66,7 @@ class Seen:
 
     @property
     def drift(self) -> float:
-        """Of the linear momentum, over its size."""
+        """Largest change of the linear momentum, over its size."""
         p: Floats = np.array(self.momenta)[:, :3]
         return float(np.ptp(p, axis=0).max()) / float(np.abs(p).max())
 
@@ -82,7 +82,7 @@ def test_energy_and_momentum_at_the_start_are_those_of_the_mesh() -> None:
 
 @pytest.mark.parametrize(("mesh", "friction"), [(BOX, 0.0), (TILTED, 0.3)])
 def test_a_rigid_box_hits_a_plate(mesh: TetMesh, friction: float) -> None:
-    """Momentum to round-off, the impulses of both parts to the bit; energy as well as without a rigid body."""
+    """Momentum to round-off, the impulses of both parts to the bit; energy as accurate as without a rigid body."""
     motions: list[dict[str, Any]] = [{}, {"rigid": RIGID, "velocity": (0.0, 0.0, -100.0)}]
     seen = Seen(rigid_case(motions, contact={"friction": friction}, end=6e-6), [PLATE, mesh])
     assert seen.sim.contact is not None
@@ -96,7 +96,7 @@ def test_a_rigid_box_hits_a_plate(mesh: TetMesh, friction: float) -> None:
     assert first.kinetic > last.kinetic + last.elastic > 0.5 * first.kinetic
 
 
-def test_rigid_bodies_hit_each_other_as_newton_says() -> None:
+def test_rigid_bodies_rebound_by_newtons_law() -> None:
     """The corner of a small cube hits a rod off its centre, with restitution 1: J = 2 v / (1/m + 1/M + d^2 / I) along x
     for an arm d about y (Goldsmith 1960, Impact, chapter 2).
     """
@@ -133,7 +133,7 @@ def test_a_rigid_box_lands_flat_and_slides_to_rest() -> None:
     assert seen.worst < 1e-12
 
 
-def test_a_rigid_body_between_a_wall_and_another_one_is_no_cushion() -> None:
+def test_a_rigid_body_between_a_wall_and_another_one_is_no_spring() -> None:
     """A block that falls on a light rigid plate on a wall, and on one of 1000 t without: to 1 % of its speed."""
     falling, plate = moved(block((3, 3, 3), 1e-3), (0.0, 0.0, 1e-3)), block((3, 3, 1), 1e-3)
     ends = []
@@ -147,7 +147,7 @@ def test_a_rigid_body_between_a_wall_and_another_one_is_no_cushion() -> None:
 
 
 def test_planes_of_symmetry_leave_a_quarter_its_motions() -> None:
-    """A quarter of a box between two planes moves along their line only, and does not turn; half of one turns."""
+    """A quarter of a box between two planes moves only along their line, and does not turn; half of one turns."""
     planes = [schema.Symmetry(kind="symmetry", axis=axis) for axis in ("x", "y")]
     motion = {"rigid": RIGID, "velocity": (0.0, 0.0, -5.0)}
     seen = Seen(rigid_case([motion], [*planes, GROUND], contact=None, end=1e-4), [moved(BOX, (-2.1e-3, -2.3e-3, 0.0))])
@@ -161,7 +161,7 @@ def test_planes_of_symmetry_leave_a_quarter_its_motions() -> None:
 
 @pytest.mark.parametrize("restitution", [0.0, 0.5])
 def test_a_body_beside_a_plane_of_symmetry_meets_its_image(restitution: float) -> None:
-    """The plane does not hold it before; a corner hits it, and its point comes off with that share of its speed."""
+    """The plane does not hold it before; a corner hits the plane, and rebounds with that share of its velocity."""
     plane = schema.Symmetry(kind="symmetry", axis="x")
     motion = {"rigid": RIGID, "velocity": (-30.0, 5.0, 0.0)}
     case = rigid_case([motion], [plane], contact={"restitution": restitution}, end=8e-5)
@@ -188,7 +188,7 @@ def test_walls_that_close_on_a_rigid_body_end_the_run() -> None:
 
 
 def test_a_driven_punch_works_from_outside() -> None:
-    """A rigid punch goes into a plate on a wall: the work is in the ledger, the motion is the course."""
+    """A rigid punch penetrates a plate on a wall: the work is in the ledger, the motion follows the course."""
     ramp = ((0.0, 0.0), (0.5e-6, 1.0))
     drive = schema.Prescribed(kind="velocity", parts=("body1",), x=0.0, y=0.0, z=-50.0, course=ramp)
     ground = GROUND.model_copy(update={"parts": ("body0",)})
@@ -267,7 +267,7 @@ def test_probes_of_a_whole_body_have_its_inertia_and_centre() -> None:
     assert found[5] != pytest.approx(energy, rel=0.1)
 
 
-def test_a_run_that_goes_on_ends_with_the_same_bits(tmp_path: Path) -> None:
+def test_a_resumed_run_ends_with_the_same_bits(tmp_path: Path) -> None:
     """From a checkpoint in the middle of an impact, of two ranks."""
 
     def halves(sim: Simulation) -> tuple[str | None, list[list[float]]]:

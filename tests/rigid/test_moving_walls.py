@@ -1,4 +1,4 @@
-"""Walls that move or are round: momentum to the bit, energy, and what theory says."""
+"""Moving and round walls: momentum to the bit, energy, and closed forms."""
 
 from typing import Any
 
@@ -26,7 +26,7 @@ PLANE: dict[str, Any] = {"kind": "wall", "point": (0.0, 0.0, 0.0), "normal": (0.
 
 
 class Seen:
-    """What a bar and its first wall show at each time."""
+    """Quantities of a bar and its first wall at each time."""
 
     def __init__(
         self, walls: list[schema.Wall], end: float, speed: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -57,7 +57,7 @@ def test_a_wall_with_a_mass_is_stopped_by_a_bar() -> None:
     seen = Seen([schema.Wall(**PLANE, velocity=(0.0, 0.0, speed), mass=mass)], 4e-6)
     rate = DENSITY * wave * SIZE[0] * SIZE[1] / mass
     times, speeds = np.array(seen.times), np.array(seen.speeds)[:, 2]
-    later = times > 0.3e-6  # the first layer of nodes has been taken along
+    later = times > 0.3e-6  # the first layer of nodes has reached the velocity of the wall
     assert speeds[later] == pytest.approx(speed * np.exp(-rate * times[later]), abs=0.04 * speed)
     momenta = np.array(seen.momenta)
     assert np.ptp(momenta, axis=0).max() < 1e-14 * mass * speed
@@ -70,7 +70,9 @@ def test_a_wall_with_a_mass_is_stopped_by_a_bar() -> None:
 
 @pytest.mark.parametrize("friction", [0.0, 0.2])
 def test_a_light_wall_is_stable(friction: float) -> None:
-    """A thousandth of the mass of the nodes that it hits: the wall ends as fast as they are, and no energy is made."""
+    """A thousandth of the mass of the nodes that it hits: the wall ends with their velocity, and no energy is
+    created.
+    """
     wall = schema.Wall(**PLANE, velocity=(3.0, 0.0, 20.0), mass=1e-3 * MASS / 13, friction=friction)
     seen = Seen([wall], 2e-6)
     assert max(energy.kinetic + energy.elastic for energy in seen.energies) <= 1.0001 * seen.energies[0].initial
@@ -79,7 +81,7 @@ def test_a_light_wall_is_stable(friction: float) -> None:
 
 
 def test_a_driven_wall_works_from_outside() -> None:
-    """Its course is followed exactly, what it gives is external work, and nothing is lost where it begins at rest."""
+    """The wall follows its course exactly, its impulses are external work, and no energy is lost when it starts at rest."""
     course = ((0.0, 0.0), (5e-6, 1.0), (10e-6, 0.0))
     seen = Seen([schema.Wall(**PLANE, velocity=(0.0, 0.0, 20.0), course=course)], 12e-6)
     assert seen.sim.walls.shapes.point[0] == pytest.approx([0.0, 0.0, 100e-6], abs=1e-15)
@@ -89,7 +91,7 @@ def test_a_driven_wall_works_from_outside() -> None:
     assert seen.momenta[-1][2] > 0.0
 
 
-def test_a_driven_wall_is_a_fixed_one_seen_from_a_train() -> None:
+def test_a_driven_wall_equals_a_fixed_one_in_a_moving_frame() -> None:
     """A bar at rest that a wall hits at 20 m/s, and one that hits a fixed wall at -20 m/s."""
     moving = Seen([schema.Wall(**PLANE, velocity=(0.0, 0.0, 20.0), friction=0.1)], 5e-6)
     fixed = Seen([schema.Wall(**PLANE, friction=0.1)], 5e-6, (0.0, 0.0, -20.0))
@@ -115,7 +117,7 @@ ROUND = {
 
 @pytest.mark.parametrize("name", ROUND)
 def test_no_node_ends_behind_a_round_wall(name: str) -> None:
-    """After each step, to what the surface curves along the way of a step; the books close."""
+    """After each step, up to the curvature of the surface along the motion of a step; the energy balance closes."""
     wall = ROUND[name]
     seen = Seen([wall], 8e-6, (0.0, 0.0, -50.0))
     radius, side = wall.radius or 0.0, 1.0 if wall.side == "outside" else -1.0

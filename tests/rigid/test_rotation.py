@@ -1,4 +1,4 @@
-"""Free rotation: what it keeps, and its period against elliptic integrals."""
+"""Free rotation: conserved quantities, and its period against elliptic integrals."""
 
 import math
 
@@ -65,7 +65,7 @@ def half_period(rate: tuple[float, float, float], moments: np.ndarray = INERTIA)
 
 
 def test_a_free_top_keeps_angular_momentum_and_energy() -> None:
-    """Momentum to 1e-12, energy to 1e-9 over 100,000 steps, about the unstable axis; the rotation stays one."""
+    """Momentum to 1e-12, energy to 1e-9 over 100,000 steps, about the unstable axis; the matrix remains a rotation."""
     top = Top((1e-3, 5.0, 2e-3))
     start, before, worst = top.momentum.copy(), top.energy, 0.0
     for k in range(STEPS):
@@ -78,7 +78,7 @@ def test_a_free_top_keeps_angular_momentum_and_energy() -> None:
 
 
 @pytest.mark.parametrize("rate", [(0.05, 5.0, 0.0), (0.0, 5.0, 0.1), (0.5, 3.0, 1.0)])
-def test_a_top_flips_as_often_as_elliptic_integrals_say(rate: tuple[float, float, float]) -> None:
+def test_a_top_flips_with_the_period_of_elliptic_integrals(rate: tuple[float, float, float]) -> None:
     """Dzhanibekov's: the period to 1e-4, and an error that falls with the square of the step."""
     exact, errors = half_period(rate), []
     for dt in (0.008, 0.004):

@@ -75,7 +75,7 @@ def test_contacts_through_the_centre_along_one_normal_are_exact(contacts: int) -
 
 
 def test_impulses_add_up_as_integers_and_moments_to_a_quantum() -> None:
-    """Of owned slots alone; all are cleared."""
+    """Sums over owned slots only; all slots are cleared."""
     bodies, draw = Bodies(3), np.random.default_rng(4)
     given = draw.integers(-(2**40), 2**40, (len(bodies.body), 3))
     bodies.active.moving_words[:, IMPULSE : IMPULSE + 3] = given
