@@ -215,7 +215,7 @@ def _assemble(
     if tied_pairs(case):
         bonds = Bonds(case, model, tied, scene, comm, clock, threads, extremes[0] * extremes[1])
     if contact is not None and bonds is not None:
-        contact.detection.tied = Tied(bonds)
+        contact.detection.tied = Tied(bonds.ties)
     if case.boundaries_of(Symmetry):
         scene.append(Mirrors.of(case, model, scene, comm))
     for bound in scene:

@@ -83,4 +83,4 @@ def run(sim: Simulation, each: Callable[[], None] | None = None) -> Energy:
 def area(sim: Simulation) -> float:
     """Of the bonds, m^2."""
     assert sim.bonds is not None
-    return float(sim.bonds._rows.area.sum())
+    return float(sim.bonds.ties.rows.area.sum())

@@ -81,7 +81,7 @@ def test_a_light_wall_is_stable(friction: float) -> None:
 
 
 def test_a_driven_wall_works_from_outside() -> None:
-    """The wall follows its course exactly, its impulses are external work, and no energy is lost when it starts at rest."""
+    """The wall follows its course exactly, its impulses are external work; started at rest, it loses no energy."""
     course = ((0.0, 0.0), (5e-6, 1.0), (10e-6, 0.0))
     seen = Seen([schema.Wall(**PLANE, velocity=(0.0, 0.0, 20.0), course=course)], 12e-6)
     assert seen.sim.walls.shapes.point[0] == pytest.approx([0.0, 0.0, 100e-6], abs=1e-15)

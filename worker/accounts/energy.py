@@ -201,7 +201,7 @@ class Ledger:
         rubbed = len(tables) - 2
         bound = rubbed
         if self._bonds is not None:
-            tables.append(Table(np.where(nodes.owned, self._bonds.loss, 0.0)[:, None], parts))
+            tables.append(Table(np.where(nodes.owned, self._bonds.account.loss, 0.0)[:, None], parts))
             bound += 1
         if self._cohesion is not None:
             tables.append(Table(self._cohesion.columns(), parts))
@@ -259,7 +259,7 @@ class Ledger:
         if contact is not None:
             external += contact.books.external_work
         if self._bonds is not None:
-            external += self._bonds.external
+            external += self._bonds.account.external
         return loss, external
 
 

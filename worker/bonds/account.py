@@ -1,0 +1,57 @@
+"""Energy account of the tied bonds: halves of the work of each impulse, with the velocities before and after it."""
+
+import numpy as np
+
+from ..migration.parcel import Parcel
+from ..model.state import Floats, Indices, Ints, extended
+from . import sweeps
+
+
+class BondAccount:
+    """Work of the impulses of tied bonds on the nodes of a rank."""
+
+    def __init__(self, nodes: int, scale: float) -> None:
+        """``nodes``: number of local nodes; ``scale``: quanta per N s."""
+        self.scale = scale
+        self.loss, self.external = np.zeros((2, nodes))
+        """(nodes,) energy dissipated by the bonds, and work from outside by prescribed velocities against them, J."""
+        self.mobility: Floats = np.zeros((0, 3))
+        """(nodes, 3) 1/kg, as the sweeps use it; 0 where a velocity is prescribed."""
+        self._local: Indices = np.zeros(0, np.int32)
+        """(h,) nodes of the last impulses."""
+        self._total, self._before = np.zeros((0, 3), np.int64), np.zeros((0, 3))
+        """(h, 3) impulses, quanta, and v(n-1/2), m/s."""
+
+    def note(self, v: Floats, local: Indices) -> None:
+        """Before the kick: books the second half of the last impulses; stores v(n-1/2) of the nodes ``local``."""
+        self._before = v[self._local]
+        self._book()
+        self._local, self._before = local, v[local]
+
+    def add(self, total: Ints) -> None:
+        """Books the first half of the impulses ``total`` (h, 3) of the step, quanta."""
+        self._total = total
+        self._book()
+
+    def grow(self, copies: int) -> None:
+        """Extends the account by copies of nodes; booked values stay with the parents."""
+        more = np.zeros(copies)
+        self.loss, self.external = extended(self.loss, more), extended(self.external, more)
+
+    def keep(self, parcel: Parcel) -> None:
+        """Adds the account to a parcel."""
+        impulse = np.zeros((len(self.loss), 3), np.int64)
+        impulse[self._local] = self._total
+        parcel.nodes |= {"bonds.loss": self.loss, "bonds.external": self.external, "bonds.impulse": impulse}
+
+    def resume(self, parcel: Parcel, scale: float) -> None:
+        """Restores the account from a parcel."""
+        self.scale = scale
+        self.loss, self.external = (np.array(parcel.nodes[f"bonds.{name}"]) for name in ("loss", "external"))
+        impulse = parcel.nodes["bonds.impulse"]
+        self._local = np.flatnonzero(impulse.any(axis=1)).astype(np.int32)
+        self._total = impulse[self._local]
+
+    def _book(self) -> None:
+        held = self.mobility[self._local]
+        sweeps.book(self.loss, self.external, self._local, self._before, self._total, held, self.scale)

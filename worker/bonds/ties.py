@@ -1,0 +1,142 @@
+"""Tied rows of all ranks, updated from the pieces of the interface and the present corners of their faces."""
+
+import numpy as np
+
+from ..migration.parcel import Parcel
+from ..model.ids import places
+from ..model.state import Flags, Floats, Ints, Model
+from ..parallel.comm import Comm
+from .faces import Faces
+from .layout import Layout
+from .pieces import Pieces
+from .records import DAMAGE, KEPT, PUSH
+from .rows import Rows, assembled
+
+_BITS = 62
+"""Bonds that contact distinguishes; further ones share a bit."""
+Known = tuple[Ints, Ints, Floats]
+"""Bonds, nodes and states of rows, (r,), (r,) and (r, KEPT)."""
+
+
+class Ties:
+    """Pieces, rows and states of the tied bonds of a case, equal on all ranks."""
+
+    def __init__(self, pieces: Pieces, model: Model, comm: Comm) -> None:
+        """``pieces``: of all ranks."""
+        self._model, self._comm = model, comm
+        self.version = 0
+        """Number that increases when rows change."""
+        self._set(pieces)
+
+    def _set(self, pieces: Pieces) -> None:
+        self._pieces = pieces
+        self.faces = Faces(np.unique(np.concatenate([pieces.slave, pieces.master])), self._model)
+        self.rows = assembled(Pieces.none(), np.zeros((0, 3), np.int64), np.zeros((0, 3), np.int64))
+        self.states = np.zeros((0, KEPT))
+        """(rows, KEPT) states when the rows last changed."""
+        self._tied = self._bits = np.zeros(0, np.int64)
+
+    @property
+    def tied(self) -> int:
+        """Number of tied nodes of all ranks."""
+        return int((self.states[:, DAMAGE] < 1.0).sum())
+
+    def bits(self, ids: Ints) -> Ints:
+        """(k,) bonds that tie each node, as bits."""
+        at = places(self._tied, ids)
+        return np.where(at >= 0, self._bits[at], 0) if len(self._tied) else np.zeros(len(ids), np.int64)
+
+    def rebuild(self, layout: Layout | None, known: list[Known] | None = None) -> None:
+        """Makes the rows from the pieces and present corners; ``layout``: present rows of this rank; ``known``: states
+        of rows from a parcel. Collective.
+        """
+        pieces, old, states = self._pieces, self.faces.of(self._pieces.slave), self._joined_states(layout)
+        self.faces.follow(self._comm)
+        left = self._left(pieces)
+        self._pieces, old = pieces.take(left), old[left]
+        now = self.faces.of(self._pieces.slave)
+        rows = assembled(self._pieces, now, self.faces.of(self._pieces.master))
+        if known is None:
+            carried = _carried(rows, self.rows, states, self._pieces.bond, now, old)
+        else:
+            bond, node, found = (np.concatenate(columns) for columns in zip(*known, strict=True))
+            carried = _of(rows.bond, rows.node, bond, node, found)
+        self.rows, self.states = rows, carried
+
+    def mark(self, rows: Rows) -> None:
+        """Sets the bits of nodes that contact ignores with each other: nodes of the intact ``rows``, and corners of
+        tied faces that lie beside the mortar side.
+        """
+        corner, bond = rows.face.reshape(-1), np.repeat(rows.bond[rows.side], 3)
+        beside = ~np.isin(corner, self.rows.node)
+        ids = np.concatenate([rows.node, rows.master, corner[beside]])
+        bonds = np.concatenate([rows.bond, rows.bond[rows.row], bond[beside]])
+        self._tied, at = np.unique(ids, return_inverse=True)
+        self._bits = np.zeros(len(self._tied), np.int64)
+        np.bitwise_or.at(self._bits, at, np.int64(1) << (bonds % _BITS))
+        self.version += 1
+
+    def keep(self, parcel: Parcel, layout: Layout | None) -> None:
+        """Adds the pieces and rows of this rank to a parcel."""
+        nodes, rows = self._model.nodes, self.rows
+        pieces = self._pieces.take(self.faces.here(self._pieces.slave))
+        parcel.rows["bonds.pieces"] = {"tet": pieces.slave // 4, **pieces.table()}
+        place = nodes.places(rows.node)
+        mine = np.flatnonzero((place >= 0) & nodes.owned[place])
+        states = self._own_states(layout)
+        parcel.rows["bonds.rows"] = {"node": rows.node[mine], "bond": rows.bond[mine], "state": states[mine]}
+
+    def resume(self, parcel: Parcel) -> None:
+        """Restores the pieces and rows from a parcel. Collective."""
+        self._set(Pieces.of(self._comm.share(parcel.rows["bonds.pieces"])))
+        tables = [table for table in self._comm.share(parcel.rows["bonds.rows"]) if table]
+        none = np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros((0, KEPT))
+        self.rebuild(None, [none, *((table["bond"], table["node"], table["state"]) for table in tables)])
+
+    def _own_states(self, layout: Layout | None) -> Floats:
+        """(rows, KEPT) states of all rows; up to date for the rows of this rank."""
+        states = self.states.copy()
+        if layout is not None:
+            states[layout.number] = layout.rows.state[:, :KEPT]
+        return states
+
+    def _joined_states(self, layout: Layout | None) -> Floats:
+        """(rows, KEPT) states of all rows, up to date, on all ranks. Collective."""
+        if layout is None:
+            return self.states
+        words = np.column_stack([layout.number, layout.rows.state[:, :KEPT].copy().view(np.int64)])
+        every, states = self._comm.join(words).reshape(-1, 1 + KEPT), self.states.copy()
+        states[every[:, 0]] = np.ascontiguousarray(every[:, 1:]).view(np.float64)
+        return states
+
+    def _left(self, pieces: Pieces) -> Flags:
+        """Returns which pieces belong to tied faces that still have all their pieces."""
+        whole = (self.faces.of(pieces.slave)[:, 0] >= 0) & (self.faces.of(pieces.master)[:, 0] >= 0)
+        _, of = np.unique(np.column_stack([pieces.bond, pieces.slave]), axis=0, return_inverse=True)
+        of = of.reshape(-1)
+        return np.asarray(np.bincount(of, whole)[of] == pieces.of_face)
+
+
+def _of(bonds: Ints, nodes: Ints, bond: Ints, node: Ints, states: Floats) -> Floats:
+    """States by ``bonds`` and ``nodes`` (k,), taken from those of each ``bond`` and ``node`` (r,); zero for rows
+    without one.
+    """
+    many = int(max(nodes.max(initial=0), node.max(initial=0))) + 1
+    keys, wanted = bond * many + node, bonds * many + nodes
+    order = np.argsort(keys, kind="stable")
+    at = places(keys[order], wanted)
+    found = np.zeros((len(wanted), states.shape[1]))
+    found[at >= 0] = states[order[at[at >= 0]]]
+    return found
+
+
+def _carried(rows: Rows, old: Rows, states: Floats, bond: Ints, now: Ints, before: Ints) -> Floats:
+    """States of ``rows`` from those of the ``old`` ones: a copy inherits from its parent, found by the corners of
+    tied faces ``now`` and ``before`` (p, 3); the impulse in proportion to the area.
+    """
+    pairs = np.unique(np.column_stack([np.repeat(bond, 3), now.reshape(-1), before.reshape(-1)]), axis=0)
+    parents = _of(pairs[:, 0], pairs[:, 2], old.bond, old.node, np.column_stack([states, old.area]))
+    found = _of(rows.bond, rows.node, pairs[:, 0], pairs[:, 1], parents)
+    area = found[:, KEPT]
+    found[:, PUSH : PUSH + 3] *= np.where(area > 0.0, rows.area / np.where(area > 0.0, area, 1.0), 0.0)[:, None]
+    return np.ascontiguousarray(found[:, :KEPT])
