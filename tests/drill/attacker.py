@@ -1,4 +1,4 @@
-"""``python -m tests.drill.attacker KIND URL TOKEN RUN LONG SECONDS``: one who takes all that he gets.
+"""``python -m tests.drill.attacker KIND URL TOKEN RUN LONG MANY SWEEP SECONDS``: one who takes all that he gets.
 
 A process of its own, for so many seconds, bounded in connections. Prints as JSON how often each status was answered; 0
 where a connection was closed without an answer.
@@ -20,6 +20,7 @@ from urllib.parse import urlsplit
 
 from ..server.hostile import quadratic
 from ..server.running import case_text
+from ..server.sweep_bodies import wish as sweep_wish
 
 NICE = 10
 """Steps of priority below the server: an attacker has a processor of his own elsewhere."""
@@ -45,12 +46,16 @@ class Attack:
 
 @dataclass
 class Target:
-    """A server, somebody's token there, a run of his that goes on, and one with a long journal."""
+    """A server, somebody's token there, a run of his that goes on, one with a long journal, many with longer ones, and
+    a sweep.
+    """
 
     url: str
     token: str
     run: str
     long: str
+    many: list[str]
+    sweep: str
     until: float
     answers: Counter[int] = field(default_factory=Counter)
 
@@ -66,11 +71,14 @@ class Target:
 
 
 def again(*paths: str, method: str = "GET", more: str = "", token: bool = True) -> Callable[[Target], Iterator[bytes]]:
-    """The same requests without end; RUN and LONG stand for the two runs, {n} for a number that is always another."""
+    """The same requests without end; RUN and LONG stand for the two runs, MANY for one of many,
+    SWEEP for the sweep, {n} for a number that is always another.
+    """
 
     def requests(target: Target) -> Iterator[bytes]:
         for n in itertools.count(random.randrange(1000)):
             path = paths[n % len(paths)].replace("RUN", target.run).replace("LONG", target.long)
+            path = path.replace("MANY", target.many[n % len(target.many)]).replace("SWEEP", target.sweep)
             yield target.get(path.replace("{n}", str(n % 4000 + 1)), method, more, token)
 
     return requests
@@ -129,6 +137,22 @@ def many_at_once(target: Target) -> Iterator[bytes]:
         yield target.get("/v1/cases") * 200
 
 
+def adaptive(target: Target) -> Iterator[bytes]:
+    """Reports of ever other adaptive sweeps, as long as they may be."""
+    points = [{"x": float(n), "changed": {"run.end_time": f"{n} us" * 8}, "run": target.run} for n in range(500)]
+    report = {"name": "bar", "began": 1.0, "result": "time", "threshold": 0.0, "key": "run.end_time", "low": 0.0}
+    body = json.dumps({**report, "high": 1.0, "tolerance": 0.1, "points": points}).encode()
+    for n in itertools.count(random.randrange(1000)):
+        more = f"Content-Length: {len(body)}\r\n"
+        yield target.get(f"/v1/sweeps/adaptive/{n % 500:016x}", "PUT", more) + body
+
+
+def swept_again(target: Target) -> Iterator[bytes]:
+    """A sweep whose points have all failed."""
+    while True:
+        yield target.post(f"/v1/sweeps/{target.sweep}:again", sweep_wish(), "application/json")
+
+
 KINDS: dict[str, Attack] = {
     "event streams": Attack(once("/v1/runs/RUN/stream"), 300),
     "event streams that nobody reads": Attack(once("/v1/runs/RUN/stream"), 300, reads=False),
@@ -170,6 +194,14 @@ KINDS: dict[str, Attack] = {
     "a connection for each request": Attack(again("/v1/me", more="Connection: close\r\n"), 60, pause=0.0),
     "lines that are no HTTP": Attack(no_http, 200, pause=0.0),
     "sweeps": Attack(again("/v1/sweeps?limit=500"), 40),
+    "the table of 3,000 runs": Attack(again("/v1/table", "/v1/table?changed=1", "/v1/table?text=a&limit=500"), 60),
+    "tables of words that no run has": Attack(again("/v1/table?text=x{n}%20y%20z%20u%20v", "/v1/table?case=*{n}*"), 60),
+    "columns of a long history": Attack(again("/v1/runs/LONG/columns?name=*&points={n}"), 60),
+    "histories of many journals of a million lines": Attack(again("/v1/runs/MANY/history"), 60),
+    "fragments of a long run": Attack(again("/v1/runs/LONG/fragments/{n}"), 60),
+    "reports of a run": Attack(again("/v1/runs/LONG:report", "/v1/runs/RUN:report", method="POST"), 60),
+    "reports of adaptive sweeps": Attack(adaptive, 60),
+    "a sweep run again and again": Attack(swept_again, 60),
     "addresses that are none": Attack(again("/v1/runs/{n}", "/%00{n}", "/v1/runs/%FF/files/x"), 60),
 }
 
@@ -226,7 +258,7 @@ def answered(target: Target, connection: socket.socket) -> bool:
 
 if __name__ == "__main__":
     os.nice(NICE)
-    kind, url, token, run, long, seconds = sys.argv[1:]
-    aimed = Target(url, token, run, long, time.monotonic() + float(seconds))
+    kind, url, token, run, long, many, sweep, seconds = sys.argv[1:]
+    aimed = Target(url, token, run, long, many.split(","), sweep, time.monotonic() + float(seconds))
     attack(kind, aimed)
     print(json.dumps({str(status): count for status, count in sorted(aimed.answers.items())}))

@@ -18,8 +18,11 @@ from functools import partial
 from pathlib import Path
 
 import httpx2
+import msgspec
 
 from conoid.cases.messages import Log, Status, to_json
+from conoid.cases.outcome import Measured, Outcome
+from conoid.cases.outcome import to_json as outcome_json
 from conoid.cases.output import layout
 from conoid.cases.run import State
 from conoid.server.database.store import Store
@@ -29,6 +32,7 @@ from conoid.server.runs.folder import Submission
 from conoid.server.settings import Settings
 
 from ..server.journal_lines import told, write
+from ..server.sweep_bodies import wish
 from .attacker import KINDS
 from .judge import TRUE, Row
 from .stand import Stand
@@ -49,7 +53,9 @@ PAUSE = 0.02
 """s between two GETs of a person."""
 RUNS, EVENTS, REPORTS, FILES = 3000, 2500, 20_000, 2000
 """Of the attacker: runs with labels; events of 20 kB, and reports, of his long run; files of another one."""
-SAID = {-1, 200, 202, 204, 206, 304, 400, 401, 404, 405, 408, 409, 413, 415, 416, 422, 429, 503}
+MANY, LINES = 20, 1_000_000
+"""Of the attacker: runs with a journal of so many lines, more runs than the server keeps histories of."""
+SAID = {-1, 200, 202, 204, 206, 304, 400, 401, 404, 405, 408, 409, 410, 413, 415, 416, 422, 429, 500, 503}
 """What the attacker may be answered; -1: he does not read it."""
 
 
@@ -84,6 +90,8 @@ class Scene:
     token: str
     run: str
     long: str
+    many: list[str]
+    sweep: str
     people: tuple[Person, Person]
 
 
@@ -115,7 +123,8 @@ def _tried(stand: Stand, kind: str) -> tuple[Row, float]:
     time.sleep(REST)
     quiet = _asked(scene.people, 1.0)
     before, load = _memory(stand), os.getloadavg()[0]
-    words = [sys.executable, "-m", "tests.drill.attacker", kind, url, scene.token, scene.run, scene.long, str(SECONDS)]
+    words = [sys.executable, "-m", "tests.drill.attacker", kind, url, scene.token, scene.run, scene.long]
+    words += [",".join(scene.many), scene.sweep, str(SECONDS)]
     attacker = subprocess.Popen(words, stdout=subprocess.PIPE, cwd=Path(__file__).parents[2])
     grown, machine = _Growth(stand, before), _Machine()
     during = _asked(scene.people, SECONDS + 1.0)
@@ -221,6 +230,7 @@ def _made(stand: Stand) -> Scene:
     with store._engine.begin() as connection:
         for n in range(RUNS):
             ended = replace(folder.first(_record(f"{n:022d}")), state=State.SUCCEEDED, started=1.0, finished=2.0)
+            _laid(stand.runs, ended.id, n)
             store._put(connection, ended)
             store._label(connection, ended, {"point": str(n % 100), "a": "b", "c": "d"})
     store.close()
@@ -228,17 +238,25 @@ def _made(stand: Stand) -> Scene:
         base_url=str(stand.http.base_url), headers={"Authorization": f"Bearer {token}"}, timeout=60.0
     )
     stand.http, own = mallory, stand.http
+    answer = mallory.post("/v1/sweeps", content=wish(), headers={"Content-Type": "application/json"})
+    sweep = answer.json()
+    for point in sweep["points"]:
+        mallory.post(f"/v1/runs/{point['run']['id']}:cancel")
     run, long = stand.running(), stand.submit()
     stand.reached(long)
     stand.reached(run, "running")
     stand.http = own
     mallory.close()
     _long_journal(stand.runs / long)
+    many = [f"{n:022d}" for n in range(MANY)]
+    write(stand.runs / many[0], (message for message in told(3 * LINES // 7) if not isinstance(message, Status)), 1)
+    for each in many[1:]:
+        (stand.runs / each / layout.JOURNAL).hardlink_to(stand.runs / many[0] / layout.JOURNAL)
     for n in range(FILES):
         (stand.runs / run / f"file-{n}.txt").touch()
     with (stand.runs / run / "large.bin").open("wb") as file:
         file.truncate(1 << 28)
-    return Scene(token, run, long, (people[0], people[1]))
+    return Scene(token, run, long, many, sweep["id"], (people[0], people[1]))
 
 
 def _person(stand: Stand, store: Store, name: str) -> Person:
@@ -251,6 +269,16 @@ def _person(stand: Stand, store: Store, name: str) -> Person:
     stand.http = own
     paths = (f"/v1/runs/{run}", "/v1/runs", f"/v1/runs/{run}/events", f"/v1/runs/{run}/history", "/healthz")
     return Person(http, paths)
+
+
+def _laid(runs: Path, run: str, n: int) -> None:
+    """The folder of a run that has ended, of a case whose values are like those of a few others."""
+    (runs / run).mkdir()
+    values = {f"key{n % 60}": {f"value{k}": f"{n} {'x' * 40}" for k in range(200)}, "run": {"end_time": n}}
+    (runs / run / layout.RESOLVED_CASE).write_text(json.dumps(values))
+    (runs / run / layout.SUBMISSION).write_bytes(msgspec.json.encode(_record(run)))
+    probes = [Measured(name=f"probe{k}", value=float(n), unit="m/s") for k in range(20)]
+    (runs / run / layout.OUTCOME).write_bytes(outcome_json(Outcome(state="succeeded", probes=probes)))
 
 
 def _record(run: str) -> Submission:
