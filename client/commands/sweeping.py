@@ -10,19 +10,21 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
+import msgspec
 import typer
 
 from conoid.cases.estimates.cores import usable_cores
 from conoid.cases.figures import counted
-from conoid.cases.load import CaseError, parse_case
+from conoid.cases.load import CaseError, apply_overrides, parse_case
 from conoid.cases.output.points import KEY, to_csv
 from conoid.cases.run import State
 
-from ..errors import ServiceError, UsageError
+from ..errors import ClientError, ServiceError, UsageError
 from ..local.atomic import save_text
 from ..local.own_server import LocalServer
 from ..remote.session import Session, connect
 from ..remote.submission import data_of, folder_of, locate
+from ..reports.compare import changes
 from ..sweeps.sweep import Point, Sweep, SweepInfo, SweepPoint, points_in, points_of, text_rows
 from ..sweeps.sweep_files import columns_of, file_named
 from . import adapting, points_table
@@ -141,10 +143,24 @@ def _handed_in(
     except ServiceError as error:
         if error.problem.get("code") != "key_reused":
             raise
-        raise UsageError(f"{case}: the case has changed since this sweep was begun; --new begins another one") from None
+        keys = _changed(session, str(error.problem.get("detail", "")), data, points[0], folder_of(case))
+        told = f"the case has changed since this sweep was begun{keys}; --new begins another one"
+        raise UsageError(f"{case}: {told}") from None
     except KeyboardInterrupt:
         complain("the server may have the points already; conoid sweep-cancel last stops them once it has taken all in")
         raise
+
+
+def _changed(session: Session, detail: str, data: Mapping[str, Any], point: Point, folder: Path) -> str:
+    """What is another in the case than in the sweep whose id ends the ``detail``: the keys; empty if not known."""
+    try:
+        (_, sweep), first = detail.rsplit(": ", 1), session.outbox.ready(apply_overrides(data, point), folder)
+        run = session.find_sweep(sweep).status().points[0].run.id
+        before = msgspec.json.decode(session.fetch(f"/v1/runs/{run}/files/case.json"))
+    except (ClientError, CaseError, ValueError, IndexError):
+        return ""
+    found = changes(before, first)
+    return f": {found}" if found else ""
 
 
 def _waited(made: Sweep) -> SweepInfo:

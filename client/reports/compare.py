@@ -7,14 +7,18 @@ from typing import Any
 
 import msgspec
 
+from conoid.cases.figures import counted
 from conoid.cases.outcome import Outcome
 from conoid.cases.output import fragments, history
 from conoid.cases.output.fragments import Summary
+from conoid.cases.reading.problems import shown
 
 from ..columns import Columns
 from ..errors import UnfinishedError
 from ..result import Result
 
+_TOLD = 3
+"""Largest number of changed keys that are named."""
 _OUTCOME = (
     "steps", "time", "ranks", "elapsed", "cpu", "elements", "nodes", "fragments", "broken", "eroded", "eroded_mass",
     "inside", "deepest", "overlapping", "overlap", "rebalances", "worst_residual", "element_updates_per_second",
@@ -83,6 +87,13 @@ def differing(a: Any, b: Any) -> list[Key]:
     first, second = dict(_flat(a)), dict(_flat(b))
     every = [*first, *(key for key in second if key not in first)]
     return [Key(key, first.get(key), second.get(key)) for key in every if first.get(key) != second.get(key)]
+
+
+def changes(before: Any, now: Any) -> str:
+    """The first keys that differ, each with both values; empty if there are none."""
+    found = differing(before, now)
+    keys = ", ".join(f"{one.key} was {shown(one.a)} and is {shown(one.b)}" for one in found[:_TOLD])
+    return keys + (f", and {counted(len(found) - _TOLD, 'more key')}" if len(found) > _TOLD else "")
 
 
 def _flat(data: Any, path: str = "") -> Iterator[tuple[str, Any]]:

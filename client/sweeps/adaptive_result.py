@@ -10,16 +10,12 @@ import msgspec
 from conoid.cases.figures import counted, duration, number
 from conoid.cases.output import history, points
 from conoid.cases.reading import whole
-from conoid.cases.reading.problems import shown
 
 from ..errors import ClientError, UsageError
 from ..local.atomic import save_text
-from ..reports.compare import differing
+from ..reports.compare import changes
 from .ballistic import Fit
 from .goal import Goal
-
-_TOLD = 3
-"""Keys of a changed case that are named."""
 
 
 class Tried(msgspec.Struct, kw_only=True, frozen=True):
@@ -192,10 +188,8 @@ def _require_same(path: Path, kept: Kept, fresh: Kept) -> None:
         raise UsageError(f"{path}: holds another sweep, {told}; {other}")
     if kept.version != fresh.version:
         raise UsageError(f"{path}: its runs are of Conoid {kept.version}, this is {fresh.version}; {other}")
-    if changed := differing(kept.case, fresh.case):
-        keys = ", ".join(f"{one.key} was {shown(one.a)} and is {shown(one.b)}" for one in changed[:_TOLD])
-        more = f", and {len(changed) - _TOLD} more keys" if len(changed) > _TOLD else ""
-        raise ClientError(f"{path}: the case has changed since: {keys}{more}; {other}")
+    if changed := changes(kept.case, fresh.case):
+        raise ClientError(f"{path}: the case has changed since: {changed}; {other}")
 
 
 def _plain(case: Mapping[str, Any]) -> dict[str, Any]:

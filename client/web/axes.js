@@ -95,6 +95,10 @@ export function expected({ value, tolerance, since, until }, tone) {
 export const pins = (name, data) =>
   ({ name, aside: true, type: "scatter", data, symbol: "pin", symbolSize: 22, color: colour("accent"), cursor: "pointer", z: 5, tooltip: { valueFormatter: () => "click to open" } });
 
+// Points without a result, as crosses.
+export const crosses = (name, data) => ({ type: "scatter", aside: true, name, data, symbol: CROSS, symbolSize: 11, color: colour("bad"), cursor: "pointer", z: 6 });
+const CROSS = "path://M2 0L5 3L8 0L10 2L7 5L10 8L8 10L5 7L2 10L0 8L3 5L0 2Z";
+
 // A horizontal line that a value should not pass.
 export const limit = (value) =>
   ({ silent: true, symbol: "none", label: { show: false }, lineStyle: { color: colour("bad"), type: "dashed" }, data: [{ yAxis: value }] });

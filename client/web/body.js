@@ -8,7 +8,7 @@ import { breaks } from "./live.js";
 import { Picked, table } from "./picked.js";
 import { range } from "./ranges.js";
 import { film, picture } from "./saving.js";
-import { unpack } from "./section.js";
+import { unpack, within } from "./section.js";
 import { colourings, decode, fragment, rowOf } from "./snapshot.js";
 import { Tools } from "./tools.js";
 import { View3d } from "./view3d.js";
@@ -190,7 +190,7 @@ export class Body {
     this.normal = axis < 0 ? way : [0, 1, 2].map((i) => (i === axis ? 1 : 0));
     this.tools.flipped = axis >= 0 && way[axis] < 0;
     const along = this.view.eye.along(this.normal);
-    this.tools.slide(...along, (along[0] + along[1]) / 2);
+    this.tools.slide(...along, within((along[0] + along[1]) / 2, this.snapshot.header.box, this.normal));
     this.slice();
     this.volume = await this.readVolume(this.entry).catch(() => null);
     if (this.volume && this.volume.header.n === this.snapshot.header.n) this.view.fill(this.volume);

@@ -1,5 +1,7 @@
 // A result of a sweep over what was changed: a curve over one key, or a matrix of two. No element is made here.
 
+import { FINAL } from "./live.js";
+
 // A run that has not come to its end has measured something else than the others.
 const measured = (row, result) => (row.state === "succeeded" ? result.value(row) : null);
 const number = (value) => typeof value === "number" && Number.isFinite(value);
@@ -29,7 +31,7 @@ export function together(points, keys) {
 }
 
 // { words, curves: [{ name, data: [[x, y, id]] }] } of a result over the column `x`, both in SI units, a curve for each
-// combination of the `others`; `words` names the places on the axis where the values of `x` are no numbers.
+// combination of the `others`; `at(row)` is its place on the axis; `words` names the places on the axis where the values of `x` are no numbers.
 export function curves(points, x, others, result) {
   const places = levels(points, x);
   const words = places.every(({ value }) => number(value)) ? null : places.map(({ text }) => text);
@@ -41,7 +43,14 @@ export function curves(points, x, others, result) {
     if (!found.has(name)) found.set(name, []);
     if (number(y)) found.get(name).push([at(row), y, row.id]);
   }
-  return { words, curves: [...found].map(([name, data]) => ({ name, data: data.sort((a, b) => a[0] - b[0]) })) };
+  return { words, curves: [...found].map(([name, data]) => ({ name, data: data.sort((a, b) => a[0] - b[0]) })), at };
+}
+
+// [[x, y, id, why]] of the points whose run has ended without a result, at the foot of the curves.
+export function lost(points, { curves: found, at }) {
+  const foot = Math.min(...found.flatMap(({ data }) => data.map(([, y]) => y)));
+  const over = points.filter(({ row }) => FINAL.has(row.state) && row.state !== "succeeded" && at(row) !== null);
+  return over.map(({ row }) => [at(row), Number.isFinite(foot) ? foot : 0, row.id, `${row.state.replaceAll("_", " ")}${row.message ? `: ${row.message}` : ""}`]);
 }
 
 // { rows, columns, cells } of two keys; cells[i][j] has the points there and the mean of their results as a share of the

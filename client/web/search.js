@@ -1,12 +1,11 @@
 // What an adaptive sweep looks for and what it has found: the answer with its uncertainty; a chart of points, bracket, curve.
 
-import { axis, colour, common, series } from "./axes.js";
+import { axis, colour, common, crosses, series } from "./axes.js";
 import { Chart } from "./charts.js";
 import { counted, exact, h, moment, si, vector } from "./figures.js";
 
 const TALL = 340;
 const SILENT = 120; // s without a report and without an open run after which the command is taken to have ended.
-const CROSS = "path://M2 0L5 3L8 0L10 2L7 5L10 8L8 10L5 7L2 10L0 8L3 5L0 2Z";
 
 // A run may take longer than SILENT: the command reports when it ends.
 export const goesOn = ({ search, reported, states }, now = Date.now() / 1000) =>
@@ -68,7 +67,7 @@ export class Answer {
       ...(curve ? drawn(curve, up) : []),
       { ...scatter("runs", "line-0", known.map(({ x, value, run }) => [x, value, run])), ...marks(bracket, threshold) },
       scatter("run goes on", "soft", points.filter(({ value, problem }) => value === null && !problem).map(({ x, run }) => [x, threshold, run]), { symbol: "emptyCircle" }),
-      scatter("no result", "bad", points.filter(({ problem }) => problem).map(({ x, run, problem }) => [x, threshold, run, problem]), { symbol: CROSS, symbolSize: 11 }),
+      crosses("no result", points.filter(({ problem }) => problem).map(({ x, run, problem }) => [x, threshold, run, problem])),
       ...(curve ? interval(curve, threshold) : []),
     ].filter(({ data }) => data.length);
     return {

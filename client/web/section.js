@@ -24,6 +24,16 @@ export function nodes(steps) {
   return out;
 }
 
+const INSET = 0.02; // Of the extent of the tets along the normal.
+
+// The place (m) along `normal` next to `middle` that is inside of the tets, whose box is given: in a half or quarter model the
+// middle of the body with its mirror images is the plane of symmetry, where the tets end.
+export function within(middle, [low, high], normal) {
+  const ends = [false, true].map((far) => normal.reduce((sum, part, i) => sum + part * ((part < 0) === far ? low[i] : high[i]), 0));
+  const inset = INSET * (ends[1] - ends[0]);
+  return Math.min(ends[1] - inset, Math.max(ends[0] + inset, middle));
+}
+
 // { corners, tet, omit }: triangles in the plane `normal` · x = `at` (m), laid out as those of a surface: x, y, z and row of each
 // corner; of each triangle its tet, and whether its last edge is none of the tet's section.
 export function cut(volume, normal, at) {

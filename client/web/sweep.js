@@ -1,7 +1,7 @@
 // The page of a sweep: how many of its points are done, a result over what was changed, each point with its values.
 
 import { Problem, call, download, refused } from "./api.js";
-import { axis, largest, lineStyle, series } from "./axes.js";
+import { axis, crosses, largest, lineStyle, series } from "./axes.js";
 import { Chart } from "./charts.js";
 import { columnsOf } from "./columns.js";
 import { counted, exact, h, meter, pill, si, words } from "./figures.js";
@@ -10,7 +10,7 @@ import { FINAL } from "./live.js";
 import { sorted } from "./sorting.js";
 import { recall, remember } from "./storage.js";
 import { Answer, goesOn } from "./search.js";
-import { curves, matrix, telling, together } from "./response.js";
+import { curves, lost, matrix, telling, together } from "./response.js";
 import { RunTable, shorts } from "./runtable.js";
 import { fill } from "./toolbar.js";
 
@@ -229,18 +229,19 @@ export class SweepPage {
     const { x, others } = this.axes;
     const result = this.chosen;
     if (!x || !result) return null;
-    const { words: places, curves: found } = curves(this.points, x, others, result);
+    const made = curves(this.points, x, others, result);
+    const { words: places, curves: found } = made;
     const lines = found.map(({ name, data }, i) => ({ ...series({ name: name || result.title, data, unit: result.base, ...lineStyle(i) }), showSymbol: true, symbolSize: 8, cursor: "pointer" }));
-    const titled = (column, made) => ({ ...made, name: made.name ? `${column.named ?? column.title}, ${made.name}` : column.named ?? column.title });
+    const titled = (column, scale) => ({ ...scale, name: scale.name ? `${column.named ?? column.title}, ${scale.name}` : column.named ?? column.title });
     const across = axis(x.base, Math.max(0, ...found.flatMap(({ data }) => data.map(([value]) => Math.abs(value)))), { scale: true, splitLine: { show: false } });
     const up = axis(result.base, largest(lines), { scale: true });
     return {
       grid: { left: 72, right: 22, top: found.length > 1 ? 58 : 36, bottom: 46 },
       xAxis: { ...titled(x, across), ...(places ? { type: "category", data: places, axisLabel: {} } : {}), nameLocation: "middle", nameGap: 28, nameTextStyle: { ...across.nameTextStyle, align: "center" } },
       yAxis: { ...titled(result, up), nameTextStyle: { ...up.nameTextStyle, align: "left" } },
-      series: lines, xName: x.base ? `${x.full} [${x.base}]` : x.full,
+      series: [...lines, crosses("no result", lost(this.points, made))], xName: x.base ? `${x.full} [${x.base}]` : x.full,
       ...(found.length > 1 ? {} : { legend: { show: false } }),
-      tooltip: { trigger: "item", formatter: ({ seriesName, value }) => `${x.title} ${places ? places[value[0]] : exact(value[0], x.base)}\n${result.title} ${si(value[1], result.base, 4)}${found.length > 1 ? `\n${seriesName}` : ""}` },
+      tooltip: { trigger: "item", formatter: ({ seriesName, value }) => (value[3] ? `${x.title} ${places ? places[value[0]] : exact(value[0], x.base)}\n${value[3]}` : `${x.title} ${places ? places[value[0]] : exact(value[0], x.base)}\n${result.title} ${si(value[1], result.base, 4)}${found.length > 1 ? `\n${seriesName}` : ""}`) },
     };
   }
 

@@ -170,7 +170,7 @@ class Sweeps:
     def _earlier(self, owner: str, key: str | None, digest: str) -> Plan | None:
         found = [p for p in self.plans.of(owner) if key is not None and p.key == key and p.search is None]
         if found and found[0].digest != digest:
-            detail = f"Idempotency-Key {key!r} was used for another sweep"
+            detail = f"Idempotency-Key {key!r} was used for another sweep: {found[0].id}"
             raise ServiceError(422, "key_reused", detail, pointer="Idempotency-Key", hint="use a new key")
         return found[0] if found else None
 

@@ -72,7 +72,8 @@ def test_a_changed_case_is_refused_in_one_line(user: Path) -> None:
     refused = conoid(*words)
     assert (refused.exit_code, refused.stdout) == (2, "")
     assert refused.stderr.splitlines() == [
-        f"conoid: {case}: the case has changed since this sweep was begun; --new begins another one"
+        f"conoid: {case}: the case has changed since this sweep was begun: run.end_time was '1 us' and is '3 us'; "
+        "--new begins another one"
     ]
 
 

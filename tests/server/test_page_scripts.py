@@ -476,6 +476,17 @@ def test_what_the_browser_keeps_is_used_where_it_has_the_kind_that_is_wanted(ask
         assert ask("storage.js", script, [json.dumps(kept), wanted]) == kept
 
 
+def test_a_section_begins_inside_of_the_tets_of_a_quarter_model(ask: Ask) -> None:
+    box = [[0.0, 0.0, -0.1], [0.02, 0.04, 0.0]]
+    for middle, normal, place in (
+        (0.0, [1, 0, 0], 0.0004),
+        (0.0, [-1, 0, 0], -0.0004),
+        (0.01, [1, 0, 0], 0.01),
+        (9.0, [0, 0.6, 0.8], 0.024 - 0.02 * 0.104),
+    ):
+        assert ask("section.js", "page.within(...data)", [middle, box, normal]) == pytest.approx(place)
+
+
 def test_the_tooltip_of_a_chart_stays_text_whatever_a_chart_adds_to_it(ask: Ask) -> None:
     globals_ = "globalThis.getComputedStyle = () => ({ getPropertyValue: () => '' }); globalThis.document = {};"
     script = f"(() => {{ {globals_} return page.whole(true, {{ tooltip: {{ trigger: 'axis' }} }}).tooltip; }})()"

@@ -171,13 +171,14 @@ def test_a_response_leaves_out_what_has_not_come_to_its_end(ask: Ask, some: dict
     script = f"""{COLUMNS}
         const points = all.slice(0, 5).map((row, n) => ({{ n, row }}));
         const [v, size, speed] = ["value:{SPEED}", "value:{SIZE}", "result:probe.speed"].map(by);
-        const {{ words, curves: made }} = page.curves(points, v, [size], speed);
+        const {{ words, curves: made, at }} = page.curves(points, v, [size], speed);
+        const lost = page.lost(points, {{ curves: made, at }});
         const map = page.matrix(points, size, v, speed);
         const results = columns.filter(({{ id }}) => id.startsWith("result:"));
         const cells = map.cells.map((row) => row.map(({{ value, points: here }}) => [value, here.length]));
         return [words, made.map(({{ name, data }}) => [name, data]), map.rows.map(({{ text }}) => text),
-          map.columns.length, cells, page.telling(points, results).id];"""
-    words, made, down, across, cells, best = ask(MODULES, f"(() => {{ {script} }})()", some)
+          map.columns.length, cells, page.telling(points, results).id, lost];"""
+    words, made, down, across, cells, best, lost = ask(MODULES, f"(() => {{ {script} }})()", some)
     assert words is None
     assert made == [
         ["element_size 4 mm", [[-200, 8, "run2"], [0, 10, "run0"]]],
@@ -186,6 +187,9 @@ def test_a_response_leaves_out_what_has_not_come_to_its_end(ask: Ask, some: dict
     assert (down, across) == (["2", "4"], 5)
     assert cells[0] == [[None, 0], [7, 1], [None, 0], [None, 1], [None, 0]]
     assert best == "result:probe.speed"
+    ended = {run["id"]: run["state"] for run in some["runs"][:5] if run["state"] in {"failed", "cancelled", "lost"}}
+    assert [(run, why.split(":")[0]) for _, _, run, why in lost] == list(ended.items())
+    assert {foot for _, foot, _, _ in lost} <= {7}
 
 
 def test_keys_that_go_together_are_one_axis(ask: Ask) -> None:
