@@ -9,10 +9,11 @@ from ...model.growing import Rooms
 from ...model.state import Bits, Flags, Floats, Indices, Ints
 from ..surface.normals import COLUMNS
 from ..surface.records import AGED, OPEN, SurfaceNodes
+from .incidence import Incidence
 
 _FRESH = {
     **dict.fromkeys(("owned", "pushes", "live", "new", "fresh", "tracked", "on_surface"), False),
-    "first": -1, "normals": 0.0, "total": 0,
+    "first": -1, "root": -1, "normals": 0.0, "total": 0,
 }  # fmt: skip
 """Initial values of a slot."""
 
@@ -81,6 +82,8 @@ class SceneSlots:
     """(slots,) local nodes on the surface: only these are in contact with faces."""
     first: Indices
     """(slots,) first pair with a face, -1 for none."""
+    root: Indices
+    """(slots,) slot of the search of which each is a copy, or which it is; -1 for one that came later."""
     normals: Floats
     """(slots, COLUMNS) mean normals; see tables.SlotTable."""
     total: Ints
@@ -94,10 +97,9 @@ class SceneSlots:
         """Returns the columns with nothing in the broad phase yet."""
         n = len(owned)
         live, new, fresh, tracked, on_surface = np.zeros((5, n), bool)
-        first, normals, total, before = (
-            np.full(n, -1, np.int32), np.zeros((n, COLUMNS)), np.zeros((n, 3), np.int64), np.zeros((n, 3)),
-        )  # fmt: skip
-        return cls(owned, pushes, live, new, fresh, tracked, on_surface, first, normals, total, before)
+        first, root = np.full(n, -1, np.int32), np.arange(n, dtype=np.int32)
+        normals, total, before = np.zeros((n, COLUMNS)), np.zeros((n, 3), np.int64), np.zeros((n, 3))
+        return cls(owned, pushes, live, new, fresh, tracked, on_surface, first, root, normals, total, before)
 
     def add(self, rows: SurfaceNodes) -> None:
         """Adds the slots of ``rows``."""
@@ -105,7 +107,9 @@ class SceneSlots:
 
     def inherit(self, copies: Indices, parents: Indices) -> None:
         """Copies normals, broad-phase flags and ranks of parents to their copies."""
-        for column in (self.normals, self.owned, self.on_surface, self.pushes, self.live, self.new, self.tracked):
+        for column in (
+            self.normals, self.owned, self.on_surface, self.pushes, self.live, self.new, self.tracked, self.root,
+        ):  # fmt: skip
             column[copies] = column[parents]
 
 
@@ -131,6 +135,11 @@ class SceneFaces:
     def at_rest(cls, corners: Indices, ids: Ints, size: Floats, exposed: Flags) -> "SceneFaces":
         """Returns the columns with nothing in the broad phase yet."""
         return cls(corners, ids, size, exposed, *np.zeros((3, len(corners)), bool))
+
+    @cached_property
+    def incidence(self) -> Incidence:
+        """Rows at each slot of the search; asked for first before any corner has become a copy."""
+        return Incidence(self.corners)
 
 
 @dataclass
@@ -188,6 +197,11 @@ class SceneEdges:
     def far(self) -> Ints:
         """Rows of edges with a face that this rank does not have."""
         return np.flatnonzero((self.faces < 0).any(axis=1))
+
+    @cached_property
+    def incidence(self) -> Incidence:
+        """Rows at each slot of the search; asked for first before any corner has become a copy."""
+        return Incidence(self.corners)
 
     @property
     def names(self) -> Ints:

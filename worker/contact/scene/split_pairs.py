@@ -62,11 +62,11 @@ def _become(ids, key, became, node, tet):  # type: ignore[no-untyped-def]
     return became[at] if at < len(key) and key[at] == wanted else node
 
 
-@njit(_I1(_N2, _N1), cache=True)
-def _torn(corners, first):  # type: ignore[no-untyped-def]
-    """Rows of ``corners`` (n, 4 or 6) with a node that has copies; ``first``: see Family."""
-    rows, n = np.empty(len(corners), np.int64), 0
-    for row in range(len(corners)):
+@njit(_I1(_N2, _N1, _I1), cache=True)
+def _torn(corners, first, near):  # type: ignore[no-untyped-def]
+    """Those of the rows ``near`` of ``corners`` (n, 4 or 6) with a node that has copies; ``first``: see Family."""
+    rows, n = np.empty(len(near), np.int64), 0
+    for row in near:
         for k in range(corners.shape[1]):
             if first[corners[row, k]] >= 0:
                 rows[n] = row
@@ -75,13 +75,13 @@ def _torn(corners, first):  # type: ignore[no-untyped-def]
     return rows[:n].copy()
 
 
-@njit(several(_I1, _N2)(_N2, _B1, _I1, _N1, _I1, _I1, _N1), cache=True)
-def follow_faces(corners, fresh, faces, first, ids, key, became):  # type: ignore[no-untyped-def]
-    """Replaces the ``corners`` (f, 4) of faces, of the ids ``faces`` (f,), by their copies; ``first``: see Family;
-    ``ids`` of the nodes; ``key`` and ``became``: see TopologyUpdate, as slots. Returns the rows of the changed
-    faces, and their corners before.
+@njit(several(_I1, _N2)(_I1, _N2, _B1, _I1, _N1, _I1, _I1, _N1), cache=True)
+def follow_faces(near, corners, fresh, faces, first, ids, key, became):  # type: ignore[no-untyped-def]
+    """Replaces the ``corners`` (f, 4) of faces, of the ids ``faces`` (f,), by their copies; ``near``: rows of all faces
+    whose corners may have copies; ``first``: see Family; ``ids`` of the nodes; ``key`` and ``became``: see
+    TopologyUpdate, as slots. Returns the rows of the changed faces, and their corners before.
     """
-    rows = _torn(corners, first)
+    rows = _torn(corners, first, near)
     old = np.empty((len(rows), 4), np.int32)
     for r in range(len(rows)):
         f = rows[r]
@@ -93,12 +93,12 @@ def follow_faces(corners, fresh, faces, first, ids, key, became):  # type: ignor
     return rows, old
 
 
-@njit(several(_I1, _N2, _B1)(_N2, _B1, _I2, _N1, _I1, _I1, _N1), cache=True)
-def follow_edges(corners, fresh, sides, first, ids, key, became):  # type: ignore[no-untyped-def]
+@njit(several(_I1, _N2, _B1)(_I1, _N2, _B1, _I2, _N1, _I1, _I1, _N1), cache=True)
+def follow_edges(near, corners, fresh, sides, first, ids, key, became):  # type: ignore[no-untyped-def]
     """Does the same for edges between ``sides`` (e, 2), ids of faces; also returns which edges vanish because their
     faces have separated there.
     """
-    rows = _torn(corners, first)
+    rows = _torn(corners, first, near)
     old, gone = np.empty((len(rows), 6), np.int32), np.zeros(len(rows), np.bool_)
     for r in range(len(rows)):
         e = rows[r]

@@ -129,8 +129,9 @@ class SplitUpdate:
     def _faces(self, heard: TopologyUpdate, became: Indices, family: Family) -> None:
         """Replaces the corners of faces by their copies, and adds pairs with the nodes that left a face."""
         faces, slots, surface_nodes = self._scene.faces, self._scene.slots, self._scene.surface_nodes
+        near = faces.incidence.at(slots.root[family.pairs[:, 0]])
         rows, old = split_pairs.follow_faces(
-            faces.corners, faces.fresh, faces.id, family.first, surface_nodes.id, heard.key, became
+            near, faces.corners, faces.fresh, faces.id, family.first, surface_nodes.id, heard.key, became
         )  # fmt: skip
         if not len(rows):
             return
@@ -144,8 +145,9 @@ class SplitUpdate:
     def _edges(self, heard: TopologyUpdate, became: Indices, family: Family) -> None:
         """Removes edges whose faces have separated, and adds pairs with the edges that left their ends."""
         edges, surface_nodes = self._scene.edges, self._scene.surface_nodes
+        near = edges.incidence.at(self._scene.slots.root[family.pairs[:, 0]])
         rows, old, gone = split_pairs.follow_edges(
-            edges.corners, edges.fresh, edges.sides, family.first, surface_nodes.id, heard.key, became
+            near, edges.corners, edges.fresh, edges.sides, family.first, surface_nodes.id, heard.key, became
         )  # fmt: skip
         some = edges.live[rows] & ~gone & self._meets(old[:, 0])
         if some.any():
