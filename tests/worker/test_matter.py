@@ -61,7 +61,7 @@ def test_the_pressure_of_a_tet_is_the_mean_of_four_nodes() -> None:
     sim = to_and_fro(TORN, "nodal")
     run(sim, steps=60)
     assert isinstance(sim.elements, AveragedElements)
-    matter, (part,) = sim.elements._matter, sim.model.blocks
+    matter, (part,) = sim.elements.means.matter, sim.model.blocks
     tets = np.asarray(part.tets, np.int64)
     assert part.row(PRESSURE) == pytest.approx(matter[tets, PRESSURE_AT].mean(axis=1), rel=1e-12)
     assert part.row(PORES) == pytest.approx(matter[tets, PORES_AT].mean(axis=1), rel=1e-12)

@@ -67,7 +67,7 @@ def stored(sim: Simulation) -> float:
     (part,) = sim.model.blocks
     tets = part.tets.astype(np.int64)
     if isinstance(sim.elements, AveragedElements) and sim.elements._kinds.any():
-        matter = sim.elements._matter[tets]
+        matter = sim.elements.means.matter[tets]
         squares = (matter[:, :, RATIO] * matter[:, :, PRESSURE_AT] ** 2).mean(axis=1)
         volume = part.row(MASS) / part.params[law.DENSITY]
     else:

@@ -6,17 +6,18 @@ from ..accounts.timers import Timers
 from ..boundaries.boundaries import Boundary
 from ..materials.law import BULK
 from ..migration.parcel import Parcel
-from ..model.state import Floats, Indices, Ints, Model, extended
+from ..model.state import Floats, Indices, Ints, Model
 from ..model.topology import Split
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour, SharedSum
 from ..parallel.passes import Pass
 from ..parallel.tags import Tag
 from ..parallel.team import Team
-from . import matter, nodal, tasks
+from . import nodal, tasks
 from .averages import Averages
 from .flat import flat_tets
 from .forms import Elements
+from .nodal_means import NodalMeans
 from .passes import BlockPass, Values
 
 
@@ -33,24 +34,12 @@ class AveragedElements(Elements):
         (matter.py); ``scene``: boundaries, among them planes of symmetry, which mirror means; ``more``: True if an
         equation of state of the case averages heat or bulking as well.
         """
-        self._averages = averages
-        n = model.nodes.n if averages is None else averages.n
-        self.split = split
-        self._columns = 3 if more else 2
-        self._gradient = np.zeros((n if split else 1, 3), np.int64)
+        self._averages, self._columns, self.split = averages, 3 if more else 2, split
         super().__init__(model, comm, neighbours, timers, team)
-        self._weight = weight
         self._params, self._kinds = params, kinds
-        self._bulk = params[self._kind, BULK]
-        self._pressed = bool(kinds.any())
-        """True if some pressures are computed at the nodes (matter.py)."""
-        self._matter = matter.at_start(n if kinds.any() else 1)
-        self._scene = scene
-        self._volumes = np.zeros((n, self._columns), np.int64)
-        self._strain, self._more, self._sizes = np.zeros(n), np.zeros(n), np.zeros(n if split else 1)
-        self._projected = np.zeros((n if split else 1, 3))
-        self.pressure = np.zeros(n if split else 1)
-        self._scale = 1.0
+        bulk = params[self._kind, BULK]
+        self.means = NodalMeans(weight, bulk, self._columns, split=split, pressed=bool(kinds.any()))
+        self._scene, self._scale = scene, 1.0
         self._strains, self._forces = BlockPass(tasks.strains, tasks.STRAINS), BlockPass(tasks.forces, tasks.FORCES)
         self._complete = Pass(team, nodal.complete, *nodal.COMPLETE)
         self._project = Pass(team, nodal.project, *nodal.PROJECT)
@@ -62,6 +51,10 @@ class AveragedElements(Elements):
         """(rows,) a part with the material of each row."""
         return self.model.nodes.part if self._averages is None else self._averages.kind
 
+    @property
+    def pressure(self) -> Floats:
+        return self.means.pressure
+
     def _connect(self) -> None:
         super()._connect()
         sharing = self._neighbours if self._averages is None else self._averages.neighbours
@@ -72,16 +65,11 @@ class AveragedElements(Elements):
     def grow(self, split: Split) -> None:
         parents = split.copies.parents if self._averages is None else self._averages.grow(split)
         super().grow(split)
-        names = ["_weight", "_bulk", "_volumes", "_strain", "_more"]
-        names += ["_gradient", "_projected", "pressure", "_sizes"] if self.split else []
-        names += ["_matter"] if self._pressed else []
-        for name in names:
-            values = getattr(self, name)
-            setattr(self, name, extended(values, values[parents]))
+        self.means.grow(parents)
 
     def keep(self, parcel: Parcel) -> None:
         super().keep(parcel)
-        columns = {name: getattr(self, name) for name in self._kept}
+        columns = self.means.stored
         if self._averages is not None:
             parcel.rows["elements.averages"] = self._averages.keep(columns)
             columns = self._averages.of_nodes(columns)
@@ -89,16 +77,10 @@ class AveragedElements(Elements):
 
     def resume(self, parcel: Parcel) -> None:
         super().resume(parcel)
-        columns = {name: np.ascontiguousarray(parcel.nodes[f"elements.{name}"]) for name in self._kept}
+        columns = {name: np.ascontiguousarray(parcel.nodes[f"elements.{name}"]) for name in self.means.stored}
         if self._averages is not None:
             columns = self._averages.resume(parcel.rows["elements.averages"], columns)
-        for name, column in columns.items():
-            setattr(self, name, column)
-
-    @property
-    def _kept(self) -> tuple[str, ...]:
-        of_split = ("pressure", "_projected") if self.split else ()
-        return "_weight", *of_split, *(("_matter",) if self._pressed else ())
+        self.means.restore(columns)
 
     def _exchanges(self) -> list[SharedSum]:
         return [self.shared_forces, self.shared_volumes, *([self.shared_gradients] if self.split else [])]
@@ -114,45 +96,43 @@ class AveragedElements(Elements):
         self._scratches.peaks[:] = 0
         self._scale = scale
         means = self._means()
-        self._over(self._strains, means, (dt,), lambda: self.shared_volumes.begin(self._volumes))
+        self._over(self._strains, means, (dt,), lambda: self.shared_volumes.begin(self.means.sums))
         if self._neighbours:
             with self._timers.phase("exchange"):
-                self.shared_volumes.finish(self._volumes)
-        self._complete.run(len(self._strain), means, self._sizes, *self._constants())
+                self.shared_volumes.finish(self.means.sums)
+        self._complete.run(self.means.n, means, self.means.volumes, *self._constants())
         self._bridge(scale, opens=True)
         self._over(self._forces, means, (dt, scale), self._send)
 
     def again(self, scale: float) -> None:
-        self._gradient[:] = 0
+        self.means.gradient[:] = 0
         self._scale = scale
         super().again(scale)
 
     def finish(self) -> None:
         super().finish()
         if self.split:
-            self.shared_gradients.begin(self._gradient)
-            self.shared_gradients.finish(self._gradient)
-            self._project.run(len(self._strain), self._means(), self._sizes, self._scale)
+            self.shared_gradients.begin(self.means.gradient)
+            self.shared_gradients.finish(self.means.gradient)
+            self._project.run(self.means.n, self.means.fields, self.means.volumes, self._scale)
             for boundary in self._scene:
                 self._mirror(boundary)
 
     def _mirror(self, boundary: Boundary) -> None:
         """Applies the boundary to the projected gradients of all rows of its nodes."""
+        projected = self.means.projected
         if self._averages is None:
-            boundary.mirror(self._projected)
+            boundary.mirror(projected)
             return
         for rows in self._averages.layers():
             of_nodes = np.zeros((self.model.nodes.n, 3))
-            of_nodes[self._averages.node[rows]] = self._projected[rows]
+            of_nodes[self._averages.node[rows]] = projected[rows]
             boundary.mirror(of_nodes)
-            self._projected[rows] = of_nodes[self._averages.node[rows]]
+            projected[rows] = of_nodes[self._averages.node[rows]]
 
     def _means(self) -> Values:
-        return (
-            self._volumes, self._weight, self._strain, self._more, self.split, self.pressure, self._projected,
-            self._gradient, self._matter,
-        )  # fmt: skip
+        return self.means.fields
 
     def _constants(self) -> Values:
         """Arguments of ``nodal.complete`` except means and volumes."""
-        return self._columns > 2, self._bulk, self._pressed, self._kind, self._kinds, self._params
+        return self._columns > 2, self.means.bulk, self.means.pressed, self._kind, self._kinds, self._params

@@ -70,8 +70,11 @@ class Elements:
         self._connect()
         self.cohesion: Bridges | None = None
         """Cohesive facets, if there are any."""
-        self.pressure = np.zeros(1)
-        """(nodes,) nodal pressure, Pa; only in the ``split`` form."""
+
+    @property
+    def pressure(self) -> Floats:
+        """(rows,) nodal pressure, Pa, in the ``split`` form; else one row."""
+        return np.zeros(1)
 
     @property
     def limit_bits(self) -> int:

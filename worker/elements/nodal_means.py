@@ -1,0 +1,61 @@
+"""Arrays of the averaged pressure forms: sums and means by row, a row for each node and each further material of it."""
+
+import numpy as np
+
+from ..model.state import Floats, Ints, extended
+from . import matter
+from .passes import Values
+
+_STORED = {"_weight": "weight", "pressure": "pressure", "_projected": "projected", "_matter": "matter"}
+"""Names in a checkpoint, and attributes."""
+
+
+class NodalMeans:
+    """Sums and means of a rank; ``fields`` is the record that kernels take (records.Means)."""
+
+    def __init__(self, weight: Floats, bulk: Floats, columns: int, *, split: bool, pressed: bool) -> None:
+        """``weight`` (rows,): one over the reference volume, 1/m^3; ``bulk`` (rows,): bulk modulus, Pa; ``columns``: of
+        the sums; ``split``: whether pressure gradients stabilise; ``pressed``: whether there are nodal pressures.
+        """
+        n, of_split = len(weight), len(weight) if split else 1
+        self.weight, self.bulk, self.split, self.pressed = weight, bulk, split, pressed
+        self.sums: Ints = np.zeros((n, columns), np.int64)
+        self.strain, self.more = np.zeros(n), np.zeros(n)
+        self.pressure, self.projected = np.zeros(of_split), np.zeros((of_split, 3))
+        self.gradient: Ints = np.zeros((of_split, 3), np.int64)
+        self.volumes = np.zeros(of_split)
+        """(rows,) nodal volumes of the step, m^3; one row without ``split``."""
+        self.matter = matter.at_start(n if pressed else 1)
+
+    @property
+    def n(self) -> int:
+        """Number of rows."""
+        return len(self.strain)
+
+    @property
+    def fields(self) -> Values:
+        """The fields of records.Means."""
+        return (
+            self.sums, self.weight, self.strain, self.more, self.split, self.pressure, self.projected, self.gradient,
+            self.matter,
+        )  # fmt: skip
+
+    def grow(self, parents: Ints) -> None:
+        """Appends copies of the rows ``parents``."""
+        names = ["weight", "bulk", "sums", "strain", "more"]
+        names += ["gradient", "projected", "pressure", "volumes"] if self.split else []
+        names += ["matter"] if self.pressed else []
+        for name in names:
+            values = getattr(self, name)
+            setattr(self, name, extended(values, values[parents]))
+
+    @property
+    def stored(self) -> dict[str, "np.ndarray"]:
+        """Columns of a checkpoint, by the names there."""
+        names = ["_weight", *(["pressure", "_projected"] if self.split else []), *(["_matter"] if self.pressed else [])]
+        return {name: getattr(self, _STORED[name]) for name in names}
+
+    def restore(self, columns: dict[str, "np.ndarray"]) -> None:
+        """Sets the columns of a checkpoint."""
+        for name, column in columns.items():
+            setattr(self, _STORED[name], column)
