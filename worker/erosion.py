@@ -17,16 +17,12 @@ from .clock import Clock
 from .contact.stage import Contact
 from .contact.surface import exposure
 from .elements.wear import BROKEN, DAMAGED, FREQUENCY, SOUND, TIRED, life
-from .materials.equation_of_state import GRUNEISEN
-from .materials.models import EQUATIONS
-from .mesh.faces import FACES
-from .mesh.faces import normals as face_normals
+from .erosion_account import ErosionAccount
 from .migration.parcel import Parcel
-from .model.rows import DAMAGE, PRESSURE, S_XX, S_XY, S_YY, S_YZ, S_ZX, S_ZZ, VISCOUS, WORK_PLASTIC, WORK_VISCOUS, WORKS
-from .model.state import CHUNK, Block, Flags, Floats, Ints, Model, Nodes, extended
+from .model.rows import DAMAGE
+from .model.state import Flags, Floats, Ints, Model, Nodes, extended
 from .model.topology import Split
 from .parallel.comm import Comm
-from .parallel.fixed_point import Tally
 from .parallel.ownership import Neighbour, complete
 from .parallel.tags import Tag
 
@@ -57,16 +53,9 @@ class Erosion:
         self.removed = np.zeros(model.nodes.n, bool)
         """(nodes,) which are removed; they stand still where they were."""
         self._tets_at = self._completed([block.tets.astype(np.int64) for block in model.blocks])
-        self._last: list[tuple[Ints, Floats]] = []
-        self._leaving, self._before = np.zeros(0, np.int64), np.zeros((0, 3))
+        self._leaving: tuple[Ints, Floats] = np.zeros(0, np.int64), np.zeros((0, 3))
         """Nodes that are removed in this step, and their v(n-1/2), m/s."""
-        mass, speed, arm = extremes
-        energy, momentum, spin = mass * speed * speed, mass * speed, mass * speed * arm
-        self.work = Tally(np.full(len(WORKS) + 1, energy))
-        """Sums of WORKS over the removed tets, J, and the heat of those whose equation of state depends on it."""
-        self.nodal = Tally(np.array([energy, mass, *[momentum] * 3, *[spin] * 3]))
-        """Energy, J, mass, kg, momentum, kg m/s, and angular momentum, kg m^2/s, of the removed nodes."""
-        self._half = self.nodal.quanta(np.zeros((0, len(self.nodal.scale))))
+        self.account = ErosionAccount(clock, extremes)
         self._limit = 0.0
         self.due = False
         """Whether the next step starts with a removal."""
@@ -96,28 +85,21 @@ class Erosion:
     def keep(self, parcel: Parcel) -> None:
         """Adds the state to a parcel."""
         nodes, ids = self._model.nodes, parcel.nodes["id"]
-        parcel.known["erosion"] = self._limit, self.due, self.work.scale, self.nodal.scale
-        for key, words in (("work", self.work.words), ("nodal", self.nodal.words), ("half", self._half)):
-            parcel.sums[f"erosion.{key}"] = words
+        account = self.account
+        parcel.known["erosion"] = self._limit, self.due, account.work.scale, account.nodal.scale
         parcel.nodes["erosion.removed"], parcel.nodes["erosion.tets_at"] = self.removed, self._tets_at
         parcel.nodes["erosion.leaves"] = self._leaves
         alone = np.flatnonzero((self._tets_at == 0) & nodes.owned)
         parcel.rows["erosion.alone"] = {"at": nodes.x[alone], "with": ids[alone][:, None]}
-        tets = np.concatenate([np.zeros((0, 4), np.int64), *(tets for tets, _ in self._last)])
-        forces = np.concatenate([np.zeros((0, 4, 3)), *(forces for _, forces in self._last)])
-        parcel.rows["erosion.last"] = {"at": nodes.x[tets].mean(axis=1), "with": ids[tets], "force": forces}
+        account.keep(parcel, nodes.x)
 
     def resume(self, parcel: Parcel) -> None:
         """Restores the state from a parcel."""
-        limit, self.due, self.work.scale, self.nodal.scale = parcel.known["erosion"]
+        limit, self.due, self.account.work.scale, self.account.nodal.scale = parcel.known["erosion"]
         self.begin(limit)
-        self.work.words, self.nodal.words, self._half = (
-            parcel.sums[f"erosion.{key}"].copy() for key in ("work", "nodal", "half")
-        )
         self.removed, self._tets_at = parcel.nodes["erosion.removed"], parcel.nodes["erosion.tets_at"]
         self._leaves = parcel.nodes["erosion.leaves"]
-        last = parcel.rows["erosion.last"]
-        self._last = [(np.searchsorted(parcel.nodes["id"], last["with"]), last["force"])]
+        self.account.resume(parcel)
         self._release()
 
     def strikes(self) -> int:
@@ -163,14 +145,11 @@ class Erosion:
 
     def note(self, state: Nodes) -> None:
         """Before the kick: books the second half of the work of the last removal."""
-        self._book_last_work(state)
-        self.nodal.words += self._half
-        self.nodal.carry()
-        self._half[:] = 0
+        self.account.note(state)
 
     def remove(self, state: Nodes) -> None:
         """Removes the marked tets, if a removal is scheduled. Collective."""
-        self._leaving = np.zeros(0, np.int64)
+        self._leaving = np.zeros(0, np.int64), np.zeros((0, 3))
         if self.due:
             self._remove(state)
             self.due = False
@@ -179,18 +158,9 @@ class Erosion:
         """After the kick: books the nodes that are removed in this step; sets the velocities of all removed nodes to
         zero.
         """
-        leaving = self._leaving
+        leaving, before = self._leaving
         if len(leaving):
-            owned = leaving[state.owned[leaving]]
-            before, after, mass = self._before[state.owned[leaving]], state.v[owned], state.mass[owned]
-            early = self._clock.shorter / state.scale * (self._before * state.force[leaving]).sum(axis=1)
-            state.stepping[leaving] -= early
-            energy = 0.5 * mass * (before * after).sum(axis=1) + early[state.owned[leaving]]
-            half = 0.5 * mass[:, None] * after
-            half = np.column_stack([half, np.cross(state.x[owned], half)])
-            self._half = self.nodal.quanta(np.column_stack([np.zeros((len(half), 2)), half]))
-            self.nodal.add(np.column_stack([energy, mass, half]))
-            state.force[leaving] = 0
+            self.account.add_nodes(state, leaving, before)
         state.v[self.removed] = 0.0
 
     def _remove(self, state: Nodes) -> None:
@@ -203,16 +173,15 @@ class Erosion:
                     gone.append(exposure.leaving(block, worn, state.id))
                 left.append(block.tets[worn].astype(np.int64))
                 ids.append(block.id[worn])
-                self._last.append((left[-1], _forces(block, worn, state.x)))
-                self.work.add(_energies(block, worn))
+                self.account.add_tets(block, worn, state.x)
                 block.drop(worn)
         self._unload(np.concatenate(ids))
         self._tets_at -= self._completed(left)
         self._model.elements_global -= int(self._comm.sum(np.array([sum(len(tets) for tets in left)]))[0])
         alone = self._tets_at == 0
         leaving = self._leaves & alone & ~self.removed
-        self._leaving, self.removed = np.flatnonzero(leaving), self.removed | leaving
-        self._before = state.v[self._leaving]
+        some = np.flatnonzero(leaving)
+        self._leaving, self.removed = (some, state.v[some]), self.removed | leaving
         self._release()
         if self._contact is not None:
             self._contact.uncover(np.concatenate(gone), self._loose, self.removed)
@@ -242,40 +211,3 @@ class Erosion:
         counts = np.bincount(corners, minlength=self._model.nodes.n)[:, None].astype(np.int64)
         complete(self._comm, self._neighbours, counts, Tag.TETS_AT_NODE)
         return counts[:, 0]
-
-    def _book_last_work(self, state: Nodes) -> None:
-        """Books the second half of the work of the last forces of removed tets, with the velocities after the kick."""
-        for tets, forces in self._last:
-            work = np.zeros(len(tets))
-            for corner in range(4):
-                for i in range(3):
-                    work -= 0.5 * self._clock.last_dt * forces[:, corner, i] * state.v[tets[:, corner], i]
-            self.work.add(np.column_stack([work, np.zeros((len(work), len(WORKS)))]))
-        self._last = []
-
-
-def _rows(block: Block, chosen: Ints, rows: "np.ndarray") -> Floats:
-    """(len(chosen), len(rows)) values of some state rows of some tets."""
-    return np.asarray(block.state[(chosen // CHUNK)[:, None], rows, (chosen % CHUNK)[:, None]])
-
-
-def _energies(block: Block, chosen: Ints) -> Floats:
-    """(k, 5) WORKS of some tets, J, and the heat in their equation of state, J."""
-    none = np.zeros(len(chosen))
-    found = {row: block.at(row, chosen) if block.has(row) else none for row in WORKS}
-    heat = found[WORK_VISCOUS] + found[WORK_PLASTIC] if EQUATIONS[block.eos] is GRUNEISEN else none
-    return np.column_stack([*found.values(), heat])
-
-
-def _forces(block: Block, chosen: Ints, x: Floats) -> Floats:
-    """(k, 4, 3) nodal forces -V stress grad N of some tets, N."""
-    values = _rows(block, chosen, np.arange(VISCOUS + 1))
-    stress = np.empty((len(chosen), 3, 3))
-    pressure = values[:, PRESSURE] + values[:, VISCOUS]
-    for (i, j), row in {(1, 2): S_YZ, (2, 0): S_ZX, (0, 1): S_XY}.items():
-        stress[:, i, j] = stress[:, j, i] = values[:, row]
-    for i, row in enumerate((S_XX, S_YY, S_ZZ)):
-        stress[:, i, i] = values[:, row] - pressure
-    return np.stack([
-        (stress * (face_normals(x, block.tets[chosen][:, face]) / 6.0)[:, None, :]).sum(axis=2) for face in FACES
-    ], axis=1)  # fmt: skip

@@ -127,7 +127,7 @@ def test_the_heat_of_what_leaves_is_counted_where_its_pressure_sees_heat(materia
     step.prepare(sim)
     tick(sim, part.id[:5].copy())
     assert sim.erosion is not None
-    heat = sim.erosion.work.total(sim.comm)[-1]
+    heat = sim.erosion.account.work.total(sim.comm)[-1]
     assert heat == pytest.approx(10.0 if material is COPPER_GAS else 0.0, rel=1e-6)
 
 

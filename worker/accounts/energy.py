@@ -221,7 +221,7 @@ class Ledger:
         if self._contact is not None:
             found["friction"] = self._contact.books.friction
         if self._erosion is not None:
-            found |= {"tets": self._erosion.work, "nodes": self._erosion.nodal}
+            found |= {"tets": self._erosion.account.work, "nodes": self._erosion.account.nodal}
         if self._cohesion is not None:
             found["facets"] = self._cohesion.gone
         return found
