@@ -3,6 +3,7 @@
 import numpy as np
 
 from ..mesh.faces import FACES
+from ..model.ids import places
 from ..model.state import Flags, Ints, Model
 from ..parallel.comm import Comm
 
@@ -53,8 +54,8 @@ class Faces:
         for b, block in enumerate(self._model.blocks):
             tets = self.names[some] // 4
             order = np.argsort(block.id[: block.n], kind="stable")
-            at = np.minimum(np.searchsorted(block.id[order], tets), max(block.n - 1, 0))
-            found = block.id[order[at]] == tets if block.n else np.zeros(len(tets), bool)
+            at = places(block.id[order], tets)
+            found = at >= 0
             rows = np.flatnonzero(some)[found]
             self._block[rows], self._place[rows] = b, order[at[found]]
 

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..model.ids import places
 from ..model.state import Flags, Floats, Ints
 from .pieces import Pieces
 
@@ -66,7 +67,7 @@ def _sides(pieces: Pieces, slaves: Ints, names: Ints, many: int) -> tuple[Ints, 
     """Returns the tied faces at the node of each row."""
     _, first = np.unique(np.column_stack([pieces.bond, pieces.slave]), axis=0, return_index=True)
     key = (pieces.bond[first, None] * many + slaves[first]).reshape(-1)
-    at = np.minimum(np.searchsorted(names, key), max(len(names) - 1, 0))
-    here = np.flatnonzero(names[at] == key) if len(names) else at[:0]
+    at = places(names, key).astype(np.int64)
+    here = np.flatnonzero(at >= 0)
     order = here[np.argsort(at[here], kind="stable")]
     return at[order], slaves[first][order // 3]

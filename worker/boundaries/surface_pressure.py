@@ -17,6 +17,7 @@ from conoid.cases.model.schema import Traction
 
 from ..kernels.jit import njit
 from ..migration.parcel import Parcel
+from ..model.ids import places
 from ..model.loads import LoadedFaces
 from ..model.state import WIDE, Bits, Block, Flags, Floats, Indices, Ints, Model, Nodes
 from ..model.topology import Split
@@ -147,18 +148,17 @@ class SurfacePressure(Driver):
         erode.
         """
         order = np.argsort(block.id)
-        at = np.minimum(np.searchsorted(block.id, self._faces.tets, sorter=order), max(block.n - 1, 0))
-        places = order[at]
-        rows = np.flatnonzero(block.id[places] == self._faces.tets)
-        return block, rows, places[rows]
+        at = places(block.id[order], self._faces.tets)
+        rows = np.flatnonzero(at >= 0)
+        return block, rows, order[at[rows]]
 
     def _drop_loose_faces(self) -> None:
         """Removes the load from faces of tets that have broken off on all sides."""
         if self._watched is None:
             self._watched = [self._within(block) for block in self._model.blocks if len(block.bond)]
         stay = np.ones(len(self._faces.tets), bool)
-        for block, rows, places in self._watched:
-            across, bond = block.across[places], block.bond[places]
+        for block, rows, tets in self._watched:
+            across, bond = block.across[tets], block.bond[tets]
             stay[rows] = ((across >= 0) & (bond != WIDE)).any(axis=1) | (across < 0).all(axis=1)
         self._take(stay)
 

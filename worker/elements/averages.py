@@ -15,6 +15,7 @@ from conoid.cases.model.joined import shared_bonds
 from conoid.cases.model.schema import MOST_PARTS, Case
 
 from ..migration.parcel import Table
+from ..model.ids import places
 from ..model.state import Block, Floats, Indices, Ints, Model, Nodes, Tets, extended
 from ..model.topology import Split
 from ..parallel.ownership import Neighbour
@@ -64,8 +65,8 @@ class Averages:
     def at(self, node: "np.ndarray", part: "np.ndarray | int") -> Ints:
         """Returns the rows of local nodes for the materials of parts; -1 if there is no such row."""
         wanted = np.asarray(node, np.int64) * MOST_PARTS + self._kinds[part]
-        place = np.minimum(np.searchsorted(self._keys, wanted), len(self._keys) - 1)
-        return np.where(self._keys[place] == wanted, self._order[place], -1)
+        at = places(self._keys, wanted)
+        return np.where(at >= 0, self._order[at], -1)
 
     def grow(self, split: Split) -> Ints:
         """Adds the rows of the copies of a split, whose tets have their new nodes already; returns the parent row of

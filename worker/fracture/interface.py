@@ -6,6 +6,7 @@ facet that they share is overstressed. The flag for that is sent with the forces
 
 import numpy as np
 
+from ..model.ids import places
 from ..model.rows import MASS
 from ..model.state import Floats, Ints
 from ..parallel.comm import Comm, Exchange
@@ -27,8 +28,8 @@ class Interface:
         met[comm.rank] = _met(mine, mine[:, [0, 2]])
         table = np.concatenate([np.zeros((0, 6), np.int64), *met.values()])
         m, last = len(table), len(neighbours)
-        places = {other.rank: k for k, other in enumerate(neighbours)} | {comm.rank: last}
-        of = np.repeat(np.array([places[rank] for rank in met], np.int64), [len(rows) for rows in met.values()])
+        index = {other.rank: k for k, other in enumerate(neighbours)} | {comm.rank: last}
+        of = np.repeat(np.array([index[rank] for rank in met], np.int64), [len(rows) for rows in met.values()])
         self._inner: Ints = np.flatnonzero(of == last)
         """Rows of facets between two blocks of this rank."""
         self._partner = _partners(table[self._inner])
@@ -48,7 +49,7 @@ class Interface:
         ends = np.cumsum([0, *map(len, met.values())])
         own, theirs = self.facets.own.view(np.int64), self.facets.theirs.view(np.int64)
         self._exchanges: dict[int, Exchange] = {
-            places[rank]: comm.exchange([(rank, own[a:b])], [(rank, theirs[a:b])], Tag.TRACTION)
+            index[rank]: comm.exchange([(rank, own[a:b])], [(rank, theirs[a:b])], Tag.TRACTION)
             for rank, a, b in zip(met, ends[:-1], ends[1:], strict=True) if b > a and rank != comm.rank
         }  # fmt: skip
         """By the index of the neighbour."""
@@ -119,8 +120,8 @@ def _met(mine: Ints, theirs: Ints) -> Ints:
     with the bits of the other mass.
     """
     theirs = theirs[np.argsort(theirs[:, 0])]
-    at = np.minimum(np.searchsorted(theirs[:, 0], mine[:, 1]), max(len(theirs) - 1, 0))
-    met = theirs[at, 0] == mine[:, 1] if len(theirs) else np.zeros(len(mine), bool)
+    at = places(theirs[:, 0], mine[:, 1])
+    met = at >= 0
     rows = np.column_stack([mine[met], theirs[at[met], 1]])
     return np.asarray(rows[np.argsort(rows[:, :2].min(axis=1))])
 
