@@ -70,7 +70,7 @@ def first_half(sim: Simulation) -> None:
     if sim.contact is not None and clock.step == 0 and sim.contact.look_ahead(nodes):
         mean_dt = clock.choose_again(sim.limit)  # 1 again: now with the limit of contact
     if sim.fracture is not None:
-        sim.fracture.unload()  # 5: f(n) without the cohesive tractions that would release more than they absorbed
+        sim.fracture.unload()  # 5: unload cohesive facets that would release more than they absorbed
     # 5: v*(n+1/2) = v(n-1/2) + (dt(n-1/2) + dt(n+1/2)) / 2 f(n) / m
     sim.leapfrog.kick(nodes, mean_dt / nodes.scale, clock.shorter / nodes.scale)
     _after_kick(sim, acts)  # 6 to 9: v(n+1/2)
