@@ -41,15 +41,15 @@ def warnings(part: Part, tough: Toughness, size: float, safety: float) -> list[s
         part.name, tough.strength * 1e-6, tough.energy, tough.zone * 1e3, size * 1e3, ratio,
     )  # fmt: skip
     if text := unresolved(tough, size):
-        lower = "fracture.resolve = 'strength' keeps it and lowers the strength"
-        more = f"fracture.resolution = {1.0 / _RESOLVED:.0f} keeps it and lowers the strength further"
+        lower = "fracture.resolve = 'strength' keeps the energy and lowers the strength"
+        more = f"fracture.resolution = {1.0 / _RESOLVED:.0f} keeps the energy and lowers the strength further"
         found.append(f"{text}; {more if spec.resolve == 'strength' else lower}")
     drawn = max(*part.stretch.rate, 0.0) if part.stretch is not None else 0.0
     opening = (tough.strength / tough.impedance + drawn * size) * step
     if spec.model == "cohesive" and opening > tough.critical:
         found.append(
-            f"a facet that breaks would open by {opening * 1e6:.3g} um in a step of {step * 1e9:.3g} ns, and by "
-            f"{tough.critical * 1e6:.3g} um altogether: no law can be followed; use fracture.model = 'instant', "
+            f"a facet that breaks would open by {opening * 1e6:.3g} um in a step of {step * 1e9:.3g} ns, and fails at "
+            f"{tough.critical * 1e6:.3g} um: the time step does not resolve the law; use fracture.model = 'instant', "
             f"fracture.resolve = 'strength', or numerics.dt_safety below {safety * tough.critical / opening:.2g}"
         )
     return found
@@ -62,7 +62,7 @@ def unresolved(tough: Toughness, size: float) -> str:
         return ""
     return (
         f"elements of {size * 1e3:.3g} mm in a cohesive zone of {tough.zone * 1e3:.3g} mm, "
-        f"{ratio:.3g} to 1, resolved below {_RESOLVED:.2g}: the mesh decides on the energy of fracture"
+        f"{ratio:.3g} to 1, resolved below {_RESOLVED:.2g}: the dissipated energy depends on the mesh"
     )
 
 
