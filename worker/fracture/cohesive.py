@@ -11,16 +11,11 @@ r"""Cohesive facets: a traction that falls linearly with the opening, irreversib
       +--+--+----> D                     The opening starts from an offset of size e along the traction at insertion:
          e   e + critical                x+ = x- is D = e, T = that traction.
 
-            5 ________ 4
-             /\      /                   A facet has two sides, nodes 0, 1, 2 of the first and 3, 4, 5 of the second:
-            /  \    /   second side      three pairs (0, 3), (1, 4), (2, 5), each with an opening, a traction and a
-           /    \  /                     third of the area. n and the first edge e are those of the triangle in the
-          /______\/                      middle between the sides, along which d is measured:
-         2 .... 3 . 1
-           \     /      first side           d_n = n . d,  d_t = (e . d, (n x e) . d)
-            \   /
-             \ /
-              0
+     second side       3-------------4      A facet from the side (nodes 2 and 5 are behind). It has three pairs of
+                      .      n      .       nodes, (0, 3), (1, 4) and (2, 5), each with an opening, a traction and a
+     middle    - - - . - - - ^ - - . - -    third of the area. n is the normal of the triangle in the middle between the
+                    .        +-> e.         sides, e a unit vector along its first edge:
+     first side    0-------------1              d_n = n . d,   d_t = (e . d, (n x e) . d)
 
 With e = 0 this is the usual law, whose stiffness is unbounded just after insertion: rounding would determine the
 direction of the traction, and unloading would require a time step of zero. The offset reproduces the traction at

@@ -4,14 +4,15 @@ Two tets of a star are in one piece if a chain of tets leads from one to the oth
 the node. A connection through an edge or through the node alone is a hinge; it carries no moment, and is separated.
 ::
 
-          -------+-------             -------+-------
-        /  t5   /|  t1   \           /  t5   #|  t1   \       A star, seen along the z axis: tets t1 to t5 round
-       /       / |        \         /       # |        \      the node a. # are broken facets.
-      +-------a--+---------+       +#######a  +a'-------+
-       \  t4  |\    t2    /         \  t4  |\ #    t2  /      {t3, t4, t5} keep a; {t1, t2} get the copy a', whose
-        \     | \        /           \     | \ #      /       label is (id of a, t1) if t3 has the smallest id of all.
-         -----+--\------              -----+--\#-----
-              t3                          t3
+             +-------+                  +-------+
+            / \  t1 # \                / \  t1 /  +
+           /   \   #   \              /   \   /  / \         The star of node a, in two dimensions: t1 to t6. Broken
+          / t6  \ #  t2 \            / t6  \ /  / t2\        facets (#) cut it into {t1, t4, t5, t6} and {t2, t3}. The
+         +-------a-------+          +-------a  a'----+       first piece has the smallest id and keeps a, the second
+          \ t5  / #  t3 /            \ t5  / \  \ t3/        one gets the copy a', whose label is (id of a, id of t2).
+           \   /   #   /              \   /   \  \ /
+            \ / t4  # /                \ / t4  \  +
+             +-------+                  +-------+
 
 If a star has more than one piece, the piece with the smallest tet id keeps the node and each other piece gets a copy of
 it. One broken facet inside a body separates nothing; broken facets that form a closed surface round a node do.
