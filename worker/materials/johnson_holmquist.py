@@ -133,9 +133,11 @@ def crumbling(w, s, params, n):  # type: ignore[no-untyped-def]
     """
     bulk, averaged = params[BULK], len(s) > _BULKING_STEP
     for i in range(n):
+        # 1. Volume ratio of n+1, and the cut-off.
         half = 0.5 * w[SEEN + i]
         ratio = s[_RATIO + i] * (1.0 + half) / (1.0 - half)
         least = -params[_T] * (1.0 - s[_DAMAGE + i])
+        # 2. Pressure of n+1, and the work beyond the cut-off: mean over the corners, or of the tet.
         if averaged:
             new, stiff, stored, beyond = 0.0, 0.0, 0.0, 0.0
             whole = s[_MASS + i] / params[DENSITY]
@@ -160,6 +162,7 @@ def crumbling(w, s, params, n):  # type: ignore[no-untyped-def]
             old, _ = _pressed(params, s[_RATIO + i], s[_BULKING + i], least)
             s[_PLASTIC + i] -= 0.5 * (s[_P + i] - old) * w[CHANGE + i]
             beyond = _beyond(params, s[_RATIO + i], ratio, old, new, s[_BULKING + i], least)
+        # 3. Work, state, modulus.
         s[_PLASTIC + i] += s[_MASS + i] / params[DENSITY] * beyond
         s[_WORK + i] -= 0.5 * (s[_P + i] + new) * w[CHANGE + i]
         s[_P + i], s[_RATIO + i] = new, ratio
