@@ -3,7 +3,7 @@
 import numpy as np
 
 from ..mesh.faces import FACES
-from ..model.ids import places
+from ..model.ids import IdIndex
 from ..model.state import Flags, Ints, Model
 from ..parallel.comm import Comm
 
@@ -53,11 +53,10 @@ class Faces:
         self._block[some] = self._place[some] = -1
         for b, block in enumerate(self._model.blocks):
             tets = self.names[some] // 4
-            order = np.argsort(block.id[: block.n], kind="stable")
-            at = places(block.id[order], tets)
+            at = IdIndex(block.id[: block.n]).places(tets)
             found = at >= 0
             rows = np.flatnonzero(some)[found]
-            self._block[rows], self._place[rows] = b, order[at[found]]
+            self._block[rows], self._place[rows] = b, at[found]
 
     def _here(self, some: Flags) -> Ints:
         """(k, 3) present corners of faces of this rank."""

@@ -17,7 +17,7 @@ from conoid.cases.model.schema import Traction
 
 from ..kernels.jit import njit
 from ..migration.parcel import Parcel
-from ..model.ids import places
+from ..model.ids import IdIndex
 from ..model.loads import LoadedFaces
 from ..model.state import WIDE, Bits, Block, Flags, Floats, Indices, Ints, Model, Nodes
 from ..model.topology import Split
@@ -147,10 +147,9 @@ class SurfacePressure(Driver):
         """Returns a block of a part that fractures, its faces, and the places of their tets. Such parts do not
         erode.
         """
-        order = np.argsort(block.id)
-        at = places(block.id[order], self._faces.tets)
+        at = IdIndex(block.id).places(self._faces.tets)
         rows = np.flatnonzero(at >= 0)
-        return block, rows, order[at[rows]]
+        return block, rows, at[rows].astype(np.int64)
 
     def _drop_loose_faces(self) -> None:
         """Removes the load from faces of tets that have broken off on all sides."""

@@ -7,7 +7,7 @@ merged while they are walked (Patwary, Blair and Manne, Experiments on union-fin
 import numpy as np
 
 from ..kernels.jit import njit
-from ..model.ids import located, places, unique
+from ..model.ids import IdIndex, located, places, unique
 from ..model.state import Block, Indices, Ints, Model
 from ..parallel.comm import Comm
 
@@ -22,7 +22,7 @@ def labels(model: Model, held: Ints, comm: Comm) -> list[Ints]:
     cohesive facets; a pair is given on a rank that has one of the two. A block without ``across`` is one piece.
     """
     ids = np.concatenate([np.zeros(0, np.int64), *(block.id for block in model.blocks)])
-    where, root, first = _Where(ids), np.arange(len(ids), dtype=np.int32), 0
+    where, root, first = IdIndex(ids), np.arange(len(ids), dtype=np.int32), 0
     borders = [_bind_held(root, ids, where, held.reshape(-1, 2))]
     for block in model.blocks:
         borders.append(_bind_block(root, ids, where, block, first))
@@ -49,24 +49,11 @@ def components(n: int, edges: Ints | Indices) -> Ints:
     return root.astype(np.int64)
 
 
-class _Where:
-    """Places of the tets of a rank by their global ids (n,)."""
-
-    def __init__(self, ids: Ints) -> None:
-        self._order = np.argsort(ids, kind="stable").astype(np.int32)
-        self._known = ids[self._order]
-
-    def of(self, wanted: Ints | Indices) -> Indices:
-        """Returns the places of tets, in the shape of ``wanted``; -1 for a tet that is not on this rank."""
-        at = places(self._known, wanted)
-        return np.where(at >= 0, self._order[at], -1) if len(self._order) else at
-
-
-def _bind_held(root: Indices, ids: Ints, where: _Where, pairs: Ints) -> Ints:
+def _bind_held(root: Indices, ids: Ints, where: IdIndex, pairs: Ints) -> Ints:
     """Joins pairs of tets (m, 2); returns (k, 2) the place of the tet here and the id of the other, for pairs across
     ranks.
     """
-    at = where.of(pairs)
+    at = where.places(pairs)
     here = at >= 0
     _bind(root, at[here.all(axis=1)].astype(np.int64), ids)
     outer = np.flatnonzero(here[:, 0] != here[:, 1])
@@ -74,7 +61,7 @@ def _bind_held(root: Indices, ids: Ints, where: _Where, pairs: Ints) -> Ints:
     return np.column_stack([at[outer, inside].astype(np.int64), pairs[outer, 1 - inside]])
 
 
-def _bind_block(root: Indices, ids: Ints, where: _Where, block: Block, first: int) -> Ints:
+def _bind_block(root: Indices, ids: Ints, where: IdIndex, block: Block, first: int) -> Ints:
     """Joins the tets of a block, whose places begin at ``first``, through their intact faces; returns (k, 2) as
     ``_bind_held``.
     """
@@ -85,20 +72,20 @@ def _bind_block(root: Indices, ids: Ints, where: _Where, block: Block, first: in
         _bind(root, np.column_stack([here[:-1], here[1:]]), ids)
         return np.array([[first, _PART + block.part]])
     pairs, outer = np.empty((block.across.size, 2), np.int64), np.empty(block.across.size, np.int64)
-    inner, rest = _across_faces(pairs, outer, where.of(block.across >> 2), block.across, block.bond, first)
+    inner, rest = _across_faces(pairs, outer, where.places(block.across >> 2), block.across, block.bond, first)
     _bind(root, pairs[:inner], ids)
     outer = outer[:rest]
     return np.column_stack([first + (outer >> 2), block.across.reshape(-1)[outer] >> 2])
 
 
-def _joined(border: Ints, root: Indices, ids: Ints, where: _Where, comm: Comm) -> Ints:
+def _joined(border: Ints, root: Indices, ids: Ints, where: IdIndex, comm: Comm) -> Ints:
     """(n,) labels of all tets, after the pieces of all ranks have been joined.
 
     ``border`` (k, 2): labels of pieces of this rank, and ids of the tets of other ranks that they are connected
     with. Collective.
     """
     asking, asked = comm.join(border).reshape(-1, 2).T
-    at = where.of(asked)
+    at = where.places(asked)
     named = ids[root]
     mine = np.flatnonzero(at >= 0)
     answers = np.zeros(len(asked), np.int64)

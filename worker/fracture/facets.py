@@ -7,7 +7,7 @@ import numpy as np
 from conoid.cases.model.schema import Fracture as Spec
 
 from ..migration.parcel import Table
-from ..model.ids import among, located, places
+from ..model.ids import IdIndex
 from ..model.state import INTACT, Bits, Block, Flags, Floats, Indices, Ints
 from ..model.topology import Split
 from . import criterion
@@ -104,13 +104,12 @@ def mesh_of(block: Block) -> Mesh:
 
 
 def _beside(block: Block) -> Indices:
-    order = np.argsort(block.id)
-    known, beside = block.id[order], np.empty((block.n, 4), np.int32)
+    index, beside = IdIndex(block.id), np.empty((block.n, 4), np.int32)
     for start in range(0, block.n, _BATCH):
         some = slice(start, start + _BATCH)
         behind = block.across[some] // 4
-        at = places(known, behind)
-        beside[some] = np.where(block.across[some] >= 0, np.where(at >= 0, order[at], ELSEWHERE), -1)
+        at = index.places(behind)
+        beside[some] = np.where(block.across[some] >= 0, np.where(at >= 0, at, ELSEWHERE), -1)
     return beside
 
 
@@ -134,11 +133,10 @@ def clocks(body: Body, step: int) -> Table:
 
 def set_clocks(body: Body, table: Table, step: int) -> None:
     """Restores the clocks of step number ``step`` from the ``table`` of all bodies."""
-    order = np.argsort(body.block.id)
-    known = body.block.id[order]
-    mine = among(known, table["tet"])
+    index = IdIndex(body.block.id)
+    mine = index.places(table["tet"]) >= 0
     facet, tet = table["key"][mine], table["tet"][mine]
-    first = among(known, facet // 4)
-    place = order[located(known, np.where(first, facet // 4, tet))]
+    first = index.places(facet // 4) >= 0
+    place = index.places(np.where(first, facet // 4, tet))
     face = np.where(first, facet % 4, np.argmax(body.block.across[place] == facet[:, None], axis=1))
     body.facets.since[place, face], body.facets.seen[place, face] = table["since"][mine], step

@@ -49,5 +49,19 @@ def unique(ids: _Ids) -> npt.NDArray[np.int64]:
     return np.flatnonzero(table[:-1])
 
 
+class IdIndex:
+    """Positions of ids in a list of any order."""
+
+    def __init__(self, ids: _Ids) -> None:
+        """``ids`` (n,): distinct."""
+        self._order = np.argsort(ids, kind="stable").astype(np.int32)
+        self._known = ids[self._order]
+
+    def places(self, wanted: _Ids) -> _Places:
+        """Return the positions of ``wanted`` ids in the list, in their shape; -1 for ids that are not in it."""
+        at = places(self._known, wanted)
+        return np.where(at >= 0, self._order[at], -1).astype(np.int32) if len(self._order) else at
+
+
 def _few(known: _Ids, wanted: _Ids) -> bool:
     return not len(known) or wanted.size * _BISECTION < known[-1]
