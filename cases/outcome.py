@@ -5,7 +5,7 @@ from typing import Any
 
 import msgspec
 
-from .messages import Energy
+from .ledger import Energy
 
 
 class Check(msgspec.Struct, kw_only=True, frozen=True):

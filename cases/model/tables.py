@@ -42,6 +42,11 @@ Sha256 = Annotated[str, AfterValidator(_hash), Field(json_schema_extra={"pattern
 """SHA-256 hash of a file that a case names, in lower case."""
 
 
+def off(value: Any) -> Any:
+    """Returns None for ``"none"``, other values unchanged."""
+    return None if value == "none" else value
+
+
 class Switch:
     """Addition to the JSON schema of a key: ``"none"`` is allowed as well."""
 

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Mapping, Sequence
 
-from ..messages import Energy, PartEnergy
+from ..ledger import Energy, PartEnergy
 
 CLOCK: dict[str, str] = {"step": "", "t": "s", "dt": "s", "limiter": ""}
 LEDGER: dict[str, str] = {name: "" if name == "residual" else "J" for name in Energy.__struct_fields__}

@@ -14,7 +14,7 @@ from typing import Any
 
 import msgspec
 
-from ..messages import Energy
+from ..ledger import Energy
 from ..model.schema import Case
 from ..outcome import Check, Measured, Outcome
 from ..reading.quantities import FIELD_UNITS, unit_of

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from conoid.cases.figures import counted, duration
-from conoid.cases.model.schema import MOST_RANKS, MOST_THREADS
+from conoid.cases.model.run import MOST_RANKS, MOST_THREADS
 from conoid.cases.reading.problems import shown
 from conoid.cases.run import ExitCode
 from conoid.cases.units import parse_quantity

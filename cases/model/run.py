@@ -1,0 +1,91 @@
+"""The models of a run: end time, cores, output, limits and load balance."""
+
+from typing import Annotated, Literal
+
+from pydantic import BeforeValidator, Field
+
+from ..units import Ratio, Time
+from .tables import Count, Model, Positive, Switch, off
+
+Scale = Annotated[Ratio, Field(gt=0)]
+
+FrameField = Literal["density", "strain", "strain_rate", "contact_pressure"]
+
+MOST_RANKS, MOST_THREADS = 4096, 256
+"""Largest numbers of ranks and threads. Chosen: far above what has been run."""
+
+
+class Run(Model):
+    """Duration of the run, cores, output, and limits at which it stops."""
+
+    end_time: Annotated[Time, Positive]
+    """Simulated time at which the run ends. It starts at 0."""
+    ranks: Annotated[Count, Field(ge=1, le=MOST_RANKS)] = 1
+    """Number of MPI processes. The answer does not depend on it."""
+    threads: Annotated[Count, Field(ge=1, le=MOST_THREADS)] = 1
+    """Number of threads of each MPI process. The answer does not depend on it. A run uses ``ranks`` times
+    ``threads`` cores; more of them than the machine has cores make it slower."""
+    profile: Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]{0,32}$")] = ""
+    """Profile of the site under which a batch system executes the run (docs/howto/cluster.md). The profile that is
+    given at submission has priority."""
+    cut_scale: tuple[Scale, Scale, Scale] = (1.0, 1.0, 1.0)
+    """Factors of the coordinates for the domain decomposition: cuts across a direction with a small factor are
+    avoided. With a small factor along the direction of impact every rank receives a part of the impact zone. Changes
+    the cost, not the answer."""
+    frames: Annotated[Count, Field(ge=0, le=100_000)] = 20
+    """Number of frames (complete fields, VTKHDF), evenly spaced up to the end; frame 0 is the initial state. 0: no
+    frames. A time step ends at each frame, so another number changes the time steps, and with them the fracture
+    pattern of bodies that shatter, as another ``dt_safety`` does."""
+    fields: tuple[FrameField, ...] = ()
+    """Additional fields of the frames. ``density``: current density of the tets. ``strain``: logarithmic (Hencky)
+    strain ln V of each tet, six components, and ``effective_strain``, sqrt(2/3 e' : e') of its deviator; where the
+    principal axes do not rotate, this is the integral of the strain rate that other explicit codes store, with
+    tensor shear components. ``strain_rate``: sqrt(2/3 d' : d') of the rate of deformation d. ``contact_pressure``:
+    impulse of contact and walls on a node since the previous frame, along the normal of its share of the loaded
+    surface (a third of each face that is hit at less than 60 degrees), over that area and time; 0 in the first
+    frame. Walls that push rigid parts are not included: use a probe of ``wall_force``."""
+    samples: Annotated[Count, Field(ge=1, le=1_000_000)] = 500
+    """Number of lines of history.csv, evenly spaced up to the end."""
+    snapshots: Annotated[Count, Field(ge=0, le=100_000)] = 100
+    """Number of snapshots of the fragments' surface for the live view, evenly spaced up to the end, and one of the
+    initial state. 0: only snapshots on request. At most one per second of wall time, and fewer where they would use
+    more than 1/200 of it; the first and the last are always made."""
+    max_steps: Annotated[Count, Field(ge=1)] = 100_000_000
+    """Largest number of time steps. A run that reaches it writes a checkpoint and stops with state ``timed_out``,
+    cause ``steps``. ``conoid restart RUN --max-steps NUMBER`` continues it."""
+    max_wall_time: Annotated[Time, Positive] | None = None
+    """Largest wall time, counted from the first time step. A run that reaches it writes a checkpoint and stops.
+    Default: no limit."""
+    checkpoint_every: Annotated[Annotated[Time, Positive] | None, BeforeValidator(off), Switch()] = 600.0
+    """Wall time between checkpoints. A checkpoint is also written on request, when a user stops the run, and at
+    ``max_wall_time``; with ``"none"`` only then."""
+    residual_limit: Annotated[Ratio, Positive] = 0.05
+    """Largest energy residual over the largest energy so far; beyond it the run fails with cause ``energy``. The
+    same limit holds for kinetic energy that exceeds all energy that has entered."""
+    made_limit: Annotated[Ratio, Positive] = 0.02
+    """Largest energy that a single line of the energy ledger may create, over the largest energy so far; beyond it
+    the run fails with cause ``energy``. It is exceeded where a dissipation decreases (``plastic``, ``viscous``,
+    ``friction``, ``fracture``), where a store releases more than it has absorbed (``contact``, ``averaging``,
+    ``eroded``, ``cohesive``), or where time steps of unequal length create or remove energy (``stepping``). 2 % of
+    an energy are 1 % of a speed."""
+
+    @property
+    def cores(self) -> int:
+        """The number of cores of the run."""
+        return self.ranks * self.threads
+
+
+class Balance(Model):
+    """Load balance: when tets are redistributed over the ranks, and by which weight. No answer depends on it."""
+
+    policy: Literal["measured", "outside", "every", "never"] = "measured"
+    """Criterion for a new decomposition of the mesh. ``measured``: the time lost by imbalance since the last
+    decomposition exceeds the cost of a new one. ``outside``: when the outside nodes of a rank have grown by the
+    factor ``alpha`` (criterion of Moon, Kim and Lee). ``every``: after a fixed number of time steps. ``never``: not
+    at all."""
+    alpha: Annotated[Ratio, Field(gt=1)] = 1.2
+    """With ``policy = "outside"``: growth factor of the outside nodes of a rank that triggers a decomposition."""
+    every: Annotated[Count, Field(ge=1)] = 1000
+    """With ``policy = "every"``: time steps between two decompositions."""
+    weights: Literal["measured", "outside", "tets"] = "measured"
+    """Quantity that is divided evenly among the ranks: measured CPU time, outside nodes, or tets."""
