@@ -1,1 +1,1 @@
-"""Decks of other codes become cases: what is read of them, what is not, and in which units they are."""
+"""Import of decks of other codes (LS-DYNA, Abaqus/Explicit, Radioss) as cases."""

@@ -1,4 +1,4 @@
-"""Parts of a deck that hold together: by nodes that they share, or because the deck ties them."""
+"""Joined parts of a deck as bonds: by common nodes, or tied by a keyword."""
 
 from collections.abc import Iterable, Sequence
 
@@ -7,7 +7,7 @@ from .draft import Body, Draft
 from .topology import Topology
 
 Tie = tuple[tuple[str, str], Entry]
-"""The keys of two bodies, and the keyword that ties them."""
+"""Keys of two bodies, and the keyword that ties them."""
 
 
 def join(draft: Draft, topology: Topology, bodies: Sequence[Body], ties: Iterable[Tie]) -> None:

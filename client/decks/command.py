@@ -1,4 +1,4 @@
-"""``conoid import``: the case of a deck and the list beside it, on the terminal and as files."""
+"""``conoid import``: makes a case and the account of a deck, on the terminal and as files."""
 
 import os
 from dataclasses import replace
@@ -21,15 +21,22 @@ from .toml import NOTE
 
 _FORMATS = ", ".join(DIALECTS)
 _SHOWN = 20
-"""Reasons of a refusal that are printed. Chosen: a screen; the list has all."""
+"""Reasons of a refusal that are printed. Chosen: a screen; the account has all."""
 
 
 def import_deck(
     deck: Annotated[Path, typer.Argument(metavar="DECK", help="LS-DYNA .k, Abaqus .inp or Radioss NAME_0000.rad.")],
     units: Annotated[
-        str | None, typer.Option("--units", metavar="L,M,T", help="Of the deck, as 'mm,t,s'; else told from steel.")
+        str | None,
+        typer.Option(
+            "--units",
+            metavar="L,M,T",
+            help="Of the deck, as 'mm,t,s'; otherwise found from a material with the density of steel.",
+        ),
     ] = None,
-    kind: Annotated[str | None, typer.Option("--format", help=f"{_FORMATS}; else told from the file.")] = None,
+    kind: Annotated[
+        str | None, typer.Option("--format", help=f"{_FORMATS}; otherwise recognised from the file.")
+    ] = None,
     out: Annotated[Path | None, typer.Option("--out", help="The case file; DECK with .toml if not given.")] = None,
     anyway: Annotated[
         bool, typer.Option("--anyway", help="Write the case in spite of what it lacks; the lack stands in it.")
@@ -38,11 +45,12 @@ def import_deck(
 ) -> None:
     """Make a case of a deck of LS-DYNA, Abaqus/Explicit or Radioss.
 
-    Beside the case stands NAME.import.txt (with --json: NAME.import.json): every keyword of the deck, and where it went
-    or why it did not. Parts have their mesh from the deck itself. Where a case would answer wrong in silence without
-    something that Conoid lacks, the import is refused and names it: --anyway writes the case all the same.
-    Units are given, named by a Radioss deck, or told from a material with the density of steel.
-    docs/howto/import.md has what is taken over.
+    Beside the case stands the account NAME.import.txt (with --json: NAME.import.json): every keyword of the deck with
+    its key in the case, or the reason why it has none. Parts take their mesh from the deck itself.
+
+    Where the case would give a wrong answer without something that Conoid lacks, the import is refused and names it:
+    --anyway writes the case all the same. Units are given, named by a Radioss deck, or found from a material with
+    the density of steel. docs/howto/import.md lists the translated keywords.
     """
     target = out or deck.with_suffix(".toml")
     if target.suffix != ".toml":
@@ -66,15 +74,15 @@ def import_deck(
 
 
 def _placed(found: Imported, target: Path) -> Imported:
-    """With the path of the deck from the folder of the case on."""
+    """Returns the case with the path of the deck relative to the folder of the case."""
     away = Path(os.path.relpath(found.deck.resolve(), target.resolve().parent)).as_posix()
     parts = [{**part, "mesh": {**part["mesh"], "path": away}} for part in found.data["parts"]]
     return replace(found, data={**found.data, "parts": parts})
 
 
 def _noted(found: Imported) -> Imported:
-    """With what it lacks as comments at its head."""
-    lacking = [f"NOT TAKEN OVER: {line}" for line in found.refusals]
+    """Returns the text of the case with its missing features as comments at the top."""
+    lacking = [f"NOT TRANSLATED: {line}" for line in found.refusals]
     head = [f"Of {found.deck.name}, {found.kind}, in {found.system}: {found.why}", *lacking]
     data: dict[str, Any] = {NOTE: head, **found.data}
     return replace(found, data=data)

@@ -1,4 +1,4 @@
-"""Which parts of a deck meet each other, with which friction, as the table ``contact`` of a case."""
+"""The table ``contact`` of a case from the contacts of a deck: parts in contact and their friction."""
 
 import itertools
 from collections import Counter
@@ -12,7 +12,8 @@ from .draft import Body, Draft
 
 @dataclass(frozen=True)
 class Meeting:
-    """A contact of a deck: bodies, by their keys, that meet ``other``, or each other and themselves (None)."""
+    """A contact of a deck: bodies, by their keys, in contact with ``other``, or with each other and themselves
+    (None)."""
 
     one: frozenset[str]
     other: frozenset[str] | None
@@ -25,13 +26,13 @@ class Meeting:
         return bool(self.one) and self.other != frozenset()
 
     def pairs(self) -> set[tuple[str, str]]:
-        """Pairs of different bodies that meet, each in order."""
+        """Pairs of different bodies in contact, each in order."""
         every = itertools.combinations(self.one, 2) if self.other is None else itertools.product(self.one, self.other)
         return {(min(pair), max(pair)) for pair in every if pair[0] != pair[1]}
 
 
 def meet(draft: Draft, bodies: Sequence[Body], meetings: Sequence[Meeting]) -> None:
-    """The table ``contact``; none where nothing meets, as in the deck."""
+    """Returns the table ``contact``; "none" for a deck without contact."""
     for each in meetings:
         if not each.meets:
             each.entry.leave("one of its surfaces has no part of the case: nothing meets")
@@ -62,7 +63,7 @@ def meet(draft: Draft, bodies: Sequence[Body], meetings: Sequence[Meeting]) -> N
 
 
 def _frictions(meetings: Sequence[Meeting]) -> dict[tuple[str, str], float]:
-    """The friction of each pair; a contact of two bodies goes before one of all."""
+    """Returns the friction of each pair; a contact of two bodies has priority over one of all."""
     met: dict[tuple[str, str], float] = {}
     for each in sorted(meetings, key=lambda one: one.other is not None):
         for pair in each.pairs():
@@ -73,7 +74,7 @@ def _frictions(meetings: Sequence[Meeting]) -> dict[tuple[str, str], float]:
 def _more(
     meetings: Sequence[Meeting], met: dict[tuple[str, str], float], inside: list[str], names: dict[str, str]
 ) -> None:
-    """A remark of pairs that meet here and do not in the deck."""
+    """Returns a note on pairs that are in contact here and not in the deck."""
     extra = [(a, b) for a, b in itertools.combinations(sorted(inside), 2) if (a, b) not in met]
     if extra:
         shown = ", ".join(f"{names[a]} and {names[b]}" for a, b in extra[:3]) + (" ..." if len(extra) > 3 else "")

@@ -1,4 +1,4 @@
-"""The codes whose decks are read, and how a file says which one it is of."""
+"""The codes whose decks are read, and the recognition of the code of a file."""
 
 import itertools
 from collections.abc import Iterable
@@ -18,7 +18,7 @@ from .radioss.reading import Radioss
 from .units import System, Weighed
 
 _LOOKED = 2000
-"""Lines at the start of a file by which it is told. Chosen: no heading of comments is longer."""
+"""Lines at the start of a file that are searched. Chosen: no heading of comments is longer."""
 
 
 class Dialect(Protocol):
@@ -28,17 +28,17 @@ class Dialect(Protocol):
     account: Account
 
     def __init__(self, path: Path) -> None:
-        """Reads all of it. Raises CardError or InpError, OSError."""
+        """Reads the deck. Raises CardError or InpError, OSError."""
 
     @property
     def own_units(self) -> System | None:
-        """The units that the deck itself names, if it does."""
+        """Unit system that the deck names, if any."""
 
     def weighed(self) -> Iterable[Weighed]:
         """Densities of its materials."""
 
     def draft(self, system: System) -> Draft:
-        """The case; every keyword of ``account`` is decided then."""
+        """Returns the case; every keyword of ``account`` is decided then."""
 
 
 DIALECTS: dict[str, type[Dialect]] = {"lsdyna": LsDyna, "abaqus": Abaqus, "radioss": Radioss}
@@ -48,7 +48,7 @@ _ABAQUS = ("*HEADING", "*PREPRINT", "*PART,", "*NODE,", "*ASSEMBLY", "*ELEMENT,"
 
 
 def dialect_of(path: Path, wanted: str | None) -> type[Dialect]:
-    """The code of a deck: the one that is named, else by its first lines and its name. Raises UsageError, OSError."""
+    """Returns the code of a deck: as given, otherwise by its first lines and its name. Raises UsageError, OSError."""
     found = wanted or _told(path)
     if found not in DIALECTS:
         raise UsageError(f"--format = {shown(found)}: allowed: {choices(list(DIALECTS))}")

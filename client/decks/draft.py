@@ -1,4 +1,4 @@
-"""The case that is made of a deck, as plain data, with what its keys come from as comments."""
+"""The case made of a deck, as plain data, with the origin of its keys as comments."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -12,7 +12,7 @@ from .toml import NOTE
 from .units import LENGTH, Dimension, System
 
 _MOST_FRAMES = 100_000
-"""That a case may have (cases/model/schema.py)."""
+"""Largest number of parts of a case (cases/model/schema.py)."""
 
 
 @dataclass
@@ -22,12 +22,12 @@ class Made:
     material: dict[str, Any]
     """Keys below ``[materials.NAME]``; empty for a law that Conoid lacks."""
     erosion: dict[str, Any] = field(default_factory=dict)
-    """What of it removes tets, in Conoid a matter of the part."""
+    """Its criteria for the deletion of tets, which are keys of the part in Conoid."""
     rigid: bool = False
     temperature: str | float | None = None
-    """At the start."""
+    """Initial temperature."""
     held: str = ""
-    """Axes along which a rigid body does not move; it does not turn either."""
+    """Axes along which a rigid body is fixed; it does not rotate either."""
 
 
 @dataclass
@@ -35,7 +35,7 @@ class Body:
     """A part of a deck that becomes a part of the case."""
 
     key: str
-    """By which the deck names it."""
+    """Key of the part in the deck."""
     title: str
     material: str
     """Key of its material in the deck."""
@@ -43,20 +43,20 @@ class Body:
     """``mesh.group`` of the case; None for the whole file."""
     entry: Entry
     velocity: tuple[float, float, float] | None = None
-    """In units of the deck."""
+    """Number in units of the deck."""
     spin: dict[str, Any] | None = None
     erosion: dict[str, Any] = field(default_factory=dict)
     temperature: str | float | None = None
     rigid: bool = False
     name: str = ""
-    """In the case."""
+    """Name in the case."""
 
 
 class Draft:
     """The tables of a case, filled keyword by keyword."""
 
     def __init__(self, deck: Path, system: System, account: Account) -> None:
-        """``deck``: whose mesh the parts have."""
+        """``deck``: the file with the mesh of the parts."""
         self.deck = deck
         self.system = system
         self.account = account
@@ -70,22 +70,22 @@ class Draft:
         self.numerics: dict[str, Any] = {}
         self.run: dict[str, Any] = {}
         self.missing: list[str] = []
-        """What the case lacks and the user must write."""
+        """Keys that the case lacks and the user must write."""
         self._names, self._made = Names(), dict[str, tuple[str, Made]]()
         self._places: dict[str, Entry] = {}
 
     def quantity(self, value: float, dimension: Dimension) -> str | float:
-        """A number of the deck with its unit."""
+        """Returns a number of the deck with its unit."""
         return self.system.quantity(value, dimension)
 
     def vector(self, values: tuple[float, ...] | list[float], dimension: Dimension) -> list[str | float]:
-        """Three of them."""
+        """Returns three numbers with their unit."""
         return [self.quantity(value, dimension) for value in values]
 
     # Materials and parts ----------------------------------------------------------------------------------------------
 
     def add_material(self, key: str, title: str, made: Made, entry: Entry) -> None:
-        """A material; without keys it stays a name that the case does not define."""
+        """Adds a material; one without keys stays a name that the case does not define."""
         found = self._names.give(title, "material", key)
         if made.material:
             self.materials[found] = {NOTE: [f"{entry.keyword}, {entry.place}"], **made.material}
@@ -97,7 +97,7 @@ class Draft:
         return self._made.get(key)
 
     def call(self, bodies: Sequence[Body], solid: Iterable[str]) -> Names:
-        """Gives the bodies their names in the case; parts that have ``solid`` elements and are not defined refuse."""
+        """Names the bodies of the case; undefined parts with ``solid`` elements refuse the import."""
         self.account.without(solid, [body.key for body in bodies])
         names = Names()
         for body in bodies:
@@ -105,7 +105,7 @@ class Draft:
         return names
 
     def add_part(self, body: Body, names: Names) -> None:
-        """A part of the case, of one of the deck."""
+        """Returns the part of the case for a part of the deck."""
         body.name = body.name or names.give(body.title, "part", body.key)
         found = self._made.get(body.material)
         if found is None:
@@ -132,7 +132,8 @@ class Draft:
         self.parts.append(part)
 
     def set_frames(self, count: float, interval: float, end: float, entry: Entry) -> int:
-        """``run.frames`` of a number, or of an interval up to the end, in the unit of the deck; 0 for none."""
+        """Returns ``run.frames`` for a number, or for an interval up to the end, in the unit of the deck; 0 for
+        none."""
         frames = count if count > 0.0 else end / interval if interval > 0.0 and math.isfinite(end) else 0.0
         if not 0.5 <= frames <= _MOST_FRAMES:
             entry.leave(f"no number of frames from 1 to {_MOST_FRAMES:,}: run.frames is 20")
@@ -144,7 +145,7 @@ class Draft:
     # The rest ---------------------------------------------------------------------------------------------------------
 
     def add_boundary(self, table: dict[str, Any], *entries: Entry) -> str:
-        """A boundary, and the keywords that it comes from; its place in the case."""
+        """Adds a boundary with the keywords of its origin; returns its index in the case."""
         place = f"boundaries[{len(self.boundaries)}]"
         note = ", ".join(dict.fromkeys(f"{each.keyword} ({each.place})" for each in entries))
         self.boundaries.append({NOTE: [note], **table})
@@ -153,7 +154,7 @@ class Draft:
         return place
 
     def data(self) -> dict[str, Any]:
-        """The case as plain data with comments."""
+        """Returns the case as plain data with comments."""
         case: dict[str, Any] = {"name": self.name}
         if self.title:
             case["title"] = self.title[:200]

@@ -1,4 +1,4 @@
-"""Named fields of a keyword: what was read of them, and what was not."""
+"""Named fields of a keyword, with a record of those that were read."""
 
 from collections.abc import Sequence
 from typing import Generic, TypeVar
@@ -8,13 +8,12 @@ from conoid.cases.reading.cards import CardError
 from .account import Entry, Remark
 
 Place = TypeVar("Place")
-"""Where a field stands: a card, or the number of a line."""
+"""Place of a field: a card, or the number of a line."""
 
 
 class Fields(Generic[Place]):
-    """The fields of a keyword by the names that the manual of its code gives them.
-
-    What is not 0 and was read by nobody is told at the end (``rest``): nothing is passed over in silence.
+    """The fields of a keyword by the names of the manual of its code. ``rest`` reports fields that are not 0 and
+    were not read: no field is ignored silently.
     """
 
     def __init__(self, entry: Entry, found: dict[str, tuple[Place, str]], extra: Sequence[int]) -> None:
@@ -25,51 +24,51 @@ class Fields(Generic[Place]):
         self._read: set[str] = set()
 
     def _real(self, place: Place, item: str, name: str) -> float:
-        """The number that a field has. Raises CardError."""
+        """Reads a required number. Raises CardError."""
         raise NotImplementedError
 
     def _whole(self, place: Place, item: str, name: str) -> int:
-        """The whole number that a field has. Raises CardError."""
+        """Reads a required whole number. Raises CardError."""
         raise NotImplementedError
 
     def given(self, name: str) -> bool:
-        """Whether the field is there and not empty."""
+        """Whether the field exists and is not empty."""
         return name in self._found and bool(self._found[name][1])
 
     def real(self, name: str, default: float = 0.0) -> float:
-        """A number; ``default`` for an empty field. Raises CardError."""
+        """Reads a number; ``default`` for an empty field. Raises CardError."""
         self._read.add(name)
         return self._real(*self._found[name], name) if self.given(name) else default
 
     def nonzero(self, name: str, default: float) -> float:
-        """A number of which 0 means the default. Raises CardError."""
+        """Reads a number of which 0 means the default. Raises CardError."""
         return self.real(name) or default
 
     def whole(self, name: str, default: int = 0) -> int:
-        """A whole number; ``default`` for an empty field. Raises CardError."""
+        """Reads a whole number; ``default`` for an empty field. Raises CardError."""
         self._read.add(name)
         return self._whole(*self._found[name], name) if self.given(name) else default
 
     def text(self, name: str) -> str:
-        """The text of a field."""
+        """Reads the text of a field."""
         self._read.add(name)
         return self._found[name][1] if name in self._found else ""
 
     def forgive(self, names: str, why: str) -> None:
-        """Fields that are left out, and why; those that are 0 say nothing."""
+        """Records fields that are omitted, with the reason; fields that are 0 are not reported."""
         self._tell("left", names.split(), why)
 
     def refuse(self, names: str, why: str) -> None:
-        """Fields without which the case would answer wrong."""
+        """Records fields without which the answer would be wrong."""
         self._tell("refused", names.split(), why)
 
     def differ(self, name: str, why: str) -> None:
-        """A field whose meaning differs here."""
+        """Records a field with another meaning in Conoid."""
         self._read.add(name)
         self.entry.remark("differs", self._shown(name), why)
 
-    def rest(self, kind: Remark = "refused", why: str = "not taken over") -> None:
-        """Everything that is not 0 and nobody has read."""
+    def rest(self, kind: Remark = "refused", why: str = "not translated") -> None:
+        """Reports all fields that are not 0 and were not read."""
         self._tell(kind, [name for name in self._found if name not in self._read], why)
         if self.extra:
             self.entry.remark(kind, f"line {self.extra[0]}", "a line that is not read here")

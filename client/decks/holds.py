@@ -1,4 +1,4 @@
-"""Nodes that a deck holds or drives, as boundaries of a case: planes of symmetry, whole parts, sets of the mesh."""
+"""Restrained and driven nodes of a deck as boundaries of a case: planes of symmetry, whole parts, sets of the mesh."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -13,37 +13,37 @@ AXES = ("x", "y", "z")
 Course = tuple[tuple[float, float], ...]
 """Times, in the unit of the deck, and factors."""
 _NEAR = 1e-6
-"""Of the size of a body: nodes no further apart along an axis are on one plane. Chosen: above the six digits of files,
-far below any tet."""
+"""Tolerance of nodes on one plane, over the size of a body. Chosen: above the six digits of files, far below any
+tet."""
 
 
 @dataclass
 class Hold:
-    """Nodes whose velocity is given along some axes, in units of the deck."""
+    """Nodes with prescribed velocity along some axes, in units of the deck."""
 
     chosen: Chosen
     entry: Entry
     speeds: dict[str, float]
-    """Along x, y, z; 0 holds them."""
+    """Velocity along x, y, z; 0 for a restraint."""
     course: Course = ()
     open: set[str] = field(default_factory=set)
-    """Axes that no boundary has yet."""
+    """Axes without a boundary so far."""
 
     def __post_init__(self) -> None:
-        """All are open."""
+        """Starts with all axes without a boundary."""
         self.open = set(self.speeds)
 
 
 class Holding:
-    """Makes boundaries of all holds of a deck."""
+    """Makes boundaries of all restraints of a deck."""
 
     def __init__(self, draft: Draft, topology: Topology, bodies: Sequence[Body]) -> None:
-        """``bodies``: those of the case, which have their names."""
+        """``bodies``: those of the case, with their names."""
         self._draft, self._topology = draft, topology
         self._names = {body.key: body.name for body in bodies}
 
     def add(self, holds: Sequence[Hold], walls: Sequence[tuple[str, ...]]) -> None:
-        """Boundaries of ``holds``. ``walls``: the keys of the parts that each rigid wall stops."""
+        """Makes the boundaries of ``holds``. ``walls``: keys of the parts that each rigid wall stops."""
         partial = [each for each in holds if each.chosen.bodies is None and not each.course]
         for axis in AXES:
             self._planes(axis, [each for each in partial if self._slides(each) and each.speeds.get(axis) == 0.0])
@@ -52,13 +52,14 @@ class Holding:
                 self._one(each, walls)
 
     def _slides(self, hold: Hold) -> bool:
-        """Whether the nodes are held along some axes and free along others."""
+        """Whether the nodes are restrained along some axes and free along others."""
         return 0 < sum(speed == 0.0 for speed in hold.speeds.values()) < 3 and not any(hold.speeds.values())
 
     # Planes of symmetry -----------------------------------------------------------------------------------------------
 
     def _planes(self, axis: str, holds: list[Hold]) -> None:
-        """A boundary for each plane whose nodes are all held across it, at an end of the bodies that it cuts."""
+        """Makes a boundary for each plane whose nodes are all restrained across it, at an end of the bodies that it
+        cuts."""
         held = set().union(*(self._topology.nodes(each.chosen) for each in holds))
         planes: dict[float, list[str]] = {}
         done: set[int] = set()
@@ -80,7 +81,8 @@ class Holding:
             each.open.discard(axis)
 
     def _plane(self, axis: str, key: str, held: set[int]) -> float | None:
-        """Where the held nodes of a body are, if they are all nodes of one plane at an end of it."""
+        """Returns the coordinate of the restrained nodes of a body if they are all nodes of one plane at an end of
+        it."""
         d, mine = AXES.index(axis), self._topology.of[key] & held
         if not mine:
             return None
@@ -123,12 +125,13 @@ class Holding:
         self._draft.add_boundary(table, hold.entry)
 
     def _parts(self, keys: Sequence[str]) -> dict[str, Any]:
-        """The key ``parts``; none where all are meant."""
+        """Returns the key ``parts``; empty for all parts."""
         return {} if len(keys) == len(self._names) else {"parts": [self._names[key] for key in keys]}
 
 
 def velocity_course(curve: Course, end: float) -> tuple[float, Course]:
-    """Speed and course of velocities by time: the largest one, and its factors. Raises ValueError for no curve."""
+    """Returns speed and course of velocities over time: the largest one, and its factors. Raises ValueError for a
+    missing curve."""
     if not curve:
         raise ValueError("the curve has no points")
     most = max((value for _, value in curve), key=abs)
@@ -140,16 +143,17 @@ def velocity_course(curve: Course, end: float) -> tuple[float, Course]:
 
 
 def displacement_speed(curve: Course, end: float) -> float:
-    """The constant velocity of displacements that grow evenly from 0 up to the end. Raises ValueError for others."""
+    """Returns the constant velocity of displacements that grow linearly from 0 up to the end. Raises ValueError for
+    others."""
     inside = [(time, value) for time, value in curve if time <= end]
     if curve and curve[-1][0] < end:
         raise ValueError(f"the curve ends at {curve[-1][0]:g}, before the end of the run at {end:g}")
     beyond = [(time, value) for time, value in curve if time > end][:1]
     points = [*inside, *beyond]
     if len(points) < 2 or points[0] != (0.0, 0.0):
-        raise ValueError("displacements are taken over that begin at 0 at the time 0")
+        raise ValueError("displacements are translated that begin at 0 at the time 0")
     speed = points[-1][1] / points[-1][0]
     most = max(abs(value) for _, value in points)
     if any(abs(speed * time - value) > 1e-6 * most for time, value in points):
-        raise ValueError("displacements are taken over that grow evenly alone: their velocity jumps; give velocities")
+        raise ValueError("displacements are translated that grow evenly alone: their velocity jumps; give velocities")
     return speed

@@ -1,4 +1,4 @@
-"""A deck of another code becomes a case beside it, with the list of what was taken over and what was not."""
+"""The import of a deck: a case and the account of its keywords."""
 
 import json
 from dataclasses import dataclass
@@ -32,7 +32,7 @@ class Imported:
     kind: str
     system: units.System
     why: str
-    """Of the units."""
+    """Reason for the choice of the units."""
     data: dict[str, Any]
     account: Account
     refusals: list[str]
@@ -44,9 +44,8 @@ class Imported:
 
 
 def read_deck(path: Path, wanted: str | None = None, kind: str | None = None) -> Imported:
-    """What a deck says. ``wanted``: units as the user names them; ``kind``: of DIALECTS, else told from the file.
-
-    Raises UsageError where units are needed, or for a file that is no deck, with one line.
+    """Imports a deck. ``wanted``: units as the user names them; ``kind``: one of DIALECTS, otherwise recognised.
+    Raises UsageError with one line where units are needed, or for a file that is not a deck.
     """
     try:
         dialect = dialect_of(path, kind)(path)
@@ -70,19 +69,19 @@ def read_deck(path: Path, wanted: str | None = None, kind: str | None = None) ->
 
 
 def _units(dialect: Dialect, wanted: str | None) -> tuple[units.System, str]:
-    """The system of the user, of the deck, or the one in which something is steel; and why."""
+    """Returns the unit system of the user, of the deck, or the one in which a material is steel; with the reason."""
     own, system = dialect.own_units, None if wanted is None else units.named(wanted)
     if own is not None:
         if system is not None and system != own:
-            raise UsageError(f"--units = {wanted!r}: the deck says {own}")
-        return own, "the deck says so"
+            raise UsageError(f"--units = {wanted!r}: the deck is in {own}")
+        return own, "given in the deck"
     if system is not None:
         return system, "given by --units"
     return units.told(dialect.weighed())
 
 
 def _checked(data: dict[str, Any]) -> list[str]:
-    """What is wrong with the case that was made, as ``conoid validate`` words it."""
+    """Returns the errors of the case that was made, as ``conoid validate`` words them."""
     try:
         parse_case(bare(data))
     except CaseError as error:
@@ -94,12 +93,13 @@ def _checked(data: dict[str, Any]) -> list[str]:
 
 
 def lines(found: Imported, target: str) -> list[str]:
-    """The list for people: what was taken over, with its key, what was not, and why; every keyword once."""
+    """Returns the account for users: translated keywords with their keys, omitted ones with the reason; every
+    keyword once."""
     account = found.account
     told = [f"{found.deck.name}, {found.kind} -> {target}", f"units: {found.system}: {found.why}"]
     told += [f"note: {each}" for each in account.remarks]
     width = max((len(each.place) for each in account.entries), default=0)
-    for title, fate in (("refused", "refused"), ("taken over", "taken"), ("not taken over", "left")):
+    for title, fate in (("refused", "refused"), ("translated", "taken"), ("not translated", "left")):
         entries = account.of(fate)  # type: ignore[arg-type]
         if entries:
             told += ["", f"{title}: {counted(len(entries), 'keyword')}"]
@@ -122,7 +122,7 @@ def _entry(entry: Entry, width: int) -> list[str]:
 
 
 def report(found: Imported, target: str) -> dict[str, Any]:
-    """The same as plain data, for JSON."""
+    """Returns the account as plain data, for JSON."""
     return {
         "deck": str(found.deck), "kind": found.kind, "case": target, "units": str(found.system),
         "units_why": found.why, "notes": found.account.remarks, "refused": found.refusals,
@@ -136,7 +136,7 @@ def as_json(found: Imported, target: str) -> str:
 
 
 def size_of(path: Path) -> int:
-    """Bytes of a deck. Raises ClientError for what is no regular file."""
+    """Returns the bytes of a deck. Raises ClientError if it is not a regular file."""
     try:
         with whole.opened(path) as file:
             return file.seek(0, 2)

@@ -1,15 +1,15 @@
-"""Constants of other codes as those of Conoid: what the formulas of both sides have in common."""
+"""Conversion of material constants of other codes to those of Conoid."""
 
 from collections.abc import Sequence
 from fractions import Fraction
 from itertools import pairwise
 
 _STRAIGHT = 1e-6
-"""By how much points of a line may be off it, of the largest stress: rounding of decks with six digits or more."""
+"""Largest deviation of points from a line, over the largest stress: rounding of decks with six digits or more."""
 
 
 def young_of(bulk: float, shear: float) -> tuple[float, float]:
-    """Young's modulus and Poisson's ratio of a bulk and a shear modulus: 9KG/(3K+G), (3K-2G)/(6K+2G)."""
+    """Returns Young's modulus and Poisson's ratio of a bulk and a shear modulus: 9KG/(3K+G), (3K-2G)/(6K+2G)."""
     return 9.0 * bulk * shear / (3.0 * bulk + shear), (3.0 * bulk - 2.0 * shear) / (6.0 * bulk + 2.0 * shear)
 
 
@@ -24,9 +24,8 @@ def shear_of(young: float, poisson: float) -> float:
 
 
 def hardening_of(young: float, tangent: float) -> float:
-    """Rise of the flow stress with the plastic strain, E Et / (E - Et), of a tangent modulus by the total strain.
-
-    Raises ValueError where the tangent is not below Young's modulus.
+    """Returns the plastic modulus, E Et / (E - Et), of a tangent modulus Et over the total strain. Raises ValueError
+    where the tangent is not below Young's modulus.
     """
     if not tangent < young:
         raise ValueError(f"the tangent modulus {tangent:g} is not below Young's modulus {young:g}")
@@ -34,8 +33,8 @@ def hardening_of(young: float, tangent: float) -> float:
 
 
 def line_of(points: Sequence[tuple[float, float]]) -> tuple[float, float] | None:
-    """Yield stress and hardening of (plastic strain, stress), if all points lie on one line that begins at strain 0;
-    None otherwise. One point is a flow stress that does not rise."""
+    """Returns yield stress and hardening of (plastic strain, stress) points if all lie on one line that begins at
+    strain 0; None otherwise. One point is a constant flow stress."""
     if not points or points[0][0] != 0.0 or any(a[0] >= b[0] for a, b in pairwise(points)):
         return None
     (_, first), (end, last) = points[0], points[-1]
@@ -45,5 +44,5 @@ def line_of(points: Sequence[tuple[float, float]]) -> tuple[float, float] | None
 
 
 def _exact(number: float) -> Fraction:
-    """The decimal number that a deck has: 0.5 - 0.4 is 0.1."""
+    """Returns the decimal number of the deck: 0.5 - 0.4 is 0.1."""
     return Fraction(repr(float(number)))

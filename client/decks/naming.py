@@ -1,21 +1,21 @@
-"""Names of a case for what a deck calls otherwise: titles with blanks, numbers, one title twice."""
+"""Names of a case for names of a deck that it cannot have: titles with blanks, numbers, repeated titles."""
 
 import re
 import unicodedata
 
 _MOST = 64
-"""Characters of a name of a case (cases/model/tables.py)."""
+"""Largest number of characters of a name of a case (cases/model/tables.py)."""
 
 
 class Names:
-    """Gives names that a case may have, each once."""
+    """Unique names that are valid in a case."""
 
     def __init__(self) -> None:
-        """None is taken yet."""
+        """Starts without names."""
         self._taken: set[str] = set()
 
     def give(self, wanted: str, kind: str, number: object = "") -> str:
-        """A name as near to ``wanted`` as can be; ``kind`` and ``number`` where nothing of it is left."""
+        """Returns a name close to ``wanted``; ``kind`` and ``number`` where none of its characters is valid."""
         plain = wanted if name(wanted)[:1] == wanted.strip()[:1] else f"{kind}_{wanted or number}"
         base = name(plain) or kind
         found, count = base, 1
@@ -28,12 +28,12 @@ class Names:
 
 
 def name(text: str) -> str:
-    """Letters, digits, ``_`` and ``-`` of a text, from its first letter on; empty where there is none."""
+    """Returns letters, digits, ``_`` and ``-`` of a text, from its first letter on; empty if there is none."""
     plain = unicodedata.normalize("NFKD", text).encode("ascii", "ignore").decode()
     joined = re.sub(r"[^A-Za-z0-9_-]+", "_", plain).strip("_")
     return re.sub(r"^[^A-Za-z]+", "", joined)[:_MOST].rstrip("_")
 
 
 def name_end(text: str) -> str:
-    """What is put behind a name to tell it from another one."""
+    """Returns the suffix that distinguishes a name from another."""
     return re.sub(r"[^A-Za-z0-9_-]+", "_", text)

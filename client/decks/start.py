@@ -1,4 +1,4 @@
-"""Velocities at the start, of nodes or parts of a deck, as those of the parts of a case."""
+"""Initial velocities of nodes or parts of a deck as those of the parts of a case."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -11,19 +11,20 @@ from .units import LENGTH
 
 @dataclass
 class Start:
-    """What a keyword gives nodes at the start, in units of the deck; later ones add components or replace them."""
+    """Initial velocity that a keyword gives to nodes, in units of the deck; later ones add components or replace
+    them."""
 
     chosen: Chosen
     entry: Entry
     velocity: dict[int, float] = field(default_factory=dict)
-    """By axis, 0 to 2."""
+    """Velocity by axis, 0 to 2."""
     rate: Point = (0.0, 0.0, 0.0)
     """Rotation vector, per unit of time."""
     centre: Point = (0.0, 0.0, 0.0)
 
 
 def begin(draft: Draft, topology: Topology, bodies: Sequence[Body], starts: Sequence[Start]) -> None:
-    """Gives each body its velocity and spin."""
+    """Sets velocity and spin of each body."""
     by_key = {body.key: body for body in bodies}
     for each in starts:
         full, some = topology.whole(each.chosen)
@@ -42,7 +43,7 @@ def begin(draft: Draft, topology: Topology, bodies: Sequence[Body], starts: Sequ
 
 def _give(draft: Draft, body: Body, start: Start) -> None:
     if body.spin or (any(start.rate) and body.velocity is not None):
-        why = f"{body.name} has a velocity from before; which of them holds where one turns is not taken over"
+        why = f"{body.name} has a velocity from before; which of them holds where one turns is not translated"
         start.entry.remark("refused", start.chosen.what, why)
     old = body.velocity or (0.0, 0.0, 0.0)
     x, y, z = (start.velocity.get(axis, old[axis]) for axis in range(3))

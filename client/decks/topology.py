@@ -1,4 +1,4 @@
-"""Which nodes a part of a deck has, and where they are: read only where a deck speaks of nodes that bodies share."""
+"""Nodes of the parts of a deck and their positions, read only for keywords that refer to common nodes of bodies."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -9,16 +9,16 @@ Point = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Chosen:
-    """What a load or a motion acts on: whole parts, or nodes."""
+    """Target of a load or a motion: whole parts, or nodes."""
 
     what: str
-    """As messages call it: ``node set 3``."""
+    """Name in messages: ``node set 3``."""
     bodies: frozenset[str] | None = None
-    """Keys of whole parts; None where nodes are meant."""
+    """Keys of whole parts; None for nodes."""
     nodes: Callable[[], set[int]] | None = None
-    """The nodes that are meant, read when they are asked for."""
+    """Function that reads the nodes."""
     on: str | None = None
-    """The name of the set by which a case finds it in the mesh file; None where it has none."""
+    """Name of the set in the mesh file; None if it has none."""
 
 
 class Topology:
@@ -30,8 +30,8 @@ class Topology:
         nodes: Callable[[], Mapping[str, set[int]]],
         points: Callable[[], Mapping[int, Point]],
     ) -> None:
-        """``bodies``: keys of the parts that become parts of the case. ``nodes`` reads the nodes of each part, and
-        ``points`` where nodes are, in the unit of the deck, when they are asked for.
+        """``bodies``: keys of the parts that become parts of the case. ``nodes`` and ``points``: functions that read
+        the nodes of each part, and the positions of nodes, in the unit of the deck, at the first use.
         """
         self.bodies = list(bodies)
         self._read_nodes, self._read_points = nodes, points
@@ -44,17 +44,17 @@ class Topology:
 
     @cached_property
     def points(self) -> Mapping[int, Point]:
-        """Where nodes are."""
+        """Positions of the nodes."""
         return self._read_points()
 
     def nodes(self, chosen: Chosen) -> set[int]:
-        """The nodes that are meant, of bodies or not."""
+        """The nodes of a target, whether they are of bodies or not."""
         if chosen.bodies is not None:
             return set().union(*(self.of.get(key, set()) for key in chosen.bodies))
         return chosen.nodes() if chosen.nodes is not None else set()
 
     def whole(self, chosen: Chosen) -> tuple[list[str], list[str]]:
-        """The bodies all of whose nodes are meant, and those of which some are, in order."""
+        """Returns the bodies with all nodes in the target, and those with some, in order."""
         if chosen.bodies is not None:
             return [key for key in self.bodies if key in chosen.bodies], []
         wanted = self.nodes(chosen)
@@ -63,7 +63,7 @@ class Topology:
         return full, some
 
     def joined(self) -> list[tuple[str, str]]:
-        """Pairs of bodies that have nodes in common."""
+        """Returns the pairs of bodies with common nodes."""
         return [
             (one, other) for i, one in enumerate(self.bodies) for other in self.bodies[i + 1 :]
             if not self.of[one].isdisjoint(self.of[other])

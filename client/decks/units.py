@@ -31,7 +31,7 @@ MASS: Dimension = (0, 1, 0, 0)
 INERTIA: Dimension = (2, 1, 0, 0)
 
 _SLINCH = Fraction("0.45359237") * Fraction("9.80665") / Fraction("0.0254")
-"""kg of lbf s^2 / in, exact by the agreement of 1959 and standard gravity."""
+"""kg in lbf s^2 / in, exact by the agreement of 1959 and standard gravity."""
 _ALIASES = {
     "ton": "t", "tonne": "t", "to": "t", "mg": "mg", "sec": "s", "msec": "ms", "usec": "us", "µs": "us", "mus": "us",
     "inch": "in", "kilogram": "kg", "gram": "g", "metre": "m", "meter": "m", "slinch": "lbf*s^2/in",
@@ -41,7 +41,7 @@ _NAMED = {
     STRESS: ("Pa", "kPa", "MPa", "GPa", "Mbar", "psi", "ksi"), SPECIFIC_HEAT: ("J/kg/K",),
     DENSITY: ("kg/m^3",), SPEED: ("m/s",), ACCELERATION: ("m/s^2",),
 }  # fmt: skip
-"""Units that people know, used where one is exactly that of a system."""
+"""Common units, used where one is exactly that of a system."""
 
 
 @dataclass(frozen=True)
@@ -65,11 +65,12 @@ class System:
         return result
 
     def si(self, value: float, dimension: Dimension) -> float:
-        """A number of the deck in SI units, rounded once."""
+        """Returns a number of the deck in SI units, rounded once."""
         return float(Fraction(repr(float(value))) * self.factor(dimension))
 
     def quantity(self, value: float, dimension: Dimension) -> str | float:
-        """A number of the deck with its unit, as a case has it. Raises ValueError for one that no case can have."""
+        """Returns a number of the deck with its unit, as in a case. Raises ValueError for one that a case cannot
+        have."""
         if not math.isfinite(value):
             raise ValueError(f"{value!r} is not finite")
         scaled = Fraction(repr(float(value))) * self.factor(dimension)
@@ -81,7 +82,7 @@ class System:
         return f"{_digits(float(scaled))} {_si(dimension)}" if unit is None else f"{_digits(value)} {unit}"
 
     def _unit(self, dimension: Dimension) -> str | None:
-        """The text of a unit; None where cases know no such unit."""
+        """Returns the text of a unit; None for a unit that cases do not have."""
         if dimension == TEMPERATURE:
             return "K"
         factor = self.factor(dimension)
@@ -117,11 +118,11 @@ USUAL = (
     System("mm", "kg", "s"), System("mm", "mg", "us"), System("mm", "g", "us"), System("cm", "g", "us"),
     System("cm", "g", "s"), System("in", "lbf*s^2/in", "s"),
 )  # fmt: skip
-"""Systems in which decks are written."""
+"""Unit systems in which decks are written."""
 
 
 def named(text: str) -> System:
-    """The system of ``mm,ms,kg``: a length, a mass and a time in any order. Raises UsageError."""
+    """Returns the system of ``mm,ms,kg``: a length, a mass and a time in any order. Raises UsageError."""
     wanted: dict[Dimension, str] = {}
     for word in re.split(r"[,;\s]+", text.strip()):
         symbol = _ALIASES.get(word, _ALIASES.get(word.lower(), word))
@@ -138,14 +139,14 @@ _WANTED = "expected a length, a mass and a time, such as 'mm,t,s', 'mm,kg,ms', '
 # Told from steel ------------------------------------------------------------------------------------------------------
 
 _STEEL, _NEAR = 7850.0, 0.04
-"""kg/m^3, and how near to it a density is that of steel: 7,536 to 8,164, no other common metal is between them."""
+"""Density of steel, kg/m^3, and its tolerance: 7,536 to 8,164, no other common metal is in this range."""
 _LEAST, _MOST = 1.7e11, 2.3e11
-"""Young's modulus of steels, Pa: 190 to 215 in handbooks, with some room."""
+"""Young's modulus of steels, Pa: 190 to 215 GPa in handbooks, with some margin."""
 
 
 @dataclass(frozen=True)
 class Weighed:
-    """A material of a deck: what it is called there, its density and Young's modulus (None where it has none)."""
+    """A material of a deck: name, density and Young's modulus (None if it has none)."""
 
     name: str
     density: float
@@ -153,9 +154,8 @@ class Weighed:
 
 
 def told(materials: Iterable[Weighed]) -> tuple[System, str]:
-    """The one usual system in which a material is steel by its density, and Young's modulus where it has one; why.
-
-    Raises UsageError where there is none, or several.
+    """Returns the single usual system in which a material is steel by its density, and Young's modulus if it has
+    one, with the reason. Raises UsageError if there is none, or several.
     """
     every = list(materials)
     found = [(system, one) for system in USUAL for one in every if _steel(system, one)]

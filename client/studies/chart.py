@@ -1,4 +1,4 @@
-"""Speed-up against cores, drawn as SVG: projected, as measured where there are cores enough, and as others measured."""
+"""Chart of speed-up over cores as SVG: projected, measured with a core for each thread, and measured by others."""
 
 import math
 from collections.abc import Mapping
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from .study import Study
 
 _WIDTH, _HEIGHT, _LEFT, _TOP, _SIDE = 424, 464, 56, 36, 320
-"""Pixels: the picture, and the square of the axes inside it with room for numbers and legend. Chosen."""
+"""Sizes in pixels: the picture, and the square of the axes inside it with room for numbers and legend. Chosen."""
 _BLUE, _RED, _GREY = "#1b6ca8", "#c8553d", "#999999"
 
 
@@ -40,13 +40,13 @@ class _Frame:
         return "\n".join(_mark(*self.place(*pair), colour, fill) for pair in values.items())
 
     def labels(self, values: Mapping[int, float], right: int, down: int) -> str:
-        """The values beside their marks."""
+        """Writes the values beside their marks."""
         places = ((*self.place(*pair), pair[1]) for pair in values.items())
         return "\n".join(f'<text x="{x + right:.1f}" y="{y + down:.1f}">{value:.2f}</text>' for x, y, value in places)
 
 
 def speed_up(study: Study, others: Mapping[int, float] | None = None, source: str = "") -> str:
-    """The figure; both axes are logarithmic. ``others``: the speed-ups that ``source`` measured, by ranks."""
+    """Returns the figure; both axes are logarithmic. ``others``: the speed-ups that ``source`` measured, by ranks."""
     best = {run.cores: run for run in sorted(study.runs, key=study.speed_up)}
     projected = {cores: study.speed_up(run) for cores, run in sorted(best.items())}
     worst = {cores: study.runs[0].time / best[cores].worst for cores in projected}

@@ -1,4 +1,4 @@
-"""A study of convergence as text: values by mesh with their limits, error over cost, advice; and as JSON."""
+"""Report of a convergence study: values by mesh with their limits, error over cost, advice; as text and JSON."""
 
 import math
 from collections.abc import Sequence
@@ -19,17 +19,17 @@ from .trade import Target
 from .variants import Variant
 
 _ENOUGH = 0.05
-"""Difference of means, relative, for which the table of ensembles tells the runs that it needs. Chosen."""
+"""Relative difference of means for which the table of ensembles gives the required number of runs. Chosen."""
 
 
 @dataclass(frozen=True)
 class Book:
-    """A whole study."""
+    """A complete convergence study."""
 
     case: str
     changes: Sequence[str]
     own: Variant
-    """That of the case."""
+    """Name of the case."""
     own_size: float
     """The smallest element size of the case, m."""
     members: int
@@ -41,17 +41,17 @@ class Book:
 
     @property
     def failed(self) -> list[Done]:
-        """Points that did not come to their end."""
+        """Points that failed."""
         return [each for each in self.done if each.problem]
 
     def goals(self) -> dict[str, tuple[Number, Target]]:
-        """By quantity, where any variant converges, references first."""
+        """Results by quantity, references first, if any variant converges."""
         found = {each.name: (each, trade.target(self.series, each, self.own)) for each in self.numbers}
         return {name: (each, goal) for name, (each, goal) in found.items() if goal is not None}
 
     def leading(self, wanted: str | None = None) -> str | None:
-        """The quantity of the advice: the wanted one, or the first that converges and has not settled on all meshes.
-        One that has settled is none where a reference has no limit.
+        """Quantity of the advice: as requested, otherwise the first that converges and differs between the meshes. A
+        quantity without differences is excluded if a reference has no limit.
         """
         goals = self.goals()
         if wanted is not None:
@@ -64,7 +64,7 @@ class Book:
         return [each for each in self.numbers if each.expected is not None and each.name not in goals]
 
     def moving(self) -> list[str]:
-        """Quantities that converge, and have not settled on all meshes; of those with a relative error."""
+        """Quantities with a relative error that converge and differ between the meshes."""
         return [
             name
             for name, (each, _) in self.goals().items()
@@ -72,7 +72,7 @@ class Book:
         ]
 
     def advice(self, wanted: str | None = None) -> str:
-        """One line."""
+        """The advice in one line."""
         name = self.leading(wanted)
         if name is None and wanted is not None:
             return f"Nothing that is called {wanted!r} converges on these meshes."
@@ -82,7 +82,7 @@ class Book:
         return trade.advice(self.series, each, goal, self.accuracy, self.own_size)
 
     def _nothing(self) -> str:
-        """What to say where there is no error to weigh against the cost."""
+        """Returns the words for a study without an error to compare with the cost."""
         said = "Nothing converges on these meshes: there is no error to weigh against the cost"
         if len(self.series) > 1:
             said += "; how far the variants differ is in their table"
@@ -99,7 +99,7 @@ class Book:
 
 
 def to_markdown(book: Book, wanted: str | None = None) -> str:
-    """The tables, with what they mean."""
+    """Returns the tables, with explanations."""
     name = book.leading(wanted)
     parts = [
         ", ".join(f"`{text}`" for text in (book.case, *book.changes)),
@@ -134,7 +134,7 @@ def _costs(book: Book, series: Series) -> str:
 
 
 def _values(book: Book, series: Series) -> str:
-    """Coarse to fine, and what follows."""
+    """Returns the table of a quantity from the coarse to the fine mesh, and its limit."""
     meshes = series.meshes[::-1]
     rows = []
     for each in book.numbers:
@@ -158,7 +158,7 @@ def _titled(each: Number) -> str:
 
 
 def _unresolved(book: Book) -> str:
-    """What no variant resolves, by name, with what it does instead."""
+    """Returns the quantities that no variant resolves, by name, with their behaviour."""
     lost: dict[Trend, list[str]] = {}
     for each in book.numbers:
         trends = [series.limits[each.name].trend for series in book.series]
@@ -168,7 +168,7 @@ def _unresolved(book: Book) -> str:
 
 
 def _between(book: Book) -> str:
-    """What each variant makes of a quantity on its finest mesh, and by how much they differ."""
+    """Returns the limits of each variant for a quantity on its finest mesh, and their differences."""
     if len(book.series) == 1:
         return ""
     rows = []
@@ -186,7 +186,7 @@ def _between(book: Book) -> str:
 
 
 def _scatter(book: Book) -> str:
-    """Deviations on the finest mesh of each variant, and what a difference needs."""
+    """Returns the deviations on the finest mesh of each variant, and the number of runs that a difference needs."""
     rows = []
     for each in book.series:
         mesh = each.meshes[0]
@@ -234,12 +234,12 @@ def _seconds(value: float) -> str:
 
 
 def _percent(share: float) -> str:
-    """Two digits, without the sign."""
+    """Returns two digits, without the sign."""
     return exact(100.0 * share, "", 2)
 
 
 def to_json(book: Book, wanted: str | None = None) -> bytes:
-    """All numbers."""
+    """Returns all numbers as plain data."""
     data: dict[str, Any] = {
         "case": book.case, "changes": book.changes, "own_size": book.own_size, "members": book.members,
         "vary": book.vary, "series": [_plain(each) for each in book.series], "advice": book.advice(wanted),

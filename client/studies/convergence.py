@@ -1,4 +1,4 @@
-"""A study of convergence: every point as a run of a server, several at once; what comes out, by quantity."""
+"""A convergence study: every point as a run of a server, several at a time, and the results by quantity."""
 
 import hashlib
 import json
@@ -30,10 +30,10 @@ class Done:
     tets: int = 0
     steps: int = 0
     cpu: float = 0.0
-    """s, of all ranks, in the step loop."""
+    """CPU time of all ranks in the step loop, s."""
     numbers: tuple[Number, ...] = ()
     problem: str = ""
-    """Why it did not succeed; empty when it did."""
+    """Reason of the failure; empty for a successful run."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class Mesh:
     """Representative element size over that of the case: (tets of the case / tets)^(1/3)."""
     steps: float
     cpu: float
-    """s, the mean of the members."""
+    """CPU time, s, mean of the members."""
     samples: Mapping[str, Sample]
 
 
@@ -60,10 +60,10 @@ class Series:
 
 
 def run_all(session: Session, data: Mapping[str, Any], plan: Plan, folder: Path) -> Iterator[Done]:
-    """Hands in every point and yields each when it has ended, in the order of the points.
+    """Submits every point and yields each when it has ended, in the order of the points.
 
-    A point that has been run by the same server before is not run again. Relative paths of files begin in ``folder``.
-    Raises CaseError for a point that is no valid case, before any is handed in.
+    A point that has been run by the same server before is not run again. Relative paths of files begin in
+    ``folder``. Raises CaseError for a point that is not a valid case, before any is submitted.
     """
     points = plan.points(parse_case(data))
     cases = [apply_overrides(data, point.changes) for point in points]
@@ -81,7 +81,8 @@ def run_all(session: Session, data: Mapping[str, Any], plan: Plan, folder: Path)
 
 
 def _key(case: Mapping[str, Any]) -> str:
-    """The same for the same case and version, so that a study which was cut short goes on."""
+    """Returns the idempotency key of a point: the same for the same case and version, so that an interrupted study
+    continues."""
     text = json.dumps([metadata.version("conoid"), case], sort_keys=True, default=str)
     return f"converge-{hashlib.sha256(text.encode()).hexdigest()[:40]}"
 
@@ -96,7 +97,7 @@ def _ended(point: Point, case: Case, run: Run) -> Done:
 
 
 def series(done: Sequence[Done]) -> list[Series]:
-    """The points in their variants and meshes. Raises ClientError when none has succeeded."""
+    """Returns the points in their variants and meshes. Raises ClientError if none has succeeded."""
     good = [each for each in done if not each.problem]
     if not good:
         raise ClientError(f"no run has succeeded; the first: {done[0].problem if done else 'there is none'}")
@@ -125,7 +126,8 @@ def _mesh(factor: float, members: Sequence[Done], own: Done) -> Mesh:
 
 
 def _limit(name: str, meshes: Sequence[Mesh], floor: float) -> Limit:
-    """Of the means; where the scatter hides what the meshes do, that is said instead of an order."""
+    """Returns the limit of the means; SCATTERS instead of an order where the scatter exceeds the differences between
+    meshes."""
     there = [mesh for mesh in meshes if name in mesh.samples]
     samples = [mesh.samples[name] for mesh in there]
     found = limit([mesh.size for mesh in there], [sample.mean for sample in samples], floor)

@@ -1,4 +1,4 @@
-"""Error over cost as a picture: a panel a quantity that converges, with the Pareto front. With matplotlib."""
+"""Picture of error over cost: a panel for each quantity that converges, with the Pareto front. Needs matplotlib."""
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -12,13 +12,13 @@ from .trade import Target
 
 _COLOURS = ("#4c78a8", "#f58518", "#54a24b", "#e45756", "#72b7b2", "#b279a2")
 _PANELS = 6
-"""Quantities that are drawn, at most. Chosen."""
+"""Largest number of quantities in the picture. Chosen."""
 _LEAST = 1e-6
-"""Relative error that is drawn for none at all: the axis is logarithmic. Chosen."""
+"""Relative error drawn for 0: the axis is logarithmic. Chosen."""
 
 
 def figure(book: Book) -> Figure:
-    """Quantities that only settled on all meshes are left out, unless nothing else is there."""
+    """Quantities without differences between the meshes are omitted if there are others."""
     goals = book.goals()
     shown = (book.moving() or list(goals))[:_PANELS]
     across = max(1, min(len(shown), 3))

@@ -25,88 +25,89 @@ from conoid.cases.output import layout
 from ..journal import from_line
 
 Seconds = dict[str, list[float]]
-"""CPU time by phase, one number a rank, s."""
+"""CPU time by phase, one number per rank, s."""
 _BANDWIDTH = re.compile(r"([\d.]+(?:e[+-]?\d+)?) ?([kMGT]?)B/s")
 
 
 @dataclass(frozen=True)
 class Network:
-    """What messages cost."""
+    """Cost of messages."""
 
     latency: float
-    """s a message."""
+    """Latency, s per message."""
     bandwidth: float
-    """Bytes/s that a rank sends."""
+    """Bandwidth of a rank, bytes/s."""
 
 
 class Phase(msgspec.Struct, frozen=True):
-    """A kind of work, s."""
+    """Time of a phase, s."""
 
     total: float
-    """Of all ranks."""
+    """Time of all ranks."""
     imbalance: float
     """Sum over windows of largest minus mean over ranks."""
 
 
 class Projection(msgspec.Struct, frozen=True, kw_only=True):
-    """A run, and what it would take with a core a thread; times in s, what is sent per step."""
+    """A run and its projection to a core for each thread; times in s, communication per step."""
 
     ranks: int
     steps: int
     windows: int
     wall: float
-    """As it was, from the first step on."""
+    """Wall time of the run, from the first step."""
     work: float
-    """CPU time of all ranks but for their waiting."""
+    """CPU time of all ranks without waiting."""
     longest: float
     """Sum over windows of the largest work of a rank."""
     longest_coarse: float
     """The same over windows twice as long."""
     messages: float
-    """What messages between two ranks take."""
+    """Time of messages between two ranks."""
     collectives: float
-    """What collectives take."""
+    """Time of collectives."""
     phases: dict[str, Phase]
     messages_sent: float
-    """By a rank, to other ranks."""
+    """Messages of a rank to other ranks."""
     bytes_sent: float
-    """In these messages, by a rank."""
+    """Bytes in these messages, per rank."""
     collectives_made: float
     bytes_shared: float
-    """In these messages, by all ranks, a node that ranks share."""
+    """Bytes in these messages, by all ranks, per shared node."""
     rebalances: int
     digest: str
     threads: int = 1
-    """Of each rank."""
+    """Threads of each rank."""
     by_tasks: bool = False
-    """Whether ``work`` follows from tasks that were timed one after the other; else it is that of so many threads."""
+    """Whether ``work`` is computed from tasks that were timed one after the other; otherwise it is measured with so
+    many threads."""
     helped: float = 0.0
-    """What all threads but the first of each rank have worked."""
+    """Working time of all threads of each rank except the first."""
     serial: dict[str, float] = {}
-    """By phase: what one thread of a rank did alone, of the rank with most of all phases; wall time."""
+    """Serial wall time by phase, of the rank with the largest sum over all phases."""
     parallel: dict[str, float] = {}
-    """By phase: in regions, which threads share, of the same rank."""
+    """Parallel wall time by phase (in regions, which threads share), of the same rank."""
     sharing: Sharing | None = None
 
     @property
     def cores(self) -> int:
-        """A core a thread."""
+        """Number of cores: one for each thread."""
         return self.ranks * self.threads
 
     @property
     def name(self) -> str:
-        """``4``, or ``4x4`` with several threads; with a star where ``by_tasks``."""
+        """``4``, or ``4x4`` with several threads; with a star if ``by_tasks``."""
         threads = f"x{self.threads}" if self.threads > 1 or self.by_tasks else ""
         return f"{self.ranks}{threads}{'*' if self.by_tasks else ''}"
 
     @property
     def time(self) -> float:
-        """T_P."""
+        """The projected time T_P."""
         return self.longest + self.messages + self.collectives
 
     @property
     def coarse(self) -> float:
-        """T_P from windows twice as long: how much depends on them."""
+        """T_P from windows twice as long: the sensitivity to the windows."""
         return self.time - self.longest + self.longest_coarse
 
     @property
@@ -122,7 +123,7 @@ class Projection(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def bandwidth(text: str) -> float:
-    """Bytes/s of a text such as ``5 GB/s``. Raises ValueError."""
+    """Reads bytes/s from a text such as ``5 GB/s``. Raises ValueError."""
     match = _BANDWIDTH.fullmatch(text.strip())
     if match is None or not float(match[1]) > 0.0:
         raise ValueError(f"{text!r} is no bandwidth; write it like '5 GB/s'")
@@ -130,7 +131,7 @@ def bandwidth(text: str) -> float:
 
 
 def read(folder: Path, network: Network, threads: int | None = None) -> Projection:
-    """The projection of a run that has ended; see ``project``."""
+    """Returns the projection of a run that has ended; see ``project``."""
     lines = (folder / layout.JOURNAL).read_bytes().splitlines()
     return project(map(from_line, lines), from_json((folder / layout.OUTCOME).read_bytes()), network, threads)
 
@@ -138,7 +139,7 @@ def read(folder: Path, network: Network, threads: int | None = None) -> Projecti
 def project(
     journal: Iterable[AnyMessage], outcome: Outcome, network: Network, threads: int | None = None
 ) -> Projection:
-    """The projection of a run's messages and outcome; with so many ``threads`` by its tasks, None: as it was."""
+    """Returns the projection of a run's messages and outcome; with ``threads`` by its tasks, None: as measured."""
     loads: list[Load] = []
     shared_steps = shared = 0
     for message in journal:
@@ -168,13 +169,13 @@ def project(
 
 
 def _of_one(outcome: Outcome, seconds: Seconds) -> dict[str, float]:
-    """Those of the rank that has most serial seconds."""
+    """Returns the serial and parallel times of the rank with the largest serial time."""
     totals = _busy(outcome.serial) if outcome.serial else []
     return {name: each[totals.index(max(totals))] for name, each in seconds.items()} if totals else {}
 
 
 def _work(load: Load) -> Seconds:
-    """The phases without the waiting, which is in ``exchange``."""
+    """Returns the phases without waiting, which is in ``exchange``."""
     packing = [spent - idle for spent, idle in zip(load.phases["exchange"], load.waiting, strict=True)]
     return {**load.phases, "exchange": packing}
 
@@ -193,7 +194,8 @@ def _messages(load: Load, network: Network) -> float:
 
 
 def _collectives(load: Load, network: Network) -> float:
-    """A collective goes up a binary tree and down again; the bytes of all pass by every rank."""
+    """Returns the time of a collective: up a binary tree and down again; the bytes of all ranks pass through every
+    rank."""
     levels = (len(load.collectives) - 1).bit_length()
     if not levels:
         return 0.0

@@ -1,4 +1,4 @@
-"""The numbers of one finished run that a study compares: references, probes, energies, counts."""
+"""Numbers of a finished run that a study compares: references, probes, energies, counts."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -12,9 +12,9 @@ from ..columns import Columns
 
 _COUNTS = ("broken", "fragments", "eroded")
 _NO_STORE = ("initial", "external", "stepping", "averaging", "residual")
-"""Lines of the ledger that are no energy at the end."""
+"""Lines of the ledger that are not energies at the end."""
 _FLOOR, _SHARE = 1e-6, 0.01
-"""Differences that mean nothing: a millionth of the value, and a hundredth of the tolerance of a reference. Chosen."""
+"""Negligible differences: a millionth of the value, and a hundredth of the tolerance of a reference. Chosen."""
 
 
 @dataclass(frozen=True)
@@ -30,28 +30,28 @@ class Number:
 
     @property
     def floor(self) -> float:
-        """The difference from which on it counts."""
+        """Smallest significant difference."""
         return max(_FLOOR * abs(self.value), _SHARE * self.tolerance)
 
     @property
     def of_nothing(self) -> bool:
-        """Whether nothing is expected, or next to it: then there is no relative error."""
+        """Whether the expected value is about 0: then there is no relative error."""
         return self.expected is not None and abs(self.expected) <= self.tolerance
 
     @property
     def scale(self) -> float:
-        """By which errors are divided: the expected value, or what was measured where zero is expected."""
+        """Divisor of errors: the expected value, or the measured one if zero is expected."""
         return max(abs(self.expected if self.expected is not None else self.value), self.tolerance)
 
 
 def of_run(case: Case, outcome: Outcome, told: Columns) -> list[Number]:
-    """References in their order, then probes, then energies at the end over the initial one, then counts."""
+    """Returns references in their order, then probes, then energies at the end over the initial one, then counts."""
     found = [*_references(outcome), *_probes(case, told), *_energies(outcome), *_counts(case, outcome)]
     return [number for number in found if "worst_residual" not in number.name]
 
 
 def names(case: Case) -> list[str]:
-    """Of all that ``of_run`` may find."""
+    """Names of all quantities that ``of_run`` can return."""
     of_probes = (f"{what} of {probe.name}" for probe in case.probes for what in ("mean", "peak", "end"))
     energies = (f"{name} energy, share" for name in history.LEDGER if name not in _NO_STORE)
     counts = (f"{name}, number" for name in _COUNTS if case.fractures or case.erodes)
@@ -60,7 +60,7 @@ def names(case: Case) -> list[str]:
 
 
 def _numbered(titles: Iterable[str]) -> Iterator[str]:
-    """Those that stand there again with their number."""
+    """Numbers names that occur more than once."""
     seen: dict[str, int] = {}
     for title in titles:
         seen[title] = seen.get(title, 0) + 1
@@ -74,7 +74,7 @@ def _references(outcome: Outcome) -> Iterator[Number]:
 
 
 def _probes(case: Case, told: Columns) -> Iterator[Number]:
-    """Mean over the time of the run, the value furthest from zero, and the last one."""
+    """Returns mean over time, value of the largest magnitude, and last value."""
     for name in (probe.name for probe in case.probes):
         values, unit = told.numbers(name), told.units[name]
         finite = [value for value in values if value == value]

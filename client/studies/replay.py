@@ -17,36 +17,36 @@ from ..errors import ClientError, UsageError
 
 Point = tuple[float, float, float]
 Shares = list[tuple[int, float]]
-"""Groups of a rank, and how much of each it has."""
+"""Groups of a rank, and its share of each."""
 
 
 @dataclass
 class Account:
-    """What a policy comes to. Times in s."""
+    """Result of a policy. Times in s."""
 
     policy: str
     ranks: int
     cuts: list[int] = field(default_factory=list)
-    """Steps before which was cut."""
+    """Steps before which the mesh was decomposed."""
     lost: float = 0.0
-    """To imbalance: what the most loaded rank worked longer than the mean."""
+    """Time lost by imbalance: work of the most loaded rank above the mean."""
     cost: float = 0.0
-    """Of all cuts."""
+    """Time of all decompositions."""
     work: float = 0.0
-    """Of a rank, in the mean."""
+    """Mean work of a rank."""
     imbalance: float = 1.0
     """Largest load over the mean, both over all steps."""
     total: float = 0.0
-    """Lost and cost."""
+    """Time lost, and time of the decompositions."""
 
     def book(self, loads: Sequence[float], steps: int) -> None:
-        """Takes the ``loads`` of all ranks, s a step, over some steps."""
+        """Adds the ``loads`` of all ranks, s per step, over some steps."""
         self.lost += lost(loads) * steps
         self.work += sum(loads) / len(loads) * steps
         self._close()
 
     def cut(self, step: int, cost: float) -> None:
-        """Takes a cut."""
+        """Adds a decomposition."""
         self.cuts.append(step)
         self.cost += cost
         self._close()
@@ -58,28 +58,27 @@ class Account:
 
 @dataclass
 class Record:
-    """What a run has told of its groups."""
+    """Loads of the groups of a run."""
 
     centres: list[Point]
-    """m, at the start."""
+    """Centres of the groups at the start, m."""
     tets: list[int]
     moments: list[Groups]
-    """The first knows no loads."""
+    """Load messages; the first has no loads yet."""
     cost: float
-    """Mean cost of a cut of the run, s, or what one was taken to cost when there was none."""
+    """Mean cost of a decomposition of the run, s, or the assumed cost if there was none."""
     happened: Account
-    """The run itself."""
+    """Result of the run itself."""
 
     @property
     def heaviest(self) -> float:
-        """Largest share of all work that one group has at any moment."""
+        """Largest share of all work that one group has at any time."""
         return max((max(m.load) / sum(m.load) for m in self.moments if any(m.load)), default=0.0)
 
 
 def read(messages: Iterable[AnyMessage], policy: str = "") -> Record:
-    """What a journal holds of loads. Raises ClientError where it holds none.
-
-    Where a run has gone on from a checkpoint, what it had told of the steps beyond is dropped.
+    """Reads the loads in a journal. Raises ClientError if it has none. Messages of steps beyond the checkpoint from
+    which a run continued are dropped.
     """
     moments: list[Groups] = []
     first, costs, expected = None, [], 0.0
@@ -107,9 +106,8 @@ def read(messages: Iterable[AnyMessage], policy: str = "") -> Record:
 
 
 def replay(record: Record, spec: Spec, ranks: int, cost: float, scale: Point = (1.0, 1.0, 1.0)) -> Account:
-    """What the policy of ``spec`` comes to on so many ``ranks`` when a cut costs ``cost``, s.
-
-    ``scale`` multiplies positions before every cut. At most as many ranks as groups.
+    """Returns the result of the policy of ``spec`` on so many ``ranks`` with a decomposition cost ``cost``, s.
+    ``scale``: factors of positions before every decomposition. At most as many ranks as groups.
     """
     if not 1 <= ranks <= len(record.centres):
         raise UsageError(f"ranks = {ranks}: 1 to {len(record.centres)}, the number of groups")
@@ -135,14 +133,14 @@ def replay(record: Record, spec: Spec, ranks: int, cost: float, scale: Point = (
 
 
 def compare(record: Record, spec: Spec, ranks: int, cost: float, scale: Point) -> list[Account]:
-    """The policy of ``spec``, then the others with its ``alpha`` and ``every``."""
+    """Returns the policy of ``spec``, then the others with its ``alpha`` and ``every``."""
     policies = [spec.policy, *(p for p in ("measured", "outside", "every", "never") if p != spec.policy)]
     specs = [spec.model_copy(update={"policy": policy}) for policy in policies]
     return [replay(record, each, ranks, cost, scale) for each in specs]
 
 
 def chosen(spec: Spec, words: str, alpha: float | None = None) -> Spec:
-    """The ``spec`` of a case with another policy, as a user writes it: ``every:500``. Raises UsageError."""
+    """Returns the ``spec`` of a case with another policy, as a user writes it: ``every:500``. Raises UsageError."""
     policy, colon, every = words.partition(":")
     told = {"policy": policy} | ({"every": every} if every else {}) | ({"alpha": alpha} if alpha is not None else {})
     try:
@@ -157,19 +155,19 @@ def chosen(spec: Spec, words: str, alpha: float | None = None) -> Spec:
 
 
 def named(spec: Spec) -> str:
-    """The policy and what it goes by."""
+    """Returns the policy and its parameter."""
     return spec.policy + {"outside": f" {number(spec.alpha)}", "every": f":{spec.every}"}.get(spec.policy, "")
 
 
 def _looks(spec: Spec, before: int, now: int) -> Iterator[int]:
-    """Steps after ``before`` and up to ``now`` before which the policy is asked; ``now`` is the last."""
+    """Yields the steps after ``before`` and up to ``now`` before which the policy decides; ``now`` is the last."""
     if spec.policy == "every":
         yield from range((before // spec.every + 1) * spec.every, now, spec.every)
     yield now
 
 
 def _weights(spec: Spec, record: Record, moment: Groups) -> Sequence[float]:
-    """What is divided evenly."""
+    """Returns the balanced quantity."""
     weights = {"measured": moment.load, "outside": moment.outside, "tets": record.tets}[spec.weights]
     return weights if any(weights) else record.tets
 
@@ -179,15 +177,14 @@ def _guards(spec: Spec, moment: Groups, held: list[Shares]) -> list[Guard]:
 
 
 def _sums(held: list[Shares], values: Sequence[float]) -> list[float]:
-    """(ranks,) what each rank has of the ``values`` (groups,)."""
+    """(ranks,) sum of the ``values`` (groups,) of each rank."""
     return [sum(share * values[group] for group, share in shares) for shares in held]
 
 
 def divide(places: Sequence[Point], weights: Sequence[float], ranks: int) -> list[Shares]:
-    """The groups of each rank: boxes cut across their longest axis so that the ``weights`` (groups,) are equal.
-
-    A group through which a cut goes is divided, as its tets would be. A number of ranks that is no power of two is
-    split as floor : ceiling.
+    """Returns the groups of each rank: boxes cut across their longest axis so that the ``weights`` (groups,) are
+    equal. A group on a cut is divided, as its tets would be. A number of ranks that is not a power of two is split
+    as floor : ceiling.
     """
     return _halved([(group, 1.0) for group in range(len(places))], places, weights, ranks)
 

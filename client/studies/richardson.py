@@ -11,20 +11,20 @@ from enum import StrEnum
 from itertools import pairwise
 
 FORMAL = 2.0
-"""Order of linear tets and of the leapfrog in smooth motion: a larger observed one is not extrapolated with."""
+"""Order of linear tets and of the leapfrog scheme in smooth motion: the largest order used for an extrapolation."""
 SAFETY, CAUTION = 1.25, 3.0
-"""Safety factors of V&V 20: with an observed order from three meshes and more, and where there is none."""
+"""Safety factors of V&V 20: with an observed order from three meshes and more, and without."""
 SLOWEST = 0.5
-"""Order below which Eca and Hoekstra trust no extrapolation."""
+"""Order below which Eca and Hoekstra do not trust an extrapolation."""
 _ORDERS = (0.01, 12.0)
-"""Between which an order is sought. Chosen: beyond them nothing is told apart."""
+"""Range in which an order is searched. Chosen: beyond it differences are not significant."""
 _GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 _SCAN, _HALVINGS = 240, 80
-"""Orders that are tried, and steps of the golden section about the best of them. Chosen: 1e-12 of the order."""
+"""Number of orders that are tried, and steps of the golden section about the best one. Chosen: 1e-12 of the order."""
 
 
 class Trend(StrEnum):
-    """What a quantity does when the elements shrink."""
+    """Behaviour of a quantity with decreasing element size."""
 
     CONVERGES = "converges"
     SETTLED = "settled"
@@ -36,15 +36,15 @@ class Trend(StrEnum):
 
 @dataclass(frozen=True)
 class Limit:
-    """What the values of several meshes say of the value without a mesh."""
+    """Limit of a quantity from several meshes, with its uncertainty."""
 
     trend: Trend
     value: float
-    """Extrapolated to the size 0 where it converges; else that of the finest mesh."""
+    """Value extrapolated to the size 0 if it converges; otherwise that of the finest mesh."""
     uncertainty: float
-    """Absolute, of the value on the finest mesh, at 95 %: the grid convergence index times the value."""
+    """Absolute uncertainty of the value on the finest mesh, at 95 %: the grid convergence index times the value."""
     order: float = math.nan
-    """Observed; NaN where there is none."""
+    """Observed order; NaN if there is none."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class Fit:
 
 
 def observed_order(sizes: Sequence[float], values: Sequence[float]) -> float:
-    """Of three meshes, the finest first; NaN where the values do not tell one.
+    """Returns the observed order of three meshes, the finest first; NaN if there is none.
 
     p ln r21 = ln|e32 / e21| + ln((r21^p - s) / (r32^p - s)), s the sign of e32 / e21 (Celik and others, eq. 3).
     """
@@ -82,17 +82,17 @@ def observed_order(sizes: Sequence[float], values: Sequence[float]) -> float:
 
 
 def extrapolated(fine: float, coarse: float, ratio: float, order: float) -> float:
-    """The value without a mesh, from two meshes whose sizes have this ratio (above 1)."""
+    """Returns the extrapolated value from two meshes with this ratio of sizes (above 1)."""
     return fine + (fine - coarse) / (float(ratio**order) - 1.0)
 
 
 def grid_convergence_index(fine: float, coarse: float, ratio: float, order: float, safety: float = SAFETY) -> float:
-    """Uncertainty of the fine value, relative to it, at 95 % (Celik and others, eq. 7)."""
+    """Returns the uncertainty of the fine value, relative to it, at 95 % (Celik and others, eq. 7)."""
     return safety * abs((fine - coarse) / fine) / (float(ratio**order) - 1.0)
 
 
 def fitted(sizes: Sequence[float], values: Sequence[float], order: float | None = None) -> Fit:
-    """The curve through three meshes or more with the least squares weighted by 1 / h; ``order`` fixes it."""
+    """Returns the curve through three meshes or more by least squares weighted by 1 / h; ``order`` fixes it."""
     if order is not None:
         return _line(sizes, values, order)
     grid = [_ORDERS[0] * (_ORDERS[1] / _ORDERS[0]) ** (k / _SCAN) for k in range(_SCAN + 1)]
@@ -123,10 +123,10 @@ def _line(sizes: Sequence[float], values: Sequence[float], order: float) -> Fit:
 
 
 def limit(sizes: Sequence[float], values: Sequence[float], floor: float = 0.0, formal: float = FORMAL) -> Limit:
-    """What the values of meshes of these sizes say; differences up to ``floor`` mean nothing.
+    """Returns the limit of the values of meshes of these sizes; differences up to ``floor`` are negligible.
 
-    Monotone with an order of at least 0.5: it converges, and the uncertainty is 1.25 times the distance from the limit
-    and what the curve misses. Otherwise it is three times the range of the values.
+    Monotone with an order of at least 0.5: it converges, and the uncertainty is 1.25 times the sum of the distance
+    from the limit and the deviation of the curve. Otherwise it is three times the range of the values.
     """
     order = sorted(range(len(sizes)), key=lambda k: sizes[k])
     sizes, values = [sizes[k] for k in order], [values[k] for k in order]
@@ -145,9 +145,8 @@ def limit(sizes: Sequence[float], values: Sequence[float], floor: float = 0.0, f
 
 
 def _monotone(sizes: Sequence[float], values: Sequence[float], formal: float) -> Limit:
-    """Values that go one way. An order above the formal one is shown, and the formal one extrapolates.
-
-    Beyond twice the formal one the meshes are too coarse or too close to each other to tell: then with ``CAUTION``.
+    """Returns the limit of monotone values. An order above the formal one is reported, and the formal one
+    extrapolates. Beyond twice the formal order the meshes are too coarse or too similar: then with ``CAUTION``.
     """
     free = fitted(sizes, values)
     if free.order < SLOWEST:

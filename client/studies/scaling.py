@@ -1,4 +1,4 @@
-"""A case on several numbers of ranks and threads: what each run took, and what it would take with a core a thread."""
+"""A scaling study: a case on several numbers of ranks and threads, with measured and projected times."""
 
 import os
 import shlex
@@ -20,13 +20,13 @@ from ..remote.submission import case_of, locate
 from .projection import Network, Projection, read
 
 CORES = usable_cores()
-"""That this process may use."""
+"""Number of cores that this process may use."""
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 _ENVIRONMENT = {**dict.fromkeys(_THREADS, "1"), "HYDRA_LAUNCHER": "fork", "HYDRA_IFACE": "lo"}
 
 
 Layout = tuple[int, int]
-"""Ranks, and threads of each."""
+"""Number of ranks, and threads of each."""
 
 
 @dataclass(frozen=True)
@@ -36,23 +36,24 @@ class Trial:
     ranks: int
     threads: int
     by_tasks: bool = False
-    """On one thread a rank, with tasks that are timed: what ``threads`` and fewer would take follows from them."""
+    """Whether the run uses one thread per rank and times its tasks, from which times with ``threads`` and fewer
+    threads follow."""
 
     @property
     def folder(self) -> str:
-        """Below that of the study."""
+        """Name of the folder of the run, below that of the study."""
         threads = f"x{self.threads}" if self.threads > 1 else ""
         return f"ranks-{self.ranks}{threads}{'-tasks' if self.by_tasks else ''}"
 
     def changes(self, overrides: Sequence[str]) -> list[str]:
-        """Keys of the case."""
+        """Changed keys of the case."""
         return [*overrides, f"run.ranks={self.ranks}", f"run.threads={self.threads}"]
 
 
 def trials(layouts: Iterable[Layout], cores: int) -> list[Trial]:
-    """The runs that a study of ``layouts`` takes on a machine with so many ``cores``: one rank first; then what there
-    are cores for, and ranks of one thread, which can take turns; then, for layouts whose threads have no cores, runs
-    with tasks that are timed, and two threads that show how right they are.
+    """Returns the runs of a study of ``layouts`` on a machine with so many ``cores``: one rank first; then layouts
+    with enough cores, and ranks of one thread, which can share cores; then, for layouts without enough cores for
+    their threads, runs with timed tasks, and two threads that check the projection.
     """
     wanted = sorted({(1, 1), *layouts})
     beyond = {ranks: threads for ranks, threads in wanted if threads > 1 and ranks * threads > cores}
@@ -66,10 +67,8 @@ def trials(layouts: Iterable[Layout], cores: int) -> list[Trial]:
 def scale(
     case: str, overrides: Sequence[str], layouts: Sequence[Layout], folder: Path, network: Network
 ) -> Iterator[Projection]:
-    """Runs a case on one rank and in each of the ``layouts``, one after the other, each in its own folder.
-
-    A run that is there already, of the same case, is only read. Raises CaseError, and ClientError for a run that does
-    not succeed.
+    """Runs a case on one rank and in each of the ``layouts``, one after the other, each in its own folder. A
+    finished run of the same case is only read. Raises CaseError, and ClientError for a run that fails.
     """
     for trial in trials(layouts, CORES):
         run(case, overrides, trial, folder)
@@ -77,8 +76,8 @@ def scale(
 
 
 def run(case: str, overrides: Sequence[str], trial: Trial, folder: Path, seconds: float | None = None) -> None:
-    """Makes a run of a study that is not there yet. Raises ClientError where it does not succeed, TimeoutExpired when
-    it has not ended after so many ``seconds``.
+    """Makes a run of a study if it does not exist yet. Raises ClientError if it fails, TimeoutExpired if it has not
+    ended after so many ``seconds``.
     """
     place = folder / trial.folder
     if not _there(place, resolved_json(case_of(case, trial.changes(overrides)))):
@@ -86,7 +85,7 @@ def run(case: str, overrides: Sequence[str], trial: Trial, folder: Path, seconds
 
 
 def found(trial: Trial, folder: Path, layouts: Sequence[Layout], network: Network) -> list[Projection]:
-    """What a run says of its layout, or of those of ``layouts`` that follow from its tasks."""
+    """Returns the projections of a run: of its layout, or of those of ``layouts`` that follow from its tasks."""
     place = folder / trial.folder
     if not trial.by_tasks:
         return [read(place, network)]
@@ -97,7 +96,7 @@ def found(trial: Trial, folder: Path, layouts: Sequence[Layout], network: Networ
 
 
 def _there(folder: Path, case: bytes) -> bool:
-    """Whether the run has been done. Raises ClientError when the folder holds another one."""
+    """Whether the run exists. Raises ClientError if the folder contains another one."""
     if not folder.exists():
         return False
     names = (layout.OUTCOME, layout.RESOLVED_CASE)
@@ -107,7 +106,7 @@ def _there(folder: Path, case: bytes) -> bool:
 
 
 def _succeeded(folder: Path) -> bool:
-    """True. Raises ClientError for a run that did not succeed."""
+    """Returns True. Raises ClientError for a run that failed."""
     ended = folder / layout.OUTCOME
     outcome = from_json(ended.read_bytes()) if ended.is_file() else None
     if outcome is None or outcome.state != State.SUCCEEDED:
@@ -136,7 +135,8 @@ def _run(case: Path, trial: Trial, overrides: Sequence[str], folder: Path, secon
 
 
 def mpiexec() -> list[str]:
-    """The site's own when it names one, else the one beside this Python or in PATH. Raises ClientError."""
+    """Returns the mpiexec of the site if it names one, otherwise that beside this Python or in PATH. Raises
+    ClientError."""
     beside = Path(sys.executable).with_name("mpiexec")
     chosen = shlex.split(os.environ.get("CONOID_MPIEXEC", ""))
     found = str(beside) if beside.is_file() else shutil.which("mpiexec")

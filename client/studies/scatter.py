@@ -1,11 +1,11 @@
-"""Ensembles of a scene in which small causes have large effects: mean, deviation, and what a difference is worth."""
+"""Ensembles of a scene that is sensitive to small changes: mean, deviation, and significance of differences."""
 
 import math
 from dataclasses import dataclass
 from statistics import NormalDist, fmean, stdev
 
 CONFIDENCE, POWER = 0.95, 0.8
-"""Of a difference that is called one, and of finding one that is there. Chosen: the custom of experiments."""
+"""Significance level, and power of the test. Chosen: usual in experiments."""
 _NORMAL = NormalDist()
 
 
@@ -17,7 +17,7 @@ class Sample:
 
     @property
     def mean(self) -> float:
-        """Of the members."""
+        """Mean of the members."""
         return fmean(self.values)
 
     @property
@@ -32,13 +32,14 @@ class Sample:
 
 
 def perturbations(members: int, least: float = 1e-3, most: float = 1e-2) -> list[float]:
-    """By which share each member's steps are shorter: none for the first, then ``least`` to ``most``, evenly in log."""
+    """Returns the share by which each member's steps are shorter: 0 for the first, then ``least`` to ``most``,
+    evenly in log."""
     last = max(members - 2, 1)
     return [0.0, *(least * (most / least) ** (k / last) for k in range(members - 1))][:members]
 
 
 def runs_needed(deviation: float, difference: float, confidence: float = CONFIDENCE, power: float = POWER) -> int:
-    """Members that each of two ensembles needs to tell a difference of their means.
+    """Returns the number of members of each of two ensembles to detect a difference of their means.
 
     2 ((z_a + z_b) s / d)^2 + z_a^2 / 4, two-sided (Guenther, The American Statistician 35 (1981) 243).
     """
@@ -51,7 +52,7 @@ def runs_needed(deviation: float, difference: float, confidence: float = CONFIDE
 
 
 def differ(a: Sample, b: Sample, confidence: float = CONFIDENCE) -> bool:
-    """Whether two means differ by more than chance: Welch's test; single values differ where they are not equal."""
+    """Whether two means differ significantly: Welch's test; single values differ if they are not equal."""
     variances = a.error**2, b.error**2
     if sum(variances) == 0.0:
         return a.mean != b.mean
@@ -61,7 +62,7 @@ def differ(a: Sample, b: Sample, confidence: float = CONFIDENCE) -> bool:
 
 
 def student(probability: float, free: float) -> float:
-    """Quantile of Student's t: exact up to two degrees of freedom, else Abramowitz and Stegun 26.7.5."""
+    """Quantile of Student's t: exact up to two degrees of freedom, otherwise Abramowitz and Stegun 26.7.5."""
     if free < 2.0:
         return math.tan(math.pi * (probability - 0.5))
     if free < 3.0:

@@ -1,6 +1,4 @@
-"""The runs of one case on several numbers of ranks and threads, as tables: speed-up, what is lost and where, what is
-sent, what one thread does alone.
-"""
+"""Report of a scaling study: speed-up, losses by phase, communication, serial parts."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,7 +16,7 @@ class Study:
 
     case: str
     changes: Sequence[str]
-    """Keys of the case that were set."""
+    """Changed keys of the case."""
     cores: int
     network: Network
     runs: Sequence[Projection]
@@ -29,22 +27,24 @@ class Study:
         return len({run.digest for run in self.runs}) == 1
 
     def speed_up(self, run: Projection) -> float:
-        """Projected; of threads by their tasks, beside one by the same tasks: others have used the cores as much."""
+        """Projected speed-up; with threads by timed tasks, relative to one thread by the same tasks, under the same
+        load of the cores."""
         alone = next((each for each in self.runs if each.by_tasks and each.cores == 1), self.runs[0])
         return (alone if run.by_tasks else self.runs[0]).time / run.time
 
     def within(self, run: Projection) -> bool:
-        """Whether there was a core for each thread, so that its wall time says something."""
+        """Whether each thread had its own core, so that the wall time is significant."""
         return run.cores <= self.cores and not run.by_tasks
 
     @property
     def error(self) -> tuple[Projection, Projection] | None:
-        """Two threads by the tasks of one, and as they were; None where there are not both."""
+        """Speed-up of two threads by the tasks of one, and as measured; None without both."""
         two = {run.by_tasks: run for run in self.runs if (run.ranks, run.threads) == (1, 2)}
         return (two[True], two[False]) if len(two) == 2 else None
 
     def losses(self, run: Projection) -> dict[str, tuple[float, float]]:
-        """What each phase adds to the time of a rank, s: its share of the work beyond that of one rank, imbalance."""
+        """Returns the additional time of each phase per rank, s: its share of the work beyond that of one rank, and
+        imbalance."""
         one = self.runs[0].phases
         share = {name: one[name].total / run.threads for name in run.phases}
         found = {name: ((p.total - share[name]) / run.ranks, p.imbalance) for name, p in run.phases.items()}
@@ -52,7 +52,7 @@ class Study:
 
 
 def to_json(study: Study) -> bytes:
-    """All numbers."""
+    """Returns all numbers as plain data."""
     runs = [
         {
             **msgspec.to_builtins(run), "projected": run.time, "coarser": run.coarse, "at_worst": run.worst,
@@ -68,7 +68,7 @@ def to_json(study: Study) -> bytes:
 
 
 def from_json(data: bytes) -> Study:
-    """What ``to_json`` wrote."""
+    """Reads the output of ``to_json``."""
     document = msgspec.json.decode(data)
     network = msgspec.convert(document["network"], Network)
     runs = msgspec.convert(document["runs"], tuple[Projection, ...])
@@ -76,7 +76,7 @@ def from_json(data: bytes) -> Study:
 
 
 def to_markdown(study: Study) -> str:
-    """The tables, with what they mean."""
+    """Returns the tables, with explanations."""
     network, crowded = study.network, [run.name for run in study.runs if run.cores > study.cores and not run.by_tasks]
     parts = [
         ", ".join(f"`{text}`" for text in (study.case, *study.changes)),
@@ -117,7 +117,7 @@ def _speeds(study: Study) -> str:
 
 
 def _by_tasks(study: Study) -> str:
-    """What stars mean, and how right they are."""
+    """Returns the explanation of stars, with the error of projections."""
     sharing = next((run.sharing for run in study.runs if run.by_tasks), None)
     if sharing is None:
         return ""
@@ -142,7 +142,7 @@ def _by_tasks(study: Study) -> str:
 
 
 def _serial(study: Study) -> list[str]:
-    """What limits the gain by threads; nothing of runs that do not say it."""
+    """Returns the limits of the gain by threads; empty for runs without these data."""
     runs = [run for run in study.runs if run.serial and not run.by_tasks]
     names = [name for name in (runs[0].serial if runs else ()) if any(run.serial[name] for run in runs)]
     rows = [[name, *(_parted(run, [name]) for run in runs)] for name in names]
@@ -198,7 +198,7 @@ def _seconds(value: float) -> str:
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Markdown with aligned columns, the first to the left."""
+    """Returns Markdown with aligned columns, the first to the left."""
     widths = [max(len(line[i]) for line in (head, *rows)) for i in range(len(head))]
     rule = ["-" * widths[0], *("-" * (width - 1) + ":" for width in widths[1:])]
     lines = [

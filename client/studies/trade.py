@@ -1,4 +1,4 @@
-"""Error over cost: how far each point is from the best limit, which points are worth their cost, and advice."""
+"""Error over cost: distance of each point from the best limit, Pareto front, and advice."""
 
 import math
 from collections.abc import Sequence
@@ -13,12 +13,12 @@ from .richardson import FORMAL, Trend
 from .variants import Variant
 
 _VAGUE = 0.3
-"""Relative uncertainty of a limit above which no error is measured from it. Chosen."""
+"""Relative uncertainty of a limit above which it is not used as target. Chosen."""
 
 
 @dataclass(frozen=True)
 class Worth:
-    """A variant on a mesh: what it costs, CPU s, and its error, relative."""
+    """A variant on a mesh: cost, CPU s, and relative error."""
 
     variant: Variant
     mesh: Mesh
@@ -28,7 +28,7 @@ class Worth:
 
 @dataclass(frozen=True)
 class Target:
-    """The limit that errors are measured from, its own uncertainty (relative), and whose it is."""
+    """The limit from which errors are measured, its relative uncertainty, and its variant."""
 
     value: float
     uncertainty: float
@@ -37,10 +37,9 @@ class Target:
 
 
 def target(all_series: Sequence[Series], number: Number, own: Variant | None = None) -> Target | None:
-    """The limit of ``own``, the variant of the case, if it converges; else the least uncertain one of all variants.
-
-    A form that locks can converge to another limit, and look the more certain: it is not preferred. None where nothing
-    converges.
+    """Returns the limit of ``own``, the variant of the case, if it converges; otherwise the least uncertain one of
+    all variants. A form that locks can converge to a wrong limit with a small uncertainty, so it is not preferred.
+    None if nothing converges.
     """
     found = [(each.limits[number.name], each.variant) for each in all_series if _sure(each, number)]
     if not found:
@@ -56,7 +55,7 @@ def _sure(series: Series, number: Number) -> bool:
 
 
 def elsewhere(all_series: Sequence[Series], number: Number, goal: Target) -> list[Variant]:
-    """Variants whose limit is further from that of the target than both are uncertain."""
+    """Returns the variants whose limit differs from that of the target by more than both uncertainties."""
     return [
         each.variant
         for each in all_series
@@ -67,7 +66,7 @@ def elsewhere(all_series: Sequence[Series], number: Number, goal: Target) -> lis
 
 
 def worths(all_series: Sequence[Series], number: Number, goal: Target) -> list[Worth]:
-    """Every point that has the quantity, the cheapest first."""
+    """Returns every point that has the quantity, the cheapest first."""
     found = [
         Worth(each.variant, mesh, mesh.cpu, _error(mesh.samples[number.name].mean, each, number, goal) / goal.scale)
         for each in all_series
@@ -78,9 +77,8 @@ def worths(all_series: Sequence[Series], number: Number, goal: Target) -> list[W
 
 
 def _error(value: float, series: Series, number: Number, goal: Target) -> float:
-    """The way to the variant's own limit and on to the target: errors that cancel by chance are no accuracy.
-
-    Where the variant has no limit, its uncertainty takes the place of the first.
+    """Returns the distance to the variant's own limit plus its distance to the target: errors that cancel by chance
+    do not count as accuracy. Without a limit, the uncertainty of the variant replaces the first.
     """
     own = series.limits[number.name]
     if _sure(series, number):
@@ -98,8 +96,7 @@ def front(points: Sequence[Worth]) -> list[Worth]:
 
 
 def advice(all_series: Sequence[Series], number: Number, goal: Target, accuracy: float, own_size: float) -> str:
-    """One line: the cheapest point that is accurate enough, or the best one, and what half its size would buy.
-
+    """Returns one line: the cheapest point that is accurate enough, or the best one, and the gain of half its size.
     ``accuracy`` is relative, ``own_size`` the smallest element size of the case, m.
     """
     line = front(worths(all_series, number, goal))
@@ -126,7 +123,8 @@ def _order(all_series: Sequence[Series], number: Number, variant: Variant) -> fl
 
 
 def _growth(all_series: Sequence[Series], variant: Variant) -> float:
-    """Exponent of the cost in 1 / size, from the finest and the coarsest mesh; 4, that of theory, from one mesh."""
+    """Returns the exponent of the cost in 1 / size, from the finest and the coarsest mesh; 4, that of theory, from
+    one mesh."""
     meshes = next(each for each in all_series if each.variant == variant).meshes
     fine, coarse = meshes[0], meshes[-1]
     if fine.size >= coarse.size or not (fine.cpu > 0.0 and coarse.cpu > 0.0):

@@ -1,4 +1,4 @@
-"""The runs of a study of convergence: which keys of the case each of them changes."""
+"""The runs of a convergence study: the changed keys of each."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -14,18 +14,18 @@ from .scatter import perturbations
 
 FORMS = ("standard", "nodal", "split")
 STEPS, SEEDS = "steps", "seeds"
-"""What differs between the members of an ensemble."""
+"""Difference between the members of an ensemble."""
 
 
 @dataclass(frozen=True)
 class Variant:
-    """How the equations are solved."""
+    """A numerical method: pressure form and time step."""
 
     form: str
     safety: float
 
     def __str__(self) -> str:
-        """As tables name it."""
+        """Name in tables."""
         return f"{self.form}, dt_safety {number(self.safety)}"
 
 
@@ -35,15 +35,15 @@ class Point:
 
     variant: Variant
     factor: float
-    """Of the element sizes of the case."""
+    """Factor of the element sizes of the case."""
     member: int
     changes: Mapping[str, Any]
-    """By key."""
+    """Changed keys with their values."""
 
 
 @dataclass(frozen=True)
 class Plan:
-    """What is varied."""
+    """The varied parameters."""
 
     factors: Sequence[float]
     forms: Sequence[str] = ()
@@ -61,7 +61,7 @@ class Plan:
         return [Variant(form, safety) for form in forms for safety in safeties]
 
     def points(self, case: Case) -> list[Point]:
-        """Every run, the dearest first. Raises UsageError for a case that has no mesh to scale."""
+        """Returns every run, the most expensive first. Raises UsageError for a case without a mesh to scale."""
         shares = perturbations(self.members) if self.vary == STEPS else [0.0] * self.members
         return [
             Point(variant, factor, member, {
@@ -75,9 +75,8 @@ class Plan:
 
 
 def sizes(case: Case, factor: float) -> dict[str, float]:
-    """Keys and values of all element sizes times ``factor``; those of mesh files and loose tets stay.
-
-    Raises UsageError where no part has a mesh that is generated.
+    """Returns keys and values of all element sizes times ``factor``; those of mesh files and loose tets stay. Raises
+    UsageError if no part has a generated mesh.
     """
     found: dict[str, float] = {}
     for index, part in enumerate(case.parts):
@@ -94,7 +93,7 @@ def sizes(case: Case, factor: float) -> dict[str, float]:
 
 
 def seeds(case: Case, member: int) -> dict[str, int]:
-    """Keys and values of the seeds of scattered strengths for a member. Raises UsageError where nothing scatters."""
+    """Returns keys and values of the seeds of scattered strengths for a member. Raises UsageError without scatter."""
     found = {}
     for name in {part.material for part in case.parts if part.fracture is not None}:
         scatter = getattr(material(case, name).brittle, "scatter", None)
@@ -106,5 +105,5 @@ def seeds(case: Case, member: int) -> dict[str, int]:
 
 
 def chaotic(case: Case) -> bool:
-    """Whether small causes can have large effects: something breaks or wears."""
+    """Whether the case is sensitive to small changes: parts break or erode."""
     return case.fractures or case.erodes

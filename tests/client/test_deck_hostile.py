@@ -144,6 +144,6 @@ def test_a_refused_deck_has_its_list_and_no_case_but_with_anyway(tmp_path: Path)
     said = conoid("import", deck, "--units", "mm,t,s", "--anyway")
     assert said.exit_code == 0
     case = (tmp_path / "foam.toml").read_text()
-    assert "# NOT TAKEN OVER: line 16, *MAT_HONEYCOMB_TITLE: Conoid has no such material law" in case
+    assert "# NOT TRANSLATED: line 16, *MAT_HONEYCOMB_TITLE: Conoid has no such material law" in case
     refused = conoid("validate", tmp_path / "foam.toml")
     assert (refused.exit_code, "parts[0].material = 'core': unknown material" in refused.stderr) == (2, True)

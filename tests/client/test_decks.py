@@ -153,7 +153,7 @@ def test_units_that_are_no_system_are_refused(tmp_path: Path, text: str) -> None
 def test_a_radioss_deck_names_its_units_itself(tmp_path: Path) -> None:
     deck = radioss("/MAT/ELAST/1", "steel", "7.85E-9", r20(2.1e5, 0.3))
     assert str(read(tmp_path, "a_0000.rad", deck, None).system) == "mm, t, s"
-    with pytest.raises(UsageError, match="the deck says mm, t, s"):
+    with pytest.raises(UsageError, match="the deck is in mm, t, s"):
         read(tmp_path, "a_0000.rad", deck, "m,kg,s")
 
 
@@ -169,7 +169,7 @@ REFUSED = {
         ("*MAT_PLASTIC_KINEMATIC", row(1, "7.85E-9", 2.1e5, 0.3, 350.0, 0.0, 1.0), row(40.0, 5.0)),
         "SRC = 40.0: the flow stress depends on the rate",
     ),
-    "a field that nobody has read": (("*MAT_ELASTIC", row(1, "7.85E-9", 2.1e5, 0.3, 0, 0, 7.0)), "K = 7.0: not taken"),
+    "an unread field": (("*MAT_ELASTIC", row(1, "7.85E-9", 2.1e5, 0.3, 0, 0, 7.0)), "K = 7.0: not translated"),
     "a velocity of a part of a part": (
         (*STEEL, "*SET_NODE_LIST", row(3), row(1, 2), "*INITIAL_VELOCITY", row(3), row(0, 0, -5.0)),
         "node set 3 has some nodes of body alone",
@@ -228,7 +228,7 @@ PUBLIC: dict[str, tuple[str, str, tuple[str, ...]]] = {
     ), ("*NGEN: makes or moves nodes", "*NFILL: makes or moves nodes")),
     "units of single options, groups of groups": ("a_0000.rad", radioss(
         "/UNIT/3", "other", r20("kg", "mm", "ms"), "/MAT/ELAST/1/3", "steel", "7.85E-6", r20(2.1e2, 0.3),
-    ), ("units of its own (unit_ID) are not taken over",)),
+    ), ("units of its own (unit_ID) are not translated",)),
 }  # fmt: skip
 
 

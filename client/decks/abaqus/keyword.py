@@ -1,4 +1,4 @@
-"""A keyword of an Abaqus input file with its parameters and data lines, and what was read of it."""
+"""A keyword of an Abaqus input file with its parameters and data lines, and a record of those that were read."""
 
 from dataclasses import dataclass, field
 
@@ -11,7 +11,7 @@ Row = tuple[int, str]
 
 @dataclass
 class Keyword:
-    """``word`` as the manual spells it; ``scope``: name of the part or instance that it stands in, empty outside."""
+    """``word`` as the manual spells it; ``scope``: name of its part or instance, empty outside."""
 
     word: str
     line: int
@@ -21,11 +21,12 @@ class Keyword:
     scope: str = ""
     material: str = ""
     step: int = 0
-    """Of which step it is, from 1; 0 outside of steps."""
+    """Number of its step, from 1; 0 outside of steps."""
     _read: set[str] = field(default_factory=set)
 
     def get(self, name: str) -> str | None:
-        """The value of a parameter without quotation marks; empty for one without value, None where it is missing."""
+        """Returns the value of a parameter without quotation marks; empty for one without value, None if it is
+        missing."""
         joined = "".join(name.split())
         self._read.add(joined)
         if joined not in self.parameters:
@@ -33,42 +34,43 @@ class Keyword:
         return (self.parameters[joined] or "").strip().strip('"')
 
     def has(self, name: str) -> bool:
-        """Whether a parameter is there."""
+        """Whether a parameter exists."""
         return self.get(name) is not None
 
     def key(self, name: str) -> str:
-        """The value as names are compared: without blanks, in upper case."""
+        """Returns the value for the comparison of names: without blanks, in upper case."""
         return joined(self.get(name) or "")
 
     def forgive(self, names: str, why: str) -> None:
-        """Parameters that are left out, and why."""
+        """Records parameters that are omitted, with the reason."""
         for name in names.split(","):
             if (value := self.get(name)) is not None:
                 self.entry.remark("left", f"{name.strip()} = {value}" if value else name.strip(), why)
 
     def rest(self) -> None:
-        """Parameters that nobody has read refuse the import."""
+        """Refuses the import for parameters that were not read."""
         for name in self.parameters:
             if name not in self._read:
-                self.entry.remark("refused", name, "this parameter is not taken over")
+                self.entry.remark("refused", name, "this parameter is not translated")
 
     def filled(self) -> list[Row]:
         """The data lines that are not empty."""
         return [row for row in self.rows if row[1].strip()]
 
     def table(self, columns: int) -> list[list[float]]:
-        """The numbers of its data lines. Raises InpError where a line has more than ``columns`` that are not 0."""
+        """Reads the numbers of its data lines. Raises InpError where a line has more than ``columns`` that are not
+        0."""
         found = [(line, numbers(line, text)) for line, text in self.filled()]
         for line, row in found:
             if any(row[columns:]):
-                raise InpError(f"line {line}: {len(row)} values; {columns} are taken over (no temperatures or fields)")
+                raise InpError(f"line {line}: {len(row)} values; {columns} are translated (no temperatures or fields)")
         return [(row + [0.0] * columns)[:columns] for _, row in found]
 
     def single(self, columns: int) -> list[float]:
-        """The numbers of its only data line. Raises InpError where there are more, or none."""
+        """Reads the numbers of its only data line. Raises InpError if there are more, or none."""
         found = self.table(columns)
         if len(found) != 1:
-            raise InpError(f"line {self.line}: *{self.word} has {len(found)} data lines; one is taken over")
+            raise InpError(f"line {self.line}: *{self.word} has {len(found)} data lines; one is translated")
         return found[0]
 
     def lists(self) -> list[tuple[int, list[str]]]:
@@ -77,5 +79,5 @@ class Keyword:
 
 
 def joined(text: str) -> str:
-    """A name as Abaqus compares names: no blanks, upper case, no quotation marks."""
+    """Returns a name for comparison: no blanks, upper case, no quotation marks."""
     return "".join(text.strip().strip('"').split()).upper()

@@ -1,4 +1,4 @@
-"""What moves and holds bodies in an Abaqus input file, how long, and what is written."""
+"""Motions, restraints, end time and output of an Abaqus input file."""
 
 from collections.abc import Callable, Sequence
 
@@ -16,14 +16,14 @@ _NAMED = {
     "ENCASTRE": "xyz", "PINNED": "xyz", "XSYMM": "x", "YSYMM": "y", "ZSYMM": "z", "XASYMM": "yz", "YASYMM": "xz",
     "ZASYMM": "xy",
 }  # fmt: skip
-"""Names of restraints, and the translations that they hold (Analysis User's Guide, "Boundary conditions")."""
+"""Names of restraints, and the translations that they fix (Analysis User's Guide, "Boundary conditions")."""
 
 
 class Loads:
-    """Restraints, motions, velocities at the start and gravity, as they are read."""
+    """Restraints, motions, initial velocities and gravity, as they are read."""
 
     def __init__(self, draft: Draft, amplitudes: Sequence[Keyword], chosen: Callable[[str, Entry], Chosen]) -> None:
-        """``chosen``: the node set of a data line."""
+        """``chosen``: returns the node set of a data line."""
         self._draft, self._chosen = draft, chosen
         self._amplitudes = {each.key("NAME"): each for each in amplitudes}
         self.adiabatic = False
@@ -32,7 +32,7 @@ class Loads:
         self._temperatures: list[tuple[Chosen, float, Entry]] = []
 
     def end(self, steps: Sequence[Keyword], dynamics: Sequence[Keyword]) -> float:
-        """The end of the run, in units of the deck; infinite where it is not known."""
+        """End of the run, in units of the deck; infinite if unknown."""
         for step in steps:
             step.forgive(
                 "NAME, NLGEOM, INC, PERTURBATION, UNSYMM", "how the step is computed: always with large strains"
@@ -71,7 +71,7 @@ class Loads:
         return row[1]
 
     def take(self, each: Keyword, end: float) -> None:
-        """A keyword, if it is one of these. Raises InpError, ValueError."""
+        """Reads a keyword of this group. Raises InpError, ValueError."""
         if each.word == "BOUNDARY":
             self._boundary(each, end)
         elif each.word == "INITIAL CONDITIONS":
@@ -107,7 +107,7 @@ class Loads:
     def _row(
         self, line: int, items: list[str], kind: str, course: Course | None, end: float
     ) -> dict[str, tuple[float, Course]]:
-        """Velocities by axis, and their courses, of one data line without its node set."""
+        """Returns velocities by axis, and their courses, of one data line without its node set."""
         if not items or joined(items[0]) in _NAMED:
             return dict.fromkeys(_NAMED[joined(items[0])] if items else "", (0.0, ()))
         first, last, value = (numbers(line, ",".join(items) + ",") + [0.0] * 3)[:3]
@@ -122,10 +122,10 @@ class Loads:
             return dict.fromkeys(axes, (most, its))
         if kind == "DISPLACEMENT" and course is not None:
             return dict.fromkeys(axes, (displacement_speed(tuple((t, value * f) for t, f in course), end), ()))
-        raise InpError(f"line {line}: TYPE = {kind}: velocities, and displacements by an amplitude, are taken over")
+        raise InpError(f"line {line}: TYPE = {kind}: velocities, and displacements by an amplitude, are translated")
 
     def _course(self, name: str | None, entry: Entry) -> Course | None:
-        """Times and factors of an amplitude. Raises InpError for one that is no table."""
+        """Returns times and factors of an amplitude. Raises InpError for one that is not a table."""
         if not name:
             return None
         found = self._amplitudes.get(joined(name))
@@ -133,7 +133,7 @@ class Loads:
             raise InpError(f"the amplitude {name!r} is not defined")
         kind, smooth = found.key("DEFINITION") or "TABULAR", found.get("SMOOTH")
         if kind != "TABULAR" or _number(smooth):
-            raise InpError(f"the amplitude {name!r} is {kind}{' with SMOOTH' if smooth else ''}; TABULAR is taken over")
+            raise InpError(f"the amplitude {name!r} is {kind}{' with SMOOTH' if smooth else ''}; TABULAR is translated")
         if found.key("VALUE") == "ABSOLUTE" or found.key("TIME") == "TOTALTIME":
             found.entry.remark("left", "TIME, VALUE", "one step has one time, and values are factors")
         found.entry.take(f"of {entry.keyword}, {entry.place}")
@@ -157,10 +157,10 @@ class Loads:
         elif kind == "ROTATINGVELOCITY":
             self._rotating(each)
         else:
-            raise InpError(f"TYPE = {kind}: velocities and temperatures at the start are taken over")
+            raise InpError(f"TYPE = {kind}: velocities and temperatures at the start are translated")
 
     def _components(self, each: Keyword) -> dict[str, dict[int, float]]:
-        """Velocities by node set and axis, of lines with a set, a direction and a value."""
+        """Returns velocities by node set and axis, of lines with a set, a direction and a value."""
         made: dict[str, dict[int, float]] = {}
         for line, items in each.lists():
             axis = numbers(line, items[1] + ",")[0] if len(items) == 3 else 0.0
@@ -170,7 +170,7 @@ class Loads:
         return made
 
     def _rotating(self, each: Keyword) -> None:
-        """A line of set, rate, and translation; then a line with two points of the axis (Keywords Guide)."""
+        """Reads a line of set, rate, and translation, and a line with two points of the axis (Keywords Guide)."""
         rows = each.lists()
         for (line, items), (second, axis) in zip(rows[::2], rows[1::2], strict=False):
             rate, vx, vy, vz = (numbers(line, ",".join(items[1:]) + ",") + [0.0] * 4)[:4]
@@ -185,7 +185,7 @@ class Loads:
             self.starts.append(start)
 
     def temperatures(self, bodies: Sequence[Body], topology: Topology, zero: float) -> None:
-        """Temperatures at the start, of whole bodies."""
+        """Reads initial temperatures of whole bodies."""
         for chosen, value, entry in self._temperatures:
             full, some = topology.whole(chosen)
             if some:
@@ -204,7 +204,7 @@ class Loads:
         each.rest()
         for line, items in each.lists():
             if len(items) < 6 or joined(items[1]) != "GRAV" or items[0]:
-                raise InpError(f"line {line}: only gravity of everything (', GRAV, size, x, y, z') is taken over")
+                raise InpError(f"line {line}: only gravity of everything (', GRAV, size, x, y, z') is translated")
             size, *along = numbers(line, ",".join(items[2:6]))
             length = sum(value * value for value in along) ** 0.5
             if length == 0.0:
@@ -225,7 +225,7 @@ class Loads:
 
 
 def _number(text: str | None) -> float:
-    """The number of a parameter; 0 where it is missing. Raises InpError."""
+    """Reads the number of a parameter; 0 if it is missing. Raises InpError."""
     try:
         return float(text or 0.0)
     except ValueError:

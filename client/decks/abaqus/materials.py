@@ -1,6 +1,6 @@
 """Materials of Abaqus/Explicit as those of Conoid (Analysis User's Guide, "Materials").
 
-What the formulas there and here do not share is a remark of the keyword: docs/howto/import.md has them side by side.
+Differences of the formulas are notes of the keyword; docs/howto/import.md compares them.
 """
 
 from collections.abc import Sequence
@@ -17,7 +17,8 @@ from .keyword import Keyword
 
 @dataclass(frozen=True)
 class Heat:
-    """Whether work heats (``*DYNAMIC, EXPLICIT, ADIABATIC``), and the temperature of the deck's absolute zero."""
+    """Whether plastic work heats (``*DYNAMIC, EXPLICIT, ADIABATIC``), and the temperature of the deck's absolute
+    zero."""
 
     adiabatic: bool
     zero: float
@@ -35,7 +36,7 @@ class Material:
             raise InpError(f"line {head.line}: *MATERIAL has a keyword twice, for several conditions or temperatures")
 
     def made(self) -> Made:
-        """The material; what of it is not taken over stands in the entries. Raises InpError, ValueError."""
+        """Returns the material; omitted properties are recorded in the entries. Raises InpError, ValueError."""
         density = self._need("DENSITY").single(1)[0]
         material: dict[str, Any] = {"density": self._system.quantity(density, DENSITY)}
         material |= self._elastic(density)
@@ -48,7 +49,7 @@ class Material:
             elif kind == "ISOTROPIC":
                 material["strength"] = self._linear(plastic)
             else:
-                raise InpError(f"line {plastic.line}: HARDENING = {kind}: ISOTROPIC and JOHNSON COOK are taken over")
+                raise InpError(f"line {plastic.line}: HARDENING = {kind}: ISOTROPIC and JOHNSON COOK are translated")
             plastic.rest()
         erosion |= self._failure(material)
         for word in ("CONDUCTIVITY", "DEPVAR"):
@@ -59,11 +60,11 @@ class Material:
                 each.entry.leave("of no meaning without *DYNAMIC, EXPLICIT, ADIABATIC and a law with a temperature")
         for word, keyword in self._below.items():
             if word not in self._done:
-                keyword.entry.refuse("this property of the material is not taken over")
+                keyword.entry.refuse("this property of the material is not translated")
         return Made(material, erosion, temperature=temperature)
 
     def taken(self, place: str) -> None:
-        """Its keywords went into the material of the case."""
+        """Records that its keywords became the material of the case."""
         self.head.entry.take(place)
         for word in self._done:
             if not self._below[word].entry.decided:
@@ -95,11 +96,11 @@ class Material:
         elastic.rest()
         if eos is None:
             if kind != "ISOTROPIC":
-                raise InpError(f"line {elastic.line}: TYPE = {kind}; ISOTROPIC is taken over, SHEAR with *EOS")
+                raise InpError(f"line {elastic.line}: TYPE = {kind}; ISOTROPIC is translated, SHEAR with *EOS")
             young, poisson = elastic.single(2)
             return {"elastic": {"young": self._stress(young), "poisson": poisson}}
         if eos.key("TYPE") != "USUP" or kind != "SHEAR":
-            raise InpError(f"line {eos.line}: *EOS, TYPE=USUP with *ELASTIC, TYPE=SHEAR is taken over alone")
+            raise InpError(f"line {eos.line}: *EOS, TYPE=USUP with *ELASTIC, TYPE=SHEAR is translated alone")
         eos.rest()
         speed, slope, gamma = eos.single(3)
         young, poisson = young_of(density * speed * speed, elastic.single(1)[0])
@@ -129,7 +130,7 @@ class Material:
         rate = self._take("RATE DEPENDENT")
         C, reference = (0.0, 0.0) if rate is None else tuple(rate.single(2))
         if rate is not None and rate.key("TYPE") != "JOHNSONCOOK":
-            raise InpError(f"line {rate.line}: TYPE = {rate.key('TYPE')}; JOHNSON COOK is taken over")
+            raise InpError(f"line {rate.line}: TYPE = {rate.key('TYPE')}; JOHNSON COOK is translated")
         if rate is not None:
             rate.rest()
             law |= {"C": C, "reference_rate": self._system.quantity(reference, RATE)}
@@ -146,7 +147,7 @@ class Material:
         return law, self._system.quantity(max(self._kelvin(0.0), 0.0), TEMPERATURE)
 
     def _heating(self, plastic: Keyword) -> dict[str, Any]:
-        """Specific heat and the share of the work that becomes heat: none without ADIABATIC."""
+        """Reads specific heat and the share of the work that becomes heat: none without ADIABATIC."""
         if not self._heat.adiabatic:
             plastic.entry.remark("differs", "no heat", "without *DYNAMIC, EXPLICIT, ADIABATIC no work becomes heat "
                                  "(taylor_quinney = 0); specific_heat has no meaning")  # fmt: skip
@@ -158,7 +159,8 @@ class Material:
     # Failure ----------------------------------------------------------------------------------------------------------
 
     def _damage(self, law: dict[str, Any]) -> dict[str, Any]:
-        """``*DAMAGE INITIATION, CRITERION=JOHNSON COOK``: d3 has the other sign there (exp(-d3 triaxiality))."""
+        """Reads ``*DAMAGE INITIATION, CRITERION=JOHNSON COOK``: d3 has the opposite sign there (exp(-d3
+        triaxiality))."""
         found = self._below.get("DAMAGE INITIATION")
         if found is None or found.key("CRITERION") != "JOHNSONCOOK":
             return {}
@@ -172,7 +174,7 @@ class Material:
         return self._evolution(found)
 
     def _same(self, found: Keyword, law: dict[str, Any], melt: float, room: float, rate: float) -> None:
-        """Damage has the temperatures and the rate of the strength here."""
+        """Checks that damage has the temperatures and the rate of the strength."""
         wanted = {
             "melt_temperature": self._system.quantity(self._kelvin(melt), TEMPERATURE) if melt else None,
             "reference_temperature": self._system.quantity(self._kelvin(room), TEMPERATURE) if melt else None,
@@ -183,7 +185,7 @@ class Material:
                 found.entry.remark("refused", f"{value}", f"damage and strength have one {key} here, {law[key]}")
 
     def _evolution(self, found: Keyword) -> dict[str, Any]:
-        """What follows the initiation: tets leave at once where no displacement or energy is given."""
+        """Reads the damage evolution: tets are deleted at once if no displacement or energy is given."""
         evolution = self._take("DAMAGE EVOLUTION")
         if evolution is None:
             found.entry.remark("differs", "no *DAMAGE EVOLUTION", "damage is counted and nothing fails, as here")
@@ -198,7 +200,7 @@ class Material:
         return {"damage": 1.0}
 
     def _failure(self, material: dict[str, Any]) -> dict[str, Any]:
-        """``*SHEAR FAILURE`` of a plastic strain, and ``*TENSILE FAILURE`` as a cut-off of the pressure."""
+        """Reads ``*SHEAR FAILURE`` of a plastic strain, and ``*TENSILE FAILURE`` as a cut-off of the pressure."""
         shear, tensile = self._below.get("SHEAR FAILURE"), self._below.get("TENSILE FAILURE")
         found: dict[str, Any] = {}
         if shear is not None and (shear.key("TYPE") or "TABULAR") == "TABULAR":
@@ -222,7 +224,7 @@ def _cold(room: str | float) -> dict[str, Any]:
 
 
 def weighed(name: str, below: Sequence[Keyword]) -> Weighed | None:
-    """Density and Young's modulus of a material, to tell the units by; None where they cannot be read."""
+    """Returns density and Young's modulus of a material, to find the units; None if they cannot be read."""
     found = {each.word: each for each in below}
     try:
         density = found["DENSITY"].single(1)[0]

@@ -13,10 +13,10 @@ Surface = Callable[[str, Entry], frozenset[str]]
 
 
 class Meetings:
-    """Contacts of a deck, and pairs that are tied."""
+    """Contacts of a deck, and tied pairs."""
 
     def __init__(self, keywords: Sequence[Keyword], bodies: Sequence[Body], surface: Surface) -> None:
-        """``surface``: the bodies of a surface by its name; it raises InpError."""
+        """``surface``: returns the bodies of a surface by its name; raises InpError."""
         self.made: list[Meeting] = []
         self.ties: list[tuple[tuple[str, str], Entry]] = []
         self._every = frozenset(body.key for body in bodies)
@@ -34,7 +34,7 @@ class Meetings:
             each.entry.refuse(str(error))
 
     def _interactions(self, keywords: Sequence[Keyword]) -> dict[str, tuple[float, list[Keyword]]]:
-        """Friction of each ``*SURFACE INTERACTION``, and the keywords that say it."""
+        """Friction of each ``*SURFACE INTERACTION``, and its keywords."""
         found: dict[str, tuple[float, list[Keyword]]] = {}
         here = ""
         for each in keywords:
@@ -98,7 +98,7 @@ class Meetings:
             self.made.append(Meeting(first, None if second == first else second, friction, each.entry))
 
     def _assigned(self, each: Keyword) -> tuple[float, list[tuple[frozenset[str], frozenset[str], float, Entry]]]:
-        """Friction of everything, and that of pairs of surfaces."""
+        """Reads the friction of general contact, and that of pairs of surfaces."""
         friction, pairs = 0.0, []
         each.rest()
         for _, items in each.lists():

@@ -1,4 +1,4 @@
-"""Which nodes the parts and sets of an Abaqus input file have: a second reading, when somebody asks."""
+"""Nodes of the parts and sets of an Abaqus input file: a second reading, on demand."""
 
 import math
 from array import array
@@ -13,22 +13,22 @@ from .keyword import joined
 from .words import spelt
 
 _SHIFT = 40
-"""Bits of a number in a file: above them stands the place of the instance."""
+"""Bits of a number in a file; the bits above contain the index of the instance."""
 _MOST = 20_000_000
-"""Numbers that one line of GENERATE may make. Chosen: more than any mesh has that is run."""
+"""Largest number of members of one line of GENERATE. Chosen: more than any mesh that is run has."""
 
 
 @dataclass
 class Scope:
-    """A part, an instance or what is in neither."""
+    """A part, an instance, or the scope outside of both."""
 
     place: int
     points: dict[int, Point] = field(default_factory=dict)
     elements: "list[tuple[array[int], array[int], int]]" = field(default_factory=list)
-    """Numbers, nodes, nodes of each."""
+    """Element numbers, nodes per element, nodes of each."""
     node_sets: dict[str, set[int]] = field(default_factory=dict)
     element_sets: dict[str, set[int]] = field(default_factory=dict)
-    """With the place of the instance in what is in neither part nor instance."""
+    """Numbers with the index of the instance, in the scope outside of parts and instances."""
     part: str = ""
     move: tuple[float, ...] = ()
     axis: tuple[float, ...] = ()
@@ -96,7 +96,7 @@ class AbaqusMesh:
             here.element_sets.setdefault(joined(given["ELSET"]), set()).update(map(self._own, ids))
 
     def _own(self, number: int) -> int:
-        """A number of this scope as sets have it."""
+        """Returns a number of this scope as in sets."""
         return number
 
     def _set(self, word: str, given: dict[str, str]) -> None:
@@ -126,7 +126,7 @@ class AbaqusMesh:
         yield from self.members(scope, rest or item, kind)
 
     def members(self, scope: Scope, name: str, kind: str) -> Iterator[int]:
-        """Members of a set of an instance, or of its part, with the place of the instance."""
+        """Returns the members of a set of an instance, or of its part, with the index of the instance."""
         if is_whole(name):
             yield (scope.place << _SHIFT) + int(name)
             return
@@ -137,7 +137,7 @@ class AbaqusMesh:
     # What others ask --------------------------------------------------------------------------------------------------
 
     def named(self, name: str, kind: str) -> set[int] | None:
-        """Members of a set by its name in a data line: ``Set-1``, ``Bar-1.Set-1``, ``17``, ``Bar-1.17``."""
+        """Returns the members of a set by its name in a data line: ``Set-1``, ``Bar-1.Set-1``, ``17``, ``Bar-1.17``."""
         if is_whole(name):
             return {int(name)}
         if (found := getattr(self.root, kind).get(joined(name))) is not None:
@@ -152,7 +152,7 @@ class AbaqusMesh:
         return None
 
     def body(self, scope: str, elset: str) -> tuple[set[int], set[int]]:
-        """Elements of a set, in an instance or a part, or in neither, and their nodes."""
+        """Returns the elements of a set, in an instance, a part, or neither, and their nodes."""
         made = self.instances.get(scope) or self.parts.get(scope) or self.root
         holder = made if made.elements else self.parts.get(made.part, made)
         wanted = made.element_sets.get(elset) or holder.element_sets.get(elset) or set()
@@ -166,7 +166,7 @@ class AbaqusMesh:
         return elements, nodes
 
     def points(self) -> dict[int, Point]:
-        """Where nodes are, by their number with the place of their instance."""
+        """Returns the positions of nodes, by their number with the index of their instance."""
         made: dict[int, Point] = dict(self.root.points)
         scopes = self.instances.values() if self.instances else self.parts.values()
         for scope in scopes:
@@ -177,7 +177,7 @@ class AbaqusMesh:
 
 
 def _placed(point: Point, scope: Scope) -> Point:
-    """A point of a part where its instance has it: moved, then turned about an axis (Rodrigues)."""
+    """Returns a point of a part in its instance: moved, then turned about an axis (Rodrigues)."""
     moved = [a + b for a, b in zip(point, (*scope.move, 0.0, 0.0, 0.0)[:3], strict=True)]
     if not scope.axis:
         return moved[0], moved[1], moved[2]

@@ -26,7 +26,7 @@ _MESH = ("NODE", "ELEMENT")
 
 
 class Abaqus:
-    """The keywords of an input file, and what becomes of each."""
+    """The keywords of an input file, with their translation."""
 
     kind = "Abaqus/Explicit input file"
     own_units: System | None = None
@@ -44,7 +44,7 @@ class Abaqus:
         self.instances = {each.key("NAME"): each for each in self.of("INSTANCE")}
 
     def of(self, *words: str) -> list[Keyword]:
-        """The keywords of these words, in order."""
+        """Returns the keywords of these words, in order."""
         return [each for each in self.keywords if each.word in words]
 
     def _take(self, block: Block) -> None:
@@ -70,7 +70,7 @@ class Abaqus:
         self.keywords.append(made)
 
     def weighed(self) -> Iterator[Weighed]:
-        """Densities of the materials, to tell the units by."""
+        """Densities of the materials, to find the units."""
         for head in self.of("MATERIAL"):
             found = weighed(head.get("NAME") or "material", self._below(head))
             if found is not None:
@@ -82,7 +82,7 @@ class Abaqus:
     # The case ---------------------------------------------------------------------------------------------------------
 
     def draft(self, system: System) -> Draft:
-        """The case, in units of ``system``."""
+        """Returns the case; ``system``: its units."""
         self._draft = Draft(self.path, system, self.account)
         self._heading()
         bodies = list(self._bodies())
@@ -114,7 +114,7 @@ class Abaqus:
             self._draft.title = self._draft.title or text
 
     def _zero(self) -> float:
-        """The absolute zero of temperatures: 0 where the deck names none."""
+        """Returns the absolute zero of temperatures: 0 if the deck gives none."""
         named = [each for each in self.of("PHYSICAL CONSTANTS") if each.has("ABSOLUTE ZERO")]
         found = [each.get("ABSOLUTE ZERO") for each in named]
         for each in named:
@@ -127,7 +127,7 @@ class Abaqus:
             head.forgive("RTOL, SRATE FACTOR", "how the other code reads tables")
             if head.material not in used:
                 for each in (head, *self._below(head)):
-                    each.entry.leave("no part that is taken over has it")
+                    each.entry.leave("no part that is translated has it")
                 continue
             made = Made({})
             try:
@@ -137,13 +137,13 @@ class Abaqus:
                 head.entry.refuse(f"its constants cannot be used: {error}")
                 for each in self._below(head):
                     if not each.entry.decided:
-                        each.entry.leave("its material is not taken over")
+                        each.entry.leave("its material is not translated")
             self._draft.add_material(head.material, head.get("NAME") or "", made, head.entry)
             if made.material:
                 material.taken(f"materials.{(self._draft.material_of(head.material) or ('?', made))[0]}")
 
     def _bodies(self) -> Iterator[Body]:
-        """A body for each section of solids, in each instance of its part."""
+        """Makes a body for each section of solids, in each instance of its part."""
         sections = self.of("SOLID SECTION")
         for section in sections:
             section.forgive("CONTROLS, ORIENTATION", "how elements are integrated")
@@ -166,7 +166,7 @@ class Abaqus:
                 yield Body(f"{section.scope}|{elset}", shown, material, group, section.entry)
 
     def _rigid(self, bodies: list[Body]) -> None:
-        """``*RIGID BODY, ELSET=``: a section of solids is rigid."""
+        """Reads ``*RIGID BODY, ELSET=``: a section of solids is rigid."""
         for each in self.of("RIGID BODY"):
             wanted = self._of_elements(each)
             found = [body for body in bodies if body.key in wanted]
@@ -180,7 +180,8 @@ class Abaqus:
             each.entry.take("parts[].rigid")
 
     def _of_elements(self, each: Keyword) -> set[str]:
-        """Keys of the bodies all of whose elements its set has; none where it has others, or some of a body."""
+        """Returns the keys of the bodies all of whose elements the set has; empty if it has others, or some of a
+        body."""
         name = each.get("ELSET") or ""
         if each.scope:
             owners = {each.scope, *(one for one, made in self.instances.items() if made.key("PART") == each.scope)}
@@ -207,13 +208,13 @@ class Abaqus:
             elif why := REFUSED.get(each.word):
                 each.entry.refuse(why)
             elif each.word in MATERIAL:
-                each.entry.refuse("it stands outside of a material that is taken over")
+                each.entry.refuse("it stands outside of a material that is translated")
 
     # What keywords name -----------------------------------------------------------------------------------------------
 
     @cached_property
     def mesh(self) -> AbaqusMesh:
-        """Nodes, elements and sets, read when they are asked for."""
+        """Nodes, elements and sets, read at the first use."""
         return AbaqusMesh(self.path)
 
     def _nodes_of(self) -> dict[str, set[int]]:
@@ -221,7 +222,7 @@ class Abaqus:
         return {key: self.mesh.body(scope, elset)[1] for key, (scope, _, elset) in pairs.items()}
 
     def chosen(self, name: str, entry: Entry) -> Chosen:
-        """The node set or node of a data line; the keyword of the set is taken with it."""
+        """Returns the node set or node of a data line, and marks the keyword of the set as read."""
         plain, _, last = name.strip().strip('"').rpartition(".")
         for each in self.of("NSET"):
             if each.key("NSET") == joined(last) and (not plain or joined(plain) in self._scopes(each)):
@@ -239,13 +240,13 @@ class Abaqus:
         return Chosen(f"node set {name}", nodes=nodes, on=on)
 
     def _scopes(self, each: Keyword) -> set[str]:
-        """Instances in which a set may be named."""
+        """Returns the instances in which a set can be named."""
         if each.scope in self.instances:
             return {each.scope}
         return {name for name, one in self.instances.items() if one.key("PART") == each.scope} | {each.key("INSTANCE")}
 
     def _surface(self, name: str, entry: Entry) -> frozenset[str]:
-        """Bodies that have elements of a surface."""
+        """Returns the bodies that have elements of a surface."""
         sets: list[str] = []
         for each in self.of("SURFACE"):
             if each.key("NAME") == joined(name):

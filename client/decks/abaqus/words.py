@@ -1,8 +1,8 @@
-"""Keywords of Abaqus that are left out, and why, and those that change the answer; the rest are read."""
+"""Keywords of Abaqus that are omitted, with the reason, and those that change the answer; all others are read."""
 
 _OUTPUT = "output: a run writes frames, history.csv and probes"
 _END = "the end of what stands before it"
-_USED = "used by nothing that is taken over"
+_USED = "not used by any translated keyword"
 
 LEFT: dict[str, str] = {
     "PREPRINT": _OUTPUT, "NODE OUTPUT": _OUTPUT, "ELEMENT OUTPUT": _OUTPUT, "CONTACT OUTPUT": _OUTPUT,
@@ -36,12 +36,12 @@ REFUSED: dict[str, str] = {
     "BEAM SECTION": "beams: here all bodies are solids", "COHESIVE SECTION": "cohesive elements: give [[bond]]",
     "CONNECTOR SECTION": "connectors: there are none here", "MASS": "masses of nodes: there are none here",
     "ROTARY INERTIA": "masses of nodes: there are none here", "SPRING": "springs: there are none here",
-    "DASHPOT": "dashpots: there are none here", "COUPLING": "joins nodes in a way that is not taken over",
-    "KINEMATIC": "joins nodes in a way that is not taken over", "MPC": "joins nodes in a way that is not taken over",
-    "EQUATION": "joins nodes in a way that is not taken over", "EMBEDDED ELEMENT": "embedded bodies: there are none",
+    "DASHPOT": "dashpots: there are none here", "COUPLING": "joins nodes in a way that is not translated",
+    "KINEMATIC": "joins nodes in a way that is not translated", "MPC": "joins nodes in a way that is not translated",
+    "EQUATION": "joins nodes in a way that is not translated", "EMBEDDED ELEMENT": "embedded bodies: there are none",
     "RIGID BODY": "a rigid body that is not a whole section of solids",
     "CONTACT EXCLUSIONS": "pairs that do not meet; here all parts of contact.parts meet each other",
-    "DSLOAD": "a load on surfaces that is not taken over: [[boundaries]] kind = \"traction\"",
+    "DSLOAD": "a load on surfaces that is not translated: [[boundaries]] kind = \"traction\"",
     "CLOAD": "forces on nodes: [[boundaries]] kind = \"traction\" acts on faces",
     "TEMPERATURE": "temperatures that are given; here work becomes heat where it is done",
     "FIELD": "fields that are given", "IMPORT": "a state of another analysis",
@@ -60,7 +60,7 @@ MATERIAL = {
     "DENSITY", "ELASTIC", "PLASTIC", "RATE DEPENDENT", "DAMAGE INITIATION", "DAMAGE EVOLUTION", "SPECIFIC HEAT",
     "INELASTIC HEAT FRACTION", "EOS", "SHEAR FAILURE", "TENSILE FAILURE", "CONDUCTIVITY", "DEPVAR", "DAMPING",
 }  # fmt: skip
-"""Keywords that may stand below ``*MATERIAL`` and are known here."""
+"""Known keywords that are allowed below ``*MATERIAL``."""
 
 READ = {
     "HEADING", "NODE", "ELEMENT", "NSET", "ELSET", "SURFACE", "PART", "ASSEMBLY", "INSTANCE", "SOLID SECTION",
@@ -73,7 +73,7 @@ _SPELT = {"".join(each.split()): each for each in (*LEFT, *REFUSED, *MATERIAL, *
 
 
 def spelt(word: str) -> str:
-    """A keyword as the manual spells it, also where it is shortened: ``ENDPART`` is ``END PART``."""
+    """Returns a keyword as the manual spells it, also for a shortened one: ``ENDPART`` is ``END PART``."""
     if word in _SPELT:
         return _SPELT[word]
     alike = [whole for joined, whole in _SPELT.items() if joined.startswith(word)] if word else []

@@ -1,4 +1,4 @@
-"""Contact, the end and the time step of an LS-DYNA deck."""
+"""Contact, end time and time step of an LS-DYNA deck."""
 
 from collections.abc import Callable
 
@@ -23,14 +23,15 @@ _LAYOUT = (
     "SSID MSID SSTYP MSTYP SBOXID MBOXID SPR MPR", "FS FD DC VC VDC PENCHK BT DT", "SFS SFM SST MST SFST SFMT FSF VSF",
 )  # fmt: skip
 Surface = Callable[[int, int, Entry], frozenset[str]]
-"""Bodies of a surface: its number, its type, the keyword. Raises ValueError."""
+"""Returns the bodies of a surface: its number, its type, the keyword. Raises ValueError."""
 
 
 def contact(block: Block, name: str, options: frozenset[str], entry: Entry, surface: Surface) -> Meeting:
-    """A contact by its three cards; bodies of a single one meet each other and themselves. Raises ValueError."""
+    """Reads a contact from its three cards; bodies of a single surface are in contact with each other and
+    themselves. Raises ValueError."""
     fields = Fields(block, entry, _behind(block, options, entry), _LAYOUT)
     fields.forgive("SPR MPR PENCHK VC VDC SFS SFM SST MST SFST SFMT VSF", "stiffness and output of the penalty method")
-    fields.refuse("SBOXID MBOXID", "boxes are not taken over")
+    fields.refuse("SBOXID MBOXID", "boxes are not translated")
     fields.refuse("BT", "the contact begins later; here it is there from the start on")
     if 0.0 < fields.real("DT") < 1e19:
         fields.refuse("DT", "the contact ends; here it lasts")
@@ -55,7 +56,7 @@ def contact(block: Block, name: str, options: frozenset[str], entry: Entry, surf
 
 
 def _behind(block: Block, options: frozenset[str], entry: Entry) -> list[Card]:
-    """The cards behind a title and those of the option MPP: one, and a second one that begins with ``&``."""
+    """Returns the cards behind a title and those of the option MPP: one, and a second one that begins with ``&``."""
     cards = trimmed(block.cards)[bool(options & {"ID", "TITLE"}) :]
     if "MPP" not in options or not cards:
         return cards
@@ -64,7 +65,7 @@ def _behind(block: Block, options: frozenset[str], entry: Entry) -> list[Card]:
 
 
 def termination(block: Block, entry: Entry) -> float:
-    """The end of the run, in units of the deck. Raises ValueError."""
+    """Reads the end of the run, in units of the deck. Raises ValueError."""
     fields = Fields(block, entry, block.cards, ("ENDTIM ENDCYC DTMIN ENDENG ENDMAS NOSOL",))
     end = fields.real("ENDTIM")
     if end <= 0.0:
@@ -76,7 +77,7 @@ def termination(block: Block, entry: Entry) -> float:
 
 
 def time_step(draft: Draft, block: Block, entry: Entry) -> None:
-    """``TSSFAC``, and what is not taken over."""
+    """Reads ``TSSFAC``, and records what is omitted."""
     layout = ("DTINIT TSSFAC ISDO TSLIMT DT2MS LCTM ERODE MS1ST",)
     fields = Fields(block, entry, block.cards, layout)
     safety = fields.real("TSSFAC")
@@ -93,7 +94,7 @@ def time_step(draft: Draft, block: Block, entry: Entry) -> None:
 
 
 def pictures(draft: Draft, block: Block, entry: Entry, end: float) -> None:
-    """``*DATABASE_BINARY_D3PLOT``: frames."""
+    """Reads ``*DATABASE_BINARY_D3PLOT``: frames."""
     fields = Fields(block, entry, block.cards, ("DT LCDT BEAM NPLTC PSETID",))
     interval, count = fields.real("DT"), fields.whole("NPLTC")
     frames = draft.set_frames(count, interval, end, entry)

@@ -1,4 +1,4 @@
-"""What materials of LS-DYNA have in common: elasticity, pressure, linear hardening."""
+"""Common properties of LS-DYNA materials: elasticity, pressure, linear hardening."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -13,19 +13,19 @@ Curve = tuple[tuple[float, float], ...]
 
 @dataclass
 class Context:
-    """What a material needs besides its own cards."""
+    """The context of a material besides its own cards."""
 
     system: System
     eos: Fields | None = None
     curves: Mapping[int, Curve] = field(default_factory=dict)
 
     def stress(self, value: float) -> str | float:
-        """With its unit."""
+        """Returns a number with its unit."""
         return self.system.quantity(value, STRESS)
 
 
 def elastic(fields: Fields, context: Context) -> dict[str, Any]:
-    """Density and elasticity of laws with E and PR."""
+    """Returns density and elasticity of laws with E and PR."""
     young, poisson = fields.real("E"), fields.real("PR")
     density = context.system.quantity(fields.real("RO"), DENSITY)
     if context.eos is not None:
@@ -34,7 +34,7 @@ def elastic(fields: Fields, context: Context) -> dict[str, Any]:
 
 
 def with_eos(fields: Fields, context: Context, shear: float) -> dict[str, Any]:
-    """Density, elasticity and equation of state of laws that take the pressure from ``*EOS``."""
+    """Returns density, elasticity and equation of state of laws with the pressure of ``*EOS``."""
     density, eos = fields.real("RO"), context.eos
     material: dict[str, Any] = {"density": context.system.quantity(density, DENSITY)}
     if eos is None:
@@ -63,14 +63,14 @@ def with_eos(fields: Fields, context: Context, shear: float) -> dict[str, Any]:
 
 
 def cut_off(fields: Fields, material: dict[str, Any], context: Context, pressure: float, name: str) -> None:
-    """``spall`` of a cut-off of the pressure, which is below 0; none for one that nothing reaches."""
+    """Returns ``spall`` of a cut-off of the pressure below 0; none for one that cannot be reached."""
     if -1e10 < context.system.si(pressure, STRESS) * 1e-9 < 0.0:
         material["spall"] = context.stress(-pressure)
         fields.differ(name, "no pressure is below it; beyond it pores open here, which take up the work")
 
 
 def linear(young: float, strength: tuple[float, float], context: Context) -> dict[str, Any]:
-    """``strength`` of a yield stress and a hardening. Raises ValueError for one that softens."""
+    """Returns ``strength`` of a yield stress and a hardening. Raises ValueError for softening."""
     law: dict[str, Any] = {"model": "linear_hardening", "yield_stress": context.stress(strength[0])}
     if strength[1] < 0.0:
         raise ValueError("the flow stress falls with the plastic strain; allowed here: one that rises or stays")
@@ -80,10 +80,10 @@ def linear(young: float, strength: tuple[float, float], context: Context) -> dic
 
 
 def no_rate(fields: Fields, names: str) -> None:
-    """Fields of a dependence on the rate."""
+    """Records the fields of a rate dependence."""
     fields.refuse(names, "the flow stress depends on the rate there, not here")
 
 
 def failing(strain: float) -> dict[str, Any]:
-    """``erosion`` of a plastic strain; none for 0 and for one that nothing reaches."""
+    """Returns ``erosion`` of a plastic strain; none for 0 and for one that cannot be reached."""
     return {"plastic_strain": strain} if 0.0 < strain < 1e10 else {}

@@ -10,7 +10,7 @@ from .fields import Fields
 
 
 def _flow(fields: Fields, context: Context) -> dict[str, Any]:
-    """A, B, n, C and the reference rate, which both laws have."""
+    """Reads A, B, n, C and the reference rate, which both laws have."""
     rate = fields.real("EPSO")
     if rate <= 0.0:
         raise ValueError("EPSO, the reference rate, is not above 0")
@@ -27,7 +27,7 @@ def _flow(fields: Fields, context: Context) -> dict[str, Any]:
 
 
 def simplified(fields: Fields, context: Context) -> Made:
-    """``*MAT_SIMPLIFIED_JOHNSON_COOK``."""
+    """Reads ``*MAT_SIMPLIFIED_JOHNSON_COOK``."""
     for name in ("SIGMAX", "SIGSAT"):
         if fields.real(name) < 1e20:
             fields.refuse(name, "the flow stress ends there, not here")
@@ -42,7 +42,7 @@ def simplified(fields: Fields, context: Context) -> Made:
 
 
 def johnson_cook(fields: Fields, context: Context) -> Made:
-    """``*MAT_JOHNSON_COOK``."""
+    """Reads ``*MAT_JOHNSON_COOK``."""
     shear = fields.real("G") or shear_of(fields.real("E"), fields.real("PR"))
     fields.forgive("E PR", "of shells; solids have G and the equation of state")
     fields.forgive("DTF", "elements leave at a small step there; parts[].erosion.time_step does that here")
@@ -77,7 +77,7 @@ def _spall(fields: Fields, material: dict[str, Any], context: Context) -> None:
 
 
 def _damage(fields: Fields, law: dict[str, Any]) -> dict[str, Any]:
-    """``strength.damage``, and the erosion that goes with it; all of D1 to D5 at 0 mean no failure."""
+    """Returns ``strength.damage`` with its erosion; D1 to D5 all 0 mean no failure."""
     values = {f"D{i}": fields.real(f"D{i}") for i in range(1, 6)}
     stays = fields.real("EROD")
     if fields.real("EFMIN") > 1e-6:
@@ -92,7 +92,7 @@ def _damage(fields: Fields, law: dict[str, Any]) -> dict[str, Any]:
 
 
 def holmquist(fields: Fields, context: Context) -> Made:
-    """``*MAT_JOHNSON_HOLMQUIST_CERAMICS``."""
+    """Reads ``*MAT_JOHNSON_HOLMQUIST_CERAMICS``."""
     shear, bulk = fields.real("G"), fields.real("K1")
     young, poisson = young_of(bulk, shear)
     rate = fields.real("EPSI")

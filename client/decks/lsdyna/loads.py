@@ -1,4 +1,4 @@
-"""What moves, holds and stops bodies in an LS-DYNA deck."""
+"""Initial velocities, restraints, motions and gravity of an LS-DYNA deck."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -23,9 +23,9 @@ _CORNERS = "DOFX DOFY DOFZ"
 
 
 def velocity(scene: Scene, block: Block, options: frozenset[str], entry: Entry) -> None:
-    """``*INITIAL_VELOCITY``: of a node set, or of everything."""
+    """Reads ``*INITIAL_VELOCITY``: of a node set, or of all nodes."""
     fields = Fields(block, entry, block.cards, ("NSID NSIDEX BOXID IRIGID ICID", "VX VY VZ VXR VYR VZR"))
-    fields.refuse("NSIDEX BOXID ICID", "exceptions, boxes and local axes are not taken over")
+    fields.refuse("NSIDEX BOXID ICID", "exceptions, boxes and local axes are not translated")
     fields.forgive("IRIGID", "whether velocities of rigid bodies are overwritten")
     fields.refuse("VXR VYR VZR", "solids have no rotations of nodes")
     chosen = scene.nodes(fields.whole("NSID"), entry)
@@ -34,11 +34,11 @@ def velocity(scene: Scene, block: Block, options: frozenset[str], entry: Entry) 
 
 
 def velocity_node(scene: Scene, block: Block, options: frozenset[str], entry: Entry) -> None:
-    """``*INITIAL_VELOCITY_NODE``: of single nodes; those with one velocity are taken together."""
+    """Reads ``*INITIAL_VELOCITY_NODE``: of single nodes; nodes with the same velocity are one group."""
     groups: dict[tuple[float, ...], set[int]] = {}
     for card in block.filled():
         fields = Fields(block, entry, [card], ("NID VX VY VZ VXR VYR VZR ICID",))
-        fields.refuse("VXR VYR VZR ICID", "solids have no rotations of nodes, and local axes are not taken over")
+        fields.refuse("VXR VYR VZR ICID", "solids have no rotations of nodes, and local axes are not translated")
         values = tuple(fields.real(f"V{axis}") for axis in "XYZ")
         groups.setdefault(values, set()).add(fields.whole("NID"))
     for values, nodes in groups.items():
@@ -47,12 +47,12 @@ def velocity_node(scene: Scene, block: Block, options: frozenset[str], entry: En
 
 
 def generation(scene: Scene, block: Block, options: frozenset[str], entry: Entry) -> None:
-    """``*INITIAL_VELOCITY_GENERATION``: translation, and rotation about an axis."""
+    """Reads ``*INITIAL_VELOCITY_GENERATION``: translation, and rotation about an axis."""
     layout = ("ID STYP OMEGA VX VY VZ IVATN ICID", "XC YC ZC NX NY NZ PHASE IRIGID")
     cards = trimmed(block.cards)
     for one, two in zip(cards[::2], [*cards[1::2], None], strict=False):
         fields = Fields(block, entry, [card for card in (one, two) if card is not None], layout)
-        fields.refuse("ICID PHASE", "local axes and later phases are not taken over")
+        fields.refuse("ICID PHASE", "local axes and later phases are not translated")
         fields.forgive("IVATN IRIGID", "how rigid bodies and attached nodes are treated")
         number, kind = fields.whole("ID"), fields.whole("STYP")
         wanted = {1: scene.bodies, 2: lambda n, _: scene.part(n), 3: scene.nodes}.get(kind)
@@ -66,7 +66,7 @@ def generation(scene: Scene, block: Block, options: frozenset[str], entry: Entry
 
 
 def _axis(fields: Fields) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
-    """Rotation vector and a point of the axis."""
+    """Returns the rotation vector and a point of the axis."""
     turn = fields.real("OMEGA")
     centre = fields.real("XC"), fields.real("YC"), fields.real("ZC")
     along = [fields.real(name) for name in ("NX", "NY", "NZ")]
@@ -78,7 +78,7 @@ def _axis(fields: Fields) -> tuple[tuple[float, float, float], tuple[float, floa
 
 
 def velocity_rigid(scene: Scene, block: Block, options: frozenset[str], entry: Entry) -> None:
-    """``*INITIAL_VELOCITY_RIGID_BODY``."""
+    """Reads ``*INITIAL_VELOCITY_RIGID_BODY``."""
     for card in block.filled():
         fields = Fields(block, entry, [card], ("PID VX VY VZ VXR VYR VZR ICID",))
         fields.refuse("VXR VYR VZR ICID", "the spin is about the centre of mass there; give parts[].spin here")
@@ -90,11 +90,11 @@ def velocity_rigid(scene: Scene, block: Block, options: frozenset[str], entry: E
 
 
 def restraint(scene: Scene, block: Block, options: frozenset[str], entry: Entry) -> None:
-    """``*BOUNDARY_SPC_SET`` and ``_NODE``: nodes that do not move along some axes."""
+    """Reads ``*BOUNDARY_SPC_SET`` and ``_NODE``: nodes fixed along some axes."""
     single = "NODE" in options
     for card in list(block.filled())["ID" in options :]:
         fields = Fields(block, entry, [card], ("ID CID DOFX DOFY DOFZ DOFRX DOFRY DOFRZ",))
-        fields.refuse("CID", "local axes are not taken over")
+        fields.refuse("CID", "local axes are not translated")
         fields.forgive("DOFRX DOFRY DOFRZ", "nodes of solids have no rotations")
         speeds = {axis: 0.0 for axis, name in zip("xyz", _CORNERS.split(), strict=True) if fields.whole(name)}
         number = fields.whole("ID")
@@ -106,11 +106,11 @@ def restraint(scene: Scene, block: Block, options: frozenset[str], entry: Entry)
 
 
 _TC = {1: "x", 2: "y", 3: "z", 4: "xy", 5: "yz", 6: "xz", 7: "xyz"}
-"""Translations that the codes TC of ``*NODE`` hold (the manual, volume I)."""
+"""Translations that the codes TC of ``*NODE`` fix (the manual, volume I)."""
 
 
 def hold_nodes(scene: Scene, held: Sequence[tuple[int, set[int], Entry]]) -> None:
-    """Nodes that ``*NODE`` itself holds, by their code."""
+    """Reads the nodes that ``*NODE`` itself fixes, by their code."""
     for code, nodes, entry in held:
         if code not in _TC:
             entry.remark("refused", f"TC = {code}", "a code of translations from 1 to 7 is expected")
@@ -124,12 +124,12 @@ def _single(number: int) -> Chosen:
 
 
 def motion(scene: Scene, block: Block, options: frozenset[str], entry: Entry) -> None:
-    """``*BOUNDARY_PRESCRIBED_MOTION_SET``, ``_NODE`` and ``_RIGID``: a velocity or a displacement by a curve."""
+    """Reads ``*BOUNDARY_PRESCRIBED_MOTION_SET``, ``_NODE`` and ``_RIGID``: a velocity or a displacement by a curve."""
     for card in list(block.filled())["ID" in options :]:
         fields = Fields(block, entry, [card], ("ID DOF VAD LCID SF VID DEATH BIRTH",))
         number, axis = fields.whole("ID"), _AXES.get(fields.whole("DOF"))
         if axis is None:
-            raise ValueError(f"DOF = {fields.text('DOF')} is not 1, 2 or 3: motions along x, y and z are taken over")
+            raise ValueError(f"DOF = {fields.text('DOF')} is not 1, 2 or 3: motions along x, y and z are translated")
         scale, kind = fields.nonzero("SF", 1.0), fields.whole("VAD")
         curve = tuple((time, scale * value) for time, value in scene.lasting(fields.whole("LCID")))
         if 0.0 < fields.real("DEATH") < scene.end:
@@ -141,7 +141,7 @@ def motion(scene: Scene, block: Block, options: frozenset[str], entry: Entry) ->
         elif kind == 2:
             speed, course = displacement_speed(curve, scene.end), ()
         else:
-            raise ValueError(f"VAD = {kind}: velocities (0) and displacements (2) are taken over")
+            raise ValueError(f"VAD = {kind}: velocities (0) and displacements (2) are translated")
         chosen = scene.part(number) if "RIGID" in options else _single(number) if "NODE" in options else None
         scene.holds.append(Hold(chosen or scene.nodes(number, entry), entry, {axis: speed}, course))
         fields.rest("refused")
@@ -151,10 +151,11 @@ def motion(scene: Scene, block: Block, options: frozenset[str], entry: Entry) ->
 
 
 def body_load(scene: Scene, block: Block, options: frozenset[str], entry: Entry) -> None:
-    """``*LOAD_BODY_X``, ``_Y``, ``_Z``: the base accelerates that way, so that bodies are pulled the other way."""
+    """Reads ``*LOAD_BODY_X``, ``_Y``, ``_Z``: an acceleration of the base, opposite to the acceleration of the
+    bodies."""
     fields = Fields(block, entry, block.cards, ("LCID SF LCIDDR XC YC ZC CID",))
     fields.forgive("LCIDDR", "the load of the dynamic relaxation")
-    fields.refuse("CID", "local axes are not taken over")
+    fields.refuse("CID", "local axes are not translated")
     fields.forgive("XC YC ZC", "a centre of rotation, of no meaning for a translation")
     (axis,) = options & {"X", "Y", "Z"}
     scale = fields.nonzero("SF", 1.0)
@@ -180,4 +181,4 @@ HANDLERS: Mapping[str, tuple[Handler, frozenset[str]]] = {
     "RIGIDWALL_GEOMETRIC": (walls.geometric, walls.OPTIONS - {"FORCES", "MOVING"}),
     "LOAD_BODY": (body_load, frozenset({"X", "Y", "Z"})),
 }
-"""Keywords that are taken over, with the options that may stand behind them."""
+"""Translated keywords, with the options that may follow them."""

@@ -1,6 +1,6 @@
 """Materials and equations of state of LS-DYNA as those of Conoid (LS-DYNA Keyword User's Manual, volume II).
 
-What the formulas there and here do not share is a remark of the keyword: docs/howto/import.md has them side by side.
+Differences of the formulas are notes of the keyword; docs/howto/import.md compares them.
 """
 
 from collections.abc import Callable
@@ -13,7 +13,8 @@ from .johnson import holmquist, johnson_cook, simplified
 
 
 def translated(name: str, fields: Fields, context: Context) -> Made | None:
-    """The material of a keyword; None, with the reason in its entry, for one that Conoid lacks. Raises CardError."""
+    """Returns the material of a keyword; None, with the reason in its entry, for one that Conoid lacks. Raises
+    CardError."""
     law = _LAWS.get(name)
     if law is None:
         fields.entry.refuse("Conoid has no such material law")
@@ -29,7 +30,7 @@ def translated(name: str, fields: Fields, context: Context) -> Made | None:
 
 
 def weighed(name: str, fields: Fields) -> tuple[float, float | None]:
-    """Density and Young's modulus of a material, in units of the deck; None where the deck does not say it."""
+    """Returns density and Young's modulus of a material, in units of the deck; None if the deck does not give it."""
     density = fields.real("RO")
     if fields.real("E") > 0.0:
         return density, fields.real("E")
@@ -43,7 +44,7 @@ def weighed(name: str, fields: Fields) -> tuple[float, float | None]:
 
 
 def erode(fields: Fields | None, made: Made) -> None:
-    """``*MAT_ADD_EROSION``: criteria of strain; all others change the answer. Raises CardError."""
+    """Reads ``*MAT_ADD_EROSION``: criteria of strain; all others change the answer. Raises CardError."""
     if fields is None:
         return
     fields.whole("MID")
@@ -58,7 +59,7 @@ def erode(fields: Fields | None, made: Made) -> None:
         fields.refuse("MXEPS", "the largest principal strain: equal to erosion.plastic_strain in simple tension alone")
     if "plastic_strain" in made.erosion:
         fields.entry.take("parts[].erosion")
-    fields.rest("refused", "a criterion of failure that is not taken over")
+    fields.rest("refused", "a criterion of failure that is not translated")
 
 
 # Laws -----------------------------------------------------------------------------------------------------------------
@@ -95,12 +96,12 @@ def _mat_piecewise(fields: Fields, context: Context) -> Made:
 
 
 def _hardening_curve(fields: Fields, context: Context) -> tuple[float, float]:
-    """Yield stress and hardening of a curve, of eight points, or of a tangent modulus, in this order."""
+    """Returns yield stress and hardening of a curve, of eight points, or of a tangent modulus, in this order."""
     number = fields.whole("LCSS")
     if number:
         fields.forgive("SIGY ETAN", "of no meaning where LCSS is given")
         if number not in context.curves:
-            raise ValueError(f"LCSS = {number} is no *DEFINE_CURVE of the deck; tables by rate are not taken over")
+            raise ValueError(f"LCSS = {number} is no *DEFINE_CURVE of the deck; tables by rate are not translated")
         return _straight(context.curves[number], f"the curve LCSS = {number}")
     strains = [fields.real(f"EPS{i}") for i in range(1, 9)]
     stresses = [fields.real(f"ES{i}") for i in range(1, 9)]
@@ -131,7 +132,7 @@ def _mat_power(fields: Fields, context: Context) -> Made:
     fields.forgive("VP", "how the rate counts, of a law without rate")
     modulus, first = fields.real("K"), fields.real("SIGY")
     if fields.real("N") != 1.0 or first <= 0.0:
-        raise ValueError("the law K (strain)^N is taken over with N = 1 and SIGY above 0 alone")
+        raise ValueError("the law K (strain)^N is translated with N = 1 and SIGY above 0 alone")
     strength = first if first > 0.02 else modulus * first
     law = linear(fields.real("E"), (strength, modulus), context)
     return Made({**elastic(fields, context), "strength": law}, failing(fields.real("EPSF")))
@@ -147,7 +148,7 @@ def _mat_rigid(fields: Fields, context: Context) -> Made:
     code = fields.real("CON1")
     held = _TRANSLATIONS.get(code, "") if fields.real("CMO") == 1.0 and fields.real("CON2") == 7.0 else ""
     if fields.real("CMO") and not held:
-        fields.refuse("CMO CON1 CON2", "global axes (1), translations 4 to 7 and all rotations (7) are taken over")
+        fields.refuse("CMO CON1 CON2", "global axes (1), translations 4 to 7 and all rotations (7) are translated")
     return Made(elastic(fields, context), rigid=True, held=held)
 
 

@@ -1,4 +1,4 @@
-"""Which nodes the parts of an LS-DYNA deck have, and where they are: read again, when somebody asks."""
+"""Nodes of the parts of an LS-DYNA deck and their positions: a second reading, on demand."""
 
 from pathlib import Path
 
@@ -11,7 +11,7 @@ _NODE, _SOLID = (8, 16, 16, 16, 8, 8), (8,) * 10
 
 
 def read_points(path: Path) -> dict[int, Point]:
-    """Where nodes are, by their numbers. Raises CardError."""
+    """Returns the positions of nodes, by their numbers. Raises CardError."""
     points: dict[int, Point] = {}
     for block in Deck(path).blocks():
         if block.name == "NODE":
@@ -34,7 +34,7 @@ def _point(block: Block, card: Card) -> tuple[int, Point]:
 
 
 def held_of(block: Block) -> dict[int, set[int]]:
-    """Nodes that ``*NODE`` itself holds, by the code of the translations (TC). Raises CardError."""
+    """Returns the nodes that ``*NODE`` itself fixes, by the code of the translations (TC). Raises CardError."""
     found: dict[int, set[int]] = {}
     start = sum(max(width, block.least) for width in _NODE[:4])
     for card in block.filled():
@@ -48,7 +48,7 @@ def held_of(block: Block) -> dict[int, set[int]]:
 
 
 def read_nodes(path: Path) -> dict[str, set[int]]:
-    """Nodes of each part with solids, by its number as text. Raises CardError."""
+    """Returns the nodes of each part with solids, by its number as text. Raises CardError."""
     nodes: dict[str, set[int]] = {}
     for block in Deck(path, without=("NODE",)).blocks():
         if block.name == "ELEMENT_SOLID":
@@ -57,7 +57,7 @@ def read_nodes(path: Path) -> dict[str, set[int]]:
 
 
 def parts_of(block: Block) -> set[str]:
-    """Numbers of the parts that have elements in ``*ELEMENT_SOLID``, as text. Raises CardError."""
+    """Returns the numbers of the parts that have elements in ``*ELEMENT_SOLID``, as text. Raises CardError."""
     heads = _heads(block)
     if any("," in card.text for card in heads[:1]):
         return {str(block.whole(card, "".join(_items(block, card)[1:2]), "pid")) for card in heads}
@@ -67,7 +67,8 @@ def parts_of(block: Block) -> set[str]:
 
 
 def _heads(block: Block) -> list[Card]:
-    """The cards with the numbers of element and part: every one, or every second where nodes follow on another card."""
+    """Yields the cards with the numbers of element and part: every one, or every second if the nodes are on another
+    card."""
     cards = list(block.filled())
     two = bool(cards) and len(_items(block, cards[0])) <= 2
     return cards[:: 1 + two]
@@ -87,7 +88,7 @@ def _solids(block: Block, nodes: dict[str, set[int]]) -> None:
 
 
 def _quick(text: str) -> tuple[str, list[int]] | None:
-    """Part and nodes of a card in the plain format without a gap; None for any other."""
+    """Returns part and nodes of a card in the plain format without a gap; None for any other."""
     items = text.split()
     if len(items) * 8 < len(text.rstrip()) or len(items) < 6:
         return None

@@ -1,4 +1,4 @@
-"""What keywords of an LS-DYNA deck name by numbers: node sets, parts, curves, surfaces."""
+"""Objects that keywords of an LS-DYNA deck refer to by numbers: node sets, parts, curves, surfaces."""
 
 from functools import partial
 
@@ -8,28 +8,28 @@ from . import sets
 
 
 class Numbered:
-    """Sets and curves of a deck by their numbers; who asks for one has its keyword taken over."""
+    """Sets and curves of a deck by their numbers; a set or curve that is used marks its keyword as translated."""
 
     topology: Topology
 
     def __init__(self) -> None:
-        """None yet; ``topology`` is set before anybody asks."""
+        """Starts empty; ``topology`` is set before the first use."""
         self.node_sets: dict[int, sets.NodeSet] = {}
         self.segments: dict[int, sets.NodeSet] = {}
         self.part_sets: dict[int, tuple[set[int], Entry]] = {}
         self.curves: dict[int, tuple[sets.Curve, Entry]] = {}
 
     def leave_rest(self) -> None:
-        """Those that nobody has asked for."""
+        """Sets and curves that have not been used."""
         for number, found in (*self.node_sets.items(), *self.segments.items()):
             if not found.entry.decided:
-                found.entry.leave(f"set {number} is used by nothing that is taken over")
+                found.entry.leave(f"set {number} is used by nothing that is translated")
         for _, entry in (*self.part_sets.values(), *self.curves.values()):
             if not entry.decided:
-                entry.leave("used by nothing that is taken over")
+                entry.leave("used by nothing that is translated")
 
     def nodes(self, number: int, entry: Entry) -> Chosen:
-        """The node set of a number; 0 is everything. Raises ValueError."""
+        """Returns the node set of a number; 0 means all nodes. Raises ValueError."""
         if number == 0:
             return Chosen("everything", bodies=frozenset(self.topology.bodies))
         found = self._node_set(number, entry)
@@ -39,7 +39,7 @@ class Numbered:
         return Chosen(f"node set {number}", nodes=partial(self._members, found), on=on)
 
     def _node_set(self, number: int, entry: Entry, within: tuple[int, ...] = ()) -> sets.NodeSet:
-        """The node set of a number, with those that it is made of in it. Raises ValueError."""
+        """Returns the node set of a number, with the sets that it consists of. Raises ValueError."""
         found = self.node_sets.get(number)
         if found is None:
             raise ValueError(f"the node set {number} is not defined")
@@ -64,11 +64,11 @@ class Numbered:
         return found.nodes.union(within if found.ranges else (), *parts)
 
     def part(self, number: int) -> Chosen:
-        """The part of a number."""
+        """Returns the part of a number."""
         return Chosen(f"part {number}", bodies=frozenset({str(number)}))
 
     def part_set(self, number: int, entry: Entry) -> Chosen:
-        """The part set of a number. Raises ValueError."""
+        """Returns the part set of a number. Raises ValueError."""
         if number not in self.part_sets:
             raise ValueError(f"the part set {number} is not defined")
         parts, own = self.part_sets[number]
@@ -76,7 +76,7 @@ class Numbered:
         return Chosen(f"part set {number}", bodies=frozenset(map(str, parts)))
 
     def curve(self, number: int) -> sets.Curve:
-        """The curve of a number. Raises ValueError."""
+        """Returns the curve of a number. Raises ValueError."""
         if number not in self.curves:
             raise ValueError(f"the curve {number} is not defined")
         curve, entry = self.curves[number]
@@ -84,7 +84,7 @@ class Numbered:
         return curve
 
     def surface(self, number: int, kind: int, entry: Entry) -> frozenset[str]:
-        """The bodies of a surface by its number and type (the manual, *CONTACT, SSTYP). Raises ValueError."""
+        """Returns the bodies of a surface by its number and type (the manual, *CONTACT, SSTYP). Raises ValueError."""
         every = frozenset(self.topology.bodies)
         if kind == 5 or (number == 0 and kind in (0, 2, 3)):
             return every

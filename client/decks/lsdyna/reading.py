@@ -29,12 +29,12 @@ _SETS = frozenset({"TITLE", "LIST", "GENERATE", "GENERAL", "ADD", "COLUMN", "COL
 
 
 class LsDyna:
-    """The keywords of a deck, and what becomes of each."""
+    """The keywords of a deck, with their translation."""
 
     kind = "LS-DYNA keyword deck"
 
     def __init__(self, path: Path) -> None:
-        """Reads all of ``path`` and of what it includes. Raises CardError, OSError."""
+        """Reads all of ``path`` and its included files. Raises CardError, OSError."""
         self.path, self.account = path, Account()
         self._blocks: list[tuple[Block, Entry]] = []
         self._solid: set[str] = set()
@@ -71,7 +71,7 @@ class LsDyna:
         return entry
 
     def _guarded(self, do: object, block: Block, entry: Entry) -> None:
-        """Does what is to be done with a keyword; one that cannot be read refuses the import, with its line."""
+        """Translates a keyword; one that cannot be read refuses the import, with its line."""
         try:
             do(block, entry)  # type: ignore[operator]
         except (CardError, ValueError) as error:
@@ -150,7 +150,7 @@ class LsDyna:
             entry.leave("no solid is of it")
 
     def weighed(self) -> Iterator[Weighed]:
-        """Densities of the materials, to tell the units by."""
+        """Densities of the materials, to find the units."""
         for number, (name, fields, title) in self._materials.items():
             shown = f"{title!r}" if title else f"material {number}"
             try:
@@ -161,7 +161,7 @@ class LsDyna:
     # The case ---------------------------------------------------------------------------------------------------------
 
     def draft(self, system: System) -> Draft:
-        """The case, in units of ``system``."""
+        """Returns the case; ``system``: its units."""
         self._draft = Draft(self.path, system, self.account)
         self._draft.title = self.title
         names = self._draft.call(self._bodies, self._solid)
@@ -241,7 +241,7 @@ class LsDyna:
     def _unknown(self, name: str, entry: Entry) -> None:
         plain = NUMBERS.get(name.removesuffix("_TITLE"), name.removesuffix("_TITLE"))
         if plain in LAYOUTS or name.startswith("MAT_"):
-            entry.leave("no part that is taken over has it")
+            entry.leave("no part that is translated has it")
         elif why := reason(name, REFUSED):
             entry.refuse(why)
 
@@ -262,4 +262,4 @@ class LsDyna:
         self._numbered.leave_rest()
         for fields in (*self._eroding.values(), *self._states.values()):
             if not fields.entry.decided:
-                fields.entry.leave("no part that is taken over has it")
+                fields.entry.leave("no part that is translated has it")

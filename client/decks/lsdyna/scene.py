@@ -1,4 +1,4 @@
-"""What loads of an LS-DYNA deck ask of it, and what they add to the case."""
+"""The interface between the loads of an LS-DYNA deck and the case."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -13,23 +13,23 @@ from ..walls import Stop
 
 @dataclass
 class Scene:
-    """The deck as its loads see it."""
+    """The parts of the deck that its loads use."""
 
     draft: Draft
     nodes: Callable[[int, Entry], Chosen]
-    """The node set of a number; raises ValueError."""
+    """Returns the node set of a number; raises ValueError."""
     bodies: Callable[[int, Entry], Chosen]
-    """The part set of a number; raises ValueError."""
+    """Returns the part set of a number; raises ValueError."""
     part: Callable[[int], Chosen]
     curve: Callable[[int], Course]
-    """Raises ValueError."""
+    """Returns the curve of a number. Raises ValueError."""
     end: float
     starts: list[Start] = field(default_factory=list)
     holds: list[Hold] = field(default_factory=list)
     walls: list[Stop] = field(default_factory=list)
 
     def lasting(self, number: int) -> Course:
-        """The curve of a number, which must not end before the run does. Raises ValueError."""
+        """Returns the curve of a number, which must not end before the run. Raises ValueError."""
         found = self.curve(number)
         if found and found[-1][0] < self.end < float("inf"):
             raise ValueError(f"the curve ends at {found[-1][0]:g}, before the end of the run at {self.end:g}")

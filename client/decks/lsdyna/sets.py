@@ -13,7 +13,7 @@ Curve = tuple[tuple[float, float], ...]
 
 @dataclass
 class NodeSet:
-    """``*SET_NODE`` or ``*SET_SEGMENT``: nodes, or parts whose nodes it has."""
+    """``*SET_NODE`` or ``*SET_SEGMENT``: nodes, or parts whose nodes it contains."""
 
     number: int
     title: str
@@ -23,14 +23,14 @@ class NodeSet:
     sets: set[int] = field(default_factory=set)
     """Other sets of nodes (``_ADD``)."""
     ranges: list[range] = field(default_factory=list)
-    """Numbers from one to another, whether there are such nodes or not."""
+    """Ranges of numbers; not all of them need to exist."""
     everything: bool = False
     odd: str = ""
-    """Why its nodes are not known, if they are not."""
+    """Reason why its nodes are unknown, if they are."""
 
 
 def titled(block: Block, options: frozenset[str]) -> tuple[str, list[Card]]:
-    """The title of a keyword with the option TITLE, and its other cards."""
+    """Returns the title of a keyword with the option TITLE, and its other cards."""
     cards = list(block.cards)
     if "TITLE" in options and cards:
         return cards[0].text.strip(), cards[1:]
@@ -38,7 +38,7 @@ def titled(block: Block, options: frozenset[str]) -> tuple[str, list[Card]]:
 
 
 def node_set(block: Block, options: frozenset[str], entry: Entry) -> NodeSet:
-    """A set of nodes. Raises CardError."""
+    """Reads a set of nodes. Raises CardError."""
     title, cards = titled(block, options)
     head = Fields(block, entry, cards, ("SID DA1 DA2 DA3 DA4 SOLVER",))
     found = NodeSet(head.whole("SID"), title, entry)
@@ -75,7 +75,7 @@ def _general(found: NodeSet, block: Block, cards: list[Card]) -> None:
 
 
 def segment_set(block: Block, options: frozenset[str], entry: Entry) -> NodeSet:
-    """A set of faces, by their nodes. Raises CardError."""
+    """Reads a set of faces, by their nodes. Raises CardError."""
     title, cards = titled(block, options)
     found = NodeSet(Fields(block, entry, cards, ("SID",)).whole("SID"), title, entry)
     if options - {"TITLE"}:
@@ -87,7 +87,7 @@ def segment_set(block: Block, options: frozenset[str], entry: Entry) -> NodeSet:
 
 
 def curve(block: Block, options: frozenset[str], entry: Entry) -> tuple[int, Curve]:
-    """``*DEFINE_CURVE``: its number and its points, scaled and shifted. Raises CardError."""
+    """Reads ``*DEFINE_CURVE``: its number and its points, scaled and shifted. Raises CardError."""
     _, cards = titled(block, options)
     head = Fields(block, entry, cards[:1], ("LCID SIDR SFA SFO OFFA OFFO DATTYP LCINT",))
     number = head.whole("LCID")

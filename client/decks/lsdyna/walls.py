@@ -25,7 +25,7 @@ def planar(scene: Scene, block: Block, options: frozenset[str], entry: Entry) ->
     layout = ["NSID NSIDEX BOXID OFFSET BIRTH DEATH RWKSF", "XT YT ZT XH YH ZH FRIC WVEL"]
     layout += ["MASS V0"] if "MOVING" in options else []
     fields = Fields(block, entry, _cards(block, options, len(layout)), layout)
-    fields.refuse("OFFSET", "an offset is not taken over")
+    fields.refuse("OFFSET", "an offset is not translated")
     fields.forgive("RWKSF WVEL", "how rigid bodies meet the wall, and a threshold of welding")
     table: dict[str, Any] = {"kind": "wall", "point": _point(scene, fields), "normal": _direction(fields)}
     if "MOVING" in options:
@@ -37,7 +37,7 @@ def geometric(scene: Scene, block: Block, options: frozenset[str], entry: Entry)
     """``*RIGIDWALL_GEOMETRIC_CYLINDER`` without an end and ``_SPHERE``, at rest or moved by a curve (``_MOTION``)."""
     shape = next((name for name in _SHAPES if name in options), "")
     if not shape:
-        raise ValueError("a cylinder or a sphere is taken over")
+        raise ValueError("a cylinder or a sphere is translated")
     layout = ["NSID NSIDEX BOXID BIRTH DEATH", "XT YT ZT XH YH ZH FRIC", _SHAPES[shape]]
     layout += ["LCID OPT VX VY VZ"] if "MOTION" in options else []
     fields = Fields(block, entry, _cards(block, options, len(layout)), layout)
@@ -101,7 +101,7 @@ def _driven(scene: Scene, fields: Fields, table: dict[str, Any]) -> None:
 
 def _stand(scene: Scene, fields: Fields, table: dict[str, Any]) -> None:
     """What all walls have in common: whom they stop, when, and their friction."""
-    fields.refuse("NSIDEX BOXID BIRTH", "exceptions, boxes and times are not taken over")
+    fields.refuse("NSIDEX BOXID BIRTH", "exceptions, boxes and times are not translated")
     if 0.0 < fields.real("DEATH") < scene.end:
         fields.refuse("DEATH", "the wall goes before the run ends; here it stays")
     friction = fields.real("FRIC")

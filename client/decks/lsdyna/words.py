@@ -1,4 +1,4 @@
-"""Keywords of LS-DYNA that are left out, and why; what is in no table refuses the import."""
+"""Keywords of LS-DYNA that are omitted, with the reason; a keyword in no table refuses the import."""
 
 LEFT: dict[str, str] = {
     "KEYWORD": "the format of the file",
@@ -22,12 +22,12 @@ LEFT: dict[str, str] = {
     "CONTROL_SOLID": "how the other code computes solids",
     "CONTROL_UNITS": "units are those of --units",
     "INTERFACE_SPRINGBACK": "output for another run",
-    "DEFINE_BOX": "used by nothing that is taken over",
-    "DEFINE_COORDINATE": "used by nothing that is taken over",
-    "DEFINE_VECTOR": "used by nothing that is taken over",
-    "DEFINE_TABLE": "used by nothing that is taken over",
+    "DEFINE_BOX": "used by nothing that is translated",
+    "DEFINE_COORDINATE": "used by nothing that is translated",
+    "DEFINE_VECTOR": "used by nothing that is translated",
+    "DEFINE_TABLE": "used by nothing that is translated",
 }
-"""Keywords by the words that they begin with."""
+"""Omitted keywords by the words that they begin with."""
 
 REFUSED: dict[str, str] = {
     "ELEMENT_SHELL": "shells: here all bodies are solids",
@@ -37,16 +37,16 @@ REFUSED: dict[str, str] = {
     "ELEMENT_MASS": "masses of nodes: there are none here",
     "ELEMENT_SEATBELT": "there are no belts here",
     "ELEMENT_SPH": "particles: here all bodies are tets",
-    "CONSTRAINED": "joins or holds nodes in a way that is not taken over",
+    "CONSTRAINED": "joins or holds nodes in a way that is not translated",
     "DAMPING": "damping of bodies: there is none here",
     "CONTROL_IMPLICIT": "an implicit analysis; here it is explicit",
     "CONTROL_THERMAL": "conduction of heat; here work becomes heat where it is done",
     "CONTROL_DYNAMIC_RELAXATION": "a state before the start, which a case does not have",
     "INITIAL_STRESS": "bodies have no stress at the start here",
     "INITIAL_STRAIN": "bodies have no strain at the start here",
-    "LOAD": "a load that is not taken over",
-    "BOUNDARY": "a boundary that is not taken over",
-    "INITIAL": "a state at the start that is not taken over",
+    "LOAD": "a load that is not translated",
+    "BOUNDARY": "a boundary that is not translated",
+    "INITIAL": "a state at the start that is not translated",
     "RIGIDWALL": "a rigid wall that ends, or has a friction by directions: walls of a case are whole planes, cylinders "
     "and spheres; a rigid part (parts[].rigid) of its shape ends where it does",
     "CONSTRAINED_NODAL_RIGID_BODY": "a rigid body of nodes; parts[].rigid makes a whole part rigid",
@@ -55,7 +55,7 @@ REFUSED: dict[str, str] = {
     "CONSTRAINED_JOINT": "joints between rigid bodies: there are none here",
     "CONSTRAINED_TIED_NODES_FAILURE": "nodes that part at a strain; [[bond]] has a strength and an energy",
     "CONSTRAINED_SPOTWELD": "welds of nodes; [[bond]] ties faces",
-    "CONTACT": "a contact that is not taken over",
+    "CONTACT": "a contact that is not translated",
     "SECTION": "no section of solids",
     "MAT": "Conoid has no such material law",
     "EOS": "Conoid has no such equation of state",
@@ -65,7 +65,7 @@ REFUSED: dict[str, str] = {
 
 
 def reason(name: str, table: dict[str, str]) -> str | None:
-    """The reason of the longest beginning of a keyword; a beginning ends between words."""
+    """Returns the reason of the longest beginning of a keyword; a beginning ends between words."""
     words = name.split("_")
     for count in range(len(words), 0, -1):
         if found := table.get("_".join(words[:count])):

@@ -1,4 +1,4 @@
-"""What moves, holds and stops bodies in a Radioss deck, what meets, and what the engine file says."""
+"""Motions, restraints, walls and contacts of a Radioss deck, and the engine file."""
 
 from collections.abc import Callable
 from typing import Any
@@ -14,7 +14,7 @@ from .walls import WALLS, wall
 
 
 def take(scene: Scene, option: Option, entry: Entry) -> None:
-    """An option, if it is one of these. Raises CardError, ValueError."""
+    """Reads an option of this group. Raises CardError, ValueError."""
     words = [*option.words, "", ""]
     handler = _HANDLERS.get((words[0], words[1])) or _HANDLERS.get((words[0], ""))
     if handler is not None:
@@ -23,7 +23,7 @@ def take(scene: Scene, option: Option, entry: Entry) -> None:
 
 def _translation(scene: Scene, option: Option, entry: Entry) -> None:
     fields = Fields(option, entry, option.rows[1:], ("VX VY VZ GRNOD: SKEW:",))
-    fields.refuse("SKEW", "local axes are not taken over")
+    fields.refuse("SKEW", "local axes are not translated")
     speed = {axis: fields.real(f"V{'XYZ'[axis]}") for axis in range(3)}
     scene.starts.append(Start(scene.nodes(fields.whole("GRNOD"), entry), entry, speed))
     fields.rest()
@@ -31,7 +31,7 @@ def _translation(scene: Scene, option: Option, entry: Entry) -> None:
 
 def _about_axis(scene: Scene, option: Option, entry: Entry) -> None:
     fields = Fields(option, entry, option.rows[1:], ("DIR: FRAME: GRNOD:", "VX VY VZ VR"))
-    fields.refuse("FRAME", "local axes are not taken over")
+    fields.refuse("FRAME", "local axes are not translated")
     along = fields.text("DIR").upper()
     if along not in ("X", "Y", "Z"):
         raise ValueError(f"Dir = {along!r} is not X, Y or Z")
@@ -47,7 +47,7 @@ def _restraint(scene: Scene, option: Option, entry: Entry) -> None:
         if not row[1].strip():
             continue
         fields = Fields(option, entry, [row], ("CODE: SKEW: GRNOD:",))
-        fields.refuse("SKEW", "local axes are not taken over")
+        fields.refuse("SKEW", "local axes are not translated")
         code = fields.text("CODE").split()
         if not code or len(code[0]) != 3 or set("".join(code)) - set("01"):
             raise ValueError(f"line {row[0]}: {' '.join(code)!r} is no code of translations and rotations")
@@ -65,7 +65,7 @@ def _restraint(scene: Scene, option: Option, entry: Entry) -> None:
 
 
 def _scaled(scene: Scene, fields: Fields, entry: Entry, names: tuple[str, str]) -> Course:
-    """Times and values of a function, with its scales. Raises ValueError."""
+    """Returns times and values of a function, with its scales. Raises ValueError."""
     along, across = fields.nonzero(names[0], 1.0), fields.nonzero(names[1], 1.0)
     return tuple((along * time, across * value) for time, value in scene.curve(fields.whole("FCT"), entry))
 
@@ -73,7 +73,7 @@ def _scaled(scene: Scene, fields: Fields, entry: Entry, names: tuple[str, str]) 
 def _motion(scene: Scene, option: Option, entry: Entry) -> None:
     layout = ("FCT: DIR: SKEW: SENS: GRNOD: FRAME: ICOOR:", "ASCALE FSCALE TSTART TSTOP")
     fields = Fields(option, entry, option.rows[1:], layout)
-    fields.refuse("SKEW SENS FRAME ICOOR TSTART", "local axes, sensors and later starts are not taken over")
+    fields.refuse("SKEW SENS FRAME ICOOR TSTART", "local axes, sensors and later starts are not translated")
     if 0.0 < fields.real("TSTOP") < scene.end:
         fields.refuse("TSTOP", "the motion ends before the run does; here it lasts")
     axis = fields.text("DIR").lower()
@@ -92,7 +92,7 @@ def _motion(scene: Scene, option: Option, entry: Entry) -> None:
 def _gravity(scene: Scene, option: Option, entry: Entry) -> None:
     layout = ("FCT: DIR: SKEW: SENS: GRNOD:", "ASCALE FSCALE")
     fields = Fields(option, entry, option.rows[1:], layout)
-    fields.refuse("SKEW SENS GRNOD", "local axes, sensors and groups of nodes are not taken over")
+    fields.refuse("SKEW SENS GRNOD", "local axes, sensors and groups of nodes are not translated")
     axis = fields.text("DIR").upper()
     if fields.whole("FCT"):
         most, course = velocity_course(_scaled(scene, fields, entry, ("ASCALE", "FSCALE")), scene.end)
@@ -110,18 +110,18 @@ def _gravity(scene: Scene, option: Option, entry: Entry) -> None:
 
 
 def _values(option: Option) -> list[float]:
-    """Numbers of the engine file, between blanks. Raises CardError."""
+    """Reads the numbers of the engine file, between blanks. Raises CardError."""
     return [real(line, item, option.shown) for line, text in option.rows for item in text.split()]
 
 
 def _frames(scene: Scene, option: Option, entry: Entry) -> None:
-    """``/ANIM/DT`` and ``/H3D/DT``: a start and an interval."""
+    """Reads ``/ANIM/DT`` and ``/H3D/DT``: a start and an interval."""
     values = _values(option)
     scene.draft.set_frames(0.0, values[1] if len(values) > 1 else 0.0, scene.end, entry)
 
 
 def _step(scene: Scene, option: Option, entry: Entry) -> None:
-    """``/DT``: the share of the bound; ``/DT/...`` are limits of elements and nodes."""
+    """Reads ``/DT``: the factor of the stable step; ``/DT/...`` are limits of elements and nodes."""
     values = _values(option) if len(option.words) == 1 else []
     if len(option.words) > 1 or not values or not 0.0 < values[0] <= 1.0:
         entry.leave("limits of the step: mass is not scaled here, and tets leave by parts[].erosion alone")
@@ -153,8 +153,8 @@ Surface = Callable[[str, int, Entry], frozenset[str]]
 
 
 def contact(option: Option, entry: Entry, surface: Surface) -> Meeting:
-    """``/INTER/TYPE7`` and ``TYPE2``: nodes of a group on faces of a surface; ``TYPE24`` and ``TYPE25``: surfaces on
-    each other, and one on itself. Raises CardError, ValueError.
+    """Reads ``/INTER/TYPE7`` and ``TYPE2``: nodes of a group on faces of a surface; ``TYPE24`` and ``TYPE25``:
+    surfaces on each other, and self-contact. Raises CardError, ValueError.
     """
     kind = option.words[1]
     fields = Fields(option, entry, option.rows[1:], _LAYOUTS[kind])
@@ -170,12 +170,12 @@ def contact(option: Option, entry: Entry, surface: Surface) -> Meeting:
 
 
 def _meeting(fields: Fields, surface: Surface, names: tuple[str, ...], friction: float) -> Meeting:
-    """Of the one or two sides that are given; one surface alone meets itself. Raises ValueError."""
+    """Returns the bodies of one or two given surfaces; a single surface has self-contact. Raises ValueError."""
     entry = fields.entry
     if not names or names == ("GRNOD",):
         raise ValueError("no surface is named")
     if len(names) > 2:
-        raise ValueError("a group of nodes beside two surfaces is not taken over")
+        raise ValueError("a group of nodes beside two surfaces is not translated")
     sides = [surface(name.rstrip("12"), fields.whole(name), entry) for name in names]
     return Meeting(sides[0], None if sides[0] == sides[-1] else sides[-1], friction, entry)
 

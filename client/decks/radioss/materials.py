@@ -1,6 +1,6 @@
 """Materials, equations of state and failure of Radioss as those of Conoid (Reference Guide, "Material laws").
 
-What the formulas there and here do not share is a remark of the option: docs/howto/import.md has them side by side.
+Differences of the formulas are notes of the option; docs/howto/import.md compares them.
 """
 
 from collections.abc import Callable
@@ -36,19 +36,20 @@ LAYOUTS: dict[str, tuple[str, ...]] = {
 
 @dataclass
 class Context:
-    """What a material needs besides its own lines."""
+    """The context of a material besides its own lines."""
 
     system: System
     eos: Fields | None = None
     failure: Fields | None = None
 
     def stress(self, value: float) -> str | float:
-        """With its unit."""
+        """Returns a number with its unit."""
         return self.system.quantity(value, STRESS)
 
 
 def translated(law: str, fields: Fields, context: Context) -> Made | None:
-    """The material of an option; None, with the reason in its entry, for one that Conoid lacks. Raises CardError."""
+    """Returns the material of an option; None, with the reason in its entry, for one that Conoid lacks. Raises
+    CardError."""
     make = _LAWS.get(law)
     if make is None:
         fields.entry.refuse("Conoid has no such material law")
@@ -65,7 +66,7 @@ def translated(law: str, fields: Fields, context: Context) -> Made | None:
 
 
 def _elastic(fields: Fields, context: Context, law: str) -> dict[str, Any]:
-    """Density, elasticity, and the equation of state where there is one."""
+    """Returns density, elasticity, and the equation of state if there is one."""
     density, young, poisson = fields.real("RHO_I"), fields.real("E"), fields.real("NU")
     material: dict[str, Any] = {"density": context.system.quantity(density, DENSITY)}
     if context.eos is not None and law != "LAW4":
@@ -119,7 +120,7 @@ def _law4(fields: Fields, context: Context) -> Made:
 
 
 def _plastic(fields: Fields, context: Context, room: float, kind: str) -> Made:
-    """Johnson-Cook's law, or linear hardening where it has neither rate nor heat and n is 1."""
+    """Reads Johnson-Cook's law; linear hardening if it has neither rate nor heat and n is 1."""
     if 0.0 < fields.real("SIG_MAX") < 1e20:
         fields.refuse("SIG_MAX", "the flow stress ends there, not here")
     material = _elastic(fields, context, kind)
@@ -148,7 +149,7 @@ def _rate(fields: Fields, context: Context) -> dict[str, Any]:
 
 
 def _heat(fields: Fields, context: Context, heats: bool, room: float) -> dict[str, Any]:
-    """Softening by heat; nothing heats where the heat capacity or the exponent is 0."""
+    """Reads thermal softening; no heating if the heat capacity or the exponent is 0."""
     cold = context.system.quantity(fields.nonzero("TR", room), TEMPERATURE)
     if not fields.real("TR") and heats:
         fields.differ("TR", f"{room:g} K, as there where it is empty")
@@ -169,7 +170,7 @@ def _heat(fields: Fields, context: Context, heats: bool, room: float) -> dict[st
 
 
 def _limit(fields: Fields) -> dict[str, Any]:
-    """A failure strain of the law: the tet keeps its pressure there, and leaves here."""
+    """Reads a failure strain of the law: a tet keeps its pressure there, and is deleted here."""
     strain = fields.real("EPS_MAX")
     if not 0.0 < strain < 1e20:
         return {}
@@ -178,7 +179,7 @@ def _limit(fields: Fields) -> dict[str, Any]:
 
 
 def _damage(law: dict[str, Any], context: Context) -> dict[str, Any]:
-    """``/FAIL/JOHNSON``: D3 has the sign that it has here."""
+    """Reads ``/FAIL/JOHNSON``: D3 has the same sign as here."""
     found = context.failure
     if found is None:
         return {}

@@ -1,4 +1,4 @@
-"""Which nodes the parts of a Radioss starter have, and where they are: read again, when somebody asks."""
+"""Nodes of the parts of a Radioss starter and their positions: a second reading, on demand."""
 
 from pathlib import Path
 
@@ -10,7 +10,7 @@ from .words import SOLIDS
 
 
 def read_points(path: Path) -> dict[int, Point]:
-    """Where nodes are, by their numbers. Raises CardError."""
+    """Returns the positions of nodes, by their numbers. Raises CardError."""
     points: dict[int, Point] = {}
     for option in options(Included(path)):
         if option.words[0] == "NODE":
@@ -23,7 +23,7 @@ def read_points(path: Path) -> dict[int, Point]:
 
 
 def read_nodes(path: Path) -> dict[str, set[int]]:
-    """Nodes of each part with solids, by its number as text. Raises CardError."""
+    """Returns the nodes of each part with solids, by its number as text. Raises CardError."""
     nodes: dict[str, set[int]] = {}
     for option in options(Included(path)):
         if option.words[0] in SOLIDS:
@@ -32,7 +32,8 @@ def read_nodes(path: Path) -> dict[str, set[int]]:
 
 
 def _solids(option: Option) -> set[int]:
-    """Nodes of elements of a fixed number of nodes, over as many lines as these take: a number, then the nodes."""
+    """Yields the nodes of elements of a fixed number of nodes, over as many lines as needed: a number, then the
+    nodes."""
     count, found = SOLIDS[option.words[0]], set[int]()
     row: list[int] = []
     filled: list[Row] = [row for row in option.rows if row[1].strip()]

@@ -24,7 +24,7 @@ from .words import LEFT, REFUSED, SOLIDS
 
 
 class Radioss:
-    """The options of a starter and its engine file, and what becomes of each."""
+    """The options of a starter and its engine file, with their translation."""
 
     kind = "Radioss starter"
 
@@ -42,7 +42,7 @@ class Radioss:
         self._groups: dict[tuple[str, int], tuple[Option, Entry]] = {}
         self._curves: dict[int, tuple[Option, Entry]] = {}
         self._mains: dict[int, str] = {}
-        """Main nodes of rigid bodies, and the keys of these: what acts on the one acts on the other."""
+        """Main nodes of rigid bodies, and the keys of these: a load on the node acts on the body."""
         self._read_all(path, "")
         self._engine()
         for option, entry in self._options:
@@ -64,7 +64,7 @@ class Radioss:
             self._options.append((option, entry))
 
     def _engine(self) -> None:
-        """The engine file, whose name the starter's says."""
+        """Returns the path of the engine file, from the name of the starter."""
         stem = self.path.stem
         engine = self.path.with_name(f"{stem[:-4]}0001{self.path.suffix}") if stem.endswith("_0000") else None
         if engine is None or not engine.is_file():
@@ -99,7 +99,7 @@ class Radioss:
             self._curves[once(self._curves, option.number(), "function")] = option, entry
 
     def _begin(self, option: Option, entry: Entry) -> None:
-        """Title, version, and the units of the input and of the work."""
+        """Reads title, version, and the units of input and work."""
         rows = [row for row in option.rows if row[1].strip()]
         self.title = self.title or (rows[0][1].strip() if rows else "")
         if len(rows) > 2:
@@ -123,7 +123,7 @@ class Radioss:
     def _law(self, option: Option, entry: Entry) -> None:
         kind = materials.NAMES.get(option.words[1], option.words[1]) if len(option.words) > 1 else ""
         if option.local:
-            entry.refuse("units of its own (unit_ID) are not taken over")
+            entry.refuse("units of its own (unit_ID) are not translated")
         if option.words[0] == "FAIL":
             self._failures[option.number()] = Fields(option, entry, option.rows, materials.LAYOUTS.get(kind, ()))
             if kind != "JOHNSON":
@@ -139,7 +139,7 @@ class Radioss:
             self._mats[once(self._mats, option.number(), "material")] = kind, fields, title
 
     def weighed(self) -> Iterator[Weighed]:
-        """Densities of the materials, to tell the units by."""
+        """Densities of the materials, to find the units."""
         for number, (_, fields, title) in self._mats.items():
             try:
                 young = fields.real("E") or None
@@ -150,7 +150,7 @@ class Radioss:
     # The case ---------------------------------------------------------------------------------------------------------
 
     def draft(self, system: System) -> Draft:
-        """The case, in units of ``system``."""
+        """Returns the case; ``system``: its units."""
         self._draft = draft = Draft(self.path, system, self.account)
         draft.name = draft.name.removesuffix("_0000")
         draft.title = self.title
@@ -188,7 +188,7 @@ class Radioss:
         used = {body.material for body in self._bodies}
         for number, (kind, fields, title) in self._mats.items():
             if str(number) not in used:
-                fields.entry.leave("no part that is taken over has it")
+                fields.entry.leave("no part that is translated has it")
                 continue
             eos, failure = self._states.get(number), self._failures.get(number)
             made = Made({})
@@ -239,7 +239,7 @@ class Radioss:
         meet(draft, self._bodies, meetings)
 
     def _surface(self, word: str, number: int, entry: Entry) -> frozenset[str]:
-        """Bodies of ``/SURF/PART`` or of a group of nodes. Raises ValueError."""
+        """Returns the bodies of ``/SURF/PART`` or of a group of nodes. Raises ValueError."""
         if word == "GRNOD":
             full, some = self._topology.whole(self._nodes(number, entry))
             return frozenset((*full, *some))
@@ -256,7 +256,7 @@ class Radioss:
     # What options name ------------------------------------------------------------------------------------------------
 
     def _nodes(self, number: int, entry: Entry, within: tuple[int, ...] = ()) -> Chosen:
-        """A group of nodes, ``within`` others. Raises ValueError."""
+        """Returns a group of nodes, ``within`` others. Raises ValueError."""
         if number in within:
             raise ValueError(f"the group of nodes {number} is within itself")
         found = self._groups.get(("GRNOD", number))
@@ -281,7 +281,7 @@ class Radioss:
         raise ValueError(f"the group of nodes {number} is a /GRNOD/{kind}; NODE, PART and GRNOD are followed")
 
     def _curve(self, number: int, entry: Entry) -> tuple[tuple[float, float], ...]:
-        """A function by its number, with its keyword taken. Raises ValueError."""
+        """Returns a function by its number, and marks its keyword as translated. Raises ValueError."""
         if number not in self._curves:
             raise ValueError(f"the function {number} is not defined")
         option, own = self._curves[number]

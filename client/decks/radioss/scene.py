@@ -1,4 +1,4 @@
-"""What loads of a Radioss deck ask of it, and what they add to the case."""
+"""The interface between the loads of a Radioss deck and the case."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -13,13 +13,13 @@ from ..walls import Stop
 
 @dataclass
 class Scene:
-    """The deck as its loads see it."""
+    """The parts of the deck that its loads use."""
 
     draft: Draft
     nodes: Callable[[int, Entry], Chosen]
     curve: Callable[[int, Entry], Course]
     points: Callable[[], Mapping[int, Point]]
-    """Where nodes are, in the unit of the deck."""
+    """Positions of nodes, in the unit of the deck."""
     rigid: frozenset[str]
     """Keys of the rigid bodies."""
     end: float

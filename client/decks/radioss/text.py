@@ -25,25 +25,25 @@ class Option:
     """``/MAT/LAW2/1``: its words in upper case, and its lines, with their numbers."""
 
     shown: str
-    """As it stands in the file."""
+    """The option as it is in the file."""
     words: list[str]
     line: int
     rows: list[Row]
     file: str = ""
 
     def number(self) -> int:
-        """The first number among its words: its identifier; 0 where there is none."""
+        """Identifier: the first number among its words; 0 if there is none."""
         return next((int(word) for word in self.words if _WHOLE.fullmatch(word)), 0)
 
     @property
     def local(self) -> bool:
-        """Whether a second number follows: units of its own."""
+        """Whether a second number follows, which selects other units."""
         return sum(_WHOLE.fullmatch(word) is not None and int(word) > 0 for word in self.words) > 1
 
 
 def options(deck: Included, file: str = "") -> Iterator[Option]:
-    """Every option of a deck, with what it includes, up to ``/END``; empty lines are among their lines. ``file``: how
-    messages call the deck. Raises CardError, OSError.
+    """Yields every option of a deck, with its included files, up to ``/END``; empty lines are among their lines.
+    ``file``: name of the deck in messages. Raises CardError, OSError.
     """
     option: Option | None = None
     try:
@@ -67,14 +67,14 @@ def options(deck: Included, file: str = "") -> Iterator[Option]:
 
 
 def whole(line: int, item: str, what: str) -> int:
-    """A whole number. Raises CardError."""
+    """Reads a whole number. Raises CardError."""
     if not _WHOLE.fullmatch(item):
         raise CardError(f"line {line}: {what} = {shown(item)} is not a whole number (fields have fixed widths)")
     return int(item)
 
 
 def real(line: int, item: str, what: str) -> float:
-    """A number, also ``1.5-3`` and ``1D5``. Raises CardError."""
+    """Reads a number, also ``1.5-3`` and ``1D5``. Raises CardError."""
     found = _REAL.fullmatch(item)
     if found is None or abs(value := float(f"{found[1]}e{found[2] or found[3] or 0}")) == float("inf"):
         raise CardError(f"line {line}: {what} = {shown(item)} is not a number (fields have fixed widths)")
@@ -82,7 +82,7 @@ def real(line: int, item: str, what: str) -> float:
 
 
 def cut(row: Row, *widths: int) -> list[str]:
-    """The fields of a line. Raises CardError for a tab, and for what stands behind them."""
+    """Returns the fields of a line. Raises CardError for a tab, and for text behind them."""
     line, text = row
     if "\t" in text:
         raise CardError(f"line {line}: a tab in a line of fixed widths; write blanks")
@@ -99,7 +99,8 @@ class Fields(fields.Fields[int]):
     """The fields of some lines of an option."""
 
     def __init__(self, option: Option, entry: Entry, rows: Sequence[Row], layout: Sequence[str]) -> None:
-        """``layout``: for each line its fields; a name with ``:`` has 10 columns, others 20, ``-`` no meaning."""
+        """``layout``: for each line its fields; a name with ``:`` has 10 columns, others 20, ``-`` for an unused
+        one."""
         self.option = option
         found: dict[str, tuple[int, str]] = {}
         for row, names in zip(rows, layout, strict=False):
@@ -116,5 +117,5 @@ class Fields(fields.Fields[int]):
 
 
 def numbers(rows: Sequence[Row], what: str) -> list[int]:
-    """Whole numbers of 10 columns, ten in a line. Raises CardError."""
+    """Reads whole numbers of 10 columns, ten in a line. Raises CardError."""
     return [whole(row[0], item, what) for row in rows for item in cut(row, *(10,) * 10) if item]

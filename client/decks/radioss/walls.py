@@ -10,17 +10,17 @@ from .text import Fields, Option
 
 _SHAPES = {"PLANE": "plane", "CYL": "cylinder", "SPHER": "sphere"}
 WALLS = [("RWALL", word) for word in _SHAPES]
-"""The first two words of options that are taken over."""
+"""The first two words of translated options."""
 
 
 def wall(scene: Scene, option: Option, entry: Entry) -> None:
-    """``/RWALL/PLANE``, ``CYL`` and ``SPHER``: stops a group of nodes. Raises CardError, ValueError."""
+    """Reads ``/RWALL/PLANE``, ``CYL`` and ``SPHER``, which stop a group of nodes. Raises CardError, ValueError."""
     shape = _SHAPES[option.words[1]]
     row = option.rows[1][1] if len(option.rows) > 1 else ""
     moves = bool(row[:10].strip(" 0"))
     layout = ["NODE: SLIDE: GRNOD1: GRNOD2:", "D FRIC DIAMETER FFAC IFQ:", "MASS VX0 VY0 VZ0" if moves else "XM YM ZM"]
     fields = Fields(option, entry, option.rows[1:], layout + ["XM1 YM1 ZM1"] * (shape != "sphere"))
-    fields.refuse("GRNOD2", "nodes that are left out are not taken over")
+    fields.refuse("GRNOD2", "nodes that are left out are not translated")
     fields.forgive("FFAC IFQ", "a filter of friction")
     start = _start(scene, fields, moves)
     table: dict[str, Any] = {"kind": "wall", "point": scene.draft.vector(start, LENGTH)}
@@ -42,7 +42,7 @@ def wall(scene: Scene, option: Option, entry: Entry) -> None:
 
 
 def _start(scene: Scene, fields: Fields, moves: bool) -> list[float]:
-    """Where the wall is: at a node where it moves. Raises ValueError."""
+    """Returns the position of the wall: that of a node if it moves. Raises ValueError."""
     if not moves:
         return [fields.real(name) for name in ("XM", "YM", "ZM")]
     number = fields.whole("NODE")
@@ -70,7 +70,7 @@ def _moving(scene: Scene, fields: Fields, table: dict[str, Any]) -> None:
 
 
 def _group(fields: Fields) -> int:
-    """The group of nodes that it stops. Raises ValueError."""
+    """Returns the group of nodes that it stops. Raises ValueError."""
     group, reach = fields.whole("GRNOD1"), fields.real("D")
     if not group and not reach:
         raise ValueError("neither grnd_ID1 nor d: the wall stops no node")

@@ -1,8 +1,8 @@
-"""Options of Radioss that are left out, and why; what is in no table refuses the import."""
+"""Options of Radioss that are omitted, with the reason; an option in no table refuses the import."""
 
 _OUTPUT = "output: a run writes frames, history.csv and probes"
 _HOW = "how the other code computes"
-_USED = "used by nothing that is taken over"
+_USED = "used by nothing that is translated"
 
 LEFT: dict[str, str] = {
     "ANALY": _HOW, "DEF_SOLID": _HOW, "DEF_SHELL": _HOW, "DEFAULT": _HOW, "IOFLAG": _OUTPUT, "RANDOM": _HOW,
@@ -31,13 +31,13 @@ REFUSED: dict[str, str] = {
     "QUAD": "plane elements: here all bodies are solids", "ADMAS": "masses of nodes: there are none here",
     "RBODY": "a rigid body of nodes; parts[].rigid makes a whole part rigid", "RBE2": "joins nodes",
     "RBE3": "joins nodes", "RLINK": "joins nodes", "MPC": "joins nodes", "CYL_JOINT": "joins nodes",
-    "INTER": "only TYPE7, TYPE24, TYPE25 and TYPE2 (tied) are taken over",
+    "INTER": "only TYPE7, TYPE24, TYPE25 and TYPE2 (tied) are translated",
     "RWALL": "a wall that ends; those of a case are whole planes, cylinders and spheres, a rigid part ends as it does",
-    "INIVEL": "only TRA and AXIS are taken over", "IMPVEL": "only motions along x, y and z are taken over",
+    "INIVEL": "only TRA and AXIS are translated", "IMPVEL": "only motions along x, y and z are translated",
     "MAT": "Conoid has no such material law", "EOS": "Conoid has no such equation of state",
-    "FAIL": "Conoid has no such law of failure", "CLOAD": "forces on nodes that are not taken over",
-    "PLOAD": "pressure on surfaces that is not taken over: [[boundaries]] kind = \"traction\"",
-    "DAMP": "damping of bodies: there is none here", "BCS": "a restraint that is not taken over",
+    "FAIL": "Conoid has no such law of failure", "CLOAD": "forces on nodes that are not translated",
+    "PLOAD": "pressure on surfaces that is not translated: [[boundaries]] kind = \"traction\"",
+    "DAMP": "damping of bodies: there is none here", "BCS": "a restraint that is not translated",
 }  # fmt: skip
 """Options that change the answer, by their first word."""
 
