@@ -1,7 +1,7 @@
-"""What a user imports: ``import conoid.client as c; c.connect().submit("taylor_copper").watch()``.
+"""The Python client: ``import conoid.client as c; c.connect().submit("taylor_copper").watch()``.
 
-The same words as on the command line: a session validates, submits and lists; a run is watched, cancelled, waited for
-and gives its result; a result is viewed.
+It has the verbs of the command line: a session validates, submits and lists; a run is watched, cancelled, waited
+for, and has a result; a result is viewed.
 """
 
 from conoid.cases.reading.problems import CaseError, ConoidError

@@ -26,14 +26,14 @@ from .examination import examine
 from .remote.submission import data_of, locate
 
 _Mistake = cast(type[typer.BadParameter], typer.BadParameter.__base__)
-"""What typer raises for words that are no command, option or value; it has no public name."""
+"""Error of typer for an unknown command, option or value; it has no public name."""
 
 
 class Guarded(Grouped):
-    """Turns what can go wrong into one clear line on standard error, and an exit code."""
+    """Prints an error as one clear line on standard error, and returns the exit code."""
 
     def main(self, *arguments: Any, **options: Any) -> Any:
-        """Reads the words and runs the command; also a help text may meet a full disk."""
+        """Parses the arguments and runs the command; a full disk is reported for a help text as well."""
         try:
             return super().main(*arguments, **options)
         except OSError as error:
@@ -59,7 +59,7 @@ class Guarded(Grouped):
 
 app = typer.Typer(
     cls=Guarded, no_args_is_help=True, pretty_exceptions_enable=False, rich_markup_mode=None,
-    help="Impact simulations: submit them, watch them, look at them.",
+    help="Impact simulations: submit, watch, view.",
 )  # fmt: skip
 app.add_typer(benches.bench, name="bench")
 
@@ -73,10 +73,10 @@ def _version(asked: bool) -> None:
 @app.callback()
 def every(
     version: Annotated[
-        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and end.")
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
     ] = False,
 ) -> None:
-    """Impact simulations: submit them, watch them, look at them."""
+    """Impact simulations: submit, watch, view."""
 
 
 @app.command(
@@ -94,9 +94,9 @@ def serve(ctx: typer.Context) -> None:
 
 @app.command(short_help="Check a case and estimate what it needs.")
 def validate(case: CaseArgument, overrides: Overrides = None, as_json: Json = False) -> None:
-    """Check a case: what is wrong with it, what is odd, what its parts bring along and what it needs.
+    """Check a case: errors, warnings, content of its parts, cost.
 
-    Mesh files are read. No server is asked. Warnings go to standard error and leave the exit code 0.
+    Mesh files are read. No server is needed. Warnings go to standard error and leave the exit code 0.
     """
     with aloud("reading mesh files"):
         found = examine(data_of(case, overrides or ()), locate(case).parent)
@@ -127,23 +127,23 @@ def validate(case: CaseArgument, overrides: Overrides = None, as_json: Json = Fa
     show(validated.estimate_table(checked, expected))
 
 
-app.command(short_help="Hand a case to the server.")(server_runs.submit)
-app.command(name="runs", short_help="List runs: which run was it.")(listing.runs)
+app.command(short_help="Submit a case to the server.")(server_runs.submit)
+app.command(name="runs", short_help="List runs, newest first.")(listing.runs)
 app.command(name="ls", hidden=True)(listing.runs)
-app.command(name="show", short_help="Show one run: where it is, or how it ended.")(server_runs.show_run)
+app.command(name="show", short_help="Show one run: its progress, or its outcome.")(server_runs.show_run)
 app.command(name="watch", short_help="Follow a run until it ends.")(server_runs.watch_run)
 app.command(short_help="Stop a run at its next step.")(server_runs.cancel)
-app.command(short_help="Ask a run for a checkpoint.")(server_runs.checkpoint)
-app.command(short_help="Ask a run for a snapshot of its fragments.")(server_runs.snapshot)
-app.command(short_help="Go on from a checkpoint of a run.")(server_runs.restart)
-app.command(short_help="Copy the files of a run here.")(server_runs.get)
-app.command(name="batch", short_help="Hand a case to Slurm, without a server.")(batch_run)
-app.command(name="view", short_help="Draw frames, off screen.")(viewing.view_frames)
+app.command(short_help="Request a checkpoint of a run.")(server_runs.checkpoint)
+app.command(short_help="Request a snapshot of the fragments of a run.")(server_runs.snapshot)
+app.command(short_help="Continue a run from its newest checkpoint.")(server_runs.restart)
+app.command(short_help="Copy the files of a run to this machine.")(server_runs.get)
+app.command(name="batch", short_help="Submit a case to Slurm, without a server.")(batch_run)
+app.command(name="view", short_help="Draw frames as a picture or a film.")(viewing.view_frames)
 app.command(name="replay-balance", short_help="Show the loads of a run under another balance policy.")(
     reports.replay_balance
 )
 app.command(short_help="Write a run as one HTML file.")(reports.report)
-app.command(short_help="Tell in what two runs differ.")(reports.compare)
+app.command(short_help="Print the differences between two runs.")(reports.compare)
 app.add_typer(reports.figures, name="figures")
 app.command(short_help="Compare meshes: order, limit, error over cost.")(converging.converge)
 app.command(short_help="Run the suite of hard cases.")(hard.hard)
@@ -153,7 +153,7 @@ app.command(name="sweep-plot", short_help="Draw the results of a sweep.")(sweepi
 app.command(name="sweep-cancel", short_help="Cancel the runs of a sweep.")(sweeping.sweep_cancel)
 
 
-app.command(name="import", short_help="Make a case of a deck of another code.")(import_deck)
+app.command(name="import", short_help="Convert a deck of another code to a case.")(import_deck)
 
 
 @app.command(name="run", short_help="Run a case on this machine: start, watch, check, draw.")
@@ -163,13 +163,14 @@ def run_case(
     threads: Threads = None,
     overrides: Overrides = None,
     out: Annotated[Path, typer.Option("--out", help="Folder of the runs.")] = Path("runs/local"),
-    picture: Annotated[Path | None, typer.Option("--view", help="Draw the last frame to this PNG.")] = None,
-    field: Annotated[str | None, typer.Option("--field", help=f"What to colour by: {', '.join(FIELDS)}.")] = None,
-    plain: Annotated[bool, typer.Option("--plain", help="Lines instead of the panel.")] = False,
-    check: Annotated[bool, typer.Option("--check", help="End with 1 when a reference number is missed.")] = False,
+    picture: Annotated[Path | None, typer.Option("--view", help="PNG file for a picture of the last frame.")] = None,
+    field: Annotated[str | None, typer.Option("--field", help=f"Field of the picture: {', '.join(FIELDS)}.")] = None,
+    plain: Annotated[bool, typer.Option("--plain", help="Print lines instead of the panel.")] = False,
+    check: Annotated[bool, typer.Option("--check", help="Exit code 1 when a reference number is missed.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the outcome as JSON and nothing else.")] = False,
 ) -> None:
-    """Do it all here: start a server, submit, watch, check, draw, stop the server. Ctrl-C cancels the run."""
+    """Run a case on this machine: start a server, submit, watch, check, draw, stop the server. Ctrl-C cancels the
+    run."""
     chosen = [*(overrides or ()), *on_cores(ranks, threads)]
     raise typer.Exit(run_once(case, chosen, out, picture, field, plain=plain, check=check, as_json=as_json))
 
@@ -181,7 +182,7 @@ def demo(
 ) -> None:
     """Run the case glass_steel_demo on this machine, check its reference numbers and draw its last frame.
 
-    Takes some ten seconds and nothing but this installation; the run is kept below runs/local.
+    It takes some ten seconds and needs only this installation; the run is kept below runs/local.
     """
     raise typer.Exit(run_once("glass_steel_demo", on_cores(ranks, None), Path("runs/local"), out, check=True))
 
@@ -192,7 +193,7 @@ app.command(short_help="List the material library, or one material.")(shipped.ma
 
 
 def main() -> None:
-    """The entry point ``conoid``."""
+    """Entry point ``conoid``."""
     prepare()
     app()
 

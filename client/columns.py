@@ -1,4 +1,4 @@
-"""Tables as columns: what can be had without any package, and as a data frame where pandas is there."""
+"""Tables as columns, without any package, or as a pandas.DataFrame if pandas is installed."""
 
 import csv
 import io
@@ -15,14 +15,14 @@ from .errors import ClientError, UsageError
 Column: TypeAlias = "array[float] | list[str]"
 """Numbers as a double array; text, such as the limiter of dt, as a list."""
 _SHOWN = 5
-"""Lines of a table that are shown of its head and of its end. Chosen."""
+"""Lines of the head and the end of a table that are shown. Chosen."""
 
 
 class Columns(dict[str, Column]):
-    """Columns by name, all of one length, in the order of the file; ``units`` has the unit of each, or ''."""
+    """Columns by name, all of the same length, in the order of the file; ``units`` has the unit of each, or ''."""
 
     def __init__(self, columns: Mapping[str, Column], units: Mapping[str, str]) -> None:
-        """Keeps the columns as they are."""
+        """Stores the columns unchanged."""
         super().__init__(columns)
         self.units = dict(units)
 
@@ -32,7 +32,7 @@ class Columns(dict[str, Column]):
         return len(next(iter(self.values()), ()))
 
     def numbers(self, name: str) -> Sequence[float]:
-        """A column of numbers. Raises ClientError for one that is not there, or is text."""
+        """Returns a column of numbers. Raises ClientError for an unknown column and for text."""
         column = self.get(name)
         if not isinstance(column, array):
             known = ", ".join(each for each, values in self.items() if isinstance(values, array))
@@ -40,7 +40,7 @@ class Columns(dict[str, Column]):
         return column
 
     def frame(self) -> Any:
-        """As a pandas.DataFrame; its ``attrs["units"]`` has the units. Raises ClientError without pandas."""
+        """Returns a pandas.DataFrame; its ``attrs["units"]`` has the units. Raises ClientError without pandas."""
         try:
             import pandas
         except ModuleNotFoundError:
@@ -50,7 +50,7 @@ class Columns(dict[str, Column]):
         return made
 
     def _repr_html_(self) -> str:
-        """Head and end, for notebooks."""
+        """Head and end of the table, for notebooks."""
         head = "".join(f"<th>{escape(title)}</th>" for title in history.header({n: self.units[n] for n in self}))
         rows = list(range(self.rows))
         chosen = rows if len(rows) <= 2 * _SHOWN else [*rows[:_SHOWN], *rows[-_SHOWN:]]
@@ -65,7 +65,7 @@ def _text(value: float | str) -> str:
 
 
 def read_columns(text: str) -> Columns:
-    """The columns of CSV text with a header line, by names without units; one that is not all numbers stays text."""
+    """Reads CSV text with a header line; columns by names without units. A column with any text stays text."""
     rows = csv.reader(io.StringIO(text))
     named = [history.split(name) for name in next(rows, [])]
     columns: list[list[str]] = [list(column) for column in zip(*_whole(rows, len(named)), strict=True)]
@@ -74,7 +74,7 @@ def read_columns(text: str) -> Columns:
 
 
 def _whole(rows: Iterator[list[str]], length: int) -> Iterator[list[str]]:
-    """The rows that have every column: the last line of a file that is being written may be cut."""
+    """Returns the rows with all columns: the last line of a growing file may be incomplete."""
     return (row for row in rows if len(row) == length)
 
 
@@ -86,7 +86,7 @@ def _column(column: list[str]) -> Column:
 
 
 def by_part(told: Columns) -> dict[str, dict[str, Sequence[float]]]:
-    """The energies of the parts in a history by name and part; empty where there is one part alone."""
+    """Returns the energies of the parts in a history by name and part; empty for a case with one part."""
     found: dict[str, dict[str, Sequence[float]]] = {}
     for column in told:
         if (named := history.part_of(column)) is not None:
@@ -95,7 +95,7 @@ def by_part(told: Columns) -> dict[str, dict[str, Sequence[float]]]:
 
 
 def joined(tables: Iterable[tuple[int, Columns]]) -> Columns:
-    """Fragment tables one below the other, with the number of each table's frame as the column ``frame``."""
+    """Joins fragment tables; the column ``frame`` has the number of each table's frame."""
     names = list(fragments.COLUMNS)
     found: dict[str, list[Any]] = {name: [] for name in ("frame", *names)}
     for index, table in tables:

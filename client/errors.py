@@ -24,41 +24,41 @@ from typing import Any
 from conoid.cases.reading.problems import CaseError, ConoidError, Problem
 
 _LONGEST = 1000
-"""Characters of a server's words that are shown. Chosen: half a screen."""
+"""Largest number of characters of a server's message that are shown. Chosen: half a screen."""
 
 
 class ClientError(ConoidError):
-    """Its text is one line for people; ``exit_code`` is what the command line ends with."""
+    """An error for the user. Its text is one line; ``exit_code`` is that of the command line."""
 
     exit_code = 1
 
 
 class ServiceError(ClientError):
-    """The server refused. ``status`` is the HTTP status, ``problem`` the body as the server sent it."""
+    """A refusal of the server. ``status`` is the HTTP status, ``problem`` the body of the answer."""
 
     def __init__(self, status: int, problem: Mapping[str, Any]) -> None:
-        """``problem`` holds what RFC 9457 names (title, detail) and what Conoid adds (code, pointer, hint, errors)."""
+        """``problem`` has the members of RFC 9457 (title, detail) and those of Conoid (code, pointer, hint, errors)."""
         self.status = status
         self.problem = dict(problem)
         super().__init__(_line(status, problem))
 
     @property
     def exit_code(self) -> int:  # type: ignore[override]
-        """2 for input that was refused, 1 for anything else."""
+        """Exit code: 2 for input that was refused, 1 for other errors."""
         return 2 if self.status in {400, 413, 422} else 1
 
     @property
     def retryable(self) -> bool:
-        """True when the same request may succeed later."""
+        """True if the same request may succeed later."""
         return bool(self.problem.get("retryable", self.status in {429, 502, 503, 504}))
 
 
 class NotFoundError(ClientError):
-    """There is no such run, file or folder."""
+    """The run, file or folder does not exist."""
 
 
 class MissingError(ServiceError, NotFoundError):
-    """The server has no such run or file, or has it no longer."""
+    """The server has no such run or file, or has removed it."""
 
 
 class UnreachableError(ClientError):
@@ -66,34 +66,34 @@ class UnreachableError(ClientError):
 
 
 class AnswerError(UnreachableError):
-    """What the server answered cannot be read, is longer than any answer, comes too slowly, or points elsewhere. To ask
-    again is of no use.
+    """The answer of the server cannot be read, is too long, comes too slowly, or redirects elsewhere. A repeated
+    request does not help.
     """
 
 
 def passes(error: ClientError) -> bool:
-    """Whether the same request may succeed soon: nobody answered, or who answered says so."""
+    """Whether the same request may succeed soon: no server answered, or its answer says that it is temporary."""
     if isinstance(error, UnreachableError):
         return not isinstance(error, AnswerError)
     return isinstance(error, ServiceError) and error.retryable
 
 
 class UnfinishedError(ClientError):
-    """The run has not written what was asked for yet."""
+    """The run has not written the requested data yet."""
 
 
 class UsageError(ClientError):
-    """What was asked for is wrong: an argument, a value, a name that nobody knows."""
+    """A wrong argument, value or name."""
 
     exit_code = 2
 
 
 class ViewError(ClientError):
-    """No picture could be made; the text says what is missing."""
+    """No picture could be made; the text has the missing part."""
 
 
 class LookError(UsageError, ViewError):
-    """A picture was asked for as there is none: an option, a field, a time."""
+    """A wrong option, field or time of a picture."""
 
 
 def _line(status: int, problem: Mapping[str, Any]) -> str:
@@ -103,13 +103,13 @@ def _line(status: int, problem: Mapping[str, Any]) -> str:
 
 
 def _brief(told: object) -> str:
-    """What a server says, as people can read it."""
+    """Returns a message of a server as text for people."""
     text = str(told)
     return text if len(text) <= _LONGEST else f"{text[:_LONGEST]} ..."
 
 
 def refusal(status: int, problem: Mapping[str, Any]) -> ConoidError:
-    """What a refusal of the server is raised as: what is raised where the same is found on this machine."""
+    """Returns the error class of a refusal: the same as for the same problem on this machine."""
     told = problem.get("errors")
     entries = [entry for entry in told if isinstance(entry, Mapping)] if isinstance(told, list) else []
     if status == 422 and entries:

@@ -1,6 +1,6 @@
-"""Everything that is known of a case before it runs: what is wrong, what is odd, what it will cost.
+"""Check of a case before it runs: errors, warnings, cost.
 
-Mesh files are read by a program of the worker, where that is installed: a process of its own.
+Mesh files are read by a program of the worker, if that is installed, in a process of its own.
 """
 
 import subprocess
@@ -30,8 +30,8 @@ from .errors import ClientError
 
 @dataclass(frozen=True)
 class Examination:
-    """A case that may run: ``odd`` are its warnings, ``survey`` is what its mesh files hold, ``touching`` are the parts
-    whose surfaces coincide."""
+    """A valid case: ``odd`` are its warnings, ``survey`` is the content of its mesh files, ``touching`` are the
+    parts whose surfaces coincide."""
 
     case: Case
     expected: Estimate
@@ -41,10 +41,8 @@ class Examination:
 
 
 def examine(data: Mapping[str, Any], folder: Path) -> Examination:
-    """Checks a case in plain data whose mesh files are in ``folder``, or have full paths.
-
-    Raises CaseError with every reason why a run of it would be refused that can be known without one; ClientError where
-    the program that reads mesh files breaks off.
+    """Checks a case in plain data whose mesh files are in ``folder``, or have full paths. Raises CaseError with
+    every known reason for a refusal, ClientError if the program that reads mesh files fails.
     """
     case = parse_case(data)
     if missing := list(missing_files((part.mesh for part in case.parts), folder)):
@@ -62,13 +60,13 @@ def examine(data: Mapping[str, Any], folder: Path) -> Examination:
 
 
 def _named(part: int, mesh: Any) -> tuple[tuple[str | int, ...], object]:
-    """The key of the file of a part, or of its mesh where that has several, and the value."""
+    """Returns the key of the file of a part, or of its mesh if it has several files, and the value."""
     path = getattr(mesh, "path", None)
     return (("parts", part, "mesh"), ...) if path is None else (("parts", part, "mesh", "path"), path)
 
 
 def _survey(case: Case, folder: Path) -> tuple[Survey, list[Problem]]:
-    """What the mesh files hold; a warning for each of them where nothing here can read it."""
+    """Returns the content of the mesh files, and a warning for each file that no program here can read."""
     files = [(i, part.mesh) for i, part in enumerate(case.parts) if isinstance(part.mesh, Measured)]
     if not files:
         return Survey(), []

@@ -1,4 +1,4 @@
-"""Journal lines as messages, also those of a newer worker than this client knows."""
+"""Lines of a journal as messages, including those of a newer worker."""
 
 from typing import Any
 
@@ -11,9 +11,8 @@ _STATES = frozenset(State)
 
 
 def from_line(line: bytes | str | msgspec.Raw) -> AnyMessage:
-    """The message; one of an unknown type or state becomes a Log line, so that the numbers stay without a hole.
-
-    Raises msgspec.DecodeError for what is no message at all.
+    """Returns the message. An unknown type or state becomes a Log line with the same number, so that no number is
+    missing. Raises msgspec.DecodeError for anything else.
     """
     try:
         message = from_json(line)
@@ -26,7 +25,7 @@ def from_line(line: bytes | str | msgspec.Raw) -> AnyMessage:
 
 
 def unknown(data: Any) -> Log:
-    """A message that this client cannot read, as a Log line with its number."""
+    """Returns a message that this client cannot read as a Log line with its number."""
     if not isinstance(data, dict) or not isinstance(data.get("seq"), int):
         raise msgspec.DecodeError("not a message: it has no seq")
     text = f"a message that this client does not know: {data.get('type')}"

@@ -1,4 +1,4 @@
-"""What is known of a run from the messages read so far: messages in, one picture out; no input or output here."""
+"""State of a run from the messages read so far: messages in, one picture out, without input or output."""
 
 import time
 from collections import deque
@@ -9,28 +9,28 @@ from conoid.cases.messages import AnyMessage, Counts, Finished, Frame, Load, Log
 from conoid.cases.run import Cause, ExitCode, State
 
 DESCHEDULED = "descheduled"
-"""Wall time that costs no CPU time: the machine has not run the rank, or the rank slept."""
+"""Wall time without CPU time: the rank was not scheduled, or slept."""
 PHASE_GROUPS = ("compute", "contact", "exchange", "output", "wait", DESCHEDULED)
 _IDLE = "exchange", "wait", DESCHEDULED
 _LOG_TAIL = 200
-"""Lines of the log that are kept for display: some screens full. Chosen."""
+"""Number of log lines that are kept for display: some screens full. Chosen."""
 
 
 @dataclass
 class Live:
-    """The newest message of each kind, and the tail of the log. ``seq`` is the number of the last message taken."""
+    """The newest message of each kind, and the end of the log. ``seq``: number of the last message."""
 
     run: str
     title: str = ""
     link: str = ""
-    """How the messages come: Zenoh or SSE."""
+    """Transport of the messages: Zenoh or SSE."""
     state: State = State.ACCEPTED
     cause: str | None = None
     message: str = ""
     reason: str = ""
-    """What it waited for when the server was asked last."""
+    """Reason for which the run waited at the last request to the server."""
     away: float = 0.0
-    """Unix time, s, since which no server answers; 0 while one does."""
+    """Unix time, s, since which no server answers; 0 while a server answers."""
     seq: int = 0
     wall: float = 0.0
     """Unix time of the last message, s."""
@@ -44,20 +44,18 @@ class Live:
     phases: dict[str, list[float]] = field(default_factory=dict)
     """Seconds of each rank in each of PHASE_GROUPS between the last two Load messages."""
     helped: list[float] = field(default_factory=list)
-    """Share of that interval that the threads of each rank besides its first have done tasks; empty where it has one
-    thread.
-    """
+    """Share of that interval in which the further threads of each rank did tasks; empty for ranks of one thread."""
     loaded: float = 0.0
-    """Unix time of the last Load message, at first that of Started, s."""
+    """Unix time of the last Load message, before the first one that of Started, s."""
     counts: Counts | None = None
     finished: Finished | None = None
     frames: int = 0
     snapshot: Snapshot | None = None
-    """The newest."""
+    """The newest snapshot."""
     log: deque[Log] = field(default_factory=lambda: deque(maxlen=_LOG_TAIL))
 
     def take(self, message: AnyMessage) -> None:
-        """Takes one message in."""
+        """Adds a message."""
         self.seq, self.wall, self.away = message.seq, message.wall, 0.0
         match message:
             case Status():
@@ -95,12 +93,12 @@ class Live:
 
     @property
     def told(self) -> str:
-        """The message of its state, or what a run in the queue waits for."""
+        """Message of the state, or the reason for which a queued run waits."""
         return self.message or (self.reason if self.state is State.QUEUED else "")
 
     @property
     def fraction(self) -> float:
-        """Share of the simulated time that is done, 0 to 1."""
+        """Share of the simulated time that is complete, 0 to 1."""
         if self.state is State.SUCCEEDED:
             return 1.0
         if self.progress is None or self.progress.end_time <= 0:
@@ -109,16 +107,14 @@ class Live:
 
     @property
     def elapsed(self) -> float:
-        """Wall time since the worker began, s: to now while it lives, to its last message once it has ended."""
+        """Wall time since the worker began, s: until now for a running worker, until its last message after the end."""
         if self.began is None:
             return 0.0
         return max(0.0, (self.wall if self.state.final else time.time()) - self.began)
 
     @property
     def busy(self) -> list[float]:
-        """Share of the last interval that each rank spent on the model itself: neither exchange nor wait, and not
-        descheduled.
-        """
+        """Share of the last interval in which each rank computed: neither exchange nor wait nor descheduled."""
         totals = [sum(seconds) for seconds in zip(*self.phases.values(), strict=True)]
         idle = [sum(self.phases[name][rank] for name in _IDLE if name in self.phases) for rank in range(len(totals))]
         return [1.0 - lost / total if total > 0 else 0.0 for lost, total in zip(idle, totals, strict=True)]
@@ -127,9 +123,9 @@ class Live:
 def grouped(
     phases: dict[str, list[float]], interval: float = 0.0, waiting: Sequence[float] = ()
 ) -> dict[str, list[float]]:
-    """Phases of the worker summed into PHASE_GROUPS, as the page has them: ``elements``, ``nodes`` and the like count
-    as compute, ``waiting`` is the part of the exchange in which a rank waits for others. What is left of the
-    ``interval``, s, is descheduled.
+    """Sums the phases of the worker into PHASE_GROUPS, as the page does: ``elements``, ``nodes`` and others are
+    compute; ``waiting`` is the part of the exchange in which a rank waits for others. The rest of the ``interval``,
+    s, is descheduled.
     """
     sums: dict[str, list[float]] = {}
     for name, seconds in phases.items():
@@ -145,7 +141,7 @@ def grouped(
 
 
 def exit_code(state: State, cause: str | None) -> int:
-    """What ``watch`` and ``run`` end with: 0 succeeded, 2 bad input, 4 cancelled, 1 anything else."""
+    """Exit code of ``watch`` and ``run``: 0 succeeded, 2 bad input, 4 cancelled, 1 anything else."""
     if state is State.SUCCEEDED:
         return ExitCode.SUCCEEDED
     if state is State.CANCELLED:

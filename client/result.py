@@ -1,4 +1,4 @@
-"""What a run leaves, read when it is asked for: the outcome, the time history, the frames, the resolved case."""
+"""Results of a run: outcome, time history, frames, resolved case. Each is read at its first use."""
 
 import json
 import re
@@ -31,12 +31,13 @@ from .reports import html
 
 _TABLE = re.compile(rf"{fragments.FOLDER}/fragments_(\d+)\.csv")
 _BEYOND = 0.01
-"""Of the time from the first frame to the last by which one may miss them. Chosen: a run ends within a step of its end.
+"""Share of the time between the first and the last frame by which a requested time may lie outside. Chosen: a run
+ends within a step of its end.
 """
 
 
 class _Part(msgspec.Struct):
-    """What is used of a part of a case."""
+    """Fields of a part that pictures use."""
 
     name: str
     material: str | None = None
@@ -46,7 +47,7 @@ class _Part(msgspec.Struct):
 
 
 class _Boundary(msgspec.Struct):
-    """What is used of a boundary of a case; a wall has a point and a normal, a plane of symmetry an axis."""
+    """Fields of a boundary that pictures use; a wall has a point and a normal, a plane of symmetry an axis."""
 
     kind: str
     axis: Literal["x", "y", "z"] | None = None
@@ -57,7 +58,7 @@ class _Boundary(msgspec.Struct):
 
 
 class _Case(msgspec.Struct):
-    """What is used of a case: a file of another shape is refused with the place that is wrong."""
+    """Fields of a case that pictures use. A file of another form is refused with the wrong place."""
 
     name: str | None = None
     title: str | None = None
@@ -68,7 +69,7 @@ class _Case(msgspec.Struct):
 
 @dataclass(frozen=True)
 class FrameFile:
-    """One written frame: its number, its simulated time in s (None when it is not listed), its name in the folder."""
+    """A written frame: its number, its simulated time in s (None if it is not listed), its name in the folder."""
 
     index: int
     time: float | None
@@ -76,7 +77,7 @@ class FrameFile:
 
 
 class Result:
-    """What a run left. Nothing is read before it is asked for; what has been read is kept."""
+    """Result of a run. Data is read at its first use and kept."""
 
     def __init__(self, folder: Folder) -> None:
         """Reads nothing yet."""
@@ -84,18 +85,18 @@ class Result:
 
     @classmethod
     def open(cls, path: Path | str) -> "Result":
-        """The result in a run's folder on this machine. Raises NotFoundError when there is no such folder."""
+        """Opens the result in a run's folder on this machine. Raises NotFoundError for a missing folder."""
         root = Path(path)
         if not root.is_dir():
             raise NotFoundError(f"{root}: there is no such folder")
         return cls(LocalFolder(root))
 
     def __repr__(self) -> str:
-        """Names the run."""
+        """Text with the name of the run."""
         return f"<result of {self.folder.name}>"
 
     def _repr_html_(self) -> str:
-        """How the run ended and its references, for notebooks."""
+        """State and reference numbers, for notebooks."""
         try:
             name, ended = str(self.case.get("title") or self.case.get("name")), self.outcome
         except UnfinishedError:
@@ -103,9 +104,8 @@ class Result:
         return html.head(self.folder.name, name, ended) + html.references(ended)
 
     def mesh(self, time: float | None = None) -> Any:
-        """The frame nearest to ``time``, s, as a pyvista.UnstructuredGrid with all its fields; None: the last one.
-
-        Raises UnfinishedError, ViewError where pyvista is missing.
+        """Returns the frame nearest to ``time``, s, as a pyvista.UnstructuredGrid with all its fields; None: the
+        last one. Raises UnfinishedError, ViewError without pyvista.
         """
         try:
             from .drawing.surfaces import read_mesh  # pyvista is loaded when it is needed
@@ -115,7 +115,7 @@ class Result:
 
     @cached_property
     def outcome(self) -> Outcome:
-        """How the run ended. Raises UnfinishedError before its end."""
+        """The outcome. Raises UnfinishedError before the end of the run."""
         path = self.folder.path(layout.OUTCOME)
         try:
             return outcome_of(path.read_bytes())
@@ -124,7 +124,7 @@ class Result:
 
     @cached_property
     def case(self) -> dict[str, Any]:
-        """The case with every default filled in, in SI, as plain data. Raises UnfinishedError, ClientError."""
+        """The case with all defaults in SI units, as plain data. Raises UnfinishedError, ClientError."""
         path = self.folder.path(layout.RESOLVED_CASE)
         try:
             data = msgspec.json.decode(path.read_bytes(), type=dict[str, Any])
@@ -135,21 +135,19 @@ class Result:
 
     @cached_property
     def history(self) -> Columns:
-        """The columns of history.csv, in its order: step, t (s), dt (s), the energies (J), the probes.
-
-        ``history.frame()`` is a pandas.DataFrame.
+        """The columns of history.csv in their order: step, t (s), dt (s), the energies (J), the probes.
+        ``history.frame()`` returns a pandas.DataFrame.
         """
         return read_columns(self.folder.path(layout.HISTORY).read_text(encoding="utf-8"))
 
     @cached_property
     def fragment_tables(self) -> list[int]:
-        """The numbers of the frames of which there is a table of fragments."""
+        """Numbers of the frames that have a table of fragments."""
         return sorted(int(found[1]) for name in self.folder.names() if (found := _TABLE.fullmatch(name)))
 
     def fragments_of(self, index: int = -1) -> Columns:
-        """The fragments of frame ``index`` (-1: the last one), with the columns of ``cases/output/fragments.py``.
-
-        Raises UnfinishedError where there is no table of them.
+        """Returns the fragments of frame ``index`` (-1: the last one), with the columns of
+        ``cases/output/fragments.py``. Raises UnfinishedError without such a table.
         """
         known = self.fragment_tables
         if not known or (index != -1 and index not in known):
@@ -160,12 +158,12 @@ class Result:
 
     @cached_property
     def fragments(self) -> Columns:
-        """The fragments of every frame, one below the other; ``fragments.frame()`` is a pandas.DataFrame."""
+        """The fragments of all frames in one table; ``fragments.frame()`` returns a pandas.DataFrame."""
         return joined((index, self.fragments_of(index)) for index in self.fragment_tables)
 
     @cached_property
     def messages(self) -> list[AnyMessage]:
-        """What the run has said, in order; a line that is torn or still being written is left out."""
+        """The messages of the run in order, without incomplete lines."""
         found = []
         for line in self.folder.path(layout.JOURNAL).read_bytes().splitlines():
             with suppress(msgspec.DecodeError):
@@ -184,7 +182,7 @@ class Result:
         ]
 
     def frame(self, index: int = -1) -> Path:
-        """The file of a frame by its number; -1 is the last one. Raises UnfinishedError when it is not there."""
+        """Returns the file of a frame by its number; -1 is the last one. Raises UnfinishedError for a missing frame."""
         found = self.frames[-1:] if index == -1 else [frame for frame in self.frames if frame.index == index]
         if not found:
             wanted = "any frame" if index == -1 else f"frame {index}"
@@ -200,15 +198,14 @@ class Result:
         time: float | str | Sequence[float | str] | None = None,
         **options: Any,
     ) -> Drawn:
-        """Draws frames: as a PNG, side by side where there are several, or as a film (``out`` ends in .gif or .mp4).
-
-        ``frame`` has their numbers, ``time`` times in s or as ``"60 us"``, of each the nearest frame. Without both it
-        is the last one, of a film every one. ``options`` are the fields of ``conoid.client.drawing.view_options.Look``.
-        Raises ViewError.
+        """Draws frames: as a PNG, several frames side by side, or as a film (``out`` ends in .gif or .mp4).
+        ``frame`` has their numbers, ``time`` times in s or as ``"60 us"``: the nearest frame is drawn. Without both,
+        the last frame is drawn; a film has every frame. ``options`` are the fields of
+        ``conoid.client.drawing.view_options.Look``. Raises ViewError.
         """
         every = str(out or "").lower().endswith(FILMS)
         if not self.frames:
-            self.folder.path(layout.JOURNAL)  # a folder without frames may be none of a run
+            self.folder.path(layout.JOURNAL)  # a folder without frames may not be that of a run
             raise UnfinishedError(f"{self.folder.name} has not written any frame")
         chosen = self._chosen(_listed(frame), [seconds(one) for one in _listed(time)], every)
         scene = self.scene()
@@ -217,14 +214,14 @@ class Result:
         return draw([self.frame(one) for one in chosen], scene, self.folder.name, field, out, **options)
 
     def _chosen(self, frames: Sequence[int], times: Sequence[float], every: bool) -> list[int]:
-        """Numbers of frames, in the order in which they were asked for."""
+        """Returns numbers of frames, in the order of the request."""
         if not frames and not times:
             return [one.index for one in self.frames] if every else [-1]
         return [*frames, *(self.nearest(time) for time in times)]
 
     def nearest(self, time: float) -> int:
-        """The number of the frame that is nearest to ``time``, s. Raises UnfinishedError where no time is known,
-        ViewError where the time lies before or beyond all frames.
+        """Returns the number of the frame nearest to ``time``, s. Raises UnfinishedError if no time is known,
+        ViewError if the time lies before or after all frames.
         """
         known = {one.time: one.index for one in self.frames if one.time is not None}
         if not known:
@@ -236,7 +233,7 @@ class Result:
         return known[min(known, key=lambda at: abs(at - time))]
 
     def scene(self) -> Scene:
-        """What a picture takes from the case; nothing when there is no case to read."""
+        """Returns the data of the case that a picture uses; empty without a case."""
         try:
             case = self.case
         except ClientError:
@@ -262,21 +259,21 @@ class Result:
 
 
 def _is_plain(boundary: dict[str, Any]) -> bool:
-    """Whether a boundary is a wall that stays where it is, and flat: others are not drawn."""
+    """Whether a boundary is a fixed plane wall: other walls are not drawn."""
     moves = any(boundary.get("velocity") or ()) or boundary.get("mass") is not None
     return boundary["kind"] == "wall" and boundary.get("shape", "plane") == "plane" and not moves
 
 
 def outcome_of(text: bytes) -> Outcome:
-    """An outcome as its file or a server has it. Raises msgspec.MsgspecError, also for a state that nobody knows."""
+    """Decodes an outcome from its file or from a server. Raises msgspec.MsgspecError, also for an unknown state."""
     ended = outcome.from_json(text)
     msgspec.convert(ended.state, State)
     return ended
 
 
 def seconds(time: object) -> float:
-    """Of a number, in s, or of a text such as ``60 us``; a text without a unit is refused, as it would be taken for
-    seconds. Raises LookError.
+    """Returns the time in s of a number or of a text such as ``60 us``. A text without a unit is refused, since it
+    could be meant in another unit than s. Raises LookError.
     """
     try:
         if not isinstance(time, str) or time.strip()[-1:].isalpha():

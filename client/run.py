@@ -1,4 +1,4 @@
-"""A handle of a run on a server: status, wait, watch, cancel, events, files, download, result."""
+"""Handle of a run on a server: status, wait, watch, cancel, events, files, download, result."""
 
 import math
 import shutil
@@ -26,37 +26,37 @@ from .result import Result
 from .snapshots import Snapshot
 
 _WAIT = 20.0
-"""s of a single request that waits for the end of a run: below the 30 s after which a request is given up (http.py)."""
+"""Time in s of a single request that waits for the end of a run: below the 30 s after which a request is given up
+(http.py)."""
 _PATIENCE = 120.0
-"""s that a server may be away while the end of a run is waited for. Chosen: time for a restart, twice over."""
+"""Time in s without a server after which waiting for a run ends. Chosen: twice the time of a restart."""
 
 
 @dataclass
 class Run:
-    """A run on a server. Nothing is asked before a method is called."""
+    """A run on a server. A request is sent only when a method is called."""
 
     session: Http
     id: str
 
     def _repr_html_(self) -> str:
-        """Its status, for notebooks."""
+        """Status of the run, for notebooks."""
         return self.status()._repr_html_()
 
     # State ------------------------------------------------------------------------------------------------------------
 
     @property
     def path(self) -> str:
-        """Its place in the REST interface."""
+        """Path of the run in the REST interface."""
         return f"/v1/runs/{quoted(self.id)}"
 
     def status(self) -> RunInfo:
-        """What the server knows of it now."""
+        """Returns the present status of the run."""
         return self.session.get(RunInfo, self.path)
 
     def wait(self, timeout: float | None = None) -> RunInfo:
-        """Returns when the run has ended. Raises TimeoutError after ``timeout`` s.
-
-        A server that is away, or too busy to answer, is waited for, two minutes long.
+        """Waits for the end of the run. Raises TimeoutError after ``timeout`` s. A server that does not answer, or
+        is too busy, is waited for, for two minutes.
         """
         deadline = math.inf if timeout is None else time.monotonic() + timeout
         heard = time.monotonic()
@@ -78,25 +78,25 @@ class Run:
                 raise TimeoutError(f"run {self.id} is still {info.state.value} after {duration(timeout)}")
 
     def cancel(self) -> RunInfo:
-        """Asks it to stop; to ask twice does no harm."""
+        """Cancels the run; repeated calls have no effect."""
         return self.session.post(RunInfo, f"{self.path}:cancel")
 
     def purge(self) -> None:
-        """Removes everything of it from the server, once it has ended. There is no way back."""
+        """Removes the run with all its files from the server after its end. This cannot be undone."""
         self.session.delete(self.path)
 
     def checkpoint(self) -> RunInfo:
-        """Asks it for a checkpoint; a ``Checkpoint`` message tells of it when it is on disk."""
+        """Requests a checkpoint; a ``Checkpoint`` message reports it when it is on disk."""
         return self.session.post(RunInfo, f"{self.path}:checkpoint")
 
     def take_snapshot(self) -> RunInfo:
-        """Asks it for a snapshot of the fragments; a ``Snapshot`` message tells of it when it is on disk."""
+        """Requests a snapshot of the fragments; a ``Snapshot`` message reports it when it is on disk."""
         return self.session.post(RunInfo, f"{self.path}:snapshot")
 
     # Messages ---------------------------------------------------------------------------------------------------------
 
     def events(self, after: int = 0) -> list[AnyMessage]:
-        """The messages in its journal with a number above ``after``."""
+        """Returns the messages of the journal with a number above ``after``."""
         found: list[AnyMessage] = []
         while True:
             page = self.session.get(EventPage, f"{self.path}/events", after=after)
@@ -108,16 +108,15 @@ class Run:
             after = page.last
 
     def messages(self, after: int = 0, link: Link | None = None) -> Generator[AnyMessage]:
-        """Every message after ``after``, once and in order: what was said, then what is said, to the run's end.
-
-        Over Zenoh where it can be reached, else over SSE; ``link`` chooses.
+        """Yields every message after ``after`` once and in order, past ones and new ones, until the end of the run.
+        Over Zenoh if it can be reached, else over SSE; ``link`` selects one.
         """
         from .remote.stream import follow  # zenoh is loaded when it is needed
 
         return follow(link or self.link(), self.events, lambda: self.status().state.final, after)
 
     def link(self) -> Link:
-        """A subscription to the run: over Zenoh where it can be reached, else over SSE."""
+        """Opens a subscription to the run: over Zenoh if it can be reached, else over SSE."""
         from .remote.stream import SseLink, StreamError, ZenohLink  # zenoh is loaded when it is needed
 
         me = self.session.me()
@@ -127,23 +126,25 @@ class Run:
         return SseLink(lambda: self.session.stream(f"{self.path}/stream"))
 
     def watch(self, live: bool | None = None) -> Live:
-        """Shows the run in the terminal until it ends. ``live`` chooses the panel or plain lines; None: as it fits."""
+        """Shows the run in the terminal until it ends. ``live`` selects the panel or plain lines; None: by the
+        terminal."""
         from .watch import watch  # rich is loaded when it is needed
 
         return watch(self, live)
 
     def history(self, points: int = 1000) -> dict[str, Any]:
-        """Its course so far in at most so many reports: ``series``, ``ranks``, ``balance``, ``snapshots``, ``last``."""
+        """Returns the history of the run with at most so many reports: ``series``, ``ranks``, ``balance``,
+        ``snapshots``, ``last``."""
         return self.session.get(dict[str, Any], f"{self.path}/history", points=points)
 
     # Snapshots --------------------------------------------------------------------------------------------------------
 
     def snapshots(self) -> list[Told]:
-        """What its journal tells of the snapshots of its fragments that there are."""
+        """Returns the messages of the journal about the snapshots of the fragments."""
         return self.session.get(SnapshotPage, f"{self.path}/snapshots").snapshots
 
     def snapshot(self, n: int = -1) -> Snapshot:
-        """Snapshot ``n``; the newest for -1. Raises UnfinishedError when there is none."""
+        """Returns snapshot ``n``; -1: the newest. Raises UnfinishedError if there is none."""
         number = n if n >= 0 else max((told.n for told in self.snapshots()), default=0)
         try:
             return Snapshot(self.session.fetch(f"{self.path}/snapshots/{number}"))
@@ -151,9 +152,8 @@ class Run:
             raise self._lacks(f"snapshot {number}") from None
 
     def fragments(self, after: int = 0, link: Link | None = None) -> Generator[Snapshot]:
-        """Every snapshot whose message comes after message ``after``, as they are made, to the run's end.
-
-        Over Zenoh they come with their messages; one that does not is fetched from the server.
+        """Yields every snapshot whose message comes after message ``after``, until the end of the run. Over Zenoh
+        the data comes with the message; missing data is fetched from the server.
         """
         chosen = link or self.link()
         for message in self.messages(after, chosen):
@@ -164,13 +164,12 @@ class Run:
     # Files ------------------------------------------------------------------------------------------------------------
 
     def files(self) -> list[FileInfo]:
-        """What lies in its folder."""
+        """Lists the files of the run's folder."""
         return self.session.get(Listing, f"{self.path}/files").files
 
     def download(self, folder: Path | str, name: str | None = None) -> Path:
-        """Copies one file, or all, into ``folder`` and returns the path of the file, or the folder.
-
-        Raises AnswerError where a file of a run that has ended is not as large as the server lists it.
+        """Copies one file, or all, into ``folder``; returns the path of the file, or the folder. Raises AnswerError
+        if a file of a run that has ended differs in size from the list.
         """
         root = Path(folder)
         if name is not None:
@@ -181,12 +180,12 @@ class Run:
         return root
 
     def over(self) -> bool:
-        """Whether it has ended: its files change no more."""
+        """Whether the run has ended: its files change no more."""
         return self.status().state.final
 
     def fetch(self, folder: Path, file: FileInfo, final: bool = False) -> Path:
-        """Copies a file of the list into ``folder`` and returns its path; of a run that has ended, ``final``, it must
-        be as large as the list has it.
+        """Copies a file of the list into ``folder`` and returns its path. If the run has ended (``final``), the size
+        must be that of the list.
         """
         target = inside(folder, file.path)
         try:
@@ -196,12 +195,12 @@ class Run:
         return target
 
     def _address(self, file: FileInfo) -> str:
-        """The one that the server tells, if it is of this run; else that of its path."""
+        """Returns the address that the server lists if it belongs to this run; else that of the path."""
         own = f"{self.path}/files/"
         return file.url if file.url.startswith(own) else f"{own}{quoted(file.path, safe='/')}"
 
     def _lacks(self, what: str) -> ClientError:
-        """What is raised for something that the run has not written, or for a run that there is none of."""
+        """Returns the error for a file that the run has not written, or for an unknown run."""
         try:
             self.status()
         except NotFoundError as error:
@@ -209,12 +208,13 @@ class Run:
         return UnfinishedError(f"run {self.id} has no {what}")
 
     def result(self) -> Result:
-        """What it has written: fetched when it is asked for, kept until the result is gone."""
+        """The result of the run: files are fetched at their first use, and kept until the result is deleted."""
         return Result(RemoteFolder(self))
 
 
 class RemoteFolder:
-    """A run's folder behind a server; each file is fetched once, into a folder that goes away with this one."""
+    """A run's folder on a server. Each file is fetched once, into a temporary folder that is removed with this
+    object."""
 
     def __init__(self, run: Run) -> None:
         """Fetches nothing yet."""
@@ -224,7 +224,7 @@ class RemoteFolder:
 
     @property
     def name(self) -> str:
-        """The run's id."""
+        """Id of the run."""
         return self.run.id
 
     def names(self) -> list[str]:
@@ -232,10 +232,10 @@ class RemoteFolder:
         return [file.path for file in self.run.files()]
 
     def path(self, name: str) -> Path:
-        """A local copy."""
+        """Returns the path of a local copy."""
         target = inside(self.root, name)
         return target if target.is_file() else self.run.download(self.root, name)
 
     def told(self, name: str) -> str:
-        """Its run and server: the local copy goes away."""
+        """Returns the text with run and server: the local copy is temporary."""
         return f"{name} of run {self.run.id} at {self.run.session.url}"

@@ -1,4 +1,4 @@
-"""A snapshot of the fragments of a run, as numpy sees it; docs/reference/snapshots.md has its arrays."""
+"""A snapshot of the fragments of a run as numpy arrays; docs/reference/snapshots.md lists the arrays."""
 
 import gzip
 import zlib
@@ -15,10 +15,10 @@ if TYPE_CHECKING:
 
 
 class Snapshot:
-    """The bytes of a snapshot, and what is in them; arrays are views of the bytes where they can be."""
+    """Content of a snapshot. Arrays are views of its bytes where possible."""
 
     def __init__(self, data: bytes) -> None:
-        """Raises ClientError for what is no snapshot."""
+        """Raises ClientError for other data."""
         self.data = data
         try:
             self.header = snapshot.header_of(data)
@@ -26,13 +26,13 @@ class Snapshot:
             raise ClientError(str(error)) from None
 
     def __repr__(self) -> str:
-        """The number, the time and what is seen."""
+        """Text with number, time and content."""
         head = self.header
         seen = counted(head.fragments_total, "fragment")
         return f"<snapshot {head.n}: step {head.step}, t {exact(head.t, 's')}, {seen}>"
 
     def array(self, name: str) -> "np.ndarray":
-        """An array as it stands in the snapshot. Raises ClientError for a name that it has not."""
+        """Returns an array of the snapshot. Raises ClientError for an unknown name."""
         import numpy as np
 
         array = self.header.arrays.get(name)
@@ -44,14 +44,15 @@ class Snapshot:
 
     @property
     def points(self) -> "np.ndarray":
-        """(vertices, 3) m."""
+        """Positions of the vertices, (vertices, 3), m."""
         import numpy as np
 
         low, high = np.array(self.header.box)
         return np.asarray(low + self.array("positions") / 65535.0 * (high - low))
 
     def field(self, name: str) -> "np.ndarray":
-        """(triangles,) a field in the unit of ``header.fields[name].unit``. Raises ClientError."""
+        """Returns a field by triangle, (triangles,), in the unit of ``header.fields[name].unit``. Raises
+        ClientError."""
         import numpy as np
 
         levels, field = self.array(snapshot.FIELD + name), self.header.fields[name]
@@ -65,7 +66,7 @@ class Snapshot:
 
 
 def read(path: Path | str) -> Snapshot:
-    """The snapshot in a file, or all tets of one (``.tets``). Raises OSError, ClientError."""
+    """Reads a snapshot from a file, or the file with all its tets (``.tets``). Raises OSError, ClientError."""
     data = Path(path).read_bytes()
     try:
         return Snapshot(gzip.decompress(data) if Path(path).suffix == layout.TETS_SUFFIX else data)

@@ -1,4 +1,4 @@
-"""``view``: a picture of frames, by whatever names them."""
+"""``view``: draws frames of a result, a folder or a file."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -20,10 +20,9 @@ def view(
     time: float | str | Sequence[float | str] | None = None,
     **options: Any,
 ) -> Drawn:
-    """Draws frames of a result, of a run's folder, or a frame file: a PNG, a GIF or an MP4. Raises ViewError.
-
-    Which frames, and by which numbers or times, is as ``Result.view`` has it; ``options`` are the fields of
-    ``conoid.client.drawing.view_options.Look``.
+    """Draws frames of a result, of a run's folder, or of a frame file: a PNG, a GIF or an MP4. Frames are selected
+    as in ``Result.view``; ``options`` are the fields of ``conoid.client.drawing.view_options.Look``. Raises
+    ViewError.
     """
     require_field(field)
     if isinstance(source, Result):

@@ -21,15 +21,16 @@ from .live import Live
 from .remote.link import Link
 
 REASON_EVERY = 3.0
-"""s between two questions what a run in the queue waits for. Chosen: below the 8 s after which silence is broken."""
+"""Time in s between two requests of the reason for which a queued run waits. Chosen: below the 8 s after which a
+progress line is printed."""
 
 
 class Titled(Protocol):
-    """What has a title."""
+    """A status with a title."""
 
     @property
     def title(self) -> str:
-        """For people."""
+        """Title of the run for people."""
 
 
 class Watched(Protocol):
@@ -38,17 +39,17 @@ class Watched(Protocol):
     id: str
 
     def status(self) -> Titled:
-        """What the server knows of it now."""
+        """Returns the present status."""
 
     def link(self) -> Link:
-        """A subscription to its messages."""
+        """Opens a subscription to its messages."""
 
     def messages(self, *, link: Link) -> Iterable[AnyMessage]:
-        """All of them, once and in order."""
+        """Yields all messages once and in order."""
 
 
 def watch(run: Watched, live: bool | None = None, console: Console | None = None) -> Live:
-    """Follows ``run`` to its end. ``live``: the panel (True), plain lines (False), what the terminal can (None)."""
+    """Shows ``run`` until its end. ``live``: the panel (True), plain lines (False), by the terminal (None)."""
     out = console or PlainConsole()
     known = Live(run.id, title=run.status().title)
     link = run.link()
@@ -62,8 +63,8 @@ def watch(run: Watched, live: bool | None = None, console: Console | None = None
 
 @contextmanager
 def explained(run: Watched, known: Live) -> Iterator[None]:
-    """While ``run`` is in the queue, or silent, a thread asks its server now and then: what it waits for, and whether
-    there is a server at all.
+    """Asks the server in a thread while ``run`` is queued or silent: for the reason of waiting, and whether the
+    server answers.
     """
     over = threading.Event()
 
@@ -101,8 +102,8 @@ def show(messages: Iterable[AnyMessage], known: Live, out: Console) -> Live:
 
 
 def tell(messages: Iterable[AnyMessage], known: Live, write: Callable[[str], None]) -> Live:
-    """One plain line for each change of state, each warning and each percent of progress; silence is broken, of what
-    takes hours more and more rarely.
+    """Prints one plain line for each change of state, each warning and each percent of progress, and progress lines
+    while there is no message, which become rarer.
     """
     told, texts = -1, set[str]()
     with progress.broken(write, lambda: _waiting(known)) as say:
@@ -124,7 +125,7 @@ def tell(messages: Iterable[AnyMessage], known: Live, write: Callable[[str], Non
 def _waiting(known: Live) -> str:
     if known.away:
         away = f"no server answers, for {duration(time.time() - known.away)}"
-        return f"{clock(time.time())}  {known.run}  {away}; it was {known.state.value} when it was last heard of"
+        return f"{clock(time.time())}  {known.run}  {away}; it was {known.state.value} at its last message"
     lasting = f", for {duration(time.time() - known.changed)}" if known.changed else ""
     at = f": {known.told}" if known.told else ""
     return f"{clock(time.time())}  {known.run}  still {known.state.value}{lasting}{at}"

@@ -1,4 +1,4 @@
-"""``conoid sweep --adaptive``: what is looked for from the words of the command, the answer as lines or JSON."""
+"""``conoid sweep --adaptive``: the goal from the arguments, the answer as lines or JSON."""
 
 import hashlib
 from collections.abc import Sequence
@@ -20,7 +20,7 @@ from .options import aloud, complain
 
 
 def file_of(case: str, goal: str, sets: Sequence[str]) -> Path:
-    """Where an adaptive sweep is kept if nothing else is said: the same file for the same words."""
+    """Returns the default file of an adaptive sweep: the same file for the same arguments."""
     keys = sorted(word.partition("=")[0].strip() for word in sets)
     told = hashlib.sha256("\n".join([goal.replace(" ", ""), *keys]).encode()).hexdigest()[:6]
     return Path(f"{locate(case).stem}-{told}.sweep.json")
@@ -30,7 +30,7 @@ def adaptive(
     session: Session, case: str, goal: str, sets: Sequence[str], more: Sequence[str], tolerance: str | None,
     at_once: int | None, most: int | None, out: Path | None, *, new: bool, as_json: bool,
 ) -> Found:  # fmt: skip
-    """Looks for the threshold and prints what was found. ``more``: further overrides. Raises CaseError, ClientError."""
+    """Runs the search and prints its answer. ``more``: further overrides. Raises CaseError, ClientError."""
     if not sets:
         raise UsageError("--adaptive takes --set KEY=LOW:HIGH, the key that varies")
     spans, constants = spans_of(sets)
@@ -39,12 +39,12 @@ def adaptive(
     if new:
         path.unlink(missing_ok=True)
     try:
-        with aloud("handing the first runs in") as name:
+        with aloud("submitting the first runs") as name:
             found = found_by(
                 session, data, folder_of(case), goal, spans, tolerance, at_once, most or MOST, path, complain, name
             )
     except KeyboardInterrupt:
-        complain(f"{path} has what was found so far; the same command goes on from there")
+        complain(f"{path} has the results so far; the same command continues from there")
         raise
     if as_json:
         echo_json(found)
@@ -54,6 +54,6 @@ def adaptive(
 
 
 def finish(found: Found) -> None:
-    """Ends the command: 0 where the bracket is as narrow as was asked for, else 1."""
+    """Ends the command: exit code 0 if the bracket has the requested width, else 1."""
     if not found.reached:
         raise typer.Exit(ExitCode.CRASHED)

@@ -31,13 +31,13 @@ from .console import echo, echo_json
 from .options import CaseArgument, Json, Overrides, Ranks, Threads, aloud, on_cores, warn
 
 _CASE = "case.json"
-"""What is asked for, as it is handed to the worker."""
+"""Command of the worker for this case."""
 _PLACES = ("~/.config/conoid/site.toml", "/etc/conoid/site.toml")
 
 
 @dataclass(frozen=True)
 class Handed:
-    """What was handed over."""
+    """The submitted job."""
 
     folder: Path
     job: str
@@ -50,18 +50,19 @@ def batch_run(
     ranks: Ranks = None,
     threads: Threads = None,
     profile: Annotated[
-        str, typer.Option("--slurm", metavar="PROFILE", help="A profile of the site; its default.")
+        str, typer.Option("--slurm", metavar="PROFILE", help="Profile of the site; default: that of the site.")
     ] = "",
-    out: Annotated[Path | None, typer.Option("--out", help="The run's folder; runs/<name> when not given.")] = None,
+    out: Annotated[Path | None, typer.Option("--out", help="The run's folder; default: runs/<name>.")] = None,
     overrides: Overrides = None,
     site: Annotated[
-        Path | None, typer.Option("--site", help="The site's settings file [CONOID_SITE, or where the site has it].")
+        Path | None, typer.Option("--site", help="The site's settings file [CONOID_SITE, or the default place].")
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Hand a case to Slurm, without a server; prints the job's number. conoid watch FOLDER follows it.
+    """Submit a case to Slurm without a server; prints the job's number.
 
-    The same command again makes no second job: it tells the one that there is, or goes on with a run that was lost.
+    conoid watch FOLDER follows it. A repeated command makes no second job: it prints the existing one, or continues
+    a run that was lost.
     """
     words = [*(overrides or ()), *on_cores(ranks, threads)]
     with aloud("reading mesh files"):
@@ -75,7 +76,8 @@ def batch_run(
 
 
 def slurm_of(site: Path | None) -> Slurm:
-    """The site's Slurm; without a settings file one profile that leaves everything to Slurm. Raises ClientError."""
+    """Returns the Slurm settings of the site; without a settings file one profile with Slurm's defaults. Raises
+    ClientError."""
     named = site or (Path(os.environ["CONOID_SITE"]) if os.environ.get("CONOID_SITE") else None)
     found = named or next((path for place in _PLACES if (path := Path(place).expanduser()).is_file()), None)
     try:
@@ -86,7 +88,7 @@ def slurm_of(site: Path | None) -> Slurm:
 
 
 def job_of(folder: Path) -> Job | None:
-    """The record in a run's folder; None when there is none. Raises ClientError for one that cannot be read."""
+    """Returns the record in a run's folder; None if it does not exist. Raises ClientError for an unreadable record."""
     try:
         return batch.read_job(folder)
     except msgspec.MsgspecError as error:
@@ -94,7 +96,7 @@ def job_of(folder: Path) -> Job | None:
 
 
 def hand_over(case: str, overrides: Iterable[str], out: Path | None, profile: str, site: Slurm) -> Handed:
-    """One job for the run in a folder, whatever happened before. Raises CaseError, ClientError."""
+    """Makes one job for the run in a folder, whatever happened before. Raises CaseError, ClientError."""
     data = data_of(case, overrides)
     files = Hashes().of(data, folder_of(case))
     data = with_hashes(data, files)
@@ -104,7 +106,9 @@ def hand_over(case: str, overrides: Iterable[str], out: Path | None, profile: st
     try:
         chosen = batch.profile_of(site, profile or checked.run.profile)
         if shutil.which("sbatch", path=site.bin or None) is None:
-            raise ClientError("sbatch: there is none; Slurm's commands are in PATH, or [slurm] bin names their folder")
+            raise ClientError(
+                "sbatch: not found; Slurm's commands must be in PATH, or [slurm] bin must name their folder"
+            )
         job = _known(folder, resolved, profile, site) if folder.exists() else None
         if job is None:
             keep_copies(files, folder)
@@ -113,7 +117,7 @@ def hand_over(case: str, overrides: Iterable[str], out: Path | None, profile: st
         noted = batch.Job(**{**{name: getattr(job, name) for name in job.__struct_fields__}, "job": number})
         whole.write(folder / layout.JOB, batch.to_json(noted))
     except slurm_call.AwayError as error:
-        raise ClientError(f"{error}; nobody knows whether there is a job: the same command again finds out") from None
+        raise ClientError(f"{error}; it is unknown whether there is a job: repeat the command to find out") from None
     except (slurm_call.SlurmError, ValueError) as error:
         raise ClientError(str(error)) from None
     except OSError as error:
@@ -122,22 +126,22 @@ def hand_over(case: str, overrides: Iterable[str], out: Path | None, profile: st
 
 
 def _known(folder: Path, resolved: bytes, profile: str, site: Slurm) -> Job | None:
-    """The record of a folder that was handed over before: of its job, or of a next one when that is lost. Raises
-    ClientError where it is of another case, or of another ``profile`` than the one that is asked for.
+    """Returns the record of a folder that was submitted before: of its job, or of a new one if that job is lost.
+    Raises ClientError if it belongs to another case, or to another ``profile`` than the requested one.
     """
     job = job_of(folder)
     if job is None:
         if any(folder.iterdir()):
-            raise ClientError(f"{folder}: not empty, and no run of Slurm; --out names another folder")
+            raise ClientError(f"{folder}: not empty, and not a run of Slurm; --out names another folder")
         return None
     if (folder / layout.OUTCOME).exists():
         raise ClientError(f"{folder}: this run has ended; --out names another folder")
     if resolved_json(parse_case(json.loads((folder / _CASE).read_bytes()))) != resolved:
         raise ClientError(
-            f"{folder}: handed to Slurm with another case, other ranks or threads; --out names another folder"
+            f"{folder}: submitted to Slurm with another case, other ranks or threads; --out names another folder"
         )
     if profile not in ("", job.profile):
-        raise ClientError(f"{folder}: handed to Slurm with the profile {job.profile!r}; --out names another folder")
+        raise ClientError(f"{folder}: submitted to Slurm with the profile {job.profile!r}; --out names another folder")
     chosen = batch.profile_of(site, job.profile)
     command = _command(folder, job.ranks, job.threads, chosen[1])
     known = slurm.jobs(site.bin, job.name)
@@ -151,7 +155,7 @@ def _known(folder: Path, resolved: bytes, profile: str, site: Slurm) -> Job | No
 def _prepared(
     folder: Path, data: dict[str, Any], resolved: bytes, run: Run, profile: tuple[str, batch.Profile], place: str
 ) -> Job:  # fmt: skip
-    """The run's folder, complete on disk before Slurm hears of it."""
+    """Creates the run's folder, complete on disk before Slurm gets the job."""
     (folder / layout.LOGS).mkdir(parents=True, exist_ok=True)
     case = folder / _CASE
     case.write_text(json.dumps(data, indent=2, default=str), encoding="utf-8")
@@ -164,14 +168,15 @@ def _prepared(
 
 
 def _command(folder: Path, ranks: int, threads: int, profile: batch.Profile) -> list[str]:
-    """What starts the ranks. It is made anew for every job: a record that lies in a folder chooses no program."""
+    """Returns the command that starts the ranks. It is made anew for every job: a record in a folder must not choose
+    a program."""
     worker = [sys.executable, "-m", "mpi4py", "-m", "conoid.worker", str(folder / _CASE), "--out", str(folder)]
     words = ["--run", folder.name, "--ranks", str(ranks), "--interruptible"]
     return [*batch.starter(profile, ranks, _mpiexec, threads), *worker, *words]
 
 
 def _written(folder: Path, job: Job, profile: batch.Profile) -> Job:
-    """The record and the script of a job, on disk."""
+    """Writes the record and the script of a job to disk."""
     whole.write(folder / layout.JOB_SCRIPT, batch.script(profile, sys.executable).encode(), 0o755)
     whole.write(folder / layout.JOB, batch.to_json(job))
     return job
@@ -186,10 +191,10 @@ def _mpiexec() -> list[str]:
 
 
 def cancel_folder(folder: Path) -> str:
-    """Asks the run in a folder to stop for good, and Slurm to end its job when that waits; one line that says so.
+    """Cancels the run in a folder, and its job if that waits; returns one line that describes it.
 
-    Slurm's commands are those of the site's file, or of PATH; a number in the folder's record is only taken for that of
-    a job whose name is in the record, too. Raises UnfinishedError for a folder that is none of a run, ClientError,
+    Slurm's commands are those of the site's file, or of PATH. The job number of the record is used only if a job of
+    this number has the name in the record. Raises UnfinishedError for a folder that is not a run's, ClientError,
     OSError.
     """
     LocalFolder(folder).path(layout.JOURNAL)
@@ -200,12 +205,12 @@ def cancel_folder(folder: Path) -> str:
         return f"{folder}: no worker writes into it; a run of a server is cancelled by its id"
     whole.touch(folder / layout.STOP_REQUEST)
     if job is None or not job.job:
-        return f"{folder} is asked to stop"
+        return f"{folder} is requested to stop"
     place = slurm_of(None).bin
     try:
         if not any((entry.job, entry.name) == (job.job, job.key) for entry in slurm.jobs(place, job.name)):
-            return f"{folder} is asked to stop; Slurm has no job {job.job} of the name {job.name}"
+            return f"{folder} is requested to stop; Slurm has no job {job.job} of the name {job.name}"
         slurm.notify(place, job.job)
     except slurm_call.SlurmError as error:
-        return f"{folder} is asked to stop; Slurm does not answer: {error}"
-    return f"{folder} is asked to stop, job {job.job}"
+        return f"{folder} is requested to stop; Slurm does not answer: {error}"
+    return f"{folder} is requested to stop, job {job.job}"

@@ -22,30 +22,35 @@ from ..studies.scaling import CORES, Layout, scale
 from .console import echo
 from .options import CaseArgument, Overrides, aloud, complain
 
-bench = typer.Typer(no_args_is_help=True, help="Measure.")
+bench = typer.Typer(no_args_is_help=True, help="Measure speed-up and scaling.")
 
 
-@bench.command(name="scale", short_help="A case on several ranks and threads: speed-up, projected beyond the cores.")
+@bench.command(
+    name="scale", short_help="Run a case on several ranks and threads: speed-up, projected beyond the cores."
+)
 def bench_scale(
     case: CaseArgument,
     ranks: Annotated[
         str,
-        typer.Option("--ranks", metavar="R,RxT,...", help="Numbers of ranks, or ranks x threads; 1 is always there."),
+        typer.Option(
+            "--ranks", metavar="R,RxT,...", help="Numbers of ranks, or ranks x threads; 1 is always included."
+        ),
     ] = "1,2,4,8",
     overrides: Overrides = None,
-    latency: Annotated[str, typer.Option("--latency", help="Of a message, for the projection.")] = "2 us",
-    width: Annotated[str, typer.Option("--bandwidth", help="Of a rank's messages, for the projection.")] = "5 GB/s",
+    latency: Annotated[str, typer.Option("--latency", help="Latency of a message, for the projection.")] = "2 us",
+    width: Annotated[
+        str, typer.Option("--bandwidth", help="Bandwidth of a rank's messages, for the projection.")
+    ] = "5 GB/s",
     out: Annotated[
         Path | None,
         typer.Option(
-            "--out", help="Folder for scale.md, .json and .svg and for the runs; those of an earlier call are read."
+            "--out", help="Folder for scale.md, .json, .svg and the runs; runs of an earlier call are used again."
         ),
     ] = None,
 ) -> None:
-    """Run a case on several numbers of ranks and threads: speed-up, where it is lost, whether all answers are equal.
+    """Run a case on several numbers of ranks and threads: speed-up, its losses, and whether all answers are equal.
 
-    Where there are fewer cores than threads, what they would take is projected from the tasks of one. Ends with 1 when
-    answers differ.
+    With more threads than cores the time is projected from the tasks of one thread. Exit code 1 when answers differ.
     """
     layouts = layouts_of(ranks)
     network = Network(_read("--latency", latency, _time), _read("--bandwidth", width, bandwidth))
@@ -65,7 +70,7 @@ def bench_scale(
 
 
 def layouts_of(text: str) -> list[Layout]:
-    """Ranks, and threads of each, of ``1,2,4x4``. Raises ClientError."""
+    """Returns the ranks, and threads of each, of ``1,2,4x4``. Raises ClientError."""
     found = []
     for word in text.split(","):
         numbers = [int(each[:9]) if each.isascii() and each.isdigit() else 0 for each in word.strip().split("x")]
@@ -81,7 +86,7 @@ def layouts_of(text: str) -> list[Layout]:
 
 
 def _read(option: str, text: str, reading: Callable[[str], float]) -> float:
-    """What an option says. Raises ClientError that names it."""
+    """Reads the value of an option. Raises ClientError with its name."""
     try:
         return reading(text)
     except ValueError as error:

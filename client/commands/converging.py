@@ -31,33 +31,34 @@ from .options import CaseArgument, Overrides, Token, Url, aloud, complain
 from .reports import drawing
 
 _ENSEMBLE = 5
-"""Members of a point of a scene that breaks. Chosen: a deviation from five is good to a third."""
+"""Number of members for each point of a scene with fracture. Chosen: the standard deviation of five is good to a
+third."""
 
 
 def converge(
     case: CaseArgument,
     overrides: Overrides = None,
-    meshes: Annotated[str, typer.Option("--meshes", help="By which the element sizes are multiplied.")] = "2,1.414,1",
+    meshes: Annotated[str, typer.Option("--meshes", help="Factors of the element sizes.")] = "2,1.414,1",
     forms: Annotated[str, typer.Option("--forms", help="Pressure forms, as standard,nodal,split.")] = "",
     safeties: Annotated[str, typer.Option("--dt-safety", help="Values of numerics.dt_safety.")] = "",
     ensemble: Annotated[
-        int | None, typer.Option("--ensemble", min=1, help="Runs a point; 5 if something breaks, else 1.")
+        int | None, typer.Option("--ensemble", min=1, help="Runs for each point; default: 5 with fracture, else 1.")
     ] = None,
-    vary: Annotated[str, typer.Option("--vary", help="What differs in an ensemble: steps or seeds.")] = STEPS,
-    ranks: Annotated[int, typer.Option("--ranks", min=1, help="Of each run.")] = 1,
-    threads: Annotated[int, typer.Option("--threads", min=1, help="Of each rank.")] = 1,
-    quantity: Annotated[str | None, typer.Option("--quantity", help="What the advice is about.")] = None,
-    accuracy: Annotated[float, typer.Option("--accuracy", min=1e-6, help="Wanted error, in per cent.")] = 1.0,
+    vary: Annotated[str, typer.Option("--vary", help="Difference within an ensemble: steps or seeds.")] = STEPS,
+    ranks: Annotated[int, typer.Option("--ranks", min=1, help="Ranks of each run.")] = 1,
+    threads: Annotated[int, typer.Option("--threads", min=1, help="Threads of each rank.")] = 1,
+    quantity: Annotated[str | None, typer.Option("--quantity", help="Quantity of the advice.")] = None,
+    accuracy: Annotated[float, typer.Option("--accuracy", min=1e-6, help="Requested error, in per cent.")] = 1.0,
     out: Annotated[
-        Path | None, typer.Option("--out", help="Folder for converge.md, .json, .png; runs there are not run again.")
+        Path | None, typer.Option("--out", help="Folder for converge.md, .json, .png; runs in it are used again.")
     ] = None,
-    on_server: Annotated[bool, typer.Option("--server", help="Run on the server instead of here.")] = False,
+    on_server: Annotated[bool, typer.Option("--server", help="Run on the server instead of this machine.")] = False,
     url: Url = None,
     token: Token = None,
 ) -> None:
     """Speed against error for any case: orders, limits with their uncertainty, error over cost, one line of advice.
 
-    Ends with 1 when a run did not succeed.
+    Exit code 1 when a run did not succeed.
     """
     data = data_of(case, overrides or ())
     checked = parse_case(data)
@@ -84,7 +85,7 @@ def converge(
 
 @contextmanager
 def _session(out: Path, cores: int, on_server: bool, url: str | None, token: str | None) -> Iterator[Session]:
-    """The server that is named, or one of our own with a slot a core."""
+    """Returns the named server, or starts one with a slot for each core."""
     if on_server or url is not None:
         with connect(url, token) as session:
             yield session
@@ -122,7 +123,7 @@ def _write(book: Book, quantity: str | None, out: Path | None) -> None:
 
 
 def _numbers(option: str, text: str) -> list[float]:
-    """Positive numbers, each once, with commas between them. Raises ClientError."""
+    """Returns positive, different numbers from a list with commas. Raises ClientError."""
     try:
         values = [float(word) for word in text.split(",") if word.strip()]
     except ValueError:

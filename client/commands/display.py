@@ -1,4 +1,4 @@
-"""A run in the terminal: a panel that is drawn again and again, or one line an update where there is no terminal."""
+"""Display of a run in the terminal: a panel that is redrawn, or one line for each update without a terminal."""
 
 import time
 from collections import Counter
@@ -31,29 +31,30 @@ _PHASE_STYLE = {
 }
 _LEVEL_STYLE = {"warning": "yellow", "error": "red"}
 _MOST_RANKS = 12
-"""Ranks with a bar of their own in the panel. Chosen: more do not fit a terminal beside the rest."""
+"""Largest number of ranks with a bar of their own in the panel. Chosen: more do not fit a terminal."""
 _BAR = 36
 """Characters of a full bar. Chosen for a terminal of 80 columns; a narrower one has shorter bars."""
 _FRAME = 4
-"""Characters that the border takes of a line."""
+"""Characters of the border in each line."""
 _APART = 2
 """Characters between two columns."""
 _DETAILS = (_MOST_RANKS, 6, True), (4, 3, True), (2, 2, True), (2, 2, False), (1, 1, False)
-"""Ranks, lines of the log, whether there are terms of the energy: the first for which the terminal is high enough."""
+"""Layouts from large to small: ranks, lines of the log, whether terms of the energy are shown. The first that fits
+the height of the terminal is used."""
 _SMALL = 0.005
-"""Of the whole energy: smaller terms share a line. Chosen: their bar has no length."""
+"""Share of the whole energy below which terms share a line. Chosen: their bar has no length."""
 Pair = tuple[str, str]
 
 
 class panel:  # noqa: N801
-    """The whole picture of a run, for rich.live, as wide and high as the terminal."""
+    """The panel of a run for rich.live, with the width and height of the terminal."""
 
     def __init__(self, live: Live, log_lines: int = 6) -> None:
-        """``log_lines``: at most."""
+        """``log_lines``: largest number of log lines."""
         self.live, self.log_lines = live, log_lines
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
-        """What rich asks for."""
+        """Method that rich calls."""
         for detail in _DETAILS:
             drawn = self._drawn(options.max_width - _FRAME, detail)
             if len(console.render_lines(drawn, options, pad=False)) < console.size.height:
@@ -76,7 +77,7 @@ class panel:  # noqa: N801
 
 
 def _under(live: Live) -> str | None:
-    """Run and subscription, below the panel."""
+    """Returns run and subscription, for the line below the panel."""
     return " ".join([*([live.run] if live.title else []), *([f"over {live.link}"] if live.link else [])]) or None
 
 
@@ -87,14 +88,14 @@ def _state(live: Live) -> Text:
 
 
 def _why(live: Live) -> list[Text]:
-    """Cause and message, in lines of their own."""
+    """Returns cause and message as separate lines."""
     return [Text(one_line(" · ".join(told)), overflow="fold")] if (told := _told(live)) else []
 
 
 def _told(live: Live) -> list[str]:
-    """Cause and message, where they say more than the state; that nobody can say more now."""
+    """Returns cause and message if they say more than the state, and that no server answers."""
     if live.away:
-        return ["when it was last heard of; no server answers"]
+        return ["at its last message; no server answers"]
     return [part for part in (live.cause, live.told) if part and part != live.state.value]
 
 
@@ -110,7 +111,7 @@ def _bar(live: Live) -> RenderableType:
 
 
 def _numbers(facts: list[Pair], width: int) -> list[RenderableType]:
-    """Names and values in as many columns as there is room for; what is longer than a column has a line of its own."""
+    """Returns names and values in as many columns as fit; a text longer than a column has a line of its own."""
     columns = next((n for n in (3, 2) if _fits(facts, width, n)), 1)
     share = (width - _APART * (columns - 1)) // columns
     name = max((len(name) for name, _ in facts), default=0)
@@ -125,7 +126,7 @@ def _numbers(facts: list[Pair], width: int) -> list[RenderableType]:
 
 
 def _fits(facts: list[Pair], width: int, columns: int) -> bool:
-    """Whether most of the facts fit so many columns: all but a quarter."""
+    """Whether at least three quarters of the facts fit into so many columns."""
     share, name = (width - _APART * (columns - 1)) // columns, max((len(name) for name, _ in facts), default=0)
     return sum(name + 1 + len(value) > share for _, value in facts) <= max(2, len(facts) // 4)
 
@@ -161,7 +162,7 @@ def _time(live: Live) -> str:
 
 
 def _ranks(live: Live, width: int, most: int) -> list[RenderableType]:
-    """A bar a rank, what the colours mean, the imbalance."""
+    """Returns a bar for each rank, the legend of the colours, and the imbalance."""
     phases, busy = live.phases, live.busy
     totals = [sum(seconds) for seconds in zip(*phases.values(), strict=True)]
     longest = max(totals, default=0.0) or 1.0
@@ -185,7 +186,7 @@ def _ranks(live: Live, width: int, most: int) -> list[RenderableType]:
 
 
 def _flow(items: list[Text], width: int) -> list[Text]:
-    """As many lines as they take side by side, none of them broken."""
+    """Joins items into as few lines as possible; no item is broken."""
     lines = [items[0]] if items else []
     for item in items[1:]:
         if len(lines[-1]) + _APART + len(item) <= width:
@@ -196,12 +197,13 @@ def _flow(items: list[Text], width: int) -> list[Text]:
 
 
 def _helped(live: Live, rank: int) -> str:
-    """How busy the other threads of a rank are."""
+    """Returns the load of the further threads of a rank."""
     return f", its threads {percent(live.helped[rank], 0)}" if rank < len(live.helped) else ""
 
 
 def _stacked(parts: dict[str, float], longest: float, cells: int) -> Text:
-    """A bar of at most so many cells; its pieces end where the sum so far ends, so that rounding does not add up."""
+    """Returns a bar of at most so many cells. Its pieces end at the cumulative sums, so that rounding errors do not
+    add up."""
     edges, total = [0], 0.0
     for seconds in parts.values():
         total += seconds
@@ -213,7 +215,7 @@ def _stacked(parts: dict[str, float], longest: float, cells: int) -> Text:
 
 
 def _ledger(energy: Energy, width: int, *, terms: bool) -> RenderableType:
-    """A bar a term; small ones share a line. Without ``terms`` the residual alone."""
+    """Returns a bar for each term of the energy; small terms share a line. Without ``terms`` only the residual."""
     residual = Text("energy residual ", style="bright_black").append(_residual(energy.residual))
     supplied = f"of {si(energy.initial, 'J')} at the start and {si(energy.external, 'J')} from outside"
     residual.append(f"  {supplied}", style="bright_black")
@@ -250,7 +252,8 @@ def _residual(residual: float) -> Text:
 
 
 def _once(live: Live) -> list[tuple[Log, int]]:
-    """The lines of the log, warnings last: each text once, where it came last, with how often it came."""
+    """Returns the lines of the log, warnings last: each text once, at its last position, with its number of
+    repetitions."""
     times = Counter(entry.text for entry in live.log)
     last = {entry.text: entry for entry in live.log}
     ordered = sorted(last.values(), key=lambda entry: (entry.level in _LEVEL_STYLE, entry.seq))
@@ -258,7 +261,7 @@ def _once(live: Live) -> list[tuple[Log, int]]:
 
 
 def _log_line(entry: Log, times: int) -> Text:
-    """A warning as a whole, what else there is on one line."""
+    """Returns a whole warning; other lines are cut to one line."""
     warns = entry.level in _LEVEL_STYLE
     text = Text(overflow="fold" if warns else "ellipsis", no_wrap=not warns)
     text.append(f"{clock(entry.wall)} ", style="bright_black")
@@ -267,17 +270,17 @@ def _log_line(entry: Log, times: int) -> Text:
 
 
 def _who(entry: Log) -> str:
-    """What kind of line it is, or of which rank."""
+    """Returns the level of the line, or its rank."""
     return f"{entry.level}: " if entry.level in _LEVEL_STYLE else f"[{entry.rank}] "
 
 
 def seen(snapshot: Snapshot) -> str:
-    """A snapshot of the fragments in some words."""
+    """Describes a snapshot of the fragments in a few words."""
     return f"snapshot {snapshot.n} at t {si(snapshot.t, 's')}: {counted(snapshot.fragments, 'fragment')}"
 
 
 def line(live: Live) -> str:
-    """One update as one plain line."""
+    """Returns one update as one plain line."""
     parts = [clock(live.wall) if live.wall else "", live.run, live.state.value]
     parts += _told(live)
     progress = live.progress

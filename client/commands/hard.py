@@ -1,4 +1,4 @@
-"""The command ``conoid hard``: the suite of hard cases, several at once, with what came of each."""
+"""The command ``conoid hard``: runs the suite of hard cases, several at a time, and prints a verdict for each."""
 
 import json
 import math
@@ -33,28 +33,30 @@ from .options import aloud, complain
 
 @dataclass(frozen=True)
 class Verdict:
-    """How a hard case ended."""
+    """Result of a hard case."""
 
     hard: Hard
     title: str
     outcome: Outcome
     drifted: float | None
-    """Of the momentum; None where something from outside pushes."""
+    """Drift of the momentum; None if an external force acts."""
     faults: list[str]
 
 
 def hard(
     names: Annotated[
-        list[str] | None, typer.Argument(metavar="[NAME]...", help="Some of them, or rows as H14.")
+        list[str] | None, typer.Argument(metavar="[NAME]...", help="Names of cases, or rows such as H14.")
     ] = None,
-    ranks: Annotated[int, typer.Option("--ranks", min=1, help="Of each run; the answers are the same.")] = 1,
-    threads: Annotated[int, typer.Option("--threads", min=1, help="Of each rank; the answers are the same.")] = 1,
-    listed: Annotated[bool, typer.Option("--list", help="List them and run none.")] = False,
+    ranks: Annotated[int, typer.Option("--ranks", min=1, help="Ranks of each run; the answers are the same.")] = 1,
+    threads: Annotated[
+        int, typer.Option("--threads", min=1, help="Threads of each rank; the answers are the same.")
+    ] = 1,
+    listed: Annotated[bool, typer.Option("--list", help="List the cases without a run.")] = False,
     out: Annotated[Path | None, typer.Option("--out", help="Folder for hard.md, hard.json and the runs.")] = None,
 ) -> None:
-    """Run the hard cases: state, worst energy residual, drift of the momentum, steps.
+    """Run the hard cases: state, largest energy residual, drift of the momentum, steps.
 
-    Ends with 1 when one ends badly.
+    Exit code 1 when a case fails.
     """
     some = chosen(suite(), names or ())
     if listed:
@@ -80,7 +82,8 @@ def hard(
 
 
 def chosen(known: Sequence[Hard], words: Sequence[str]) -> list[Hard]:
-    """Those of these names or rows; all without words. Raises ClientError for a word that is none of them."""
+    """Returns the cases with these names or in these rows; all without arguments. Raises ClientError for an unknown
+    word."""
     for word in words:
         if not any(word == each.name or word in each.rows for each in known):
             names = allowed(word, [each.name for each in known])
@@ -89,7 +92,7 @@ def chosen(known: Sequence[Hard], words: Sequence[str]) -> list[Hard]:
 
 
 def run_all(session: Session, some: Sequence[Hard], ranks: int, threads: int = 1) -> Iterator[Verdict]:
-    """Hands in all, and yields each when it has ended. Raises CaseError for a case that is none."""
+    """Submits all cases, and yields each after its end. Raises CaseError for an invalid case."""
     quiet = {
         "run.ranks": ranks, "run.threads": threads, "run.frames": 0, "run.snapshots": 0,
         "run.checkpoint_every": "none",
@@ -114,7 +117,7 @@ def _momenta(told: Columns) -> list[tuple[float, float, float]]:
 
 
 def to_markdown(ended: Sequence[Verdict]) -> str:
-    """One line each, then what is wrong."""
+    """Prints one line for each case, then the failures."""
     head = ("case", "rows", "state", "worst residual", "momentum drift", "steps", "tets", "CPU s", "references")
     rows = [
         [

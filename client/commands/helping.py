@@ -1,4 +1,4 @@
-"""The help of the command line: commands in groups, an example or two behind each."""
+"""Help of the command line: commands in groups, with examples for each."""
 
 import typer
 from typer.core import TyperCommand, TyperGroup
@@ -12,7 +12,7 @@ GROUPS: dict[str, tuple[str, ...]] = {
     "Server": ("serve",),
     "Measure Conoid itself": ("bench", "hard"),
 }
-"""Commands by what they are for, in the order of a user's work."""
+"""Commands by purpose, in the order of a user's work."""
 EXAMPLES: dict[str, tuple[str, ...]] = {
     "cases": ("conoid cases", "conoid cases copy taylor_copper"),
     "validate": ("conoid validate my_case.toml", "conoid validate demo --set run.end_time='20 us'"),
@@ -53,14 +53,14 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "bench": ("conoid bench --help",),
     "hard": ("conoid hard",),
 }
-"""A line each; one that begins with blanks goes on with the line before."""
+"""Lines of the help; a line that begins with blanks continues the line before."""
 
 
 class Grouped(TyperGroup):
-    """A group whose help has its commands in GROUPS, and behind each command its EXAMPLES."""
+    """A group whose help lists its commands by GROUPS, and the help of each command its EXAMPLES."""
 
     def format_commands(self, ctx: typer.Context, formatter: object) -> None:  # type: ignore[override]
-        """Writes the commands; those of no group come last."""
+        """Writes the list of commands; those without a group come last."""
         there = {name: self.get_command(ctx, name) for name in self.list_commands(ctx)}
         named = {name for names in GROUPS.values() for name in names}
         groups = {**GROUPS, "More": tuple(name for name in there if name not in named)}
@@ -76,7 +76,7 @@ class Grouped(TyperGroup):
                     formatter.write_dl(rows)  # type: ignore[attr-defined]
 
     def get_command(self, ctx: typer.Context, cmd_name: str) -> TyperCommand | None:  # type: ignore[override]
-        """The command, with its examples."""
+        """Writes the help of the command, with its examples."""
         command = super().get_command(ctx, cmd_name)
         if command is not None and cmd_name in EXAMPLES and not command.epilog:
             lines = "\n".join(f"  {line}" for line in EXAMPLES[cmd_name])

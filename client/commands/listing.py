@@ -1,4 +1,4 @@
-"""``conoid runs``: which run was it."""
+"""``conoid runs``: the list of runs."""
 
 from typing import Annotated
 
@@ -14,18 +14,22 @@ from .options import Json, Labels, Token, Url, labels_of, show_lines
 from .times import moment
 
 _VALUES = 4
-"""Values that are told of a run, at most. Chosen: as many as a line has room for."""
+"""Largest number of values that are shown of a run. Chosen: as many as fit into a line."""
 
 
 Words = Annotated[
     list[str] | None,
-    typer.Argument(metavar="[WORD]...", help="Words: each in the name, title, a label, the state or the message."),
+    typer.Argument(
+        metavar="[WORD]...", help="Words that all occur in the name, title, a label, the state or the message."
+    ),
 ]
-Case = Annotated[str, typer.Option("--case", help="Name of the case; * stands for any letters.")]
+Case = Annotated[str, typer.Option("--case", help="Name of the case; * stands for any characters.")]
 States = Annotated[list[State] | None, typer.Option("--state", help="Only runs in this state; may be repeated.")]
-Since = Annotated[str, typer.Option("--since", metavar="WHEN", help="Submitted then or later: a date, today, 3d, 12h.")]
-Until = Annotated[str, typer.Option("--until", metavar="WHEN", help="Submitted before that.")]
-Limit = Annotated[int, typer.Option("--limit", min=1, help="At most so many.")]
+Since = Annotated[
+    str, typer.Option("--since", metavar="WHEN", help="Submitted at this time or later: a date, today, 3d, 12h.")
+]
+Until = Annotated[str, typer.Option("--until", metavar="WHEN", help="Submitted before this time.")]
+Limit = Annotated[int, typer.Option("--limit", min=1, help="Largest number of runs.")]
 
 
 def runs(
@@ -42,7 +46,7 @@ def runs(
 ) -> None:
     """List runs, newest first, with the values of their cases that differ.
 
-    The ids are short: each is the beginning that no other run has, and every command takes it.
+    Ids are short: each is the shortest unique prefix, which every command accepts.
     """
     first = moment(since, "--since") if since else None
     last = moment(until, "--until") if until else None
@@ -54,4 +58,4 @@ def runs(
     elif rows:
         show_lines(tables.runs_table(rows, differing(rows, _VALUES)))
     else:
-        echo("no runs" if not (text or case or state or label or since or until) else "no run is like this")
+        echo("no runs" if not (text or case or state or label or since or until) else "no run matches")

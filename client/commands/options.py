@@ -1,4 +1,4 @@
-"""What the commands have in common: options, how a run is found, how things are printed."""
+"""Common parts of the commands: options, selection of a run, output."""
 
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -27,31 +27,35 @@ from . import progress
 from .console import PlainConsole, echo, one_line
 
 _MOST_WARNINGS = 12
-"""Lines of warnings that are printed. Chosen: half a screen."""
+"""Largest number of warnings that are printed. Chosen: half a screen."""
 
 _RARER = 1.2
-"""From one word to the next, over the time that something takes. Chosen: some forty words in a day."""
+"""Growth of the time between two progress lines, relative to the whole duration. Chosen: some forty lines in a day."""
 
 _NO_WIDTH = 1000
 """Characters of a line in a file or a pipe. Chosen: more than any table needs."""
 
-Url = Annotated[str | None, typer.Option("--url", help="The server [CONOID_URL, or the configuration file].")]
-Token = Annotated[str | None, typer.Option("--token", help="Who asks [CONOID_TOKEN, or the configuration file].")]
+Url = Annotated[
+    str | None, typer.Option("--url", help="Address of the server [CONOID_URL, or the configuration file].")
+]
+Token = Annotated[
+    str | None, typer.Option("--token", help="Token of the user [CONOID_TOKEN, or the configuration file].")
+]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON, for scripts.")]
 
 
 def complete_cases(incomplete: str) -> list[str]:
-    """Names of shipped cases, for the shell."""
+    """Completes names of shipped cases for the shell."""
     return [name for name in shipped() if name.startswith(incomplete)]
 
 
 def complete_materials(incomplete: str) -> list[str]:
-    """Names of the material library, for the shell."""
+    """Completes names of the material library for the shell."""
     return [name for name in materials() if name.startswith(incomplete)]
 
 
 def _complete_files(incomplete: str) -> list[str]:
-    """Shipped cases, case files and folders, for the shell."""
+    """Completes shipped cases, case files and folders for the shell."""
     folder, _, start = incomplete.rpartition("/")
     try:
         found = sorted(Path(folder or ("/" if incomplete.startswith("/") else ".")).iterdir())
@@ -63,27 +67,27 @@ def _complete_files(incomplete: str) -> list[str]:
 
 
 def named(text: str) -> str:
-    """The id of a run or a sweep as it was given, or a folder. Raises UsageError for an empty one: a variable that is
-    not set; NotFoundError for a path at which there is no folder: no id has a ``/``.
+    """Returns the given id of a run or a sweep, or a folder. Raises UsageError for an empty text, such as an unset
+    variable; NotFoundError for a path without a folder: no id contains ``/``.
     """
     sweep_named(text)
     if ("/" in text or "\0" in text) and folder_of(text) is None:
-        raise NotFoundError(f"{text}: this is no folder of a run; write its folder, its id, or 'last'")
+        raise NotFoundError(f"{text}: not the folder of a run; write its folder, its id, or 'last'")
     return text
 
 
 def sweep_named(text: str) -> str:
-    """The id of a sweep as it was given. Raises UsageError for an empty one."""
+    """Returns the given id of a sweep. Raises UsageError for an empty text."""
     if not text.strip():
         raise UsageError("the name is empty: write an id, or 'last'")
     return text
 
 
 def folder_of(text: str) -> Path | None:
-    """The folder that is meant, None where there is none of this name."""
+    """Returns the folder of this name, None if there is none."""
     try:
         return Path(text) if Path(text).is_dir() else None
-    except (OSError, ValueError):  # a name that is too long, or that no file can have
+    except (OSError, ValueError):  # a name that is too long or not allowed
         return None
 
 
@@ -95,7 +99,7 @@ CaseArgument = Annotated[
 ]
 Overrides = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="KEY=VALUE", help="Change a key of the case, as run.end_time='20 us'."),
+    typer.Option("--set", metavar="KEY=VALUE", help="Change a key of the case, such as run.end_time='20 us'."),
 ]
 Ranks = Annotated[int | None, typer.Option("--ranks", min=1, help="MPI ranks; the case's own number if not given.")]
 Threads = Annotated[
@@ -106,7 +110,7 @@ MaxSteps = Annotated[
 ]
 Labels = Annotated[
     list[str] | None,
-    typer.Option("--label", metavar="NAME=VALUE", help="By which runs are found again; may be repeated."),
+    typer.Option("--label", metavar="NAME=VALUE", help="Label to find runs again; may be repeated."),
 ]
 SourceArgument = Annotated[
     str, typer.Argument(metavar="RUN", callback=named, help="The id of a run or its beginning, 'last', or its folder.")
@@ -114,38 +118,38 @@ SourceArgument = Annotated[
 
 
 def on_cores(ranks: int | None, threads: int | None) -> list[str]:
-    """The overrides that these options stand for."""
+    """Returns the overrides of these options."""
     chosen = (("run.ranks", ranks), ("run.threads", threads))
     return [f"{key}={number}" for key, number in chosen if number is not None]
 
 
 def labels_of(words: Sequence[str] | None) -> dict[str, str]:
-    """Of ``NAME=VALUE``. Raises ClientError."""
+    """Returns labels of ``NAME=VALUE``. Raises ClientError."""
     pairs = [word.partition("=") for word in words or ()]
     for name, equals, _ in pairs:
         if not (name and equals):
             raise UsageError(f"label = {name!r}: write NAME=VALUE")
     labels = {name: value for name, _, value in pairs}
     if len(labels) < len(pairs):
-        raise UsageError(f"label: each has one value; given are {', '.join(words or ())}")
+        raise UsageError(f"label: each name may have one value; given are {', '.join(words or ())}")
     return labels
 
 
 def complain(*lines: str) -> None:
-    """Tells people what is wrong, a line each."""
+    """Prints each problem in one line."""
     for line in lines:
         echo(f"conoid: {one_line(line)}", err=True)
 
 
 def warn(odd: Sequence[Problem]) -> None:
-    """Tells people what is odd, a line each, and how many more there are."""
+    """Prints each warning in one line, and the number of further ones."""
     complain(*(f"warning: {each}" for each in odd[:_MOST_WARNINGS]))
     if len(odd) > _MOST_WARNINGS:
         complain(f"warning: and {len(odd) - _MOST_WARNINGS} more; conoid validate --json has all")
 
 
 def warn_of(case: str, overrides: Iterable[str]) -> None:
-    """Tells what is odd with a case that is about to run; what is wrong with it is told by who runs it."""
+    """Prints the warnings of a case that is about to run; its errors are reported by the caller."""
     with suppress(CaseError, ArithmeticError):
         data = data_of(case, overrides)
         checked = parse_case(data)
@@ -159,7 +163,7 @@ def show(thing: RenderableType) -> None:
 
 
 def show_lines(rows: RenderableType) -> None:
-    """Prints a table of one line an entry; what is not a terminal has no width, and gets the lines whole."""
+    """Prints a table with one line for each entry; without a terminal the width is unlimited and lines stay whole."""
     console = PlainConsole()
     if not console.is_terminal:
         console.width = _NO_WIDTH
@@ -168,9 +172,7 @@ def show_lines(rows: RenderableType) -> None:
 
 @contextmanager
 def aloud(what: str) -> Iterator[Callable[[str], None]]:
-    """While what is done inside takes long, people are told ``what`` it is at, or what it was last called with; of what
-    takes hours more and more rarely.
-    """
+    """Prints ``what`` is in progress while the block inside takes long; the lines become rarer with time."""
     at, began, due = what, time.monotonic(), 0.0
 
     def name(now: str) -> None:
@@ -189,15 +191,15 @@ def aloud(what: str) -> Iterator[Callable[[str], None]]:
 
 
 def find(session: Session, run: str) -> Run:
-    """The run of an id or its beginning, or the newest one for ``last``. Raises NotFoundError, UsageError."""
+    """Returns the run of an id or a prefix of it, or the newest one for ``last``. Raises NotFoundError, UsageError."""
     if "/" in run:
-        raise UsageError(f"run = {shown(run)}: this asks a server; write the id of a run, or 'last'")
+        raise UsageError(f"run = {shown(run)}: this command needs a server; write the id of a run, or 'last'")
     return session.run(run)
 
 
 @contextmanager
 def opened(source: str, url: str | None, token: str | None) -> Iterator[Result]:
-    """The result of a run by its id, or in its folder."""
+    """Returns the result of a run by its id or its folder."""
     if (folder := folder_of(source)) is not None:
         yield Result.open(folder)
         return

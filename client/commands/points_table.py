@@ -1,4 +1,4 @@
-"""The table of a sweep in a terminal: keys, state, the results that tell most."""
+"""Table of a sweep in a terminal: keys, state, the most informative results."""
 
 import csv
 import io
@@ -15,11 +15,11 @@ from .sweep_columns import Row, number_of, telling
 from .tables import short_names, table
 
 _MOST = 4
-"""Results that are shown when nobody names any. Chosen: with keys and state they fit 80 characters."""
+"""Number of results that are shown by default. Chosen: with keys and state they fit 80 characters."""
 
 
 def narrowed(text: str, keys: Sequence[str], columns: Sequence[str]) -> str:
-    """CSV with the columns of the keys, the state and those that are named alone. Raises UsageError."""
+    """Returns CSV with the columns of the keys, the state and the named columns only. Raises UsageError."""
     rows = list(csv.DictReader(io.StringIO(text)))
     titles = {split(title)[0]: title for title in (rows[0] if rows else ())}
     names = dict.fromkeys([*(key for key in keys if key in titles), "run", "state", *columns])
@@ -33,8 +33,8 @@ def narrowed(text: str, keys: Sequence[str], columns: Sequence[str]) -> str:
 
 
 def table_of(rows: Sequence[Row], keys: Sequence[str], *, whole: bool) -> Table | Group:
-    """Keys, state and results of the lines of a table: all of them when it is ``whole``, else the telling ones and how
-    many more differ.
+    """Prints keys, state and results of a table: all of them if ``whole``, else the most informative ones, and the
+    number of further results that differ.
     """
     titles = list(rows[0]) if rows else []
     changed = [title for title in titles if split(title)[0] in keys]

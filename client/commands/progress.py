@@ -1,4 +1,4 @@
-"""Nobody waits 10 s without a word: what takes long is said again, by a thread, while nothing else is."""
+"""Progress lines: a command that is silent for almost 10 s prints what it does, from a thread."""
 
 import threading
 import time
@@ -6,17 +6,17 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 LONGEST = 8.0
-"""s after which something is said."""
+"""Time in s without output after which a line is printed."""
 _RARER = 1.2
-"""From one word to the next, over the silence. Chosen: some forty words in a day."""
+"""Growth of the time between two lines, relative to the silent time. Chosen: some forty lines in a day."""
 _LOOK = 0.125
-"""Between two looks of the thread, over ``LONGEST``."""
+"""Time between two checks of the thread, relative to ``LONGEST``."""
 
 
 @contextmanager
 def broken(write: Callable[[str], None], words: Callable[[], str]) -> Iterator[Callable[[str], None]]:
-    """``write``, to be used inside; when ``LONGEST`` s have passed without a line, it writes ``words()``, and after
-    that each time that the silence has become longer by a fifth.
+    """Context in which the caller prints with ``write``. After ``LONGEST`` s without a line it writes ``words()``,
+    and again each time that the silent time has grown by a fifth.
     """
     last, spoken, over = time.monotonic(), 0.0, threading.Event()
 

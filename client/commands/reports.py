@@ -1,4 +1,4 @@
-"""Commands that tell and draw what a run has said of itself, and what two runs have."""
+"""Commands that print and draw results of a run, and that compare two runs."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -19,15 +19,15 @@ from . import tables
 from .console import echo, echo_json
 from .options import Json, SourceArgument, Token, Url, aloud, named, opened, show
 
-figures = typer.Typer(no_args_is_help=True, help="Charts from what a run has told.")
+figures = typer.Typer(no_args_is_help=True, help="Draw charts of a run.")
 
 
-OutArgument = Annotated[Path, typer.Argument(metavar="OUT.png", help="The PNG, or SVG, or PDF.")]
+OutArgument = Annotated[Path, typer.Argument(metavar="OUT.png", help="PNG, SVG or PDF file to write.")]
 
 
 @contextmanager
 def drawing() -> Iterator[None]:
-    """Imports of modules that need matplotlib stand in it. Raises ViewError where matplotlib is missing."""
+    """Context for imports of modules that need matplotlib. Raises ViewError without matplotlib."""
     try:
         yield
     except ModuleNotFoundError as error:
@@ -38,7 +38,7 @@ def drawing() -> Iterator[None]:
 
 @figures.command(name="energy")
 def energy_figure(source: SourceArgument, out: OutArgument, url: Url = None, token: Token = None) -> None:
-    """Draw the energy ledger over time, also without its kinetic term, the residual, and each part's energy."""
+    """Draw the energy ledger over time, with and without its kinetic term, the residual, and each part's energy."""
     with drawing():
         from ..reports import curves
     with opened(source, url, token) as result, aloud(f"drawing {out}"):
@@ -47,7 +47,7 @@ def energy_figure(source: SourceArgument, out: OutArgument, url: Url = None, tok
 
 @figures.command(name="dt")
 def dt_figure(source: SourceArgument, out: OutArgument, url: Url = None, token: Token = None) -> None:
-    """Draw the length of the time step, and what holds it down."""
+    """Draw the length of the time step, and what limits it."""
     with drawing():
         from ..reports import curves
     with opened(source, url, token) as result, aloud(f"drawing {out}"):
@@ -56,7 +56,7 @@ def dt_figure(source: SourceArgument, out: OutArgument, url: Url = None, token: 
 
 @figures.command(name="fragments")
 def fragments_figure(source: SourceArgument, out: OutArgument, url: Url = None, token: Token = None) -> None:
-    """Draw how many fragments there are over time, and how many of which mass in the end."""
+    """Draw the number of fragments over time, and the distribution of their masses at the end."""
     with drawing():
         from ..reports import curves
     with opened(source, url, token) as result, aloud(f"drawing {out}"):
@@ -75,7 +75,7 @@ def history_figure(
     url: Url = None,
     token: Token = None,
 ) -> None:
-    """Draw columns of history.csv over time, those of one unit in one panel."""
+    """Draw columns of history.csv over time; columns of one unit share a panel."""
     with drawing():
         from ..reports import curves
     with opened(source, url, token) as result, aloud(f"drawing {out}"):
@@ -86,7 +86,7 @@ def report(
     source: SourceArgument,
     out: Annotated[Path | None, typer.Option("--out", help="The HTML file; named after the run if not given.")] = None,
     field: Annotated[
-        list[str] | None, typer.Option("--field", help="A field to draw; may be repeated. Default: what tells most.")
+        list[str] | None, typer.Option("--field", help="A field to draw; may be repeated. Default: by the case.")
     ] = None,
     pictures: Annotated[bool, typer.Option("--pictures/--no-pictures", help="Draw frames.")] = True,
     url: Url = None,
@@ -105,7 +105,9 @@ def report(
 def compare(
     a: SourceArgument,
     b: Annotated[str, typer.Argument(metavar="OTHER", callback=named, help="Another run, likewise.")],
-    out: Annotated[Path | None, typer.Option("--out", help="Draw both histories and fragment masses here.")] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", help="File for a chart of both histories and fragment masses.")
+    ] = None,
     column: Annotated[
         list[str] | None,
         typer.Option("--column", help="A column of history.csv to draw; may be repeated. Default: energies, probes."),
@@ -114,7 +116,7 @@ def compare(
     token: Token = None,
     as_json: Json = False,
 ) -> None:
-    """Tell in what two runs differ: keys, final values, fragments; draw their histories over each other."""
+    """Print how two runs differ: keys, final values, fragments; draw their histories in one chart."""
     with opened(a, url, token) as first, opened(b, url, token) as second, aloud("comparing the runs"):
         found = comparing.compare(first, second)
         if out is not None:
@@ -132,7 +134,7 @@ def compare(
 
 @figures.command(name="balance")
 def balance_figure(source: SourceArgument, out: OutArgument, url: Url = None, token: Token = None) -> None:
-    """Draw the outside nodes of each rank with the cuts, and where the CPU time went."""
+    """Draw the surface nodes of each rank with the balance events, and the CPU time by phase."""
     with drawing():
         from ..reports import charts
     with opened(source, url, token) as result, aloud(f"drawing {out}"):
@@ -147,16 +149,16 @@ def replay_balance(
         str | None,
         typer.Option("--policy", help="measured, outside, every, every:N or never; the run's own if not given."),
     ] = None,
-    alpha: Annotated[float | None, typer.Option("--alpha", help="Of the policy 'outside'.")] = None,
+    alpha: Annotated[float | None, typer.Option("--alpha", help="Parameter alpha of the policy 'outside'.")] = None,
     ranks: Annotated[int | None, typer.Option("--ranks", min=1, help="Ranks; those of the run if not given.")] = None,
     cost: Annotated[
-        float | None, typer.Option("--cost", min=0.0, help="Of a cut, s; what the run has measured if not given.")
+        float | None, typer.Option("--cost", min=0.0, help="Cost of a cut in s; default: as measured in the run.")
     ] = None,
     url: Url = None,
     token: Token = None,
     as_json: Json = False,
 ) -> None:
-    """Tell what other balance policies would have cost and saved, from the loads that a run has told."""
+    """Print what other balance policies would have cost and saved, from the measured loads of a run."""
     with opened(source, url, token) as result, aloud("reading the run"):
         spec = Balance.model_validate(result.case.get("balance", {}))
         record = replay.read(result.messages, replay.named(spec))

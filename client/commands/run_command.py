@@ -1,4 +1,4 @@
-"""``conoid run``: one case, from start to picture, on this machine."""
+"""``conoid run``: runs one case on this machine, from its check to a picture."""
 
 import signal
 from contextlib import ExitStack
@@ -32,7 +32,7 @@ from .console import PlainConsole, echo_json, one_line
 from .options import complain
 
 _LAST_WORDS = 30.0
-"""s that the server gets to tell the end of a run whose last message has come."""
+"""Time in s in which the server must report the end of a run after its last message."""
 
 
 def run_once(
@@ -46,9 +46,8 @@ def run_once(
     check: bool = False,
     as_json: bool = False,
 ) -> int:
-    """Runs a case with a server of its own and returns the exit code. Raises CaseError, ClientError.
-
-    Ctrl-C, and SIGTERM, cancel the run, wait for its end and stop the server.
+    """Runs a case with a server of its own and returns the exit code. Ctrl-C and SIGTERM cancel the run, wait for
+    its end and stop the server. Raises CaseError, ClientError.
     """
     if field is not None and field not in FIELDS:
         raise UsageError(f"field = {field!r}: {allowed(field, FIELDS)}")
@@ -65,7 +64,7 @@ def run_once(
         at = ["the server is starting"]
         with progress.broken(out.print, lambda: at[-1]):
             up.enter_context(server)
-            at.append("handing the case in")
+            at.append("submitting the case")
             server.session.outbox.say = at.append
             run = server.session.submit(data, folder=folder_of(case))
         info, told = _follow(run, checked, out, plain)
@@ -83,16 +82,18 @@ def run_once(
 
 
 def _warn_of_cores(case: Case) -> None:
-    """Threads that take turns on a core make a run slower than fewer threads."""
+    """Warns of more threads than cores: they make a run slower."""
     run, there = case.run, usable_cores()
     if run.cores > there:
         wanted = f"{crew(run.ranks, run.threads)} want {counted(run.cores, 'core')}"
-        complain(f"warning: {wanted}, and there {'is' if there == 1 else 'are'} {there}: they take turns")
+        complain(
+            f"warning: {wanted}, and there {'is' if there == 1 else 'are'} {there}: they share cores and run slower"
+        )
 
 
 def _follow(run: Run, case: Case, out: Console, plain: bool) -> tuple[RunInfo, set[str]]:
-    """Shows the run to its end; a first Ctrl-C cancels it, further ones change nothing. Returns also the texts of its
-    log that are printed as lines: a panel has its last ones alone.
+    """Shows the run until its end. The first Ctrl-C cancels it; further ones have no effect. Also returns the log
+    texts that were printed as lines: a panel shows only the last ones.
     """
     known, told = Live(run.id, title=case.title or case.name), set[str]()
     try:
@@ -115,7 +116,7 @@ def _follow(run: Run, case: Case, out: Console, plain: bool) -> tuple[RunInfo, s
 
 
 def _report(result: Result, outcome: Outcome, told: set[str], out: Console) -> None:
-    """``told``: warnings that need not be printed again."""
+    """``told``: warnings that were printed before."""
     out.print()
     for part in tables.end_tables(outcome, told):
         out.print(part)
@@ -124,7 +125,8 @@ def _report(result: Result, outcome: Outcome, told: set[str], out: Console) -> N
 
 
 def _telling_field(case: Case) -> str:
-    """The fragments where something can break, plastic strain where something can yield, else the stress."""
+    """Returns the field of the picture: fragments if something can break, plastic strain if something can yield,
+    else the stress."""
     if case.fractures:
         return "fragment"
     yields = any(material(case, part.material).strength is not None for part in case.parts)

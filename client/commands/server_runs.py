@@ -1,4 +1,4 @@
-"""Commands on the runs of a server: hand one in, list, show and follow runs, ask something of one, fetch its files."""
+"""Commands on the runs of a server: submit, list, show, follow, cancel, request, fetch files."""
 
 import sys
 from collections.abc import Callable
@@ -47,7 +47,7 @@ from .options import (
 
 
 def _filled(key: str | None) -> str | None:
-    """The key. Raises UsageError for an empty one: a variable that is not set would make a second run."""
+    """Returns the idempotency key. Raises UsageError for an empty one: an unset variable would make a second run."""
     if key is not None and not key.strip():
         raise UsageError("--key is empty: write one, or leave it out")
     return key
@@ -68,17 +68,19 @@ def submit(
     ranks: Ranks = None,
     threads: Threads = None,
     label: Labels = None,
-    profile: Annotated[str, typer.Option("--profile", help="Of the site's batch system; its default.")] = "",
-    priority: Annotated[int, typer.Option("--priority", help="Among your own runs: -100 to 100.")] = 0,
+    profile: Annotated[
+        str, typer.Option("--profile", help="Profile of the site's batch system; default: that of the site.")
+    ] = "",
+    priority: Annotated[int, typer.Option("--priority", help="Priority among your own runs: -100 to 100.")] = 0,
     url: Url = None,
     token: Token = None,
     as_json: Json = False,
 ) -> None:
-    """Hand a case to the server; prints the run's id."""
+    """Submit a case to the server; prints the run's id."""
     changes = [*(overrides or ()), *on_cores(ranks, threads)]
     warn_of(case, changes)
     with connect(url, token) as session:
-        with aloud("handing the case in") as session.outbox.say:
+        with aloud("submitting the case") as session.outbox.say:
             run = session.submit(case, changes, key, labels_of(label), profile, priority)
         if as_json:
             echo_json(run.status())
@@ -95,7 +97,7 @@ def restart(
     token: Token = None,
     as_json: Json = False,
 ) -> None:
-    """Go on from the newest checkpoint of a run, as a new run with the same answer; prints its id."""
+    """Continue from the newest checkpoint of a run, as a new run with the same answer; prints its id."""
     with connect(url, token) as session:
         made = session.restart(find(session, run).id, ranks, threads=threads, max_steps=max_steps)
         if as_json:
@@ -105,7 +107,7 @@ def restart(
 
 
 def show_run(run: SourceArgument, url: Url = None, token: Token = None, as_json: Json = False) -> None:
-    """Show one run: where it is, or how it ended."""
+    """Show one run: its progress, or its outcome."""
     if (folder := folder_of(run)) is not None:
         info = local_run.status(folder)
     else:
@@ -123,7 +125,7 @@ def show_run(run: SourceArgument, url: Url = None, token: Token = None, as_json:
 
 def watch_run(
     run: SourceArgument,
-    plain: Annotated[bool, typer.Option("--plain", help="Lines instead of the panel.")] = False,
+    plain: Annotated[bool, typer.Option("--plain", help="Print lines instead of the panel.")] = False,
     url: Url = None,
     token: Token = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print every message as one line of JSON.")] = False,
@@ -147,19 +149,19 @@ def _watched(run: str, plain: bool, url: str | None, token: str | None, as_json:
         found = find(session, run)
         try:
             known = _print_messages(found) if as_json else watch(found, False if plain else None)
-            if not known.state.final:  # a journal that has lost its end
+            if not known.state.final:  # a journal without its end
                 info = found.status()
                 known.state, known.cause, known.message = info.state, info.cause, info.message
             if not as_json:
                 _tell_probes(found.status)
             return known
         except KeyboardInterrupt:
-            complain(f"the run goes on; conoid watch {found.id} shows it again")
+            complain(f"the run continues; conoid watch {found.id} shows it again")
             raise
 
 
 def _tell_probes(status: Callable[[], RunInfo]) -> None:
-    """What the probes have measured, where that can be asked: the run has been shown to its end already."""
+    """Prints the probes if they can be read: the run itself has been shown already."""
     with suppress(ClientError):
         ended = status().outcome
         if ended is not None and ended.probes:
@@ -183,7 +185,7 @@ def _tell(info: RunInfo, text: str, as_json: bool) -> None:
 
 
 def cancel(run: SourceArgument, url: Url = None, token: Token = None, as_json: Json = False) -> None:
-    """Stop a run at its next step; of a run without a server, name the folder."""
+    """Stop a run at its next step; for a run without a server give its folder."""
     if (folder := folder_of(run)) is not None and local_run.at_hand(folder):
         echo(cancel_folder(folder))
         return
@@ -193,37 +195,39 @@ def cancel(run: SourceArgument, url: Url = None, token: Token = None, as_json: J
 
 
 def checkpoint(run: SourceArgument, url: Url = None, token: Token = None, as_json: Json = False) -> None:
-    """Ask a run for a checkpoint, from which it can go on if it is lost."""
+    """Request a checkpoint, from which a lost run can continue."""
     if (folder := folder_of(run)) is not None and local_run.at_hand(folder):
         echo(local_run.ask(folder, layout.CHECKPOINT_REQUEST, "a checkpoint"))
         return
     with connect(url, token) as session:
         info = find(session, run).checkpoint()
-    _tell(info, f"{info.id} asked for a checkpoint", as_json)
+    _tell(info, f"{info.id} checkpoint requested", as_json)
 
 
 def snapshot(run: SourceArgument, url: Url = None, token: Token = None, as_json: Json = False) -> None:
-    """Ask a run for a snapshot of its fragments; watch tells when it is there."""
+    """Request a snapshot of the fragments; watch reports it when it is there."""
     if (folder := folder_of(run)) is not None and local_run.at_hand(folder):
         echo(local_run.ask(folder, layout.SNAPSHOT_REQUEST, "a snapshot"))
         return
     with connect(url, token) as session:
         info = find(session, run).take_snapshot()
-    _tell(info, f"{info.id} asked for a snapshot", as_json)
+    _tell(info, f"{info.id} snapshot requested", as_json)
 
 
 def get(
     run: SourceArgument,
     names: Annotated[
         list[str] | None,
-        typer.Argument(metavar="[FILE]...", help="Files to fetch; all when none, but for checkpoints."),
+        typer.Argument(metavar="[FILE]...", help="Files to copy; default: all except checkpoints."),
     ] = None,
-    out: Annotated[Path | None, typer.Option("--out", help="Folder to copy into; the run's id when not given.")] = None,
+    out: Annotated[Path | None, typer.Option("--out", help="Target folder; default: the run's id.")] = None,
     url: Url = None,
     token: Token = None,
     as_json: Annotated[bool, typer.Option("--json", help="List the run's files as JSON; copies nothing.")] = False,
 ) -> None:
-    """Copy a run's files here; those that it lacks are named, and the command ends with 1 then."""
+    """Copy a run's files to this machine.
+
+    If files are missing, they are listed and the exit code is 1."""
     if (folder := folder_of(run)) is not None and local_run.at_hand(folder):
         _copy(local_run.FolderFiles(folder), names, out, as_json)
         return

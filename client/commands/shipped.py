@@ -1,4 +1,4 @@
-"""What comes with Conoid: the keys of a case, the shipped cases, the material library."""
+"""Commands on the files of the installation: keys of a case, shipped cases, material library."""
 
 from pathlib import Path
 from typing import Annotated
@@ -17,7 +17,7 @@ from .console import echo, echo_json
 from .options import Json, complete_cases, complete_materials, show
 
 cases = typer.Typer(invoke_without_command=True, help="The shipped cases: list them, copy one.")
-OutOption = Annotated[Path | None, typer.Option("--out", help="Write to this file.")]
+OutOption = Annotated[Path | None, typer.Option("--out", help="File to write.")]
 
 
 def schema(
@@ -36,7 +36,7 @@ def schema(
 
 def materials(
     name: Annotated[
-        str | None, typer.Argument(metavar="[NAME]", help="One of them.", autocompletion=complete_materials)
+        str | None, typer.Argument(metavar="[NAME]", help="Name of a material.", autocompletion=complete_materials)
     ] = None,
     as_json: Json = False,
 ) -> None:
@@ -60,7 +60,7 @@ def materials(
 
 @cases.callback()
 def list_cases(ctx: typer.Context, as_json: Json = False) -> None:
-    """List the shipped cases: name, title and what each costs."""
+    """List the shipped cases: name, title and cost."""
     if ctx.invoked_subcommand is not None:
         return
     known = {name: load.read_case(path) for name, path in load.shipped().items()}
@@ -77,8 +77,8 @@ def copy_case(
     name: Annotated[str, typer.Argument(metavar="NAME", help="A shipped case.", autocompletion=complete_cases)],
     out: OutOption = None,
 ) -> None:
-    """Copy a shipped case here, to change it, with the files that it names, and the schema beside it by which editors
-    complete its keys.
+    """Copy a shipped case into this folder, with the files that it names, and the schema by which editors complete
+    its keys.
     """
     shipped = load.shipped_path(name)
     text = shipped.read_text(encoding="utf-8")

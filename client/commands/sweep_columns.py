@@ -1,4 +1,4 @@
-"""Which columns of the table of a sweep tell most; its lines are mappings of titles to texts."""
+"""The most informative columns of the table of a sweep. Its lines are mappings of titles to texts."""
 
 from collections.abc import Mapping, Sequence
 from typing import TypeAlias
@@ -19,14 +19,14 @@ _FIRST = (
     "energy.plastic",
     "energy.kinetic",
 )
-"""What is drawn rather than other columns."""
+"""Columns that are shown first."""
 _NEVER = frozenset({"time", "elapsed", "cpu", "elements", "nodes", "worst_residual", "reference.worst_residual",
                     "energy.residual", "energy.initial", "steps", "warnings"})  # fmt: skip
-"""What is drawn only when it is asked for: it tells of the machine or of the mesh."""
+"""Columns that are shown only on request: they depend on the machine or on the mesh."""
 
 
 def known(rows: Sequence[Row], name: str) -> str:
-    """The title of a column of numbers, by its name. Raises UsageError."""
+    """Returns the title of a column of numbers by its name. Raises UsageError."""
     there = [column for column in rows[0] if any(number_of(row[column]) is not None for row in rows)]
     titles = {_bare(column): column for column in there} | {column: column for column in there}
     if name not in titles:
@@ -35,7 +35,7 @@ def known(rows: Sequence[Row], name: str) -> str:
 
 
 def telling(rows: Sequence[Row], titles: Sequence[str]) -> list[str]:
-    """The columns of numbers that differ between the points, the most telling ones first."""
+    """Returns the columns of numbers that differ between the points, the most informative ones first."""
 
     def differs(name: str) -> bool:
         found = {value for row in rows if (value := number_of(row[name])) is not None}
@@ -47,18 +47,18 @@ def telling(rows: Sequence[Row], titles: Sequence[str]) -> list[str]:
 
 
 def _rank(title: str) -> tuple[bool, int]:
-    """The least comes first; extremes of probes come last."""
+    """Sort key of a title: smallest first, extremes of probes last."""
     first = next((n for n, begins in enumerate(_FIRST) if title.startswith(begins)), len(_FIRST))
     return _bare(title).endswith((".min", ".max")), first
 
 
 def _bare(column: str) -> str:
-    """The name of a column without its unit."""
+    """Returns the name of a column without its unit."""
     return split(column)[0]
 
 
 def number_of(text: str) -> float | None:
-    """None for a text that is no number."""
+    """Returns None for a text that is not a number."""
     try:
         return float(text)
     except ValueError:

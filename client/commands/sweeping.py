@@ -1,4 +1,4 @@
-"""``conoid sweep``: hand in, look at, cancel, the table and the plot."""
+"""``conoid sweep``: submit, show, cancel, table and plot."""
 
 import hashlib
 import json
@@ -42,21 +42,26 @@ Sets = Annotated[
     list[str] | None,
     typer.Option(
         "--set", metavar="KEY=A,B,C",
-        help="Values of a key, or one for all points; KEY=LOW:HIGH with --adaptive. May be given again.",
+        help="Values of a key, or one for all points; KEY=LOW:HIGH with --adaptive. May be repeated.",
     ),
 ]  # fmt: skip
 Adaptive = Annotated[
     str | None,
-    typer.Option("--adaptive", metavar="'RESULT = VALUE'", help="Find where a result of the table passes a value."),
+    typer.Option(
+        "--adaptive",
+        metavar="'RESULT = VALUE'",
+        help="Search for the point at which a result of the table passes a value.",
+    ),
 ]
 Tolerance = Annotated[
-    str | None, typer.Option("--tolerance", help="With --adaptive: width of the bracket; 1 % of the larger end.")
+    str | None,
+    typer.Option("--tolerance", help="With --adaptive: width of the bracket; default: 1 % of the larger end."),
 ]
 
 
 @dataclass(frozen=True)
 class Place:
-    """Where the runs are made: on a server, or with one of our own in a folder of this machine."""
+    """Place of the runs: a server, or a folder of this machine with a server of its own."""
 
     local: bool
     runs: Path
@@ -65,13 +70,13 @@ class Place:
 
     @contextmanager
     def session(self, data: Mapping[str, Any]) -> Iterator[Session]:
-        """A session; a server of our own has a slot for each core, and as many as the case takes."""
+        """Yields a session. An own server has a slot for each core, and at least as many as the case needs."""
         if not self.local:
             with connect(self.url, self.token) as session:
                 yield session
             return
         cores = usable_cores()
-        with suppress(CaseError):  # what is wrong is told when the points are made
+        with suppress(CaseError):  # errors are reported when the points are made
             cores = max(cores, parse_case(data).run.cores)
         with LocalServer(self.runs, cores) as server:
             yield server.session
@@ -80,30 +85,34 @@ class Place:
 def sweep(
     case: CaseArgument,
     sets: Sets = None,
-    grid: Annotated[bool, typer.Option("--grid", help="Each value of a key with each of the others.")] = False,
+    grid: Annotated[bool, typer.Option("--grid", help="Run all combinations of the values.")] = False,
     listed: Annotated[
         Path | None, typer.Option("--list", metavar="FILE", help="Points from a CSV file; its first line has the keys.")
     ] = None,
     adaptive: Adaptive = None,
     tolerance: Tolerance = None,
-    most: Annotated[int | None, typer.Option("--most", min=2, help="With --adaptive: runs at most; 40.")] = None,
+    most: Annotated[
+        int | None, typer.Option("--most", min=2, help="With --adaptive: largest number of runs; default: 40.")
+    ] = None,
     ranks: Ranks = None,
     threads: Threads = None,
-    at_once: Annotated[int | None, typer.Option("--at-once", min=1, help="Runs of it that run at a time.")] = None,
-    wait: Annotated[bool, typer.Option("--wait", help="Return when all runs have ended; 1 when one failed.")] = False,
-    new: Annotated[bool, typer.Option("--new", help="Begin anew, also where the same sweep is there.")] = False,
+    at_once: Annotated[int | None, typer.Option("--at-once", min=1, help="Largest number of runs at a time.")] = None,
+    wait: Annotated[
+        bool, typer.Option("--wait", help="Wait until all runs have ended; exit code 1 when one failed.")
+    ] = False,
+    new: Annotated[bool, typer.Option("--new", help="Start a new sweep, even if the same one exists.")] = False,
     local: Annotated[bool, typer.Option("--local", help="Run on this machine, without a server.")] = False,
     runs: Annotated[Path, typer.Option("--runs", help="With --local: folder of the runs.")] = Path("runs/local"),
     out: Annotated[
-        Path | None, typer.Option("--out", help="Write the table here (CSV); with --adaptive what was found (JSON).")
+        Path | None, typer.Option("--out", help="File for the table (CSV); with --adaptive for the answer (JSON).")
     ] = None,
     url: Url = None,
     token: Token = None,
     as_json: Json = False,
 ) -> None:
-    """Run a case at many points, or look for the point where a result passes a value.
+    """Run a case at many points, or search for the point at which a result passes a value.
 
-    The same command goes on with a sweep that was interrupted: points that have succeeded are not run again.
+    The same command continues an interrupted sweep: points that have succeeded are not run again.
     """
     cores, place = on_cores(ranks, threads), Place(local, runs, url, token)
     if adaptive is not None:
@@ -129,7 +138,7 @@ def sweep(
 
 
 def _same(case: str, points: Sequence[Point], cores: Sequence[str], at_once: int | None) -> str:
-    """The key of the sweep that these words mean."""
+    """Returns the idempotency key of the sweep with these arguments."""
     told = json.dumps([locate(case).stem, points, list(cores), at_once], default=str)
     return f"sweep-{hashlib.sha256(told.encode()).hexdigest()[:40]}"
 
@@ -195,14 +204,14 @@ def _end(made: Sweep, info: SweepInfo, out: Path | None, *, as_json: bool) -> No
 
 
 def _how(point: SweepPoint) -> str:
-    """A point and how its run has ended."""
+    """Prints a point and the end of its run."""
     values = ", ".join(f"{key} = {value}" for key, value in point.values.items())
     why = f": {point.run.message or point.run.cause}" if point.run.state is not State.SUCCEEDED else ""
     return f"{values}: {point.run.state.value}{why}"
 
 
 def told(failed: list[SweepPoint], total: int) -> str:
-    """How many runs have not succeeded, and the first of them."""
+    """Prints the number of runs without success, and the first of them."""
     values, run = failed[0].values, failed[0].run
     point = ", ".join(f"{key} = {value}" for key, value in values.items())
     why = run.message or run.cause
@@ -213,16 +222,17 @@ def told(failed: list[SweepPoint], total: int) -> str:
 def sweep_table(
     sweep: SweepArgument,
     columns: Annotated[
-        list[str] | None, typer.Option("--column", help="Of the table; may be given again. If none: what differs.")
+        list[str] | None,
+        typer.Option("--column", help="Column of the table; may be repeated. Default: those that differ."),
     ] = None,
     out: Annotated[Path | None, typer.Option("--out", help="CSV file to write; standard output if not given.")] = None,
     url: Url = None,
     token: Token = None,
 ) -> None:
-    """Print a sweep: a line a point with its values, the state of its run and its results.
+    """Print a sweep: one line for each point with its values, state and results.
 
-    A terminal gets a table of the results that differ, or of the columns that are named; a pipe and --out get CSV of
-    all columns, or of the keys, the state and the columns that are named.
+    A terminal gets a table of the results that differ, or of the named columns; a pipe and --out get CSV with all
+    columns, or with the keys, the state and the named columns.
     """
     if (path := file_named(sweep)) is not None:
         made = columns_of(path)
@@ -244,17 +254,21 @@ def sweep_table(
 
 def sweep_plot(
     sweep: SweepArgument,
-    out: Annotated[Path, typer.Option("--out", help="PNG file to write, or what its name ends in.")] = Path(
+    out: Annotated[Path, typer.Option("--out", help="PNG file to write; another ending selects its format.")] = Path(
         "sweep.png"
     ),
     columns: Annotated[
-        list[str] | None, typer.Option("--column", help="Of the table; may be given again. If none: what differs.")
+        list[str] | None,
+        typer.Option("--column", help="Column of the table; may be repeated. Default: those that differ."),
     ] = None,
-    x: Annotated[str | None, typer.Option("--x", metavar="KEY", help="On the axis; the first that varies.")] = None,
+    x: Annotated[
+        str | None, typer.Option("--x", metavar="KEY", help="Key on the axis; default: the first that varies.")
+    ] = None,
     url: Url = None,
     token: Token = None,
 ) -> None:
-    """Draw the results of a sweep over what was changed: a panel a result, a curve a value of other keys."""
+    """Draw the results of a sweep over the changed key: a panel for each result, a curve for each value of the other
+    keys."""
     with aloud(f"drawing {out}"):
         if (path := file_named(sweep)) is not None:
             made = columns_of(path)
@@ -270,7 +284,7 @@ def sweep_plot(
 
 
 def sweep_cancel(sweep: SweepArgument, url: Url = None, token: Token = None, as_json: Json = False) -> None:
-    """Cancel every run of a sweep that has not ended."""
+    """Cancel every open run of a sweep."""
     with connect(url, token) as session:
         info: SweepInfo = session.find_sweep(sweep).cancel()
     if as_json:

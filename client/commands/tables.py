@@ -1,4 +1,4 @@
-"""What the command line prints once: lists of runs, one run, outcomes, reference numbers; estimates: ``validated``."""
+"""Tables on the command line: lists of runs, one run, outcomes, reference numbers; estimates are in ``validated``."""
 
 import math
 from collections import Counter
@@ -41,15 +41,15 @@ from ..studies.replay import Account
 from .display import STATE_STYLE
 
 _LONGEST = 60
-"""Characters of the value of a key that are shown. Chosen: two lines beside another one; a description is a page."""
+"""Characters of the value of a key that are shown. Chosen: two lines beside another one; a description has a page."""
 _NUMBERS = ("A", "B", "B - A", "% of A")
 _LEAST = 26
-"""Characters of names beside numbers. Chosen: what they leave of 80, and most names fit."""
+"""Characters of names beside numbers. Chosen: the rest of 80, and most names fit."""
 
 
 def table(*columns: str, right: Sequence[str] = (), wide: Sequence[str] = ("case",), least: int | None = None) -> Table:
-    """An open table with these columns; those named in ``right`` are numbers, ``wide`` ones are wrapped where need be,
-    the first of them to ``least`` characters.
+    """Returns an open table with these columns; those in ``right`` are numbers, ``wide`` ones are wrapped if
+    necessary, the first of them to ``least`` characters.
     """
     made = Table(box=box.SIMPLE_HEAD, header_style="bold", pad_edge=False, show_edge=False, padding=(0, 1, 0, 0))
     for column in columns:
@@ -62,7 +62,7 @@ def table(*columns: str, right: Sequence[str] = (), wide: Sequence[str] = ("case
 
 
 def pairs(entries: Mapping[str, str] | Mapping[str, str | Text]) -> Table:
-    """Names and values in two columns; entries without a value are left out."""
+    """Returns names and values in two columns; entries without a value are left out."""
     grid = Table.grid(padding=(0, 2))
     grid.add_column(style="bright_black", no_wrap=True)
     grid.add_column(overflow="fold")
@@ -73,13 +73,13 @@ def pairs(entries: Mapping[str, str] | Mapping[str, str | Text]) -> Table:
 
 
 def state_text(state: State, cause: str | None = None) -> Text:
-    """The state in its colour, with the cause of the end."""
+    """Returns the state in its colour, with the cause of the end."""
     text = Text(state.value, style=STATE_STYLE.get(state, "bold"))
     return text.append(f" ({cause})", style="default") if cause and cause != state.value else text
 
 
 def runs_table(rows: Sequence[RunRow], keys: Sequence[str]) -> Table:
-    """One line a run, with the values of ``keys``: where the terminal is too narrow, texts end in an ellipsis."""
+    """Prints one line for each run, with the values of ``keys``; in a narrow terminal texts end with an ellipsis."""
     last = ("cores", "submitted", "took")
     named = short_names(keys)
     told = [_differs(row, named) for row in rows]
@@ -99,7 +99,7 @@ def runs_table(rows: Sequence[RunRow], keys: Sequence[str]) -> Table:
 
 
 def row_of(row: RunRow) -> dict[str, Any]:
-    """A row of the table as plain data."""
+    """Returns a row of the table as plain data."""
     return {
         **row.info.listed, "values": row.values, "results": row.results, "units": row.units,
         "references": row.references, "missed": row.missed,
@@ -107,12 +107,12 @@ def row_of(row: RunRow) -> dict[str, Any]:
 
 
 def _own(run: RunInfo) -> dict[str, str]:
-    """Labels without those that a sweep gives its runs."""
+    """Returns the labels without those of a sweep."""
     return {name: value for name, value in run.labels.items() if name not in ("sweep", "point")}
 
 
 def _how(row: RunRow) -> Text:
-    """The state, how far it is, how many reference numbers it misses."""
+    """Returns the state, the progress, and the number of failed references."""
     run, text = row.info, state_text(row.info.state, row.info.cause)
     if run.progress is not None and not run.state.final and run.progress.end_time > 0.0:
         text.append(f" {percent(run.progress.t / run.progress.end_time, 0)}", style="default")
@@ -122,14 +122,14 @@ def _how(row: RunRow) -> Text:
 
 
 def short_names(keys: Sequence[str]) -> dict[str, str]:
-    """Each key by its last parts, as many as no other one of them ends with."""
+    """Returns each key by its last parts, as many as make it unique."""
     tails = {key: [".".join(key.split(".")[-n:]) for n in range(1, key.count(".") + 2)] for key in keys}
     times = Counter(tail for own in tails.values() for tail in own)
     return {key: next((tail for tail in own if times[tail] == 1), key) for key, own in tails.items()}
 
 
 def _differs(row: RunRow, named: Mapping[str, str]) -> str:
-    """The values of some keys, each with its short name."""
+    """Returns the values of some keys, each with its short name."""
     there = [(key, name, row.values[key]) for key, name in named.items() if key in row.values]
     return ", ".join(
         f"{name} {exact(value, row.units.get(key, '')) if _is_number(value) else value}" for key, name, value in there
@@ -145,7 +145,7 @@ def _cores(run: RunInfo) -> str:
 
 
 def run_table(run: RunInfo) -> Table:
-    """Everything about one run."""
+    """Prints everything about one run."""
     progress = run.progress
     done = progress.t / progress.end_time if progress is not None and progress.end_time > 0.0 else None
     return pairs({
@@ -166,7 +166,7 @@ def run_table(run: RunInfo) -> Table:
 
 
 def cases_table(cases: Mapping[str, Case]) -> Table:
-    """One line a shipped case, with the CPU time that it takes, about."""
+    """Prints one line for each shipped case, with its approximate CPU time."""
     made = table("case", "title", "tets", "core time", right=("tets", "core time"), wide=("title",))
     for name, case in cases.items():
         expected = estimate(case)
@@ -176,7 +176,7 @@ def cases_table(cases: Mapping[str, Case]) -> Table:
 
 
 def materials_table(materials: Mapping[str, Material]) -> Table:
-    """One line a material of the library."""
+    """Prints one line for each material of the library."""
     made = table("material", "kg/m^3", "what it is", right=("kg/m^3",), wide=("what it is",))
     for name, each in sorted(materials.items()):
         made.add_row(name, number(each.density), each.description)
@@ -184,7 +184,7 @@ def materials_table(materials: Mapping[str, Material]) -> Table:
 
 
 def constants_table(constants: Sequence[Constant]) -> Table:
-    """One line a constant: how sure it is, and the key of its source."""
+    """Prints one line for each constant: its confidence, and the key of its source."""
     made = table("key", "value", "known", "source", right=("value",))
     for each in constants:
         made.add_row(each.key, each.value, each.confidence, each.source)
@@ -192,12 +192,12 @@ def constants_table(constants: Sequence[Constant]) -> Table:
 
 
 def sources_table(constants: Sequence[Constant]) -> Table:
-    """What the keys of the sources stand for."""
+    """Returns the sources of these keys."""
     return pairs({each.source: each.cited for each in constants})
 
 
 def outcome_table(outcome: Outcome, told: Collection[str] = ()) -> Table:
-    """How a run ended, with its warnings but for those that are ``told`` already."""
+    """Prints the outcome of a run, with its warnings except those in ``told``, which were printed before."""
     energy, ranks = outcome.energy, crew(outcome.ranks, outcome.threads)
     entries: dict[str, str | Text] = {"state": state_text(State(outcome.state), outcome.cause), "why": outcome.message}
     speed, setup, worst = outcome.element_updates_per_second, outcome.setup, rough(outcome.worst_residual)
@@ -217,7 +217,7 @@ def outcome_table(outcome: Outcome, told: Collection[str] = ()) -> Table:
 
 
 def _a_step(outcome: Outcome) -> str:
-    """What one thread does alone, and what threads share, of the rank that is alone for longest."""
+    """Returns the serial and the parallel shares of the rank with the longest serial part."""
     alone, steps = [sum(each) for each in zip(*outcome.serial.values(), strict=True)], outcome.steps
     if not alone or not steps:
         return ""
@@ -232,13 +232,14 @@ def _a_step(outcome: Outcome) -> str:
 
 
 def _compressed(met: Compressed) -> str:
-    """The compression that a part without a law against it has met."""
+    """Returns the largest compression of a part without a law for it."""
     beyond = f", {counted(met.tets, 'tet')} beyond it at once" if met.tets else ""
     return f"{met.part} up to {si(met.most, 'Pa')}, {fixed(met.times)} times Griffith's criterion{beyond}"
 
 
 def balance_table(accounts: Sequence[Account], happened: Account) -> Table:
-    """What balance policies come to, beside what happened; the time saved is against no cut at all."""
+    """Prints costs of balance policies beside the actual ones; the saved time is relative to a run without
+    balancing."""
     made = table(
         "policy", "cuts", "lost", "cost of cuts", "total", "saved", "imbalance",
         right=("cuts", "lost", "cost of cuts", "total", "saved", "imbalance"),
@@ -258,7 +259,7 @@ def balance_table(accounts: Sequence[Account], happened: Account) -> Table:
 
 
 def checks_table(checks: Sequence[Check]) -> Table:
-    """The reference numbers: value, expected, tolerance, and whether they agree."""
+    """Prints the reference numbers: value, expected value, tolerance, verdict."""
     made = table("reference", "value", "expected", "tolerance", "", right=("value", "expected", "tolerance"))
     for check in checks:
         verdict = Text("pass", style="bold green") if check.passed else Text("FAIL", style="bold red")
@@ -268,7 +269,7 @@ def checks_table(checks: Sequence[Check]) -> Table:
 
 
 def probes_table(probes: Sequence[Measured]) -> Table:
-    """The last value of each probe, its smallest and its largest."""
+    """Prints the last value of each probe, its minimum and its maximum."""
     made = table("probe", "at the end", "min", "max", right=("at the end", "min", "max"), wide=("probe",))
     for probe in probes:
         made.add_row(probe.name, *exacts((probe.value, probe.least, probe.most), probe.unit))
@@ -276,7 +277,7 @@ def probes_table(probes: Sequence[Measured]) -> Table:
 
 
 def end_tables(outcome: Outcome, told: Collection[str] = ()) -> list[Table | str]:
-    """How a run ended, its probes and reference numbers, with an empty line between them."""
+    """Prints the outcome of a run, its probes and reference numbers, with an empty line between them."""
     parts: list[Table | str] = [outcome_table(outcome, told)]
     if outcome.probes:
         parts += ["", probes_table(outcome.probes)]
@@ -290,7 +291,7 @@ def _brief(text: str) -> str:
 
 
 def comparison_tables(found: Comparison) -> list[Table | str]:
-    """What differs between two runs, what their ends are, and what is said of their fragments."""
+    """Prints the differences between two runs, their outcomes and fragments."""
     same = "the same answer, to the bit" if found.same_answer else "different answers"
     keys = table("key", "A", "B", wide=("A", "B"))
     for each in found.keys:

@@ -1,4 +1,4 @@
-"""What ``conoid validate`` prints of a case: its parts, files, loads, what touches, and what it will cost."""
+"""Output of ``conoid validate``: parts, files, loads, contacts, cost."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -21,7 +21,7 @@ from .tables import pairs, table
 
 
 def estimate_table(case: Case, expected: Estimate) -> Table:
-    """What a case needs, about; a dash where a mesh file does not tell. And what of it which stage takes."""
+    """Prints the approximate needs of a case, and the share of each stage; a dash if a mesh file is not read."""
     total = expected.core_seconds or 1.0
     shares = sorted(expected.costs.items(), key=lambda cost: -cost[1])
     return pairs({
@@ -38,7 +38,7 @@ def estimate_table(case: Case, expected: Estimate) -> Table:
 
 
 def _clock(case: Case, expected: Estimate) -> str:
-    """What ranks and threads take, with what is assumed of them."""
+    """Prints the time on these ranks and threads, and its assumptions."""
     clock, run = expected.clock, case.run
     if clock is None:
         return UNKNOWN
@@ -54,14 +54,14 @@ def _clock(case: Case, expected: Estimate) -> str:
 def _up_to(
     value: float | None, more: float, shown: Callable[[float], str], when: str = "all that may break turns to dust"
 ) -> str:
-    """What it takes, and what ``when`` bodies turn to dust, which takes so much ``more``."""
+    """Returns the memory, and the larger memory ``more`` ``when`` bodies break into single tets."""
     if value is None or not more:
         return _about(value, shown)
     return f"{_about(value, shown)}, up to {shown(value + more)} if {when}"
 
 
 def parts_table(case: Case, expected: Estimate) -> Table:
-    """What is modelled of each part, about: its size, and what it brings along at the start."""
+    """Prints the approximate model of each part: its size and its initial state."""
     right = ("tets", "mass", "extent", "momentum", "energy")
     made = table("part", "material", *right, right=right, wide=("material",))
     brought = _brings([each.bulk for each in expected.parts])
@@ -71,8 +71,8 @@ def parts_table(case: Case, expected: Estimate) -> Table:
 
 
 def files_table(case: Case, survey: Survey) -> Table:
-    """What was measured of mesh files, combinations and CAD: the volumes, and the smallest altitude of a tet, which
-    decides the time step."""
+    """Prints measurements of mesh files, combinations and CAD: the volumes, and the smallest altitude of a tet,
+    which determines the time step."""
     right = ("nodes", "volume", "smallest altitude")
     made = table("part", "from", "group", *right, right=right, wide=("from",))
     for each in survey.parts:
@@ -83,7 +83,7 @@ def files_table(case: Case, survey: Survey) -> Table:
 
 
 def _source(mesh: Mesh) -> tuple[str, str]:
-    """Of which file a mesh is, or which combination, and which part of the file."""
+    """Returns the source of a mesh: file and part of the file, or combination."""
     if isinstance(mesh, MeshFile):
         return mesh.path, mesh.group or "all tets"
     if isinstance(mesh, Cad):
@@ -92,7 +92,7 @@ def _source(mesh: Mesh) -> tuple[str, str]:
 
 
 def touching_table(case: Case, touches: Sequence[Touch]) -> Table:
-    """Which parts touch at the start and have no bond: none of them are joined."""
+    """Prints the parts that touch at the start without a bond: they are not joined."""
     title = "parts that touch, not joined (a [[bond]] joins them)"
     made = table(title, "area", right=("area",), wide=(title,))
     for touch in touches:
@@ -102,7 +102,7 @@ def touching_table(case: Case, touches: Sequence[Touch]) -> Table:
 
 
 def loads_table(case: Case, acted_on: Sequence[Load]) -> Table:
-    """What each traction and each prescribed velocity acts on, about, of what is modelled."""
+    """Prints the approximate area of each traction and each prescribed velocity on the modelled bodies."""
     columns = ("area", "faces", "nodes")
     made = table("boundary", "acts by", *columns, right=columns, wide=("acts by",))
     for load in acted_on:
@@ -122,7 +122,7 @@ def _acts(spec: Boundary) -> str:
 
 
 def _brings(parts: Sequence[Bulk | None]) -> list[tuple[str, ...]]:
-    """Mass, extent, momentum and kinetic energy of each part; dashes where a mesh file does not tell."""
+    """Prints mass, extent, momentum and kinetic energy of each part; dashes if a mesh file is not read."""
     known = [bulk for bulk in parts if bulk is not None]
     columns = (
         alike([bulk.mass for bulk in known], "kg"), vectors([bulk.extent for bulk in known], "m", between=" x "),

@@ -21,18 +21,18 @@ from .console import echo, echo_json
 from .options import Json, Token, Url, aloud, complain, find
 
 _NEAR = 0.005
-"""Of a time, by which a frame may be of another one without a word. Chosen: what three digits show."""
+"""Relative difference of times below which no note is printed. Chosen: three digits are shown."""
 
 
 def view_frames(
     source: Annotated[str, typer.Argument(metavar="SOURCE", help="A run's id, its folder, or a frame file.")],
-    field: Annotated[str, typer.Option("--field", help=f"What to colour by: {', '.join(FIELDS)}.")] = "mises",
+    field: Annotated[str, typer.Option("--field", help=f"Field of the picture: {', '.join(FIELDS)}.")] = "mises",
     out: Annotated[
         Path | None, typer.Option("--out", help="A PNG, or a film (GIF, MP4); named after run and field if not given.")
     ] = None,
     frame: Annotated[
         list[int] | None,
-        typer.Option("--frame", help="Number of a frame, -1 is the last one; repeated: several side by side."),
+        typer.Option("--frame", help="Number of a frame, -1: the last one; if repeated, frames stand side by side."),
     ] = None,
     time: Annotated[
         list[str] | None, typer.Option("--time", help="The frame nearest to a time such as '60 us'; may be repeated.")
@@ -41,34 +41,34 @@ def view_frames(
         str, typer.Option("--mirror", help="Complete a half or quarter model: auto, or planes such as x,y=0.002 (m).")
     ] = "none",
     section: Annotated[
-        str, typer.Option("--section", help="Cut away what lies before planes such as x=middle,y=0.002 (m).")
+        str, typer.Option("--section", help="Cut away the material in front of planes such as x=middle,y=0.002 (m).")
     ] = "",
     whole: Annotated[
-        list[str] | None, typer.Option("--whole", metavar="PART", help="A part that sections leave whole; repeatable.")
+        list[str] | None,
+        typer.Option("--whole", metavar="PART", help="A part that sections do not cut; may be repeated."),
     ] = None,
     hide: Annotated[
         list[str] | None, typer.Option("--hide", metavar="PART", help="A part that is not drawn; may be repeated.")
     ] = None,
     opacity: Annotated[
-        list[str] | None, typer.Option("--opacity", metavar="PART=SHARE", help="See through a part: target=0.3.")
+        list[str] | None, typer.Option("--opacity", metavar="PART=SHARE", help="Opacity of a part: target=0.3.")
     ] = None,
     focus: Annotated[
-        list[str] | None, typer.Option("--focus", metavar="PART", help="A part that fills the picture; repeatable.")
+        list[str] | None,
+        typer.Option("--focus", metavar="PART", help="A part that fills the picture; may be repeated."),
     ] = None,
     camera: Annotated[
         str, typer.Option("--camera", help=f"{', '.join(VIEWS)}, an axis such as -x, or a direction as 1,-1.5,0.6.")
     ] = "",
-    up: Annotated[str, typer.Option("--up", help="What points upwards: an axis such as -y, or a direction.")] = "",
+    up: Annotated[str, typer.Option("--up", help="Upward direction: an axis such as -y, or a vector.")] = "",
     zoom: Annotated[float, typer.Option("--zoom", help="1: the body fills the picture.")] = 1.0,
     limits: Annotated[tuple[float, float] | None, typer.Option("--range", help="Ends of the colour bar.")] = None,
     percentiles: Annotated[
         tuple[float, float],
         typer.Option("--percentiles", help="Values at the ends of the colour bar where --range is not given."),
     ] = (0.5, 99.5),
-    fixed: Annotated[bool, typer.Option("--fixed", help="The range of all frames of the run, whichever are drawn.")] = (
-        False
-    ),
-    bands: Annotated[int, typer.Option("--bands", help="So many bands of one colour each; 0: a smooth scale.")] = 0,
+    fixed: Annotated[bool, typer.Option("--fixed", help="Use the range of all frames of the run.")] = (False),
+    bands: Annotated[int, typer.Option("--bands", help="Number of colour bands; 0: a smooth scale.")] = 0,
     vectors: Annotated[str, typer.Option("--vectors", help=f"Arrows on the surface: {', '.join(VECTORS)}.")] = "",
     size: Annotated[tuple[int, int], typer.Option("--size", min=SMALLEST, max=16384, help="Width and height.")] = (
         1600,
@@ -83,14 +83,14 @@ def view_frames(
     captions: Annotated[
         bool, typer.Option("--captions/--no-captions", help="Write title, colour bar or legend beside the body.")
     ] = True,
-    dark: Annotated[bool, typer.Option("--dark", help="Draw on a dark ground.")] = False,
-    transparent: Annotated[bool, typer.Option("--transparent", help="Leave out the ground of the picture.")] = False,
+    dark: Annotated[bool, typer.Option("--dark", help="Draw on a dark background.")] = False,
+    transparent: Annotated[bool, typer.Option("--transparent", help="Make the background transparent.")] = False,
     rate: Annotated[float, typer.Option("--rate", help="Frames a second of a film.")] = 8.0,
     url: Url = None,
     token: Token = None,
     as_json: Json = False,
 ) -> None:
-    """Draw frames off screen: as a PNG, side by side where there are several, or as a film (--out x.gif or x.mp4, all
+    """Draw frames off screen: as a PNG, several frames side by side, or as a film (--out x.gif or x.mp4, all
     frames).
     """
     options: dict[str, Any] = {
@@ -115,7 +115,7 @@ def view_frames(
 
 
 def _shares(told: Sequence[str]) -> dict[str, float]:
-    """``PART=SHARE`` as a share for each part. Raises LookError."""
+    """Returns the opacity of each part of ``PART=SHARE``. Raises LookError."""
     found = {}
     for text in told:
         part, _, share = text.rpartition("=")
@@ -129,7 +129,7 @@ def _shares(told: Sequence[str]) -> dict[str, float]:
 
 
 def _tell_of_times(asked: list[float], drawn: list[float | None]) -> None:
-    """Says of each time how far the nearest frame is, where that is not as good as the same."""
+    """Prints for each time the distance of the nearest frame, if it is not practically the same."""
     for wanted, found in zip(asked, drawn[len(drawn) - len(asked) :], strict=True):
         if found is not None and abs(found - wanted) > _NEAR * max(abs(wanted), abs(found)):
             complain(f"time = {si(wanted, 's')}: the nearest frame is of {si(found, 's')}")

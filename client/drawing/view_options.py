@@ -54,7 +54,7 @@ class Look(msgspec.Struct, kw_only=True, frozen=True):
     fixed: bool = False
     """The colour bar is that of all frames of the run, whichever are drawn."""
     bands: int = 0
-    """So many bands of one colour each; 0: a smooth scale."""
+    """Number of colour bands; 0: a smooth scale."""
     vectors: str = ""
     """``velocity`` or ``displacement`` as arrows on the surface."""
     raw: bool = False

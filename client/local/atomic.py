@@ -1,4 +1,5 @@
-"""Files that appear whole or not at all: what a full disk cuts off is removed, and what was there before stays."""
+"""Files that are written completely or not at all: after an error the incomplete file is removed, and an earlier one
+stays."""
 
 import os
 from collections.abc import Iterator
@@ -10,11 +11,11 @@ from ..errors import ClientError
 
 @contextmanager
 def whole(out: Path) -> Iterator[Path]:
-    """A path to write to, whose file becomes ``out`` at the end; of the same ending, by which libraries know the kind.
-
-    What is no plain file, such as /dev/stdout, is written to as it is. Raises ClientError that names ``out``.
+    """Yields a path to write to, whose file replaces ``out`` at the end; it has the same ending, by which libraries
+    choose the format. A target that is not a regular file, such as /dev/stdout, is written directly. Raises
+    ClientError with the name of ``out``.
     """
-    target = out.resolve()  # a link stays, what it names is replaced
+    target = out.resolve()  # a link is kept, its target is replaced
     plain = target.is_file() or not target.exists()
     part = target.with_name(f".{target.stem}.{os.getpid()}.part{target.suffix}") if plain else target
     try:
@@ -30,6 +31,6 @@ def whole(out: Path) -> Iterator[Path]:
 
 
 def save_text(out: Path, text: str | bytes) -> None:
-    """Writes a text, or one that is in UTF-8. Raises ClientError that names ``out``."""
+    """Writes a text or bytes in UTF-8. Raises ClientError with the name of ``out``."""
     with whole(out) as part:
         part.write_bytes(text if isinstance(text, bytes) else text.encode())

@@ -1,4 +1,4 @@
-"""The folder of a run: where its files are, on this machine or behind a server."""
+"""The folder of a run, on this machine or on a server."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,24 +9,24 @@ from conoid.cases.output import layout
 from ..errors import ClientError, UnfinishedError
 
 _NAMED = 8
-"""Runs that are named when a folder holds some and is none. Chosen: as many as a line has room for."""
+"""Number of runs that are listed for a folder of several runs. Chosen: as many as fit into a line."""
 
 
 class Folder(Protocol):
-    """A run's folder, on this machine or behind a server."""
+    """A run's folder, on this machine or on a server."""
 
     @property
     def name(self) -> str:
-        """What to call the run."""
+        """Name of the run."""
 
     def names(self) -> list[str]:
-        """Every file, relative to the folder, with ``/``."""
+        """Lists every file, relative to the folder, with ``/``."""
 
     def path(self, name: str) -> Path:
-        """A local path of a file. Raises UnfinishedError when the run has not written it."""
+        """Returns a local path of a file. Raises UnfinishedError for a file that is not written yet."""
 
     def told(self, name: str) -> str:
-        """What to call a file where people are told of it."""
+        """Returns the name of a file in messages."""
 
 
 @dataclass(frozen=True)
@@ -37,15 +37,15 @@ class LocalFolder:
 
     @property
     def name(self) -> str:
-        """The name of the folder, which is the run's id where a server made it."""
+        """Name of the folder, which is the run's id if a server made it."""
         return self.root.resolve().name
 
     def names(self) -> list[str]:
-        """Every file, relative to the folder."""
+        """Lists every file, relative to the folder."""
         return sorted(path.relative_to(self.root).as_posix() for path in self.root.rglob("*") if path.is_file())
 
     def path(self, name: str) -> Path:
-        """The file itself. Raises ClientError for a link that leads elsewhere: what it names is not the run's."""
+        """Returns the file itself. Raises ClientError for a link that leads out of the folder."""
         path = self.root / name
         if not path.is_file():
             raise UnfinishedError(self._lacks(name))
@@ -54,11 +54,11 @@ class LocalFolder:
         return path
 
     def told(self, name: str) -> str:
-        """Its path."""
+        """Returns its path."""
         return str(self.root / name)
 
     def _lacks(self, name: str) -> str:
-        """Why a file is not there: the folder may be one that holds those of runs."""
+        """Returns why a file is missing: the folder may be one that contains runs."""
         found = (path for depth in ("*", "*/*") for path in self.root.glob(f"{depth}/{layout.JOURNAL}"))
         runs = sorted(path.parent.relative_to(self.root).as_posix() for path in found)
         if not runs or (self.root / layout.JOURNAL).exists():

@@ -1,4 +1,4 @@
-"""``conoid watch FOLDER``: follows a run by the journal in its folder, without a server; asks Slurm why it waits."""
+"""``conoid watch FOLDER``: follows a run by the journal in its folder, without a server; asks Slurm about its job."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -19,16 +19,16 @@ from ..journal import from_line
 from ..remote.link import Link
 
 _PAUSE = 0.5
-"""s between two looks at the journal. Chosen: a run reports four times a second."""
+"""Time in s between two readings of the journal. Chosen: a run reports four times a second."""
 _ASK_EVERY = 10.0
-"""s of silence after which Slurm is asked. Chosen: a few hundred watchers are one request in 30 ms."""
+"""Time in s of silence after which Slurm is asked. Chosen: a few hundred watchers make one request in 30 ms."""
 _AT_WORK = {State.STARTING, State.RUNNING}
 """States in which a worker writes into the folder."""
 
 
 @dataclass(frozen=True)
 class Titled:
-    """What ``watch`` shows above all."""
+    """Head of the display."""
 
     title: str
 
@@ -37,15 +37,15 @@ class _File:
     name, trouble = "journal", ""
 
     def get(self, timeout: float) -> AnyMessage | None:
-        """Nothing comes by itself."""
+        """A subscription without messages."""
         return None
 
     def close(self) -> None:
-        """There is nothing to let go."""
+        """Does nothing."""
 
 
 class FolderRun:
-    """A run in a folder, as ``watch`` wants one."""
+    """A run in a folder, which can be followed."""
 
     def __init__(self, folder: Path, place: str = "") -> None:
         """``place``: the folder of Slurm's commands; empty: they are in PATH."""
@@ -54,7 +54,7 @@ class FolderRun:
         self._asked, self._told = time.monotonic(), ""
 
     def status(self) -> Titled:
-        """The title of its case, when that is there already."""
+        """Title of its case, if it exists already."""
         try:
             case = msgspec.json.decode(whole.read(self.folder / layout.RESOLVED_CASE), type=dict[str, Any])
         except (OSError, msgspec.MsgspecError):
@@ -62,21 +62,21 @@ class FolderRun:
         return Titled(str(case.get("title") or case.get("name", "")))
 
     def link(self) -> Link:
-        """The journal itself."""
+        """Returns a subscription without messages: the journal is read."""
         return _File()
 
     def messages(
         self, *, link: Link | None = None, pause: Callable[[float], None] = time.sleep
     ) -> Iterator[AnyMessage]:
-        """Every line once and in order, then how the run has ended."""
+        """Yields every line once and in order, until the end of the run."""
         offset, state = 0, State.QUEUED
         while True:
-            end = self._outcome()  # written last: all that there is to read is there before
+            end = self._outcome()  # it is written last, so the journal is complete
             raw, offset = self._read(offset)
             for line in raw:
                 try:
                     message = from_line(line)
-                except msgspec.DecodeError:  # a killed worker has left it half written
+                except msgspec.DecodeError:  # incomplete line of a killed worker
                     continue
                 yield message
                 if isinstance(message, Status):
@@ -96,7 +96,7 @@ class FolderRun:
                 self._asked = time.monotonic()
 
     def _read(self, offset: int) -> tuple[list[bytes], int]:
-        """The complete lines from ``offset`` on, and where the next one begins."""
+        """Returns the complete lines from ``offset`` on, and the offset of the next one."""
         try:
             with (self.folder / layout.JOURNAL).open("rb") as file:
                 file.seek(offset)
@@ -113,7 +113,7 @@ class FolderRun:
             return None
 
     def _pending(self, state: State, message: str) -> Iterator[Status]:
-        """That a run in the queue waits, where it is news."""
+        """Returns the reason for which a queued run waits, if it has changed."""
         if state is State.QUEUED and message != self._told:
             self._told = message
             yield self._said(state, message)
@@ -129,8 +129,8 @@ class FolderRun:
         return Status(run=self.id, wall=time.time(), state=state, cause=cause, message=message)
 
     def _ask(self, state: State) -> Iterator[Status]:
-        """What Slurm says of a job that is silent, only what is new; without a job, whether the worker is still there
-        that has begun, by the ``state`` that was told last.
+        """Returns new information about a silent job from Slurm; without a job, whether its worker still exists.
+        ``state``: the last reported state.
         """
         if time.monotonic() - self._asked <= _ASK_EVERY:
             return

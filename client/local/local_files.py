@@ -1,4 +1,4 @@
-"""The files that a case names, on this machine: found, hashed, copied."""
+"""Files that a case names on this machine: found, hashed, copied."""
 
 import copy
 import hashlib
@@ -28,43 +28,43 @@ State = tuple[int, int, int, int]
 
 @dataclass(frozen=True)
 class LocalFile:
-    """A file that a case names, as it was when it was hashed."""
+    """A file that a case names, in the state in which it was hashed."""
 
     named: Named
     path: Path
     sha256: str
     state: State
     named_in: str = ""
-    """Of a deck that includes others, which is written out as one file at ``path``: the hash of the deck itself."""
+    """For a deck with includes, which is written as one file to ``path``: hash of the deck itself."""
 
     @property
     def size(self) -> int:
-        """Bytes."""
+        """Size in bytes."""
         return self.state[2]
 
     def check(self, file: int) -> None:
-        """Raises ClientError where the open file is another one than that which was hashed."""
+        """Raises ClientError if the open file is not the one that was hashed."""
         if state_of(file) != self.state:
             raise self.changed()
 
     def changed(self) -> ClientError:
-        """The line that says so."""
+        """Returns the error line for it."""
         return ClientError(f"{self.path}: has changed since it was hashed; nothing is handed in: try again")
 
 
 class Hashes:
-    """The hashes of files, each computed once for every state of a file."""
+    """Hashes of files, computed once for each state of a file."""
 
     def __init__(self) -> None:
-        """None is known yet."""
+        """Starts without hashes."""
         self._known: dict[State, str] = {}
         self._decks: dict[tuple[Path, State], _Deck] = {}
         self._place: Path | None = None
-        """Where decks are written out as one file, while this is there."""
+        """Temporary folder for decks that are written as one file."""
 
     def of(self, case: Mapping[str, Any], folder: Path) -> list[LocalFile]:
-        """The files that a case in plain data names, from its ``folder`` on; one that is not here and whose hash stands
-        in the case is left out: who runs the case may have it. Raises CaseError with every one that cannot be used.
+        """Returns the files that a case in plain data names, relative to its ``folder``. A missing file with a hash
+        in the case is left out: the server may have it. Raises CaseError with every unusable file.
         """
         found, problems = [], list[Problem]()
         for named in files_of(case):
@@ -86,8 +86,8 @@ class Hashes:
         return found
 
     def _hashed(self, named: Named, path: Path) -> LocalFile:
-        """Raises OSError; IsADirectoryError for what is no regular file, be it behind a link; ValueError for a deck
-        that cannot be followed.
+        """Opens and hashes a file. Raises OSError; IsADirectoryError for anything but a regular file, also behind a
+        link; ValueError for a deck with unusable includes.
         """
         itself = self._read(named, path)
         if not one_deck.includes(path):
@@ -98,7 +98,7 @@ class Hashes:
         return replace(self._read(named, deck.path), named_in=itself.sha256)
 
     def _written(self, path: Path) -> "_Deck":
-        """A deck with all that it includes, as one file."""
+        """Writes a deck with all its includes as one file."""
         if self._place is None:
             self._place = Path(tempfile.mkdtemp(prefix="conoid-decks-"))
             weakref.finalize(self, shutil.rmtree, self._place, True)
@@ -118,14 +118,14 @@ class Hashes:
 
 @dataclass(frozen=True)
 class _Deck:
-    """A deck that was written out, and the states of the files that it was made of."""
+    """A deck that was written as one file, and the states of its source files."""
 
     path: Path
     files: dict[Path, State]
 
 
 def state_at(path: Path) -> State:
-    """Of a file by its path. Raises OSError."""
+    """Returns the state of a file by its path. Raises OSError."""
     with whole.opened(path) as file:
         return state_of(file.fileno())
 
@@ -135,13 +135,13 @@ def _wrong(named: Named, key: str, value: object, said: str) -> Problem:
 
 
 def state_of(file: int) -> State:
-    """Of an open file, by its descriptor."""
+    """Returns the state of an open file by its descriptor."""
     status = os.fstat(file)
     return status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns
 
 
 def with_hashes(case: Mapping[str, Any], files: Iterable[LocalFile]) -> dict[str, Any]:
-    """The case with the hash of each file in the table that names it."""
+    """Returns the case with the hash of each file in the table that names it."""
     made: dict[str, Any] = copy.deepcopy(dict(case))
     for file in files:
         table: Any = made
@@ -152,8 +152,8 @@ def with_hashes(case: Mapping[str, Any], files: Iterable[LocalFile]) -> dict[str
 
 
 def keep_copies(files: Iterable[LocalFile], folder: Path) -> None:
-    """Copies files into the folder of a run, under their hashes. Raises ClientError for one that has changed since it
-    was hashed, OSError.
+    """Copies files into the folder of a run, named by their hashes. Raises ClientError for one that has changed
+    since it was hashed, OSError.
     """
     for file in files:
         target = folder / layout.FILES / Named(file.named.table, file.named.path, file.sha256).copy

@@ -1,4 +1,4 @@
-"""A run in a folder of this machine, as the commands want one: its status, and what can be asked of its worker."""
+"""A run in a folder of this machine: its status, and requests to its worker."""
 
 import re
 import shutil
@@ -21,13 +21,13 @@ from .folders import LocalFolder
 from .safe_paths import inside
 
 _ID = re.compile(r"[0-9a-z]{22}")
-"""The id of a run of a server, by which ``conoid get`` calls the folder that it copies into."""
+"""Id of a run on a server, which is the name of the folder into which ``conoid get`` copies it."""
 _AT_WORK = {State.STARTING, State.RUNNING, State.STOPPING}
 """States in which a worker writes into the folder."""
 
 
 def status(folder: Path) -> RunInfo:
-    """What the folder tells of the run. Raises UnfinishedError for a folder that is none of a run."""
+    """Returns the status of the run by its folder. Raises UnfinishedError for a folder that is not a run's."""
     result = Result.open(folder)
     messages = result.messages
     known = Live(result.folder.name)
@@ -54,7 +54,7 @@ def status(folder: Path) -> RunInfo:
 
 
 def _cores(case: dict[str, Any], known: Live, what: str) -> int:
-    """The ``ranks`` or ``threads`` that have started, or that the case asks for."""
+    """Returns the ``ranks`` or ``threads`` of the started worker, or those of the case."""
     if known.started is not None:
         return int(getattr(known.started, what))
     asked = case.get("run", {}).get(what, 1) if isinstance(case.get("run"), dict) else 1
@@ -62,8 +62,8 @@ def _cores(case: dict[str, Any], known: Live, what: str) -> int:
 
 
 def ask(folder: Path, request: str, wish: str) -> str:
-    """Leaves a request where the worker looks for it; one line that says so. Raises UnfinishedError where there is no
-    worker, OSError.
+    """Writes a request file that the worker reads; returns one line that describes it. Raises UnfinishedError
+    without a worker, OSError.
     """
     LocalFolder(folder).path(layout.JOURNAL)
     if not slurm.held(folder):
@@ -73,13 +73,13 @@ def ask(folder: Path, request: str, wish: str) -> str:
 
 
 def at_hand(folder: Path) -> bool:
-    """Whether the run is of this folder: not where it may be a copy that ``conoid get`` has made of a server's."""
+    """Whether the worker runs in this folder: not if it may be a copy of a server's run by ``conoid get``."""
     copied = _ID.fullmatch(str(folder)) is not None
     return not copied or (folder / layout.JOB).exists() or slurm.held(folder)
 
 
 class FolderFiles:
-    """The files of a run in a folder, as those of a run of a server are had."""
+    """The files of a run in a folder, with the interface of a run on a server."""
 
     def __init__(self, folder: Path) -> None:
         """Reads nothing yet."""
@@ -87,11 +87,11 @@ class FolderFiles:
         self.id = self._folder.name
 
     def files(self) -> list[FileInfo]:
-        """What lies in the folder."""
+        """Lists the files of the folder."""
         return [FileInfo(path=name, size=(self._folder.root / name).stat().st_size) for name in self._folder.names()]
 
     def over(self) -> bool:
-        """Nothing is known of its end, and nothing lost on the way from a folder."""
+        """Always False: copies from a folder are complete in any state of the run."""
         return False
 
     def fetch(self, folder: Path, file: FileInfo, final: bool) -> Path:

@@ -1,4 +1,4 @@
-"""A deck with all that it includes, as one file: so it is sent, hashed and kept."""
+"""A deck with all its includes as one file, which is hashed and sent."""
 
 import re
 from collections.abc import Callable, Iterator
@@ -9,12 +9,12 @@ from conoid.cases.reading import inp, whole
 from conoid.cases.reading.included import LONGEST_LINE, Included, flattened, included_by, lines
 
 ENDINGS = (".k", ".key", ".dyn")
-"""Of the names of keyword decks."""
+"""Endings of keyword decks."""
 _PLAIN: dict[str, Callable[[str], str | None]] = {".inp": inp.included_by, ".rad": included_by}
-"""Endings of the other decks, and which file a line of them includes: its lines stand in the place of that line."""
+"""Endings of the other decks, and patterns of a line that includes a file: the lines of that file replace it."""
 _INCLUDES = re.compile(rb"(?im)^[ \t]*[*#][ \t]*INCLUDE")
 _CHUNK = 1 << 24
-"""Bytes that are searched at once. Chosen."""
+"""Bytes that are searched at a time. Chosen."""
 _STANDARD = "*KEYWORD"
 
 
@@ -32,9 +32,8 @@ def includes(path: Path) -> bool:
 
 
 def write(deck: Path, target: Path) -> list[Path]:
-    """Writes the deck with all that it includes to ``target``; returns every file that it was read from.
-
-    Raises ValueError where it cannot be followed, OSError.
+    """Writes the deck with all its includes to ``target``; returns every source file. Raises ValueError for unusable
+    includes, OSError.
     """
     included, plain = Included(deck), _PLAIN.get(deck.suffix.lower())
     with target.open("w", encoding="utf-8", newline="\n") as made:
@@ -47,16 +46,18 @@ def write(deck: Path, target: Path) -> list[Path]:
 
 @dataclass
 class _Flat:
-    """The lines of a deck, those of what it includes in their places. The format that ``*KEYWORD`` sets holds in its
-    own file and in what that includes from there on: it is set again behind a file that has set another one.
+    """Yields the lines of a deck with those of its includes in their places.
+
+    The format of ``*KEYWORD`` holds in its own file and in the files that this includes afterwards. It is written
+    again after a file that has changed it.
     """
 
     included: Included
     stands: str = _STANDARD
-    """The line that has set the format of what was written last."""
+    """The line that set the format of the last written line."""
 
     def of(self, path: Path, stands: str, *, top: bool = False) -> Iterator[str]:
-        """The lines of a file that begins in the format that ``stands``."""
+        """Yields the lines of a file that begins in the format ``stands``."""
         names: list[str] | None = None
         for _, text in lines(path):
             name = _name(text) if text.startswith("*") else ""
@@ -78,7 +79,7 @@ class _Flat:
             yield "*END"
 
     def _follow(self, names: list[str], path: Path, stands: str) -> Iterator[str]:
-        """The lines of included files; a name that ends with `` +`` goes on in the next line."""
+        """Yields the lines of included files; a name that ends with `` +`` continues in the next line."""
         for name in "\n".join(names).replace(" +\n", "").splitlines():
             yield f"$ begin of {name}"
             yield from self.of(self.included.enter(name, path), stands)
@@ -90,6 +91,6 @@ class _Flat:
 
 
 def _name(text: str) -> str:
-    """Of a keyword line, in upper case; with its suffix, where it has one."""
+    """Returns the keyword of a line in upper case, with its suffix if it has one."""
     word = text[1:].partition("$")[0].split()
     return word[0].upper() if word[:1] and (len(word) == 1 or word[0].upper() == "KEYWORD") else "?"

@@ -1,4 +1,4 @@
-"""A server of one's own for the time of one run: started as a process, known by its server.json, stopped after."""
+"""A server for the duration of one run: started as a process, found by its server.json, stopped afterwards."""
 
 import os
 import subprocess
@@ -20,35 +20,35 @@ ADDRESS_FILE = "server.json"
 LOG_FILE = "server.log"
 OWNER = "local"
 _START_SECONDS = 60.0
-"""s that a server may take to start. Chosen: it takes one or two, and many times that on a busy machine."""
+"""Time in s for the start of a server. Chosen: it takes one or two, and many times that on a busy machine."""
 _STOP_SECONDS = 15.0
-"""s that it may take to stop before it is killed: ``GRACE`` for its workers, and five for itself."""
+"""Time in s for its end before it is killed: ``GRACE`` for its workers, and five for itself."""
 GRACE = 10.0
-"""s that a cancelled worker gets before it is killed."""
+"""Time in s for a cancelled worker before it is killed."""
 
 
 class Address(msgspec.Struct, kw_only=True, frozen=True):
-    """What a server writes when it answers."""
+    """Content of server.json."""
 
     url: str
     pid: int
 
 
 class LocalServer:
-    """A server on loopback ports of its own choosing, with a token only this process knows.
+    """A server on free loopback ports, with a token that only this process has.
 
-    A context manager: it is up inside, and stopped after. It is not in the terminal's process group, so that Ctrl-C
-    reaches this process alone; on Linux it ends when this process dies.
+    A context manager: the server runs inside, and is stopped afterwards. It is not in the terminal's process group,
+    so that Ctrl-C reaches only this process; on Linux it ends when this process dies.
     """
 
     def __init__(self, runs: Path, slots: int) -> None:
-        """``runs`` is the folder of the runs, ``slots`` how many cores runs may take at a time."""
+        """``runs``: folder of the runs; ``slots``: number of cores that runs may use at a time."""
         self.runs = runs.resolve()
         self.slots = slots
         self._process: subprocess.Popen[bytes] | None = None
 
     def __enter__(self) -> Self:
-        """Starts the server and waits until it answers. Raises ClientError with its own last words."""
+        """Starts the server and waits until it answers. Raises ClientError with the last line of its log."""
         self.runs.mkdir(parents=True, exist_ok=True)
         self.token = _token(self.runs)
         options = ["--port", "0", "--zenoh-port", "0", "--slots", str(self.slots), "--grace", str(GRACE)]
@@ -65,7 +65,7 @@ class LocalServer:
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Cancels what still runs, then stops the server: its workers would go on without it."""
+        """Cancels open runs, then stops the server: workers would continue without it."""
         with suppress(ClientError, TimeoutError):
             for run in self.session.runs([state.value for state in State if not state.final]):
                 self.session.run(run.id).cancel()
@@ -86,7 +86,7 @@ class LocalServer:
         raise ClientError(f"the server did not start within {duration(_START_SECONDS)}; see {self.runs / LOG_FILE}")
 
     def stop(self) -> None:
-        """Asks the server to end, and ends it when it does not."""
+        """Asks the server to end, and kills it if it does not."""
         if self._process is None or self._process.poll() is not None:
             return
         self._process.terminate()
@@ -109,11 +109,11 @@ if sys.platform == "linux":
 runpy.run_module("conoid.server", run_name="__main__", alter_sys=True)
 """
 _TETHERED = [sys.executable, "-c", _TETHER]
-"""The server, to which the kernel sends SIGTERM when the process of the first argument dies, however it dies."""
+"""Command of the server. The kernel sends SIGTERM to it when the process of the first argument dies."""
 
 
 def _token(runs: Path) -> str:
-    """A token for this server. Raises ClientError with the server's own last words."""
+    """Returns a new token for this server. Raises ClientError with the last line of the server's log."""
     command = [*_SERVER, "token", "add", OWNER, "--runs", str(runs)]
     try:
         made = subprocess.run(
@@ -129,7 +129,7 @@ def _token(runs: Path) -> str:
 
 
 def _environment() -> dict[str, str]:
-    """A site's database is not for a server of one run."""
+    """Returns the environment without a site's database, which a server of one run must not use."""
     return {name: value for name, value in os.environ.items() if name not in {"CONOID_DATABASE", "CONOID_RUNS"}}
 
 

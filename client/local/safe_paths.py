@@ -1,4 +1,4 @@
-"""Names of files and parts of addresses that a server or a user has given."""
+"""Checked names of files and parts of addresses from a server or a user."""
 
 import os
 from pathlib import Path, PurePosixPath, PureWindowsPath
@@ -13,15 +13,15 @@ _LONGEST_NAME = 255
 
 
 def quoted(text: str, safe: str = "") -> str:
-    """``text`` as a part of an address."""
+    """Returns ``text`` as a part of an address."""
     return quote(text, safe=safe)
 
 
 def inside(root: Path, name: str) -> Path:
-    """The path of ``name``, which a server or a user has given, below ``root``.
+    """Returns the path of ``name``, which a server or a user has given, below ``root``.
 
-    Raises ClientError for a name that would leave it, here or on another system, also by a link that lies in ``root``,
-    and for one that no file can have.
+    Raises ClientError for a name that leaves ``root`` on any system, also through a link inside, and for an
+    impossible name.
     """
     path, other = PurePosixPath(name), PureWindowsPath(name)
     if path.is_absolute() or other.anchor or ".." in (*path.parts, *other.parts) or not path.parts:
@@ -35,7 +35,7 @@ def inside(root: Path, name: str) -> Path:
 
 
 def _writable(name: str) -> bool:
-    """Whether each part of it fits a file system."""
+    """Whether each part of the name fits a file system."""
     try:
         return all(len(os.fsencode(part)) <= _LONGEST_NAME for part in name.split("/"))
     except UnicodeEncodeError:

@@ -1,4 +1,4 @@
-"""Where the server is and who asks: options first, then the environment, then the user's configuration file."""
+"""Address of the server and token: from options, else the environment, else the user's configuration file."""
 
 import os
 import re
@@ -14,27 +14,26 @@ from ..errors import ClientError, UsageError
 
 DEFAULT_URL = "http://127.0.0.1:8750"
 _SIGNS = re.compile(r"[!-\[\]-~]+")
-"""Of an address: visible ASCII without the backslash, which some programs take for a slash."""
+"""Characters of an address: visible ASCII without the backslash, which some programs read as a slash."""
 
 
 @dataclass(frozen=True)
 class Target:
-    """Address of a server, and the token to show it (None: a server without access control)."""
+    """Address of a server, and the token for it (None: a server without access control)."""
 
     url: str
     token: str | None
 
 
 def config_file() -> Path:
-    """``~/.config/conoid/client.toml``; XDG_CONFIG_HOME is respected."""
+    """Path of ``~/.config/conoid/client.toml``; XDG_CONFIG_HOME is respected."""
     base = os.environ.get("XDG_CONFIG_HOME") or str(Path.home() / ".config")
     return Path(base) / "conoid" / "client.toml"
 
 
 def target(url: str | None = None, token: str | None = None) -> Target:
-    """The server to talk to. A token from the file is only shown to the server that the file names.
-
-    Raises ClientError.
+    """Returns the server to use. A token from the file is only sent to the server that the file names. Raises
+    ClientError.
     """
     saved = read_config()
     chosen = address(url or os.environ.get("CONOID_URL") or saved.get("url") or DEFAULT_URL)
@@ -45,7 +44,8 @@ def target(url: str | None = None, token: str | None = None) -> Target:
 
 
 def address(url: str) -> str:
-    """The address of a server: scheme, host, perhaps port and path, without a slash at its end. Raises UsageError."""
+    """Returns the address of a server: scheme, host, perhaps port and path, without a slash at its end. Raises
+    UsageError."""
     try:
         parts = urlsplit(url)
         fits = parts.port is None or parts.port > 0
@@ -62,7 +62,7 @@ def address(url: str) -> str:
 
 
 def read_config() -> dict[str, str]:
-    """The keys of the configuration file; empty when there is none. Raises ClientError when it cannot be used."""
+    """Returns the keys of the configuration file; empty without one. Raises ClientError for an unusable file."""
     path = config_file()
     try:
         data = tomllib.loads(whole.read_text(path))

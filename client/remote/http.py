@@ -1,7 +1,7 @@
-"""Requests to a server over HTTP, and refusals as one clear line.
+"""Requests to a server over HTTP; refusals become one clear line.
 
-An answer has limits: of time until its head has come, of bytes, and of the time that so many bytes may take. Whatever
-answers at an address, nobody waits without end, and no memory or disk is filled.
+Answers have limits: the time until the head has arrived, the number of bytes, and the mean rate of the bytes. So no
+request waits for ever, and no answer fills the memory or the disk.
 """
 
 import base64
@@ -30,33 +30,34 @@ from .config import address
 T = TypeVar("T")
 
 _WORDS = 300
-"""Characters of an error's words that are shown. Chosen."""
+"""Largest number of characters of an error message that are shown. Chosen."""
 _AS_IT_IS = {"Accept-Encoding": "identity"}
-"""A file comes with its length."""
+"""A file is requested with its length."""
 
 _ANSWER, _CONNECTION = 30.0, 5.0
-"""s: an answer may take a while when a disk is slow, a connection may not. Chosen."""
+"""Timeouts in s: an answer may take a while with a slow disk, a connection may not. Chosen."""
 _TIMEOUT = httpx2.Timeout(_ANSWER, connect=_CONNECTION)
 _STREAM_TIMEOUT = httpx2.Timeout(60.0, connect=_CONNECTION)
-"""s of silence on a stream: four times the 15 s after which the server sends a comment (server/answers/stream.py)."""
+"""Silence of a stream in s: four times the 15 s after which the server sends a comment (server/answers/stream.py)."""
 _SPARE = 10.0
-"""s beyond the silence that is allowed, after which the head of an answer is given up that comes letter by letter."""
+"""Time in s beyond the allowed silence after which an answer whose head arrives byte by byte is given up."""
 _SLOWEST = 1000.0
-"""Bytes a second that an answer must come with in the mean, after its first 30 s. Chosen: no line is that slow."""
+"""Least mean rate of an answer in bytes per s, after its first 30 s. Chosen: slower than any connection."""
 _LONGEST = 1 << 28
-"""Bytes of an answer that is read at once, or does not say how long it is. Chosen: ten times the largest snapshot."""
+"""Largest size in bytes of an answer that is read into memory, or has no length. Chosen: ten times the largest
+snapshot."""
 UNAUTHORIZED = 401
-"""HTTP's status of a request without a valid token."""
+"""HTTP status of a request without a valid token."""
 NOT_FOUND = 404
 _TRIES = 3
-"""Times a request is sent that may be repeated, 0.3 and 0.6 s apart. Chosen: a lost connection is back by then."""
+"""Number of tries of a request that may be repeated, 0.3 and 0.6 s apart. Chosen: a lost connection is back by then."""
 _PATIENCE = 10.0
-"""s after which a request that has failed is not sent again: a server that has not answered for so long hangs. Chosen:
-three connections that time out are tried, and one answer that does."""
+"""Time in s after which a failed request is not repeated: a server that is silent for so long hangs. Chosen: three
+connections that time out are tried, and one answer that does."""
 
 
 class Router(msgspec.Struct, kw_only=True, frozen=True):
-    """Where the Zenoh router is, and the user and password to show it (neither: it asks for none)."""
+    """Address of the Zenoh router, and user and password for it (both None: without access control)."""
 
     endpoint: str
     user: str | None = None
@@ -64,8 +65,8 @@ class Router(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class Me(msgspec.Struct, kw_only=True, frozen=True):
-    """Who the server takes us for, what the token allows, how to subscribe over Zenoh (None: not possible), and the
-    cores of its runs: ``total`` and ``used``.
+    """Name of the user on the server, scopes of the token, access to Zenoh (None: none), and the cores for runs:
+    ``total`` and ``used``.
     """
 
     owner: str
@@ -75,12 +76,11 @@ class Me(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class Http:
-    """A server that answers requests. Use it as a context manager, or close it."""
+    """A client of a server. Use it as a context manager, or close it."""
 
     def __init__(self, url: str, token: str | None = None, transport: httpx2.BaseTransport | None = None) -> None:
         """Connects at the first request. ``transport`` replaces the network, for a server in the same process.
-
-        Raises UsageError for a token, or an address, that cannot be one.
+        Raises UsageError for an impossible token or address.
         """
         shown = (token or "").strip()
         if not _visible(shown):
@@ -94,7 +94,7 @@ class Http:
             raise UsageError(f"url = {self.url!r}: {error}") from None
 
     def __enter__(self) -> Self:
-        """Itself."""
+        """Returns itself."""
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -106,19 +106,20 @@ class Http:
         self._http.close()
 
     def me(self) -> Me:
-        """Who we are to the server."""
+        """Returns the user of the token."""
         return self.get(Me, "/v1/me")
 
     def get(self, kind: type[T], path: str, **query: str | float | list[str]) -> T:
-        """The answer at ``path``; a list gives its name several times. Raises ServiceError, UnreachableError."""
+        """Returns the answer of a GET; a parameter with a list is sent several times. Raises ServiceError,
+        UnreachableError."""
         return self._decoded(kind, self._request("GET", path, params=query))
 
     def post(
         self, kind: type[T], path: str, body: bytes = b"", content: str = "", key: str | None = None,
         more: float = 0.0,
     ) -> T:  # fmt: skip
-        """The answer to a POST. It is tried again, when the network fails, only with an idempotency key. ``more``: s
-        that the answer may take beyond what others may.
+        """Returns the answer of a POST. After a network error it is repeated only with an idempotency key. ``more``:
+        additional time for the answer in s.
         """
         headers = {"Content-Type": content} if content else {}
         if key is not None:
@@ -130,23 +131,21 @@ class Http:
         return self._decoded(kind, response)
 
     def put(self, kind: type[T], path: str, body: bytes, headers: Mapping[str, str], more: float = 0.0) -> T:
-        """The answer to a PUT, which is sent once. ``more``: as for ``post``."""
+        """Returns the answer of a PUT, which is sent once. ``more`` as for ``post``."""
         timeout = httpx2.Timeout(_ANSWER + more, connect=_CONNECTION)
         return self._decoded(kind, self._request("PUT", path, content=body, headers=headers, timeout=timeout))
 
     def delete(self, path: str) -> None:
-        """Removes what is at ``path``. Raises ServiceError, UnreachableError."""
+        """Sends a DELETE. Raises ServiceError, UnreachableError."""
         self._request("DELETE", path)
 
     def fetch(self, path: str) -> bytes:
-        """The body at ``path``. Raises ServiceError, UnreachableError."""
+        """Returns the body of a GET. Raises ServiceError, UnreachableError."""
         return self._request("GET", path)
 
     def download(self, path: str, target: Path, listed: int | None = None) -> None:
-        """Writes the body at ``path`` to a file that appears whole, with the server's sha256 and as many bytes as are
-        ``listed``, where that is known, or not at all.
-
-        Raises ServiceError, UnreachableError, and OSError with the name of the file.
+        """Downloads a body to a file, completely or not at all; checks the server's sha256 and the ``listed`` size,
+        if known. Raises ServiceError, UnreachableError, and OSError with the name of the file.
         """
         beside = target.with_name(f".{uuid.uuid4().hex}.part")
         try:
@@ -160,7 +159,7 @@ class Http:
                 raise AnswerError(f"{path} has {got} bytes, where the list of files has {listed}")
             told = response.headers.get("Repr-Digest")
             if told is not None and told != f"sha-256=:{base64.b64encode(digest.digest()).decode()}:":
-                raise AnswerError(f"{path} arrived damaged: its sha256 is not the one that the server told")
+                raise AnswerError(f"{path} arrived damaged: its sha256 is not that of the server")
             beside.replace(target)
         except OSError as error:
             error.filename, error.filename2 = str(target), None
@@ -169,7 +168,7 @@ class Http:
             beside.unlink(missing_ok=True)
 
     def stream(self, path: str, after: int = 0) -> Iterator[AnyMessage]:
-        """The messages of an SSE stream after a number, as they come; it ends when the server ends it."""
+        """Yields the messages of an SSE stream after a number as they arrive, until the server ends it."""
         headers = {"Accept": "text/event-stream", "Last-Event-ID": str(after)}
         with self._opened("GET", path, headers=headers, timeout=_STREAM_TIMEOUT) as response:
             for event in httpx2.EventSource(response) if response.status_code == 200 else ():
@@ -177,14 +176,14 @@ class Http:
                     yield self.line(event.data)
 
     def line(self, data: str | msgspec.Raw) -> AnyMessage:
-        """A message as the server sends it. Raises AnswerError."""
+        """Decodes a message of the server. Raises AnswerError."""
         try:
             return from_line(data)
         except (msgspec.MsgspecError, RecursionError) as error:
             raise self._unreadable(error) from None
 
     def _request(self, method: str, path: str, repeat: bool = False, **options: Any) -> bytes:
-        """The whole answer; a GET, and what says ``repeat``, is tried again when the network fails."""
+        """Returns the whole answer. A GET, and a request with ``repeat``, is repeated after a network error."""
         tries, began = _TRIES if repeat or method == "GET" else 1, time.monotonic()
         for attempt in range(tries):
             try:
@@ -198,13 +197,13 @@ class Http:
 
     @contextmanager
     def _opened(self, method: str, path: str, **options: Any) -> Iterator[httpx2.Response]:
-        """The answer as a stream. Raises ServiceError for a refusal, UnreachableError for a broken connection,
+        """Opens the answer as a stream. Raises ServiceError for a refusal, UnreachableError for a broken connection,
         AnswerError.
         """
         try:
             with closing(self._begun(method, path, **options)) as response:
                 if 300 <= response.status_code < 400:
-                    raise AnswerError(f"{self.url} is elsewhere: it points to {_place(response)}; write that address")
+                    raise AnswerError(f"{self.url} redirects to {_place(response)}; write that address")
                 if response.status_code >= 400:
                     raise refusal(response.status_code, self._refusal(response))
                 yield response
@@ -216,7 +215,8 @@ class Http:
             raise self._unreadable(error) from None
 
     def _begun(self, method: str, path: str, timeout: httpx2.Timeout = _TIMEOUT, **options: Any) -> httpx2.Response:
-        """The answer when its head has come, within a time: httpx limits the silence between two letters alone."""
+        """Returns the answer once its head has arrived, within a time limit: httpx limits only the silence between
+        two bytes."""
         request = self._http.build_request(method, path, timeout=timeout, **options)
         done: queue.SimpleQueue[httpx2.Response | Exception] = queue.SimpleQueue()
 
@@ -231,7 +231,7 @@ class Http:
         try:
             answer = done.get(timeout=most)
         except queue.Empty:
-            raise AnswerError(f"{self.url} has not answered whole within {duration(most)}") from None
+            raise AnswerError(f"{self.url} did not answer completely within {duration(most)}") from None
         if isinstance(answer, Exception):
             raise answer
         return answer
@@ -240,7 +240,7 @@ class Http:
         return b"".join(self._chunks(response, _LONGEST))
 
     def _chunks(self, response: httpx2.Response, most: int) -> Iterator[bytes]:
-        """The pieces of an answer, ``most`` bytes of it. Raises AnswerError for one without end, or too slow."""
+        """Yields at most ``most`` bytes of an answer. Raises AnswerError for an endless or slow one."""
         began, got = time.monotonic(), 0
         for chunk in response.iter_bytes():
             got += len(chunk)
@@ -252,7 +252,7 @@ class Http:
             yield chunk
 
     def _refusal(self, response: httpx2.Response) -> Mapping[str, Any]:
-        """What the server said; where it misses a token, which way one is given to this client."""
+        """Returns the message of the server; for a missing token, how to set one for this client."""
         told = _problem(response.status_code, self._body(response))
         if response.status_code != UNAUTHORIZED:
             return told
@@ -271,11 +271,11 @@ class Http:
             raise self._unreadable(error) from None
 
     def endless(self, what: str) -> ClientError:
-        """Of a list whose pages have no end."""
+        """Error for a list whose pages do not end."""
         return AnswerError(f"the list of {what} of {self.url} has no end")
 
     def _unreadable(self, error: Exception) -> ClientError:
-        """Of another program, or of a newer server."""
+        """Error for an answer of another program, or of a newer server."""
         why = " ".join(str(error).split())[:_WORDS]
         return AnswerError(f"the answer of {self.url} cannot be read: {why}; is it a Conoid server, and no newer?")
 
@@ -289,12 +289,13 @@ def _problem(status: int, content: bytes) -> Mapping[str, Any]:
 
 
 def _place(response: httpx2.Response) -> str:
-    """Where an answer points to; the address as it is written may be none."""
+    """Returns the target of a redirect; the address as it is written may be invalid."""
     return repr(response.headers.get("location", "nowhere")[:_WORDS])
 
 
 def _most(response: httpx2.Response, target: Path) -> int:
-    """Bytes that a file may have: as many as the answer says, where the disk has room for them. Raises ClientError."""
+    """Returns the largest size of a downloaded file: its announced size, if the disk has room for it. Raises
+    ClientError."""
     told = response.headers.get("content-length", "")
     if not told.isdecimal() or "content-encoding" in response.headers:
         return _LONGEST
@@ -311,5 +312,5 @@ def _reason(error: Exception) -> str:
 
 
 def _visible(text: str) -> bool:
-    """Whether all of it is visible ASCII, which a header can have."""
+    """Whether all characters are visible ASCII, as a header requires."""
     return all("!" <= letter <= "~" for letter in text)

@@ -1,4 +1,4 @@
-"""A subscription to a run's messages, whatever carries them."""
+"""A subscription to a run's messages, over any transport."""
 
 from typing import Protocol
 
@@ -6,14 +6,14 @@ from conoid.cases.messages import AnyMessage
 
 
 class Link(Protocol):
-    """Messages as they arrive, perhaps with gaps and repeats."""
+    """Messages as they arrive, perhaps with gaps and repetitions."""
 
     name: str
     trouble: str
-    """Why nothing comes by it any more; empty where something may."""
+    """Reason for which no message arrives any more; empty for a working subscription."""
 
     def get(self, timeout: float) -> AnyMessage | None:
-        """The next message; None after ``timeout`` s without one."""
+        """Returns the next message; None after ``timeout`` s without one."""
 
     def close(self) -> None:
-        """Lets go; a second call does nothing."""
+        """Closes the subscription; a second call has no effect."""

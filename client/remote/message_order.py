@@ -1,4 +1,4 @@
-"""Messages in the order of ``seq``, each once: what the stream missed is read from the journal. No network in here."""
+"""Messages in the order of ``seq``, each once; missing ones are read from the journal. This module uses no network."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -6,30 +6,30 @@ from collections.abc import Callable, Iterator
 from conoid.cases.messages import AnyMessage
 
 Refill = Callable[[int], list[AnyMessage]]
-"""The messages of the journal after a number, in order."""
+"""Function that returns the messages of the journal after a number, in order."""
 
 _TRIES = 3
-"""Times the journal is read for a message that is missing before it is given up. Chosen: the journal is written before
-the sample is sent, so the first reading finds it but on a file system that lags behind."""
+"""Number of readings of the journal for a missing message before it is given up. Chosen: the journal is written
+before the sample is sent, so the first reading has it unless the file system lags."""
 
 
 class InOrder:
-    """Turns messages as they arrive into messages as they were written.
+    """Sorts arriving messages into the order in which they were written.
 
-    A number that was seen is dropped; a number that skips some calls ``refill``. The journal is written before
-    anything is published, so a refill has what is missing; should it not (a file system that lags behind), it is
-    asked again a little later, and ``missing`` counts what never came.
+    A message with a known number is dropped; a gap in the numbers calls ``refill``. The journal is written before
+    anything is published, so a refill has the missing messages. If it does not (a file system that lags), it is
+    called again a little later, and ``missing`` counts the messages that never came.
     """
 
     def __init__(self, refill: Refill, after: int = 0, pause: float = 0.2) -> None:
-        """``after`` is the number of the last message that is known already; ``pause`` in s between tries."""
+        """``after``: number of the last known message; ``pause`` in s between tries."""
         self.refill = refill
         self.last = after
         self.pause = pause
         self.missing = 0
 
     def take(self, message: AnyMessage) -> Iterator[AnyMessage]:
-        """What can be told now that ``message`` has arrived."""
+        """Yields the messages that are complete in order after ``message`` has arrived."""
         for attempt in range(_TRIES):
             if message.seq <= self.last + 1:
                 break
@@ -42,7 +42,7 @@ class InOrder:
             yield message
 
     def catch_up(self) -> Iterator[AnyMessage]:
-        """What the journal has beyond the last message told."""
+        """Yields the messages of the journal after the last one."""
         for message in self.refill(self.last):
             if message.seq == self.last + 1:
                 self.last = message.seq

@@ -1,4 +1,4 @@
-"""Cases on their way to a server, with the files that they name: these are sent first, where the server lacks them."""
+"""Submission of cases with files: files that the server lacks are sent before the case."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -15,24 +15,24 @@ from .sending import send
 from .submission import CaseSource, body_of, data_of, folder_of, to_json
 
 SURVEY = 330.0
-"""s that a server may take to read the files of a case before it answers: server/intake/reader.py has 300. Chosen."""
+"""Time in s in which a server must read the files of a case before it answers: server/intake/reader.py has 300.
+Chosen."""
 _POINT = 30.0
-"""s that it may take for a point of a sweep whose files are others than those of the points before. Chosen."""
+"""Additional time in s for each point of a sweep with other files than the point before. Chosen."""
 
 
 class Outbox:
-    """Hashes each file once for each state of it."""
+    """Files of cases; each file is hashed once for each state."""
 
     def __init__(self, http: Http) -> None:
         """Sends nothing yet."""
         self._http, self._hashes = http, Hashes()
         self.say: Callable[[str], None] = lambda text: None
-        """Hears how far the sending is."""
+        """Callback with the progress of the upload."""
 
     def ready(self, case: Mapping[str, Any], folder: Path) -> dict[str, Any]:
-        """A case in plain data with the hash of each file that it names, all of which the server has when this returns.
-
-        Relative paths begin in ``folder``. Raises CaseError for files that cannot be used, ClientError.
+        """Returns a case in plain data with the hash of each file that it names; the server has all of them on
+        return. Relative paths are relative to ``folder``. Raises CaseError for unusable files, ClientError.
         """
         files = self._hashes.of(case, folder)
         for file in {file.sha256: file for file in files}.values():
@@ -42,9 +42,8 @@ class Outbox:
     def body(
         self, case: CaseSource, overrides: Overrides = (), folder: Path | str | None = None
     ) -> tuple[str, bytes, float]:
-        """Content type and body of a case, and s by which its answer may be late because the server reads its files.
-
-        A case without files is sent as it is written, and what is wrong with it is told by the server.
+        """Returns content type and body of a case, and the additional time in s for its answer, because the server
+        reads its files. A case without files is sent unchanged, and the server reports its problems.
         """
         changes = list(overrides) if isinstance(overrides, Iterator) else overrides
         try:
@@ -59,8 +58,8 @@ class Outbox:
     def sweep(
         self, case: CaseSource, points: Sequence[Point], folder: Path | str | None = None
     ) -> tuple[dict[str, Any], Sequence[Point], float]:
-        """The case and the points of a sweep with the hashes of their files, in a point where it names another file
-        than the case; and the s as of ``body``.
+        """Returns the case and the points of a sweep with the hashes of their files, and the additional time in s as
+        in ``body``. A point has a hash if it names another file than the case.
         """
         data = data_of(case)
         try:
@@ -79,18 +78,18 @@ class Outbox:
 
 
 def place_of(case: CaseSource, folder: Path | str | None) -> Path:
-    """The folder in which relative paths begin: the one that is given, else that of the case. Raises CaseError."""
+    """Returns the folder of relative paths: the given one, else that of the case. Raises CaseError."""
     return folder_of(case) if folder is None else Path(folder)
 
 
 def _with_those_of(data: dict[str, Any], ready: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """The case with the hashes of those of its files that some point leaves as they are."""
+    """Returns the case with the hashes of the files that at least one point does not change."""
     hashes = {(file.table, file.path): file.sha256 for each in ready for file in files_of(each)}
     known = {file.table: hashes[file.table, file.path] for file in files_of(data) if (file.table, file.path) in hashes}
     return apply_overrides(data, {f"{dotted(table)}.sha256": sha256 for table, sha256 in known.items()})
 
 
 def _told(point: Point, ready: Mapping[str, Any], data: Mapping[str, Any]) -> Point:
-    """A point with the hashes of the files that it alone names."""
+    """Returns a point with the hashes of its own files."""
     own = [file for file in files_of(ready) if file not in files_of(data)]
     return {**point, **{f"{dotted(file.table)}.sha256": file.sha256 for file in own}}

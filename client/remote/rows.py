@@ -1,4 +1,4 @@
-"""The table of runs: the values of their cases and their results, as the server tells them of many runs at once."""
+"""The table of runs: values of their cases and results, in one answer for many runs."""
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -11,18 +11,18 @@ from conoid.cases.reference.flat import Scalar
 from .run_info import RunInfo
 
 _NEVER = frozenset({"run.ranks", "run.threads", "run.profile"})
-"""Keys of a case that other columns of a list have."""
+"""Keys of a case that other columns of a list show."""
 
 
 class Result(msgspec.Struct, kw_only=True, frozen=True):
-    """What a number of a run is."""
+    """Name and unit of a result."""
 
     name: str
     unit: str = ""
 
 
 class Alike(msgspec.Struct, kw_only=True, frozen=True):
-    """What cases that are alike have in common: values and units by key, and the results of their runs."""
+    """A group of similar cases: common values and units by key, and the results of their runs."""
 
     values: dict[str, Scalar]
     units: dict[str, str]
@@ -30,7 +30,7 @@ class Alike(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class TableRow(RunInfo, kw_only=True, frozen=True):
-    """A run as the table tells of it: ``case`` is its place among those that are alike."""
+    """A run in the table; ``case``: index of its group of similar cases."""
 
     case: int | None
     values: dict[str, Scalar | None]
@@ -40,7 +40,7 @@ class TableRow(RunInfo, kw_only=True, frozen=True):
 
 
 class TablePage(msgspec.Struct, kw_only=True, frozen=True):
-    """A page of the table; ``pending`` of its runs are not read yet."""
+    """A page of the table; the results of ``pending`` of its runs are not read yet."""
 
     runs: list[TableRow]
     cases: list[Alike]
@@ -54,21 +54,21 @@ class RunRow:
 
     info: RunInfo
     values: dict[str, Scalar]
-    """By key, such as ``parts[0].velocity[2]``, in SI units."""
+    """Values of the case in SI units by key, such as ``parts[0].velocity[2]``."""
     results: dict[str, float | None]
-    """By name, such as ``probe.speed``, in SI units; empty before the end."""
+    """Results in SI units by name, such as ``probe.speed``; empty before the end of the run."""
     units: dict[str, str]
-    """Of values and results that have one."""
+    """Units of the values and results that have one."""
     references: int
-    """Reference numbers that it was compared with."""
+    """Number of reference values with which the run was compared."""
     missed: list[str]
-    """Names of those that it misses."""
+    """Names of the reference values that the run does not reach."""
     alike: Alike | None
-    """What its case has in common with others of the same answer."""
+    """Common data of its group of similar cases in the same answer."""
 
 
 def rows_of(page: TablePage) -> Iterator[RunRow]:
-    """The rows of a page."""
+    """Yields the rows of a page."""
     for run in page.runs:
         alike = page.cases[run.case] if run.case is not None else None
         values = {**(alike.values if alike is not None else {}), **run.values}
@@ -84,7 +84,7 @@ def rows_of(page: TablePage) -> Iterator[RunRow]:
 
 
 def differing(rows: Sequence[RunRow], most: int) -> list[str]:
-    """Keys of which two of the rows with cases that are alike have different values; those of most rows first."""
+    """Returns the keys whose values differ between rows of similar cases; those of most rows first."""
     found = Counter[str]()
     for alike in {id(row.alike): row.alike for row in rows if row.alike is not None}.values():
         own = [row for row in rows if row.alike is alike]

@@ -1,4 +1,4 @@
-"""What a server tells of a run: its state, its files, its messages, as plain data."""
+"""Data of a run on a server: its state, its files, its messages."""
 
 from html import escape
 from typing import Annotated, Any
@@ -14,13 +14,13 @@ from ..errors import ClientError
 from ..result import outcome_of
 
 ID = r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,127}\Z"
-"""Of a run or a sweep: a name of a folder, too."""
+"""Pattern of the id of a run or a sweep, which is also the name of a folder."""
 _OF_ONE = {"estimate", "progress", "outcome_json"}
-"""What is told of one run, not in a list."""
+"""Fields of a single run that lists do not have."""
 
 
 class RunInfo(msgspec.Struct, kw_only=True, frozen=True):
-    """What the server tells of a run. Times are Unix s, None when they have not come yet."""
+    """A run on a server. Times are Unix s, None before the event."""
 
     id: Annotated[str, msgspec.Meta(pattern=ID)]
     owner: str
@@ -31,22 +31,22 @@ class RunInfo(msgspec.Struct, kw_only=True, frozen=True):
     cause: str | None = None
     message: str = ""
     reason: str = ""
-    """What a queued run waits for."""
+    """Reason for which a queued run waits."""
     started: float | None = None
     finished: float | None = None
     labels: dict[str, str] = {}
     threads: int = 1
-    """Of each rank."""
+    """Threads of each rank."""
     title: str = ""
     short: str = ""
-    """The beginning of the id that no other run has; told in lists alone."""
+    """Shortest unique prefix of the id; in lists only."""
     estimate: dict[str, Any] = {}
-    """This and what follows is told of one run, not in a list (_OF_ONE)."""
+    """This field and the following ones are those of a single run, not of a list (_OF_ONE)."""
     progress: Progress | None = None
     outcome_json: msgspec.Raw = msgspec.field(name="outcome", default=msgspec.Raw(b"null"))
 
     def _repr_html_(self) -> str:
-        """For notebooks."""
+        """Table for notebooks."""
         labels = ", ".join(f"{name}={value}" for name, value in self.labels.items())
         rows = {
             "run": self.id,
@@ -60,12 +60,12 @@ class RunInfo(msgspec.Struct, kw_only=True, frozen=True):
 
     @property
     def listed(self) -> dict[str, Any]:
-        """What a list tells of it, as plain data."""
+        """The fields of a list, as plain data."""
         return {name: getattr(self, name) for name in self.__struct_fields__ if name not in _OF_ONE}
 
     @property
     def outcome(self) -> Outcome | None:
-        """How it ended; None before its end. Raises ClientError when this client cannot read it."""
+        """The outcome; None before the end. Raises ClientError if this client cannot read it."""
         if bytes(self.outcome_json) == b"null":
             return None
         try:
@@ -75,24 +75,24 @@ class RunInfo(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class FileInfo(msgspec.Struct, kw_only=True, frozen=True):
-    """A file in a run's folder: its path there, its bytes, and where it is fetched. Bytes of a name that are no UTF-8
-    are shown as ``\\xff``: the address alone has them.
+    """A file in a run's folder: its path, its size in bytes, its address. Bytes of a name that are not UTF-8 are
+    shown as ``\xff``; only the address has the exact name.
     """
 
     path: str
     size: int | None = None
-    """None where it is not known."""
+    """Size in bytes; None if unknown."""
     url: str = ""
 
 
 class Listing(msgspec.Struct, kw_only=True, frozen=True):
-    """What lies in a run's folder."""
+    """The files of a run's folder."""
 
     files: list[FileInfo]
 
 
 class EventPage(msgspec.Struct, kw_only=True, frozen=True):
-    """Journal lines, the number of the last one, and whether there are more."""
+    """Lines of the journal, the number of the last one, and whether more exist."""
 
     events: list[msgspec.Raw]
     last: int

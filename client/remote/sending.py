@@ -1,4 +1,4 @@
-"""Files on their way to a server: what it lacks is sent in pieces, and goes on where a broken connection has ended."""
+"""Upload of files: the missing bytes are sent in pieces, and the upload continues after a broken connection."""
 
 import time
 from collections.abc import Callable
@@ -14,32 +14,32 @@ from ..local.local_files import LocalFile
 from .http import Http
 
 _LARGEST, _SMALLEST = 1 << 20, 1 << 14
-"""Bytes of a piece. Chosen: a proxy takes bodies of 1 MiB; at 1 kB/s 16 KiB are sent before an answer is late."""
+"""Smallest and largest size of a piece in bytes. Chosen: a proxy takes bodies of 1 MiB; at 1 kB/s 16 KiB are sent
+before a timeout."""
 _FIRST = 1 << 17
-"""Bytes of the first piece, until it is known how fast the line is. Chosen."""
+"""Bytes of the first piece, before the speed of the connection is known. Chosen."""
 _WANTED = 2.0
-"""s that a piece should take; it becomes smaller where it takes longer. Chosen: what is lost by a break is as much."""
+"""Target duration of a piece in s; a slower piece makes the next ones smaller. Chosen: a break loses as much."""
 _PATIENCE = 60.0
-"""s without a byte after which the sending is given up. Chosen: a server that is started anew is back by then."""
+"""Time in s without progress after which the upload is given up. Chosen: a restarted server is back by then."""
 _PAUSE = 0.5
-"""s after a break before the server is asked how much it has."""
+"""Time in s after a break before the server is asked for its number of bytes."""
 _LAST = 120.0
-"""s that the answer to the last piece may take: the server reads the whole file again, and has it on disk."""
+"""Time in s for the answer to the last piece: the server reads the whole file again and writes it to disk."""
 _PASSING = frozenset({408, 500, 502, 503, 504})
-"""Statuses after which the same piece may be taken."""
+"""Statuses after which the same piece may be sent again."""
 
 
 class SentFile(msgspec.Struct, kw_only=True, frozen=True):
-    """What a server has of a file: ``offset`` of its bytes, all of them, verified, where it is ``whole``."""
+    """State of an upload on the server: ``offset`` bytes have arrived; ``whole``: the file is complete and verified."""
 
     offset: int
     whole: bool
 
 
 def send(http: Http, file: LocalFile, say: Callable[[str], None] = lambda text: None) -> None:
-    """The server has the file, as it was hashed, when this returns. ``say`` hears how far it is.
-
-    Raises ClientError where the file has changed, ServiceError, UnreachableError.
+    """Sends a file; on return the server has it with the hash that was computed before. ``say`` is called with the
+    progress. Raises ClientError if the file has changed, ServiceError, UnreachableError.
     """
     told = _status(http, file)
     if told is not None and told.whole:
@@ -61,14 +61,15 @@ def _place(file: LocalFile) -> str:
 
 
 class _Sending:
-    """One file on its way."""
+    """The upload of one file."""
 
     def __init__(self, http: Http, file: LocalFile, opened: FileIO, say: Callable[[str], None]) -> None:
         self._http, self._file, self._opened, self._say = http, file, opened, say
         self._piece, self._again = min(_FIRST, _LARGEST), True
 
     def go_on(self, offset: int) -> None:
-        """Sends piece after piece; waits, and goes on, where the connection breaks or another one sends the file."""
+        """Sends piece after piece. Waits and continues when the connection breaks or another client sends the same
+        file."""
         moved = time.monotonic()
         while True:
             self._say(f"sending {self._file.path.name}, {size(offset)} of {size(self._file.size)}")
@@ -91,7 +92,7 @@ class _Sending:
             offset = there
 
     def _sent(self, offset: int) -> SentFile:
-        """One piece, which becomes larger or smaller after the time that it takes."""
+        """Sends one piece, and adapts the size of the next one to the time."""
         self._opened.seek(offset)
         data = self._opened.read(min(self._piece, self._file.size - offset)) or b""
         end = offset + len(data)
@@ -109,7 +110,7 @@ class _Sending:
         return told
 
     def _passes(self, error: ClientError) -> bool:
-        """Whether the sending may go on. Raises ClientError where the file has changed since it was hashed."""
+        """Whether the upload may continue. Raises ClientError if the file has changed since it was hashed."""
         if not isinstance(error, ServiceError):
             return isinstance(error, UnreachableError)
         code = error.problem.get("code")
@@ -117,12 +118,12 @@ class _Sending:
             self._file.check(self._opened.fileno())
             if not self._again:
                 raise self._file.changed()
-            self._again = False  # what the server had before may have been damaged: once from the first byte on
+            self._again = False  # the bytes on the server may be damaged: start again once
             return True
         return code in {"wrong_offset", "in_progress", "incomplete", "busy"} or error.status in _PASSING
 
     def _offset(self, known: int) -> int | None:
-        """The byte to go on with, None where the server has the file; ``known`` where it cannot be asked now."""
+        """Returns the byte to continue with, None if the server has the file; ``known`` if it cannot be asked now."""
         try:
             told = _status(self._http, self._file)
         except (ServiceError, UnreachableError):

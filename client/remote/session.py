@@ -1,4 +1,4 @@
-"""A server and the words of its API."""
+"""A session with a server: the operations of its API."""
 
 import re
 import time
@@ -31,23 +31,23 @@ from .run_query import Moment, query_of, words_of
 from .submission import CaseSource, data_of, to_json
 
 _CANDIDATES = 8
-"""Ids that are named where several begin as one was given. Chosen: as many as a line has room for."""
+"""Largest number of ids that are listed for an ambiguous prefix. Chosen: as many as fit into a line."""
 _LAST = "z" * 22
-"""Behind the beginning of an id: no id that begins so comes after it."""
+"""Text after a prefix of an id that sorts after every id with this prefix."""
 _MOST_PAGES = 10_000
-"""Of a list. Chosen: a million runs; a server that has more pages has no end."""
+"""Largest number of pages of a list. Chosen: a million runs; more pages are an error of the server."""
 _POINT = 0.5
-"""s that a server may take for each point of a sweep, which it reads, checks and writes to disk before it answers.
-Chosen: ten times what one takes on two cores at a load of 4.
+"""Time in s for each point of a sweep, which the server reads, checks and writes to disk before it answers. Chosen:
+ten times the time on two cores at a load of 4.
 """
 _PAGE = 500
-"""Rows of a page of the table: as many as a server gives."""
+"""Rows of a page of the table: the largest number that a server sends."""
 _READING, _REST = 60.0, 0.2
-"""s for which results that a server still reads are waited for, and between two questions. Chosen."""
+"""Time in s to wait for results that a server still reads, and between two requests. Chosen."""
 
 
 class _Known(Protocol):
-    """A run or a sweep that a server tells of."""
+    """A run or a sweep in a list."""
 
     @property
     def id(self) -> str:
@@ -55,7 +55,7 @@ class _Known(Protocol):
 
 
 class Verdict(msgspec.Struct, kw_only=True, frozen=True):
-    """What the server says of a case."""
+    """Answer of the server to the check of a case."""
 
     valid: bool
     problems: list[dict[str, str]] = []
@@ -63,23 +63,24 @@ class Verdict(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class Page(msgspec.Struct, kw_only=True, frozen=True):
-    """A page of a list of runs; ``next`` is the cursor of the following one."""
+    """A page of a list of runs; ``next`` is the cursor of the next page."""
 
     runs: list[RunInfo]
     next: str | None = None
 
 
 class Session(Http):
-    """A server, and the right to ask it. Use it as a context manager, or close it."""
+    """A session with a server. Use it as a context manager, or close it."""
 
     def __init__(self, url: str, token: str | None = None, transport: httpx2.BaseTransport | None = None) -> None:
-        """As an ``Http``."""
+        """Takes the arguments of ``Http``."""
         super().__init__(url, token, transport)
         self.outbox = Outbox(self)
-        """Sends the files that cases name."""
+        """Uploads of files that cases name."""
 
     def validate(self, case: CaseSource, overrides: Overrides = (), folder: Path | str | None = None) -> dict[str, Any]:
-        """The server's estimate of a case; ``folder`` as for ``submit``. Raises CaseError with every problem."""
+        """Checks a case on the server, and returns its estimate; ``folder`` as for ``submit``. Raises CaseError with
+        every problem."""
         kind, body, more = self.outbox.body(case, overrides, folder)
         answer = self.post(Verdict, "/v1/cases:validate", body, kind, more=more)
         if not answer.valid:
@@ -96,14 +97,14 @@ class Session(Http):
         priority: int = 0,
         folder: Path | str | None = None,
     ) -> Run:
-        """Hands a case in: a file, the name of a shipped case, or plain data. The files that it names are sent first,
-        where the server lacks them; relative paths begin in the ``folder`` of the case, for plain data in the working
-        one, where none is given.
+        """Submits a case: a file, the name of a shipped case, or plain data.
 
-        ``overrides`` change keys: ``["run.ranks=2"]``, ``{"run.ranks": 2}``. ``key`` is the Idempotency-Key; one is
-        made up when it is None, so that a retry never makes a second run. ``labels`` are words of your own by which
-        runs are found again, ``profile`` is one of the site's batch system; of two of your runs the one with the
-        higher ``priority`` comes first. Raises CaseError, ServiceError, UnreachableError.
+        Files that the case names are sent first if the server lacks them; relative paths are relative to the
+        ``folder`` of the case, for plain data to the working folder, unless it is given. ``overrides`` change keys:
+        ``["run.ranks=2"]``, ``{"run.ranks": 2}``. ``key`` is the Idempotency-Key; without one a random key is used,
+        so that a retry never makes a second run. ``labels`` are words to find runs again, ``profile`` is one of the
+        site's batch system; among a user's runs those with the higher ``priority`` start first. Raises CaseError,
+        ServiceError, UnreachableError.
         """
         kind, body, more = self.outbox.body(case, overrides, folder)
         words = [("label", word) for word in words_of(labels)]
@@ -116,11 +117,11 @@ class Session(Http):
         self, run: str, ranks: int | None = None, key: str | None = None, profile: str = "", priority: int = 0,
         threads: int | None = None, max_steps: int | None = None,
     ) -> Run:  # fmt: skip
-        """A new run of the same case that goes on from the newest checkpoint of ``run``, on so many ranks of so many
-        threads, to ``max_steps`` (``run.max_steps``); as the case has them where they are not given.
+        """Submits a new run of the same case that continues from the newest checkpoint of ``run``.
 
-        Its answer is that of a run that nothing has interrupted. Raises ServiceError when there is no checkpoint, and
-        when ``run`` has used up its steps and ``max_steps`` is not larger.
+        ``ranks``, ``threads`` and ``max_steps`` (``run.max_steps``) replace the values of the case if given. The
+        final answer is the same as without an interruption. Raises ServiceError without a checkpoint, and when
+        ``run`` has used up its steps and ``max_steps`` is not larger.
         """
         numbers = {"ranks": ranks, "threads": threads, "max_steps": max_steps}
         words = {name: str(number) for name, number in numbers.items() if number is not None}
@@ -132,11 +133,11 @@ class Session(Http):
         self, case: CaseSource, points: Sequence[Point] | Mapping[str, Iterable[Any]], at_once: int | None = None,
         key: str | None = None, *, grid: bool = False, folder: Path | str | None = None, again: bool = False,
     ) -> Sweep:  # fmt: skip
-        """Hands a case in at many points, each a mapping of keys to values: all become runs, or none.
+        """Submits a case at many points, each a mapping of keys to values. All points become runs, or none.
 
-        A mapping of keys to as many values each is one point after the other, or each with each for a ``grid``.
-        ``at_once`` of them run at a time; ``key`` and ``folder`` as for ``submit``: the same key is the same sweep, of
-        which ``again`` runs the points once more that have ended without success. Raises CaseError, ServiceError.
+        A mapping of keys to lists of the same length gives one point for each position, or all combinations for a
+        ``grid``. At most ``at_once`` runs run at a time. ``key`` and ``folder`` as for ``submit``: the same key is
+        the same sweep, whose points without success run again with ``again``. Raises CaseError, ServiceError.
         """
         chosen = listed(points_along(points, grid=grid) if isinstance(points, Mapping) else points)
         data, told, more = self.outbox.sweep(case, chosen, folder)
@@ -167,11 +168,11 @@ class Session(Http):
         )  # fmt: skip
 
     def sweeps(self) -> list[SweepInfo]:
-        """Our sweeps, newest first, without their points."""
+        """Yields the user's sweeps, newest first, without their points."""
         return list(self._sweeps())
 
     def _sweeps(self, beginning: str = "") -> Iterator[SweepInfo]:
-        """Newest first, from those that begin so on."""
+        """Yields sweeps, newest first, from those with this prefix on."""
         query = {"before": beginning + _LAST} if beginning else {}
         for _ in range(_MOST_PAGES):
             page = self.get(SweepPage, "/v1/sweeps", limit=500, **query)
@@ -182,9 +183,8 @@ class Session(Http):
         raise self.endless("sweeps")
 
     def find_sweep(self, sweep_id: str) -> Sweep:
-        """A handle of a sweep: by its id, by a beginning of it that no other has, or of the newest one for ``last``.
-
-        Raises NotFoundError where there is none, UsageError where several begin so.
+        """Returns a handle of a sweep: by its id, by a unique prefix of it, or of the newest one for ``last``.
+        Raises NotFoundError for an unknown sweep, UsageError for an ambiguous prefix.
         """
         if sweep_id == "last":
             newest = next(self._sweeps(), None)
@@ -194,9 +194,8 @@ class Session(Http):
         return Sweep(self, self._named("sweep", "/v1/sweeps", sweep_id, self._sweeps))
 
     def run(self, run_id: str) -> Run:
-        """A handle of a run: by its id, by a beginning of it that no other one has, or of the newest one for ``last``.
-
-        Raises NotFoundError where there is none, UsageError where several begin so.
+        """Returns a handle of a run: by its id, by a unique prefix of it, or of the newest one for ``last``. Raises
+        NotFoundError for an unknown run, UsageError for an ambiguous prefix.
         """
         if run_id == "last":
             newest = self.runs(limit=1)
@@ -209,9 +208,9 @@ class Session(Http):
         return self.get(Page, "/v1/runs", limit=_CANDIDATES + 1, prefix=beginning).runs
 
     def _named(self, what: str, path: str, name: str, after: Callable[[str], Iterable[_Known]]) -> str:
-        """The id that is meant; ``after`` gives runs, or sweeps, from a beginning of an id on."""
+        """Returns the id of a prefix; ``after`` returns runs, or sweeps, from a prefix on."""
         if not re.fullmatch(ID, name):
-            raise NotFoundError(f"{what} {shown(name)}: there is none; an id has letters and digits")
+            raise NotFoundError(f"{what} {shown(name)}: it does not exist; an id has letters and digits")
         try:
             self.get(dict[str, Any], f"{path}/{quoted(name)}")
         except MissingError as error:
@@ -224,11 +223,11 @@ class Session(Http):
             return name
         if len(found) > 1:
             more = " and more" if len(found) > _CANDIDATES else ""
-            raise UsageError(f"{what} = {name!r}: several begin so: {', '.join(found[:_CANDIDATES])}{more}")
+            raise UsageError(f"{what} = {name!r}: several ids begin so: {', '.join(found[:_CANDIDATES])}{more}")
         return found[0]
 
     def _candidates(self, name: str, after: Callable[[str], Iterable[_Known]]) -> list[str]:
-        """Ids that begin so, some of them; none where the server is too old to be asked."""
+        """Returns some ids with this prefix; none if the server is too old for the request."""
         try:
             named = takewhile(lambda one: one.id.startswith(name), after(name))
             return [one.id for one in islice(named, _CANDIDATES + 1)]
@@ -239,11 +238,11 @@ class Session(Http):
         self, states: Sequence[str] = (), limit: int = 50, labels: Mapping[str, str] | None = None, *, case: str = "",
         text: str = "", since: Moment = None, until: Moment = None,
     ) -> list[RunInfo]:  # fmt: skip
-        """Our runs, newest first, at most ``limit``; with ``labels``, those that have all of them.
+        """Returns the user's runs, newest first, at most ``limit``.
 
-        ``case`` is the name of their case, with ``*`` for any letters; ``text`` are words, each of which stands in the
-        name, the title, a label, the state or the message, or begins the id; ``since`` and ``until`` bound when they
-        were submitted: Unix s, or a datetime.
+        ``labels``: all of them must match. ``case``: name of the case, with ``*`` for any characters. ``text``:
+        words that all occur in the name, the title, a label, the state or the message, or that begin the id.
+        ``since`` and ``until``: limits of the time of submission, Unix s or a datetime.
         """
         found: list[RunInfo] = []
         query = query_of(states, labels, case, text, since, until)
@@ -259,7 +258,7 @@ class Session(Http):
         self, states: Sequence[str] = (), limit: int = 50, labels: Mapping[str, str] | None = None, *, case: str = "",
         text: str = "", since: Moment = None, until: Moment = None,
     ) -> list[RunRow]:  # fmt: skip
-        """The same runs with the values of their cases and their results, in SI units."""
+        """Returns the same runs with the values of their cases and their results, in SI units."""
         found: list[RunRow] = []
         query = query_of(states, labels, case, text, since, until)
         for _ in range(_MOST_PAGES):
@@ -271,7 +270,7 @@ class Session(Http):
         raise self.endless("runs")
 
     def _table(self, limit: int, query: Mapping[str, Any]) -> TablePage:
-        """A page of the table; asked again while the server still reads results, for a while."""
+        """Returns a page of the table. Repeats the request for a while if the server still reads results."""
         until = time.monotonic() + _READING
         while (page := self.get(TablePage, "/v1/table", limit=limit, **query)).pending and time.monotonic() < until:
             time.sleep(_REST)
@@ -279,6 +278,7 @@ class Session(Http):
 
 
 def connect(url: str | None = None, token: str | None = None) -> Session:
-    """A session with the server of the arguments, of CONOID_URL and CONOID_TOKEN, or of the configuration file."""
+    """Opens a session with the server of the arguments, of CONOID_URL and CONOID_TOKEN, or of the configuration
+    file."""
     chosen = target(url, token)
     return Session(chosen.url, chosen.token)

@@ -1,7 +1,7 @@
-"""A run's messages, live: over Zenoh where it can be reached, else over SSE; gaps are refilled over REST.
+"""Live messages of a run: over Zenoh if it can be reached, else over SSE; gaps are refilled over REST.
 
-The only module of the client that knows Zenoh. A late joiner subscribes first, then reads the history, then the
-stream: nothing is missed and nothing told twice.
+This is the only module of the client that imports zenoh. A client subscribes first, then reads the past messages,
+then the stream: no message is missing, and none comes twice.
 """
 
 import hashlib
@@ -29,40 +29,39 @@ from .message_order import InOrder, Refill
 T = TypeVar("T")
 
 _CAPACITY = 4096
-"""Messages that wait to be read. Chosen: minutes of a run, which sends some ten a second."""
+"""Largest number of messages that wait to be read. Chosen: minutes of a run, which sends some ten per second."""
 _BLOBS = 4
-"""Snapshots of fragments that are kept until they are asked for. Chosen: who reads is seconds behind at most."""
+"""Number of snapshots that are kept until they are read. Chosen: a reader is seconds behind at most."""
 _OPEN_SECONDS = 5.0
-"""s that a router may take to answer before SSE is used. Chosen."""
+"""Time in s in which a router must answer before SSE is used. Chosen."""
 _CLOSE_SECONDS = 2.0
-"""s that a subscription may take to close. Chosen: nothing is lost when it does not."""
+"""Time in s for closing a subscription. Chosen: nothing is lost without it."""
 _SILENCE = 3.0
-"""s without a message after which the journal is read. Chosen: a run reports four times a second."""
+"""Time in s without a message after which the journal is read. Chosen: a run reports four times a second."""
 _PATIENCE = 60.0
-"""s that a server may be away while a run is followed. Chosen: time for a restart."""
+"""Time in s without a server after which following a run ends. Chosen: the time of a restart."""
 
 
 class StreamError(ClientError):
-    """Zenoh cannot be used: no router, or it refuses the user."""
+    """Zenoh cannot be used: there is no router, or it refuses the user."""
 
 
 class Mailbox:
-    """A bounded queue between the threads that receive and the one that reads; when it is full, the new are dropped.
-
-    What is dropped leaves a gap in ``seq``, and gaps are refilled.
+    """A bounded queue between the receiving threads and the reading one. When it is full, new messages are dropped;
+    gaps in ``seq`` are refilled.
     """
 
     def __init__(self) -> None:
-        """Empty."""
+        """Starts empty."""
         self._queue: queue.Queue[AnyMessage] = queue.Queue(_CAPACITY)
 
     def put(self, message: AnyMessage) -> None:
-        """Never waits."""
+        """Adds a message without waiting."""
         with suppress(queue.Full):
             self._queue.put_nowait(message)
 
     def get(self, timeout: float) -> AnyMessage | None:
-        """The oldest message, or None after ``timeout`` s."""
+        """Returns the oldest message, or None after ``timeout`` s."""
         try:
             return self._queue.get(timeout=timeout)
         except queue.Empty:
@@ -70,15 +69,15 @@ class Mailbox:
 
 
 class ZenohLink:
-    """A native subscription to everything that a run says."""
+    """A native subscription to all messages of a run."""
 
     name, trouble = "Zenoh", ""
 
     def __init__(self, router: Router, prefix: str) -> None:
-        """Opens a session and subscribes. Raises StreamError when that does not succeed within seconds."""
+        """Opens a session and subscribes. Raises StreamError if that fails or takes too long."""
         self._mailbox = Mailbox()
         self.blobs: dict[str, bytes] = {}
-        """The newest snapshots of the fragments that have come, by their sha256."""
+        """The newest snapshots that have arrived, by their sha256."""
         self._session = _within(_OPEN_SECONDS, lambda: zenoh.open(_config(router)))
         self._subscriber = self._session.declare_subscriber(keys.everything(prefix), self._receive)
 
@@ -91,7 +90,7 @@ class ZenohLink:
             self._mailbox.put(message)
 
     def _keep(self, message: Snapshot, payload: bytes) -> None:
-        """Its bytes, where they have come with it and are whole."""
+        """Returns the bytes of a snapshot, if they have arrived and are complete."""
         with suppress(msgspec.MsgspecError):
             data = fragments_from_msgpack(payload).blob
             if hashlib.sha256(data).hexdigest() == message.sha256:
@@ -99,11 +98,11 @@ class ZenohLink:
                 self.blobs = dict([*kept, (message.sha256, data)])
 
     def get(self, timeout: float) -> AnyMessage | None:
-        """The next message; None after ``timeout`` s without one."""
+        """Returns the next message; None after ``timeout`` s without one."""
         return self._mailbox.get(timeout)
 
     def close(self) -> None:
-        """Closes the session; a router that does not answer is not waited for."""
+        """Closes the session, without waiting for a router that does not answer."""
         with suppress(StreamError):
             _within(_CLOSE_SECONDS, self._session.close)
 
@@ -123,7 +122,7 @@ def _config(router: Router) -> zenoh.Config:
 
 
 def _within(seconds: float, work: Callable[[], T]) -> T:
-    """The value of ``work``, done in a thread of its own. Raises StreamError when it fails or takes longer."""
+    """Returns the result of ``work``, computed in a thread. Raises StreamError when it fails or takes longer."""
     done: queue.Queue[tuple[T | None, Exception | None]] = queue.Queue()
 
     def attempt() -> None:
@@ -143,12 +142,13 @@ def _within(seconds: float, work: Callable[[], T]) -> T:
 
 
 class SseLink:
-    """The server's SSE bridge, read in a thread; when it breaks off it says no more, and the journal is polled."""
+    """The SSE stream of the server, read in a thread. After a break it returns no more messages, and the journal is
+    read."""
 
     name, trouble = "SSE", ""
 
     def __init__(self, events: Callable[[], Iterator[AnyMessage]]) -> None:
-        """``events`` opens the stream and gives its messages."""
+        """``events`` opens the stream and yields its messages."""
         self._mailbox = Mailbox()
         self._closed = threading.Event()
         threading.Thread(target=self._read, args=(events,), name="sse", daemon=True).start()
@@ -161,25 +161,25 @@ class SseLink:
                 self._mailbox.put(message)
         except AnswerError as error:
             self.trouble = f"the events cannot be followed, and the journal is read instead: {error}"
-        except ClientError:  # it has broken off, or is refused: so will the journal be
+        except ClientError:  # a broken or refused stream: the journal is read instead
             return
 
     def get(self, timeout: float) -> AnyMessage | None:
-        """The next message; None after ``timeout`` s without one."""
+        """Returns the next message; None after ``timeout`` s without one."""
         return self._mailbox.get(timeout)
 
     def close(self) -> None:
-        """The thread ends with its next message, or with the process."""
+        """Ends the thread at its next message, or with the process."""
         self._closed.set()
 
 
 def follow(link: Link, refill: Refill, ended: Callable[[], bool], after: int = 0) -> Generator[AnyMessage]:
-    """Every message after ``after``, once and in order, to the run's final status; closes ``link``.
+    """Yields every message after ``after`` once and in order, until the final status of the run; closes ``link``.
 
-    ``refill`` reads the journal, ``ended`` asks the server whether the run is over. While the link is silent both are
-    asked every few seconds, so a dead router delays messages and loses none. A server that does not answer, or answers
-    that it cannot now, is waited for, a minute long; then UnreachableError or ServiceError is raised. Where the link
-    gives what nobody can read, a warning comes before the next message; it is in no journal and has no number.
+    ``refill`` reads the journal, ``ended`` asks the server whether the run has ended. While the link is silent both
+    are called every few seconds, so a failed router delays messages and loses none. A server that does not answer,
+    or is temporarily unavailable, is waited for, for a minute; then UnreachableError or ServiceError is raised. If a
+    message cannot be decoded, a warning comes before the next one; it is not in the journal and has no number.
     """
     order, said = InOrder(_patient(refill), after), False
     try:
@@ -207,7 +207,7 @@ def _told(link: Link, order: InOrder, ended: Callable[[], bool]) -> Iterator[Any
 
 
 def _asked(ended: Callable[[], bool]) -> bool:
-    """Whether the run is over; not while nobody can say."""
+    """Whether the run has ended; False while no server answers."""
     try:
         return ended()
     except ClientError as error:

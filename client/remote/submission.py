@@ -1,4 +1,4 @@
-"""A case as the user names it: a file, the name of a shipped case, or plain data; sent as it is written."""
+"""A case as the user gives it: a file, the name of a shipped case, or plain data. It is sent unchanged."""
 
 import json
 from collections.abc import Iterator, Mapping
@@ -15,7 +15,7 @@ _SUFFIXES = {".toml": "application/toml", ".json": "application/json"}
 
 
 def locate(source: str | Path) -> Path:
-    """The file that is meant: a path, or the name of a shipped case. Raises CaseError."""
+    """Returns the file of a path or of the name of a shipped case. Raises CaseError."""
     if not str(source).strip():
         raise CaseError([Problem("case", "''", "the name is empty: write a .toml or .json file, or a shipped case")])
     path = Path(source)
@@ -28,12 +28,12 @@ def locate(source: str | Path) -> Path:
 
 
 def folder_of(source: CaseSource) -> Path:
-    """Where relative paths of files begin: the folder of the case, for plain data the working one. Raises CaseError."""
+    """Returns the folder of relative paths: that of the case, for plain data the working folder. Raises CaseError."""
     return locate(source).parent if isinstance(source, str | Path) else Path()
 
 
 def data_of(source: CaseSource, overrides: Overrides = ()) -> dict[str, Any]:
-    """The plain data of a case with the overrides made, not checked yet. Raises CaseError."""
+    """Returns the plain data of a case with its overrides, unchecked. Raises CaseError."""
     if isinstance(source, Case):
         data = source.model_dump(mode="json", exclude_unset=True)
     elif isinstance(source, Mapping):
@@ -46,14 +46,13 @@ def data_of(source: CaseSource, overrides: Overrides = ()) -> dict[str, Any]:
 
 
 def case_of(source: CaseSource, overrides: Overrides = ()) -> Case:
-    """The checked case. Raises CaseError with every error."""
+    """Returns the checked case. Raises CaseError with every error."""
     return parse_case(data_of(source, overrides))
 
 
 def body_of(source: CaseSource, overrides: Overrides = ()) -> tuple[str, bytes]:
-    """Content type and body to send: a file as it is written, anything else as JSON. The server checks it.
-
-    Raises CaseError when there is no such file, or an override cannot be made.
+    """Returns content type and body: a file unchanged, anything else as JSON. The server checks it. Raises CaseError
+    for a missing file, and for an impossible override.
     """
     changes = list(overrides) if isinstance(overrides, Iterator) else overrides
     if isinstance(source, str | Path) and not changes:
@@ -66,8 +65,8 @@ def body_of(source: CaseSource, overrides: Overrides = ()) -> tuple[str, bytes]:
 
 
 def to_json(data: Mapping[str, Any]) -> bytes:
-    """Plain data as it is sent: NaN and infinity as such, which the server refuses with their key; numbers of numpy
-    as numbers, and what JSON has no word for as text.
+    """Encodes plain data: NaN and infinity unchanged, which the server refuses with their key; numbers of numpy as
+    numbers, types that JSON lacks as text.
     """
     return json.dumps(data, default=_plain).encode()
 

@@ -61,7 +61,7 @@ def energy(told: Columns) -> Figure:
     right.semilogy(t, positive, color=_INK, linewidth=1.2)
     _name(left, "energy", "energy, J", ylim=(0, None))
     _name(middle, "without the kinetic term", "energy, J")
-    _name(right, "residual of the ledger", "of the largest energy that came in")
+    _name(right, "residual of the ledger", "of the largest energy input")
     for axes, (name, some) in zip(others, parts.items(), strict=True):
         for (part, values), colour in zip(some.items(), _COLOURS * len(some), strict=False):
             axes.plot(t, values, color=colour, label=part, linewidth=1.4)
@@ -86,7 +86,7 @@ def steps(told: Columns) -> Figure:
         some = [(t, 1e9 * dt) for t, dt, by in points if by == name or (name == "others" and by not in often)]
         if some:
             axes.plot(*zip(*some, strict=True), ".", markersize=3, color=colour, label=name or "not known")
-    _name(axes, "time step, and what holds it down", "dt, ns", ylim=(0, None))
+    _name(axes, "time step, and its limiter", "dt, ns", ylim=(0, None))
     return figure
 
 

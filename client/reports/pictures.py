@@ -73,7 +73,7 @@ def _key(drawn: Drawn) -> str:
     """The colour bar of a picture as text and a stripe."""
     field = FIELDS[drawn.field]
     if field.kind == "fragments":
-        return "<span class=hint>a hue for each part, pieces vary it; what is whole is pale</span>"
+        return "<span class=hint>a hue for each part, fragments vary it; unbroken parts are pale</span>"
     if field.kind == "classes":
         return ""
     low, high = exacts((drawn.low, drawn.high), drawn.unit, 4)

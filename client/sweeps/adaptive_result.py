@@ -88,7 +88,7 @@ class Found(msgspec.Struct, kw_only=True, frozen=True):
             if not self._within(self.fit.limit):
                 told.append("the curve has its limit outside of the bracket: near it the results do not follow the law")
         if self.why:
-            told.append(f"not as close as asked for ({self._x(self.tolerance)}): {self.why}")
+            told.append(f"bracket wider than requested ({self._x(self.tolerance)}): {self.why}")
         failed = f", {self.failed} of them without a result" if self.failed else ""
         told.append(
             f"{counted(self.points, 'run')}{failed}, {self.fresh} of them now; {duration(self.cpu)} of CPU time"
@@ -178,7 +178,7 @@ def read(path: Path) -> Kept:
     except OSError as error:
         raise UsageError(f"{path}: {error.strerror}") from None
     except msgspec.MsgspecError:
-        raise UsageError(f"{path}: this is no file of an adaptive sweep; name another one with --out") from None
+        raise UsageError(f"{path}: not a file of an adaptive sweep; name another one with --out") from None
 
 
 def _require_same(path: Path, kept: Kept, fresh: Kept) -> None:

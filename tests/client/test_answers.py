@@ -108,7 +108,7 @@ def endless(first: bytes, piece: bytes) -> Answer:
         (endless(head(200, None), b"[" * 65536), "is longer than 1.05 MB"),
         (endless(head(500, None), b"x" * 65536), "is longer than 1.05 MB"),
         (endless(head(200, 1 << 60), b"[" * 65536), "is longer than 1.05 MB"),
-        (drip(b"HTTP/1.1 200 OK\r\nA: "), "has not answered whole within"),
+        (drip(b"HTTP/1.1 200 OK\r\nA: "), "did not answer completely within"),
         (drip(head(200, 3000)), "comes too slowly"),
         (drip(head(200, None)), "comes too slowly"),
     ],

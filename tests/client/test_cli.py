@@ -123,7 +123,7 @@ def test_a_label_is_a_name_and_a_value(quiet_home: Path) -> None:
     result = conoid("ls", "--label", "batch", "--url", "http://127.0.0.1:1")
     assert (result.exit_code, result.stderr) == (2, "conoid: label = 'batch': write NAME=VALUE\n")
     result = conoid("ls", "--label", "a=1", "--label", "a=2", "--url", "http://127.0.0.1:1")
-    assert (result.exit_code, result.stderr) == (2, "conoid: label: each has one value; given are a=1, a=2\n")
+    assert (result.exit_code, result.stderr) == (2, "conoid: label: each name may have one value; given are a=1, a=2\n")
 
 
 @pytest.mark.usefixtures("warm")
@@ -330,7 +330,7 @@ def test_watch_can_be_left(user: Path) -> None:
     child.send_signal(signal.SIGINT)
     _, said = child.communicate(timeout=60)
     assert child.returncode == 130
-    assert said == f"conoid: the run goes on; conoid watch {run} shows it again\n"
+    assert said == f"conoid: the run continues; conoid watch {run} shows it again\n"
     assert read(conoid("show", run, "--json"))["state"] in {"starting", "running"}
     conoid("cancel", run)
 

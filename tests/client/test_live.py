@@ -248,7 +248,7 @@ def test_a_server_that_is_gone_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
                 run.heard.set()
 
     known = watch(run, live=False, console=Heard(file=io.StringIO()))
-    assert any(line.endswith("it was running when it was last heard of") for line in lines)
+    assert any(line.endswith("it was running at its last message") for line in lines)
     assert "no server answers" not in rendered(known), "it has come back"
     known.away = run_messages.START
     assert "no server answers" in rendered(known), "the panel tells it too"

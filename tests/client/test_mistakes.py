@@ -85,14 +85,14 @@ def test_a_link_out_of_a_folder_is_not_read(damaged: Path) -> None:
 @pytest.mark.parametrize("command", ["watch", "show", "report", "get", "cancel"])
 def test_a_path_at_which_there_is_no_run_asks_no_server(command: str, quiet_home: Path) -> None:
     assert refused(1, command, "runs/none") == (
-        "conoid: runs/none: this is no folder of a run; write its folder, its id, or 'last'"
+        "conoid: runs/none: not the folder of a run; write its folder, its id, or 'last'"
     )
 
 
 def test_a_folder_is_told_that_a_server_wants_an_id(quiet_home: Path) -> None:
     (quiet_home / "runs" / "one").mkdir(parents=True)
     assert refused(2, "restart", "runs/one") == (
-        "conoid: run = 'runs/one': this asks a server; write the id of a run, or 'last'"
+        "conoid: run = 'runs/one': this command needs a server; write the id of a run, or 'last'"
     )
 
 

@@ -71,9 +71,9 @@ def test_a_beginning_that_one_has_is_enough(server: Hostile) -> None:
 
 def test_a_beginning_that_several_have_is_one_line_with_them(server: Hostile) -> None:
     with Session(server.url) as session:
-        with pytest.raises(UsageError, match="run = '1kbb': several begin so: 1kbbx, 1kbbw"):
+        with pytest.raises(UsageError, match="run = '1kbb': several ids begin so: 1kbbx, 1kbbw"):
             session.run("1kbb")
-        with pytest.raises(UsageError, match="sweep = '1kbb': several begin so: 1kbbx, 1kbbw"):
+        with pytest.raises(UsageError, match="sweep = '1kbb': several ids begin so: 1kbbx, 1kbbw"):
             session.find_sweep("1kbb")
         assert session.run("1kbbx").id == "1kbbx", "the whole id is that of one"
     assert "several begin so" in refused(2, "cancel", "1kbb", "--url", server.url)
@@ -126,8 +126,8 @@ def test_a_run_in_a_folder_is_shown_and_asked(folder: Path) -> None:
     told = json.loads(conoid("show", folder, "--json"))
     assert (told["id"], told["state"], told["ranks"], told["name"]) == ("a%b ü", "running", 3, "bar")
     assert "A bar" in conoid("show", folder)
-    assert "asked for a checkpoint" in conoid("checkpoint", folder)
-    assert "asked for a snapshot" in conoid("snapshot", folder)
+    assert "checkpoint requested" in conoid("checkpoint", folder)
+    assert "snapshot requested" in conoid("snapshot", folder)
     assert "asked to stop" in conoid("cancel", folder)
     assert {layout.CHECKPOINT_REQUEST, layout.SNAPSHOT_REQUEST, layout.STOP_REQUEST} <= {
         p.name for p in folder.iterdir()
