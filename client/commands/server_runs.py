@@ -197,7 +197,7 @@ def cancel(run: SourceArgument, url: Url = None, token: Token = None, as_json: J
 def checkpoint(run: SourceArgument, url: Url = None, token: Token = None, as_json: Json = False) -> None:
     """Request a checkpoint, from which a lost run can continue."""
     if (folder := folder_of(run)) is not None and local_run.at_hand(folder):
-        echo(local_run.ask(folder, layout.CHECKPOINT_REQUEST, "a checkpoint"))
+        echo(local_run.ask(folder, layout.CHECKPOINT_REQUEST, "checkpoint"))
         return
     with connect(url, token) as session:
         info = find(session, run).checkpoint()
@@ -207,7 +207,7 @@ def checkpoint(run: SourceArgument, url: Url = None, token: Token = None, as_jso
 def snapshot(run: SourceArgument, url: Url = None, token: Token = None, as_json: Json = False) -> None:
     """Request a snapshot of the fragments; watch reports it when it is there."""
     if (folder := folder_of(run)) is not None and local_run.at_hand(folder):
-        echo(local_run.ask(folder, layout.SNAPSHOT_REQUEST, "a snapshot"))
+        echo(local_run.ask(folder, layout.SNAPSHOT_REQUEST, "snapshot"))
         return
     with connect(url, token) as session:
         info = find(session, run).take_snapshot()

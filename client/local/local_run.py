@@ -69,7 +69,7 @@ def ask(folder: Path, request: str, wish: str) -> str:
     if not slurm.held(folder):
         raise UnfinishedError(f"{folder}: no worker writes into it; a run that is running can be asked")
     whole.touch(folder / request)
-    return f"{folder} asked for {wish}"
+    return f"{folder} {wish} requested"
 
 
 def at_hand(folder: Path) -> bool:

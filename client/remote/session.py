@@ -210,7 +210,7 @@ class Session(Http):
     def _named(self, what: str, path: str, name: str, after: Callable[[str], Iterable[_Known]]) -> str:
         """Returns the id of a prefix; ``after`` returns runs, or sweeps, from a prefix on."""
         if not re.fullmatch(ID, name):
-            raise NotFoundError(f"{what} {shown(name)}: it does not exist; an id has letters and digits")
+            raise NotFoundError(f"{what} {shown(name)}: there is none; an id has letters and digits")
         try:
             self.get(dict[str, Any], f"{path}/{quoted(name)}")
         except MissingError as error:

@@ -1,7 +1,7 @@
-// What an address shows: `#/` the runs, `#/runs/ID` one, `#/compare/ID/ID/…` several, `#/sweeps/NAME` a sweep, `#/new` a
-// new run; behind a `?` there may be more.
+// Addresses of the page: `#/` the runs, `#/runs/ID` a run, `#/compare/ID/ID/…` several runs, `#/sweeps/NAME` a sweep,
+// `#/new` a new run; a `?` may add parameters.
 
-// What stands in an address as text; null for what cannot be read.
+// Decoded text of an address; null if it is malformed.
 function decoded(word) {
   try {
     return decodeURIComponent(word);
@@ -10,11 +10,11 @@ function decoded(word) {
   }
 }
 
-// How many names each page has, at least and at most.
+// Least and largest number of names of each page.
 const NAMES = { runs: [0, 1], compare: [2, Infinity], sweeps: [1, 1], new: [0, 0] };
 
-// { page, names, query }: "runs", "run", "compare", "sweep" or "new", and which; an address that cannot be read is that
-// of the runs.
+// { page, names, query }: page is "runs", "run", "compare", "sweep" or "new". A malformed address is that of
+// the runs.
 export function place(hash) {
   const [path, search = ""] = hash.replace(/^#\/?/, "").split("?", 2);
   const [page, ...words] = path.split("/").filter((word) => word !== "");
@@ -27,5 +27,5 @@ export function place(hash) {
 
 const WORDS = { run: "runs", sweep: "sweeps", compare: "compare" };
 
-// The address of a page and its names.
+// Address of a page with its names.
 export const addressOf = (page, names) => `#/${[WORDS[page], ...names.map(encodeURIComponent)].join("/")}`;

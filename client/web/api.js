@@ -4,7 +4,7 @@ import { token } from "./token.js";
 
 export { token };
 
-// A refusal in the server's own words (RFC 9457).
+// A refusal of the server with its message (RFC 9457).
 export class Problem extends Error {
   constructor(status, body) {
     const detail = body?.detail && body.detail !== body.title ? `: ${body.detail}` : "";
@@ -13,7 +13,7 @@ export class Problem extends Error {
   }
 }
 
-// Whether the server will not answer later either; a proxy says 502 and 503 for a server that starts again.
+// Whether a later request would fail as well. A proxy answers 502 and 503 while the server restarts.
 export const refused = (error) => error instanceof Problem && error.status < 500 && error.status !== 429;
 
 const address = (path) => new URL(path, document.baseURI);
@@ -25,14 +25,14 @@ export async function send(path, { method = "GET", headers = {}, body, signal, c
   return response;
 }
 
-// Snapshots never change, and the server says so: the browser keeps them.
+// Snapshots never change: the cache headers of the server let the browser keep them.
 export const binary = async (path, options) => (await send(path, { ...options, cache: "default" })).arrayBuffer();
 
 export const text = async (path, options) => (await send(path, options)).text();
 
 const TAIL = 65536; // Bytes of a log that are shown.
 
-// The end of the log of a rank, or of "launcher". Of an empty file no part can be asked for.
+// End of the log of a rank, or of "launcher". A Range request of an empty file would fail.
 export async function tail(run, rank) {
   const path = `v1/runs/${encodeURIComponent(run)}/logs/${rank}`;
   const { headers } = await send(path, { method: "HEAD" });
@@ -42,11 +42,11 @@ export async function tail(run, rank) {
 
 export const call = async (path, options) => (await send(path, options)).json();
 
-const LARGE = 64 << 20; // Bytes from which on a file goes to disk as it comes, where the browser can do that.
-const MOST = 1 << 30; // Bytes that a browser keeps in memory until the file is saved.
+const LARGE = 64 << 20; // Size in bytes from which a file is streamed to disk, if the browser can do that.
+const MOST = 1 << 30; // Largest size in bytes of a file that the browser holds in memory until it is saved.
 
-// Saves a file of the server as `name`. A link cannot show the token, so the bytes go through the page; `onBytes` hears
-// how many have come. Throws Error for a file that is too large for that.
+// Saves a file of the server as `name`. A link cannot send the token, so the page fetches the bytes; `onBytes` is called
+// with the number of bytes so far. Throws Error for a file that is too large for memory.
 export async function download(path, name, size, onBytes) {
   const place = size > LARGE ? await globalThis.showSaveFilePicker?.({ suggestedName: name }) : null;
   if (!place && size > MOST) throw new Error("too large for this browser; conoid get copies it");
@@ -62,7 +62,7 @@ export async function download(path, name, size, onBytes) {
   return setTimeout(() => URL.revokeObjectURL(href), 60000);
 }
 
-// The messages of a run after the number `after`, as they come, until the server ends the stream; `onOpen` when it begins.
+// Messages of a run after the number `after` as they arrive, until the server ends the stream; calls `onOpen` at its start.
 export async function* messages(run, after, signal, onOpen) {
   const headers = { Accept: "text/event-stream", "Last-Event-ID": String(after) };
   const response = await send(`v1/runs/${encodeURIComponent(run)}/stream`, { headers, signal });

@@ -1,4 +1,4 @@
-// Which page is shown, and the form to sign in.
+// Router of the page, and the sign-in form.
 
 import { Problem, call, token } from "./api.js";
 import { h } from "./figures.js";
@@ -14,7 +14,7 @@ import { isShort, wholeNames } from "./shortids.js";
 const page = document.getElementById("page");
 const who = document.getElementById("who");
 const leave = document.getElementById("leave");
-const AWAY = 3000; // ms after which a server that does not answer is asked again.
+const AWAY = 3000; // ms after which a request to a server that does not answer is repeated.
 let shown = null;
 let again = 0;
 
@@ -47,7 +47,7 @@ function signIn(told = "") {
   field.focus();
 }
 
-// Where we are ---------------------------------------------------------------------------------------------------------
+// Router ---------------------------------------------------------------------------------------------------------------
 
 const refuse = () => {
   token.clear();
@@ -61,7 +61,7 @@ const PAGES = {
   new: (_, query) => new NewPage(query, refuse),
 };
 
-// An id may be written short: the address gets the whole one.
+// Replaces a short id in the address by the whole one.
 async function route() {
   clearTimeout(again);
   const { page: name, names, query } = place(location.hash);
@@ -81,11 +81,11 @@ async function route() {
 
 function away(error) {
   show({ element: h("section.card.missing", {}, h("h1", {}, "The server does not answer"), h("p.problem", { role: "status" }, `No answer from the server: ${error.message}`),
-    h("p.hint", {}, "It is asked again every few seconds.")) });
+    h("p.hint", {}, "The request is repeated every few seconds.")) });
   again = setTimeout(start, AWAY);
 }
 
-// A server with tokens is not asked before there is one. One that is away is asked again until it answers.
+// A server with tokens gets no request before a token is known. Without an answer the request is repeated.
 async function start() {
   clearTimeout(again);
   try {
@@ -97,7 +97,7 @@ async function start() {
     route();
   } catch (error) {
     if (error instanceof Problem && (error.status === 401 || error.status === 403)) {
-      const told = token.get() ? "The server does not know this token." : "";
+      const told = token.get() ? "This token is not valid on the server." : "";
       token.clear();
       return signIn(told);
     }
@@ -110,7 +110,7 @@ leave.addEventListener("click", () => {
   token.clear();
   signIn();
 });
-// Another tab has signed in to stay, or has signed out.
+// Another tab has stored or removed the token.
 token.listen((text) => {
   if (text && shown?.signsIn) start();
   else if (!text) {

@@ -1,9 +1,9 @@
 // Velocities as arrows, of a few triangles that are spread evenly over the body (docs/snapshots.md).
 
-const LONGEST = 0.09; // Of the diagonal of what the frame shows: the arrow of the greatest speed.
+const LONGEST = 0.09; // Length of the arrow of the largest speed, as a share of the diagonal of the frame.
 const SIDES = 6;
-const [SHAFT, HEAD, TIP] = [0.014, 0.05, 0.26]; // Radii and length of the head, of the arrow's length.
-const MOST = 600; // With all images.
+const [SHAFT, HEAD, TIP] = [0.014, 0.05, 0.26]; // Radii and length of the head, as shares of the arrow's length.
+const MOST = 600; // Largest number of arrows, with all images.
 
 export class Arrows {
   constructor(THREE) {
@@ -13,7 +13,7 @@ export class Arrows {
     Object.assign(this.mesh, { frustumCulled: false, visible: false, count: 0 });
   }
 
-  // The greatest speed, m/s. `keep` (part, place) says which arrows there are, `reach` is the size of what the frame shows, m.
+  // The largest speed, m/s. `keep` (part, place) selects the arrows, `reach` is the size of the framed region, m.
   show(snapshot, { explode, middle, mirrors, keep, ink, reach }) {
     const { Matrix4, Quaternion, Vector3 } = this.three;
     const found = collect(snapshot, explode, middle, keep);

@@ -4,20 +4,20 @@ import { exact, onAxis, percent, scaleOf, si } from "./figures.js";
 
 export const FONT = 12;
 const DASHES = ["solid", [7, 4], [2, 3]];
-const HUES = 6; // Of the style sheet: --line-0 and so on, which the colour-blind tell apart (Okabe and Ito 2008).
+const HUES = 6; // Colours of the style sheet, --line-0 and so on, safe for colour blindness (Okabe and Ito 2008).
 export const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim() || name;
 
-// Colour and dash of the line number `i`: no two of the first eighteen have both alike.
+// Colour and dash of line number `i`: the first eighteen combinations differ.
 export const lineStyle = (i) => ({ colour: `line-${i % HUES}`, dash: DASHES[Math.floor(i / HUES) % DASHES.length] });
 
-// The option of a chart with what all charts have; its own tooltip adds to theirs, so that names in it stay text.
+// Adds the common options of all charts to the option of a chart. Its tooltip escapes names, so they stay text.
 export function whole(alone, option) {
   const all = common(alone);
   return { ...all, ...option, tooltip: { ...all.tooltip, ...option.tooltip } };
 }
 
-// What all charts have: the theme's colours, zoom with Ctrl and the wheel; those that stand `alone` a tooltip of one item,
-// the others the cursor, for which cursorbox.js has the values.
+// Common options of all charts: colours of the theme, zoom with Ctrl and the wheel. A chart that is `alone` has a tooltip
+// for one item, the others a cursor, whose values cursorbox.js shows.
 export function common(alone) {
   return {
     animation: false,
@@ -41,7 +41,7 @@ export const time = (end, more = {}) => ({
   axisPointer: { label: { show: false, formatter: ({ value }) => exact(Number(value), "s", 4) } }, ...more,
 });
 
-// An axis in one unit, which stands above it; `most` is the largest magnitude on it.
+// An axis in one unit, which is written above it; `most` is the largest magnitude on it.
 export function axis(unit, most, more = {}) {
   const scale = scaleOf(most, unit);
   return {
@@ -57,7 +57,7 @@ export const logarithmic = (unit, more = {}) => ({
 
 export const shares = (more = {}) => ({ ...axis("", 1), min: 0, max: 1, interval: 0.25, axisLabel: label((value) => percent(value, 0)), ...more });
 
-// The largest magnitude in some series; of a stack the sum at each place.
+// Largest magnitude in some series; for a stack of the sum at each place.
 export function largest(list) {
   let most = 0;
   const sums = new Map();
@@ -72,8 +72,8 @@ export function largest(list) {
   return most;
 }
 
-// series({ name, data: [[t, value]], colour, unit, … }): a line, or with `stack` an area on those before. `text` words a
-// value; it gets the point too.
+// series({ name, data: [[t, value]], colour, unit, … }): a line, or with `stack` an area on those before. `text` formats
+// a value; its second argument is the point.
 export function series({ name, data, colour: tone, unit = "", stack, dash = "solid", width = 1.8, text = (value) => si(value, unit, 4), ...more }) {
   return {
     name, unit, type: "line", data, showSymbol: data.length === 1, sampling: stack || data.length < 2000 ? undefined : "minmax", color: colour(tone), connectNulls: false,
@@ -82,7 +82,7 @@ export function series({ name, data, colour: tone, unit = "", stack, dash = "sol
   };
 }
 
-// A number that is expected, with its tolerance, over the time for which it is: a dashed line in a band.
+// Expected value with its tolerance over its time interval: a dashed line in a band.
 export function expected({ value, tolerance, since, until }, tone) {
   return {
     markLine: { silent: true, symbol: "none", animation: false, label: { show: false }, lineStyle: { color: colour(tone), type: [4, 3], width: 1.4 },
@@ -91,7 +91,7 @@ export function expected({ value, tolerance, since, until }, tone) {
   };
 }
 
-// Events as pins, which a click opens.
+// Events as pins; a click opens them.
 export const pins = (name, data) =>
   ({ name, aside: true, type: "scatter", data, symbol: "pin", symbolSize: 22, color: colour("accent"), cursor: "pointer", z: 5, tooltip: { valueFormatter: () => "click to open" } });
 
@@ -99,6 +99,6 @@ export const pins = (name, data) =>
 export const crosses = (name, data) => ({ type: "scatter", aside: true, name, data, symbol: CROSS, symbolSize: 11, color: colour("bad"), cursor: "pointer", z: 6 });
 const CROSS = "path://M2 0L5 3L8 0L10 2L7 5L10 8L8 10L5 7L2 10L0 8L3 5L0 2Z";
 
-// A horizontal line that a value should not pass.
+// A horizontal line for the limit of a value.
 export const limit = (value) =>
   ({ silent: true, symbol: "none", label: { show: false }, lineStyle: { color: colour("bad"), type: "dashed" }, data: [{ yAxis: value }] });

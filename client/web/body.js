@@ -1,4 +1,4 @@
-// The card of the breaking body: the view, its tools, a picked fragment, and the snapshots over time.
+// Card of the 3-D body: the view, its tools, a selected fragment, and the snapshots over time.
 
 import { binary, call } from "./api.js";
 import { count, counted, h, si } from "./figures.js";
@@ -13,14 +13,14 @@ import { colourings, decode, fragment, rowOf } from "./snapshot.js";
 import { Tools } from "./tools.js";
 import { View3d } from "./view3d.js";
 
-const MOST_KEPT = 40; // Decoded snapshots, about 1 MB each.
-const MOST_VOLUMES = 8; // Those of all tets, some MB each.
+const MOST_KEPT = 40; // Largest number of decoded snapshots, about 1 MB each.
+const MOST_VOLUMES = 8; // Largest number of snapshots with all tets, some MB each.
 const PLAY = 400; // ms for each snapshot.
 const HOLLOW = "this snapshot has no file of all tets, so its section is not filled";
 
 export class Body {
-  // `onShow` gets the snapshot that is on the screen. `bare`: without tools and the time line, for several beside each other:
-  // `ready` is the View3d once it is there (share() of camera.js), at(t) shows a time.
+  // `onShow` is called with the snapshot on the screen. `bare`: without tools and time line, for several bodies side by side;
+  // `ready` resolves to the View3d (share() of camera.js), at(t) shows a time.
   constructor(run, onShow = () => {}, { bare = false } = {}) {
     Object.assign(this, { run, onShow, bare, entries: [], kept: new Map(), volumes: new Map(), noun: "fragment", following: true, picked: null, wanted: null, planes: [] });
     this.path = `v1/runs/${encodeURIComponent(run)}`;
@@ -50,7 +50,7 @@ export class Body {
     this.playing.onclick = () => (this.player ? this.pause() : this.play());
   }
 
-  // All snapshots of the run so far, as messages tell of them. The newest is shown, unless an earlier one was chosen.
+  // All snapshots of the run so far, from its messages. The newest is shown, unless the user has chosen an earlier one.
   update(entries) {
     if (entries.length === this.entries.length) return;
     const first = !this.entries.length;
@@ -72,7 +72,7 @@ export class Body {
       this.view.eye.onMode = () => { this.tools.frame.value = this.view.eye.mode === "part" ? `part ${this.view.eye.part}` : this.view.eye.mode; };
       Object.assign(this.view.canvas, { tabIndex: 0 });
       this.view.canvas.setAttribute("role", "application");
-      this.view.canvas.setAttribute("aria-label", "the body in 3-D; arrow keys turn it, plus and minus zoom, more keys stand under Camera");
+      this.view.canvas.setAttribute("aria-label", "the body in 3-D; arrow keys turn it, plus and minus zoom, more keys are listed under Camera");
       this.view.canvas.addEventListener("keydown", (event) => this.key(event));
       this.holder.append(this.view.element);
       this.whenReady(this.view);
@@ -82,7 +82,7 @@ export class Body {
     }
   }
 
-  // The planes of symmetry that hold all parts, one for each axis.
+  // The planes of symmetry on whose positive side all parts lie, one for each axis.
   cuts(plan) {
     const found = (plan?.boundaries ?? []).filter(({ kind, parts }) => kind === "symmetry" && !parts?.length);
     this.planes = ["x", "y", "z"].map((name, axis) => ({ axis, at: found.find((one) => one.axis === name)?.at })).filter(({ at }) => at !== undefined);
@@ -91,7 +91,7 @@ export class Body {
 
   // Snapshots -----------------------------------------------------------------------------------------------------------
 
-  // Only the place asked for last is fetched, when scrubbing is faster than the network.
+  // Only the last requested snapshot is fetched when the slider moves faster than the network.
   async show(place) {
     this.scrub.value = place;
     this.wanted = place;
@@ -115,7 +115,7 @@ export class Body {
     }
   }
 
-  // The last snapshot up to a time, s, or the first.
+  // The last snapshot up to the time t, s, or the first one.
   at(t) {
     const place = Math.max(0, this.entries.findLastIndex((entry) => entry.t <= t * (1 + 1e-9)));
     if (this.entries[place] !== this.entry) this.show(place);
@@ -126,7 +126,7 @@ export class Body {
     return this.known(this.kept, n, MOST_KEPT, async () => decode(await binary(`${this.path}/snapshots/${n}`)));
   }
 
-  // Null where it has none.
+  // Null if the snapshot has none.
   async readVolume({ n, tets }) {
     return tets ? this.known(this.volumes, n, MOST_VOLUMES, async () => unpack(await binary(`${this.path}/snapshots/${n}/tets`))) : null;
   }
@@ -177,7 +177,7 @@ export class Body {
     return this.view.colour(by, ends, this.tools.choice.bands);
   }
 
-  // Another plane: in the middle of what the frame shows, with the side cut away that the camera sees.
+  // Another plane: through the middle of the frame; the side towards the camera is cut away.
   async choose() {
     const name = this.tools.across.value;
     this.slicing = name !== "none";
@@ -235,7 +235,7 @@ export class Body {
 
   // Fragments -----------------------------------------------------------------------------------------------------------
 
-  // `kept`: of a new snapshot, in which a fragment may be missing.
+  // `kept`: the selection is kept in a new snapshot, which may lack the fragment.
   pick(row, kept = false) {
     const found = row >= 0 ? fragment(this.snapshot, row) : null;
     this.view.mark(row);
@@ -250,7 +250,7 @@ export class Body {
     this.tools.heaviest.replaceChildren(...table(this.snapshot, row, (chosen) => this.pick(chosen)));
   }
 
-  // { t, mass, speed } of a fragment, from the server, or from what is here.
+  // { t, mass, speed } of a fragment: from the server, or from the snapshots in memory.
   async history(id) {
     return call(`${this.path}/fragments/${id}`).catch(() => this.remembered(id));
   }

@@ -1,18 +1,18 @@
-// The camera: it fits what it is to show, follows a part or stays, looks along the axes, and can be shared by several views.
+// The camera: fits the framed region, follows a part or stays, turns to the axes, and can be shared by several views.
 
 import { mirrored, points, stand } from "./framing.js";
 
-const ANGLE = 30; // Degrees, of the height of the picture.
-const MARGIN = 1.06; // Round what is fitted.
-const TURN = Math.PI / 24; // Of one arrow key.
-const FREE = 0.16; // Of the height: free for axes and scale bar.
-const LEGEND = [90, 0.2]; // Free at the right for the legend: px, of the width at most.
+const ANGLE = 30; // Vertical angle of view, degrees.
+const MARGIN = 1.06; // Margin round the framed region.
+const TURN = Math.PI / 24; // Turn of one arrow key.
+const FREE = 0.16; // Share of the height that is left free for axes and scale bar.
+const LEGEND = [90, 0.2]; // Space at the right for the legend: px, and largest share of the width.
 const VIEWS = { "+x": [1, 0, 0], "-x": [-1, 0, 0], "+y": [0, 1, 0], "-y": [0, -1, 0], "+z": [0, 0, 1], "-z": [0, 0, -1] };
 
 export const VIEW_NAMES = [...Object.keys(VIEWS), "isometric"];
 
 export class ViewCamera {
-  // `changed` is called when the picture has to be drawn anew, `framed` gives what frames depend on: { snapshot, explode, mirrors, shown }.
+  // `changed` is called when the picture must be redrawn; `framed` returns what the frame depends on: { snapshot, explode, mirrors, shown }.
   constructor({ THREE, OrbitControls }, canvas, changed, framed) {
     Object.assign(this, { three: THREE, framed, changed, mode: "fit", part: null, others: new Set() });
     this.camera = new THREE.PerspectiveCamera(ANGLE, 1, 1e-3, 10);
@@ -25,10 +25,10 @@ export class ViewCamera {
     this.reserved = 0;
   }
 
-  // The unit vector from what is looked at to the camera.
+  // Unit vector from the target to the camera.
   back() { return this.camera.position.clone().sub(this.controls.target).normalize().toArray(); }
 
-  // From where to where what the frame shows reaches along a direction, m.
+  // Extent of the framed region along a direction: [from, to], m.
   along(normal) {
     const list = this.list();
     const ends = [Infinity, -Infinity];
@@ -39,7 +39,7 @@ export class ViewCamera {
     return ends;
   }
 
-  // The diagonal of what the frame shows, m.
+  // Diagonal of the framed region, m.
   reach() { return Math.hypot(...[[1, 0, 0], [0, 1, 0], [0, 0, 1]].map((axis) => this.along(axis)).map(([low, high]) => high - low)); }
 
   get distance() { return this.camera.position.distanceTo(this.controls.target); }
@@ -50,7 +50,7 @@ export class ViewCamera {
     for (const other of this.others) other.copy(this);
   }
 
-  // Turning keeps the frame; whoever zooms or shifts has a frame of his own.
+  // Turning keeps the frame; zooming and shifting make it free.
   released() {
     const shifted = this.framedAt && this.controls.target.distanceTo(this.framedAt) > 1e-6 * this.distance;
     if (this.mode !== "free" && (shifted || Math.abs(this.distance / this.touched - 1) > 1e-3)) this.follow(this.mode === "part" ? "part" : "free", this.part);
@@ -65,14 +65,14 @@ export class ViewCamera {
     else if (mode === "fit" || mode === "all") this.fit();
   }
 
-  // A new snapshot, or another thing that a frame depends on.
+  // A new snapshot, or another change of what the frame depends on.
   keep() {
     if (!this.direction) this.first();
     else if (this.mode === "fit" || this.mode === "all") this.fit();
     else if (this.mode === "part") this.carry();
   }
 
-  // A long body lies along the picture, seen a little from above and from the side that planes of symmetry have cut open.
+  // A long body lies along the picture, seen from slightly above and from the side cut open by planes of symmetry.
   first() {
     const list = this.list();
     const side = [0, 1, 2].map((axis) => extent(list, axis));
@@ -85,7 +85,7 @@ export class ViewCamera {
     this.look(away, up);
   }
 
-  // From a direction; `up` is an axis.
+  // View along a direction; `up` is an axis.
   look(away, up) {
     this.direction = true;
     this.camera.up.set(0, 0, 0).setComponent(up, 1);
@@ -94,7 +94,7 @@ export class ViewCamera {
     this.fit(this.mode === "part" ? { only: this.part } : {});
   }
 
-  // One of VIEW_NAMES.
+  // Selects one of VIEW_NAMES.
   view(name) {
     const away = VIEWS[name] ?? [1, -1, 0.8];
     const up = VIEWS[name]?.[2] ? 1 : 2;
@@ -103,7 +103,7 @@ export class ViewCamera {
     this.onMode?.();
   }
 
-  // Places that the frame shows, of all views that share it.
+  // Points of the framed region, of all views that share the frame.
   list(more = {}) {
     return [this, ...this.others].flatMap((eye) => eye.places({ all: this.mode === "all", ...more }));
   }
@@ -130,14 +130,14 @@ export class ViewCamera {
     if (this.mode === "part") this.home = this.centre();
   }
 
-  // Fragments that are drawn apart need more room.
+  // Exploded fragments need more room.
   pulled(list) {
     const { explode, snapshot: { header: { box } } } = this.framed();
     if (!explode) return list;
     return list.map((value, i) => value + explode * (value - (box[0][i % 3] + box[1][i % 3]) / 2));
   }
 
-  // Moves with the mass of its part.
+  // Follows the centre of mass of its part.
   carry() {
     const now = this.centre();
     if (!now || !this.home) return;
@@ -170,7 +170,7 @@ export class ViewCamera {
     if (this.framed().snapshot && this.direction && (this.mode === "fit" || this.mode === "all")) this.fit();
   }
 
-  // A key turns, shifts (with Shift) or zooms; whether it is one of these.
+  // A key that turns, shifts (with Shift) or zooms; returns false for any other key.
   key(name, shift) {
     const moves = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
     if (moves[name] && shift) this.shift(...moves[name]);
@@ -203,7 +203,7 @@ export class ViewCamera {
     this.onMode?.();
   }
 
-  // The same view as another one has. `share` has all of some views move together.
+  // Takes the view of another camera. `share` couples several views.
   copy(other) {
     this.quiet = true;
     this.direction = true;
@@ -218,7 +218,7 @@ export class ViewCamera {
   }
 }
 
-// All views move when one of them does; each is { eye }. The others of the first, which fits, follow it.
+// All views move with one of them; each is { eye }. The frame is that of the first one.
 export function share(views) {
   for (const { eye } of views) eye.others = new Set(views.map((other) => other.eye).filter((other) => other !== eye));
   if (views[0]?.eye.direction) views[0].eye.moved();

@@ -1,11 +1,11 @@
-// The charts below the body: a grid of cards that can be closed, and one of them beside the body. What is closed and
-// which one stands beside is the same at the next visit.
+// The charts below the body: a grid of cards that can be closed, and one card beside the body. The browser stores
+// which are closed and which one is beside the body.
 
 import { h } from "./figures.js";
 import { recall, remember } from "./storage.js";
 
 export class Cards {
-  // `first` is the card that stands beside the body until another one is chosen.
+  // `first` is the default card beside the body.
   constructor(first) {
     Object.assign(this, { first, cards: new Map() });
     this.grid = h("div.cards.charts");
@@ -15,17 +15,17 @@ export class Cards {
 
   get closed() { return recall("cards.closed", []); }
 
-  // The name of the card beside the body; "" for none.
+  // Name of the card beside the body; "" for none.
   get chosen() {
     const name = recall("cards.beside", this.first);
     return this.cards.has(name) && !this.closed.includes(name) ? name : "";
   }
 
-  // A card with its title, what stands beside it, and its content; `name` is what the browser keeps it by.
+  // A card with its title, an element beside it, and its content; `name` is its key in the storage.
   add(name, title, beside, ...content) {
     const words = typeof title === "string" ? title : title.textContent;
     const tool = (what, told, act) => h(`button.tool.${what}`, { type: "button", title: told, "aria-label": `${told}: ${words}`, onclick: act });
-    const move = tool("move", "beside the body, or back into the grid", () => this.move(name));
+    const move = tool("move", "move beside the body, or back to the grid", () => this.move(name));
     const close = tool("shut", "close", () => this.close(name));
     const element = h("section.card", { "data-card": name, tabindex: -1, "aria-label": words },
       h("div.card-head", {}, h("h2", {}, title), beside, h("span.tools", {}, move, close)), ...content);
@@ -33,7 +33,7 @@ export class Cards {
     return element;
   }
 
-  // Whether there is anything to be seen in a card.
+  // Whether a card has content.
   show(name, there) {
     const card = this.cards.get(name);
     if (card.there === there) return;
@@ -61,7 +61,7 @@ export class Cards {
     this.cards.get(name).move.focus();
   }
 
-  // Every card where it belongs. Those that stay are not touched: a focus or a canvas is lost where an element moves.
+  // Moves every card to its place. Other cards are not touched: a moved element loses focus and canvas.
   place() {
     const { closed, chosen } = this;
     const open = [...this.cards].filter(([name, { there }]) => there && !closed.includes(name));

@@ -1,12 +1,12 @@
-// Where the keys of a case stand in its text, TOML or JSON, and the text with another value of a key. The server reads the
-// case; this only finds lines, and leaves all else of the text as it is.
+// Positions of the keys of a case in its text, TOML or JSON, and the text with another value of a key. The server reads
+// the case; this module only finds lines, and leaves the rest of the text unchanged.
 
 const HEADER = /^\s*(\[\[?)\s*([^\]]+?)\s*\]\]?/;
 const KEY = /^\s*((?:[\w-]+|"[^"\n]*"|'[^'\n]*')(?:\s*\.\s*(?:[\w-]+|"[^"\n]*"|'[^'\n]*'))*)\s*=\s*/;
-const LITERAL = /^("(?:[^"\\\n]|\\.)*"|'[^'\n]*'|[^#"'\n]*?)(\s*#.*)?$/; // A value on one line, and the comment behind it.
+const LITERAL = /^("(?:[^"\\\n]|\\.)*"|'[^'\n]*'|[^#"'\n]*?)(\s*#.*)?$/; // A value on one line, and the comment after it.
 const OPENS = { "[": 1, "{": 1, "]": -1, "}": -1 };
 
-// [{ line, start, end }]: a statement may go over several lines, in brackets or in a text of three quotes.
+// [{ line, start, end }]: a statement may span several lines, in brackets or in a text in three quotes.
 export function statements(text) {
   const found = [];
   let [start, line, depth, quote] = [0, 0, 0, ""];
@@ -38,8 +38,8 @@ export function statements(text) {
 
 const plain = (key) => key.split(/\s*\.\s*/).map((word) => word.replace(/^["']|["']$/g, "")).join(".");
 
-// [{ line, start, end, table, key, value }]: `table` is the place of the statement, `parts[0].mesh`; `key` what stands
-// before its "=", "" for a header; `value` is where its value begins.
+// [{ line, start, end, table, key, value }]: `table` is the path of the statement, `parts[0].mesh`; `key` the text
+// before its "=", "" for a header; `value` the start of its value.
 export function placed(text) {
   const counts = {};
   let table = "";
@@ -63,7 +63,7 @@ export function placed(text) {
   });
 }
 
-// The value of a number or a text, as it is written; "" for what is not there.
+// A number or a text as it is written; "" for a missing one.
 export function valueOf(text, table, name) {
   if (isJson(text)) return String((table ? read(text)?.[table] : read(text))?.[name] ?? "");
   const found = placed(text).find((one) => full(one) === (table ? `${table}.${name}` : name));
@@ -81,7 +81,7 @@ function read(text) {
   }
 }
 
-// JSON that cannot be read stays as it is: the server says what is wrong with it.
+// Malformed JSON stays unchanged: the server reports the error.
 function changed(text, change) {
   const data = read(text);
   if (!data) return text;
@@ -97,7 +97,7 @@ function eachTable(value, act) {
 
 const full = ({ table, key }) => [table, key].filter(Boolean).join(".");
 
-// The line (from 0) on which a key stands, or what it is part of; -1 for what stands nowhere.
+// Line (from 0) of a key, or of its nearest parent; -1 if there is none.
 export function lineOf(text, key) {
   const all = placed(text).map((one) => [full(one), one.line]);
   for (let name = key; name; name = name.slice(0, Math.max(0, name.lastIndexOf("."), name.lastIndexOf("[")))) {
@@ -107,7 +107,7 @@ export function lineOf(text, key) {
   return -1;
 }
 
-// The text with `name = literal` in a table of the whole case ("" for its beginning); a table that is missing is added.
+// The text with `name = literal` in a table of the case ("" for the top level); a missing table is added.
 export function withKey(text, table, name, literal) {
   if (isJson(text)) return changed(text, (data) => { (table ? (data[table] ??= {}) : data)[name] = JSON.parse(literal); });
   const all = placed(text);
@@ -120,10 +120,10 @@ export function withKey(text, table, name, literal) {
   return `${text.trimEnd()}\n\n[${table}]\n${name} = ${literal}\n`;
 }
 
-// What stands behind a value that is a number or a text in quotes.
+// Rest of the line after a number or a quoted text.
 const comment = (value) => LITERAL.exec(value)?.[2] ?? "";
 
-// The text with the sha256 of a file beside each place where the case names it by `path`.
+// The text with the sha256 of a file wherever the case names it by `path`.
 export function withHash(text, path, sha256) {
   if (isJson(text)) return changed(text, (data) => eachTable(data, (one) => { if (one.path === path) one.sha256 = sha256; }));
   const all = placed(text);
@@ -137,7 +137,7 @@ export function withHash(text, path, sha256) {
 const literals = (path) => [JSON.stringify(path), `'${path}'`];
 const reads = (text, { value, end }, path) => literals(path).some((one) => text.slice(value, end).startsWith(one));
 
-// `mesh.path = "…"` on a line of its own: the hash is the next line, or the one that stands in the same table.
+// `mesh.path = "…"` on a line of its own: the hash becomes the next line, or replaces the one in the same table.
 function beside(text, all, one, sha256) {
   const name = `${one.key.slice(0, -"path".length)}sha256`;
   const known = all.find(({ table, key }) => table === one.table && key === name);
@@ -145,7 +145,7 @@ function beside(text, all, one, sha256) {
   return { start: one.end, end: one.end, words: `\n${/^[ \t]*/.exec(text.slice(one.start, one.end))[0]}${name} = "${sha256}"` };
 }
 
-// `{ path = "…" }`: in the braces that hold it, which may be several.
+// `{ path = "…" }`: the braces around it, which may be nested.
 function inside(text, { value, end }, path, sha256) {
   const words = literals(path).map((one) => one.replace(/[.*+?^${}()|[\]\\]/g, "\\$&")).join("|");
   const body = text.slice(value, end);

@@ -1,4 +1,4 @@
-// A chart of a run on ECharts: one cursor and one zoom for all of a page, keys as well as the pointer, saved as CSV and SVG.
+// A chart of a run with ECharts: one cursor and one zoom for all charts of a page, pointer and keys, saved as CSV and SVG.
 
 import { colour, whole } from "./axes.js";
 import { h } from "./figures.js";
@@ -7,13 +7,13 @@ import { readout } from "./cursorbox.js";
 import { save, tableOf, toCsv } from "./tables.js";
 
 const GROUP = "run";
-const NEAR = "100px"; // Of the window: a chart farther off is drawn when there is time, and again when it comes near.
+const NEAR = "100px"; // Distance to the window: a chart farther off is drawn when the browser is idle, and again when it comes near.
 const PICTURE = { width: 960, height: 420 }; // px of a saved picture.
-const whenIdle = globalThis.requestIdleCallback ?? ((work) => setTimeout(work, 200)); // Not every browser has it.
+const whenIdle = globalThis.requestIdleCallback ?? ((work) => setTimeout(work, 200)); // Some browsers lack it.
 
-// A chart of `height` px. `option()` gives what ECharts calls an option, or null while there is nothing to draw.
-// `unit` is that of its x axis; only time is shared with other charts. `onEnter` gets the place of the cursor in the first series when Enter is pressed; `table()` promises the table that is
-// saved, { head, rows }, in place of what is drawn; `name()` is how its files begin.
+// A chart of `height` px. `option()` returns an option of ECharts, or null without data.
+// `unit` is that of its x axis; only charts over time share the cursor. Enter calls `onEnter` with the index of the cursor in the first series; `table()` resolves to
+// the saved table, { head, rows }, instead of the drawn points; `name()` is the beginning of its file names.
 export class Chart {
   constructor(height, label, option, { alone = false, unit = "s", onClick, onEnter, table, name = () => "chart" } = {}) {
     this.element = h("div.plot", { tabindex: 0, role: "img", "aria-label": `${label}; arrow keys move the cursor${onEnter ? ", Enter opens the nearest marker" : ""}`, style: { height: `${height}px` } },
@@ -49,7 +49,7 @@ export class Chart {
     if (stale) this.draw();
   }
 
-  // Out of view only the first time, and where that is `needed`.
+  // Out of view it is drawn the first time, and when it is `needed`.
   draw(needed = false) {
     if (this.seen) this.paint();
     else if ((needed || !this.chart) && !this.waiting) this.waiting = whenIdle(() => this.late());
@@ -70,7 +70,7 @@ export class Chart {
     const places = new Map(option.series.map(({ name, xAxisIndex = 0 }) => [name, xAxisIndex]));
     const moved = [...places].some(([name, place]) => (this.places?.get(name) ?? place) !== place) || panels !== (this.places?.panels ?? panels);
     this.places = Object.assign(places, { panels });
-    const how = moved ? { notMerge: true } : { replaceMerge: ["series"] }; // ECharts fails where a line moves to another panel.
+    const how = moved ? { notMerge: true } : { replaceMerge: ["series"] }; // ECharts fails when a line moves to another panel.
     this.chart.setOption(whole(this.alone, option), { ...how, lazyUpdate: false });
     this.series = option.series;
     this.reads = !this.alone && !option.tooltip?.formatter;
@@ -97,7 +97,7 @@ export class Chart {
     return chart;
   }
 
-  // Of all charts that show the cursor the one that has the pointer or the focus tells what its lines are worth.
+  // Of all charts with the cursor, the one with the pointer or the focus shows the values of its lines.
   read(cursor) {
     const focused = document.activeElement === this.element;
     if (!this.reads || !cursor || !(this.pointer || focused)) return;
@@ -122,7 +122,7 @@ export class Chart {
     if (point) this.read({ value: (point.value ?? point)[0] });
   }
 
-  // Makes one series stand out; null: none.
+  // Highlights one series; null: none.
   highlight(seriesName) {
     this.chart?.dispatchAction({ type: "downplay" });
     if (seriesName !== null) this.chart?.dispatchAction({ type: "highlight", seriesName });

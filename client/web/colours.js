@@ -1,20 +1,20 @@
 // Colours of the view: a hue for each part, variations of it for the fragments of the part.
 // client/drawing/part_colours.py has the same function.
 
-// Degrees in OKLCH of the first parts.
+// OKLCH hues of the first parts, degrees.
 const HUES = [252, 70, 165, 15, 305, 120, 205, 345];
 // 2^64 over the powers of 1.2207, the root of g^4 = g + 1: their multiples fill a cube evenly (Roberts 2018, R3).
 const STEPS = [0xd1b54a32d192ed03n, 0xabc98388fb8fac03n, 0x8cb92ba72f3d8dd7n];
-// Lightness and chroma of a part by name, and of what is whole: muted, so that what has broken off stands out.
+// Lightness and chroma of a part by name, and of unbroken parts: muted, so that detached fragments stand out.
 const [STRONG, MUTED] = [[0.66, 0.12], [0.84, 0.045]];
-const DARKER = 0.13; // Lightness between a part and the one that has its hue again.
-const REST = [140, 146, 152]; // Of the fragments that have no row of their own, number -1.
+const DARKER = 0.13; // Difference of lightness between parts with the same hue.
+const REST = [140, 146, 152]; // Colour of the fragments without a row of their own, number -1.
 
-// [r, g, b] of a rank or a part by its number from 0 on, and the same for a style.
+// [r, g, b] of a rank or a part by its number from 0, and the same as a CSS colour.
 export const ofName = (number) => rgb(STRONG[0] - DARKER * (Math.floor(number / HUES.length) % 3), STRONG[1], HUES[number % HUES.length]);
 export const named = (number) => `#${ofName(number).map((byte) => byte.toString(16).padStart(2, "0")).join("")}`;
 
-// [r, g, b] of the fragment `id` (BigInt) where it belongs to `part`. The first `bodies` numbers are of what was there at the start.
+// [r, g, b] of the fragment `id` (BigInt) of `part`. The first `bodies` numbers are those of the initial bodies.
 export function ofFragment(id, part, bodies) {
   if (id < 0n) return REST;
   const hue = HUES[part % HUES.length];

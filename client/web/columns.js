@@ -1,4 +1,4 @@
-// The columns of tables of runs: what each shows of a row, and in which unit.
+// Columns of the tables of runs: the value that each shows of a row, and its unit.
 
 import { count, duration, exact, scaleOf, si, UNKNOWN, when } from "./figures.js";
 import { FINAL } from "./live.js";
@@ -10,8 +10,8 @@ export const share = (row) => (row.state === "succeeded" ? 1 : row.progress?.end
 export const cores = ({ ranks, threads }) => (threads > 1 ? `${ranks}×${threads}` : String(ranks));
 export const took = (row) => (row.started && FINAL.has(row.state) ? row.finished - row.started : null);
 
-// { id, title, group, number, value(row), text(row) }: `value` is what rows are sorted by, null where there is none;
-// `number` columns stand at the right, and may have a `unit`, in which `write(value)` writes a number.
+// { id, title, group, number, value(row), text(row) }: rows are sorted by `value`, which is null if missing;
+// `number` columns are right-aligned, and may have a `unit`, in which `write(value)` formats a number.
 const FIRST = [
   { id: "run", title: "run", value: (row) => row.name, text: (row) => row.name, width: 27 },
   { id: "state", title: "state", value: (row) => STATES.indexOf(row.state) - share(row), text: (row) => row.state, width: 24 },
@@ -26,11 +26,11 @@ const LAST = [
   { id: "title", title: "title", value: (row) => row.title, text: (row) => row.title, shown: false },
   { id: "message", title: "message", value: (row) => row.message || null, text: (row) => row.message, shown: false },
 ];
-const IF_ANY = new Set(["references", "labels"]); // Shown where a row has something there.
-const unsure = ({ state }) => state !== "succeeded"; // A result of such a run is that of an earlier time than the end.
-const TELLING = /^(fragments|reference\.penetration.*)$/; // Results that are shown where nobody has chosen.
-const MOST_PROBES = 4; // That are shown where nobody has chosen.
-const MOST_VALUES = 6; // Likewise.
+const IF_ANY = new Set(["references", "labels"]); // Shown if a row has a value.
+const unsure = ({ state }) => state !== "succeeded"; // The result of such a run belongs to a time before the end.
+const TELLING = /^(fragments|reference\.penetration.*)$/; // Results that are shown by default.
+const MOST_PROBES = 4; // Probes that are shown by default.
+const MOST_VALUES = 6; // Keys that are shown by default.
 
 function labels(row) {
   const own = Object.entries(row.labels).filter(([name]) => name !== "sweep" && name !== "point");
@@ -42,7 +42,7 @@ function references(row) {
   return row.missed.length ? `${row.missed.length} of ${row.references} missed` : `${row.references} pass`;
 }
 
-// All columns of some rows. `keys`: those of cases that differ between them; `units`: of results, by name.
+// All columns of some rows. `keys`: keys of cases that differ between rows; `units`: units of results by name.
 export function columnsOf(rows, keys, units) {
   const values = keys.map((key, n) => numeric(rows, {
     id: `value:${key}`, title: key, group: "values that differ", shown: n < MOST_VALUES, value: (row) => valueOf(row, key), unit: rows.find((row) => row.kind?.units[key])?.kind.units[key] ?? "", exact: true,
@@ -62,7 +62,7 @@ export function columnsOf(rows, keys, units) {
 
 const titled = (name) => name.replace(/worst_residual/, "worst energy residual").replace(/^probe\./, "").replace(/^reference\.(.*)$/, "$1, reference").replace(/\.(min|max)$/, " $1");
 
-// A column whose values are numbers, in the unit that fits most of them; words stay as they are.
+// A column of numbers, in the unit that fits most of them; words stay unchanged.
 function numeric(rows, column) {
   const { unit, value } = column;
   const values = rows.map(value).filter((one) => one !== null);
@@ -74,7 +74,7 @@ function numeric(rows, column) {
   return { ...column, number: values.length > 0, worth, base: unit, unit: name, write: text, text: (row) => text(value(row)) };
 }
 
-// Keys are shown by their last parts, as many as tell them from each other.
+// Short names of keys: their last parts, as many as make them unique.
 function brief(columns) {
   const keys = columns.filter(({ id }) => id.startsWith("value:")).map(({ title }) => title);
   const tail = (key, parts) => key.split(".").slice(-parts).join(".");

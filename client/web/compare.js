@@ -1,4 +1,4 @@
-// Several runs on one page: their histories over each other, what tells them apart, their results, their bodies side by side.
+// Comparison of several runs: their histories in common charts, different keys, results, bodies side by side.
 
 import { axis, largest, lineStyle, logarithmic, series, time } from "./axes.js";
 import { binary, call, refused } from "./api.js";
@@ -15,9 +15,9 @@ import { SideBySide } from "./sidebyside.js";
 import { decode } from "./snapshot.js";
 
 const TALL = 260;
-const AGAIN = 5000; // ms until runs that go on, or of which nobody answered, are read again.
-const POINTS = 600; // Of a line; twelve lines are drawn at once.
-const REPORTS = 200; // Of a line of reports.
+const AGAIN = 5000; // ms after which open runs, and runs without an answer, are read again.
+const POINTS = 600; // Points of a line; twelve lines are drawn at a time.
+const REPORTS = 200; // Points of a line of reports.
 const AT_ONCE = 4; // Runs that are read at the same time.
 const MOST_CHARTS = 8;
 const LEDGER = ["kinetic", "elastic", "plastic", "viscous", "contact", "friction", "eroded", "fracture", "cohesive", "external", "residual"];
@@ -69,7 +69,7 @@ export class ComparePage {
     this.timer = setTimeout(() => this.read(), this.again);
   }
 
-  // The last snapshot of each run, for the sizes of its fragments; after all else.
+  // The last snapshot of each run, for the sizes of its fragments; it is read last.
   async readSnapshots() {
     const { signal } = this.abort;
     await inTurn(this.runs, AT_ONCE, async (run) => {
@@ -89,7 +89,7 @@ export class ComparePage {
 
   get key() { return `compare.${this.runs[0]?.plan?.name ?? ""}`; }
 
-  // { group: [name, …] } of what all runs have.
+  // { group: [name, …] } of quantities that all runs have.
   offered() {
     const columns = common(this.runs.map(({ columns: { units } }) => Object.keys(units)));
     const probes = common(this.runs.map(({ plan }) => (plan?.probes ?? []).map(({ name }) => name))).filter((name) => columns.includes(name));
@@ -181,7 +181,7 @@ export class ComparePage {
 
   keep() { remember(this.key, this.charts.map(({ name }) => name)); }
 
-  // Reads what charts show and is not there yet, and draws them.
+  // Reads missing data of the visible charts, and draws them.
   async fill(charts) {
     const { signal } = this.abort;
     const names = charts.map(({ name }) => name);
@@ -208,7 +208,7 @@ export class ComparePage {
       xAxis: time(Math.max(...ends)), yAxis: log ? logarithmic(unit) : axis(unit, largest(list), { scale: true }), series: list };
   }
 
-  // All lines of all runs, one below the other.
+  // All lines of all runs in one table.
   async table(name) {
     const unit = this.runs.map(({ columns }) => columns.units[name]).find((one) => one !== undefined) ?? "";
     const each = await Promise.all(this.runs.map(async (run) => (name in JOURNAL ? points(run, name) : (await everyLine(run.id, [name])).rows)));
@@ -252,7 +252,7 @@ async function readUnits(name, signal) {
   return cases[0]?.units ?? {};
 }
 
-// Does work for each of many, some at a time.
+// Calls work for each item, a few at a time.
 async function inTurn(list, atOnce, work) {
   const left = [...list];
   await Promise.all(Array.from({ length: atOnce }, async () => {

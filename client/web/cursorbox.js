@@ -1,12 +1,12 @@
-// What the lines of a chart are worth at its cursor: a box beside the pointer, or beside the chart that has the focus.
+// Values of the lines of a chart at its cursor: a box beside the pointer, or beside the focused chart.
 
 import { colour } from "./axes.js";
 import { exact, h } from "./figures.js";
 
-const AWAY = 14; // px from the pointer.
-const MOST = 24; // Lines.
+const AWAY = 14; // Distance from the pointer, px.
+const MOST = 24; // Largest number of lines.
 
-// The place in `data` that is nearest to x; data goes by x.
+// Index in `data` nearest to x; data is sorted by x.
 export function nearestTo(data, x) {
   let [low, high] = [0, data.length - 1];
   const at = (i) => (data[i].value ?? data[i])[0];
@@ -18,7 +18,7 @@ export function nearestTo(data, x) {
   return Math.abs(at(high) - x) < Math.abs(at(low) - x) ? high : low;
 }
 
-// [{ name, value, colour, dash, text }] of series at x, the largest values first, of a stack the uppermost.
+// [{ name, value, colour, dash, text }] of series at x, sorted by value, the largest first; a stack from its top.
 export function worth(list, x) {
   const known = list.filter(({ data, aside, tooltip }) => data?.length && !aside && tooltip);
   const told = known.flatMap(({ name, data, color, lineStyle, tooltip: { valueFormatter }, stack }) => {
@@ -29,14 +29,14 @@ export function worth(list, x) {
   return told.some(({ stack }) => stack) ? told.reverse() : told.sort((a, b) => b.value - a.value);
 }
 
-// One box for the whole page: a chart that is left gives it to the next.
+// One box for the whole page, which the active chart uses.
 class Readout {
   get element() {
     if (!this.made) document.body.append(this.made = h("div.readout", { role: "status", hidden: "" }));
     return this.made;
   }
 
-  // `of` is the chart, `place` what [x, y] in the window it stands beside.
+  // `of` is the chart, `place` the [x, y] in the window of the box.
   show(of, x, list, place) {
     const rows = worth(list, x);
     if (!rows.length) return this.hide(of);

@@ -1,29 +1,29 @@
-// What tells some runs apart: their names, the keys of their cases that differ, the results of each.
+// Differences between runs: their names, the keys of their cases that differ, their results.
 
 import { count, duration, exact, fixed, number, rough, scaleOf, words } from "./figures.js";
 
-const NEVER = /^(name|title|description|reference\b.*)$/; // Keys that change no answer.
-const FEW = 3; // Keys in the name of a run.
-const PLACES = new Set(["parts", "run", "boundaries", "materials", "numerics"]); // Tables that need no mention in it.
-const SHORT = 8; // Letters of an id, at least.
+const NEVER = /^(name|title|description|reference\b.*)$/; // Keys that do not affect the answer.
+const FEW = 3; // Largest number of keys in the name of a run.
+const PLACES = new Set(["parts", "run", "boundaries", "materials", "numerics"]); // Tables that names leave out.
+const SHORT = 8; // Least number of characters of an id.
 
 const AXES = ["x", "y", "z"];
 
-// { "run.ranks": 2, "parts[0].velocity[2]": 210, … } of a case with all defaults, by the keys that can be set.
+// { "run.ranks": 2, "parts[0].velocity[2]": 210, … } of a case with all defaults, by key.
 export function flat(value, key = "") {
   if (value === null || typeof value !== "object") return { [key]: value };
   const under = (name) => (Array.isArray(value) ? `${key}[${name}]` : key ? `${key}.${name}` : name);
   return Object.assign({}, ...Object.keys(value).map((name) => flat(value[name], under(name))));
 }
 
-// [[key, value of the first, of the second, …], …] of what cases do not have in common.
+// [[key, value of the first, of the second, …], …] of the keys that differ between cases.
 export function differences(plans) {
   const all = plans.map((plan) => flat(plan ?? {}));
   const keys = [...new Set(all.flatMap(Object.keys))];
   return keys.filter((key) => !NEVER.test(key) && all.some((one) => (one[key] ?? null) !== (all[0][key] ?? null))).map((key) => [key, ...all.map((one) => one[key])]);
 }
 
-// What a key is about: "steel velocity z" for "parts[0].velocity[2]".
+// Words for a key: "steel velocity z" for "parts[0].velocity[2]".
 export function about(key, plan) {
   let at = plan;
   const told = key.split(/[.[\]]+/).filter(Boolean).map((word) => {
@@ -39,7 +39,7 @@ export function shown(value) {
   return typeof value === "number" ? number(value) : String(value);
 }
 
-// The shortest beginnings of ids that tell them apart.
+// Shortest unique prefixes of ids.
 export function shortened(ids) {
   let length = SHORT;
   const longest = Math.max(0, ...ids.map((id) => id.length));
@@ -47,7 +47,7 @@ export function shortened(ids) {
   return ids.map((id) => id.slice(0, length));
 }
 
-// What runs are called: by name; those of one name by the few keys that differ, else by their ids.
+// Names of runs: the name of the case; for equal names the few keys that differ, else the ids.
 export function called(runs, differing, units = {}) {
   const names = runs.map(({ info }) => info.name || info.id);
   const ids = shortened(runs.map(({ info }) => info.id));
@@ -58,7 +58,7 @@ export function called(runs, differing, units = {}) {
 
 const keyed = ([key, ...values], i, runs, units) => `${about(key, runs[0].plan)} ${typeof values[i] === "number" ? exact(values[i], units[key] ?? "") : shown(values[i])}`;
 
-// A column for each of the first keys that differ: what it is about, its key, its unit, the values.
+// A column for each of the first keys that differ: words, key, unit, values.
 export const keyColumns = (differing, plan, units) => differing.map(([key, ...values]) => {
   const numbers = values.filter(Number.isFinite);
   const scale = scaleOf(Math.max(0, ...numbers.map(Math.abs)), units[key] ?? "");
@@ -76,8 +76,8 @@ export const inWords = (name) => QUANTITIES[name] ?? words(name.replace(/^(kinet
 
 // Results ----------------------------------------------------------------------------------------------------------------
 
-// [{ title, unit, values, text }] of what can be compared of the results, a value a run; null where a run has none.
-// `which` of last, least and most is told of probes.
+// [{ title, unit, values, text }] of comparable results, one value for each run; null if a run has none.
+// `which`: last, least or most of probes.
 export function results(runs, which) {
   const probes = common(runs.map(({ plan }) => (plan?.probes ?? []).map(({ name }) => name)));
   const references = [...new Set(runs.flatMap(({ info }) => (info.outcome?.reference ?? []).map(({ name }) => name)))];
@@ -99,7 +99,7 @@ const check = (info, name) => (info.outcome?.reference ?? []).find((one) => one.
 const unitOf = (runs, name) => runs.map(({ columns }) => columns.units[name]).find((unit) => unit !== undefined) ?? "";
 export const common = (lists) => (lists.length ? lists[0].filter((name) => lists.every((list) => list.includes(name))) : []);
 
-// Numbers of a column have one unit, which stands in its head.
+// Numbers of a column have one unit, in its header.
 function column(title, unit, values, text) {
   const scale = scaleOf(Math.max(0, ...values.filter(Number.isFinite).map(Math.abs)), unit);
   return { title: words(title), si: unit, unit: text ? "" : scale.unit, values, text: (value) => (value === null ? "–" : text ? text(value) : exact(Number(scale.text(value)), "", 5)) };

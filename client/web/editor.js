@@ -1,4 +1,4 @@
-// A text with line numbers. A line of which something is wrong is marked.
+// A text with line numbers. Lines with a problem are marked.
 
 import { h } from "./figures.js";
 
@@ -14,7 +14,7 @@ export class Editor {
 
   get text() { return this.area.value; }
 
-  // The caret stays on its line where the text around it has changed.
+  // Keeps the caret on its line when the text around it has changed.
   set text(text) {
     if (this.area.value === text) return;
     const { selectionStart: at, scrollTop } = this.area;

@@ -1,4 +1,4 @@
-// The energy of a run over time: the ledger, whose terms add up to what came in, and the energies of the parts.
+// Energy of a run over time: the ledger, whose terms add up to the energy input, and the energies of the parts.
 
 import { axis, largest, limit, logarithmic, series, time } from "./axes.js";
 import { named } from "./colours.js";
@@ -6,8 +6,8 @@ import { rough } from "./figures.js";
 import { TERMS } from "./live.js";
 
 export const VIEWS = { ledger: "all terms of the ledger", lost: "without the kinetic energy", internal: "internal energy by part", kinetic: "kinetic energy by part" };
-const FLOOR = 1e-10; // Residuals below it are rounding.
-const RESIDUAL = 1e-2; // Above it a run's energy does not close.
+const FLOOR = 1e-10; // Residuals below it are rounding errors.
+const RESIDUAL = 1e-2; // Limit of the residual.
 
 export const end = ({ plan, progress, columns, ledger }) => plan?.run?.end_time ?? progress?.end_time ?? columns.values.t.at(-1) ?? ledger.at(-1)?.t ?? 1;
 export const parts = ({ ledger, columns }) => {
@@ -15,7 +15,7 @@ export const parts = ({ ledger, columns }) => {
   return told.length ? told : Object.keys(ledger.at(-1)?.parts ?? {});
 };
 
-// [[t, value]] of a column of the history; of a run that has none yet, of its reports.
+// [[t, value]] of a column of the history; without a history, of the reports.
 export function course(live, name) {
   const { values } = live.columns;
   if (values[name]) return values.t.map((t, i) => [t, values[name][i]]);
@@ -32,7 +32,7 @@ export function ofEnergy(live, view) {
   return { xAxis: time(end(live)), yAxis: axis("J", largest(list)), series: list };
 }
 
-// Areas on each other, below zero what is given back: with the kinetic energy they end at what came in, a line.
+// Stacked areas, negative terms below zero; with the kinetic energy their sum is the energy input, a line.
 function ofTerms(live, view) {
   const all = TERMS.filter(([name]) => view === "ledger" || name !== "kinetic").map(([name, tone]) => ({ name: words(name), colour: tone, unit: "J", stack: "energy", data: course(live, name) }));
   const list = all.filter(({ data }) => data.some(([, value]) => value)).map(series);
@@ -44,7 +44,7 @@ function ofTerms(live, view) {
 
 const words = (name) => ({ stepping: "time stepping", averaging: "pressure averaging", viscous: "bulk viscosity" })[name] ?? name;
 
-// One area a part, in the colours that the parts have in the view of the body.
+// One area for each part, in the colours of the parts in the 3-D view.
 export const ofParts = (live, view) => parts(live).map((part, i) =>
   series({ name: part, colour: named(i), unit: "J", stack: "energy", data: course(live, `${view}.${part}`).filter(([, value]) => value !== null) }));
 

@@ -1,5 +1,5 @@
-// Numbers and times as people read them, and the making of elements.
-// They are those of cases/figures.py; tests/figures.json has inputs and texts that hold for both.
+// Numbers and times as text, and creation of elements.
+// The same rules as cases/figures.py; tests/figures.json has inputs and texts for both.
 
 const UP = [[1e12, "T"], [1e9, "G"], [1e6, "M"], [1e3, "k"]];
 const DOWN = [[1, ""], [1e-3, "m"], [1e-6, "µ"], [1e-9, "n"], [1e-12, "p"]];
@@ -13,21 +13,21 @@ const LADDERS = {
   "m^3": [[1e-3, "m^3"], [1e-12, "mm^3"], [1e-18, "µm^3"]],
 };
 const WORTH = { "m^2": 1, "mm^2": 1e-6, "µm^2": 1e-12, "m^3": 1, "mm^3": 1e-9, "µm^3": 1e-18 };
-const PLAIN = [1e-3, 5]; // Without a power of ten from here on, below so many digits before the point.
-const MOST = 1e12; // From which on a whole number is written with its power of ten.
+const PLAIN = [1e-3, 5]; // Numbers from here on, with fewer digits before the point than this, have no power of ten.
+const MOST = 1e12; // Integers from here on are written with a power of ten.
 const MOST_HOURS = 10000;
 export const UNKNOWN = "–";
 
 const known = (value) => (typeof value === "number" ? value : NaN);
 const tied = (text, unit) => (text === UNKNOWN ? text : `${text} ${unit}`.trim());
 
-// With significant digits and the unit, which gets the prefix that fits where it takes one.
+// A number with significant digits and the unit, with a fitting prefix if the unit takes one.
 export const si = (value, unit = "", digits = 3) => alike([value], unit, digits)[0];
 
-// Likewise, without zeros at the end.
+// The same without trailing zeros.
 export const exact = (value, unit = "", digits = 6) => trimmed(si(value, unit, digits));
 
-// Values that belong together: all have the prefix of the largest magnitude.
+// Values of one group: all have the prefix of the largest magnitude.
 export function alike(values, unit = "", digits = 3) {
   const [worth, name] = unitOf(values.map(known), unit, digits);
   return values.map(known).map((value) => (Number.isNaN(value) ? UNKNOWN : tied(significant(value / worth, digits), name)));
@@ -35,19 +35,19 @@ export function alike(values, unit = "", digits = 3) {
 
 export const exacts = (values, unit = "", digits = 6) => alike(values, unit, digits).map(trimmed);
 
-// Components that belong together, with their unit once: "1, 200 mm".
+// Components of a vector with one unit: "1, 200 mm".
 export function vector(values, unit = "", digits = 3, between = ", ") {
   const [worth, name] = unitOf(values.map(known), unit, digits);
   return tied(values.map((value) => trimmed(significant(known(value) / worth, digits))).join(between), name);
 }
 
-// Texts of an axis from 0 to `most`: all have the same prefix.
+// Labels of an axis from 0 to `most` with the same prefix.
 export function onAxis(most, unit) {
   const [worth, name] = unitOf([known(most)], unit, 3);
   return (value) => tied(trimmed(significant(value / worth, 3)), name);
 }
 
-// The unit of an axis or a column whose largest magnitude is `most`, with its prefix, what it is worth, and the texts of
+// Unit with prefix of an axis or a column whose largest magnitude is `most`, its factor, and the texts of
 // numbers without it.
 export function scaleOf(most, unit) {
   const [worth, name] = unitOf([known(most)], unit, 3);
@@ -81,7 +81,7 @@ export function percent(share, decimals = 1) {
   return text === UNKNOWN ? text : `${text} %`;
 }
 
-// Thousands are parted by a space at which no line ends.
+// Thousands are separated by a space that does not break.
 export function count(value) {
   if (!Number.isFinite(value)) return UNKNOWN;
   if (Math.abs(value) >= MOST) return power(value, 3);
@@ -102,7 +102,7 @@ function significant(value, digits) {
   return rounded(value, Math.max(0, digits - 1 - at));
 }
 
-// Halves away from zero.
+// Rounds halves away from zero.
 function rounded(value, decimals) {
   const text = Math.abs(value).toFixed(decimals);
   return value < 0 && Number(text) !== 0 ? `-${text}` : text;
@@ -110,7 +110,7 @@ function rounded(value, decimals) {
 
 const power = (value, digits) => (value < 0 ? "-" : "") + Math.abs(value).toExponential(digits - 1).replace("e+", "e");
 
-// Without zeros behind the point at the end of the number.
+// Removes zeros at the end of the decimals.
 const trimmed = (text) => text.replace(/(\.\d*?)0+(?=e| |$)/, "$1").replace(/\.(?=e| |$)/, "");
 
 export function duration(seconds) {
@@ -138,7 +138,7 @@ const HOUR = new Intl.DateTimeFormat("en-GB", { hour: "2-digit", minute: "2-digi
 const DAY = new Intl.DateTimeFormat("en-GB", { day: "numeric", month: "short" });
 const DATE = new Intl.DateTimeFormat("en-GB", { day: "numeric", month: "short", year: "numeric" });
 
-// A moment in a column: the year stands there where it is another one.
+// A time in a column: the year is written if it is not the present one.
 export function when(wall) {
   const [then, now] = [new Date(1000 * wall), new Date()];
   const day = then.getFullYear() === now.getFullYear() ? DAY : DATE;

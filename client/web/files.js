@@ -1,10 +1,10 @@
-// The files of a run: which there are, how large they are, and a copy of any of them for who reads the page.
+// Files of a run: names, sizes, and a download of each.
 
 import { call, download } from "./api.js";
 import { counted, h, size } from "./figures.js";
 import { fold } from "./storage.js";
 
-const MOST = 500; // Files of a folder that are listed.
+const MOST = 500; // Largest number of files of a folder that are listed.
 
 export class Files {
   constructor(run) {
@@ -19,7 +19,7 @@ export class Files {
     if (this.fold.open) this.read();
   }
 
-  // The files of the run: [{ path, size }], null where they are not known; they stay as they were where the server does not answer.
+  // Files of the run: [{ path, size }], null while unknown; unchanged if the server does not answer.
   async read() {
     try {
       const { files } = await call(this.path);
@@ -32,7 +32,7 @@ export class Files {
     return this.known ?? null;
   }
 
-  // Those of the run's folder itself, then each folder below it, closed.
+  // Files of the run's folder itself, then each folder inside it, closed.
   rows(files) {
     return grouped(files).map(([folder, inside]) => {
       const table = h("table.listing", {}, h("tbody", {}, inside.slice(0, MOST).map((file) => this.row(file, folder))));
@@ -60,7 +60,7 @@ export class Files {
   }
 }
 
-// [[folder, files]] by the first part of their paths, "" for those of the run's folder itself, which come first.
+// [[folder, files]] by the first part of their paths; "" for the run's folder itself, which is first.
 export function grouped(files) {
   const folders = new Map([["", []]]);
   for (const file of files) {

@@ -1,12 +1,12 @@
-// What of a body its frame is to show, and from where a camera sees all of it.
+// Region of a body that the frame shows, and the camera position from which all of it is visible.
 
-const HEAVY = 0.02; // Of the mass of its part: a fragment that is always in the frame.
-const ENOUGH = 0.9; // Of the mass of a part: what is lighter than that of the rest is debris.
-const INNER = [0.05, 0.95]; // Shares by mass of the debris that are in the frame along each axis.
-const MOST = 6000; // Points.
+const HEAVY = 0.02; // Share of the mass of its part above which a fragment is always in the frame.
+const ENOUGH = 0.9; // Share of the mass of a part: the fragments beyond it, sorted by mass, are debris.
+const INNER = [0.05, 0.95]; // Shares by mass of the debris that lies in the frame along each axis.
+const MOST = 6000; // Largest number of points.
 
-// Places (m, three numbers each) that the frame is to show: of every part that is shown the heavy fragments whole, and of its
-// debris the inner part where it is much of the mass. `all`: everything; `shown`: by part; `only`: a part, or null.
+// Points (m, three numbers each) of the framed region: heavy fragments of every visible part completely, and
+// the inner part of its debris if that has much of the mass. `all`: everything; `shown`: by part; `only`: a part, or null.
 export function points(snapshot, { all = false, only = null, shown = () => true } = {}) {
   const { arrays } = snapshot;
   const part = partOf(arrays);
@@ -17,21 +17,21 @@ export function points(snapshot, { all = false, only = null, shown = () => true 
   return found.length + debris.length ? [...found, ...debris] : corners(snapshot, () => true);
 }
 
-// The part of each row of the table: that of its first triangle; 255 for what is not drawn.
+// Part of each row of the table: that of its first triangle; 255 for rows that are not drawn.
 export function partOf({ fragment_id: ids, triangles, vertex_fragment: rows, triangle_part: parts }) {
   const out = new Uint8Array(ids.length).fill(255);
   for (let i = parts.length - 1; i >= 0; i -= 1) out[rows[triangles[3 * i]]] = parts[i];
   return out;
 }
 
-// Whether a row is one of the heavy fragments of its part.
+// Whether a row is a heavy fragment of its part.
 function heavy({ fragment_mass: masses, fragment_id: ids }, part, wanted) {
   const total = new Float64Array(256);
   for (let row = 0; row < masses.length; row += 1) total[part[row]] += masses[row];
   return (row) => wanted(row) && ids[row] >= 0n && masses[row] >= HEAVY * total[part[row]];
 }
 
-// Corners of the box that holds the inner debris of each part, where it is more than a little.
+// Corners of the box of the inner debris of each part, if its mass is not small.
 function inner({ fragment_mass: masses, fragment_centre: centres, fragment_id: ids }, part, light) {
   const out = [], total = new Float64Array(256), rows = new Map();
   for (let row = 0; row < masses.length; row += 1) {
@@ -71,9 +71,9 @@ function corners({ header: { box: [low, high] }, arrays: { positions, vertex_fra
   return out;
 }
 
-// Where a camera stands that looks along -`back` and just sees all points: { place, depth }, `depth` the distance to their middle.
+// Camera position that points along -`back` with all points in view: { place, depth }, `depth` the distance to their middle.
 // `right`, `up`, `back`: unit vectors; `toLeft`, `toRight`, `tall`: tangents of the angles to the left, to the right, and of half the
-// height. The closest place for such a frustum.
+// height. The closest such position.
 export function stand(list, { right, up, back }, [toLeft, toRight], tall) {
   const far = [-Infinity, -Infinity, -Infinity, -Infinity, Infinity, -Infinity];
   for (let i = 0; i < list.length; i += 3) {
@@ -89,7 +89,7 @@ export function stand(list, { right, up, back }, [toLeft, toRight], tall) {
   return { place, depth: away - (far[4] + far[5]) / 2 };
 }
 
-// The same places with their images behind planes of symmetry, { axis, at } each.
+// The same points with their images behind planes of symmetry, { axis, at } each.
 export function mirrored(list, planes) {
   let out = list;
   for (const { axis, at } of planes) out = [...out, ...out.map((value, i) => (i % 3 === axis ? 2 * at - value : value))];

@@ -1,13 +1,13 @@
-// The table of runs as it is seen: columns that sort, rows in view, groups, marks.
+// Element of the table of runs: sortable columns, visible rows, groups, marks.
 
 import { counted, exact, duration, h, meter, pill, percent } from "./figures.js";
 import { FINAL } from "./live.js";
 import { share } from "./columns.js";
 import { Windowed } from "./windowed.js";
 
-const TALL = { wide: 34, narrow: 86 }; // px of a row; runs.css has the same.
-const SAMPLED = 200; // Rows by which a column's width is chosen.
-const LETTERS = [7, 30]; // Of a column, at least and at most.
+const TALL = { wide: 34, narrow: 86 }; // Height of a row, px; the same as in runs.css.
+const SAMPLED = 200; // Number of rows that determine the width of a column.
+const LETTERS = [7, 30]; // Least and largest width of a column in characters.
 const NARROW = matchMedia("(max-width: 760px)");
 
 export class Grid {
@@ -28,7 +28,7 @@ export class Grid {
     NARROW.removeEventListener("change", this.redraw);
   }
 
-  // `items`: { row } or { group }, in order; `all`: the rows of all of them, which are others where `stamp` is another.
+  // `items`: { row } or { group }, in order; `all`: all rows, which have changed if `stamp` has changed.
   draw({ columns, sort, items, all, marked, shorts, stamp }) {
     Object.assign(this, { columns, marked, shorts, all });
     this.drawHead(columns, sort);
@@ -57,7 +57,7 @@ export class Grid {
     return h(`th${column.number ? ".right" : ""}${column.id === "run" ? ".first" : ""}`, { scope: "col", "aria-sort": here ? (sort.down ? "descending" : "ascending") : false }, button);
   }
 
-  // Widths that do not change while the rows scroll.
+  // Widths that stay constant while the rows scroll.
   measure(columns, stamp) {
     if (stamp === this.stamp) return;
     this.stamp = stamp;
@@ -101,7 +101,7 @@ export class Grid {
   }
 }
 
-// A click on a row opens its run, but not on what is in it, nor where text is being marked.
+// A click on a row opens its run, except on a control inside it or while text is selected.
 function opened(event, address) {
   if (event.target.closest("a, button, input") || String(getSelection?.() ?? "")) return;
   location.hash = address;
@@ -109,7 +109,7 @@ function opened(event, address) {
 
 const heading = ({ title, unit }) => 0.9 * title.length + (unit ? 1 + 0.9 * unit.length : 0) + 2.5;
 
-// The state, and what there is to say of it: how far, what it waits for, why it has ended.
+// The state with its detail: progress, reason of waiting, or cause of the end.
 function state(row) {
   const going = row.progress && !FINAL.has(row.state);
   const note = going ? percent(share(row), 0) : row.state === "succeeded" ? "" : row.message || row.reason || row.cause || "";

@@ -1,12 +1,12 @@
-// The head of a run: its title, its state, whether its messages arrive, what can be asked of it, how far it is.
+// Head of a run: title, state, connection, actions, progress.
 
 import { duration, h, meter, percent, pill } from "./figures.js";
 import { FINAL } from "./live.js";
 
-const OLD = 5; // s without a message or the server after which the age of the numbers is shown.
+const OLD = 5; // s without a message or an answer after which the age of the numbers is shown.
 
 export class Headline {
-  // `ask(verb)` asks the server for a checkpoint or a snapshot, or cancels.
+  // `ask(verb)` requests a checkpoint, a snapshot or a cancel.
   constructor(run, ask) {
     this.title = h("h1");
     this.sub = h("div.sub");
@@ -23,7 +23,7 @@ export class Headline {
       this.progress, this.told);
   }
 
-  // `connection` is [kind, words]; `busy` has the verbs that are asked for just now.
+  // `connection` is [kind, words]; `busy` has the requests in progress.
   draw(live, info, { connection: [kind, words], state, notice, busy }) {
     const over = FINAL.has(state);
     const old = !over && live.age > OLD ? `numbers ${duration(live.age)} old` : "";
@@ -45,7 +45,7 @@ export class Headline {
   }
 }
 
-// A text that is the same is left alone: what is marked with the pointer stays marked.
+// An unchanged text is not set again: this would clear a selection.
 function say(element, text) {
   if (element.said !== text) element.textContent = element.said = text;
 }

@@ -1,13 +1,13 @@
-// Fills the record of a run from the server's history: one answer instead of every message since the start.
+// Fills the record of a run from the server's history: one answer instead of all messages.
 
 import { Problem, call, refused, text } from "./api.js";
 import { FINAL, TERMS, compared, grouped, totals } from "./live.js";
 import { pick } from "./tables.js";
 
 const POINTS = 1000;
-const MOST = 4096; // Reports that the server gives.
-const SOON = 2000; // ms until the columns of the history are asked for again while there are none,
-const LATER = 15000; // and while the run goes on: the stream has some lines only.
+const MOST = 4096; // Largest number of reports of the server.
+const SOON = 2000; // ms after which the columns of the history are requested again while there are none,
+const LATER = 15000; // and while the run is open: the stream has only some of the lines.
 
 const path = (run) => `v1/runs/${encodeURIComponent(run)}`;
 const pause = (ms, signal) => new Promise((resolve) => {
@@ -15,14 +15,14 @@ const pause = (ms, signal) => new Promise((resolve) => {
   signal.addEventListener("abort", () => { clearTimeout(timer); resolve(); }, { once: true });
 });
 
-// `info` is the run as the server tells it, `plan` its case with every default, null before it is there.
+// `info`: the run from the server, `plan`: its case with all defaults, null while missing.
 export async function fill(live, info, plan, signal) {
   const columns = readColumns(live.run, undefined, undefined, signal).catch(() => live.columns);
   take(live, await call(`${path(live.run)}/history?points=${POINTS}`, { signal }), info, plan);
   live.columns = await columns;
 }
 
-// The columns of history.csv that are named, all without a name: { units, values, lines, extremes }.
+// The named columns of history.csv; without names all: { units, values, lines, extremes }.
 export async function readColumns(run, names = ["*"], points = POINTS, signal = undefined) {
   const words = [...names.map((name) => `name=${encodeURIComponent(name)}`), `points=${points}`];
   let told = await call(`${path(run)}/columns?${words.join("&")}`, { signal });
@@ -31,7 +31,7 @@ export async function readColumns(run, names = ["*"], points = POINTS, signal = 
   return { units, values: { t: [], ...told.values }, lines: told.lines, extremes: told.columns };
 }
 
-// Keeps the columns of a run that goes on up to date until it has ended; `onNews` is called when they have changed.
+// Updates the columns of an open run until its end; calls `onNews` after a change.
 export async function followColumns(live, signal, onNews) {
   for (let over = FINAL.has(live.state); !over && !signal.aborted;) {
     await untilLater(live, signal);
@@ -40,20 +40,20 @@ export async function followColumns(live, signal, onNews) {
       live.columns = await readColumns(live.run, undefined, undefined, signal);
       onNews();
     } catch (error) {
-      if (refused(error)) return; // The page of the run says what is wrong.
+      if (refused(error)) return; // The page of the run reports the error.
       over = false;
       await pause(LATER, signal);
     }
   }
 }
 
-// Some seconds, or until the run has ended.
+// Waits some seconds, or until the end of the run.
 async function untilLater(live, signal) {
   const until = Date.now() + (live.columns.lines ? LATER : SOON);
   while (Date.now() < until && !FINAL.has(live.state) && !signal.aborted) await pause(SOON / 4, signal);
 }
 
-// { head, rows } of columns of history.csv, every line that there is.
+// { head, rows } of columns of history.csv with every line.
 export const everyLine = async (run, names) => pick(await text(`${path(run)}/files/history.csv`), names);
 
 // A record of the same run with as many reports as the server has.
@@ -63,7 +63,7 @@ export async function everyReport(live, make) {
   return whole;
 }
 
-// The case of a run with all defaults, null while it is not written yet.
+// The case of a run with all defaults, null until it is written.
 export async function readPlan(run, signal) {
   try {
     return await call(`v1/runs/${encodeURIComponent(run)}/files/case.resolved.json`, { signal });
@@ -91,7 +91,7 @@ export function take(live, history, info = {}, plan = null) {
   if (rows.length) latest(live, rows.at(-1), ranks, info.progress, plan);
 }
 
-// What the head and the bars show until the next message: the newest report.
+// The newest report, which the head and the bars show until the next message.
 function latest(live, row, ranks, progress, plan) {
   const ledger = live.ledger.at(-1);
   const end = plan?.run?.end_time ?? progress?.end_time ?? row.t;
@@ -103,13 +103,13 @@ function latest(live, row, ranks, progress, plan) {
   live.load = { imbalance: row.imbalance, groups, totals: totals(groups) };
 }
 
-// Of { part: { kinetic: […], internal: […] } } one moment.
+// Values of { part: { kinetic: […], internal: […] } } at one time.
 const at = (parts, i) => Object.fromEntries(Object.entries(parts).map(([part, columns]) =>
   [part, Object.fromEntries(Object.entries(columns).map(([name, values]) => [name, values[i]]))]));
 
 const energy = (row) => Object.fromEntries([...TERMS.map(([name]) => name), "external", "initial", "residual"].map((name) => [name, row[name] ?? 0]));
 
-const NUMBERS = new Set(["t", "steps", "waiting"]); // Of `ranks`; all else are phases.
+const NUMBERS = new Set(["t", "steps", "waiting"]); // Members of `ranks` that are not phases.
 
 function phasesAt(ranks, i) {
   const names = Object.keys(ranks).filter((name) => !NUMBERS.has(name) && ranks[name][i]?.length);

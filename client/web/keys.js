@@ -1,4 +1,4 @@
-// Keys of the body, beside those that turn it (camera.js).
+// Keys of the body, besides those of the camera (camera.js).
 
 const AXES = ["x", "y", "z"];
 const KEYS = {
@@ -8,7 +8,7 @@ const KEYS = {
   ...Object.fromEntries(AXES.flatMap((name) => [[name, (body) => body.view.eye.view(`+${name}`)], [name.toUpperCase(), (body) => body.view.eye.view(`-${name}`)]])),
 };
 
-// Does what a key says; whether it says anything.
+// Performs the action of a key; returns false for other keys.
 export function act(body, key) {
   if (!Object.hasOwn(KEYS, key)) return false;
   KEYS[key](body);

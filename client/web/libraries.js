@@ -1,14 +1,14 @@
-// three.js and ECharts, out of the package that the server has found; each is loaded when it is needed, once.
+// three.js and ECharts from the package on the server; each is loaded once, at its first use.
 
 const known = {};
 
-// What `read` gives, read once; again where that has failed: the server may be back.
+// Result of `read`, read once; after a failure it is read again.
 const once = (name, read) => (known[name] ??= read().catch((error) => {
   delete known[name];
   throw error;
 }));
 
-// { auth, problem, three, echarts }: what the server has. It needs no token.
+// { auth, problem, three, echarts }: libraries of the server. No token is needed.
 export const offer = () => once("offer", () => fetch(new URL("lib/index.json", document.baseURI)).then((answer) => answer.json()));
 
 async function library(name) {

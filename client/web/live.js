@@ -1,4 +1,4 @@
-// What is known of a run: the history first, then its messages; one record out, nothing is drawn here.
+// State of a run: its history first, then its messages; one record, without drawing.
 
 export const FINAL = new Set(["succeeded", "failed", "cancelled", "timed_out", "lost"]);
 export const GROUPS = ["compute", "contact", "exchange", "waiting", "output", "descheduled"];
@@ -6,24 +6,24 @@ export const TERMS = [["kinetic", "kinetic"], ["elastic", "elastic"], ["plastic"
 
 const MOST_POINTS = 2000;
 const MOST_LINES = 1500;
-const OWN = new Set(["contact", "exchange", "output"]); // Phases with a group of their own; the others are computing.
+const OWN = new Set(["contact", "exchange", "output"]); // Phases with a group of their own; all others are computing.
 
 export class Live {
   constructor(run) {
     Object.assign(this, { run, seq: 0, state: "", cause: null, message: "", began: null, wall: 0, heard: 0 });
     Object.assign(this, { started: null, progress: null, load: null, counts: null, finished: null, loaded: 0 });
-    this.plan = null; // The case with every default, null before it is there
-    this.columns = { units: {}, values: { t: [] }, lines: 0 }; // Of history.csv: by name, as many values as t has
+    this.plan = null; // Case with all defaults, null while missing
+    this.columns = { units: {}, values: { t: [] }, lines: 0 }; // Columns of history.csv: by name, each as long as t
     this.ledger = []; // { t, dt, limiter, energy, parts: { name: { kinetic, internal } } }
-    this.loads = []; // { t, imbalance, by: { group: share of the CPU time }, shares: [of the busiest, a rank] }
+    this.loads = []; // { t, imbalance, by: { group: share of the CPU time }, shares: [work of each rank / busiest rank] }
     this.sizes = []; // { t, nodes, facets, fragments }
-    this.spread = null; // { t, smallest, sizes }: how many fragments have which size now
-    this.found = -1; // Step of the newest state whose fragments are known
+    this.spread = null; // { t, smallest, sizes }: newest size distribution of the fragments
+    this.found = -1; // Step of the newest state with known fragments
     this.balances = []; // the messages
     this.snapshots = []; // { n, t, fragments, … }
-    this.log = []; // messages for people: of the log, of states, of checkpoints
-    this.leftOut = 0; // Messages in the middle of a long log that the server has left out
-    this.warnings = new Map(); // Level by text of every warning and error
+    this.log = []; // messages for people: log, states, checkpoints
+    this.leftOut = 0; // Number of messages in the middle of a long log that the server left out
+    this.warnings = new Map(); // Level of every warning and error, by text
   }
 
   take(message) {
@@ -55,7 +55,7 @@ export class Live {
     this.follow(message);
   }
 
-  // The newest line of the history, which a report has; what it does not have comes with the next answer of the server.
+  // The newest line of the history, as in a report; missing columns come with the next answer of the server.
   follow({ sampled, energy, parts = {}, probes = {} }) {
     const { values } = this.columns;
     if (!(sampled > (values.t.at(-1) ?? Infinity))) return;
@@ -67,13 +67,13 @@ export class Live {
   on_load(message) {
     const interval = this.loaded ? message.wall - this.loaded : 0;
     const groups = grouped(message, interval);
-    const others = ((message.threads ?? 1) - 1) * interval; // s of the threads of a rank besides its first
+    const others = ((message.threads ?? 1) - 1) * interval; // s of the other threads of a rank
     this.loaded = message.wall;
     this.load = { ...message, groups, totals: totals(groups), helped: others > 0 ? message.helped.map((seconds) => seconds / others) : [] };
     keep(this.loads, { t: message.t, imbalance: message.imbalance, ...compared(groups) });
   }
 
-  // Its fragments may be those of a step not long before, and a snapshot may have told of later ones.
+  // Its fragments may belong to an earlier step, and a snapshot may have reported later ones.
   on_counts(message) {
     const { t, step, nodes, facets, counted = -1 } = message;
     const fragments = this.spreads(counted < 0 ? step : counted, message) ? message.fragments : this.counts?.fragments ?? message.fragments;
@@ -81,7 +81,7 @@ export class Live {
     keep(this.sizes, { t, nodes, facets, fragments });
   }
 
-  // Whether nothing is known of a later step than that of the fragments of a message; their sizes are taken in.
+  // Whether the fragments of a message are the newest; then their sizes are stored.
   spreads(step, { t, smallest, sizes }) {
     if (step < this.found) return false;
     this.found = step;
@@ -91,7 +91,7 @@ export class Live {
 
   on_balance(message) { this.balances.push(message); }
 
-  // It counts the fragments too.
+  // It also has the number of fragments.
   on_snapshot(message) {
     if (this.spreads(message.step, message) && this.counts) this.counts = { ...this.counts, fragments: message.fragments };
     if (!this.snapshots.some(({ n }) => n === message.n)) this.snapshots.push(message);
@@ -107,7 +107,7 @@ export class Live {
     if (this.log.length > MOST_LINES) this.log.shift();
   }
 
-  // A warning that is said again is there once.
+  // A repeated warning is stored once.
   warn(level, text) {
     if ((level === "warning" || level === "error") && !this.warnings.has(text)) this.warnings.set(text, level);
   }
@@ -125,20 +125,20 @@ export class Live {
     return (FINAL.has(this.state) ? this.wall : Date.now() / 1000) - this.began;
   }
 
-  // How old the newest message is, s, by this machine's clock.
+  // Age of the newest message, s, by the clock of this machine.
   get age() { return this.heard ? Date.now() / 1000 - this.heard : undefined; }
 }
 
-// [noun, number] of the pieces of a run. The solver counts fragments where something can fracture; elsewhere only the
+// [noun, number] of the fragments of a run. The solver counts fragments if something can fracture; otherwise only the
 // snapshots count the pieces that erosion leaves.
 export function pieces({ plan, counts, snapshots }) {
   return breaks(plan) ? ["fragment", counts?.fragments] : ["piece", snapshots.at(-1)?.fragments ?? counts?.fragments];
 }
 
-// Whether something of a case, or a bond of it, can break; true where the case is not known.
+// Whether a part or a bond of a case can break; true for an unknown case.
 export const breaks = (plan) => !plan?.parts || plan.bond?.length > 0 || plan.parts.some(({ fracture }) => fracture);
 
-// A series that grows too long loses every second point of its older half.
+// Removes every second point of the older half of a long series.
 function keep(series, point) {
   series.push(point);
   if (series.length <= MOST_POINTS) return;
@@ -146,8 +146,8 @@ function keep(series, point) {
   series.splice(0, half, ...series.slice(0, half).filter((_, i) => i % 2 === 0));
 }
 
-// CPU seconds of each rank by GROUPS. Waiting for other ranks costs CPU time and is measured; what is left of the wall
-// time is neither: the machine has not run the rank, or the rank slept.
+// CPU seconds of each rank by GROUPS. Waiting for other ranks uses CPU time and is measured; the rest of the wall
+// time is not: the rank was not scheduled, or slept.
 export function grouped({ phases = {}, waiting = [] }, interval) {
   const sums = {};
   for (const [name, seconds] of Object.entries(phases)) {
@@ -169,7 +169,7 @@ export function totals(groups) {
 
 const sum = (values = []) => values.reduce((total, value) => total + value, 0);
 
-// The work of each rank over that of the busiest one, and what share of the CPU time of all ranks each group has.
+// Work of each rank relative to the busiest one, and the share of each group in the CPU time of all ranks.
 export function compared(groups) {
   const work = totals(Object.fromEntries(["compute", "contact", "output"].filter((name) => groups[name]).map((name) => [name, groups[name]])));
   const most = Math.max(...work, 1e-300);

@@ -1,14 +1,14 @@
-// How evenly the ranks of a run are loaded over time: imbalance, the work of each rank, what the CPU time is spent on.
+// Load balance of the ranks over time: imbalance, work of each rank, CPU time by phase.
 
 import { FONT, axis, colour, common, label, pins, series, shares, time } from "./axes.js";
 import { end } from "./energies.js";
 import { fixed, percent, si } from "./figures.js";
 import { GROUPS } from "./live.js";
 
-const MOST_COLUMNS = 240; // Of the map of work; more are less than a pixel wide on a phone.
-const MOST_ROWS = 64; // Of it; neighbours among more ranks share a row.
-// What the groups of live.js are.
-export const SPENT = { compute: "elements, nodes, facets", exchange: "messages between ranks", waiting: "waiting for other ranks", descheduled: "not run by the machine" };
+const MOST_COLUMNS = 240; // Largest number of columns of the map of work; more would be thinner than a pixel on a phone.
+const MOST_ROWS = 64; // Largest number of rows; with more ranks, neighbours share a row.
+// Names of the groups of live.js.
+export const SPENT = { compute: "elements, nodes, facets", exchange: "messages between ranks", waiting: "waiting for other ranks", descheduled: "not scheduled" };
 
 export function ofImbalance(live) {
   const { loads, balances } = live;
@@ -20,7 +20,7 @@ export function ofImbalance(live) {
   ] };
 }
 
-// The place of the cut that is nearest to a place in live.loads; the first of several.
+// Index of the balance event nearest to an index in live.loads; the first of several.
 export function nearest({ loads, balances }, at) {
   const away = balances.map(({ t }) => Math.abs(t - loads[at].t));
   return Math.max(0, away.indexOf(Math.min(...away)));
@@ -34,8 +34,8 @@ export function ofSpent(live) {
     series({ name: SPENT[name] ?? name, colour: name, stack: "spent", data: loads.map(({ t, by }) => [t, by[name] ?? 0]), text: (value) => percent(value) })) };
 }
 
-// Cells { from, to, row, share }: each report lasts from the one before to its own time; many are gathered into columns of
-// equal length, many ranks into rows.
+// Cells { from, to, row, share }: a report covers the time since the previous one; many reports are joined to columns of
+// equal duration, many ranks to rows.
 export function cells(loads, ranks, last) {
   const rows = Math.min(ranks, MOST_ROWS);
   const known = loads.map((one, i) => ({ ...one, from: i ? loads[i - 1].t : 0 })).filter(({ shares: each }) => each.length === ranks);
@@ -83,7 +83,7 @@ function drawCell(_, api) {
   return { type: "rect", shape: { x: left, y: middle - height / 2, width: Math.max(0.5, right - left + 0.4), height: height - (height > 4 ? 1 : 0) }, style: { fill: api.visual("color") } };
 }
 
-// A row a report and a column a rank: the work over that of the busiest.
+// One row for each report and one column for each rank: work relative to the busiest rank.
 export const workTable = ({ loads }) => ({
   head: ["t [s]", ...(loads.at(-1)?.shares ?? []).map((_, rank) => `rank ${rank}`)], rows: loads.map(({ t, shares: each }) => [t, ...each]),
 });

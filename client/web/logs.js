@@ -1,4 +1,4 @@
-// What a run has said in words: its warnings, its messages as they come, and the log file of each rank.
+// Messages of a run: its warnings, its log, and the log file of each rank.
 
 import { tail } from "./api.js";
 import { clock, count, counted, h, size } from "./figures.js";
@@ -21,7 +21,7 @@ export class Warnings {
   }
 }
 
-// The tabs are moved between by the arrow keys.
+// The arrow keys move between the tabs.
 export class Logs {
   constructor(live) {
     Object.assign(this, { live, tab: "messages", ranks: 0, logged: "" });

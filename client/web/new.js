@@ -1,4 +1,4 @@
-// A new run: its case in an editor, the files that it names, what the server says of it, and the start.
+// A new run: its case in an editor, the files that it names, the check by the server, and the start.
 
 import { Problem, call, send } from "./api.js";
 import { isJson, lineOf, valueOf, withKey } from "./casetext.js";
@@ -9,13 +9,13 @@ import { recall, remember } from "./storage.js";
 import { filesTable, verdict } from "./validation.js";
 
 const IDLE = 500; // ms without a key after which the case is checked.
-const AGAIN = 3000; // ms after which a server that did not answer is asked again.
-const DRAFT = 200000; // Letters of a case that the browser keeps until the next visit.
-const OWN = /^(restart|keep|sweep.*)$/; // Labels that say something of one run alone.
+const AGAIN = 3000; // ms after which a request without an answer is repeated.
+const DRAFT = 200000; // Largest number of characters of a case that the browser stores.
+const OWN = /^(restart|keep|sweep.*)$/; // Labels that belong to a single run.
 const FIELDS = [["title", "Title", "", "title"], ["ranks", "Ranks", "run", "ranks"], ["threads", "Threads", "run", "threads"]];
 
 export class NewPage {
-  // `query` may name a run from which the case is taken (`from`), or a shipped case (`case`).
+  // `query` may have a run whose case is loaded (`from`), or a shipped case (`case`).
   constructor(query, onRefused) {
     Object.assign(this, { from: query.get("from") ?? "", onRefused, told: null, checked: null, abort: new AbortController(), key: fresh() });
     this.outbox = new Outbox(this.from, () => this.news());
@@ -25,7 +25,7 @@ export class NewPage {
     document.title = "New run · Conoid";
   }
 
-  // Files may be dropped anywhere on the page: beside it the browser would leave the page for them.
+  // Files may be dropped anywhere on the page: otherwise the browser would open them and leave the page.
   listen() {
     const { signal } = this.abort;
     const mark = (over) => this.element.classList.toggle("dropping", over);
@@ -64,7 +64,7 @@ export class NewPage {
     this.element = h("div.work.new", { onkeydown: (event) => this.pressed(event) },
       h("div.run-head", {}, h("h1", {}, this.from ? "Start again with changes" : "New run"), h("span.grow"), this.gallery, file),
       h("div.bench", {},
-        h("section.card.stage-editor", { "aria-label": "case" }, h("p.hint", {}, "Paste a case, drop it here with the files that it names, or begin with a shipped one."), this.editor.element),
+        h("section.card.stage-editor", { "aria-label": "case" }, h("p.hint", {}, "Paste a case, drop it here with the files that it names, or start from a shipped one."), this.editor.element),
         h("aside.now", { "aria-label": "check and start" },
           h("section.card.start", { "aria-label": "start" }, ...this.fields.map(({ element }) => element), h("label.row", {}, h("span", {}, "Labels"), this.labels),
             h("div.actions", {}, this.startButton, h("span.hint", {}, "Ctrl+Enter")), this.said),
@@ -72,7 +72,7 @@ export class NewPage {
           h("section.card", { "aria-label": "files of the case" }, h("h2", {}, "Files"), this.files))));
   }
 
-  // Where the case comes from ---------------------------------------------------------------------------------------------
+  // Source of the case -----------------------------------------------------------------------------------------------------
 
   async begin(shipped) {
     this.draw();
@@ -110,7 +110,7 @@ export class NewPage {
     this.typed();
   }
 
-  // A case goes into the editor, all others are files that a case may name.
+  // A case goes into the editor; all other files may be named by it.
   async drop(files) {
     const cases = files.filter(({ name }) => /\.(toml|json)$/i.test(name));
     if (cases.length) this.show(await cases[0].text());
@@ -144,7 +144,7 @@ export class NewPage {
     this.timer = setTimeout(() => this.check(), ms);
   }
 
-  // One check at a time, of the text as it is then; what is typed meanwhile is checked after it.
+  // One check at a time, of the present text; text that is typed meanwhile is checked afterwards.
   async check() {
     const { text } = this.editor;
     if (this.checking || this.checked === text || this.abort.signal.aborted) return;
@@ -175,7 +175,7 @@ export class NewPage {
     this.news();
   }
 
-  // Hashes that have become known go into the case; a file that has come makes the check worth while again.
+  // Writes known hashes into the case; a new file requires a new check.
   news() {
     if (this.abort.signal.aborted) return;
     const named = this.told?.files ?? [];
@@ -191,7 +191,7 @@ export class NewPage {
 
   // The start -------------------------------------------------------------------------------------------------------------
 
-  // The same key for the same case: a start that is asked for twice is one run.
+  // The same key for the same case: a repeated start is one run.
   async start() {
     const labels = this.labels.value.split(",").map((one) => one.trim()).filter(Boolean);
     const query = labels.map((label) => `label=${encodeURIComponent(label)}`).join("&");
@@ -216,7 +216,7 @@ export class NewPage {
 
   say(text) { this.said.replaceChildren(text ? h("span.problem", {}, text) : ""); }
 
-  // What is wrong; a file that is not here yet stands among the files.
+  // Problems of the case; missing files are shown in the list of files.
   problems(named) {
     const wanted = new Set(named.filter((file) => !file.sha256 || this.outbox.stateOf(file).state !== "sent").map(({ key }) => `${key}.sha256`));
     return (this.told?.problems ?? []).filter(({ key }) => !wanted.has(key));
@@ -242,14 +242,14 @@ export class NewPage {
   }
 }
 
-// The line of a problem: that of its key, or the one that the message names.
+// Line of a problem: that of its key, or the one that its message names.
 function place(text, { key, message }) {
   const told = /at line (\d+)/.exec(message);
   const named = key || /^([a-z][\w.[\]]*) = /.exec(message)?.[1];
   return told ? Number(told[1]) - 1 : named ? lineOf(text, named) : -1;
 }
 
-// A file that several parts name is one file.
+// A file that several parts name is listed once.
 export const once = (named) => [...new Map(named.map((file) => [file.path, file])).values()];
 
 const fresh = () => [...crypto.getRandomValues(new Uint8Array(16))].map((byte) => byte.toString(16).padStart(2, "0")).join("");

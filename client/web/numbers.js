@@ -1,4 +1,4 @@
-// The numbers of a run: the five that matter now, and all others.
+// Numbers of a run: the five most important ones, and all others.
 
 import { alike, count, duration, fixed, h, large, moment, rough, si } from "./figures.js";
 import { FINAL, pieces } from "./live.js";
@@ -20,7 +20,7 @@ export class Numbers {
   }
 }
 
-// Time and time left, dt and what holds it, residual, fragments, imbalance.
+// Time and remaining time, dt and its limiter, residual, fragments, imbalance.
 function five(live, outcome) {
   const { progress, load, state } = live;
   const [noun, number] = pieces(live);
@@ -53,7 +53,7 @@ function others(live, info, outcome) {
   ].filter(Boolean);
 }
 
-// Where a run is: as its outcome has it, else as its newest report has it. `residual`: [value, whether it has failed by it].
+// Present state of a run: from its outcome, else from its newest report. `residual`: [value, whether it is above the limit].
 export function ended(progress, outcome) {
   const failed = outcome?.cause === "energy";
   const energy = failed ? outcome.worst_residual : outcome?.energy?.residual;

@@ -1,8 +1,8 @@
-// Lines round the fragments, and a mark round the picked one: where the numbers of a second drawing change.
+// Outlines of the fragments, and a mark round the selected one: where the row numbers of a second drawing change.
 
 import { LINES, OVER } from "./shaders.js";
 
-const MARK = [1, 0.1, 0.75]; // Of the picked fragment alone: no part has this hue so strong.
+const MARK = [1, 0.1, 0.75]; // Colour of the selected fragment: no part has this hue at this strength.
 const STRENGTH = 0.55;
 
 export class Outlines {

@@ -1,12 +1,12 @@
-// What stands over the body in its picture: axes, a bar of a round length, the legend, the time. Drawn on a canvas, so that
-// a saved picture has what the page shows.
+// Drawing over the body: axes, scale bar, legend, time. It is a canvas, so that a saved picture shows the
+// same as the page.
 
 import { alike, si } from "./figures.js";
 
 const PAD = 12; // px.
-const ARM = 26; // px of an axis.
+const ARM = 26; // Length of an axis, px.
 const BAR = [12, 150]; // px: width and height of the colour bar.
-const NAMES = 12; // Names in a legend.
+const NAMES = 12; // Largest number of names in a legend.
 const ROUND = [1, 2, 5];
 const AXIS_TONES = ["#d64545", "#3c9a4e", "#3f73d8"];
 const FONT = '"Segoe UI", system-ui, Roboto, "DejaVu Sans", sans-serif';
@@ -22,7 +22,7 @@ export function draw(ctx, told) {
   if (told.caption) text(ctx, told, told.caption, told.axes ? PAD + 2.9 * ARM : PAD, told.height - PAD - 4, 12.5, told.ink);
 }
 
-// With a rim in the colour of the paper: it can be read over any body.
+// With a rim in the colour of the background, readable over any body.
 function text(ctx, { ink, paper }, words, x, y, size = 12, colour = ink, align = "left", weight = 400) {
   ctx.font = `${weight} ${size}px ${FONT}`;
   ctx.textAlign = align;
@@ -49,7 +49,7 @@ function axes(ctx, told) {
   }
 }
 
-// True at the depth of the point that the camera turns about.
+// Its scale is exact at the depth of the point about which the camera turns.
 function bar(ctx, told) {
   const { width, height, camera, distance } = told;
   const metre = height / (2 * distance * Math.tan((camera.fov * Math.PI) / 360));
@@ -115,5 +115,5 @@ function scale(ctx, told, x, y) {
   return y + tall;
 }
 
-// How many of `number` round values have a label where there is room for `most`: all, every second or third, or the ends.
+// Step of the labels of `number` round values with room for `most`: all, every second or third, or the ends.
 const labels = (number, most) => [1, 2, 3].map((step) => (number - 1) / step + 1).find((some) => Number.isInteger(some) && some <= most) ?? 2;

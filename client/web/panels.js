@@ -1,4 +1,4 @@
-// The parts of a run's page that are no charts: bars of the ranks, balance events, reference numbers.
+// Tables of a run's page: bars of the ranks, balance events, reference numbers.
 
 import { alike, count, exacts, fixed, h, legend, percent, si } from "./figures.js";
 import { GROUPS } from "./live.js";
@@ -29,9 +29,9 @@ export class Ranks {
   }
 }
 
-// One balance event at a time: why, what each rank had and what it should have now, what it cost and what cuts have saved.
+// One balance event at a time: reason, work of each rank before and after, its cost, and the saved time.
 export class Balances {
-  // `onOpen` brings the card of the events before the reader.
+  // `onOpen` scrolls to the card of the events.
   constructor(live, onOpen) {
     Object.assign(this, { live, onOpen, place: null });
     this.element = h("div");
@@ -76,7 +76,7 @@ function bars(title, values) {
 
 const COLUMNS = ["quantity", "computed", "expected", "tolerance", "result", "source"];
 
-// A narrow window shows a row as lines, each with the name of its column; the roles stay when the layout is no table's.
+// A narrow window shows a row as lines, each with the name of its column; the ARIA roles keep the table.
 const cell = (what, column, text) => h(what, { role: "cell", "data-name": COLUMNS[column] }, text);
 
 export function checksTable(checks) {

@@ -1,4 +1,4 @@
-// What is known of one fragment: a list of facts, and its mass and speed over the snapshots. And the table of the heaviest.
+// Data of one fragment, its mass and speed over the snapshots, and the table of the heaviest fragments.
 
 import { alike, count, h, si, vector } from "./figures.js";
 
@@ -8,12 +8,12 @@ const [WIDE, TALL] = [200, 40]; // px of a small chart.
 const entry = (name, value, broad) => h(broad ? "div.broad" : "div", {}, h("dt", {}, name), h("dd", {}, value));
 
 export class Picked {
-  // `onClose` is called when it is put away, `history(id)` gives { t, mass, speed }.
+  // `onClose` is called when it is closed, `history(id)` resolves to { t, mass, speed }.
   constructor(onClose, history) {
     this.history = history;
     this.list = h("dl.facts.row");
     this.course = h("div.course");
-    const close = h("button.quiet.shut-picked", { type: "button", "aria-label": "put the fragment away", onclick: onClose }, "×");
+    const close = h("button.quiet.shut-picked", { type: "button", "aria-label": "close the fragment", onclick: onClose }, "×");
     this.element = h("div.picked", { hidden: "" }, close, this.list, this.course);
   }
 
@@ -37,7 +37,7 @@ export class Picked {
     this.course.replaceChildren(...[["mass", told.mass, "kg"], ["speed", told.speed, "m/s"]].map(([name, values, unit]) => small(name, told.t, values, unit)));
   }
 
-  // A line at the time that is shown.
+  // A line at the present time.
   place(t) {
     if (!this.told) return;
     const x = across(this.told.t)(t);
@@ -45,7 +45,7 @@ export class Picked {
   }
 }
 
-// Nobody knows it where erosion alone parts bodies.
+// The origin is unknown if parts are separated by erosion only.
 const born = (birth) => (birth === 0 ? "at the start" : si(birth, "s"));
 
 function facts(found) {
@@ -67,7 +67,7 @@ function svg(tag, attributes, ...children) {
   return element;
 }
 
-// A line over time from 0 to the largest value, which stands beside its name.
+// A line over time from 0 to the largest value, which is written beside its name.
 function small(name, t, values, unit) {
   const most = Math.max(...values) || 1;
   const x = across(t);
@@ -78,7 +78,7 @@ function small(name, t, values, unit) {
   return h("figure", {}, h("figcaption", {}, `${name}, up to ${si(most, unit)}`), drawn);
 }
 
-// The heaviest fragments of a snapshot; `onPick` gets the row of one.
+// The heaviest fragments of a snapshot; `onPick` is called with the row of one.
 export function table({ arrays, header }, picked, onPick) {
   const { fragment_id: ids, fragment_mass: masses, fragment_size: sizes, fragment_velocity: v, fragment_birth: births } = arrays;
   const rows = [...ids.keys()].filter((row) => ids[row] >= 0n).sort((a, b) => masses[b] - masses[a]).slice(0, HEAVIEST);

@@ -1,4 +1,4 @@
-// What each chart of a run shows: the record of the run (live.js) as series.
+// Data of each chart of a run: series from the record of the run (live.js).
 
 import { axis, largest, logarithmic, series, time } from "./axes.js";
 import { Chart } from "./charts.js";
@@ -15,9 +15,9 @@ import { sizes } from "./snapshot.js";
 const TALL = 250;
 const COUNTED = [["nodes", "compute"], ["facets", "exchange"], ["fragments", "fracture"]];
 const CURVE = 60; // Points of a fitted law.
-const LEAST = 1; // Fragment, where the axis of their number begins.
+const LEAST = 1; // Least number of fragments on its axis.
 
-// { name: [chart, title, what stands beside the title] }; `onBalance` gets the place of a balance event in live.balances.
+// { name: [chart, title, element beside the title] }; `onBalance` is called with the index of a balance event in live.balances.
 export function plots(live, onBalance) {
   const title = h("span", {}, "Energy");
   const by = h("select", { "aria-label": "energy by", onchange: () => {
@@ -46,18 +46,18 @@ export function plots(live, onBalance) {
     imbalance: add("imbalance", "load imbalance over time", "Load imbalance: slowest rank over mean", [], () => ofImbalance(live),
       { table: reports(ofImbalance), onClick: ({ seriesName, dataIndex }) => seriesName === "balance" && onBalance(dataIndex), onEnter: (at) => live.balances.length && onBalance(nearest(live, at)) }),
     heat: add("work", "work of each rank over time", "Work of each rank", [], () => ofWork(live), { alone: true, table: async () => workTable(await everyReport(live, (run) => new Live(run))) }),
-    spent: add("cpu_time", "what the CPU time is spent on, over time", "CPU time by what it is spent on", [], () => ofSpent(live), { table: reports(ofSpent) }),
+    spent: add("cpu_time", "CPU time by phase over time", "CPU time by phase", [], () => ofSpent(live), { table: reports(ofSpent) }),
   };
   return made;
 }
 
-// Which charts a run has nothing for: it has no such probes, or cannot break.
+// Charts without data in this run: it has no such probes, or cannot break.
 export const nothing = (live) => ({ probes: !live.plan?.probes?.length && !Object.keys(live.columns.values).some((name) => name.startsWith("momentum")), forces: !columnsOf(live).length });
 
 function ofCounts(live) {
   const all = live.sizes;
   if (!all.length) return null;
-  const now = { ...all.at(-1), t: Math.max(all.at(-1).t, live.loads.at(-1)?.t ?? 0) }; // Counts are told when they change.
+  const now = { ...all.at(-1), t: Math.max(all.at(-1).t, live.loads.at(-1)?.t ?? 0) }; // Counts are reported when they change.
   const there = COUNTED.filter(([name]) => all.some((point) => point[name] > 0));
   return { xAxis: time(end(live)), yAxis: logarithmic("", { axisLabel: { formatter: count } }), series: there.map(([name, tone]) =>
     ({ ...series({ name: name === "facets" ? "broken facets" : name, colour: tone, data: [...all, now].map((point) => [point.t, point[name] > 0 ? point[name] : null]), text: count }), showSymbol: all.length < 3 })) };
@@ -71,8 +71,8 @@ function ofStep(live) {
   return { xAxis: time(end(live)), yAxis: axis("s", largest(list), { scale: true }), series: list };
 }
 
-// N(size) over the size, both logarithmic: of the snapshot that is shown, with the law that fits best, and of the newest
-// report in its bins, which counts dust too.
+// N(size) over the size, both logarithmic: of the shown snapshot with the best fitting law, and of the newest
+// report in its bins, which includes dust.
 function ofSizes(snapshot, spread) {
   const list = [...(snapshot ? ofSnapshot(snapshot) : []), ...(spread ? [ofSpread(spread)] : [])];
   if (!list.length) return null;
@@ -92,7 +92,7 @@ function ofSnapshot(snapshot) {
   return list;
 }
 
-const known = new WeakMap(); // Fits by snapshot: the chart is drawn more often than it has new points.
+const known = new WeakMap(); // Fits by snapshot: the chart is drawn more often than its points change.
 
 export function fitted(snapshot) {
   if (!known.has(snapshot)) known.set(snapshot, sizes(snapshot));
@@ -101,7 +101,7 @@ export function fitted(snapshot) {
 
 const ofSpread = ({ t, ...spread }) => ({ ...series({ name: `with dust, at ${exact(t, "s", 3)}`, colour: "faint", data: longer(spread), text: count }), step: "end", sampling: undefined });
 
-// [size, number of fragments as long and longer] at the beginning of each bin, from bins of half a power of two.
+// [size, number of fragments of this size and larger] at the start of each bin of half a power of two.
 export function longer({ smallest, sizes: counts }) {
   let left = counts.reduce((sum, count_) => sum + count_, 0);
   return counts.map((count_, i) => {

@@ -1,4 +1,4 @@
-// The probes of a run over time: any of them in one chart, a panel for each unit, with the numbers that are expected.
+// Probes of a run over time in one chart, with a panel for each unit, and their expected values.
 
 import { axis, expected, largest, lineStyle, series, time } from "./axes.js";
 import { end } from "./energies.js";
@@ -12,13 +12,13 @@ const PUSH = /^(contact|wall)_force_([xyz])$/;
 const probes = ({ plan }) => plan?.probes ?? [];
 const isThere = ({ columns }) => (name) => name in columns.values;
 
-// The names that can be chosen: of the probes of the case in their order, then of the momenta.
+// Names that can be selected: probes of the case in their order, then momenta.
 export function choices(live) {
   const told = probes(live).map(({ name }) => name);
   return { probes: told.filter(isThere(live)), momenta: Object.keys(live.columns.values).filter((name) => MOMENTA.test(name) && !told.includes(name)) };
 }
 
-// A list of boxes to mark, which opens below its button; what is marked is kept by the name of the case.
+// A list of check boxes below its button; the selection is stored by the name of the case.
 export class Chooser {
   constructor(live, onChange) {
     Object.assign(this, { live, onChange });
@@ -58,13 +58,13 @@ export class Chooser {
   }
 }
 
-// What is expected of a probe, and over which time.
+// Expected value of a probe, and its time interval.
 function references({ plan }, name, last) {
   const told = (plan?.reference ?? []).filter(({ probe, quantity }) => probe === name && quantity.startsWith("probe_"));
   return told.map(({ quantity, value, tolerance, since, until }) => ({ value, tolerance, until: until ?? last, since: quantity === "probe_last" ? 0.97 * last : since ?? 0 }));
 }
 
-// One panel a unit, one below the other, with one time axis.
+// One panel for each unit, with a common time axis.
 export function ofProbes(live, chosen) {
   const { columns: { units, values } } = live;
   const there = chosen.filter(isThere(live));
@@ -93,7 +93,7 @@ export function panels(list, last) {
   };
 }
 
-// The largest magnitude of series and of what is expected of them.
+// Largest magnitude of series and of their expected values.
 const heights = (list) => Math.max(largest(list), ...list.flatMap(({ markArea }) => (markArea ? markArea.data.flat().map(({ coord }) => Math.abs(coord[1])) : [])));
 
 // Contact forces ---------------------------------------------------------------------------------------------------------
@@ -111,8 +111,8 @@ export function pushes(live) {
 
 export const columnsOf = (live) => Object.values(pushes(live)).flatMap(Object.values);
 
-// The components that are measured, and where all three are, the magnitude: not of thinned lines, whose components are
-// of different times.
+// The measured components, and the magnitude if all three exist: not for thinned lines, whose components belong
+// to different times.
 export function ofForces(live) {
   const { columns: { values, lines } } = live;
   const list = Object.entries(pushes(live)).flatMap(([who, told]) => {

@@ -1,12 +1,12 @@
-// The ends of the colour scale: of the snapshot that is shown or of all of the run, with or without the extremes, or by hand.
+// Ends of the colour scale: of the shown snapshot or of the whole run, with or without extremes, or given by the user.
 
 import { rounded, scaleOf } from "./scales.js";
 
-const ALIKE = 1e-9; // Share of a value by which others differ from it by rounding alone.
-const EXTREMES = [0.005, 0.995]; // Shares of the triangles, as in the message of a snapshot (docs/snapshots.md).
+const ALIKE = 1e-9; // Relative difference of values that is rounding only.
+const EXTREMES = [0.005, 0.995]; // Quantiles of the triangles, as in the message of a snapshot (docs/snapshots.md).
 
 // { low, high, number, uniform } for a field of a snapshot. `choice`: { how: "most" | "all" | "hand", over: "run" | "now", hand: [low, high] };
-// `told`: the ranges of the field in the messages of all snapshots, [least, low, high, most] each.
+// `told`: ranges of the field in the messages of all snapshots, [least, low, high, most] each.
 export function range(choice, name, snapshot, told) {
   if (choice.how === "hand" && choice.hand) return { low: choice.hand[0], high: choice.hand[1], number: 5 };
   const all = choice.how === "all";
@@ -19,7 +19,7 @@ export function range(choice, name, snapshot, told) {
 
 const extent = ({ header }, name) => [header.fields[name].low, header.fields[name].high];
 
-// What all but the extremes of the triangles have.
+// Range of the triangles without the extremes.
 function most(snapshot, name) {
   const levels = snapshot.arrays[`field:${name}`];
   const [low, high] = extent(snapshot, name);

@@ -1,20 +1,20 @@
-// A result of a sweep over what was changed: a curve over one key, or a matrix of two. No element is made here.
+// Response of a sweep: a result over the changed key as a curve, or a matrix of two keys. No elements are created here.
 
 import { FINAL } from "./live.js";
 
-// A run that has not come to its end has measured something else than the others.
+// A run without success has results of an earlier time than the others.
 const measured = (row, result) => (row.state === "succeeded" ? result.value(row) : null);
 const number = (value) => typeof value === "number" && Number.isFinite(value);
 
-// The values of a column that points have, in order: numbers by size, words as they come.
+// Values of a column in the points, in order: numbers by size, words by occurrence.
 export function levels(points, column) {
   const found = [...new Map(points.map(({ row }) => [column.text(row), column.value(row)]))];
   const numbers = found.every(([, value]) => number(value));
   return (numbers ? found.sort(([, a], [, b]) => a - b) : found).map(([text, value]) => ({ text, value }));
 }
 
-// The keys that vary, each with those that go together with it: each value of one belongs to one value of the other. The
-// first of them stands for all; `named` says how many more there are. Where no key varies, the first one is the axis.
+// The keys that vary, grouped with those that change together: each value of one belongs to one value of the other. The
+// first one stands for its group; `named` has the number of the others. If no key varies, the first one is the axis.
 export function together(points, keys) {
   const course = (key) => {
     const texts = points.map(({ row }) => key.text(row));
@@ -31,7 +31,7 @@ export function together(points, keys) {
 }
 
 // { words, curves: [{ name, data: [[x, y, id]] }] } of a result over the column `x`, both in SI units, a curve for each
-// combination of the `others`; `at(row)` is its place on the axis; `words` names the places on the axis where the values of `x` are no numbers.
+// combination of the `others`; `at(row)` is its place on the axis; `words` are the labels of the axis if the values of `x` are not numbers.
 export function curves(points, x, others, result) {
   const places = levels(points, x);
   const words = places.every(({ value }) => number(value)) ? null : places.map(({ text }) => text);
@@ -53,8 +53,8 @@ export function lost(points, { curves: found, at }) {
   return over.map(({ row }) => [at(row), Number.isFinite(foot) ? foot : 0, row.id, `${row.state.replaceAll("_", " ")}${row.message ? `: ${row.message}` : ""}`]);
 }
 
-// { rows, columns, cells } of two keys; cells[i][j] has the points there and the mean of their results as a share of the
-// range of all, null where none of them has one.
+// { rows, columns, cells } of two keys; cells[i][j] has the points there and the mean of their results relative to the
+// range of all, null without results.
 export function matrix(points, down, across, result) {
   const [rows, columns] = [levels(points, down), levels(points, across)];
   const all = points.map(({ row }) => measured(row, result)).filter(number);
@@ -70,7 +70,7 @@ export function matrix(points, down, across, result) {
 
 const TELLING = [/residual_velocity/, /penetration/, /^result:probe\.[^.]*$/, /^result:reference\.(?!worst_residual)/, /^result:fragments$/, /^result:energy\.kinetic$/];
 
-// The result that tells most: one that differs between the points, in the order of TELLING.
+// The most informative result: one that differs between the points, in the order of TELLING.
 export function telling(points, results) {
   const differs = (column) => new Set(points.map(({ row }) => measured(row, column)).filter(number)).size > 1;
   const there = results.filter(differs);

@@ -1,4 +1,4 @@
-// The table of runs that are compared: what is different about each, and what came out; sorted by any column.
+// Table of the compared runs: different keys and results, sortable by any column.
 
 import { h, pill } from "./figures.js";
 import { swatch } from "./linestyles.js";
@@ -17,7 +17,7 @@ export class ResultTable {
     this.element = h("section.card", { hidden: "" }, h("div.card-head", {}, h("h2", {}, "Values that differ, and results"), h("span.beside", {}, this.which, h("span.save", {}, csv))), this.place, this.note);
   }
 
-  // `rows`: { name, href, line, state } a run; `keys`: columns of what differs; `results` gives columns for which value.
+  // `rows`: { name, href, line, state } for each run; `keys`: columns of different keys; `results` returns columns of results.
   draw(rows = this.rows, keys = this.keys, results = this.results) {
     Object.assign(this, { rows, keys, results });
     this.element.hidden = false;
@@ -45,10 +45,10 @@ export class ResultTable {
     this.draw();
   }
 
-  // A result of a run that has not succeeded is that of an earlier time than the end.
+  // The result of a run without success belongs to a time before the end.
   unsure(i) { return this.rows[i].state !== "succeeded"; }
 
-  // Places of the rows; what has no value stands last, before it results of runs that have not succeeded.
+  // Order of the rows; missing values are last, results of runs without success before them.
   order() {
     const places = this.rows.map((_, i) => i);
     const column = this.columns.find(({ title }) => title === this.by);

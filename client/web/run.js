@@ -1,4 +1,4 @@
-// The page of one run: everything on it follows from the run's history and messages.
+// Page of one run, drawn from the run's history and messages.
 
 import { call, download, messages, refused } from "./api.js";
 import { Body } from "./body.js";
@@ -15,12 +15,12 @@ import { nothing, plots } from "./plots.js";
 import { RunState } from "./runstate.js";
 
 const CHARTS_EVERY = 500; // ms; the head and the bars are drawn with every message.
-const QUEUE_EVERY = 3; // s after which the place in the queue is asked for.
-const STAGES = { "": "Nothing of this run has been read yet.", accepted: "This run is taken in.", queued: "This run waits for its turn.", starting: "This run starts: its mesh and its program are made ready." };
+const QUEUE_EVERY = 3; // s after which the place in the queue is requested again.
+const STAGES = { "": "No data of this run has been read yet.", accepted: "The server accepts this run.", queued: "This run waits in the queue.", starting: "This run starts: the mesh is made and the solver is loaded." };
 const pause = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 
 export class RunPage {
-  // `onRefused` is called where the server does not accept the token any more.
+  // `onRefused` is called when the token is no longer valid.
   constructor(run, onRefused) {
     Object.assign(this, { live: new Live(run), info: {}, outcome: null, abort: new AbortController(), connection: ["waiting", "connecting"], due: false, plotted: 0, busy: new Set(), onRefused });
     this.path = `v1/runs/${encodeURIComponent(run)}`;
@@ -59,7 +59,7 @@ export class RunPage {
     this.draw();
   }
 
-  // The cards in their order: reference numbers, every chart that there is, ranks and cuts.
+  // Cards in their order: reference numbers, charts with data, ranks, balance events.
   fillCards() {
     this.cards = new Cards("energy");
     this.checks = h("div");
@@ -68,7 +68,7 @@ export class RunPage {
     const add = (name, title, beside, content) => this.cards.add(name, title, beside, content);
     add("checks", "Against the reference", "", this.checks);
     for (const [name, [chart, title, beside]] of this.drawn) add(name, title, h("span.beside", {}, beside, this.notes[name]), chart.element);
-    add("ranks", "What each rank spends its time on", this.ranks.note, this.ranks.element);
+    add("ranks", "Time of each rank by activity", this.ranks.note, this.ranks.element);
     add("balances", this.balances.title, this.balances.beside, this.balances.element).setAttribute("aria-label", "balance events");
     this.cards.show("checks", false);
     this.cards.show("balances", false);
@@ -112,7 +112,7 @@ export class RunPage {
       wait = Math.min(2 * wait, 8000);
       await this.readInfo();
       if (FINAL.has(this.info.state) && this.caughtUp) Object.assign(live, { state: this.info.state, cause: this.info.cause, message: this.info.message });
-      this.caughtUp = FINAL.has(this.info.state); // One more look at the stream before the end is believed.
+      this.caughtUp = FINAL.has(this.info.state); // The stream is read once more before the run counts as ended.
     }
     this.connection = ["", "ended"];
     await this.readInfo();
@@ -140,7 +140,7 @@ export class RunPage {
     for (const text of this.outcome?.warnings ?? []) this.live.warn("warning", text);
   }
 
-  // No message tells of the place in the queue: it is asked for now and then.
+  // No message reports the place in the queue: it is requested regularly.
   tick() {
     this.later();
     this.ticks = (this.ticks ?? 0) + 1;
@@ -180,7 +180,7 @@ export class RunPage {
     return this.later();
   }
 
-  // There is no such run, or there is no more of it than what the server tells.
+  // The run does not exist, or only the record of its removal does.
   fail(error) {
     this.close();
     if (error.status === 401 && this.onRefused) return this.onRefused();
@@ -193,7 +193,7 @@ export class RunPage {
 
   // Drawing ------------------------------------------------------------------------------------------------------
 
-  // The time from a message's birth to the pixels stands in the browser's timeline as "conoid:event".
+  // The browser's timeline has the time from a message to its pixels as "conoid:event".
   later(message) {
     if (message) this.born ??= message.wall;
     if (this.due) return;
@@ -204,7 +204,7 @@ export class RunPage {
       this.draw();
       const start = 1000 * this.born - performance.timeOrigin;
       this.born = undefined;
-      if (!(start > 0)) return; // Older than the page.
+      if (!(start > 0)) return; // The message is older than the page.
       performance.measure("conoid:event", { start, end: performance.now() });
       performance.clearMeasures("conoid:event");
     });
@@ -232,7 +232,7 @@ export class RunPage {
     document.title = `${live.state ? `${percent(live.fraction)} ` : ""}${this.info.name ?? live.run} · Conoid`;
   }
 
-  // After the frame that has the news in the head and the bars.
+  // After the frame that draws the head and the bars.
   drawCharts() {
     if (!this.abort.signal.aborted) for (const [, [chart]] of this.drawn) chart.draw(FINAL.has(this.live.state));
   }
@@ -258,12 +258,12 @@ export class RunPage {
     this.cards.show("checks", true);
   }
 
-  // Until there is a snapshot the place of the body says why.
+  // Before the first snapshot, the place of the body shows the reason.
   drawStage() {
     const { state, message, snapshots } = this.live;
     this.empty.hidden = snapshots.length > 0;
     if (this.empty.hidden) return;
-    const told = FINAL.has(state) ? "This run has left no snapshot." : STAGES[state] ?? "The body is shown here with the first snapshot.";
+    const told = FINAL.has(state) ? "This run has no snapshot." : STAGES[state] ?? "The first snapshot will be shown here.";
     const more = state === "queued" ? this.info.reason : message;
     this.empty.replaceChildren(h("div", {}, h("p", {}, told), FINAL.has(state) ? "" : h("p.hint", {}, more)));
   }

@@ -1,4 +1,4 @@
-// The page of all runs: a table that is sorted, filtered and grouped, whose marked runs are compared.
+// Page of all runs: a table with sorting, filters and groups; marked runs can be compared.
 
 import { Problem, call, refused } from "./api.js";
 import { columnsOf } from "./columns.js";
@@ -10,21 +10,21 @@ import { recall, remember } from "./storage.js";
 import { RunTable, differing, shorts } from "./runtable.js";
 import { Toolbar } from "./toolbar.js";
 
-const FIRST = 200; // Runs of the first answer; those after it come in larger pages.
+const FIRST = 200; // Runs of the first answer; later pages are larger.
 const PAGE = 500;
-const MOST = 10000; // Runs that are shown; more are found by the command line.
+const MOST = 10000; // Largest number of runs that are shown; the command line finds older ones.
 const SOON = 2000; // ms between two answers while a run is open.
 const LATER = 6000; // ms otherwise.
-const ANEW = 60000; // ms after which the newest page is read whole: runs may have been removed, labels changed.
-const SLACK = 10; // s by which what the server saves may lag.
-const MOST_VALUES = 24; // Keys that differ and have a column.
-const MOST_TOLD = 100; // Groups of which it is told what was changed.
-const RANGES = 3; // Keys of a group that are named.
+const ANEW = 60000; // ms after which the newest page is read completely: runs may have been removed, labels changed.
+const SLACK = 10; // s by which the saved state of the server may lag.
+const MOST_VALUES = 24; // Largest number of keys with a column.
+const MOST_TOLD = 100; // Largest number of groups whose changed keys are shown.
+const RANGES = 3; // Largest number of keys in the title of a group.
 const NEWEST = { id: "submitted", down: true };
-const kept = { text: "", state: "", days: "", open: new Set(), marked: new Set(), top: 0 }; // While the tab lives.
+const kept = { text: "", state: "", days: "", open: new Set(), marked: new Set(), top: 0 }; // For the life of the tab.
 
 export class RunsPage {
-  // `onRefused` is called where the server does not accept the token any more.
+  // `onRefused` is called when the token is no longer valid.
   constructor(onRefused) {
     Object.assign(this, { onRefused, told: new RunTable(), sweeps: new Map(), abort: new AbortController(), cache: {} });
     this.build();
@@ -57,7 +57,7 @@ export class RunsPage {
     this.say("Loading …");
   }
 
-  // What the server tells ----------------------------------------------------------------------------------------------
+  // Requests to the server ------------------------------------------------------------------------------------------
 
   async start() {
     document.addEventListener("visibilitychange", this.woken = () => document.hidden || this.next(0));
@@ -87,9 +87,9 @@ export class RunsPage {
 
   ask(query) { return call(`v1/table?${new URLSearchParams(query)}`, { signal: this.abort.signal }); }
 
-  // Page after page, newest first; the first is shown before the others are there.
+  // Page after page, newest first; the first is shown before the others arrive.
   async readWhole() {
-    const listed = this.readSweeps().catch(() => {}); // Without them the groups have no names.
+    const listed = this.readSweeps().catch(() => {}); // Without sweeps the groups have no names.
     let next = null;
     let pending = 0;
     const all = [];
@@ -136,11 +136,11 @@ export class RunsPage {
     this.note.replaceChildren(...children);
   }
 
-  // What is shown ------------------------------------------------------------------------------------------------------
+  // Drawing -----------------------------------------------------------------------------------------------------------
 
   get sort() { return recall("runs.sort", NEWEST); }
 
-  // The columns of all runs, as far as their values differ between those that are shown, and the rows.
+  // Columns of all runs whose values differ between the shown runs, and the rows.
   pick() {
     const { told } = this;
     const all = [...told.rows.values()];
@@ -212,7 +212,7 @@ export class RunsPage {
 
   tell(rows) {
     if (!this.told.rows.size) return this.say(beginning());
-    if (!rows.length) return this.say("No run is like this. ", h("button.quiet", { type: "button", onclick: () => this.showAll() }, "Show all runs"));
+    if (!rows.length) return this.say("No run matches. ", h("button.quiet", { type: "button", onclick: () => this.showAll() }, "Show all runs"));
     if (this.more) return this.say(`The newest ${count(this.told.rows.size)} are shown; `, h("code", {}, "conoid runs --until DATE"), " finds older ones.");
     return this.say();
   }
@@ -223,13 +223,13 @@ export class RunsPage {
     this.draw();
   }
 
-  // What is done -------------------------------------------------------------------------------------------------------
+  // Actions -----------------------------------------------------------------------------------------------------------
 
-  // A column, once more the other way; or "ID up", "ID down".
+  // Sorts by a column, the second time in reverse; or "ID up", "ID down".
   sortBy(words) {
     const [, id, way] = /^(.*?)(?: (up|down))?$/.exec(words);
     const { sort } = this;
-    const first = id === "submitted" || id.startsWith("result:"); // The newest, the largest.
+    const first = id === "submitted" || id.startsWith("result:"); // The newest, the largest first.
     remember("runs.sort", { id, down: way ? way === "down" : sort.id === id ? !sort.down : first });
     this.draw();
   }
@@ -239,7 +239,7 @@ export class RunsPage {
     this.draw();
   }
 
-  // With the Shift key from the run that was marked last to this one.
+  // With Shift: from the last marked run to this one.
   mark(row, on, far) {
     const from = far ? this.rows.findIndex(({ id }) => id === this.last) : -1;
     const to = this.rows.findIndex(({ id }) => id === row.id);
@@ -255,20 +255,20 @@ export class RunsPage {
     this.draw();
   }
 
-  // The marked runs in the order of the table, those that are not shown last.
+  // The marked runs in the order of the table, hidden ones last.
   chosen() {
     const shown = this.rows.filter(({ id }) => kept.marked.has(id)).map(({ id }) => id);
     return [...shown, ...[...kept.marked].filter((id) => !shown.includes(id))];
   }
 }
 
-// What an adaptive sweep looks for, and where it is.
+// Goal of an adaptive sweep, and its present answer.
 function soughtFor({ key, result, threshold, result_unit: up, bracket, unit }) {
   const found = bracket ? vector([(bracket[0] + bracket[1]) / 2, (bracket[1] - bracket[0]) / 2], unit, 4, " ± ") : "not bracketed";
   return `${result} = ${exact(threshold, up)} at ${key} ${found}`;
 }
 
-// What was changed within a group: "velocity[2] 60 to 300 m/s".
+// Changed keys of a group: "velocity[2] 60 to 300 m/s".
 function ranges(rows, columns) {
   return differing(rows, RANGES).map((key) => columns.find(({ id }) => id === `value:${key}`)).filter(Boolean).map((column) => {
     const there = sorted(rows.filter((row) => column.value(row) !== null), column, false);
@@ -277,5 +277,5 @@ function ranges(rows, columns) {
 }
 
 const beginning = () => h("div.empty", {}, h("h2", {}, "No runs yet"),
-  h("p", {}, h("a", { href: "#/new?case=taylor_copper" }, "Begin with a shipped case"), " on this page, or from a terminal:"),
-  h("pre", {}, h("code", {}, "conoid cases                      # the shipped cases\nconoid submit taylor_copper       # hands one in; it appears here\nconoid sweep taylor_copper --set \"parts[0].velocity[2]=-150 m/s,-200 m/s\"")));
+  h("p", {}, h("a", { href: "#/new?case=taylor_copper" }, "Start from a shipped case"), " on this page, or from a terminal:"),
+  h("pre", {}, h("code", {}, "conoid cases                      # the shipped cases\nconoid submit taylor_copper       # submits one; it appears here\nconoid sweep taylor_copper --set \"parts[0].velocity[2]=-150 m/s,-200 m/s\"")));

@@ -1,30 +1,30 @@
-// What is to be said of a run that waits, or that has not ended as it should: why, how far it came, the end of its log,
-// and what can be done next.
+// Notice for a run that waits, or that ended without success: reason, progress, end of its log,
+// and what the user can do next.
 
 import { call, tail } from "./api.js";
 import { h, percent, si, words } from "./figures.js";
 import { ended } from "./numbers.js";
 
-const LINES = 12; // Of the end of the log.
+const LINES = 12; // Number of lines of the log.
 const CAUSES = {
-  input: "its case cannot be run", mesh: "its mesh cannot be made", diverged: "its numbers have grown beyond all bounds", energy: "its energy does not close",
-  memory: "it needs more memory than there is", walltime: "its wall time was used up", steps: "run.max_steps was used up before run.end_time",
-  preempted: "the batch system has taken its place away", node: "a process or a machine of it is gone", launch: "it could not be started",
-  storage: "a file could not be written", cancelled: "it was cancelled", service: "the server could not go on with it",
+  input: "its case cannot be run", mesh: "its mesh cannot be made", diverged: "its solution has diverged", energy: "its energy does not close",
+  memory: "it ran out of memory", walltime: "it reached its limit of wall time", steps: "it reached run.max_steps before run.end_time",
+  preempted: "the batch system has stopped its job", node: "one of its processes or machines has failed", launch: "it could not be started",
+  storage: "a file could not be written", cancelled: "it was cancelled", service: "the server could not continue it",
 };
 const HELP = {
   input: "Change the keys that the message names, and start again.", mesh: "Change the mesh, and start again.",
-  diverged: "Look at the last snapshot and at dt before the end; a smaller numerics.dt_safety or erosion of worn tets helps.",
-  energy: "The energy by term shows what has grown until then.",
-  memory: "Use larger elements, or a machine with more memory.", walltime: "Go on from the last checkpoint, or allow more in run.wall_time.",
-  steps: "Go on with a larger run.max_steps; dt is held down by what stands beside it.", storage: "Make room on the disk, then go on from the last checkpoint.",
+  diverged: "Check the last snapshot and dt before the end; a smaller numerics.dt_safety or erosion of distorted tets may help.",
+  energy: "The chart of energy by term shows which term has grown.",
+  memory: "Use larger elements, or a machine with more memory.", walltime: "Continue from the last checkpoint, or increase run.max_wall_time.",
+  steps: "Continue with a larger run.max_steps; the limiter of dt is shown beside it.", storage: "Free space on the disk, then continue from the last checkpoint.",
 };
 const POINT = /^checkpoints\/(\d+)\/manifest\.json$/;
-const FATED = new Set(["input", "mesh", "diverged", "energy"]); // Causes that the same case meets again.
+const FATED = new Set(["input", "mesh", "diverged", "energy"]); // Causes that would recur with the same case.
 const BAD = new Set(["failed", "lost", "timed_out", "cancelled"]);
 
 export class RunState {
-  // `files()` promises the files of the run, null where they are not known.
+  // `files()` resolves to the files of the run, null if unknown.
   constructor(run, files) {
     Object.assign(this, { run, files, told: "" });
     this.path = `v1/runs/${encodeURIComponent(run)}`;
@@ -51,13 +51,13 @@ export class RunState {
     if (turn !== this.turn) return;
     const point = FATED.has(live.cause) ? null : files?.filter(({ path }) => POINT.test(path)).at(-1);
     if (point) actions.append(this.restart(Number(POINT.exec(point.path)[1]), live));
-    else if (files && !FATED.has(live.cause)) actions.append(h("span.hint", {}, "It has left no checkpoint to go on from; open the case, change it and start again."));
+    else if (files && !FATED.has(live.cause)) actions.append(h("span.hint", {}, "It has no checkpoint to continue from; open the case, change it and start again."));
     log.hidden = !lines;
     log.replaceChildren(lines);
     log.scrollTop = log.scrollHeight;
   }
 
-  // A run that has used up its steps goes on with twice as many.
+  // A run that used up its steps continues with twice as many.
   restart(step, { cause, finished }) {
     const most = cause === "steps" ? 2 * Math.max(step, finished?.steps ?? 0) : 0;
     const button = h("button", { type: "button", onclick: async () => {
@@ -69,11 +69,11 @@ export class RunState {
         button.after(h("span.problem", {}, error.message));
         button.disabled = false;
       }
-    } }, `Go on from step ${step}${most ? ` with run.max_steps = ${most}` : ""}`);
+    } }, `Continue from step ${step}${most ? ` with run.max_steps = ${most}` : ""}`);
     return button;
   }
 
-  // Of the first log that has any: of the launcher where a run never began, else of rank 0.
+  // From the first log with text: of the launcher if no rank started, else of rank 0.
   async end(live) {
     for (const name of live.progress ? ["0", "launcher"] : ["launcher", "0"]) {
       const text = (await tail(this.run, name).catch(() => "")).trimEnd();
@@ -87,13 +87,13 @@ export const sentence = ({ state, cause }) => `${{ failed: "Failed", lost: "Lost
 
 function advice(cause, outcome) {
   const made = cause === "energy" ? outcome?.made?.[0] : null;
-  const most = made ? `Of the lines of the ledger ${words(made.line)} has made the most: ${percent(made.share)} of the energy, at ${si(made.time, "s")}.` : "";
+  const most = made ? `The largest contribution to the residual is from ${words(made.line)}: ${percent(made.share)} of the energy, at ${si(made.time, "s")}.` : "";
   return HELP[cause] || most ? h("p", {}, [HELP[cause], most].filter(Boolean).join(" ")) : "";
 }
 
 function reached({ progress, snapshots }, outcome) {
-  if (!progress) return "It had not begun its first step.";
+  if (!progress) return "It had not reached its first step.";
   const { t, step } = ended(progress, outcome);
   const last = snapshots.at(-1);
-  return `It had come to ${si(t, "s")} of ${si(progress.end_time, "s")}, step ${step}${last ? `; the last snapshot, of ${si(last.t, "s")}, is shown below` : ""}.`;
+  return `It reached ${si(t, "s")} of ${si(progress.end_time, "s")}, step ${step}${last ? `; the last snapshot, of ${si(last.t, "s")}, is shown below` : ""}.`;
 }

@@ -1,17 +1,17 @@
-// What the server tells of many runs (GET /v1/table), merged page by page. No element is made here.
+// Rows of many runs (GET /v1/table), merged page by page. No elements are created here.
 
-const ALIKE = 0.8; // Of the keys of two cases that both have, where their values are compared; as the server has it.
+const ALIKE = 0.8; // Share of common keys above which the values of two cases are compared; the same as on the server.
 
 export class RunTable {
   constructor() {
     this.rows = new Map(); // By id.
-    this.kinds = []; // Cases that are alike: { keys, units }.
-    this.units = new Map(); // Of results, by name.
+    this.kinds = []; // Groups of similar cases: { keys, units }.
+    this.units = new Map(); // Units of results, by name.
     this.pending = 0;
     this.version = 0;
   }
 
-  // One answer; true where it has told something new.
+  // Merges one answer; true if anything has changed.
   take({ runs, cases, pending = 0 }) {
     const kinds = cases.map((one) => this.kind(one));
     for (const { results } of cases) for (const { name, unit } of results) if (!this.units.has(name)) this.units.set(name, unit);
@@ -21,7 +21,7 @@ export class RunTable {
     return fresh.length > 0;
   }
 
-  // False where the row says what is known already.
+  // False for an unchanged row.
   put(run, one, kind) {
     const told = JSON.stringify([run, one?.results.length]);
     if (this.rows.get(run.id)?.told === told) return false;
@@ -30,7 +30,7 @@ export class RunTable {
     return true;
   }
 
-  // The runs that are newer than the last of a page which has been read anew, and are not on it, are gone.
+  // Removes runs that are newer than the last row of a reread page but are not on it.
   keepOnly(runs, whole) {
     const last = whole ? "" : runs.at(-1)?.id ?? "";
     const there = new Set(runs.map(({ id }) => id));
@@ -50,7 +50,7 @@ export class RunTable {
     return found ?? this.kinds.at(-1);
   }
 
-  // When the newest of them was handed in or ended, Unix s.
+  // Unix time in s of the newest submission or end.
   get latest() {
     let latest = 0;
     for (const { submitted, finished } of this.rows.values()) latest = Math.max(latest, submitted, finished ?? 0);
@@ -63,15 +63,15 @@ function alike(known, keys) {
   return both >= ALIKE * (known.size + keys.length - both);
 }
 
-// What words are looked for in.
+// Text that filters search.
 const hay = ({ name, title, state, cause, message, labels }) =>
   [name, title, state, cause, message, ...Object.entries(labels).map(([key, value]) => `${key}=${value}`)].join("\n").toLowerCase();
 
 export const valueOf = (row, key) => (key in row.values ? row.values[key] : row.base[key] ?? null);
 
-const NEVER = /^run\.(ranks|threads|profile)$/; // Keys that other columns have.
+const NEVER = /^run\.(ranks|threads|profile)$/; // Keys with columns of their own.
 
-// Keys of which two of the rows with cases that are alike have different values, those that most rows have first.
+// Keys whose values differ between rows of similar cases; those of most rows first.
 export function differing(rows, most) {
   const found = new Map();
   for (const kind of new Set(rows.map((row) => row.kind))) {
@@ -87,7 +87,7 @@ export function differing(rows, most) {
   return [...found].filter(([key]) => !NEVER.test(key)).sort((a, b) => b[1] - a[1]).slice(0, most).map(([key]) => key);
 }
 
-// The shortest beginning of each id that no other one of them has, of at least `least` letters.
+// Shortest unique prefix of each id, of at least `least` characters.
 export function shorts(ids, least = 7) {
   const sorted = [...ids].sort();
   const shared = (a = "", b = "") => {

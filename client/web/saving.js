@@ -1,13 +1,13 @@
-// A picture of the body as it is seen, and a film of its snapshots.
+// Picture of the body as shown, and film of its snapshots.
 
-const RATE = 8; // Snapshots a second of a film.
-const BITS = 12e6; // A second.
+const RATE = 8; // Snapshots per second of a film.
+const BITS = 12e6; // Bits per second.
 const KINDS = ["video/webm;codecs=vp9", "video/webm;codecs=vp8", "video/webm"];
-const HOLD = 800; // ms that the last one stands.
+const HOLD = 800; // ms for which the last one is shown.
 
-// What a view shows, on the colour of the page, on `onto` (a canvas, made where there is none).
+// Draws the view on the background colour of the page onto `onto` (a canvas, created if missing).
 export function composed(view, onto = document.createElement("canvas")) {
-  view.draw(); // The browser keeps what is drawn until this task ends.
+  view.draw(); // The browser keeps the drawing until the end of this task.
   const { width, height } = view.canvas;
   if (onto.width !== width || onto.height !== height) Object.assign(onto, { width, height });
   const ctx = onto.getContext("2d");
@@ -23,13 +23,13 @@ export async function picture(view, name) {
   download(blob, `${name}.png`);
 }
 
-// What keeps this browser from making films, or an empty text.
+// Reason for which this browser cannot make films, or an empty text.
 export function hindrance() {
-  if (typeof MediaRecorder === "undefined" || !HTMLCanvasElement.prototype.captureStream) return "This browser makes no films.";
-  return KINDS.some((kind) => MediaRecorder.isTypeSupported(kind)) ? "" : "This browser makes no films in WebM.";
+  if (typeof MediaRecorder === "undefined" || !HTMLCanvasElement.prototype.captureStream) return "This browser cannot record films.";
+  return KINDS.some((kind) => MediaRecorder.isTypeSupported(kind)) ? "" : "This browser cannot record films in WebM.";
 }
 
-// What came of it. `show(i)` shows snapshot i and returns when it stands; `told(i)` is called before each; `signal` ends it early.
+// Records a film; returns its data. `show(i)` shows snapshot i and resolves when it is drawn; `told(i)` is called before each; `signal` stops it.
 export async function film(view, name, number, show, told, signal) {
   const canvas = composed(view);
   const stream = canvas.captureStream(RATE);

@@ -1,4 +1,4 @@
-// The scale of each field: its name for people, its colours, and round ends. client/drawing/fields.py and scales.py have the same.
+// Scale of each field: its name, its colours, and round ends. client/drawing/fields.py and scales.py have the same.
 
 // Perceptual scales (van der Walt and Smith 2015, CC0; cividis: Nunez, Anderton and Renslow 2018) without their darkest part,
 // and a diverging one (RdBu of ColorBrewer, Harrower and Brewer 2003).
@@ -7,7 +7,7 @@ const CIVIDIS = ["#3b496c", "#575d6d", "#707173", "#8a8779", "#a59c74", "#c3b369
 const PLASMA = ["#5302a3", "#8b0aa5", "#b83289", "#db5c68", "#f48849", "#febd2a", "#f0f921"];
 const STRAINED = ["#d9dfe6", "#f7d889", "#f49a3d", "#d4432c", "#7c0f34"];
 const DIVERGING = ["#053061", "#2166ac", "#4393c3", "#92c5de", "#d1e5f0", "#f7f7f7", "#fddbc7", "#f4a582", "#d6604d", "#b2182b", "#67001f"];
-export const UNIFORM = ["#9fb0c0", "#9fb0c0"]; // Of what has one value everywhere: of no scale.
+export const UNIFORM = ["#9fb0c0", "#9fb0c0"]; // Colour of a uniform field, which is not in any scale.
 
 const KNOWN = {
   mises: { label: "von Mises stress" },
@@ -42,9 +42,9 @@ export function ramp(colours, bands = 0) {
   return out;
 }
 
-const PARTS = 6; // Of a colour bar, at most.
+const PARTS = 6; // Largest number of intervals of a colour bar.
 
-// Round numbers round `low` and `high`, and how many there are from one to the other: [low, high, number].
+// Round numbers around `low` and `high`, and the number of intervals: [low, high, number].
 export function rounded(low, high) {
   const span = Math.max(high - low, 1e-9 * Math.max(Math.abs(low), Math.abs(high)), 1e-30);
   const power = 10 ** Math.floor(Math.log10(span / 4));

@@ -1,11 +1,11 @@
-// What an adaptive sweep looks for and what it has found: the answer with its uncertainty; a chart of points, bracket, curve.
+// Page of an adaptive sweep: its answer with the uncertainty; a chart of points, bracket and curve.
 
 import { axis, colour, common, crosses, series } from "./axes.js";
 import { Chart } from "./charts.js";
 import { counted, exact, h, moment, si, vector } from "./figures.js";
 
 const TALL = 340;
-const SILENT = 120; // s without a report and without an open run after which the command is taken to have ended.
+const SILENT = 120; // s without a report and without an open run after which the command counts as ended.
 
 // A run may take longer than SILENT: the command reports when it ends.
 export const goesOn = ({ search, reported, states }, now = Date.now() / 1000) =>
@@ -28,7 +28,7 @@ export class Answer {
 
   close() { this.chart.close(); }
 
-  // `info`: the sweep as the server has it.
+  // `info`: the sweep from the server.
   draw(info) {
     this.info = info;
     const { search } = info;
@@ -37,7 +37,7 @@ export class Answer {
     const y = (value) => exact(value, search.result_unit, 4);
     const told = new Map(search.points.map((point) => [point.x, point.value]));
     const { bracket, curve } = search;
-    this.state.textContent = search.over ? "" : goesOn(info) ? "goes on" : `no report since ${moment(info.reported)}: the command that decides the points has ended, or is away; the same command goes on`;
+    this.state.textContent = search.over ? "" : goesOn(info) ? "goes on" : `no report since ${moment(info.reported)}: the command that selects the points has ended or lost its connection; the same command continues the sweep`;
     this.found.textContent = bracket ? x([(bracket[0] + bracket[1]) / 2, (bracket[1] - bracket[0]) / 2], " ± ") : search.over ? "not found" : "not bracketed yet";
     this.sought.textContent = `${search.key}${search.more.length ? ` and ${counted(search.more.length, "key")} with it` : ""}, where ${search.result} = ${y(search.threshold)}`;
     const without = search.points.filter(({ problem }) => problem).length;
@@ -80,7 +80,7 @@ export class Answer {
     };
   }
 
-  // SI units, as the other tables that are saved.
+  // SI units, as in the other saved tables.
   table() {
     const { search: { points, key, unit, result, result_unit: up } } = this.info;
     const head = (name, si_unit) => (si_unit ? `${name} [${si_unit}]` : name);
@@ -94,7 +94,7 @@ function constants({ factor, exponent }) {
   return exponent === null ? `slope ${si(factor, "", 4)}` : `a = ${si(factor, "", 4)}, p = ${si(exponent, "", 4)}`;
 }
 
-// What there is to know besides.
+// Further data.
 function remarks({ why, mixed, curve, bracket }, x) {
   const beyond = curve && bracket && (curve.limit < bracket[0] || curve.limit > bracket[1]);
   return [
@@ -104,7 +104,7 @@ function remarks({ why, mixed, curve, bracket }, x) {
   ].filter(Boolean);
 }
 
-// The threshold across, the bracket down.
+// Horizontal line: threshold. Vertical band: bracket.
 function marks(bracket, threshold) {
   const quiet = { silent: true, animation: false, label: { show: false } };
   return {
@@ -121,7 +121,7 @@ function drawn({ law, course }, unit) {
   return [...(banded.length ? [edge(banded.map(([x, y, error]) => [x, y - error])), { ...edge(banded.map(([x, , error]) => [x, 2 * error])), areaStyle: { color: colour("line-1"), opacity: 0.2 } }] : []), line];
 }
 
-// Where the curve has its limit, with the standard error.
+// The limit of the curve with its standard error.
 function interval({ limit, error }, threshold) {
   const bar = { ...series({ name: "", colour: "line-1", data: [[limit - error, threshold], [limit + error, threshold]], width: 5 }), silent: true, z: 6, lineStyle: { width: 6, opacity: 0.55, cap: "round" } };
   return [...(error === null ? [] : [bar]), { type: "scatter", name: "limit of the curve", data: [[limit, threshold]], symbol: "diamond", symbolSize: 12, color: colour("line-1"), z: 7 }];

@@ -1,15 +1,15 @@
-// A section through the body: from all tets of a snapshot (docs/snapshots.md) the polygons in which a plane cuts them.
+// Section through the body: polygons in which a plane cuts the tets of a snapshot (docs/snapshots.md).
 
 import { decode } from "./snapshot.js";
 
-// { header, arrays, tets }: the file of all tets; `tets` (4 n) are the nodes. Throws Error for what is none.
+// { header, arrays, tets }: the file of all tets; `tets` (4 n) are the nodes. Throws Error for other data.
 export async function unpack(buffer) {
   const stream = new Blob([buffer]).stream().pipeThrough(new DecompressionStream("gzip"));
   const found = decode(await new Response(stream).arrayBuffer());
   return { ...found, tets: nodes(found.arrays.tet_steps) };
 }
 
-// From the differences, byte by byte.
+// Decodes differences, byte by byte.
 export function nodes(steps) {
   const n = steps.length / 16;
   const out = new Int32Array(4 * n);
@@ -35,7 +35,7 @@ export function within(middle, [low, high], normal) {
 }
 
 // { corners, tet, omit }: triangles in the plane `normal` · x = `at` (m), laid out as those of a surface: x, y, z and row of each
-// corner; of each triangle its tet, and whether its last edge is none of the tet's section.
+// corner; for each triangle its tet, and which of its edges is not an edge of the tet's section.
 export function cut(volume, normal, at) {
   const distance = distances(volume, normal, at);
   const { tets } = volume;
@@ -81,7 +81,7 @@ function crossing(tets, distance) {
   return { tets: found, triangles };
 }
 
-// The corners of the polygon into `point`, in the order round it; how many there are.
+// Writes the corners of the polygon to `point`, in order; returns their number.
 function polygon(point, positions, tets, tet, distance) {
   const above = [], below = [];
   for (let k = 0; k < 4; k += 1) (distance[tets[4 * tet + k]] > 0 ? above : below).push(tets[4 * tet + k]);

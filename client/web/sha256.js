@@ -1,5 +1,5 @@
-// The sha256 of a file (FIPS 180-4), piece by piece. crypto.subtle takes a file only as a whole, and is missing where the
-// page comes over plain http from another machine; so one way serves all files and all addresses.
+// sha256 of a file (FIPS 180-4), piece by piece. crypto.subtle needs the whole file in memory, and is missing on
+// pages over plain http from another machine; so all files and addresses use this code.
 
 const BLOCK = 64;
 const PIECE = 1 << 22; // Bytes that are read and hashed at once: some 20 ms.
@@ -20,7 +20,7 @@ export class Sha256 {
     Object.assign(this, { held: 0, length: 0 });
   }
 
-  // Takes the next bytes, a Uint8Array.
+  // Adds the next bytes, a Uint8Array.
   update(bytes) {
     this.length += bytes.length;
     let at = 0;
@@ -60,7 +60,7 @@ export class Sha256 {
     state[0] += a; state[1] += b; state[2] += c; state[3] += d; state[4] += e; state[5] += f; state[6] += g; state[7] += h;
   }
 
-  // Of all bytes so far, in hexadecimal digits; nothing can be taken after it.
+  // Digest of all bytes in hexadecimal digits; nothing can be added afterwards.
   digest() {
     const blocks = this.held + 9 > BLOCK ? 2 : 1;
     const view = new DataView(this.rest.buffer);
@@ -73,7 +73,7 @@ export class Sha256 {
   }
 }
 
-// Of a File or Blob; `onBytes` hears how many have been read. The page goes on between the pieces.
+// sha256 of a File or Blob; `onBytes` is called with the number of bytes read. The page stays responsive between pieces.
 export async function hashed(file, onBytes, signal) {
   const hash = new Sha256();
   for (let at = 0; at < file.size; at += PIECE) {

@@ -1,10 +1,10 @@
-// The program that draws the body: places from 16 bits, an offset and a colour of each fragment from small textures.
+// Shaders of the body: positions from 16 bits, an offset and a colour of each fragment from small textures.
 
 export const ROWS_WIDTH = 256; // Texels in a line of a texture that has one texel a fragment.
 export const MOST_PARTS = 256;
 
-// `mirrors`: planes, x y z of the normal and the distance; bit k of the image's number says whether it lies behind plane k.
-// `layer`: -1 draws what is opaque, k the part k alone. What is not drawn is put outside.
+// `mirrors`: planes, x y z of the normal and the distance; bit k of the image's number: it lies behind plane k.
+// `layer`: -1 draws the opaque parts, k the part k alone. Other vertices are moved outside the view.
 export const VERTEX = `
 precision highp float;
 precision highp int;
@@ -53,8 +53,8 @@ void main() {
 }`;
 
 // mode 0: the colour of the fragment; 1: the value through the map; 2: the number of the row, to pick by and to find outlines.
-// Faces in a plane of symmetry (nearer than `thin`) are between a body and its image, and not drawn.
-// `cap` 1: a section, which no light shades and no plane cuts. `plane`: what lies beyond it is cut away.
+// Faces in a plane of symmetry (nearer than `thin`) lie between a body and its image, and are not drawn.
+// `cap` 1: a section, without light and without cutting. `plane`: the material beyond it is cut away.
 export const FRAGMENT = `
 precision highp float;
 precision highp int;
@@ -104,7 +104,7 @@ export const OVER = `
 precision highp float;
 void main() { gl_Position = vec4(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0, 0.0, 1.0); }`;
 
-// Thin lines round every fragment, and a thick one in a colour of its own round the picked one.
+// Thin lines round every fragment, and a thick one in its own colour round the selected one.
 export const LINES = `
 precision highp float;
 precision highp int;

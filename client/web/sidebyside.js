@@ -1,4 +1,4 @@
-// Bodies of several runs side by side: one camera, and one clock, the nearest snapshot of each.
+// Bodies of several runs side by side: one camera, one clock, the nearest snapshot of each run.
 
 import { binary } from "./api.js";
 import { share } from "./camera.js";
@@ -13,8 +13,8 @@ import { View3d } from "./view3d.js";
 const MOST = 4;
 const AT_FIRST = 2;
 const PLAY = 400; // ms for each step of the clock.
-const STEPS = 100; // Of the clock.
-const MOST_KEPT = 24; // Decoded snapshots a run.
+const STEPS = 100; // Steps of the clock.
+const MOST_KEPT = 24; // Largest number of decoded snapshots for each run.
 
 // The snapshot nearest to a time.
 export const nearestTo = (entries, t) => entries.reduce((best, one) => (Math.abs(one.t - t) < Math.abs(best.t - t) ? one : best));
@@ -32,7 +32,7 @@ export class SideBySide {
       h("div.card-head", {}, h("h2", {}, "Bodies side by side"), this.told, h("span.beside", {}, h("label.field", {}, "Colour ", this.by))), this.choice, this.row, h("div.scrub", {}, this.playing, this.clock));
   }
 
-  // Runs that have snapshots, { id, snapshots, line, called }; the first two are shown.
+  // Runs with snapshots, { id, snapshots, line, called }; the first two are shown.
   offer(runs) {
     this.runs = runs;
     this.element.hidden = !runs.length;
@@ -43,7 +43,7 @@ export class SideBySide {
     if (this.seen) this.place();
   }
 
-  // Nothing is drawn before it comes near.
+  // It is drawn when it comes near the window.
   whenSeen() {
     const eye = new IntersectionObserver((entries) => {
       if (!entries.at(-1).isIntersecting) return;
@@ -69,7 +69,7 @@ export class SideBySide {
     this.place();
   }
 
-  // A pane for each run that is chosen.
+  // A pane for each selected run.
   async place() {
     const modules = await three().catch(() => null);
     if (!modules) return this.row.replaceChildren(h("p.hint", {}, "No 3-D: the server has no libraries for it"));
@@ -107,7 +107,7 @@ export class SideBySide {
     this.offerColours();
   }
 
-  // Only what is asked for last is fetched, when the clock is faster than the network.
+  // Only the last request is fetched when the clock is faster than the network.
   async show(pane, t) {
     pane.wanted = t;
     if (pane.busy) return;
@@ -147,7 +147,7 @@ export class SideBySide {
     this.by.value = names.includes(before) ? before : names[0];
   }
 
-  // One scale of colours for all bodies that are shown, and all times.
+  // One colour scale for all shown bodies and all times.
   paintOne({ view, snapshot }) {
     const by = this.by.value;
     if (!snapshot.header.fields[by]) return view.colour(by);

@@ -1,4 +1,4 @@
-// A snapshot of the fragments: from bytes (docs/reference/snapshots.md) to what the view draws and the tables show.
+// A snapshot of the fragments: from bytes (docs/reference/snapshots.md) to the data of the view and the tables.
 
 const MAGIC = "CONOSNAP";
 const VERSION = 1;
@@ -9,7 +9,7 @@ const TYPES = {
 const DUST = 10; // Tets, as in conoid.cases.output.fragments.
 const MOST_ROWS = 65536; // A vertex names its row in 16 bits.
 
-// { header, arrays: { name: typed array, flat } }, without a copy. Throws Error for what is no snapshot.
+// { header, arrays: { name: typed array, flat } }, without a copy. Throws Error for other data.
 export function decode(buffer) {
   const bytes = new DataView(buffer);
   if (buffer.byteLength < START || new TextDecoder().decode(new Uint8Array(buffer, 0, 8)) !== MAGIC) throw new Error("not a snapshot");
@@ -23,7 +23,7 @@ export function decode(buffer) {
   return { header, arrays };
 }
 
-// One corner after the other, so that neighbours need not agree on anything: x, y, z and the row of the fragment.
+// Separate corners of the triangles, without sharing: x, y, z and the row of the fragment.
 export function corners({ positions, triangles, vertex_fragment: rows }) {
   const out = new Uint16Array(4 * triangles.length);
   for (let i = 0, o = 0; i < triangles.length; i += 1) {
@@ -36,7 +36,7 @@ export function corners({ positions, triangles, vertex_fragment: rows }) {
   return out;
 }
 
-// What triangles are coloured by: "fragment", "part", "rank" and the fields of this case.
+// Colourings of the triangles: "fragment", "part", "rank" and the fields of this case.
 export const colourings = ({ header }) => ["fragment", "part", ...(header.ranks > 1 ? ["rank"] : []), ...Object.keys(header.fields)];
 
 // One byte a corner: the rank and the part by number, a field between its low and its high.
@@ -49,7 +49,7 @@ export function cornerValues({ arrays }, by) {
   return out;
 }
 
-// One row of the table of fragments, in SI; `rest` when it stands for all that have no row of their own.
+// A row of the table of fragments, in SI; `rest` if it stands for all fragments without a row of their own.
 export function fragment({ arrays }, row) {
   const vector = (name) => [0, 1, 2].map((axis) => arrays[name][3 * row + axis]);
   return {
@@ -58,11 +58,11 @@ export function fragment({ arrays }, row) {
   };
 }
 
-// The row of a fragment in another snapshot of the run; -1 where it does not exist.
+// Row of a fragment in another snapshot of the run; -1 if it does not exist there.
 export const rowOf = ({ arrays }, id) => arrays.fragment_id.indexOf(id);
 
-// N(size): how many fragments are as long as a size and longer, from the shortest on, and the law that fits them best.
-// Dust has no shape of its own: fragments of fewer than DUST tets are left out, as in the tables of the run.
+// N(size): number of fragments of a size and larger, from the smallest on, and the best fitting law.
+// Fragments of fewer than DUST tets have no shape of their own and are left out, as in the tables of the run.
 export function sizes({ arrays }) {
   const whole = [...arrays.fragment_size].filter((size, row) => size > 0 && arrays.fragment_id[row] >= 0n && arrays.fragment_tets[row] >= DUST);
   const sorted = whole.sort((a, b) => a - b);

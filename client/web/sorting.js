@@ -1,8 +1,8 @@
-// Rows of tables of runs: sorted, filtered, grouped. No element is made here.
+// Sorting, filters and groups of the rows of a table. No elements are created here.
 
 const collator = new Intl.Collator("en", { numeric: true });
 
-// The rows by a column; what has no value comes last either way, before it what is `unsure`; equal ones the newest first.
+// Rows sorted by a column. Missing values are last in both directions, `unsure` ones before them; equal ones by age, newest first.
 export function sorted(rows, column, down) {
   const sign = down ? -1 : 1;
   const keyed = rows.map((row) => [column.value(row), row, column.unsure?.(row) ?? false]);
@@ -13,10 +13,10 @@ export function sorted(rows, column, down) {
 }
 
 const COMPARED = /^(.+?)(<=|>=|<|>|=)(-?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?)$/i;
-const NEAR = 1e-9; // Of a number, by which one that is written in another unit may differ from it.
+const NEAR = 1e-9; // Relative difference of a number that is written in another unit.
 const HOLDS = { "<": (way) => way < 0, ">": (way) => way > 0, "<=": (way) => way <= 0, ">=": (way) => way >= 0, "=": (way) => way === 0 };
 
-// A test of rows for words, all of which hold: text anywhere, the beginning of an id, state:failed, case:bar, or a
+// A test of rows for words that must all match: text anywhere, the beginning of an id, state:failed, case:bar, or a
 // number of a column in its unit, such as speed_end>12.
 export function matcher(text, columns) {
   const tests = text.trim().split(/\s+/).filter(Boolean).map((word) => tested(word.toLowerCase(), columns));
@@ -45,7 +45,7 @@ const named = (columns, name) => {
   return by((title) => title === name) ?? by((title) => title.includes(name));
 };
 
-// { key, rows } of each group, in the order of the first row of each; what is in no sweep has the key "" and comes last.
+// { key, rows } of each group, in the order of its first row; runs without a sweep have the key "" and come last.
 export function grouped(rows, by) {
   const groups = new Map();
   for (const row of rows) {

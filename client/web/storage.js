@@ -1,11 +1,11 @@
-// What this browser keeps for the next visit. Where it keeps nothing (a private window, a full store) the page goes
-// without: values last as long as the page.
+// Values that this browser stores for the next visit. Without storage (a private window, no space) they last as
+// long as the page.
 
 import { h } from "./figures.js";
 
 const here = new Map();
 
-// A value of another kind than `otherwise`, which another version of the page may have left, counts as none.
+// A value of another type than `otherwise`, which another version of the page may have stored, counts as missing.
 export function recall(key, otherwise) {
   const there = stored(key) ?? here.get(key);
   return there !== undefined && alike(there, otherwise) ? there : otherwise;
@@ -19,7 +19,7 @@ function stored(key) {
   }
 }
 
-// Whether a value has the kind of an example, an object the kinds of its fields, a list texts alone; all are like none.
+// Whether a value has the type of an example: an object the types of its fields, a list only texts; null accepts any type.
 function alike(value, example) {
   if (example === null || example === undefined) return true;
   if (Array.isArray(example)) return Array.isArray(value) && value.every((one) => typeof one === "string");
@@ -32,11 +32,11 @@ export function remember(key, value) {
   try {
     localStorage.setItem(`conoid.${key}`, JSON.stringify(value));
   } catch {
-    // It lasts as long as the page.
+    // The value lasts as long as the page.
   }
 }
 
-// A part of the page that opens and closes at its title, and is the next time as it was left.
+// A section that opens and closes by its title; its state is stored.
 export function fold(key, open, title, ...content) {
   const element = h("details.fold", { open: recall(`fold.${key}`, open) ? "" : false, ontoggle: () => remember(`fold.${key}`, element.open) },
     h("summary", {}, title), ...content);

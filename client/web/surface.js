@@ -1,4 +1,4 @@
-// What is drawn of a snapshot: one mesh for all fragments and all images behind planes of symmetry, and the sections.
+// Meshes of a snapshot: one mesh for all fragments and all images behind planes of symmetry, and the sections.
 
 import { ofFragment, ofName } from "./colours.js";
 import { partOf } from "./framing.js";
@@ -7,7 +7,7 @@ import { cut, cutValues } from "./section.js";
 import { FRAGMENT, MOST_PARTS, ROWS_WIDTH, VERTEX } from "./shaders.js";
 import { cornerValues, corners } from "./snapshot.js";
 
-export const OPEN = 1e30; // A section plane that cuts nothing, m.
+export const OPEN = 1e30; // Position of a section plane that cuts nothing, m.
 const LAYERS = ["solid", "depth", "colour"];
 
 export class Surface {
@@ -29,7 +29,7 @@ export class Surface {
     this.opacity = [];
   }
 
-  // A mesh with a material for each layer, that share their uniforms.
+  // A mesh with one material for each layer; they share their uniforms.
   mesh(own) {
     const { InstancedBufferGeometry, Mesh, RawShaderMaterial, DoubleSide, GLSL3 } = this.three;
     const more = { solid: {}, depth: { colorWrite: false }, colour: { transparent: true } };
@@ -53,7 +53,7 @@ export class Surface {
     this.shared[name].value = texture;
   }
 
-  // What is shown -------------------------------------------------------------------------------------------------------
+  // State of the drawing ----------------------------------------------------------------------------------------------------
 
   show(snapshot) {
     const [low, high] = snapshot.header.box;
@@ -113,7 +113,7 @@ export class Surface {
     this.shared.shown.value.needsUpdate = true;
   }
 
-  // Images behind planes of symmetry, { axis, at } each. Fragments are pulled apart from a middle that lies on the planes.
+  // Images behind planes of symmetry, { axis, at } each. Fragments explode from a middle on these planes.
   reflect(planes) {
     this.planes = planes;
     const [low, high] = this.snapshot.header.box;
@@ -126,7 +126,7 @@ export class Surface {
 
   // Sections ------------------------------------------------------------------------------------------------------------
 
-  // `section`: { normal, at } or null; what lies beyond is cut away. Without all tets, or with null, there is no cap.
+  // `section`: { normal, at } or null; the material beyond is cut away. Without all tets, or with null, there is no cap.
   slice(section) {
     this.section = section;
     if (section) this.shared.plane.value.set(...section.normal, section.at);
@@ -150,7 +150,7 @@ export class Surface {
     this.tintCaps();
   }
 
-  // The section of each image, in the place of the body itself; images that the plane cuts alike have it in common.
+  // Section of each image, at the position of the body itself; images that are cut alike share it.
   images() {
     const known = new Map();
     return Array.from({ length: 2 ** this.planes.length }, (_, image) => {
@@ -181,7 +181,7 @@ export class Surface {
 
   // Passes --------------------------------------------------------------------------------------------------------------
 
-  // Draws what is opaque, and then each part that is not, the farthest first: its nearest surface alone, over what is behind it.
+  // Draws opaque parts, then each transparent part, the farthest first: only its nearest surface, over what is behind it.
   draw(renderer, camera) {
     this.pass(renderer, camera, "solid", -1);
     for (const part of this.ghosts(camera)) {

@@ -1,4 +1,4 @@
-// The page of a sweep: how many of its points are done, a result over what was changed, each point with its values.
+// Page of a sweep: number of completed points, a result over the changed keys, each point with its values.
 
 import { Problem, call, download, refused } from "./api.js";
 import { axis, crosses, largest, lineStyle, series } from "./axes.js";
@@ -14,14 +14,14 @@ import { curves, lost, matrix, telling, together } from "./response.js";
 import { RunTable, shorts } from "./runtable.js";
 import { fill } from "./toolbar.js";
 
-const AGAIN = 2000; // ms until a sweep that goes on is read again.
-const LATER = 10000; // ms likewise of an adaptive sweep whose command may go on with it.
+const AGAIN = 2000; // ms after which an open sweep is read again.
+const LATER = 10000; // ms for an adaptive sweep whose command may continue.
 const TALL = 320;
 const PAGE = 500;
-const BRIEF = 9; // Letters of the id that are shown.
+const BRIEF = 9; // Characters of the id that are shown.
 
 export class SweepPage {
-  // `onRefused` is called where the server does not accept the token any more.
+  // `onRefused` is called when the token is no longer valid.
   constructor(id, onRefused) {
     Object.assign(this, { id, onRefused, told: new RunTable(), abort: new AbortController(), marked: new Set(), points: [], columns: [], sort: { id: "point", down: false } });
     this.path = `v1/sweeps/${encodeURIComponent(id)}`;
@@ -51,7 +51,7 @@ export class SweepPage {
     this.failed = h("section.card", { hidden: "", "aria-label": "points that have failed" });
     this.result = h("select", { "aria-label": "result", onchange: ({ target }) => { remember(this.name("result"), target.value); this.drawResponse(); } });
     this.over = h("select", { "aria-label": "over", onchange: ({ target }) => { remember(this.name("over"), target.value); this.drawResponse(); } });
-    this.chart = new Chart(TALL, "the result over what was changed", () => this.option(), { alone: true, name: () => `${this.info.name}-sweep`, onClick: ({ data }) => { if (data?.[2]) location.hash = `#/runs/${data[2]}`; } });
+    this.chart = new Chart(TALL, "the result over the changed key", () => this.option(), { alone: true, name: () => `${this.info.name}-sweep`, onClick: ({ data }) => { if (data?.[2]) location.hash = `#/runs/${data[2]}`; } });
     this.squares = h("div.scroll", { tabindex: 0, role: "region", "aria-label": "matrix of two keys" });
     this.response = h("section.card", { hidden: "" },
       h("div.card-head", {}, h("h2", {}, "Response"), this.chart.tools, h("span.beside", {}, h("label.field", {}, "result", this.result), this.overLabel = h("label.field", {}, "over", this.over))),
@@ -64,7 +64,7 @@ export class SweepPage {
     this.grid.region.hidden = true;
   }
 
-  // What the browser keeps a choice by: the same for all sweeps of a case.
+  // Key of stored choices: the same for all sweeps of a case.
   name(what) { return `sweep.${what}.${this.info?.name}`; }
 
   async read() {
@@ -97,7 +97,7 @@ export class SweepPage {
     this.problem.textContent = words;
   }
 
-  // Points whose run has ended, or has been removed after that.
+  // Points whose run has ended or was removed.
   get ended() { return Object.entries(this.info.states).reduce((sum, [state, n]) => sum + (FINAL.has(state) ? n : 0), this.info.removed); }
 
   get finished() {
@@ -144,7 +144,7 @@ export class SweepPage {
       h("ul", {}, failed.map(({ n, row }) => h("li", {}, pill(row.state), " ", h("a", { href: `#/runs/${row.id}` }, this.words(row, n)), " ", row.message || row.cause || ""))));
   }
 
-  // A point in words: the values of its keys.
+  // Text of a point: the values of its keys.
   words(row, n) {
     return this.keys.map((key) => `${key.title} ${key.text(row)}${key.unit ? ` ${key.unit}` : ""}`).join(", ") || `point ${n + 1}`;
   }
@@ -257,7 +257,7 @@ export class SweepPage {
   }
 }
 
-// A cell of the matrix: its number on the colour of its share, or the state of its run.
+// A cell of the matrix: its number on its colour, or the state of its run.
 function square({ points, value, share }, result) {
   if (!points.length) return h("td");
   const { row } = points[0];
@@ -267,7 +267,7 @@ function square({ points, value, share }, result) {
   return h("td", {}, link);
 }
 
-// The keys of a sweep as columns: of the case with all defaults where it has a value of that name, in SI units; else as
+// Keys of a sweep as columns: with the values of the case with all defaults in SI units, if it has the key; else as
 // they were written.
 function keyColumns(points, units) {
   const rows = points.map(({ row }) => row);

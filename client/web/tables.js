@@ -1,8 +1,8 @@
-// Files that the page makes: tables as CSV in SI units, pictures as SVG.
+// Files made by the page: tables as CSV in SI units, pictures as SVG.
 
 import { h } from "./figures.js";
 
-// Hands a text to the browser as a file.
+// Saves a text as a file.
 export function save(name, text, type) {
   const url = URL.createObjectURL(new Blob([text], { type }));
   const link = h("a", { href: url, download: name.replace(/[^\w.-]+/g, "_") });
@@ -18,8 +18,8 @@ const cell = (value) => {
 
 export const toCsv = (head, rows) => [head, ...rows].map((row) => row.map(cell).join(",")).join("\n").concat("\n");
 
-// What is drawn as a table: x and a column a series, a row a place. Series at the same places are one column each of
-// the same rows; others have empty cells where they have no point.
+// Drawn data as a table: x and a column for each series, a row for each point. Series with the same x share rows;
+// others have empty cells.
 export function tableOf({ series, xName = "t [s]" }) {
   const drawn = series.filter(({ data, aside }) => data?.length && !aside);
   const rows = new Map();
@@ -32,7 +32,7 @@ export function tableOf({ series, xName = "t [s]" }) {
   return { head, rows: [...rows.values()].sort((a, b) => a[0] - b[0]) };
 }
 
-// The lines of a history.csv, t and the columns that are named: all of them, however many a chart draws.
+// All lines of a history.csv with t and the named columns, even if a chart draws fewer.
 export function pick(text, names) {
   const [head, ...lines] = text.split(/\r?\n/).filter(Boolean);
   const columns = head.split(",");
@@ -41,5 +41,5 @@ export function pick(text, names) {
   return { head: places.map((place) => columns[place]), rows: rows.map((cells) => places.map((place) => cells[place])) };
 }
 
-// The cells of a line; one that holds a comma stands in quotation marks.
+// Cells of a line; a cell with a comma is quoted.
 const split = (line) => (line.includes('"') ? [...line.matchAll(/(?:^|,)(?:"((?:[^"]|"")*)"|([^,]*))/g)].map(([, quoted, plain]) => quoted?.replaceAll('""', '"') ?? plain) : line.split(","));

@@ -1,4 +1,4 @@
-// The token of this tab, or the one that this browser remembers. Where a browser keeps nothing it lasts as long as the
+// Token of this tab, or the one that this browser has stored. Without storage it lasts as long as the
 // page.
 
 const KEY = "conoid.token";
@@ -17,7 +17,7 @@ const lasting = () => localStorage;
 export const token = {
   get: () => here || (at(session, (store) => store.getItem(KEY)) ?? at(lasting, (store) => store.getItem(KEY)) ?? ""),
 
-  // `remembered`: also for the tabs and the visits to come.
+  // `remembered`: also for other tabs and later visits.
   set(text, remembered = false) {
     here = text;
     at(session, (store) => store.setItem(KEY, text));
@@ -31,7 +31,7 @@ export const token = {
     at(lasting, (store) => store.removeItem(KEY));
   },
 
-  // `onChange(text)` when another tab remembers a token, or signs out ("").
+  // Calls `onChange(text)` when another tab stores a token, or signs out ("").
   listen(onChange) {
     addEventListener("storage", ({ key, newValue, storageArea }) => {
       if (key === KEY && storageArea === at(lasting, (store) => store)) onChange(newValue ?? "");

@@ -1,4 +1,4 @@
-// What stands above the table of runs: filter, groups, order, columns, and what is done with the marked runs.
+// Controls above the table of runs: filter, groups, order, columns, and actions on the marked runs.
 
 import { count, h, words } from "./figures.js";
 import { recall, remember } from "./storage.js";
@@ -49,14 +49,14 @@ export class Toolbar {
     }, TYPING);
   }
 
-  // Nothing is filtered any more.
+  // Clears all filters.
   reset() {
     this.search.value = this.kept.text;
     this.days.value = this.kept.days;
     this.search.focus();
   }
 
-  // `rows`: all that there are; `choice`: which columns somebody has chosen or put away.
+  // `rows`: all rows; `choice`: columns that the user has selected or hidden.
   draw({ columns, choice, sort, rows }) {
     const states = new Map();
     for (const { state } of rows) states.set(state, (states.get(state) ?? 0) + 1);
@@ -90,8 +90,8 @@ export class Toolbar {
   }
 }
 
-// The choices of a list, made again only where there are other ones: an open list would close. A value that is none of
-// them stands for the first.
+// Options of a list, made again only after a change: an open list would close. An unknown value selects
+// the first option.
 export function fill(element, choices, value) {
   const told = JSON.stringify(choices);
   if (element.told !== told) element.replaceChildren(...choices.map(([name, shown]) => h("option", { value: name }, shown)));

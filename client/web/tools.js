@@ -1,4 +1,4 @@
-// The bar of tools of the body: colour, section, camera, scale, parts, what is shown, fragments, saving. It keeps what is chosen.
+// Tools of the body: colour, section, camera, scale, parts, display, fragments, saving. The browser stores the choices.
 
 import { named } from "./colours.js";
 import { VIEW_NAMES } from "./camera.js";
@@ -7,13 +7,13 @@ import { hindrance } from "./saving.js";
 import { scaleOf } from "./scales.js";
 
 const CUTS = ["none", "x", "y", "z", "as seen"];
-const STEPS = 400; // Of the slider of a section.
+const STEPS = 400; // Steps of the slider of a section.
 const SIGNS = { "+": "+", "-": "−" };
 const KEYS = "x y z: look from there, with Shift from the other side · i: isometric · f: fit · a: fit all · e: edges · o: outlines · "
   + "v: arrows · m: mirror · arrows: turn, with Shift move · + −: zoom · , .: snapshot · Space: play";
 
 export class Tools {
-  // `act` has what the tools do: colour(), slice(), camera(name), follow(text), set(changes), opacities(), save(kind), fragments().
+  // `act` has the actions: colour(), slice(), camera(name), follow(text), set(changes), opacities(), save(kind), fragments().
   constructor(act) {
     Object.assign(this, { act, choice: { how: "most", over: "run", hand: null, bands: 0 }, flipped: false });
     this.by = choice("colour by", ["fragment", "part"], () => act.colour());
@@ -46,7 +46,7 @@ export class Tools {
 
   // Parts that the camera can follow.
   frames(parts) {
-    const names = { fit: "fits the bodies", all: "fits all, debris too", free: "stays" };
+    const names = { fit: "fits the bodies", all: "fits all, with debris", free: "stays" };
     const before = this.frame.value;
     this.frame.replaceChildren(...Object.entries(names).map(([value, name]) => h("option", { value }, name)),
       ...parts.map((name, i) => h("option", { value: `part ${i}` }, `follows ${name}`)));
@@ -71,7 +71,7 @@ export class Tools {
     return h("div.lines", {}, field("Ends", this.how), field("Over", this.over), field("From", this.low), field("to", this.high, this.unit), field("Colours", this.bands));
   }
 
-  // Shown beside the fields for the ends by hand.
+  // Inputs for the ends, beside the fields.
   ends({ low, high }, unit) {
     const [shown, name] = si(Math.max(Math.abs(low), Math.abs(high)), unit).split(" ");
     this.unit.textContent = name ?? "";
@@ -108,7 +108,7 @@ export class Tools {
     return h("div.lines", {}, h("div.buttons", {}, button("Picture", "save a picture (PNG)", () => this.act.save("picture")), this.filming), this.saved);
   }
 
-  // `make` makes a film, and tells how far it is; what comes of it stands beside the button.
+  // `make` makes a film, and reports its progress; the result is shown beside the button.
   async whileFilming(make) {
     const problem = hindrance();
     this.saved.textContent = problem;
@@ -119,7 +119,7 @@ export class Tools {
     this.filming.textContent = "Film";
   }
 
-  // `list`: names of what can be chosen to colour by.
+  // `list`: names of the fields to colour by.
   offer(list) {
     if (list.join() === [...this.by.options].map(({ value }) => value).join()) return;
     const before = this.by.value;
@@ -127,20 +127,20 @@ export class Tools {
     this.by.value = list.includes(before) ? before : "fragment";
   }
 
-  // The slider goes over `low` to `high`, m, and stands at `at`.
+  // The slider goes from `low` to `high`, m; its value is `at`.
   slide(low, high, at) {
     Object.assign(this.place, { min: low, max: high, step: (high - low) / STEPS || "any" });
     this.place.value = at;
     this.cutting.hidden = false;
   }
 
-  // m.
+  // Value in m.
   get at() {
     const { value, min, max } = this.place;
     return Math.abs(value) < 1e-6 * (max - min) ? 0 : Number(value);
   }
 
-  // What stands beside the slider.
+  // Text beside the slider.
   tell(at, hollow) {
     this.told.textContent = at === null ? "" : `${si(at, "m")}${hollow ? ", hollow" : ""}`;
     this.told.title = hollow;

@@ -1,16 +1,16 @@
-// What the server says of a case that is not handed in yet: problems, warnings, what it will cost, and its files.
+// Result of the check of a case: problems, warnings, estimate, and its files.
 
 import { count, counted, duration, h, percent, si, size } from "./figures.js";
 
-const MOST = 50; // Problems that are listed.
+const MOST = 50; // Largest number of problems that are listed.
 
-// `lines`: where each problem stands in the text, -1 for nowhere; `onLine` is called for one that is chosen.
+// `lines`: line of each problem in the text, -1 if unknown; `onLine` is called with the selected one.
 export function verdict(text, busy, told, lines, onLine) {
   if (!text.trim()) return h("p.hint", {}, "Nothing to check yet.");
   if (!told) return h("p.hint", {}, busy || "not checked yet");
   const { valid, problems, warnings = [], estimate = {} } = told;
   const head = valid ? h("p.good", {}, h("b", {}, "This case can be run.")) : problems.length ? h("p.bad", {}, h("b", {}, counted(problems.length, "problem")))
-    : h("p.warn", {}, h("b", {}, "It needs its files."));
+    : h("p.warn", {}, h("b", {}, "Files are missing."));
   return h("div", {}, h("div.verdict", {}, head, h("span.hint", {}, busy)), valid ? expected(estimate) : "",
     h("ul.problems", {}, problems.slice(0, MOST).map((one, i) => h("li", {}, line(one, lines[i], onLine)))),
     warnings.length ? h("details.fold", { open: "" }, h("summary", {}, counted(warnings.length, "warning")), h("ul.warnings", { tabindex: 0, "aria-label": "warnings" },
@@ -32,7 +32,7 @@ function expected({ elements, nodes, dt, steps, memory_bytes: memory, seconds })
 
 const WORDS = { missing: "needed: drop it here or choose it", asking: "asking the server …", ready: "waits", sent: "on the server" };
 
-// The files that the case names, each with how far it is; then those that no table names.
+// Files that the case names with their progress, then the other files.
 export function filesTable(named, outbox) {
   const spare = outbox.spare(named);
   if (!named.length && !spare.length) return h("p.hint", {}, "The case names none.");

@@ -1,5 +1,5 @@
-// The body in 3-D: a canvas with the picture and one over it with axes, scale bar and legend. Frames are drawn when something
-// has changed. It fills the element that holds it, and may be there several times; share() of camera.js has them move together.
+// The body in 3-D: a canvas for the picture and one above it for axes, scale bar and legend. Frames are drawn only after
+// a change. It fills its element, and may exist several times; share() of camera.js couples their cameras.
 
 import { Arrows } from "./arrows.js";
 import { ViewCamera } from "./camera.js";
@@ -10,11 +10,11 @@ import { ramp, scaleOf } from "./scales.js";
 import { named } from "./colours.js";
 import { Surface } from "./surface.js";
 
-const MANY = 60_000; // Triangles from which on lines wait until the body stands still.
+const MANY = 60_000; // Number of triangles from which lines are drawn only after the body stops moving.
 const STILL = 160; // ms.
 
 export class View3d {
-  // `modules` is what libraries.three() gives; `onPick` gets the row of a fragment, or -1.
+  // `modules` is the result of libraries.three(); `onPick` is called with the row of a fragment, or -1.
   constructor(modules, onPick = () => {}) {
     const { THREE } = modules;
     this.renderer = new THREE.WebGLRenderer({ antialias: true, alpha: true });
@@ -39,7 +39,7 @@ export class View3d {
     this.watch.observe(this.element);
   }
 
-  // What is shown -------------------------------------------------------------------------------------------------------
+  // State of the view -----------------------------------------------------------------------------------------------------
 
   show(snapshot) {
     this.snapshot = snapshot;
@@ -51,14 +51,14 @@ export class View3d {
     this.later();
   }
 
-  // All tets of the snapshot that is shown (section.js), for sections that are filled.
+  // All tets of the shown snapshot (section.js), for filled sections.
   fill(volume) {
     this.surface.volume = volume;
     this.surface.cutAll();
     this.later();
   }
 
-  // `range`: { low, high, number } of the scale for a field, in so many bands; 0: smooth.
+  // `range`: { low, high, number } of the scale of a field; number of bands, 0: smooth.
   colour(by, range, bands = 0) {
     Object.assign(this, { by, range, bands });
     this.surface.colour(by, range, bands);
@@ -81,7 +81,7 @@ export class View3d {
     this.later();
   }
 
-  // Cuts away what lies beyond `normal` · x = `at`, m; null: nothing.
+  // Cuts away the material beyond `normal` · x = `at`, m; null: nothing.
   slice(section) {
     this.section = section;
     if (!this.snapshot) return;
@@ -90,7 +90,7 @@ export class View3d {
     this.later();
   }
 
-  // The greatest speed of the arrows is in `fastest`.
+  // The largest speed of the arrows is `fastest`.
   pointers() {
     if (!this.look.arrows) return this.arrows.hide();
     const { normal, at } = this.section ?? {};
@@ -131,7 +131,7 @@ export class View3d {
     requestAnimationFrame(() => this.draw());
   }
 
-  // While a large body turns it is drawn without lines.
+  // A large body is drawn without lines while it turns.
   turned() {
     if (this.snapshot?.arrays.triangles.length > 3 * MANY) {
       clearTimeout(this.still);
@@ -141,7 +141,7 @@ export class View3d {
     this.later();
   }
 
-  // The script time of a frame stands in the browser's own timeline as "conoid:frame", with the number of draw calls.
+  // The browser's timeline has the script time of a frame as "conoid:frame", with the number of draw calls.
   draw() {
     this.due = false;
     if (this.closed || !this.snapshot || !this.sized) return;
@@ -206,7 +206,7 @@ export class View3d {
     });
   }
 
-  // The row of the fragment at a place of the canvas (CSS pixels), -1 beside the body: one pixel is drawn by number.
+  // Row of the fragment at a position of the canvas (CSS pixels), -1 beside the body: one pixel is drawn by row number.
   pick(x, y) {
     const { renderer, surface, eye: { camera } } = this;
     const pixel = new Uint8Array(4);

@@ -1,12 +1,12 @@
-// Many rows of a table, of which only those in view are elements. All rows are equally tall.
+// A table with many rows, of which only the visible ones have elements. All rows have the same height.
 
 import { h } from "./figures.js";
 
-const MORE = 8; // Rows beyond the view, above and below: the Tab key goes on there.
+const MORE = 8; // Rows beyond the view, above and below, so that the Tab key can continue there.
 
 export class Windowed {
-  // `make(item, n)` gives the row element of an item; it is made again where `item` or `version` is another one.
-  // `region` is the element that scrolls, `tall()` the height of a row, px.
+  // `make(item, n)` returns the row element of an item; it is made again when `item` or `version` has changed.
+  // `region` is the scrolling element, `tall()` the height of a row, px.
   constructor(region, make, tall) {
     Object.assign(this, { region, make, tall, items: [], version: 0, made: new Map() });
     this.above = h("tr.space", { "aria-hidden": "true" });
@@ -19,7 +19,7 @@ export class Windowed {
 
   close() { this.watch.disconnect(); }
 
-  // Items have a `key` that no other one has, and a `told` that changes where they look otherwise.
+  // Items have a unique `key`, and a `told` that changes with their look.
   set(items, version) {
     Object.assign(this, { items, version });
     this.draw();
@@ -50,7 +50,7 @@ export class Windowed {
     return element;
   }
 
-  // What puts the focus back where it is now, in a row that is made again.
+  // Restores the focus in a row that is made again.
   focused() {
     const active = document.activeElement;
     const found = active && this.body.contains?.(active) && [...this.made].find(([, { element }]) => element.contains(active));
@@ -63,7 +63,7 @@ export class Windowed {
   }
 }
 
-// The children of an element, in order; those that are there stay where they are.
+// Sets the children of an element in order; existing ones are not moved.
 function put(place, elements) {
   const wanted = new Set(elements);
   for (const child of [...place.children]) if (!wanted.has(child)) child.remove();

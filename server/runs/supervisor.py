@@ -36,8 +36,7 @@ _TIDY = 5.0
 """Time in s between two checks of the tokens."""
 _AGAIN = 1.0
 """Time in s between two checks while failed steps wait for their next try."""
-_GONE = "the folder of the run has been removed"
-_DAMAGED = "the folder of the run cannot be used"
+_GONE, _DAMAGED = "the folder of the run has been removed", "the folder of the run cannot be used"
 _ANSWER = 10.0
 """Time in s in which the supervisor's thread must answer. Chosen: it checks fifty times a second."""
 
@@ -145,14 +144,12 @@ class Supervisor:
         return self._waitlist.why(run_id)
 
     def taken(self, owner: str) -> tuple[int, float]:
-        """Returns the number of an owner's runs with cores or in a batch system, and the owner's core-seconds that
-        count in the queue."""
+        """Returns the number of an owner's runs with cores or in a batch system, and the counted core-seconds."""
         own = [run for run in tuple(self._open.values()) if run.owner == owner]
         return sum(run.id in self._watches for run in own), self._waitlist.used(owner, own)
 
     def stranded(self) -> list[str]:
-        """Returns open runs that have neither a watch nor a place in the queue nor a timer. There must be none at
-        any time."""
+        """Returns open runs without a watch, a place in the queue or a timer. There must be none at any time."""
         looked_after = {*self._watches, *self._index.unsaved, *self._retries.timed()}
         return scheduling.stranded(tuple(self._open.values()), looked_after)
 
@@ -243,16 +240,11 @@ class Supervisor:
         return None
 
     def _fail(self, run: Run, event: Event | None, error: Exception) -> Exception | None:
-        """Handles a failed step. A run without a folder, or whose folder alone cannot be used, has ended; any other
-        step is tried again."""
+        """Handles a failed step. A run without a usable folder has ended; any other one is tried again."""
         if not isinstance(event, Broken):
-            if self._hands.gone(run.id):
+            if (hands := self._hands).gone(run.id):
                 return self._apply(run.id, Broken(_GONE))
-            if (
-                self._retries.damaged(run.id, error)
-                and not self._hands.lives(run.id)
-                and self._hands.beyond_use(run.id)
-            ):
+            if self._retries.damaged(run.id, error) and not hands.lives(run.id) and hands.beyond_use(run.id):
                 return self._apply(run.id, Broken(f"{_DAMAGED}: {words(error)}"))
         self._waitlist.changed()
         return self._retries.put_off(run.id, error, event if isinstance(event, ONCE) else None)
@@ -283,13 +275,13 @@ class Supervisor:
             if not run.state.final and self._hands.gone(run_id):
                 self._apply(run_id, Broken(_GONE))
         for run_id in self.stranded():
-            _log.error("run %s was not looked after; it is taken up again", run_id)
+            _log.error("run %s was not supervised; it is read again", run_id)
             self._earlier_runs.take_up(self._settings.runs / run_id)
         if self._telemetry is not None:
             try:
                 self._telemetry.follow(self._store.tokens())
             except (SQLAlchemyError, TelemetryError) as error:
-                _log.error("the router does not know the newest tokens: %s", error)
+                _log.error("the router does not have the newest tokens: %s", error)
 
     def _take_up(self) -> None:
         """Makes memory and database agree with the runs' folders, and continues the runs of an earlier server."""

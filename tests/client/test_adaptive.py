@@ -301,7 +301,7 @@ def test_another_case_or_goal_is_refused_with_the_key_that_changed(tmp_path: Pat
     with pytest.raises(UsageError, match=r"holds another sweep, probe.left = 0 over"):
         find(Firing(law), out=out, goal="probe.left = 1 m/s")
     out.write_text("{}")
-    with pytest.raises(UsageError, match="no file of an adaptive sweep"):
+    with pytest.raises(UsageError, match="not a file of an adaptive sweep"):
         find(Firing(law), out=out)
 
 

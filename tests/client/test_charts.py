@@ -30,7 +30,7 @@ def test_the_course_of_a_run_that_went_on_from_a_checkpoint_is_drawn_once() -> N
 
 
 def test_a_journal_without_loads_is_refused() -> None:
-    with pytest.raises(ClientError, match="has not told the loads of its ranks"):
+    with pytest.raises(ClientError, match="has no messages with the loads of its ranks"):
         charts.course([cut(1.0)])
 
 

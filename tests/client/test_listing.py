@@ -74,7 +74,7 @@ def test_runs_are_found_by_case_label_state_words_and_date(server: LocalServer, 
     assert found("--state", "failed") == set()
     assert found("--since", "1h", "--until", "2999-01-01") == set(made)
     assert found("--since", "2999-01-01") == set()
-    assert conoid("runs", "no", "such", "words").stdout == "no run is like this\n"
+    assert conoid("runs", "no", "such", "words").stdout == "no run matches\n"
     wrong = conoid("runs", "--since", "soon")
     assert (wrong.exit_code, wrong.stderr[:24]) == (2, "conoid: --since = 'soon'")
     rows = {row.info.id: row for row in server.session.table(text="of=")}

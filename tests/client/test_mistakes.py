@@ -178,7 +178,7 @@ def test_what_did_not_come_in_time_is_told(quiet_home: Path, monkeypatch: pytest
 
 def test_without_slurm_nothing_is_prepared(quiet_home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PATH", str(quiet_home))
-    assert refused(1, "batch", "demo", "--ranks", "1").startswith("conoid: sbatch: there is none; ")
+    assert refused(1, "batch", "demo", "--ranks", "1").startswith("conoid: sbatch: not found; ")
     assert not Path("runs").exists()
 
 

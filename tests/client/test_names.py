@@ -76,7 +76,7 @@ def test_a_beginning_that_several_have_is_one_line_with_them(server: Hostile) ->
         with pytest.raises(UsageError, match="sweep = '1kbb': several ids begin so: 1kbbx, 1kbbw"):
             session.find_sweep("1kbb")
         assert session.run("1kbbx").id == "1kbbx", "the whole id is that of one"
-    assert "several begin so" in refused(2, "cancel", "1kbb", "--url", server.url)
+    assert "several ids begin so" in refused(2, "cancel", "1kbb", "--url", server.url)
 
 
 def test_a_server_too_old_for_beginnings_says_what_it_said(server: Hostile) -> None:
@@ -128,7 +128,7 @@ def test_a_run_in_a_folder_is_shown_and_asked(folder: Path) -> None:
     assert "A bar" in conoid("show", folder)
     assert "checkpoint requested" in conoid("checkpoint", folder)
     assert "snapshot requested" in conoid("snapshot", folder)
-    assert "asked to stop" in conoid("cancel", folder)
+    assert "requested to stop" in conoid("cancel", folder)
     assert {layout.CHECKPOINT_REQUEST, layout.SNAPSHOT_REQUEST, layout.STOP_REQUEST} <= {
         p.name for p in folder.iterdir()
     }
@@ -156,7 +156,7 @@ def test_files_of_a_folder_are_copied(folder: Path, quiet_home: Path) -> None:
 
 
 def test_what_only_a_server_can_do_says_so(folder: Path) -> None:
-    assert "this asks a server" in refused(2, "restart", folder)
+    assert "this command needs a server" in refused(2, "restart", folder)
     assert "there is none" in refused(1, "sweep-table", folder)
 
 

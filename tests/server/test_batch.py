@@ -74,7 +74,7 @@ def test_a_run_without_a_server_is_handed_over_once_and_followed_to_its_end(plac
 def test_a_job_that_waits_is_cancelled_by_its_folder(place: Path, cluster: Cluster) -> None:
     handed = conoid("batch", "two_tets", "--ranks", 2 * real_slurm.CORES, "--out", "large")
     assert handed.exit_code == 0, handed.output
-    assert "is asked to stop" in conoid("cancel", "large").stdout
+    assert "is requested to stop" in conoid("cancel", "large").stdout
     deadline = time.monotonic() + 20.0
     while cluster.jobs("conoid-large-")[0][1] != "CANCELLED":
         assert time.monotonic() < deadline

@@ -189,9 +189,9 @@ def test_a_run_that_has_ended_says_why_and_what_it_was_warned_of(web: Path) -> N
         return told;
     """
     told, warnings, log_shown, files = played(web, script % json.dumps([ENDED, history]))
-    assert "Failed: a process or a machine of it is gone" in told
+    assert "Failed: one of its processes or machines has failed" in told
     assert "tet 7 is inside out" in told
-    assert "Go on from step 120" in told
+    assert "Continue from step 120" in told
     assert warnings.split() == ["a", "b", "c"]
     assert log_shown.split()[1::2] == ["a", "b", "a"]
     assert "2.00 MB" in files
@@ -214,7 +214,7 @@ def test_a_run_that_has_used_up_its_steps_goes_on_with_more(web: Path) -> None:
     """
     told, button, asked = played(web, script)
     assert button in told
-    assert button == "Go on from step 500 with run.max_steps = 1000"
+    assert button == "Continue from step 500 with run.max_steps = 1000"
     assert asked == "?max_steps=1000"
 
 
@@ -243,7 +243,7 @@ def test_a_page_by_a_short_id_waits_for_the_server_and_claims_nothing(web: Path)
     """
     before, unread, went = played(web, script)
     assert "The server does not answer" in before
-    assert "Nothing of this run has been read yet" in unread
+    assert "No data of this run has been read yet" in unread
     assert not any(words in unread for words in ("accepted", "taken in", "0.0 %", "0 %", "no such run"))
     assert went.endswith("1k1ffx9000000000000000")
 
@@ -320,7 +320,7 @@ def test_what_stands_beside_a_failure_is_of_the_outcome(web: Path) -> None:
     """
     told, numbers = played(web, script)
     assert "511 ns of 1.00 µs, step 20" in told
-    assert "contact has made the most: 25" in told
+    assert "from contact: 25" in told
     assert "dt_safety" not in told
     assert "511" in numbers
     assert "1.0e-6" in numbers

@@ -112,7 +112,7 @@ def test_rows_are_sorted_filtered_and_grouped(page: Page) -> None:
     assert all(text.startswith("failed") for text in column(page, "state"))
     assert all(float(text) < 250 for text in column(page, "velocity[2]"))
     fill(page, "no such run")
-    page.wait("document.body.innerText.includes('No run is like this')")
+    page.wait("document.body.innerText.includes('No run matches')")
     press(page, "Show all runs")
     page.slide("select[aria-label=groups]", "sweep")
     assert page.evaluate("document.querySelectorAll('.runs .group').length") == 11

@@ -3,7 +3,7 @@
 from conoid.cases.output.search import Search
 
 from .cases import Gallery, Validation
-from .files import Files, SentFile, SentFiles
+from .files import Files, Report, SentFile, SentFiles
 from .history import EventPage, FragmentCourse, History, Snapshots
 from .problems import Problem
 from .runs import Receipt, RunPage, RunStatus
@@ -14,5 +14,6 @@ from .table import Table
 ALL = (
     Problem, Receipt, RunPage, RunStatus, Table, Validation, Gallery, EventPage, Files, SentFile, SentFiles, Snapshots,
     FragmentCourse, History, Me, Health, Wish, SweepPage, Sweep, Search, Reported,
+    Report,
 )  # fmt: skip
 """Schemas of whole answers and of requests."""

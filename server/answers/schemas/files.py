@@ -34,3 +34,11 @@ class SentFiles(msgspec.Struct, kw_only=True):
 
     files: list[SentFile]
     bytes: int
+
+
+class Report(msgspec.Struct, kw_only=True):
+    """The report of a run: its path in the run's folder, its size in bytes, its address."""
+
+    path: str
+    size: int
+    url: str
