@@ -16,6 +16,7 @@ from ..reports import compare as comparing
 from ..reports import report as reporting
 from ..studies import replay
 from . import tables
+from .comparison_tables import comparison_tables
 from .console import echo, echo_json
 from .options import Json, SourceArgument, Token, Url, aloud, named, opened, show
 
@@ -126,7 +127,7 @@ def compare(
     if as_json:
         echo_json(found)
         return
-    for each in tables.comparison_tables(found):
+    for each in comparison_tables(found):
         show(each)
     if out is not None:
         echo(out)

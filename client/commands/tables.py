@@ -36,15 +36,8 @@ from conoid.cases.run import State
 
 from ..remote.rows import RunRow
 from ..remote.run_info import RunInfo
-from ..reports.compare import AT_THE_END, Comparison
 from ..studies.replay import Account
 from .display import STATE_STYLE
-
-_LONGEST = 60
-"""Characters of the value of a key that are shown. Chosen: two lines beside another one; a description has a page."""
-_NUMBERS = ("A", "B", "B - A", "% of A")
-_LEAST = 26
-"""Characters of names beside numbers. Chosen: the rest of 80, and most names fit."""
 
 
 def table(*columns: str, right: Sequence[str] = (), wide: Sequence[str] = ("case",), least: int | None = None) -> Table:
@@ -283,29 +276,4 @@ def end_tables(outcome: Outcome, told: Collection[str] = ()) -> list[Table | str
         parts += ["", probes_table(outcome.probes)]
     if outcome.reference:
         parts += ["", checks_table(outcome.reference)]
-    return parts
-
-
-def _brief(text: str) -> str:
-    return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 1]}…"
-
-
-def comparison_tables(found: Comparison) -> list[Table | str]:
-    """Prints the differences between two runs, their outcomes and fragments."""
-    same = "the same answer, to the bit" if found.same_answer else "different answers"
-    keys = table("key", "A", "B", wide=("A", "B"))
-    for each in found.keys:
-        keys.add_row(each.key, *("–" if value is None else _brief(str(value)) for value in (each.a, each.b)))
-    runs = pairs(dict(zip("AB", found.names, strict=True)))
-    parts: list[Table | str] = [runs, same, "", keys if found.keys else "no key of the case differs"]
-    for title, values in (("at the end", found.ends), ("fragments", found.sizes)):
-        if values:
-            made = table(title, "unit", *_NUMBERS, right=_NUMBERS, wide=(title,), least=_LEAST)
-            made.padding = 0
-            for one in values:
-                share = fixed(100 * one.relative) if one.difference else ""
-                share = f"+{share}" if one.relative > 0 else share
-                change = number(one.difference) if one.difference else "same"
-                made.add_row(one.name.removesuffix(AT_THE_END), one.unit, number(one.a), number(one.b), change, share)
-            parts += ["", made]
     return parts

@@ -6,9 +6,7 @@ request waits for ever, and no answer fills the memory or the disk.
 
 import base64
 import hashlib
-import json
 import queue
-import shutil
 import threading
 import time
 import uuid
@@ -25,12 +23,11 @@ from conoid.cases.messages import AnyMessage
 
 from ..errors import AnswerError, ClientError, UnreachableError, UsageError, passes, refusal
 from ..journal import from_line
+from . import replies
 from .config import address
 
 T = TypeVar("T")
 
-_WORDS = 300
-"""Largest number of characters of an error message that are shown. Chosen."""
 _AS_IT_IS = {"Accept-Encoding": "identity"}
 """A file is requested with its length."""
 
@@ -43,9 +40,6 @@ _SPARE = 10.0
 """Time in s beyond the allowed silence after which an answer whose head arrives byte by byte is given up."""
 _SLOWEST = 1000.0
 """Least mean rate of an answer in bytes per s, after its first 30 s. Chosen: slower than any connection."""
-_LONGEST = 1 << 28
-"""Largest size in bytes of an answer that is read into memory, or has no length. Chosen: ten times the largest
-snapshot."""
 UNAUTHORIZED = 401
 """HTTP status of a request without a valid token."""
 NOT_FOUND = 404
@@ -83,7 +77,7 @@ class Http:
         Raises UsageError for an impossible token or address.
         """
         shown = (token or "").strip()
-        if not _visible(shown):
+        if not replies.visible(shown):
             raise UsageError("token: only visible ASCII characters are allowed; was it copied whole?")
         headers = {"Authorization": f"Bearer {shown}"} if shown else {}
         self.url = address(url)
@@ -123,7 +117,7 @@ class Http:
         """
         headers = {"Content-Type": content} if content else {}
         if key is not None:
-            if not _visible(key):
+            if not replies.visible(key):
                 raise UsageError(f"Idempotency-Key {key[:80]!r}: 1 to 255 visible ASCII characters")
             headers["Idempotency-Key"] = key
         timeout = httpx2.Timeout(_ANSWER + more, connect=_CONNECTION)
@@ -152,7 +146,7 @@ class Http:
             target.parent.mkdir(parents=True, exist_ok=True)
             with self._opened("GET", path, headers=_AS_IT_IS) as response, beside.open("xb") as file:
                 digest = hashlib.sha256()
-                for chunk in self._chunks(response, _most(response, target)):
+                for chunk in self._chunks(response, replies.most(response, target)):
                     digest.update(chunk)
                     file.write(chunk)
             if listed is not None and (got := beside.stat().st_size) != listed:
@@ -203,14 +197,14 @@ class Http:
         try:
             with closing(self._begun(method, path, **options)) as response:
                 if 300 <= response.status_code < 400:
-                    raise AnswerError(f"{self.url} redirects to {_place(response)}; write that address")
+                    raise AnswerError(f"{self.url} redirects to {replies.place(response)}; write that address")
                 if response.status_code >= 400:
                     raise refusal(response.status_code, self._refusal(response))
                 yield response
         except httpx2.InvalidURL as error:
             raise UsageError(f"url = {self.url!r}: {error}") from None
         except httpx2.TransportError as error:
-            raise UnreachableError(f"no answer from {self.url}: {_reason(error)}") from None
+            raise UnreachableError(f"no answer from {self.url}: {replies.reason(error)}") from None
         except (httpx2.HTTPError, httpx2.StreamError) as error:
             raise self._unreadable(error) from None
 
@@ -237,7 +231,7 @@ class Http:
         return answer
 
     def _body(self, response: httpx2.Response) -> bytes:
-        return b"".join(self._chunks(response, _LONGEST))
+        return b"".join(self._chunks(response, replies.LONGEST))
 
     def _chunks(self, response: httpx2.Response, most: int) -> Iterator[bytes]:
         """Yields at most ``most`` bytes of an answer. Raises AnswerError for an endless or slow one."""
@@ -253,7 +247,7 @@ class Http:
 
     def _refusal(self, response: httpx2.Response) -> Mapping[str, Any]:
         """Returns the message of the server; for a missing token, how to set one for this client."""
-        told = _problem(response.status_code, self._body(response))
+        told = replies.problem(response.status_code, self._body(response))
         if response.status_code != UNAUTHORIZED:
             return told
         if self._has_token:
@@ -276,41 +270,5 @@ class Http:
 
     def _unreadable(self, error: Exception) -> ClientError:
         """Error for an answer of another program, or of a newer server."""
-        why = " ".join(str(error).split())[:_WORDS]
+        why = " ".join(str(error).split())[: replies.WORDS]
         return AnswerError(f"the answer of {self.url} cannot be read: {why}; is it a Conoid server, and no newer?")
-
-
-def _problem(status: int, content: bytes) -> Mapping[str, Any]:
-    try:
-        body = json.loads(content)
-    except (ValueError, RecursionError):
-        body = None
-    return body if isinstance(body, dict) else {"title": f"the server answered {status}"}
-
-
-def _place(response: httpx2.Response) -> str:
-    """Returns the target of a redirect; the address as it is written may be invalid."""
-    return repr(response.headers.get("location", "nowhere")[:_WORDS])
-
-
-def _most(response: httpx2.Response, target: Path) -> int:
-    """Returns the largest size of a downloaded file: its announced size, if the disk has room for it. Raises
-    ClientError."""
-    told = response.headers.get("content-length", "")
-    if not told.isdecimal() or "content-encoding" in response.headers:
-        return _LONGEST
-    free = shutil.disk_usage(target.parent).free
-    if int(told) > free:
-        raise ClientError(f"{target}: cannot be written: it has {size(int(told))}, and {size(free)} are free")
-    return int(told)
-
-
-def _reason(error: Exception) -> str:
-    if isinstance(error, httpx2.ConnectError):
-        return "is it running there? (conoid serve; another address: CONOID_URL or --url)"
-    return " ".join(str(error).split()) or type(error).__name__
-
-
-def _visible(text: str) -> bool:
-    """Whether all characters are visible ASCII, as a header requires."""
-    return all("!" <= letter <= "~" for letter in text)
