@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 from conoid.client.cli import app
 from conoid.client.errors import AnswerError, ClientError, UsageError
 from conoid.client.local.safe_paths import inside
-from conoid.client.remote import http
+from conoid.client.remote import http, replies
 from conoid.client.remote.config import address
 from conoid.client.remote.http import Http
 from conoid.client.run import Run
@@ -116,7 +116,7 @@ def endless(first: bytes, piece: bytes) -> Answer:
 def test_an_answer_without_end_is_given_up(
     answer: Answer, words: str, server: Hostile, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(http, "_LONGEST", 1 << 20)
+    monkeypatch.setattr(replies, "LONGEST", 1 << 20)
     monkeypatch.setattr(http, "_ANSWER", 0.5)
     monkeypatch.setattr(http, "_SPARE", -29.5)
     server.answers = Every(answer)
@@ -150,7 +150,7 @@ def test_a_file_that_no_disk_holds_is_not_begun(server: Hostile, tmp_path: Path)
 def test_a_file_without_a_length_has_one_all_the_same(
     server: Hostile, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(http, "_LONGEST", 1 << 20)
+    monkeypatch.setattr(replies, "LONGEST", 1 << 20)
     server.answers["/f"] = endless(head(200, None), b"x" * 65536)
     with Http(server.url) as asked, pytest.raises(AnswerError, match="is longer than"):
         asked.download("/f", tmp_path / "f")
