@@ -83,6 +83,11 @@ def test_python_compiles_and_names_what_the_client_has(text: str) -> None:
             assert hasattr(known, node.attr) or node.attr in known.__annotations__, ast.unparse(node)
 
 
+def test_the_reference_of_the_client_has_every_public_name() -> None:
+    text = (ROOT / "docs" / "reference" / "python.md").read_text(encoding="utf-8")
+    assert sorted(re.findall(r"^::: conoid\.client\.(\w+)$", text, re.MULTILINE)) == sorted(conoid.client.__all__)
+
+
 # Commands
 
 
