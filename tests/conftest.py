@@ -1,4 +1,4 @@
-"""What all tests begin with.
+"""Start of all tests.
 
 Numba is pointed to the worker's kernel cache before anything imports it: compiled once, not once a run. Ranks that wait
 leave their core to others, for there may be fewer cores than ranks. And what tests start can be interrupted: a shell

@@ -21,7 +21,7 @@ WORKER_ONLY = {"numba", "mpi4py", "gmsh"}
 ONE_MODULE = {"mpi4py": "worker", "gmsh": "worker", "pyvista": "client", "numba": "worker"}
 """Libraries that one module of one house imports, and no other."""
 HEAVY = WORKER_ONLY | {"pyvista", "vtk", "vtkmodules"}
-"""What the contract, the client and the server run without; pictures alone need pyvista."""
+"""Libraries without which the contract, the client and the server run; only pictures need pyvista."""
 TESTS = sorted((ROOT / "tests").rglob("*.py"))
 SOURCES = sorted(path for house in HOUSES for path in (ROOT / house).rglob("*.py"))
 
@@ -71,7 +71,7 @@ def test_relative_imports_stay_at_home() -> None:
 
 
 def test_helpers_of_tests_are_modules_of_their_own() -> None:
-    """What two tests need is in neither, and not in a conftest, which holds fixtures."""
+    """Code that two tests need is in neither, and not in a conftest, which holds fixtures."""
     for path in TESTS:
         for node in ast.walk(tree(path)):
             if isinstance(node, ast.ImportFrom):
@@ -141,7 +141,7 @@ PATTERNS = {"cases/laws/NAME.py", "worker/materials/NAME.py", "server/routes/NAM
 
 
 def prose(path: Path) -> Iterator[str]:
-    """What a page says, or a module in its comments and docstrings."""
+    """Text of a page, or of the comments and docstrings of a module."""
     text = path.read_text(encoding="utf-8")
     if path.suffix == ".md":
         yield text
@@ -304,7 +304,7 @@ TELLS = {
     "worker/output/frames.py", "worker/run/job.py", "worker/snapshots/decimate.py", "worker/snapshots/invariants.py",
     "worker/snapshots/table.py",
 }  # fmt: skip
-"""They report, refuse and balance; what they compute is in no answer, but for parts that are pushed apart at the start
+"""Files that report, refuse and balance; no answer depends on them, except for parts that are pushed apart at the start
 (docs/theory/sums.md)."""
 POWERS_OF_TWO, REFUSES, WINDS = "worker/mesh/occ/frame.py", "worker/mesh/frame.py", "worker/mesh/occ/shells.py"
 """A scale that is rounded; a size in a message; how often a surface goes round a point, which is rounded."""

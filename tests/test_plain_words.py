@@ -1,5 +1,7 @@
 """Tests of the checker of words: it finds what CONVENTIONS.md bans, and leaves code and plain prose alone."""
 
+from collections import Counter
+
 import pytest
 
 from . import plain_words
@@ -66,6 +68,13 @@ def test_long_lines_are_found_except_tables_and_addresses() -> None:
 )
 def test_commit_subjects_name_an_area_and_what_changed(subject: str, good: bool) -> None:
     assert plain_words.is_subject(subject) is good
+
+
+def test_more_findings_than_a_folder_may_have_are_reported(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(plain_words, "NOT_YET", {"cases": 2})
+    counts = Counter({"cases": 3, "docs": 1})
+    assert [line.partition(":")[0] for line in plain_words.excess(counts)] == ["cases", "docs"]
+    assert plain_words.excess(Counter({"cases": 2})) == []
 
 
 def test_every_kind_of_list_in_the_conventions_is_read() -> None:

@@ -18,7 +18,7 @@ FACES = {
     PYRAMID5: ((0, 3, 2, 1), (0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)),
 }
 DEGENERATE = {WEDGE6: (1, 0, 3, 4, 2, 2, 5, 5), PYRAMID5: (0, 1, 2, 3, 4, 4, 4, 4)}
-"""As LS-DYNA writes them: the wedge lies on a face of four corners."""
+"""Elements as LS-DYNA writes them: the wedge lies on a face of four corners."""
 
 
 @dataclass
@@ -29,7 +29,7 @@ class Mixture:
     elements: dict[int, Element]
 
     def content(self, degenerate: bool = False) -> Content:
-        """As a reader gives it."""
+        """Elements as a reader returns them."""
         return Content(np.arange(len(self.points)), self.points, list(self.cells(degenerate)))
 
     def cells(self, degenerate: bool = False) -> list[Cells]:

@@ -1,4 +1,4 @@
-"""How far the worst tet of a mesh is from the others, by step lengths; and how tets share faces."""
+"""Ratio of the worst tet of a mesh to the others, by step lengths; and shared faces of tets."""
 
 from dataclasses import dataclass
 

@@ -350,4 +350,4 @@ POISONS: tuple[Callable[[Random, list[bytes]], None], ...] = (
     lambda random, lines: lines.append(b"*NODE\n1, 0, zero, 0"),
     lambda random, lines: lines.insert(0, b"1, 2, 3"),
 )
-"""What makes any of the files one that must be refused."""
+"""Changes that make any of the files one that must be refused."""

@@ -192,7 +192,7 @@ except MeshError as error:
 
 @pytest.mark.parametrize(("memory", "says"), [(3 * 2**30, "True"), (200 * 2**20, "0.195 GiB")])
 def test_a_child_asks_for_no_more_than_is_allowed(memory: int, says: str, cache: Path) -> None:
-    """Under hard limits, as of ``ulimit -v`` and ``ulimit -t`` or of a batch system, which nobody can raise."""
+    """Under hard limits, as of ``ulimit -v`` and ``ulimit -t`` or of a batch system, which no user can raise."""
     command = [sys.executable, "-c", UNDER_LIMITS, str(memory), "200"]
     ended = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True)
     assert says in ended.stdout

@@ -75,7 +75,7 @@ def cut_off(path: Path, chance: Random, where: str) -> None:
 
 
 def check_gmsh(folder: Path, seed: int, count: int) -> int:
-    """How many files meshio could read, too."""
+    """Number of files that meshio could read, too."""
     command = [sys.executable, str(Path(__file__).with_name("gmsh_files.py")), str(folder), str(seed), str(count)]
     subprocess.run(command, check=True, timeout=600)
     both = 0

@@ -91,7 +91,7 @@ def one(nodes: list[int], points: np.ndarray = CUBE, line: int = 0) -> NamedMesh
     ],
 )
 def test_a_hexahedron_may_repeat_nodes(nodes: list[int], volume: float | None, tets: int) -> None:
-    """As a wedge in two ways, a pyramid, a flat tet, a tet in two ways, and with one edge gone."""
+    """A hexahedron as a wedge in two ways, a pyramid, a flat tet, a tet in two ways, and with one edge gone."""
     if volume is None:
         with pytest.raises(MeshError, match="hexahedron 7 is flat"):
             one(nodes)

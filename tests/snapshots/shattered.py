@@ -30,7 +30,7 @@ class Shattered:
     """(tets,) which fragment each tet was meant for; they may fall into several pieces."""
 
     def shares(self, ranks: int) -> list[Share]:
-        """What each of some ranks gives away, with tets scattered among them and in any order."""
+        """The share of each of some ranks, with tets scattered among them and in any order."""
         random = np.random.default_rng(ranks)
         owner = random.integers(0, ranks, len(self.tets))
         owner[random.permutation(len(self.tets))[:ranks]] = np.arange(ranks)

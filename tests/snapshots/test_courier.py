@@ -1,4 +1,4 @@
-"""What a rank gives away becomes a snapshot in a process of its own; nothing that happens there holds up the solver."""
+"""The share of a rank becomes a snapshot in a process of its own; no failure there delays the solver."""
 
 import hashlib
 import io
@@ -155,7 +155,7 @@ def test_the_last_snapshot_does_not_wait_for_what_others_leave(
 
 
 def test_what_waits_for_the_network_is_bounded_and_counted() -> None:
-    """Nobody listens at the endpoint."""
+    """The endpoint has no listener."""
     telemetry = Telemetry("tcp/127.0.0.1:1", "conoid/v1/ann/run")
     began = time.monotonic()
     for n in range(5):

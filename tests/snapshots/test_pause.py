@@ -1,4 +1,4 @@
-"""How far apart snapshots are: what they may cost (docs/reference/snapshots.md)."""
+"""Time between snapshots, by their cost (docs/reference/snapshots.md)."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""What a rank gives away: the rows that a material has."""
+"""The share of a rank: the rows that a material has."""
 
 import numpy as np
 

@@ -10,7 +10,9 @@ RATES = tomllib.loads(Path(__file__).with_name("rates.toml").read_text(encoding=
 
 
 def assert_converges(name: str, errors: Sequence[float]) -> None:
-    """The errors, each at half the size of the one before, fall with the order of the table, and as far as it says."""
+    """The errors, each at half the size of the one before, fall with the order of the table, as far as it
+    goes.
+    """
     rate = RATES[name]
     orders = [math.log2(coarse / fine) for coarse, fine in pairwise(errors)]
     assert min(orders) > rate["order"] - rate["within"], f"{name}: orders {orders}"

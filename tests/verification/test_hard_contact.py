@@ -29,7 +29,7 @@ SIZE = 1e-3
 
 
 def depth(sim: Simulation) -> float:
-    """How far the deepest node inside another part is from that part's surface, m; of two parts on one rank."""
+    """Depth of the deepest node inside another part below its surface, m; of two parts on one rank."""
     assert sim.contact is not None
     x, part = sim.model.nodes.x, sim.model.nodes.part
     faces = sim.contact.exterior.motion.sides.faces.nodes[:, :3]
@@ -234,7 +234,7 @@ class Shot:
         return float(begin) * SIZE if begin < end else None
 
     def fly(self) -> tuple[float, float] | None:
-        """How far the tet has flown, m, at the step that pushes it first, and after it; None when none does."""
+        """Distance that the tet has flown, m, at the step that pushes it first, and after it; None when none does."""
         motions: list[dict[str, Any]] = [
             {"velocity": tuple(self.drift + v)} for v in (0.0 * self.way, self.way * self.speed)
         ]
@@ -250,7 +250,8 @@ class Shot:
 
 
 def misjudged(seeds: range) -> tuple[int, list[int]]:
-    """How many shots hit, and the seeds of those that were pushed too early, too late or at all; grazing ones may be.
+    """Number of shots that hit, and the seeds of those that were pushed too early, too late or at all; grazing ones may
+    be.
 
     Grazing is what half a per cent more or less of either body's size decides; a hundredth of a face is near enough.
     """

@@ -50,7 +50,7 @@ def elements_across(closing: float, size: float) -> float:
 
 @dataclass(frozen=True)
 class Impact:
-    """What the run of an impact measured."""
+    """Measurements of the run of an impact."""
 
     force: float
     """N, of whole spheres."""
@@ -98,7 +98,7 @@ def _run(folder: Path, closing: float, mesh: tuple[float, float]) -> Impact:
 
 def _parting(folder: Path, upper: float, closing: float) -> float:
     """The speed of parting over that of closing: the spheres' meshes differ in mass by 6e-5, and the momentum at the
-    start says how fast the lower one is.
+    start gives the speed of the lower one.
     """
     with (folder / layout.HISTORY).open() as lines:
         first = next(csv.DictReader(lines))

@@ -111,7 +111,7 @@ def shear_errors(steps: int) -> float:
 
 
 def test_simple_shear_follows_the_jaumann_rate() -> None:
-    """V11: to a shear of 10 the stress of a material with a strength turns as the rate says; the error is the shear of
+    """V11: to a shear of 10 the stress of a material with a strength turns by the rate; the error is the shear of
     one step, times G."""
     errors = [shear_errors(steps) for steps in (250, 500, 1000, 2000)]
     assert_converges("simple_shear", errors)

@@ -26,7 +26,7 @@ def exact(values: Floats) -> Floats:
 def test_a_spinning_bursting_body_keeps_its_momentum(metal: str, form: Form) -> None:
     """Flight, spin and a violent start; forces add to zero as integers in every step.
 
-    x(n) x m v(n+1/2) is what the leapfrog keeps: v does not turn the way it goes, forces of a symmetric stress have
+    x(n) x m v(n+1/2) is conserved by the leapfrog: v does not turn the way it goes, forces of a symmetric stress have
     no moment.
     """
     material: materials.Material = METALS[metal]

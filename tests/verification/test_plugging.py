@@ -9,7 +9,9 @@ from ..bench import plugging
 SIZES = (0.6, 0.4)
 """mm."""
 OPEN = {399.6: 0.03, 285.4: 0.10, 244.2: 0.33}
-"""What tets of 0.4 mm leave open, of the published speed: 0, 8 and 31 % as measured (docs/verification/plugging.md)."""
+"""Error of tets of 0.4 mm, as a share of the published speed: 0, 8 and 31 % as measured
+(docs/verification/plugging.md).
+"""
 
 
 @pytest.mark.slow

@@ -72,7 +72,7 @@ def stored(sim: Simulation) -> float:
 
 @dataclass(frozen=True)
 class Bar:
-    """How a Taylor bar ended; lengths in mm."""
+    """The end of a Taylor bar; lengths in mm."""
 
     length: float
     radius: float
@@ -168,7 +168,7 @@ def breathing(form: Form) -> float:
 
 
 def test_the_split_form_damps_elastic_motion_and_nodal_does_not() -> None:
-    """What validate, converge and the reference say of it (cases/warnings/damping.py); that of 6,400 tets is in
+    """Texts of validate, converge and the reference about it (cases/warnings/damping.py); that of 6,400 tets is in
     docs/theory/elements.md."""
     assert breathing("split") > 0.08
     assert 0.0 <= breathing("nodal") < 0.03, "differences within a tet are stored, and come back"

@@ -33,7 +33,7 @@ def test_what_flies_rebounds_as_with_many_more_sweeps() -> None:
 
 
 def pen(friction: float) -> Case:
-    """A block of steel that flies at a cube of glass between rigid walls, whom it breaks against them, for 20 us."""
+    """A block of steel that breaks a cube of glass between rigid walls, for 20 us."""
 
     def box(half: float, low: float, high: float, **of: Any) -> dict[str, Any]:
         corners = {"low": [-half, -half, low], "high": [half, half, high]}
@@ -69,7 +69,9 @@ def outcome(case: Case) -> Energy:
 
 @pytest.mark.parametrize("friction", [0.0, 0.3])
 def test_contact_makes_no_energy_where_walls_press_back(friction: float) -> None:
-    """By sweeps that know nothing of walls it takes 0.33 of it without friction and makes 0.033 with (by hand)."""
+    """By sweeps that know nothing of walls it takes 0.33 of it without friction and makes 0.033 with (2026-11-28, no
+    script).
+    """
     found = outcome(pen(friction))
     print(found)
     assert -0.01 < found.contact / found.initial < 0.12

@@ -73,7 +73,8 @@ def test_phase_error_falls_with_the_square_of_the_size(form: Form) -> None:
 
 @pytest.mark.parametrize("form", FORMS)
 def test_a_wave_of_twenty_elements_keeps_its_height(form: Form) -> None:
-    """Loss of amplitude a wavelength without viscosity: none, but for what the split form spends on its pressure modes.
+    """Loss of amplitude a wavelength without viscosity: none, except the energy that the split form spends on its
+    pressure modes.
 
     The ledger closes in any case.
     """
