@@ -36,7 +36,47 @@ ALLOWED = {
     r"\bwho (?:asks|am i)\b": "the user of a request",
 }
 """Contexts in which a banned word is correct, and why."""
-NOT_YET: dict[str, int] = {}
+NOT_YET: dict[str, int] = {
+    ".": 1,
+    "cases": 2,
+    "cases/output": 4,
+    "client": 4,
+    "client/commands": 1,
+    "client/decks": 14,
+    "client/drawing": 44,
+    "client/local": 2,
+    "client/remote": 2,
+    "client/reports": 31,
+    "client/studies": 8,
+    "client/sweeps": 45,
+    "client/web": 3,
+    "docs/reference": 1,
+    "server/answers": 1,
+    "server/launch": 3,
+    "server/runs": 1,
+    "tests/bench": 116,
+    "tests/cases": 33,
+    "tests/client": 61,
+    "tests/contact": 71,
+    "tests/drill": 98,
+    "tests/fracture": 1,
+    "tests/mesh": 14,
+    "tests/parallel": 44,
+    "tests/server": 200,
+    "tests/snapshots": 1,
+    "tests/verification": 5,
+    "tests/worker": 78,
+    "worker/accounts": 21,
+    "worker/contact": 5,
+    "worker/gauges": 18,
+    "worker/kernels": 19,
+    "worker/mesh": 105,
+    "worker/migration": 24,
+    "worker/output": 34,
+    "worker/parallel": 1,
+    "worker/scene": 39,
+    "worker/snapshots": 24,
+}
 """Folders that are not clean yet, and how many findings they have: these numbers may fall and not rise."""
 
 

@@ -23,7 +23,7 @@ BUILD = "from setuptools import build_meta; import sys; print(getattr(build_meta
 
 def called(*command: str | Path, folder: Path) -> str:
     ended = subprocess.run(
-        [*map(str, command)], cwd=folder, env={**os.environ, **MPI}, capture_output=True, text=True, timeout=240,
+        [*map(str, command)], cwd=folder, env={**os.environ, **MPI}, capture_output=True, text=True, timeout=600,
         check=False,
     )  # fmt: skip
     assert ended.returncode == 0, ended.stdout + ended.stderr
@@ -57,6 +57,7 @@ def installed(wheel: Path, folder: Path) -> Path:
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(1200)  # where no kernel is compiled yet
 def test_a_wheel_of_the_source_distribution_runs_in_an_empty_folder(tmp_path: Path) -> None:
     source = built("sdist", checkout(tmp_path / "checkout"), tmp_path)
     shutil.unpack_archive(source, tmp_path, filter="data")
