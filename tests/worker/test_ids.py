@@ -20,6 +20,14 @@ def test_places_are_those_of_the_ids_and_minus_one_elsewhere(many: int, kind: ty
 
 
 @pytest.mark.parametrize("many", [1, 1000])
+@pytest.mark.parametrize("known", [[], [90, 0, 4000, 3, 4]], ids=["none", "shuffled"])
+def test_an_index_has_the_places_in_a_list_of_any_order(many: int, known: list[int]) -> None:
+    wanted = np.tile(WANTED, (many, 1))
+    found = ids.IdIndex(np.array(known, np.int64)).places(wanted)
+    assert found.tolist() == [[known.index(w) if w in known else -1 for w in row] for row in wanted.tolist()]
+
+
+@pytest.mark.parametrize("many", [1, 1000])
 def test_ids_that_are_there_are_located(many: int) -> None:
     wanted = np.tile([4000, 0, 90], many)
     assert ids.located(KNOWN, wanted).tolist() == [4, 0, 3] * many
