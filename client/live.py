@@ -54,6 +54,15 @@ class Live:
     """The newest snapshot."""
     log: deque[Log] = field(default_factory=lambda: deque(maxlen=_LOG_TAIL))
 
+    @property
+    def pieces(self) -> tuple[str, int | None]:
+        """Noun and number of what the bodies have come to: fragments where something can break (its counts have
+        sizes), else the pieces that erosion leaves, which the snapshots count. As the page has it (live.js).
+        """
+        if self.counts is None or self.counts.sizes:
+            return "fragment", None if self.counts is None else self.counts.fragments
+        return "piece", self.counts.fragments if self.snapshot is None else self.snapshot.fragments
+
     def take(self, message: AnyMessage) -> None:
         """Adds a message."""
         self.seq, self.wall, self.away = message.seq, message.wall, 0.0

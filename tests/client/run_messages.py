@@ -48,7 +48,7 @@ def whole() -> list[AnyMessage]:
         progress(6, 0.25),
         Load(run=RUN, seq=7, wall=START + 7, imbalance=1.2, phases={
             "elements": [1.0, 0.5], "nodes": [0.2, 0.2], "exchange": [0.2, 0.8], "output": [0.1, 0.0]}),
-        Counts(run=RUN, seq=8, wall=START + 8, elements=24000, nodes=4961, shared=310, fragments=1,
+        Counts(run=RUN, seq=8, wall=START + 8, elements=24000, nodes=4961, shared=310, fragments=1, sizes=[1],
                elements_per_rank=[12000, 12000]),
         Frame(run=RUN, seq=9, wall=START + 9, index=0, path="frames/000000.vtkhdf"),
         Log(run=RUN, seq=10, wall=START + 10, level="warning", text="the foot has folded", rank=1),
