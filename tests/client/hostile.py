@@ -1,4 +1,4 @@
-"""A server that answers with whatever bytes a test wants, and texts that no terminal should be given."""
+"""A server that answers with any bytes that a test wants, and texts that must not reach a terminal."""
 
 import json
 import socket

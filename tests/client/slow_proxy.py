@@ -1,4 +1,4 @@
-"""A line between a client and a server, in this process: it may be slow, and breaks where it is told to."""
+"""A proxy between a client and a server, in this process: it can be slow, and breaks the connection on request."""
 
 import socket
 import threading

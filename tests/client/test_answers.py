@@ -1,4 +1,4 @@
-"""Whatever answers at an address, and whatever it says: one line, in a bounded time, and no file outside the folder."""
+"""Answers of any server: one line, in a bounded time, and no file outside the folder."""
 
 import itertools
 import json

@@ -1,4 +1,4 @@
-"""``conoid runs``: which run was it; and short ids, which every command takes."""
+"""``conoid runs``: filters and columns; short ids, which every command accepts."""
 
 from datetime import datetime
 from pathlib import Path

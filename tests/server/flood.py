@@ -1,4 +1,5 @@
-"""``flood.py HOST PORT SECONDS THREADS``: asks without a token as often as it can; prints the answers by status."""
+"""``flood.py HOST PORT SECONDS THREADS``: sends requests without a token as fast as it can; prints the number of
+answers by status."""
 
 import json
 import socket

@@ -1,4 +1,4 @@
-"""Bodies that nobody in his right mind sends: small ones that cost much, numbers without end, half characters."""
+"""Hostile bodies: small ones that cost much, numbers without end, half characters."""
 
 import json
 import random

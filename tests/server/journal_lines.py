@@ -1,4 +1,4 @@
-"""What a run says that computes nothing: reports, cuts and snapshots, as lines of a journal."""
+"""Messages of a run that computes nothing, as lines of a journal: reports, balance events, snapshots."""
 
 import hashlib
 from collections.abc import Iterator

@@ -1,4 +1,4 @@
-"""Sweeps to hand in, one case over four ends, and servers that are killed while they take one."""
+"""Requests for sweeps of one case with four end times, and servers that are killed during a submission."""
 
 import json
 import time

@@ -1,4 +1,4 @@
-"""What the files of a run tell of its end where its worker has not."""
+"""The end of a run from its files, if its worker wrote no outcome."""
 
 import math
 import os

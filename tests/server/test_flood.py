@@ -1,4 +1,4 @@
-"""Those who open connections and say nothing, log floods, and tokens that are revoked in the middle of an answer."""
+"""Clients that open silent connections, floods of the log, and tokens that are revoked during an answer."""
 
 import logging
 import socket

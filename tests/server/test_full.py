@@ -1,4 +1,4 @@
-"""A full disk under a server that starts and under its commands: what can be done is done, the rest is one line."""
+"""A full disk when a server starts and under its commands: what is possible is done, the rest is one line."""
 
 import asyncio
 import errno

@@ -1,4 +1,4 @@
-"""Hostile bodies: each gets its one line, costs little, and nobody else notices."""
+"""Hostile bodies: each is refused in one line at a small cost, and other users are not delayed."""
 
 import json
 import math

@@ -1,4 +1,4 @@
-"""What is no regular file, or has no end, where a file of a run should be: nobody waits, nothing fills the memory."""
+"""Irregular or endless files in place of a run's files: no request hangs, and the memory stays bounded."""
 
 import os
 import signal

@@ -1,4 +1,4 @@
-"""What decides about jobs, without Slurm: replies that are lost, second jobs, what a signal has meant, the lock."""
+"""Decisions about jobs without Slurm: lost replies, second jobs, meaning of signals, the lock."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""The embedded Zenoh router: who hears whom."""
+"""The embedded Zenoh router: which client may subscribe to which runs."""
 
 import json
 import socket

@@ -1,4 +1,4 @@
-"""Whose turn it is: shares, priorities, backfill with a reservation, memory. Pure functions, no clock."""
+"""Scheduling: shares, priorities, backfill with a reservation, memory. Pure functions, no clock."""
 
 import math
 import random
