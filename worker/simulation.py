@@ -44,7 +44,7 @@ from .parallel.team import team
 from .reduction import StepReduction
 from .rigid.stage import Rigid
 from .rigid.start import rigid_of
-from .scene import conditions, domain
+from .scene import conditions, domain, starting
 from .scene.assembly import Say, quiet
 
 
@@ -183,7 +183,7 @@ def build(case: Case, folder: Path, comm: Comm, say: Say = quiet) -> Simulation:
     say("setting up the first step")
     walls = conditions.walls_of(case)
     scene = conditions.build(case, model, piece.loads, piece.neighbours, comm, walls)
-    more = conditions.start(case, model, scene, comm)
+    more = starting.start(case, model, scene, comm)
     rigid = rigid_of(case, model, walls, comm)
     timers = Timers(comm, team(case.run.threads))
     sim = _assemble(case, model, piece.neighbours, scene, (rigid, walls), piece.node_volume, comm, timers, piece.tied)

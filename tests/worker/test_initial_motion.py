@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from conoid.worker.model.hashing import splitmix64, uniform
-from conoid.worker.scene import assembly, domain
+from conoid.worker.scene import domain, motion
 
 from .kernels import scene, whole_of
 from .meshes import Floats, block
@@ -60,5 +60,5 @@ def test_jitter_fills_its_range_and_adds_to_the_velocity() -> None:
 def test_jitter_does_not_know_of_ranks(ranks: int) -> None:
     whole = whole_of(MESH, scene(jitter=1.0))
     for piece in domain.cut(whole, ranks):
-        expected = 2.0 * uniform(3 * piece.node_ids[:, None] + np.arange(3), assembly._JITTER) - 1.0
+        expected = 2.0 * uniform(3 * piece.node_ids[:, None] + np.arange(3), motion._JITTER) - 1.0
         assert (piece.velocity == expected).all()

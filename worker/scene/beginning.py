@@ -6,7 +6,7 @@ from conoid.cases.model.schema import Case
 
 from ..mesh.model import TetMesh
 from ..parallel.comm import SerialComm
-from . import conditions, domain, selection
+from . import conditions, domain, selection, starting
 from .assembly import assembled
 
 
@@ -19,4 +19,4 @@ def begun(case: Case, meshes: Mapping[int, TetMesh], compiled: bool) -> list[str
     model, piece = domain.alone(case, whole)
     scene = conditions.build(case, model, piece.loads, piece.neighbours, comm)
     known = selection.settled(case, meshes)
-    return [*whole.warnings, *conditions.start(case, model, scene, comm, known)]
+    return [*whole.warnings, *starting.start(case, model, scene, comm, known)]

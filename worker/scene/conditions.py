@@ -1,13 +1,9 @@
 """The boundary conditions of a case: which nodes each holds, and what of them cannot be."""
 
-from collections.abc import Sequence
-
 import numpy as np
 
-from conoid.cases.checks.drives import REST, clash, motions
 from conoid.cases.checks.on import bits
 from conoid.cases.model import schema
-from conoid.cases.shapes.region import GENERATED
 
 from ..boundaries.boundaries import Boundary, SymmetryPlane, driven, mirrored
 from ..boundaries.drivers import Course, Gravity, PrescribedRotation, PrescribedVelocity, Traction
@@ -15,18 +11,15 @@ from ..boundaries.moving_walls import MovingWalls
 from ..boundaries.surface_pressure import SurfacePressure
 from ..boundaries.wall_shapes import Walls
 from ..boundaries.walls import RigidWalls
-from ..errors import InputError
 from ..migration.parcel import Parcel
 from ..model.loads import Load, LoadedFaces
-from ..model.state import Flags, Floats, Indices, Ints, Model, Nodes
+from ..model.state import Flags, Floats, Indices, Ints, Model
 from ..parallel.comm import Comm
 from ..parallel.ownership import Neighbour
 from ..rigid.bodies import of_nodes
 from . import marks, selection
 
 AXES = {"x": 0, "y": 1, "z": 2}
-_ASIDE = 1e-9
-"""Of the largest speed: less across a symmetry plane is rounding."""
 
 
 def loads(parcel: Parcel) -> list[Load | LoadedFaces]:
@@ -65,7 +58,7 @@ def bodies_beside(case: schema.Case, model: Model, comm: Comm) -> Ints:
     found = np.zeros((len(planes), len(model.parts)), np.int64)
     for row, (_, spec) in zip(found, planes, strict=True):
         on = np.zeros(len(model.parts))
-        on[nodes.part[_of_parts(spec, model) & (heights(spec, model) == 0.0)]] = 1.0
+        on[nodes.part[of_parts(spec, model) & (heights(spec, model) == 0.0)]] = 1.0
         row[:] = np.where(comm.maximum(on) > 0.0, 0.0, part_sides(spec, model, comm))
     return found
 
@@ -81,7 +74,7 @@ def build(
     """
     nodes = model.nodes
     loose = of_nodes(case, nodes) < 0
-    held = [_held_by(case, spec, model) & (loose | isinstance(spec, schema.Symmetry)) for spec in case.boundaries]
+    held = [held_by(case, spec, model) & (loose | isinstance(spec, schema.Symmetry)) for spec in case.boundaries]
     boundaries: list[Boundary] = [
         Gravity(_indices(held[i]), np.array(spec.acceleration), Course(spec.course))
         for i, spec in case.boundaries_of(schema.Gravity)
@@ -107,71 +100,19 @@ def build(
     return [*boundaries, *_walls(case, stopped, planes), *_moving(case, stopped, planes, model, moving, comm)]
 
 
-def start(
-    case: schema.Case, model: Model, boundaries: list[Boundary], comm: Comm, known: Sequence[bool] | None = None
-) -> list[str]:
-    """Makes the initial velocities agree with the boundaries; what the user should know of them. All ranks take part.
-    ``known``: those all of whose parts are in the model, of the others less is asked and told; None for all.
-
-    Raises InputError, on every rank alike, for a boundary that holds no node, two that drive a node in two ways, a body
-    that starts behind a wall or through a symmetry plane, and motion prescribed across one.
-    """
-    held = [_held_by(case, spec, model) for spec in case.boundaries]
-    known = [True] * len(held) if known is None else known
-    counts = comm.sum(np.array([int(each.sum()) for each in held], np.int64))
-    beside = _beside(case, model, comm)
-    for index in np.flatnonzero(counts == 0).tolist():
-        if index not in beside and known[index]:
-            raise InputError(f"boundaries[{index}]: holds no node; check its place and its parts")
-    _refuse_two_drives(case.boundaries, held, comm)
-    _refuse_conflicts(case.boundaries, held, boundaries, model.nodes, comm)
-    _refuse_overlaps(case, model, boundaries, comm)
-    _refuse_crossings(case, model, comm)
-    told = [
-        f"boundaries[{index}]: no node starts on this plane of symmetry; it holds what comes to it later"
-        for index in beside if counts[index] == 0 and known[index]
-    ]  # fmt: skip
-    told += _stopped(case, held, model.nodes, comm, known)
-    for boundary in boundaries:
-        boundary.start(model.nodes)
-    return told
-
-
-def _beside(case: schema.Case, model: Model, comm: Comm) -> list[int]:
-    """The symmetry planes beside which nodes start."""
-    planes = case.boundaries_of(schema.Symmetry)
-    found = comm.sum(np.array([int(np.count_nonzero(sides(spec, model))) for _, spec in planes], np.int64))
-    return [index for (index, _), many in zip(planes, found, strict=True) if many]
-
-
-def _stopped(
-    case: schema.Case, held: list[Flags], nodes: Nodes, comm: Comm, known: Sequence[bool]
-) -> list[str]:  # fmt: skip
-    """Where symmetry planes take a velocity from nodes that start on them."""
-    planes = case.boundaries_of(schema.Symmetry)
-    across = [np.abs(nodes.v[held[index], AXES[spec.axis]]).max(initial=0.0) for index, spec in planes]
-    speeds = comm.maximum(np.array([*across, np.abs(nodes.v).max(initial=0.0)]))
-    return [
-        f"boundaries[{index}]: nodes start on this plane of symmetry with up to {speed:.3g} m/s across it, and are "
-        "stopped; is the motion symmetric?"
-        for (index, _), speed in zip(planes, speeds[:-1], strict=True)
-        if known[index] and speed > _ASIDE * speeds[-1]
-    ]  # fmt: skip
-
-
-def _held_by(case: schema.Case, spec: schema.Boundary, model: Model) -> Flags:
+def held_by(case: schema.Case, spec: schema.Boundary, model: Model) -> Flags:
     """(n,) the nodes that a boundary acts on."""
     nodes, on_set = model.nodes, isinstance(spec, schema.Prescribed | schema.Rotation) and spec.on is not None
     marked = marks.held(nodes.marks, bits(case)[str(getattr(spec, "on", ""))]) if on_set else np.True_
     if isinstance(spec, schema.Prescribed):
         return selection.held(spec, model.parts, nodes.x0, nodes.of_parts(), model.slack) & marked
-    chosen = _of_parts(spec, model) & marked
+    chosen = of_parts(spec, model) & marked
     if isinstance(spec, schema.Symmetry):
         chosen &= heights(spec, model) == 0.0
     return chosen
 
 
-def _of_parts(spec: schema.Boundary, model: Model) -> Flags:
+def of_parts(spec: schema.Boundary, model: Model) -> Flags:
     """(n,) the nodes of the parts that a boundary names."""
     return model.nodes.among(selection.named(spec, model.parts))
 
@@ -184,7 +125,7 @@ def heights(spec: schema.Symmetry, model: Model) -> Floats:
 
 def sides(spec: schema.Symmetry, model: Model) -> Floats:
     """(n,) on which side of a symmetry plane that holds them nodes start: 1 above, -1 below, else 0."""
-    return np.where(_of_parts(spec, model), np.sign(heights(spec, model)), 0.0)
+    return np.where(of_parts(spec, model), np.sign(heights(spec, model)), 0.0)
 
 
 def part_sides(spec: schema.Symmetry, model: Model, comm: Comm) -> Floats:
@@ -227,81 +168,6 @@ def _moving(
     which = np.zeros((np.count_nonzero(touched), walls.n), bool)
     which[:, : len(found)] = np.array([h[touched] for h in found]).T
     return [MovingWalls(_indices(touched), nodes.owned[touched], walls, which, planes[touched], comm, tells)]
-
-
-def _refuse_overlaps(case: schema.Case, model: Model, boundaries: list[Boundary], comm: Comm) -> None:
-    indices = [index for index, _ in case.boundaries_of(schema.Wall)]
-    for walls in boundaries:
-        if isinstance(walls, RigidWalls | MovingWalls):
-            for index, depth in zip(indices, comm.maximum(walls.depths(model.nodes)), strict=True):
-                if depth > GENERATED * model.size:
-                    raise InputError(f"boundaries[{index}]: a body starts {depth:.3g} m behind this wall")
-
-
-def _refuse_crossings(case: schema.Case, model: Model, comm: Comm) -> None:
-    """A tet through a symmetry plane would lie in its own mirror image."""
-    for index, spec in case.boundaries_of(schema.Symmetry):
-        named, height, beyond = selection.named(spec, model.parts), heights(spec, model), np.zeros(len(model.parts))
-        for block in (block for block in model.blocks if named[block.part]):
-            of = height[block.tets]
-            beyond[block.part] = np.minimum(of.max(axis=1), -of.min(axis=1)).max(initial=beyond[block.part])
-        beyond = comm.maximum(beyond)
-        if (most := beyond.max()) > 0.0:
-            raise InputError(
-                f"boundaries[{index}]: tets of part {model.parts[int(beyond.argmax())]!r} reach {most:.3g} m through "
-                "this plane of symmetry into their own mirror images; let the body end on it, or name the parts that "
-                "have an image in parts"
-            )
-
-
-def _refuse_two_drives(specs: Sequence[schema.Boundary], held: list[Flags], comm: Comm) -> None:
-    """A component of a node has one drive: of two the last would win."""
-    found = comm.maximum(np.array([float(_two_drives(specs, held))]))[0]
-    if found >= 0:
-        second, first = divmod(int(found), len(specs))
-        axes = ", ".join(clash(specs[first], specs[second]))
-        raise InputError(
-            f"boundaries[{second}]: drives nodes along {axes} that boundaries[{first}] drives in another way there; "
-            "give each nodes of its own"
-        )
-
-
-def _two_drives(specs: Sequence[schema.Boundary], held: list[Flags]) -> int:
-    """Two boundaries that drive a node of this rank each in its own way: second * boundaries + first; -1 for none."""
-    drivers = {axis: np.full(len(held[0]) if held else 0, -1) for axis in AXES}
-    for second, spec in enumerate(specs):
-        for axis in motions(spec):
-            of = drivers[axis]
-            for first in np.unique(of[held[second]]):
-                if first >= 0 and axis in clash(specs[first], spec):
-                    return second * len(specs) + int(first)
-            of[held[second]] = second
-    return -1
-
-
-def _refuse_conflicts(
-    specs: Sequence[schema.Boundary], held: list[Flags], boundaries: list[Boundary], nodes: Nodes, comm: Comm
-) -> None:
-    """Motion prescribed across a symmetry plane, now or later, would do work on it that never happened."""
-    before = nodes.v.copy()
-    for boundary in boundaries:
-        boundary.start(nodes)
-    planes = [(index, spec.axis) for index, spec in enumerate(specs) if isinstance(spec, schema.Symmetry)]
-    crossed = np.zeros((len(planes), len(specs)))
-    for row, (plane, axis) in zip(crossed, planes, strict=True):
-        turned = (nodes.v[:, AXES[axis]] != 0.0) & held[plane]
-        for drive, spec in enumerate(specs):
-            if motions(spec).get(axis, REST) != REST:
-                nodes_of_both = turned if isinstance(spec, schema.Rotation) else held[plane]
-                row[drive] = float((nodes_of_both & held[drive]).any())
-    nodes.v[:] = before
-    crossed = comm.maximum(crossed.reshape(-1)).reshape(crossed.shape)
-    for row, drive in np.argwhere(crossed):
-        plane, axis = planes[row]
-        raise InputError(
-            f"boundaries[{drive}]: leads nodes off their plane of symmetry, boundaries[{plane}], along {axis}; allowed "
-            "is motion along it"
-        )
 
 
 def _indices(chosen: Flags) -> Indices:

@@ -28,7 +28,7 @@ class Marks:
     """(k, 3) ascending nodes of the faces of surfaces, by bit."""
     surfaces: dict[int, set[int]] = field(default_factory=dict)
     """The parts in which a set is a surface, by bit."""
-    told: list[str] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
     """What the user should know."""
 
     def holds(self, bit: int) -> Flags:
@@ -75,7 +75,7 @@ def marks(case: Case, meshes: Meshes, n: int, boundary: int | None = None) -> Ma
             _mark(made, bits[spec.on or ""], index, one, meshes[index][1])
             if one.inner and hasattr(spec, "pressure"):
                 name = case.parts[index].name
-                made.told.append(f"{where}: {one.inner} of its faces lie inside of {name!r} and bear nothing")
+                made.warnings.append(f"{where}: {one.inner} of its faces lie inside of {name!r} and bear nothing")
     return made
 
 

@@ -1,4 +1,4 @@
-"""Where the nodes of a part are at the start, and how they move."""
+"""Positions and velocities of the nodes of a part at the start."""
 
 import numpy as np
 

@@ -1,0 +1,76 @@
+"""Tractions of a case on the faces of the meshes, and nodes of prescribed velocities."""
+
+import numpy as np
+
+from conoid.cases.model import schema
+
+from ..boundaries import surface_pressure
+from ..errors import InputError
+from ..mesh.faces import FACES, across, normals
+from ..model.loads import Load, LoadedFaces
+from ..model.state import Floats, Indices, Ints
+from . import selection
+from .marks import Marks
+from .selection import Members, Nearness, Selected
+
+
+def loads(
+    case: schema.Case,
+    x: Floats,
+    members: Members,
+    of_tets: tuple[Indices, Indices],
+    near: Nearness,
+    known: list[bool],
+    marked: Marks,
+) -> tuple[list[Load | LoadedFaces], list[Selected], list[str]]:
+    """The tractions of the case: a third of the force on each face for each of its nodes, in the order of the tets, or
+    the faces that a pressure follows; what they act on, and warnings; ``of_tets``: (m, 4), and their parts (m,). Those
+    that are not ``known`` act on nothing. Raises InputError for another one that acts on no face.
+    """
+    tractions = case.boundaries_of(schema.Traction)
+    loads, found, told = list[Load | LoadedFaces](), list[Selected](), list[str]()
+    tets, tet_part = of_tets
+    tet, face = np.nonzero(across(tets) < 0) if tractions else (np.zeros(0, np.int64), np.zeros(0, np.int64))
+    faces = tets[tet[:, None], FACES[face]]
+    for index, spec in tractions:
+        if not known[index]:
+            none = np.zeros(0, np.int64)
+            loads.append(_load(spec, none, np.zeros((0, 3), np.int64), np.zeros((0, 3))))
+            continue
+        selected, chosen = selection.counted(case, index, x, members, (faces, tet_part[tet]), near, marked)
+        loaded = faces[chosen]
+        if not len(loaded):
+            where = "its box and its parts" if spec.cylinder is None else "its cylinder, its box and its parts"
+            where = where if spec.on is None else f"whether the faces of {spec.on!r} are on the surface, and its box"
+            raise InputError(f"boundaries[{index}]: acts on no face; check {where}")
+        found.append(selected)
+        took = np.isin(np.arange(len(case.parts)), tet_part[tet[chosen]])
+        told += selection.missed(case, index, x, members, near, took)
+        loads.append(_load(spec, tet[chosen].astype(np.int64), loaded.astype(np.int64), 0.5 * normals(x, loaded)))
+    return loads, found, told
+
+
+def _load(spec: schema.Traction, tets: Ints, faces: Ints, outward: Floats) -> Load | LoadedFaces:
+    """That of a traction on ``faces`` (m, 3) of ``tets`` (m,) with areas along their normals, ``outward`` (m, 3)."""
+    if spec.follows:
+        return LoadedFaces(tets, faces, surface_pressure.scale(spec, outward))
+    if spec.stress is not None:
+        force = np.linalg.norm(outward, axis=1)[:, None] / 3.0 * np.array(spec.stress)
+    else:
+        force = -(spec.pressure or 0.0) / 3.0 * outward
+    of = np.repeat(tets, 3)
+    return Load(np.arange(len(of)), of, faces.reshape(-1), np.repeat(force, 3, axis=0))
+
+
+def driven(
+    case: schema.Case, x: Floats, members: Members, near: Nearness, known: list[bool], marked: Marks
+) -> tuple[list[Selected], list[str]]:
+    """What the boxes of prescribed velocities that are ``known`` hold, and warnings."""
+    found, told = list[Selected](), list[str]()
+    for index in (index for index, _ in case.boundaries_of(schema.Prescribed) if known[index]):
+        selected, held = selection.counted(case, index, x, members, selection.NO_FACES, near, marked)
+        found.append(selected)
+        if held.any():
+            took = np.isin(np.arange(len(case.parts)), members[1][held[members[0]]])
+            told += selection.missed(case, index, x, members, near, took)
+    return found, told
