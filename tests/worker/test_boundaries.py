@@ -221,7 +221,7 @@ def test_a_body_may_fly_at_a_symmetry_plane() -> None:
     plane = {"kind": "symmetry", "axis": "z", "at": -1e-5}
     sim = with_boundary(plane, velocity=(0.0, 0.0, -100.0), end=1.5e-6)
     assert sim.warnings[-1] == (
-        "boundaries[0]: no node starts on this plane of symmetry; it holds what comes to it later"
+        "boundaries[0]: no node starts on this plane of symmetry; it holds nodes that reach it later"
     )
     run(sim)
     assert sim.model.nodes.x[:, 2].min() >= -1e-5 - 1e-12

@@ -67,7 +67,7 @@ def test_sets_are_counted_before_a_run(tmp_path: Path) -> None:
         (
             {"on": "END"},
             "",
-            "'END': sets of several files have this name, in 'bar', 'stub'; say in parts which are meant",
+            "'END': sets of several files have this name, in 'bar', 'stub'; name the parts that are meant",
         ),
         (
             {"on": "CLAMP", "parts": ["bar"]},

@@ -135,7 +135,7 @@ def test_what_is_there_twice_is_refused_by_both(shift: Any, contact: Any, folder
     write(folder / "bar.inp", (0, 0, 0), shift)
     made = parse_case(case() | {"contact": contact})
     said = (
-        r"parts\[0\].mesh: pieces of 'bar' that share no node overlap: about [0-9.e-]+ of 1.6e-08 m\^3 is there twice"
+        r"parts\[0\].mesh: pieces of 'bar' that share no node overlap: about [0-9.e-]+ of 1.6e-08 m\^3 counts twice"
     )
     with pytest.raises(ConoidError, match=said) as error:
         simulation.build(made, folder, SerialComm())

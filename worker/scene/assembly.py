@@ -1,4 +1,6 @@
-"""The whole mesh of a case, on rank 0: the parts as they are meshed, turned, moved apart, loaded and set in motion."""
+"""The whole mesh of a case, built on rank 0: meshes of all parts, turned, moved apart, loaded, with initial
+velocities.
+"""
 
 import logging
 import math
@@ -36,12 +38,12 @@ from .stacking import Stacked, stacked
 log = logging.getLogger("conoid.worker")
 
 Say = Callable[[str], None]
-"""Reports what the start is doing."""
+"""Callback that reports a phase of the start-up."""
 
 
 @dataclass
 class Whole:
-    """The whole mesh, on rank 0."""
+    """The whole mesh with its loads and initial velocities, on rank 0."""
 
     points: Floats
     node_part: Indices
@@ -49,31 +51,34 @@ class Whole:
     tet_part: Indices
     volumes: Floats
     across: Indices
-    """(tets, 4) see state.Block."""
+    """(tets, 4) neighbours of the faces, see state.Block."""
     shares: Shares
-    """Of the nodes of several parts."""
+    """Nodes of several parts."""
     node_volume: Floats
     mass: Floats
     velocity: Floats
     loads: list[Load | LoadedFaces]
-    """Of the tractions of the case."""
+    """Loads of the tractions of the case."""
     tied: Pieces
-    """Of the bonds of meshes that do not match."""
+    """Pieces of the bonds of meshes that do not match."""
     near: Nearness
     marks: Ints
-    """(nodes,) see state.Nodes."""
+    """(nodes,) sets that contain each node, see state.Nodes."""
     warnings: list[str]
-    """What the user should know of the meshes, and of what the boundaries of the case select of them."""
+    """Warnings about the meshes and about the regions of the boundaries."""
     survey: Survey
-    """What is measured of meshes from files."""
+    """Measurements of the meshes from files."""
 
 
 def quiet(what: str) -> None:
-    """Reports nothing."""
+    """Report nothing."""
 
 
 def assemble(case: schema.Case, folder: Path, say: Say = quiet) -> Whole:
-    """Builds the meshes of all parts; ``folder`` is where relative mesh paths start. Raises MeshError, InputError."""
+    """Build the meshes of all parts. Raises MeshError, InputError.
+
+    ``folder``: where relative paths of mesh files start.
+    """
     facts = Facts(case)
     whole = assembled(case, _built(case, folder, say, facts))
     whole.survey = facts.survey()
@@ -81,7 +86,7 @@ def assemble(case: schema.Case, folder: Path, say: Say = quiet) -> Whole:
 
 
 def _built(case: schema.Case, folder: Path, say: Say, facts: Facts) -> Iterator[tuple[int, TetMesh]]:
-    """The meshes of all parts by their numbers; those from files are measured."""
+    """Yield the mesh of each part with its number, and measure those from files."""
     joint = dict[int, TetMesh]()
     for index, part in enumerate(case.parts):
         said = partial(say, f"meshing {part.name}, part {index + 1} of {len(case.parts)}")
@@ -95,9 +100,10 @@ def _built(case: schema.Case, folder: Path, say: Say, facts: Facts) -> Iterator[
 
 
 def assembled(case: schema.Case, meshes: Iterable[tuple[int, TetMesh]], overlaps: bool = True) -> Whole:
-    """The whole of the ``meshes`` of parts by their numbers. Where these are not all parts, as before a run, what
-    boundaries select is found for those whose parts are all there. Bodies that overlap are looked for only where
-    ``overlaps`` is set. Raises MeshError, InputError.
+    """Return the whole mesh of the ``meshes`` with their part numbers. Raises MeshError, InputError.
+
+    If some parts are missing, as before a run, only boundaries whose parts are all present select nodes and faces.
+    Overlaps of bodies are searched for if ``overlaps`` is set.
     """
     made = stacked(case, meshes, overlaps)
     x, t, part_of_tet, warnings = made.points, made.tets, made.tet_part, made.warnings
@@ -138,7 +144,7 @@ def assembled(case: schema.Case, meshes: Iterable[tuple[int, TetMesh]], overlaps
 
 
 def _shares(case: schema.Case, made: Stacked, masses: Floats) -> Shares:
-    """What of nodes of several parts is of which, by the ``masses`` (tets,) of the tets, kg."""
+    """Return the shares of the nodes of several parts, from the ``masses`` (tets,) of the tets, kg."""
     rank = ranks(case)
     if not len(rank):
         return Shares()
@@ -150,12 +156,12 @@ def _shares(case: schema.Case, made: Stacked, masses: Floats) -> Shares:
 
 
 def _quarters(tets: Indices, values: Floats, n: int) -> Floats:
-    """(n,) a quarter of each tet's value summed at its nodes, in the order of the tets."""
+    """Return (n,) the sum at each node of a quarter of the value of each of its tets, in the order of the tets."""
     return np.bincount(tets.reshape(-1), np.repeat(values / 4.0, 4), n).astype(np.float64)
 
 
 def _weighed(case: schema.Case, mass: Floats, part: Indices) -> Floats:
-    """(n,) masses of the nodes, kg, of which those of a rigid part add up to what is given for it."""
+    """Return (n,) the masses of the nodes, kg, scaled for a rigid part with a given mass."""
     for index in case.rigid:
         spec = case.parts[index].rigid
         if spec is not None and spec.mass is not None:

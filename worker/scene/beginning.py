@@ -1,4 +1,4 @@
-"""How a run would begin with the meshes that are there: what it would refuse, and what it would warn of."""
+"""Trial start of a run before it is submitted: the errors and warnings that its start would give."""
 
 from collections.abc import Mapping
 
@@ -11,9 +11,10 @@ from .assembly import assembled
 
 
 def begun(case: Case, meshes: Mapping[int, TetMesh], compiled: bool) -> list[str]:
-    """The warnings of a run up to its first step, by the ``meshes`` of parts by their numbers: all parts, or those that
-    are from files. Raises InputError, MeshError where it would be refused. Overlaps are looked for by kernels, where
-    these are ``compiled``.
+    """Return the warnings of a run up to its first step. Raises the InputError or MeshError of its start.
+
+    ``meshes``: by part number, of all parts or of those from files; ``compiled``: whether kernels are compiled,
+    without which overlaps are not searched for.
     """
     whole, comm = assembled(case, meshes.items(), compiled), SerialComm()
     model, piece = domain.alone(case, whole)

@@ -1,4 +1,4 @@
-"""The boundary conditions of a case: which nodes each holds, and what of them cannot be."""
+"""Boundary conditions of a case: the nodes that each holds, and the objects that apply them."""
 
 import numpy as np
 
@@ -23,7 +23,7 @@ AXES = {"x": 0, "y": 1, "z": 2}
 
 
 def loads(parcel: Parcel) -> list[Load | LoadedFaces]:
-    """The loads of the tractions that a parcel has, in their order."""
+    """Return the loads of the tractions in a parcel, in the order of the boundaries."""
     found: list[Load | LoadedFaces] = []
     for name in (f"boundary{index}" for index in range(len(parcel.known["last_push"]))):
         if (table := parcel.rows.get(f"{name}.load")) is not None:
@@ -34,8 +34,10 @@ def loads(parcel: Parcel) -> list[Load | LoadedFaces]:
 
 
 def walls_of(case: schema.Case) -> Walls:
-    """The walls of a case, as they are at the start. Where parts are rigid, two follow for each plane of symmetry,
-    above and below it: there a body that starts beside the plane meets its mirror image.
+    """Return the walls of a case in their initial position.
+
+    If parts are rigid, each plane of symmetry adds two walls, one for bodies above it and one for bodies below:
+    contact of a body beside the plane with its mirror image.
     """
     planes = case.boundaries_of(schema.Symmetry) if case.rigid else []
     images = [_image(spec, sign) for _, spec in planes for sign in (1.0, -1.0)]
@@ -43,7 +45,7 @@ def walls_of(case: schema.Case) -> Walls:
 
 
 def _image(plane: schema.Symmetry, sign: float) -> schema.Wall:
-    """The plane as a wall that holds what is above it, or below."""
+    """Return the plane as a wall for bodies above it (``sign`` 1) or below it (-1)."""
     along = np.eye(3)[AXES[plane.axis]]
     return schema.Wall(
         kind="wall", name="image", point=tuple((plane.at * along).tolist()), normal=tuple((sign * along).tolist())
@@ -51,8 +53,8 @@ def _image(plane: schema.Symmetry, sign: float) -> schema.Wall:
 
 
 def bodies_beside(case: schema.Case, model: Model, comm: Comm) -> Ints:
-    """(planes, parts) 1 for a rigid part that starts above a plane of symmetry that holds it, without a node on it, -1
-    for one below, 0 for all others. All ranks take part.
+    """Return (planes, parts) 1 for a rigid part that starts above a plane of symmetry that holds it, without a node
+    on it, -1 for one below, 0 for all others. Collective.
     """
     planes, nodes = case.boundaries_of(schema.Symmetry), model.nodes
     found = np.zeros((len(planes), len(model.parts)), np.int64)
@@ -67,10 +69,11 @@ def build(
     case: schema.Case, model: Model, loads: list[Load | LoadedFaces], neighbours: list[Neighbour], comm: Comm,
     moving: Walls | None = None,
 ) -> list[Boundary]:  # fmt: skip
-    """The boundaries of a case on this rank's nodes: gravity and tractions first, so that what is held stays held;
-    walls last, and they leave alone what has a prescribed motion. ``loads``: of the tractions; ``moving``: the walls
-    of the case, as they move. What acts on rigid parts is in rigid/motion.py, but for planes of symmetry, on which
-    their nodes lie as others do. All ranks take part.
+    """Return the boundaries of a case on this rank's nodes, in the order in which they act. Collective.
+
+    Gravity and tractions come first, so that constraints correct them; walls come last and omit nodes with a
+    prescribed motion. Rigid parts have their own motion (rigid/motion.py) and appear here only in planes of
+    symmetry. ``loads``: of the tractions; ``moving``: the walls of the case in their present position.
     """
     nodes = model.nodes
     loose = of_nodes(case, nodes) < 0
@@ -101,7 +104,7 @@ def build(
 
 
 def held_by(case: schema.Case, spec: schema.Boundary, model: Model) -> Flags:
-    """(n,) the nodes that a boundary acts on."""
+    """Return (n,) the nodes on which a boundary acts."""
     nodes, on_set = model.nodes, isinstance(spec, schema.Prescribed | schema.Rotation) and spec.on is not None
     marked = marks.held(nodes.marks, bits(case)[str(getattr(spec, "on", ""))]) if on_set else np.True_
     if isinstance(spec, schema.Prescribed):
@@ -113,24 +116,24 @@ def held_by(case: schema.Case, spec: schema.Boundary, model: Model) -> Flags:
 
 
 def of_parts(spec: schema.Boundary, model: Model) -> Flags:
-    """(n,) the nodes of the parts that a boundary names."""
+    """Return (n,) the nodes of the parts that a boundary names."""
     return model.nodes.among(selection.named(spec, model.parts))
 
 
 def heights(spec: schema.Symmetry, model: Model) -> Floats:
-    """(n,) of the nodes over a symmetry plane at the start, m; zero on it, and as near to it as rounding."""
+    """Return (n,) the heights of nodes above a symmetry plane at the start, m; 0 for those within round-off of it."""
     found = model.nodes.x0[:, AXES[spec.axis]] - spec.at
     return np.where(np.abs(found) <= model.rounding[model.nodes.part], 0.0, found)
 
 
 def sides(spec: schema.Symmetry, model: Model) -> Floats:
-    """(n,) on which side of a symmetry plane that holds them nodes start: 1 above, -1 below, else 0."""
+    """Return (n,) the side of a symmetry plane on which the nodes that it holds start: 1 above, -1 below, 0 else."""
     return np.where(of_parts(spec, model), np.sign(heights(spec, model)), 0.0)
 
 
 def part_sides(spec: schema.Symmetry, model: Model, comm: Comm) -> Floats:
-    """(parts,) 1 for a part that lies above a symmetry plane that holds it, -1 below; 0 where it is not held or has
-    nodes on both sides. All ranks take part.
+    """Return (parts,) 1 for a part above a symmetry plane that holds it, -1 for one below; 0 for a part that it does
+    not hold or that has nodes on both sides. Collective.
     """
     side, found = sides(spec, model), np.zeros((2, len(model.parts)))
     nodes, part = model.nodes.of_parts()
@@ -158,7 +161,7 @@ def _walls(case: schema.Case, held: list[Flags], planes: Flags) -> list[Boundary
 def _moving(
     case: schema.Case, held: list[Flags], planes: Flags, model: Model, walls: Walls | None, comm: Comm
 ) -> list[Boundary]:  # fmt: skip
-    """Those that are no fixed planes; all ranks take part."""
+    """Return the walls that are not fixed planes. Collective."""
     found = [held[index] & (not spec.plain) for index, spec in case.boundaries_of(schema.Wall)]
     if all(spec.plain for _, spec in case.boundaries_of(schema.Wall)):
         return []

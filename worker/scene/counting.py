@@ -1,4 +1,4 @@
-"""What tractions and prescribed velocities act on in meshes that have been read, before a run."""
+"""Nodes and faces that tractions and prescribed velocities select in meshes from files, counted before a run."""
 
 from collections.abc import Iterator, Mapping
 
@@ -16,12 +16,12 @@ from .marks import marks
 from .setting import turned
 
 Meshes = Mapping[int, TetMesh]
-"""Of parts by their numbers, not yet turned."""
+"""Meshes by part number, before the turn of their part."""
 
 
 def loads(case: Case, meshes: Meshes) -> Iterator[Load]:
-    """Of each boundary that is for parts with these meshes and for no others, as the run will count it. Raises
-    InputError for bonds without nodes in common.
+    """Yield the count of each boundary whose parts all have a mesh in ``meshes``, equal to the count of the run.
+    Raises InputError for bonds without common nodes.
     """
     body = bodies(case)
     for number, spec in enumerate(case.boundaries):
@@ -55,7 +55,7 @@ def _load(case: Case, number: int, meshes: Meshes) -> Load:
 
 
 def empty(case: Case, found: list[Load]) -> Iterator[str]:
-    """A refusal for each that acts on nothing."""
+    """Yield an error message for each boundary that selects nothing."""
     for load in found:
         if not (load.faces or load.nodes):
             what = "face" if isinstance(case.boundaries[load.boundary], Traction) else "node"

@@ -1,7 +1,7 @@
-"""What each rank holds: its piece of the whole mesh, shared nodes, masses, blocks of tets.
+"""The piece of a rank: its part of the whole mesh, shared nodes, masses and blocks of tets.
 
-Rank 0 builds the whole mesh (assembly.py), numbers it and cuts it; every rank receives its own piece.
-Global ids follow the order of the parts and, within a part, the order of the mesh, on any number of ranks.
+Rank 0 builds the whole mesh (assembly.py), numbers it and cuts it; every rank receives its piece. Global ids follow
+the order of the parts and, within a part, the order of the mesh, for any number of ranks.
 """
 
 import math
@@ -32,12 +32,12 @@ from . import assembly
 from .assembly import Say, Whole
 
 GROUPS = 256
-"""Parts of the mesh whose loads are told (worker/migration/groups.py)."""
+"""Number of groups of tets whose loads are recorded (migration/groups.py). Chosen."""
 
 
 @dataclass
 class Piece:
-    """What one rank receives."""
+    """The data that one rank receives."""
 
     node_ids: Ints
     node_part: Indices
@@ -48,18 +48,17 @@ class Piece:
     mass: Floats
     node_volume: Floats
     shares: Shares
-    """Of the nodes of several parts."""
+    """Nodes of several parts."""
     loads: list[Load | LoadedFaces]
-    """Of the tractions of the case, on all nodes that this rank holds; of those that follow the surface the faces of
-    its tets."""
+    """Loads of the tractions on all nodes of this rank; those that follow the surface on the faces of its tets."""
     tied: Pieces
-    """Of the bonds of meshes that do not match, of all ranks."""
+    """Pieces of the bonds of meshes that do not match, of all ranks."""
     tet_ids: Ints
     tet_part: Indices
     tets: Indices
     tet_volume: Floats
     across: Indices
-    """(tets, 4) see state.Block."""
+    """(tets, 4) neighbours of the faces, see state.Block."""
     border: Flags
     node_group: Indices
     tet_group: Indices
@@ -67,27 +66,27 @@ class Piece:
     """(groups, 4) see state.Model."""
     neighbours: list[Neighbour]
     totals: tuple[int, int, int]
-    """Tets, nodes and shared nodes of the whole."""
+    """Numbers of tets, nodes and shared nodes of the whole mesh."""
     part_starts: Ints
     """Global id of the first tet of each part."""
     mean_volumes: Floats
-    """(parts,) m^3."""
+    """(parts,) mean volume of a tet, m^3."""
     size: float
-    """Largest coordinate of the whole, m."""
+    """Largest absolute coordinate of the whole mesh, m."""
     slack: Floats
     rounding: Floats
-    """(parts,) see state.Model."""
+    """(parts,) tolerances, see state.Model."""
     marks: Ints
-    """(nodes,) see state.Nodes."""
+    """(nodes,) sets that contain each node, see state.Nodes."""
     warnings: list[str]
     """See Whole."""
 
 
 def cut(whole: Whole, ranks: int, scale: tuple[float, float, float] = (1.0, 1.0, 1.0)) -> list[Piece]:
-    """The pieces of ``ranks`` ranks: tets by recursive bisection of their centres, nodes with every tet's rank.
+    """Return the pieces of ``ranks`` ranks: tets by recursive bisection of their centres, with all nodes of the tets.
 
-    ``scale`` multiplies the centres first: a direction that is small is cut last.
-    Raises InputError when there are more ranks than tets.
+    ``scale`` multiplies the centres first: a direction with a small factor is cut last. Raises InputError if there
+    are more ranks than tets.
     """
     if ranks > len(whole.tets):
         raise InputError(f"run.ranks = {ranks}: at most {len(whole.tets)}, the number of tets")
@@ -108,7 +107,9 @@ def cut(whole: Whole, ranks: int, scale: tuple[float, float, float] = (1.0, 1.0,
 
 
 def _grouped(whole: Whole, centres: Floats) -> tuple[Indices, Indices, Floats]:
-    """The groups of the nodes and of the tets, and the groups; the tets are bisected by their ``centres`` (tets, 3)."""
+    """Return the group of each node and of each tet, and the groups (groups, 4); the tets are bisected by their
+    ``centres`` (tets, 3).
+    """
     n = min(GROUPS, len(centres))
     tets, _ = bisect(centres, np.arange(len(centres)), np.ones(len(centres)), n, SerialComm())
     middle, sizes = whole.points[whole.tets].mean(axis=1), np.bincount(tets, minlength=n)
@@ -117,7 +118,7 @@ def _grouped(whole: Whole, centres: Floats) -> tuple[Indices, Indices, Floats]:
 
 
 def _home(whole: Whole, owner: Indices) -> Indices:
-    """Which part of a cut has each node: the one that has its tet of smallest id; that rank owns the node."""
+    """Return (nodes,) the part of a cut that owns each node: the owner of its tet of smallest id."""
     home = np.zeros(len(whole.points), np.int32)
     home[whole.tets[::-1].reshape(-1)] = np.repeat(owner[::-1], 4)
     return home
@@ -150,9 +151,9 @@ def _piece(
 
 
 def build(case: schema.Case, folder: Path, comm: Comm, say: Say = assembly.quiet) -> tuple[Model, Piece]:
-    """This rank's model; rank 0 calls ``say`` with what it is at.
+    """Return this rank's model and piece; rank 0 reports each phase with ``say``. Collective.
 
-    Raises MeshError on every rank when rank 0 cannot build a mesh.
+    Raises MeshError on every rank if rank 0 cannot build a mesh.
     """
     pieces: list[Piece] | None = None
     failure: Exception | None = None
@@ -172,16 +173,16 @@ def build(case: schema.Case, folder: Path, comm: Comm, say: Say = assembly.quiet
 
 
 def _warned(case: schema.Case, folder: Path, survey: Survey) -> list[str]:
-    """What is odd about the case, as who checks it before is told."""
+    """Return the warnings about the case that ``conoid validate`` gives."""
     try:
         expected = estimate(case, folder, survey)
-    except (ArithmeticError, ValueError):  # too many elements to be counted: it is refused where it is checked
+    except (ArithmeticError, ValueError):  # too many elements to count: the reader of the case refuses it
         return []
     return [str(each) for each in warned(case, expected, survey, [*touching(case), *survey.touching])]
 
 
 def alone(case: schema.Case, whole: Whole) -> tuple[Model, Piece]:
-    """The model of a single rank."""
+    """Return the model and the piece of a single rank."""
     (piece,) = cut(whole, 1)
     return _model(case, piece), piece
 
@@ -220,7 +221,7 @@ def _block(case: schema.Case, piece: Piece, index: int) -> Block:
 def block(
     case: schema.Case, index: int, ids: Ints, tets: Tets, state: Floats, across: Indices, border: int
 ) -> Block:  # fmt: skip
-    """The block of part ``index``: what is known of its tets, the ``border`` ones first, and what the case says."""
+    """Return the block of part ``index`` from the arrays of its tets, the ``border`` ones first, and the case."""
     part = case.parts[index]
     material = find_material(case, part.material)
     return Block(

@@ -1,4 +1,4 @@
-"""What meshes from files hold where they stand at the start: measured before a run, and by it."""
+"""Measurements of meshes from files: size, mass, momentum, energy and contact of their surfaces at the start."""
 
 import numpy as np
 
@@ -14,22 +14,22 @@ from .setting import turned, velocities
 
 
 class Facts:
-    """Of the parts of a case, as their meshes are taken one after the other."""
+    """Measurements of the parts of a case; the meshes are added one after the other."""
 
     def __init__(self, case: Case) -> None:
-        """Nothing is taken yet."""
+        """No part is measured yet."""
         self._case = case
         self.parts: list[Surveyed] = []
         self._surfaces: dict[int, Surface] = {}
 
     def take(self, index: int, mesh: TetMesh) -> None:
-        """Measures the mesh of part ``index``."""
+        """Measure the mesh of part ``index``."""
         points = turned(mesh.points, self._case.parts[index].turn)
         self._surfaces[index] = points, boundary_faces(mesh.tets)
         self.parts.append(_measured(self._case, index, mesh, self._surfaces[index]))
 
     def survey(self) -> Survey:
-        """All of it, and which parts touch."""
+        """Return all measurements, and which parts touch."""
         return Survey(parts=self.parts, touching=list(touches(self._case, self._surfaces)))
 
 
@@ -57,6 +57,6 @@ def _measured(case: Case, index: int, mesh: TetMesh, surface: Surface) -> Survey
 
 
 def _smallest_altitude(mesh: TetMesh, volumes: Floats) -> float:
-    """m: three times the volume of a tet over its largest face."""
+    """Return the smallest altitude, m: three times the volume of a tet over its largest face."""
     largest = areas(mesh.points, mesh.tets[:, FACES].reshape(-1, 3)).reshape(-1, 4).max(axis=1)
     return float((3.0 * volumes / largest).min())

@@ -13,7 +13,7 @@ from ..mesh.model import TetMesh
 
 
 def asked(part: Part) -> Mesh:
-    """The mesh of a part, with the default that its erosion decides."""
+    """Return the mesh of a part; the default of ``aligned`` depends on its erosion."""
     mesh = part.mesh
     if isinstance(mesh, Symmetric) and mesh.aligned is None:
         return mesh.model_copy(update={"aligned": part.erosion is not None})
@@ -21,7 +21,7 @@ def asked(part: Part) -> Mesh:
 
 
 def grouped(case: Case, index: int) -> list[int]:
-    """The parts that gmsh meshes together with one: those of its body that it makes."""
+    """Return the parts that gmsh meshes together with part ``index``: those of its body that are meshed by gmsh."""
     body = bodies(case)
     made = [isinstance(part.mesh, Primitive | Meshed) and part.mesh.generator == "gmsh" for part in case.parts]
     return [i for i, of in enumerate(body) if of == body[index] and made[i]] if made[index] else []
@@ -30,6 +30,6 @@ def grouped(case: Case, index: int) -> list[int]:
 def built_together(
     case: Case, group: list[int], folder: Path, said: Callable[[], None] = lambda: None
 ) -> dict[int, TetMesh]:
-    """The meshes of the parts of a ``group``, by their numbers; ``said`` is called before they are made."""
+    """Return the meshes of the parts of a ``group`` by their numbers; ``said`` is called before they are made."""
     meshes = {f"parts[{i}].mesh": asked(case.parts[i]) for i in group}
     return dict(zip(group, build_together(meshes, folder, made=said), strict=True))

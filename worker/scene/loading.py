@@ -23,12 +23,14 @@ def loads(
     known: list[bool],
     marked: Marks,
 ) -> tuple[list[Load | LoadedFaces], list[Selected], list[str]]:
-    """The tractions of the case: a third of the force on each face for each of its nodes, in the order of the tets, or
-    the faces that a pressure follows; what they act on, and warnings; ``of_tets``: (m, 4), and their parts (m,). Those
-    that are not ``known`` act on nothing. Raises InputError for another one that acts on no face.
+    """Return the loads of the tractions of a case, what each selects, and warnings.
+
+    A traction gives a third of the force on each face to each of its nodes, in the order of the tets; a pressure
+    that follows the surface keeps the faces. ``of_tets``: (m, 4) tets, and (m,) their parts; tractions that are not
+    ``known`` get no face. Raises InputError for a known one that selects no face.
     """
     tractions = case.boundaries_of(schema.Traction)
-    loads, found, told = list[Load | LoadedFaces](), list[Selected](), list[str]()
+    loads, found, warnings = list[Load | LoadedFaces](), list[Selected](), list[str]()
     tets, tet_part = of_tets
     tet, face = np.nonzero(across(tets) < 0) if tractions else (np.zeros(0, np.int64), np.zeros(0, np.int64))
     faces = tets[tet[:, None], FACES[face]]
@@ -45,13 +47,13 @@ def loads(
             raise InputError(f"boundaries[{index}]: acts on no face; check {where}")
         found.append(selected)
         took = np.isin(np.arange(len(case.parts)), tet_part[tet[chosen]])
-        told += selection.missed(case, index, x, members, near, took)
+        warnings += selection.missed(case, index, x, members, near, took)
         loads.append(_load(spec, tet[chosen].astype(np.int64), loaded.astype(np.int64), 0.5 * normals(x, loaded)))
-    return loads, found, told
+    return loads, found, warnings
 
 
 def _load(spec: schema.Traction, tets: Ints, faces: Ints, outward: Floats) -> Load | LoadedFaces:
-    """That of a traction on ``faces`` (m, 3) of ``tets`` (m,) with areas along their normals, ``outward`` (m, 3)."""
+    """Return the load of a traction on ``faces`` (m, 3) of ``tets`` (m,) with area vectors ``outward`` (m, 3), m^2."""
     if spec.follows:
         return LoadedFaces(tets, faces, surface_pressure.scale(spec, outward))
     if spec.stress is not None:
@@ -65,12 +67,12 @@ def _load(spec: schema.Traction, tets: Ints, faces: Ints, outward: Floats) -> Lo
 def driven(
     case: schema.Case, x: Floats, members: Members, near: Nearness, known: list[bool], marked: Marks
 ) -> tuple[list[Selected], list[str]]:
-    """What the boxes of prescribed velocities that are ``known`` hold, and warnings."""
-    found, told = list[Selected](), list[str]()
+    """Return the nodes that the regions of the ``known`` prescribed velocities select, and warnings."""
+    found, warnings = list[Selected](), list[str]()
     for index in (index for index, _ in case.boundaries_of(schema.Prescribed) if known[index]):
         selected, held = selection.counted(case, index, x, members, selection.NO_FACES, near, marked)
         found.append(selected)
         if held.any():
             took = np.isin(np.arange(len(case.parts)), members[1][held[members[0]]])
-            told += selection.missed(case, index, x, members, near, took)
-    return found, told
+            warnings += selection.missed(case, index, x, members, near, took)
+    return found, warnings

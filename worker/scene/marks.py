@@ -1,4 +1,4 @@
-"""Which nodes and faces are in the sets of mesh files that a case is on."""
+"""Nodes and faces in the sets of mesh files to which a case refers by ``on``."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -15,29 +15,29 @@ from ..mesh.model import NodeSet, TetMesh
 from ..model.state import Flags, Indices, Ints
 
 Meshes = Mapping[int, tuple[TetMesh, Ints]]
-"""Of parts by their numbers, with the places (n,) of their nodes among all."""
+"""Meshes by part number, with the global indices (n,) of their nodes."""
 
 
 @dataclass
 class Marks:
-    """Of all nodes of some parts."""
+    """Membership of nodes and faces in sets."""
 
     nodes: Ints
-    """(n,) bit b of a node: whether it is in set b of ``cases.on.bits``; (0,) where the case is on none."""
+    """(n,) bit b of a node: whether it is in set b of ``cases.on.bits``; (0,) if the case refers to no set."""
     faces: dict[int, Ints] = field(default_factory=dict)
     """(k, 3) ascending nodes of the faces of surfaces, by bit."""
     surfaces: dict[int, set[int]] = field(default_factory=dict)
     """The parts in which a set is a surface, by bit."""
     warnings: list[str] = field(default_factory=list)
-    """What the user should know."""
+    """Warnings for the user."""
 
     def holds(self, bit: int) -> Flags:
-        """(n,) the nodes that are in a set."""
+        """Return (n,) the nodes that are in a set."""
         return held(self.nodes, bit)
 
     def chosen(self, bit: int, faces: Indices, part: Indices) -> Flags:
-        """(m,) which of the exposed faces (m, 3) a set has: those of a surface, and those all of whose nodes are in a
-        set of nodes. ``part``: (m,) whose they are.
+        """Return (m,) the exposed faces (m, 3) that a set contains: faces of a surface, or faces with all nodes in a
+        set of nodes. ``part``: (m,) their parts.
         """
         of_surface = np.isin(part, sorted(self.surfaces.get(bit, ())))
         by_nodes = self.holds(bit)[faces].all(axis=1)
@@ -51,13 +51,15 @@ class Marks:
 
 
 def held(marks: Ints, bit: int) -> Flags:
-    """(n,) which nodes have a bit."""
+    """Return (n,) the nodes that have a bit."""
     return np.asarray((marks >> bit & 1).astype(bool))
 
 
 def marks(case: Case, meshes: Meshes, n: int, boundary: int | None = None) -> Marks:
-    """Of ``n`` nodes; ``boundary``: of what this one is on alone. Raises MeshError where a set is not there, has no
-    node, or a name means two things.
+    """Return the marks of ``n`` nodes. Raises MeshError if a set does not exist or has no node, or if a name is
+    ambiguous.
+
+    ``boundary``: only the sets of this boundary.
     """
     bits = on.bits(case)
     made = Marks(np.zeros(n if bits else 0, np.int64))
@@ -75,12 +77,12 @@ def marks(case: Case, meshes: Meshes, n: int, boundary: int | None = None) -> Ma
             _mark(made, bits[spec.on or ""], index, one, meshes[index][1])
             if one.inner and hasattr(spec, "pressure"):
                 name = case.parts[index].name
-                made.warnings.append(f"{where}: {one.inner} of its faces lie inside of {name!r} and bear nothing")
+                made.warnings.append(f"{where}: {one.inner} of its faces are inside of {name!r} and carry no load")
     return made
 
 
 def _found(case: Case, name: str, candidates: Sequence[int], meshes: Meshes, each: bool) -> list[tuple[int, NodeSet]]:
-    """The set in each part; ``each``: whether all of these must have it."""
+    """Return the set in each part; ``each``: whether all parts must have it."""
     if not candidates:
         return []
     found = [(index, meant(meshes[index][0].sets, name)) for index in candidates]
@@ -96,7 +98,7 @@ def _found(case: Case, name: str, candidates: Sequence[int], meshes: Meshes, eac
     files = {origin.file for index, _ in filled if (origin := meshes[index][0].origin) is not None}
     if len(files) > 1:
         names = ", ".join(repr(case.parts[index].name) for index, _ in filled)
-        raise MeshError(f"sets of several files have this name, in {names}; say in parts which are meant")
+        raise MeshError(f"sets of several files have this name, in {names}; name the parts that are meant")
     return filled
 
 

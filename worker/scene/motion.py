@@ -14,28 +14,30 @@ from .setting import velocities
 _JITTER = 0x6A697474
 """Seed of the random velocities of the start."""
 _ALIKE = 1e-6
-"""Of the larger of two velocities: they differ by rounding."""
+"""Share of the larger of two velocities below which their difference is round-off. Chosen."""
 
 
 def initial_velocities(case: schema.Case, x: Floats, part: Indices, shares: Shares) -> tuple[Floats, list[str]]:
-    """Of the nodes (n, 3), whose ``part`` is that which they stand for; and a warning where the parts of one node start
-    in two ways: it has the mean of them, by mass.
+    """Return the velocities of the nodes (n, 3), m/s, and a warning if parts with a common node have different
+    velocities: the node gets their mean by mass.
+
+    ``part``: (n,) the representative part of each node.
     """
     v = np.zeros_like(x)
     for index, spec in enumerate(case.parts):
         chosen = part == index
         v[chosen] = velocities(spec, x[chosen])
-    told = _mean_velocities(case, v, x, shares)
+    warnings = _mean_velocities(case, v, x, shares)
     for index, spec in enumerate(case.parts):
         if spec.jitter > 0.0:
             chosen = part == index
             places = 3 * np.flatnonzero(chosen)[:, None] + np.arange(3)
             v[chosen] += spec.jitter * (2.0 * uniform(places, _JITTER) - 1.0)
-    return v, told
+    return v, warnings
 
 
 def _mean_velocities(case: schema.Case, v: Floats, x: Floats, shares: Shares) -> list[str]:
-    """Sets those of nodes whose parts start in several ways; a warning where there are any."""
+    """Set the velocities of nodes of several parts with different velocities; return a warning if there are any."""
     own = np.zeros((len(shares.node), 3))
     for index, spec in enumerate(case.parts):
         chosen = shares.part == index
@@ -47,19 +49,19 @@ def _mean_velocities(case: schema.Case, v: Floats, x: Floats, shares: Shares) ->
     v[nodes] = 0.0
     np.add.at(v, shares.node[odd], weight * own[odd])
     names = " and ".join(repr(case.parts[i].name) for i in np.unique(shares.part[odd]))
-    return [f"bond: {len(nodes)} nodes of {names} would start at two velocities, and start at their mean by mass"]
+    return [f"bond: {len(nodes)} nodes of {names} have two initial velocities; they start with the mean by mass"]
 
 
 def parted(case: schema.Case, x: Floats, tets: Indices, tied: Pieces) -> list[str]:
-    """Warnings of ``tied`` parts that start with other velocities than each other where they are bonded."""
-    told = []
+    """Return warnings of ``tied`` parts that start with different velocities at their bond."""
+    warnings = []
     for k, one, two in interface.tied_pairs(case):
         places = x[np.unique(interface.corners(tied.slave[tied.bond == k], tets))]
         u, v = (velocities(case.parts[i], places) for i in (one, two))
         if (most := float(np.abs(u - v).max(initial=0.0))) > _ALIKE * float(np.abs([u, v]).max(initial=0.0)):
-            told.append(
+            warnings.append(
                 f"bond[{k}]: {case.parts[one].name!r} and {case.parts[two].name!r} start at two velocities where they "
-                f"are tied, up to {most:.3g} m/s from each other: the bond takes the energy of that in the first step, "
-                "or breaks"
+                f"are tied, up to {most:.3g} m/s from each other: the bond takes the energy of the difference in the "
+                "first step, or breaks"
             )
-    return told
+    return warnings

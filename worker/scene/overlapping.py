@@ -14,7 +14,9 @@ from .stacking import Stacked
 
 
 def apart(case: schema.Case, made: Stacked) -> Floats:
-    """The points, when no body overlaps another; moved apart where the case asks for that. Raises InputError."""
+    """Return the points after overlaps were removed, if ``contact.overlap`` requests it. Raises InputError if bodies
+    overlap.
+    """
     assert case.contact is not None
     x, tets, body, part, exposed = made.points, made.tets, made.body, made.part_of_body, made.across < 0
     tet, face = np.nonzero(exposed)

@@ -1,4 +1,4 @@
-"""Pieces of a part from a mesh file: bodies that share no node. What of them is there twice, and who may meet whom."""
+"""Pieces of a part from a mesh file, which have no node in common: overlaps between them, and their contact."""
 
 from collections.abc import Iterator
 
@@ -16,18 +16,18 @@ from ..mesh.model import TetMesh
 from ..model.state import Indices
 
 _MANY = 1_000
-"""Pieces of a part beyond which nothing finds out whether they overlap each other. Chosen: the table of who meets whom
-grows with their square."""
-UNSEEN = "whether bodies overlap is found out by the run: kernels are not compiled here yet"
-"""What is told where overlaps are not looked for."""
+"""Number of pieces of a part above which overlaps between them are not searched for. Chosen: the table of pairs
+grows with its square."""
+UNSEEN = "the run checks whether bodies overlap: kernels are not compiled here yet"
+"""Warning if overlaps are not searched for."""
 
 
 def pieces(case: Case, index: int, mesh: TetMesh, overlaps: bool) -> tuple[Indices, list[str]]:
-    """(nodes,) which piece of its part each node belongs to, where the mesh is from a file and the part meets itself;
-    else all to the first. And warnings: nodes that coincide and are not merged are the commonest slip in a mesh.
+    """Return (nodes,) the piece of each node, if the mesh is from a file and the part has self-contact, else zeros; and
+    warnings: unmerged coincident nodes are a common error of meshes.
 
-    ``overlaps``: whether pieces that do not meet each other are looked at, too. Raises InputError where these have
-    volume in common: it would be there twice.
+    ``overlaps``: whether overlaps of pieces without contact are searched for. Raises InputError if such pieces have
+    volume in common: it would count twice.
     """
     whole = np.zeros(len(mesh.points), np.int32)
     if not isinstance(case.parts[index].mesh, Measured):
@@ -39,29 +39,29 @@ def pieces(case: Case, index: int, mesh: TetMesh, overlaps: bool) -> tuple[Indic
     if many == 1:
         return whole, []
     if many > _MANY:
-        return whole, [f"{said}: whether they overlap each other at the start is found out for {_MANY} at most"]
+        return whole, [f"{said}: overlaps between them at the start are checked for {_MANY} pieces at most"]
     if case.contact is not None and not np.isnan(part_pairs.friction(case)[index, index]):
         return piece, []
-    told = [
-        f"{said}, and they do not meet each other: merge the nodes where they coincide, or let the part meet itself "
+    warnings = [
+        f"{said}, without contact between them: merge coincident nodes, or give the part contact with itself "
         "(contact.self_contact)"
     ]
-    return whole, [*told, *(_doubled(case, index, mesh, piece) if overlaps else [f"parts[{index}].mesh: {UNSEEN}"])]
+    return whole, [*warnings, *(_doubled(case, index, mesh, piece) if overlaps else [f"parts[{index}].mesh: {UNSEEN}"])]
 
 
 def _doubled(case: Case, index: int, mesh: TetMesh, piece: Indices) -> Iterator[str]:
-    """A warning where nodes of a piece lie in another one; InputError where tets do, by their centres."""
+    """Yield a warning if nodes of a piece are inside of another one. Raises InputError if centres of tets are."""
     inside, tets = overlap.within(mesh.points, mesh.tets, piece)
     if len(tets):
         volumes, at = mesh.volumes(), mesh.points[mesh.tets[tets[0]]].mean(axis=0)
         place = ", ".join(f"{c:.6g}" for c in at)
         raise InputError(
             f"parts[{index}].mesh: pieces of {case.parts[index].name!r} that share no node overlap: about "
-            f"{0.5 * volumes[tets].sum():.3g} of {volumes.sum():.3g} m^3 is there twice, at ({place}) m for one; is an "
-            "instance there twice?"
+            f"{0.5 * volumes[tets].sum():.3g} of {volumes.sum():.3g} m^3 counts twice, for example at ({place}) m; "
+            "is an instance in the file twice?"
         )
     if len(inside):
         yield (
             f"parts[{index}].mesh: {counted(len(inside), 'node')} of pieces that share no node "
-            f"{'lies' if len(inside) == 1 else 'lie'} inside of other pieces: some volume is there twice"
+            f"{'lies' if len(inside) == 1 else 'lie'} inside of other pieces: some volume counts twice"
         )

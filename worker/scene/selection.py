@@ -1,4 +1,4 @@
-"""Nodes and faces that the regions of a case select, and whether they are those that ``validate`` expects."""
+"""Nodes and faces that the regions of a case select, compared with the numbers that ``validate`` expects."""
 
 import logging
 from collections.abc import Container, Iterator, Sequence
@@ -19,31 +19,31 @@ from .marks import Marks
 log = logging.getLogger("conoid.worker")
 
 _CLOSE = 0.5
-"""Of the shortest edge: how far outside of a border nodes are counted, to see whether they lie in layers. Chosen: the
-next layer of a regular mesh is twice as far."""
+"""Distance outside of a border, over the shortest edge, within which nodes are counted to detect a layer. Chosen:
+the next layer of a regular mesh is twice as far."""
 _LAYER, _FEWEST = 0.5, 4
-"""Of these nodes, how many nearer than region.MOST are a layer, and their least number. Chosen: a fifth of them is that
-near where they lie at random."""
+"""Share of these nodes within region.MOST that is taken as a layer, and the least number of nodes. Chosen: of nodes
+at random a fifth is as near."""
 Members = tuple[Ints, Indices]
 """(m,) nodes and (m,) their parts: a row for each part of each node (state.Nodes.of_parts)."""
 _EDGES = ((0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3))
-"""Of a tet."""
+"""Corners of the edges of a tet."""
 
 
 @dataclass(frozen=True)
 class Nearness:
-    """How near to a border a node of each part counts as on it, m; see ``cases/shapes/region.py``."""
+    """Distances from a border within which nodes of each part count as on it, m; see ``cases/shapes/region.py``."""
 
     edge: Floats
-    """(parts,) the shortest edge."""
+    """(parts,) shortest edge."""
     slack: Floats
-    """(parts,) for regions."""
+    """(parts,) distance for regions."""
     rounding: Floats
-    """(parts,) for planes of symmetry."""
+    """(parts,) distance for planes of symmetry."""
 
 
 def nearness(case: schema.Case, x: Floats, members: Members, tets: Indices, tet_part: Indices) -> Nearness:
-    """Of the parts of a case, from all their nodes (n, 3), tets (m, 4), and the parts of both."""
+    """Return the distances for all parts, from nodes (n, 3), tets (m, 4), and the parts of both."""
     nodes, part = members
     n = len(case.parts)
     squared, reach = np.full(n, np.inf), np.zeros(n)
@@ -59,17 +59,17 @@ def nearness(case: schema.Case, x: Floats, members: Members, tets: Indices, tet_
 
 
 def named(spec: schema.Boundary, parts: Sequence[str]) -> Flags:
-    """(parts,) the parts that a boundary names; all where it names none."""
+    """Return (parts,) the parts that a boundary names; all if it names none."""
     return np.array([not spec.parts or name in spec.parts for name in parts])
 
 
 def settled(case: schema.Case, there: Container[int]) -> list[bool]:
-    """Of each boundary, whether all parts that it is for are among those that are ``there``, by number."""
+    """Return for each boundary whether the numbers of all its parts are in ``there``."""
     return [all(index in there for index in np.flatnonzero(meant(case, spec)).tolist()) for spec in case.boundaries]
 
 
 def meant(case: schema.Case, spec: schema.Boundary) -> Flags:
-    """(parts,) the parts that a boundary is for: where it is on a set and names none, those with a mesh from a file."""
+    """Return (parts,) the parts of a boundary: if it is on a set and names no part, those with a mesh from a file."""
     found = named(spec, [part.name for part in case.parts])
     if getattr(spec, "on", None) is not None and not spec.parts:
         found &= np.array([isinstance(part.mesh, MeshFile) for part in case.parts])
@@ -77,15 +77,15 @@ def meant(case: schema.Case, spec: schema.Boundary) -> Flags:
 
 
 def inside(spec: schema.Prescribed | schema.Traction, x: Floats, part: Indices, near: Floats) -> Flags:
-    """(n,) the nodes (n, 3) of any part that lie in the region of a boundary; ``near``: (parts,) slack, m."""
+    """Return (n,) the points (n, 3) in the region of a boundary, of any part; ``near``: (parts,) slack, m."""
     return np.asarray(np.full(len(x), True) & Region.of(spec).holds(x.T, near[part]))
 
 
 def held(
     spec: schema.Prescribed | schema.Traction, names: Sequence[str], x: Floats, members: Members, near: Floats
 ) -> Flags:  # fmt: skip
-    """(n,) the nodes (n, 3) of the parts of a boundary that lie in its region; ``names`` of the parts, and ``near``
-    (parts,): slack, m.
+    """Return (n,) the nodes (n, 3) of the parts of a boundary that are in its region; ``names``: of the parts;
+    ``near``: (parts,) slack, m.
     """
     nodes, part = members
     some = named(spec, names)[part] & inside(spec, x[nodes], part, near)
@@ -96,7 +96,7 @@ def held(
 
 @dataclass(frozen=True)
 class Selected:
-    """What the region of a boundary selects: area, m^2, and faces of a traction, nodes of a velocity."""
+    """Selection of the region of a boundary: faces and their area, m^2, of a traction, nodes of a velocity."""
 
     boundary: int
     nodes: int
@@ -105,7 +105,7 @@ class Selected:
 
 
 def compared(case: schema.Case, found: Sequence[Selected]) -> Iterator[str]:
-    """What is selected beside what ``validate`` expects: all of it into the log, a warning where they disagree."""
+    """Log what is selected and what ``validate`` expects; yield a warning where they disagree."""
     expected = {load.boundary: load for load in loaded.loads(case)}
     for each in found:
         load = expected[each.boundary]
@@ -127,8 +127,8 @@ def _words(found: Selected) -> str:
 def missed(
     case: schema.Case, number: int, x: Floats, members: Members, near: Nearness, took: Flags
 ) -> Iterator[str]:  # fmt: skip
-    """Warnings for the region of a boundary that took something of the parts ``took`` (parts,): parts that it names and
-    took nothing of, and layers of nodes that lie so little outside of it that they were hardly meant to.
+    """Yield warnings for the region of a boundary that selects something of the parts ``took`` (parts,): parts that
+    it names and selects nothing of, and layers of nodes so close outside of it that the user may have meant them.
     """
     spec = case.boundaries[number]
     assert isinstance(spec, schema.Prescribed | schema.Traction)
@@ -160,8 +160,9 @@ def counted(
     near: Nearness,
     marked: Marks,
 ) -> tuple[Selected, Flags]:
-    """What boundary ``number`` selects of nodes (n, 3), and of exposed ``faces``, (m, 3) and their parts (m,); which
-    nodes of a velocity, or faces of a traction, that are. ``marked``: of the nodes.
+    """Return what boundary ``number`` selects, and which nodes (n,) of a velocity or faces (m,) of a traction.
+
+    ``faces``: exposed faces (m, 3) and their parts (m,); ``marked``: sets of the nodes.
     """
     spec, names = case.boundaries[number], [each.name for each in case.parts]
     assert isinstance(spec, schema.Prescribed | schema.Traction)
@@ -180,14 +181,14 @@ def counted(
 
 
 NO_FACES = np.zeros((0, 3), np.int32), np.zeros(0, np.int32)
-"""For ``counted``."""
+"""Argument ``faces`` of ``counted`` for velocities."""
 
 
 def off_planes(
     case: schema.Case, x: Floats, members: Members, near: Nearness, known: Sequence[bool]
 ) -> Iterator[str]:  # fmt: skip
-    """A warning for each plane of symmetry that is ``known`` off which nodes lie so little that they were hardly meant
-    to.
+    """Yield a warning for each ``known`` plane of symmetry with nodes so close to it that the user may have meant
+    them to be on it.
     """
     names, (nodes, part) = [each.name for each in case.parts], members
     for number, plane in case.boundaries_of(schema.Symmetry):

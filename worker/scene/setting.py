@@ -9,7 +9,7 @@ from ..mesh.model import Floats
 
 
 def turned(points: Floats, turn: Turn | None) -> Floats:
-    """Points (n, 3) after the rotation of their part."""
+    """Return the points (n, 3) after the rotation of their part."""
     if turn is None:
         return points
     i, j = ((1, 2), (2, 0), (0, 1))["xyz".index(turn.axis)]
@@ -21,7 +21,7 @@ def turned(points: Floats, turn: Turn | None) -> Floats:
 
 
 def velocities(part: Part, points: Floats) -> Floats:
-    """(n, 3) velocities, m/s, of nodes of ``part`` at ``points``, (n, 3), m, without its jitter."""
+    """Return (n, 3) the velocities, m/s, of nodes of ``part`` at ``points``, (n, 3), m, without its jitter."""
     found = np.empty_like(points)
     found[:] = part.velocity
     if part.spin is not None:

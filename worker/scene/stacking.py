@@ -1,4 +1,4 @@
-"""The meshes of all parts as one mesh: nodes and tets in the order of the parts, joined where bonds have it so."""
+"""One mesh of all parts: nodes and tets in the order of the parts, with common nodes where bonds join parts."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -24,27 +24,28 @@ class Stacked:
     """All nodes and tets."""
 
     points: Floats
-    """(n, 3) m, as their parts turn them."""
+    """(n, 3) positions after the rotation of their part, m."""
     tets: Indices
-    """(m, 4)."""
+    """(m, 4) nodes."""
     tet_part: Indices
     node_part: Indices
-    """(n,) of nodes of several parts the first."""
+    """(n,) part; the first part of a node of several."""
     body: Indices
-    """(n,) which body each node is of: a part, a piece of one, or what bonds hold together."""
+    """(n,) the body of each node: a part, a piece of a part, or several joined by bonds."""
     part_of_body: Ints
-    """(bodies,) the first part of each; also of those that are part of another."""
+    """(bodies,) the first part of each, also of bodies that were joined to another."""
     stands: Ints
-    """(bodies,) the body that each is part of."""
+    """(bodies,) the body that each was joined to."""
     across: Indices
-    """(m, 4) see state.Block; (0, 4) where nobody asks."""
+    """(m, 4) see state.Block; (0, 4) if no stage needs it."""
     warnings: list[str]
     read: dict[int, tuple[TetMesh, Ints]]
-    """Meshes from files by parts, and where their nodes are among all; where the case is on sets."""
+    """Meshes from files by part number, with the indices of their nodes; filled if the case refers to sets."""
 
     def any_of_body(self, allowed: Flags) -> Flags:
-        """(bodies, bodies) who meets whom: whatever meets a part of a body meets the body; ``allowed``: by parts of
-        bodies alone.
+        """Return (bodies, bodies) the pairs in contact: a body is in contact with all that one of its parts is.
+
+        ``allowed``: (bodies, bodies) pairs by the part of each body alone.
         """
         met, (one, other) = np.zeros_like(allowed), np.nonzero(allowed)
         met[self.stands[one], self.stands[other]] = True
@@ -52,15 +53,16 @@ class Stacked:
 
 
 def stacked(case: Case, meshes: Iterable[tuple[int, TetMesh]], overlaps: bool) -> Stacked:
-    """The ``meshes`` of parts by their numbers, in their order; ``overlaps``: whether pieces of a part that overlap are
-    looked for. Raises MeshError, InputError.
+    """Return the mesh of the ``meshes`` with their part numbers, in their order. Raises MeshError, InputError.
+
+    ``overlaps``: whether overlaps between pieces of a part are searched for.
     """
-    points, tets, tet_part, node_part, told = [], [], [], [], list[str]()
+    points, tets, tet_part, node_part, warnings = [], [], [], [], list[str]()
     bodies, part_of_body, placed, n = [], list[int](), dict[int, Placed](), 0
     read, on_sets = dict[int, tuple[TetMesh, Ints]](), bool(ons(case))
     for index, mesh in meshes:
-        piece, said = pieces(case, index, mesh, overlaps)
-        told += said
+        piece, more = pieces(case, index, mesh, overlaps)
+        warnings += more
         bodies.append(piece + len(part_of_body))
         part_of_body += [index] * (int(piece.max(initial=0)) + 1)
         points.append(turned(mesh.points, case.parts[index].turn))
@@ -76,7 +78,7 @@ def stacked(case: Case, meshes: Iterable[tuple[int, TetMesh]], overlaps: bool) -
     made = Stacked(
         np.concatenate(points), np.concatenate(tets).astype(np.int32), np.concatenate(tet_part),
         np.concatenate(node_part), np.concatenate(bodies), np.array(part_of_body), np.arange(len(part_of_body)),
-        np.zeros((0, 4), np.int32), told, read,
+        np.zeros((0, 4), np.int32), warnings, read,
     )  # fmt: skip
     several = _join(made, joined(case, placed, n))
     if several or case.in_contact or case.fractures:
@@ -87,9 +89,7 @@ def stacked(case: Case, meshes: Iterable[tuple[int, TetMesh]], overlaps: bool) -
 
 
 def _join(made: Stacked, stands: Ints) -> bool:
-    """Leaves of the nodes those that stand for themselves; ``stands`` (n,): who stands for each. Whether any node does
-    not.
-    """
+    """Merge nodes: ``stands`` (n,) is the node that represents each. Return whether any node was merged."""
     kept = np.flatnonzero(stands == np.arange(len(stands)))
     if len(kept) == len(stands):
         return False

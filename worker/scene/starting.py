@@ -18,16 +18,18 @@ from . import selection
 from .conditions import AXES, heights, held_by, sides
 
 _ASIDE = 1e-9
-"""Of the largest speed: less across a symmetry plane is rounding."""
+"""Share of the largest speed below which a velocity across a symmetry plane is round-off. Chosen."""
 
 
 def start(
     case: schema.Case, model: Model, boundaries: list[Boundary], comm: Comm, known: Sequence[bool] | None = None
 ) -> list[str]:
-    """Makes the initial velocities agree with the boundaries; what the user should know of them. All ranks take part.
-    ``known``: those all of whose parts are in the model, of the others less is asked and told; None for all.
+    """Apply the boundaries to the initial velocities; return warnings. Collective.
 
-    Raises InputError, on every rank alike, for a boundary that holds no node, two that drive a node in two ways, a body
+    ``known``: for each boundary whether all its parts are in the model; for the others fewer checks are made; None for
+    all.
+
+    Raises InputError, on every rank, for a boundary that holds no node, two that drive a node differently, a body
     that starts behind a wall or through a symmetry plane, and motion prescribed across one.
     """
     held = [held_by(case, spec, model) for spec in case.boundaries]
@@ -41,18 +43,18 @@ def start(
     _refuse_conflicts(case.boundaries, held, boundaries, model.nodes, comm)
     _refuse_overlaps(case, model, boundaries, comm)
     _refuse_crossings(case, model, comm)
-    told = [
-        f"boundaries[{index}]: no node starts on this plane of symmetry; it holds what comes to it later"
+    warnings = [
+        f"boundaries[{index}]: no node starts on this plane of symmetry; it holds nodes that reach it later"
         for index in beside if counts[index] == 0 and known[index]
     ]  # fmt: skip
-    told += _stopped(case, held, model.nodes, comm, known)
+    warnings += _stopped(case, held, model.nodes, comm, known)
     for boundary in boundaries:
         boundary.start(model.nodes)
-    return told
+    return warnings
 
 
 def _beside(case: schema.Case, model: Model, comm: Comm) -> list[int]:
-    """The symmetry planes beside which nodes start."""
+    """Return the symmetry planes that have nodes beside them at the start."""
     planes = case.boundaries_of(schema.Symmetry)
     found = comm.sum(np.array([int(np.count_nonzero(sides(spec, model))) for _, spec in planes], np.int64))
     return [index for (index, _), many in zip(planes, found, strict=True) if many]
@@ -61,7 +63,7 @@ def _beside(case: schema.Case, model: Model, comm: Comm) -> list[int]:
 def _stopped(
     case: schema.Case, held: list[Flags], nodes: Nodes, comm: Comm, known: Sequence[bool]
 ) -> list[str]:  # fmt: skip
-    """Where symmetry planes take a velocity from nodes that start on them."""
+    """Return warnings of symmetry planes that change the velocity of nodes on them."""
     planes = case.boundaries_of(schema.Symmetry)
     across = [np.abs(nodes.v[held[index], AXES[spec.axis]]).max(initial=0.0) for index, spec in planes]
     speeds = comm.maximum(np.array([*across, np.abs(nodes.v).max(initial=0.0)]))
@@ -83,7 +85,7 @@ def _refuse_overlaps(case: schema.Case, model: Model, boundaries: list[Boundary]
 
 
 def _refuse_crossings(case: schema.Case, model: Model, comm: Comm) -> None:
-    """A tet through a symmetry plane would lie in its own mirror image."""
+    """Raise InputError for a tet through a symmetry plane: it would overlap its own mirror image."""
     for index, spec in case.boundaries_of(schema.Symmetry):
         named, height, beyond = selection.named(spec, model.parts), heights(spec, model), np.zeros(len(model.parts))
         for block in (block for block in model.blocks if named[block.part]):
@@ -99,7 +101,7 @@ def _refuse_crossings(case: schema.Case, model: Model, comm: Comm) -> None:
 
 
 def _refuse_two_drives(specs: Sequence[schema.Boundary], held: list[Flags], comm: Comm) -> None:
-    """A component of a node has one drive: of two the last would win."""
+    """Raise InputError for a component of a node with two different prescribed motions."""
     found = comm.maximum(np.array([float(_two_drives(specs, held))]))[0]
     if found >= 0:
         second, first = divmod(int(found), len(specs))
@@ -111,7 +113,9 @@ def _refuse_two_drives(specs: Sequence[schema.Boundary], held: list[Flags], comm
 
 
 def _two_drives(specs: Sequence[schema.Boundary], held: list[Flags]) -> int:
-    """Two boundaries that drive a node of this rank each in its own way: second * boundaries + first; -1 for none."""
+    """Return a pair of boundaries that drive a node of this rank differently, as second * boundaries + first; -1 for
+    none.
+    """
     drivers = {axis: np.full(len(held[0]) if held else 0, -1) for axis in AXES}
     for second, spec in enumerate(specs):
         for axis in motions(spec):
@@ -126,7 +130,7 @@ def _two_drives(specs: Sequence[schema.Boundary], held: list[Flags]) -> int:
 def _refuse_conflicts(
     specs: Sequence[schema.Boundary], held: list[Flags], boundaries: list[Boundary], nodes: Nodes, comm: Comm
 ) -> None:
-    """Motion prescribed across a symmetry plane, now or later, would do work on it that never happened."""
+    """Raise InputError for motion prescribed across a symmetry plane at any time: the plane would do work."""
     before = nodes.v.copy()
     for boundary in boundaries:
         boundary.start(nodes)

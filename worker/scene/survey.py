@@ -1,7 +1,7 @@
-"""What the mesh files of a case hold: ``python -m conoid.worker.scene.survey``.
+"""Measurements of the mesh files of a case: ``python -m conoid.worker.scene.survey``.
 
-One question on standard input, one answer on standard output (conoid.cases.reading.survey). Files are read by child
-processes with limits, as for a run, and kept as for a run: one that follows does not read them again.
+One question on standard input, one answer on standard output (conoid.cases.reading.survey). Child processes read the
+files with the limits and the store of a run: a run that follows does not read them again.
 """
 
 import sys
@@ -27,9 +27,8 @@ from .setting import turned
 
 
 def surveyed(case: Case, folder: Path, compiled: bool = True) -> Survey:
-    """Reads the files of all parts; what is wrong with one of them hides nothing that is wrong with another. Where all
-    can be used, a run begins with them as far as its first step; without ``compiled`` kernels nothing finds out whether
-    bodies overlap.
+    """Read the files of all parts and report the errors of each. If all can be used, start a run with them up to its
+    first step; without ``compiled`` kernels overlaps of bodies are not searched for.
     """
     facts, refused, placed, meshes = Facts(case), list[str](), list[Placed](), dict[int, TetMesh]()
     for index, part in enumerate(case.parts):
@@ -59,7 +58,9 @@ def surveyed(case: Case, folder: Path, compiled: bool = True) -> Survey:
 
 
 def _made(case: Case, index: int, folder: Path, there: dict[int, TetMesh]) -> dict[int, TetMesh]:
-    """The mesh of a part, and of those that are meshed together with it, where they are not ``there`` yet."""
+    """Return the meshes of part ``index`` and of those meshed together with it, by number; none if it is in
+    ``there``.
+    """
     if index in there:
         return {}
     group = grouped(case, index)
@@ -69,14 +70,14 @@ def _made(case: Case, index: int, folder: Path, there: dict[int, TetMesh]) -> di
 
 
 def _begun(case: Case, meshes: dict[int, TetMesh], compiled: bool) -> list[str]:
-    """Imported where it is needed: numba must know where its kernels are before."""
+    """Return the warnings of the trial start. It is imported here: numba must have its cache folder before."""
     from .beginning import begun
 
     return begun(case, meshes, compiled) if meshes else []
 
 
 def main() -> int:
-    """Answers the question on standard input; the exit code."""
+    """Answer the question on standard input; return the exit code."""
     asked = survey.read_question(sys.stdin.buffer.read())
     limit(Limits().allowed())
     compiled = (store.use_cache() / ahead.COMPLETE).exists()

@@ -107,7 +107,7 @@ def joined(occ: Any, solids: Solids, key: str) -> Solids:
     after = sum(occ.getMass(*each) for each in made)
     if after < before * (1.0 - 1e-6):
         share = (before - after) / before
-        raise MeshError(f"{key}: its solids overlap each other: {share:.2g} of their volume is there twice")
+        raise MeshError(f"{key}: its solids overlap each other: {share:.2g} of their volume counts twice")
     return made
 
 
