@@ -12,6 +12,7 @@ from conoid.cases.model.schema import Case, Symmetry
 
 from . import scales
 from .accounts.energy import Ledger
+from .accounts.sums import Sums
 from .accounts.timers import Timers, worked
 from .bonds.interface import tied_pairs
 from .bonds.pieces import Pieces
@@ -228,7 +229,8 @@ def _assemble(
         fracture = Fracture(case, model, neighbours, elements, by_node, contact, comm, clock)
     stopping = tuple(bound for bound in scene if bound.given is not None)
     probes = Probes(case, Scene(model, contact, stopping, rigid, erosion, fracture, clock, comm))
-    ledger = Ledger(model, scene, contact, bonds, erosion, fracture, (rigid, moving), comm, clock, threads)
+    sums = Sums(model, scene, contact, bonds, erosion, fracture, (rigid, moving), comm, clock, threads)
+    ledger = Ledger(sums, model.parts)
     return Simulation(
         case=case, comm=comm, model=model, elements=elements, leapfrog=Leapfrog(threads), boundaries=scene,
         contact=contact, bonds=bonds, erosion=erosion, fracture=fracture, rigid=rigid, walls=moving,

@@ -166,9 +166,7 @@ def test_motion_that_nobody_has_paid_for_ends_the_run() -> None:
         before *= math.sqrt(1.2)
         sim.model.nodes.v[:] *= math.sqrt(1.2)
         sim.ledger.close(before)
-        with pytest.raises(
-            EnergyError, match=r"the energy of motion beyond all that has come in, 0\.\d+, passed run\."
-        ):
+        with pytest.raises(EnergyError, match=r"the kinetic energy above all energy received, 0\.\d+, passed run\."):
             sim.ledger.require(sim.case.run, 0.9, "now")
         ran = True
 

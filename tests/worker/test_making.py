@@ -6,7 +6,7 @@ import re
 import pytest
 
 from conoid.cases.messages import Energy
-from conoid.worker.accounts.making import LASTING, RETURNED, TOLD, Making
+from conoid.worker.accounts.making import LASTING, RETURNED, WARNED, Making
 from conoid.worker.errors import EnergyError
 
 from .kernels import COPPER, build, scene
@@ -53,12 +53,12 @@ def test_hot_matter_that_erodes_may_have_given_its_heat() -> None:
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_unequal_steps_count_either_way_and_their_cure_is_derived(sign: float) -> None:
-    """An error of the second order in the step: half of TOLD is left at the named share of the present one."""
+    """An error of the second order in the step: half of WARNED is left at the named share of the present one."""
     making = Making(0.0)
     making.look(lines(stepping=sign * 0.04), 1.0, 1e-6)
     (text,) = making.warnings(0.9)
     named = float(text.partition("numerics.dt_safety = ")[2].split()[0])
-    assert 0.04 * (named / 0.9) ** 2 == pytest.approx(0.5 * TOLD, rel=0.05)
+    assert 0.04 * (named / 0.9) ** 2 == pytest.approx(0.5 * WARNED, rel=0.05)
 
 
 def test_the_share_is_of_the_largest_energy_so_far() -> None:

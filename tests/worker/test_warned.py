@@ -134,9 +134,7 @@ def test_what_is_there_twice_is_refused_by_both(shift: Any, contact: Any, folder
     """As much of 8 mm^3 as the shift leaves; exact where the tets coincide, else a half of a layer of tets off."""
     write(folder / "bar.inp", (0, 0, 0), shift)
     made = parse_case(case() | {"contact": contact})
-    said = (
-        r"parts\[0\].mesh: pieces of 'bar' that share no node overlap: about [0-9.e-]+ of 1.6e-08 m\^3 counts twice"
-    )
+    said = r"parts\[0\].mesh: pieces of 'bar' that share no node overlap: about [0-9.e-]+ of 1.6e-08 m\^3 counts twice"
     with pytest.raises(ConoidError, match=said) as error:
         simulation.build(made, folder, SerialComm())
     assert surveyed(made, folder).refused == [str(error.value)]

@@ -1,4 +1,4 @@
-"""The digest: sha256 over the state of nodes and tets in the order of their global ids, for any number of ranks."""
+"""Digest of the final state: sha256 over nodes and tets in the order of their global ids, for any number of ranks."""
 
 import hashlib
 
@@ -10,11 +10,11 @@ from ..parallel.comm import Comm
 
 
 def digest(model: Model, comm: Comm, nodal: list[Floats], more: bytes = b"") -> str | None:
-    """Hex digest on rank 0, None elsewhere.
+    """Return the hex digest on rank 0, None on the others. Collective.
 
-    Positions, velocities, what else the nodes carry (``nodal``), every row of the tets' state but VOLUME_FLUX, which is
-    scratch, or in a material without a strength the volume, which the positions say; and what all ranks have alike
-    (``more``).
+    It covers positions, velocities, the other ``nodal`` arrays, every row of the tets' state except VOLUME_FLUX,
+    which is scratch or a volume that follows from the positions, and the bytes ``more``, which are equal on all
+    ranks.
     """
     nodes, h = model.nodes, hashlib.sha256()
     owned = nodes.owned

@@ -1,10 +1,10 @@
-"""Seconds per phase of the step: CPU time by the clock of this thread, and wall time inside and outside regions.
+"""Seconds per phase of the step: CPU time of this thread, and wall time inside and outside of regions.
 
-MPI polls while it waits: what a phase spends in calls that wait for other ranks counts as ``exchange``, whichever phase
-it is in; the other phases are work. Kernels are loaded at their first call: that counts in no phase.
+MPI polls while it waits: the time of a phase in calls that wait for other ranks counts as ``exchange``; the other
+phases are work. The loading of kernels at their first call counts in no phase.
 
-A region is a call of ``Team.run``, whose tasks all threads of the rank share. Wall time within regions is ``parallel``,
-the rest but for the waiting is ``serial``: one thread works then, and the others of the rank have nothing to do.
+A region is a call of ``Team.run``, whose tasks all threads of the rank share. Wall time in regions is ``parallel``,
+the rest except the waiting is ``serial``: then one thread works and the others of the rank are idle.
 """
 
 from collections.abc import Sequence
@@ -15,16 +15,16 @@ from ..parallel.comm import Comm
 from ..parallel.team import Team
 
 PHASES = ("elements", "exchange", "nodes", "contact", "fracture", "output", "balance", "rest")
-"""``rest`` is what lies between the others."""
+"""``rest`` is the time between the others."""
 
 
 def worked(comm: Comm) -> float:
-    """CPU time of this thread so far, but for its waiting and for the loading of kernels, s."""
+    """Return the CPU time of this thread so far without waiting and without the loading of kernels, s."""
     return cpu_time() - comm.waited
 
 
 def by_phase(seconds: Sequence[dict[str, float]]) -> dict[str, list[float]]:
-    """One number a rank, of the ``seconds`` by phase of each; nothing of no rank."""
+    """Return for each phase one number a rank, from the ``seconds`` by phase of each; {} for no ranks."""
     return {name: [each[name] for each in seconds] for name in PHASES} if seconds else {}
 
 
@@ -38,23 +38,23 @@ def _less(now: dict[str, float], before: dict[str, float]) -> dict[str, float]:
 
 @dataclass
 class Spent:
-    """s by phase, and of all phases the waiting."""
+    """Seconds by phase, and of all phases the waiting."""
 
     cpu: dict[str, float] = field(default_factory=_none)
-    """Of this thread."""
+    """CPU time of this thread."""
     serial: dict[str, float] = field(default_factory=_none)
-    """Wall time outside regions, but for the waiting. Where others use the cores, too, it has their time in it."""
+    """Wall time outside of regions, without the waiting. It includes the time of other programs on the same core."""
     parallel: dict[str, float] = field(default_factory=_none)
-    """Wall time within regions."""
+    """Wall time in regions."""
     waiting: float = 0.0
-    """CPU time in calls that wait for other ranks; ``exchange`` of ``cpu`` has it, too."""
+    """CPU time in calls that wait for other ranks; it is part of ``exchange`` of ``cpu``, too."""
     helped: float = 0.0
-    """That the other threads have done tasks, all together."""
+    """Time of the other threads in tasks, all together."""
     projected: dict[int, dict[str, float]] = field(default_factory=dict)
-    """By number of threads: ``cpu`` but for the waiting, as it would be with so many (parallel/projecting.py)."""
+    """By number of threads: ``cpu`` without the waiting, as estimated for so many threads (parallel/projecting.py)."""
 
     def since(self, before: "Spent") -> "Spent":
-        """What has been added."""
+        """Return the difference from an earlier state."""
         return Spent(
             _less(self.cpu, before.cpu), _less(self.serial, before.serial), _less(self.parallel, before.parallel),
             self.waiting - before.waiting, self.helped - before.helped,
@@ -62,20 +62,20 @@ class Spent:
         )  # fmt: skip
 
     def of_all_phases(self) -> dict[str, float]:
-        """What messages.Load has besides CPU time by phase."""
+        """Return the sums over all phases for messages.Load."""
         return {
             "serial": sum(self.serial.values()), "parallel": sum(self.parallel.values()), "waiting": self.waiting,
             "helped": self.helped,
         }  # fmt: skip
 
     def copy(self) -> "Spent":
-        """As it is now."""
+        """Return a copy."""
         projected = {crew: dict(seconds) for crew, seconds in self.projected.items()}
         return Spent(dict(self.cpu), dict(self.serial), dict(self.parallel), self.waiting, self.helped, projected)
 
 
 class Timers:
-    """Accumulates time per phase."""
+    """Accumulated time per phase."""
 
     def __init__(self, comm: Comm, team: Team) -> None:
         self._comm, self._team = comm, team
@@ -89,7 +89,7 @@ class Timers:
         return self.spent.cpu
 
     def begin(self) -> None:
-        """Counts ``rest`` from here on."""
+        """Start to count, in the phase ``rest``."""
         projecting = self._team.projecting
         self._spans = projecting.spans if projecting is not None else []
         for crew in projecting.crews if projecting is not None else ():
@@ -102,12 +102,12 @@ class Timers:
         self._reported, self._helped = self.spent.copy(), self._team.helped
 
     def phase(self, name: str) -> "_Phase":
-        """Adds the time of the block to a phase; a phase within it takes its own time out."""
+        """Return a context whose time is added to a phase; a phase within it subtracts its own time."""
         return self._blocks[name]
 
     def switch(self, name: str) -> str:
-        """Ends the present phase, which it returns, and begins another one. Each change of the phase reads the clock of
-        the thread, a call of the system of up to 1 us: a step makes as few as it can.
+        """End the present phase, which is returned, and begin another. Each change reads the clock of the thread, a
+        system call of up to 1 us: a step makes as few as possible.
         """
         cpu, wall, waited, within = cpu_time(), wall_time(), self._comm.waited, self._team.within
         ended, spent = self._phase, self.spent
@@ -125,7 +125,7 @@ class Timers:
         return ended
 
     def _project(self, phase: str, serial: float) -> None:
-        """Adds to a phase the CPU time outside regions, and what each crew would take within them."""
+        """Add to a phase the CPU time outside of regions, and the estimated time of each crew in them."""
         assert self._team.projecting is not None
         spans = self._team.projecting.spans
         for seconds, now, before in zip(self.spent.projected.values(), spans, self._spans, strict=True):
@@ -133,7 +133,7 @@ class Timers:
         self._spans = spans
 
     def since_last(self) -> Spent:
-        """What was spent since the last call; asked between phases."""
+        """Return the time since the last call; called between phases."""
         self.switch(self._phase)
         self.spent.helped = self._team.helped - self._helped
         added = self.spent.since(self._reported)
@@ -142,7 +142,7 @@ class Timers:
 
 
 class _Phase:
-    """Blocks of the step, which may lie within each other; two dozen in every step, too many for generators."""
+    """Context of a phase; a class, since two dozen run in every step and generators take longer."""
 
     __slots__ = ("_name", "_outer", "_timers")
 
