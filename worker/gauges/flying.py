@@ -1,4 +1,4 @@
-"""The heaviest fragment: of a part, and of what of it is beyond a plane."""
+"""Probes of fragments: velocity and mass of the heaviest fragment of a part beyond a plane."""
 
 from typing import Any
 
@@ -13,13 +13,13 @@ from .sums import ahead, way
 
 
 def held(scene: Scene) -> Ints:
-    """(m, 2) tets that a broken facet still joins."""
+    """Return (m, 2) pairs of tets that a broken facet still connects by its cohesion."""
     cohesion = scene.fracture.cohesion if scene.fracture is not None else None
     return cohesion.facets.tets if cohesion is not None else np.zeros((0, 2), np.int64)
 
 
 class Flying:
-    """The probes of fragments beyond a plane. They have no memory."""
+    """The probes of fragments beyond a plane; they have no state."""
 
     def __init__(self, case: Case, scene: Scene) -> None:
         self._scene = scene

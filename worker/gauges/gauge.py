@@ -1,4 +1,4 @@
-"""A gauge: the probes of a case that are measured in one way, and what of the simulation they look at."""
+"""Interface of gauges, groups of probes that are measured in one way, and the data that they read."""
 
 from typing import Any, NamedTuple, Protocol
 
@@ -13,7 +13,7 @@ from ..rigid.stage import Rigid
 
 
 class Scene(NamedTuple):
-    """What gauges look at, on this rank."""
+    """The parts of a simulation that gauges read, on this rank."""
 
     model: Model
     contact: Contact | None
@@ -26,13 +26,13 @@ class Scene(NamedTuple):
 
 
 class Gauge(Protocol):
-    """All ranks take part in everything, and have the same answers."""
+    """A group of probes. Every method is collective and returns the same values on all ranks."""
 
     def measure(self, v: Floats) -> dict[int, float]:
-        """The present values by the number of the probe; ``v`` (nodes, 3): velocities now, m/s."""
+        """Return the present values by the number of the probe; ``v`` (nodes, 3): velocities now, m/s."""
 
     def keep(self) -> Any:
-        """What it remembers, equal on all ranks: numbers and arrays in lists."""
+        """Return the state for a checkpoint, equal on all ranks: numbers and arrays in lists."""
 
     def resume(self, known: Any) -> None:
-        """Takes it back."""
+        """Set the state of ``keep``."""

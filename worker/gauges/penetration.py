@@ -1,8 +1,8 @@
-"""How deep the hole is that a part has made in the others, from lines along the axis.
+"""Depth of the hole that a part has made in the others, measured on lines parallel to the axis.
 
-A line is cut into spans inside of tets, and into voids between them. The hole is the void in front of the bodies and
-whatever is joined to it: voids of lines side by side are joined where they overlap. A cavity that opens ahead of the
-hole is joined to nothing, and a flake in the hole does not end it. The free space behind the bodies is no cavity.
+A line is cut into spans inside of tets and voids between them. The hole is the void in front of the bodies and all
+voids joined to it: voids of neighbouring lines are joined where they overlap. A cavity that opens ahead of the hole
+is not joined to it, and a flake in the hole does not end it. The free space behind the bodies is not a void.
 """
 
 from itertools import pairwise
@@ -13,18 +13,19 @@ from ..model.state import Floats, Ints, Model, Tets
 from ..parallel.comm import Comm
 
 LINES = np.arange(1, 11) / 10.0
-"""Distances of the lines from the axis, of the radius of the part; voids of each are joined to those of the next."""
+"""Distances of the lines from the axis, over the radius of the part; voids of each are joined to those of the next."""
 MEASURED = (0, 2, 4)
 """Lines whose depths are averaged: at 0.1, 0.3 and 0.5 of the radius."""
 _TOUCHING = 1e-6
-"""Of the radius, as far as the lines are moved aside (``spans``): a smaller gap is none."""
+"""Largest gap, over the radius, that counts as closed: the distance by which lines are moved aside (``spans``)."""
 
 
 def spans(x: Floats, tets: Tets, axis: int, at: tuple[float, float]) -> tuple[Ints, Floats]:
-    """Which tets a line along ``axis`` passes, (k,) rows, and (k, 2) from where to where along the axis, m.
+    """Return the tets that a line along ``axis`` passes, (k,), and (k, 2) the interval inside of each along the axis,
+    m.
 
-    ``at``: where the line passes the two directions across. It is moved aside by some 1e-6 of its distance from the
-    axis: in a face it would belong to two tets.
+    ``at``: position of the line in the two directions across. It is moved aside by some 1e-6 of its distance from
+    the axis: a line in a face would be in two tets.
     """
     i, j = (axis + 1) % 3, (axis + 2) % 3
     aside = 1e-6 * max(map(abs, at))
@@ -49,9 +50,9 @@ def spans(x: Floats, tets: Tets, axis: int, at: tuple[float, float]) -> tuple[In
 
 
 def passed(x: Floats, tets: Tets, part: Ints, axis: int, radius: float) -> Floats:
-    """(k, 4) line, part, and from where to where, m, for every tet of a line; ``part`` (n,) of the tets.
+    """Return (k, 4) line, part, and the interval, m, for every tet on a line; ``part`` (n,): of the tets.
 
-    The lines lie between the two directions across the axis, where every sector of a body is modelled.
+    The lines lie between the two directions across the axis, where every sector of a body has tets.
     """
     rows = [np.zeros((0, 4))]
     for line, share in enumerate(LINES):
@@ -62,9 +63,10 @@ def passed(x: Floats, tets: Tets, part: Ints, axis: int, radius: float) -> Float
 
 
 def passed_by(model: Model, name: str, along: str, comm: Comm) -> tuple[Floats, float]:
-    """What lines along the axis pass now of the other parts than ``name`` (``passed``), and its radius, m.
+    """Return the intervals of the lines in the other parts than ``name`` (see ``passed``), and its radius, m.
+    Collective.
 
-    The part comes from below: else the axis is turned round. All ranks take part, all get the same rows.
+    The part comes from below; otherwise the axis is reversed.
     """
     nodes, axis = model.nodes, "xyz".index(along)
     mine = nodes.in_part(model.parts.index(name))
@@ -88,17 +90,18 @@ def _maximum(comm: Comm, values: Floats) -> float:
 
 
 def thickness(rows: Floats, parts: int) -> Floats:
-    """(measured lines, parts) what each line passes of each part, m; ``rows`` as ``passed`` gives them."""
+    """Return (measured lines, parts) the length of each line in each part, m; ``rows``: see ``passed``."""
     total = np.zeros((len(LINES), parts))
     np.add.at(total, (rows[:, 0].astype(int), rows[:, 1].astype(int)), rows[:, 3] - rows[:, 2])
     return total[list(MEASURED)]
 
 
 def depth(rows: Floats, thick: Floats, radius: float) -> float:
-    """How much of the thickness ``thick`` (measured lines, parts), m, lies in front of the end of the hole, m.
+    """Return the part of the thickness ``thick`` (measured lines, parts), m, that lies in front of the end of the hole,
+    m.
 
-    The hole comes from below. Of each part all is left that lies between the end of the hole and the rear of the part,
-    whatever cavities it has; the rear is the furthest that any line finds, for a cavity may have opened it.
+    The hole comes from below. The remaining thickness of each part is from the end of the hole to the rear of the
+    part, cavities included; the rear is the furthest point on any line, since a cavity may have opened it on some.
     """
     rears = np.full(thick.shape[1], -np.inf)
     np.maximum.at(rears, rows[:, 1].astype(int), rows[:, 3])
@@ -107,7 +110,7 @@ def depth(rows: Floats, thick: Floats, radius: float) -> float:
 
 
 def bottoms(rows: Floats, tolerance: float) -> Floats:
-    """(lines,) where the hole ends on each line, m; infinite where nothing is left in its way."""
+    """Return (lines,) the end of the hole on each line, m; infinite if the line is open to the rear."""
     voids = [_voids(rows[rows[:, 0] == line, 2:], tolerance) for line in range(len(LINES))]
     reached = [np.arange(len(some)) == 0 for some in voids]
     while True:
@@ -121,7 +124,7 @@ def bottoms(rows: Floats, tolerance: float) -> Floats:
 
 
 def _voids(spans: Floats, tolerance: float) -> Floats:
-    """(v, 2) from where to where a line is in no body, but for what lies behind the last one."""
+    """Return (v, 2) the intervals of a line outside of all bodies, without the one behind the last body."""
     spans = spans[np.argsort(spans[:, 0])]
     reach = np.concatenate([[-np.inf], np.maximum.accumulate(spans[:, 1])])
     starts = np.append(spans[:, 0], np.inf)
@@ -131,6 +134,6 @@ def _voids(spans: Floats, tolerance: float) -> Floats:
 
 
 def _overlap(one: Floats, two: Floats, tolerance: float) -> "np.ndarray":
-    """(v, w) whether voids of two lines overlap."""
+    """Return (v, w) whether voids of two lines overlap."""
     low, high = np.maximum(one[:, None, 0], two[:, 0]), np.minimum(one[:, None, 1], two[:, 1])
     return np.asarray(high > low + tolerance)

@@ -1,4 +1,4 @@
-"""Probes: mass-weighted means of a field over chosen tets, and gauges, as columns of history.csv."""
+"""Probes, the columns of history.csv: mass-weighted means of a field over chosen tets, and gauges."""
 
 import logging
 import math
@@ -13,22 +13,7 @@ from conoid.cases.model.schema import Case, Probe
 from conoid.cases.shapes.region import Region
 
 from ..errors import InputError
-from ..model.rows import (
-    DAMAGE,
-    MASS,
-    PLASTIC_STRAIN,
-    PRESSURE,
-    S_XX,
-    S_XY,
-    S_YY,
-    S_YZ,
-    S_ZX,
-    S_ZZ,
-    TEMPERATURE,
-    VISCOUS,
-    WORK,
-    WORK_VISCOUS,
-)
+from ..model import rows
 from ..model.state import Block, Floats, Ints, Model, Tets
 from ..output.frames import von_mises
 from ..parallel.fixed_point import Ragged, exact_totals
@@ -41,14 +26,14 @@ from .sums import NodeSums
 
 log = logging.getLogger("conoid.worker")
 
-_NORMAL = {"stress_xx": S_XX, "stress_yy": S_YY, "stress_zz": S_ZZ}
-_SHEAR = {"stress_yz": S_YZ, "stress_zx": S_ZX, "stress_xy": S_XY}
-_ROWS = {"plastic_strain": PLASTIC_STRAIN, "damage": DAMAGE, "temperature": TEMPERATURE, **_SHEAR}
+_NORMAL = {"stress_xx": rows.S_XX, "stress_yy": rows.S_YY, "stress_zz": rows.S_ZZ}
+_SHEAR = {"stress_yz": rows.S_YZ, "stress_zx": rows.S_ZX, "stress_xy": rows.S_XY}
+_ROWS = {"plastic_strain": rows.PLASTIC_STRAIN, "damage": rows.DAMAGE, "temperature": rows.TEMPERATURE, **_SHEAR}
 _VELOCITY = {"velocity_x": 0, "velocity_y": 1, "velocity_z": 2}
 
 
 def tet_volumes(tets: Tets, x: Floats) -> Floats:
-    """(n,) present volumes of tets (n, 4), m^3."""
+    """Return (n,) present volumes of tets (n, 4), m^3."""
     origin = x[tets[:, 0]]
     e1, e2, e3 = (x[tets[:, k]] - origin for k in (1, 2, 3))
     volumes: Floats = (e1 * np.cross(e2, e3)).sum(axis=1) / 6.0
@@ -56,16 +41,16 @@ def tet_volumes(tets: Tets, x: Floats) -> Floats:
 
 
 def field(block: Block, name: str, model: Model, places: Ints) -> Floats:
-    """(n,) a field of ``cases.schema.ProbeField`` over the tets at ``places`` (n,) of a block; stress includes the
-    viscous part.
+    """Return (n,) a field of ``cases.schema.ProbeField`` for the tets at ``places`` (n,) of a block; stress includes
+    the viscous part.
     """
 
     def row(row: int) -> Floats:
         return block.at(row, places)
 
     if name in _NORMAL:
-        return row(_NORMAL[name]) - row(PRESSURE) - row(VISCOUS)
-    if name == "temperature" and not block.has(TEMPERATURE):
+        return row(_NORMAL[name]) - row(rows.PRESSURE) - row(rows.VISCOUS)
+    if name == "temperature" and not block.has(rows.TEMPERATURE):
         return np.full(len(places), block.temperature)
     if name in _ROWS:
         return row(_ROWS[name]) if block.has(_ROWS[name]) else np.zeros(len(places))
@@ -73,16 +58,16 @@ def field(block: Block, name: str, model: Model, places: Ints) -> Floats:
         a, b, c, d = model.nodes.v[block.tets[places].T, _VELOCITY[name]]
         return np.asarray((a + b + c + d) / 4.0)
     if name == "pressure":
-        return row(PRESSURE) + row(VISCOUS)
+        return row(rows.PRESSURE) + row(rows.VISCOUS)
     if name == "mises":
-        return von_mises(np.array([row(component) for component in range(S_XX, S_XY + 1)]))
+        return von_mises(np.array([row(component) for component in range(rows.S_XX, rows.S_XY + 1)]))
     if name == "density":
-        return row(MASS) / tet_volumes(block.tets[places], model.nodes.x)
-    return (row(WORK) + row(WORK_VISCOUS)) / row(MASS)
+        return row(rows.MASS) / tet_volumes(block.tets[places], model.nodes.x)
+    return (row(rows.WORK) + row(rows.WORK_VISCOUS)) / row(rows.MASS)
 
 
 def _gauges(case: Case, scene: Scene) -> list[Gauge]:
-    """Those that the probes of a case ask for."""
+    """Return the gauges of the probes of a case."""
     kinds = {kind(probe.field) for probe in case.probes}
     every: tuple[tuple[tuple[str, ...], Callable[[Case, Scene], Gauge]], ...] = (
         (PUSHES, Pushes), (SUMS, NodeSums), (("fragment_velocity", "fragment_mass"), Flying), (SHAPES, Shapes),
@@ -99,7 +84,7 @@ class Probes:
         self._gauges = _gauges(case, scene)
         self._sums = NodeSums(case, scene)
         self.sums = any(isinstance(gauge, NodeSums) for gauge in self._gauges)
-        """Whether there are sums over nodes, which have velocities of their own."""
+        """Whether there are sums over nodes, for which velocities at time n are computed."""
         other = (*PUSHES, *SUMS, *BEYOND, *SHAPES)
         self._means = [k for k, name in enumerate(self._fields) if kind(name) not in other]
         model = scene.model
@@ -108,18 +93,17 @@ class Probes:
             k: [_inside(case, case.probes[k], block, model, x) for block, x in zip(model.blocks, centres, strict=True)]
             for k in self._means
         }
-        """Global ids of the tets that each mean has in each block."""
+        """Global ids of the tets of each mean, for each block."""
         self._counted: list[int] | None = None
-        """How many tets each block had when these were last found."""
+        """Number of tets of each block when ``_found`` was made."""
         self._found: list[tuple[str, Block, Ints, slice, slice]] = []
-        """Of means that have tets in a block: the field, the block, where these tets stand in it, and which of the
-        values that are added up are the field times mass, and mass.
-        """
+        """For each mean and block with tets of it: the field, the block, the indices of the tets, and the slices of
+        the summed values that are field times mass, and mass."""
         self._starts = np.zeros(1, np.int64)
-        """Where the values of each begin."""
+        """First value of each sum."""
 
     def require_tets(self, case: Case) -> None:
-        """Raises InputError, on every rank alike, when a mean holds no tet, or a sum over a box or a set no node."""
+        """Raise InputError, on every rank, for a mean without a tet, or a sum over a box or a set without a node."""
         some = [k for k, probe in enumerate(case.probes) if kind(probe.field) in SUMS]
         boxes = [k for k in some if case.probes[k].low is not None or case.probes[k].on is not None]
         tets = [sum(len(ids) for ids in self._chosen[k]) for k in self._means]
@@ -139,17 +123,19 @@ class Probes:
                 )
 
     def keep(self) -> list[Any]:
-        """What they remember, equal on all ranks."""
+        """Return the state for a checkpoint, equal on all ranks."""
         return [gauge.keep() for gauge in self._gauges]
 
     def resume(self, known: list[Any]) -> None:
-        """Takes it back."""
+        """Set the state of ``keep``."""
         for gauge, own in zip(self._gauges, known, strict=True):
             gauge.resume(own)
 
     def measure(self, v: Floats | None = None) -> Floats:
-        """(probes,) the present values, equal on any number of ranks; NaN when all tets of a probe have left. ``v``
-        (nodes, 3): velocities of sums now, m/s, where those of the model are half a step ahead.
+        """Return (probes,) the present values, equal for any number of ranks; NaN if all tets of a probe were removed.
+        Collective.
+
+        ``v`` (nodes, 3): velocities at time n for sums, if those of the model are half a step ahead.
         """
         if not self.names:
             return np.zeros(0)
@@ -163,18 +149,18 @@ class Probes:
         return np.array([found[k] for k in range(len(self.names))])
 
     def _columns(self) -> Ragged:
-        """Of each mean the field times mass, and mass, of its tets."""
+        """Return for each mean the field times mass, and the mass, of its tets."""
         if self._counted != (counted := [block.n for block in self._model.blocks]):
             self._find()
             self._counted = counted
         values = np.empty(self._starts[-1])
         for name, block, places, product, weight in self._found:
-            values[weight] = mass = block.at(MASS, places)
+            values[weight] = mass = block.at(rows.MASS, places)
             np.multiply(field(block, name, self._model, places), mass, out=values[product])
         return Ragged(values, self._starts)
 
     def _find(self) -> None:
-        """Where the tets of each mean stand, anew when tets have left."""
+        """Find the tets of each mean again after tets were removed."""
         self._found, starts, end = [], [0], 0
         for k in self._means:
             begin, there = end, []
@@ -192,7 +178,7 @@ class Probes:
 
 
 def _centres(block: Block, model: Model) -> Floats:
-    """(3, tets) initial centres, m."""
+    """Return (3, tets) initial centres, m."""
     return np.array([x[block.tets].sum(axis=1) for x in model.nodes.x0.T.copy()]) / 4.0
 
 

@@ -1,4 +1,6 @@
-"""What contact and walls push parts with: impulses so far, and forces as means since the line before."""
+"""Forces and impulses of contact and walls on parts: impulses since the start, and mean forces since the last
+sample.
+"""
 
 from typing import Any
 
@@ -16,14 +18,14 @@ _AXES = "xyz"
 
 
 class Pushes:
-    """The forces and impulses of a case on this rank."""
+    """The probes of forces and impulses on this rank."""
 
     def __init__(self, case: Case, scene: Scene) -> None:
         self._scene = scene
         self._probes = {k: probe for k, probe in enumerate(case.probes) if kind(probe.field) in PUSHES}
         self._names = [wall.name for _, wall in case.boundaries_of(Wall)]
         self._given, self._since = np.zeros(len(self._probes)), 0.0
-        """(probes,) impulses, N s, at the time, s, of the line before."""
+        """(probes,) impulses, N s, at the last sample, and its time, s."""
 
     def measure(self, v: Floats) -> dict[int, float]:
         now, t = self._impulses(), self._scene.clock.t
@@ -41,7 +43,7 @@ class Pushes:
         self._given, self._since = known
 
     def _impulses(self) -> Floats:
-        """(probes,) what each part has got so far along the axis of its probe, N s."""
+        """Return (probes,) the impulse on each part so far along the axis of its probe, N s."""
         parts, contact = self._scene.model.parts, self._scene.contact
         of = {probe.by is None for probe in self._probes.values() if probe.field.startswith("contact_")}
         every = contact.impulses() if contact is not None and True in of else None
@@ -58,7 +60,7 @@ class Pushes:
         return found
 
     def _of_walls(self) -> Floats:
-        """(probes,) of those of walls, zero for the others."""
+        """Return (probes,) the impulses of walls, zero for other probes."""
         if not any(probe.field.startswith("wall_") for probe in self._probes.values()):
             return np.zeros(len(self._probes))
         tables = [np.zeros((0, len(self._probes))), *(self._given_by(walls) for walls in self._scene.walls)]
@@ -70,7 +72,7 @@ class Pushes:
         return found
 
     def _given_by(self, walls: Boundary) -> Floats:
-        """(n, probes) what they have given each of their nodes, of those that this rank owns, N s."""
+        """Return (n, probes) the impulses of walls on each of their nodes that this rank owns, N s."""
         nodes, columns = self._scene.model.nodes, np.zeros((len(walls.nodes), len(self._probes)))
         for place, probe in enumerate(self._probes.values()):
             if probe.field.startswith("wall_"):
@@ -82,5 +84,5 @@ class Pushes:
         return columns
 
     def _of(self, probe: Probe) -> list[int]:
-        """Which walls a probe is of."""
+        """Return the walls of a probe."""
         return [k for k, name in enumerate(self._names) if probe.wall in (None, name)]

@@ -1,4 +1,4 @@
-"""Rays in a plane from a line to matter: how far the opening of a body reaches round the line."""
+"""Rays from a point across an axis to matter: the shape of a hole round the axis."""
 
 import numpy as np
 
@@ -7,11 +7,11 @@ from ..mesh.faces import FACES
 from ..model.state import Floats, Tets
 
 RAYS = 360
-"""Chosen: an opening of a hundred tets round has three or four rays each."""
+"""Number of rays. Chosen: a hole with a hundred tets on its circumference has three or four rays for each."""
 
 
 def directions(axis: int) -> Floats:
-    """(RAYS, 3) unit vectors across an axis; none lies in a plane of symmetry that the line is in."""
+    """Return (RAYS, 3) unit vectors across an axis; none is in a coordinate plane, which may be one of symmetry."""
     angles: Floats = (np.arange(RAYS, dtype=float) + 0.5) * (2.0 * np.pi / RAYS)
     sines, cosines = sines_and_cosines(angles)
     found = np.zeros((RAYS, 3))
@@ -20,9 +20,9 @@ def directions(axis: int) -> Floats:
 
 
 def reach(x: Floats, tets: Tets, origin: Floats, axis: int) -> Floats:
-    """(RAYS,) how far matter is from ``origin`` (3,) along each ray across an axis, m; infinite where there is none.
+    """Return (RAYS,) the distance of matter from ``origin`` (3,) along each ray across an axis, m; infinite for none.
 
-    A ray is in a tet while it is behind the planes of all its faces (Cyrus and Beck).
+    A ray is inside of a tet while it is behind the planes of all its faces (Cyrus and Beck).
     """
     along = x[tets][:, :, axis]
     corners = x[tets[(along.min(axis=1) <= origin[axis]) & (along.max(axis=1) >= origin[axis])]]

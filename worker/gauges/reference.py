@@ -1,4 +1,4 @@
-"""``[[reference]]``: the finished run beside published or derived numbers."""
+"""``[[reference]]``: comparison of a finished run with published or derived numbers."""
 
 import csv
 from pathlib import Path
@@ -23,10 +23,8 @@ _STRESSES = ("stress_xx", "stress_yy", "stress_zz", "stress_yz", "stress_zx", "s
 
 
 def thicknesses(sim: Simulation) -> list[list[list[float]]]:
-    """For every reference that asks for a penetration: what there is to be pierced, m, by line and part; nothing for
-    the others.
-
-    All ranks take part, all get the same answer.
+    """Return for every reference of a penetration the initial thicknesses, m, by line and part; [] for the others.
+    Collective, equal on all ranks.
     """
     parts = len(sim.model.parts)
     return [
@@ -36,9 +34,8 @@ def thicknesses(sim: Simulation) -> list[list[list[float]]]:
 
 
 def measure(sim: Simulation, folder: Path, thick: list[list[list[float]]]) -> list[Check]:
-    """Every reference of the case, measured; ``thick`` as ``thicknesses`` gave it at the start.
-
-    All ranks take part, all get the same answer.
+    """Return the result of every reference of the case; ``thick``: ``thicknesses`` at the start. Collective, equal
+    on all ranks.
     """
     fields = {probe.name: probe.field for probe in sim.case.probes}
     pairs = zip(sim.case.reference, thick, strict=True)

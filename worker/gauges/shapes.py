@@ -1,4 +1,4 @@
-"""Depth of penetration, holes and cones: shapes of bodies that rays, lines and faces find."""
+"""Probes of shapes: depth of penetration, holes and cones, measured with rays, lines and faces."""
 
 import math
 from typing import Any
@@ -19,11 +19,13 @@ from .gauge import Scene
 
 _AXES = "xyz"
 _DAMAGED = 0.5
-"""From which damage on a tet counts as broken. Chosen: laws and facets go from 0 to 1 within some steps."""
+"""Damage of a tet above which it counts as broken. Chosen: damage rises from 0 to 1 within few steps."""
 
 
 class Shapes:
-    """The shapes of a case on this rank. They remember the start: thicknesses, rays that met matter, areas of faces."""
+    """The probes of shapes on this rank. Their state is that of the start: thicknesses, rays that hit matter, areas
+    of faces.
+    """
 
     def __init__(self, case: Case, scene: Scene) -> None:
         self._case, self._scene = case, scene
@@ -89,15 +91,15 @@ class Shapes:
         return -self._scene.comm.maximum(-nearest)
 
     def _ends(self, probe: Probe, axis: int) -> tuple[float, float]:
-        """Where the part starts and ends along the axis, m."""
+        """Return the first and the last coordinate of the part along the axis at the start, m."""
         nodes = self._scene.model.nodes
         x = nodes.x0[nodes.in_part(self._scene.model.parts.index(probe.part)), axis]
         low, high = self._scene.comm.maximum(np.array([-x.min(initial=np.inf), x.max(initial=-np.inf)]))
         return -float(low), float(high)
 
     def _areas(self, probe: Probe, axis: int, ends: tuple[float, float], sound: Any) -> list[float]:
-        """Initial areas, m^2, of the faces of tets at the two ends of the part; ``sound``: of those tets alone, for
-        each block (n,) of the part.
+        """Return the initial areas, m^2, of the faces of tets at the two ends of the part; ``sound``: (n,) for each
+        block of the part, the tets that count; None for all.
         """
         x, near, columns = self._scene.model.nodes.x0, self._scene.model.slack, []
         for b, block in enumerate(self._blocks(probe)):
@@ -110,7 +112,7 @@ class Shapes:
         return [float(v) for v in exact_sums(self._scene.comm, np.concatenate([np.zeros((0, 2)), *columns]))]
 
     def _sound(self, probe: Probe) -> Any:
-        """For each block of the part (n,) the tets that are not damaged and belong to its heaviest fragment."""
+        """Return (n,) for each block of the part the undamaged tets of its heaviest fragment."""
         scene, model = self._scene, self._scene.model
         cohesion = scene.fracture.cohesion if scene.fracture is not None else None
         damaged = damage(self._case, model, cohesion, scene.comm)

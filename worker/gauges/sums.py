@@ -1,4 +1,4 @@
-"""Sums over nodes: mass, momentum, energy, centre of mass, and of what is beyond a plane alone."""
+"""Probes of sums over nodes: mass, momentum, energy and centre of mass, of all nodes or of those beyond a plane."""
 
 import math
 from typing import Any
@@ -19,17 +19,17 @@ _AXES = "xyz"
 
 
 def ahead(beyond: Beyond, x: Floats) -> Floats:
-    """(n,) how far points (n, 3) are beyond a plane, m."""
+    """Return (n,) the distances of points (n, 3) beyond a plane, m."""
     return np.asarray((x[:, _AXES.index(beyond.axis)] - beyond.at) * way(beyond))
 
 
 def way(beyond: Beyond) -> float:
-    """The sign of the direction that leads away from the plane."""
+    """Return the sign of the direction away from the plane."""
     return 1.0 if beyond.side == "above" else -1.0
 
 
 class NodeSums:
-    """The sums of a case on this rank. They have no memory."""
+    """The probes of sums on this rank; they have no state."""
 
     def __init__(self, case: Case, scene: Scene) -> None:
         self._scene, self._bits = scene, bits(case)
@@ -48,7 +48,9 @@ class NodeSums:
         pass
 
     def started(self, probe: Probe) -> Flags:
-        """(nodes,) the nodes that started in the box of a probe and are in its set, of those that this rank counts."""
+        """Return (nodes,) the nodes that were in the box of a probe at the start and are in its set, of those that
+        this rank owns.
+        """
         model, nodes = self._scene.model, self._scene.model.nodes
         part = model.parts.index(probe.part)
         inside = Region.of(probe).holds(nodes.x0.T, model.slack[part])
@@ -57,7 +59,7 @@ class NodeSums:
         return np.asarray(nodes.owned & nodes.in_part(part) & inside)
 
     def chosen(self, probe: Probe) -> Flags:
-        """(nodes,) the nodes of a probe that this rank counts."""
+        """Return (nodes,) the nodes of a probe that this rank owns."""
         nodes, erosion, found = self._scene.model.nodes, self._scene.erosion, self.started(probe)
         if erosion is not None:
             found &= ~erosion.removed
@@ -66,7 +68,9 @@ class NodeSums:
         return np.asarray(found)
 
     def _of_bodies(self, v: Floats) -> dict[int, float]:
-        """Of probes of whole rigid parts, which may have another inertia and centre than their nodes."""
+        """Return the values of probes of whole rigid parts, whose inertia and centre may differ from those of their
+        nodes.
+        """
         found: dict[int, float] = {}
         rigid, clock = self._scene.rigid, self._scene.clock
         if rigid is None:
@@ -80,7 +84,7 @@ class NodeSums:
         return found
 
     def _columns(self, probe: Probe, v: Floats) -> tuple[Floats, Floats]:
-        """(nodes,) what is added up, and what the sum is divided by."""
+        """Return (nodes,) the terms of the sum, and the terms of its divisor."""
         nodes, field = self._scene.model.nodes, kind(probe.field)
         mass = np.where(self.chosen(probe), nodes.mass_of(self._scene.model.parts.index(probe.part)), 0.0)
         if field in ("mass", "residual_mass"):

@@ -1,4 +1,6 @@
-"""How little the parts of a run that has ended were strained (cases/warnings/unstrained.py)."""
+"""Parts of a finished run that were strained so little that they could have been rigid
+(cases/warnings/unstrained.py).
+"""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -15,8 +17,8 @@ from ..simulation import Simulation
 from .probes import tet_volumes
 
 
-def told(sim: Simulation, folder: Path, eroded: int) -> Iterator[str]:
-    """A line for each part that could have been rigid; all ranks take part. ``eroded``: tets that have left."""
+def found(sim: Simulation, folder: Path, eroded: int) -> Iterator[str]:
+    """Yield a line for each part that could have been rigid. Collective. ``eroded``: number of removed tets."""
     case, parts = sim.case, len(sim.case.parts)
     if case.contact is None or parts < 2 or all(part.rigid is not None for part in case.parts):
         return
@@ -32,11 +34,11 @@ def told(sim: Simulation, folder: Path, eroded: int) -> Iterator[str]:
     if not energies:
         return
     whole = max(sum(energies[name][1] for name in names), 1e-300)
-    found = []
+    strains = []
     for i, part in enumerate(case.parts):
         energy, volume = max(energies[names[i]][1], 0.0), float(totals[parts + i])
         stiffness = material(case, part.material).elastic.young * volume
         strain = float(np.sqrt(2.0 * energy / stiffness)) if stiffness > 0.0 else 0.0
         worn = bool(eroded) and part.erosion is not None
-        found.append(Strained(int(totals[i]), strain, energy / whole, most[i] > 0.0 or worn))
-    yield from could_be_rigid(case, found, limiter)
+        strains.append(Strained(int(totals[i]), strain, energy / whole, most[i] > 0.0 or worn))
+    yield from could_be_rigid(case, strains, limiter)

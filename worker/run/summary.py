@@ -56,7 +56,7 @@ def sum_up(loop: Loop, folder: Path, failure: PhysicsError | None, start: Start,
     fragments, labels = _fragments(sim)
     contact, warnings = _penetration(sim, labels)
     compressed = sim.crushing.found() if sim.crushing is not None else []
-    stiff = list(unstrained.told(sim, folder, eroded)) if complete else []
+    stiff = list(unstrained.found(sim, folder, eroded)) if complete else []
     return Outcome(
         **_end(loop, failure), **costs, **contact, digest=hexdigest or "",
         steps=sim.clock.step, time=sim.clock.t, elements=start.elements, eroded=eroded,
