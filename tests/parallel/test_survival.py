@@ -204,11 +204,11 @@ def refused(words: Sequence[str]) -> str:
 
 def test_what_cannot_go_on_says_why(tmp_path: Path) -> None:
     words = case("nodal", tmp_path, tmp_path)
-    none = f"--restart: {tmp_path / 'nodal'} has no checkpoint that is whole: "
-    assert refused(words) == f"{none}it has none"
+    none = f"--restart: {tmp_path / 'nodal'} has no complete checkpoint: "
+    assert refused(words) == f"{none}there is none"
     go(words, [(1, 1, 4)])
     assert refused([*words, "--set", "run.end_time=2 us"]) == (
-        "run.end_time: differs from the case of the checkpoint, and --restart goes on with that one"
+        "run.end_time: differs from the case of the checkpoint, which --restart resumes"
     )
     file = next((tmp_path / "nodal" / layout.CHECKPOINTS).glob("*/rank-0.h5"))
     data = bytearray(file.read_bytes())

@@ -89,7 +89,7 @@ def course(sim: Simulation) -> tuple[list[dict[str, Any]], Simulation]:
     return [*told, groups.record(sim)], sim
 
 
-def test_groups_are_told_alike_on_any_number_of_ranks(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_groups_are_recorded_alike_on_any_number_of_ranks(monkeypatch: pytest.MonkeyPatch) -> None:
     """Of the same tets and nodes, moved or not; what has left is in none, and copies are where their parents were."""
     case = breaking()
     monkeypatch.setattr(Meter, "costs", lambda *_: TETS)
@@ -111,7 +111,7 @@ def test_groups_are_told_alike_on_any_number_of_ranks(monkeypatch: pytest.Monkey
 def test_a_record_is_due_at_times_of_the_run_and_costs_little_of_it() -> None:
     sim = build(breaking().model_copy(update={"run": schema.Run(end_time=1.0)}), MESHES)
     groups = Groups(sim, 0.0)
-    began = groups._told
+    began = groups._recorded
     assert groups.due(0.0, began + 0.25)
     groups._t, groups._took = 0.005, 1e-4
     assert [groups.due(t, began + s) for t, s in ((0.004, 1.0), (0.005, 1.0), (0.004, 11.0), (0.005, 0.03))] == [

@@ -119,7 +119,7 @@ def test_a_checkpoint_that_is_not_whole_is_passed_over(tmp_path: Path, harm: str
     assert (place, manifest.step) == (places[1], 2)
     assert [line.partition(":")[0] for line in damaged] == ["checkpoint 000000003 is damaged"]
     shutil.rmtree(places[1])
-    with pytest.raises(InputError, match="no checkpoint that is whole: checkpoint 000000003 is damaged: "):
+    with pytest.raises(InputError, match="no complete checkpoint: checkpoint 000000003 is damaged: "):
         checkpoint.latest(tmp_path)
 
 

@@ -1,8 +1,8 @@
-"""Load balance: what tets cost, when it pays to cut anew, and what came of it.
+"""Load balance: costs of tets, the decision to cut again, and the time that cuts have saved.
 
-Costs are CPU seconds of this run: of a tet of each part by the passes over it, of nodes, and of contact by the
-candidates that a node has. Every rank receives the work of all, so that all decide alike. The answer of the run
-does not depend on it.
+Costs are CPU seconds of this run: of the tets of each part by the passes over them, of nodes, and of contact by the
+candidates of a node. Every rank receives the work of all ranks, so that all decide alike. The answer of the run does
+not depend on it.
 """
 
 import time
@@ -26,8 +26,8 @@ from .parcel import Parcel
 from .route import route
 
 _LEAST = 1e-9
-"""s: what a tet costs at least, so that every rank gets some before anything has been
-measured. Chosen far below what any tet takes."""
+"""Least cost of a tet, s: so that every rank gets tets before any cost is measured. Chosen far below the cost of any
+tet."""
 
 
 @dataclass
@@ -39,7 +39,7 @@ class Window:
     """By phase, one number a rank."""
 
     def loads(self, phases: tuple[str, ...]) -> list[float]:
-        """(ranks,) s a step, in some phases."""
+        """Return (ranks,) the load of each rank in some phases, s a step."""
         return [float(load) / max(self.steps, 1) for load in np.sum([self.work[name] for name in phases], axis=0)]
 
     @property
@@ -50,42 +50,41 @@ class Window:
 
 @dataclass
 class Balance:
-    """Watches the loads of a run and moves tets where that pays."""
+    """Measures the loads of a run and moves tets when that saves time."""
 
     case: Case
     comm: Comm
     trigger: Trigger
     _meter: Meter
-    """Set at the last cut, and again in a look that finds half of what calls for the next one lost, but not all of it:
-    fronts move, and costs over the things of the present are those of the present.
-    """
+    """Measures costs since the last cut, and again since half of the loss that triggers the next cut: costs change
+    as fronts move."""
     spent: float = 0.0
     """Wall time of all cuts, s."""
     events: int = 0
     _half: bool = False
-    """Whether the meter has been set again since the last cut."""
+    """Whether the meter was reset since the last cut."""
     _guard: Guard | None = None
     _latest: Window | None = None
     _before: float | None = None
-    """The imbalance of the steps just before the last cut."""
+    """Imbalance of the steps just before the last cut."""
     _saved: float = 0.0
-    """By the cuts before the last one, s."""
+    """Time saved by the cuts before the last one, s."""
 
     @classmethod
     def of(cls, sim: Simulation) -> Self:
-        """For a run that begins or goes on."""
+        """Return the balance of a run that starts or resumes."""
         trigger = Trigger(sim.case.balance, sim.assembled, sim.clock.step)
         return cls(sim.case, sim.comm, trigger, Meter.of(sim))
 
     def look(self, window: Window) -> None:
-        """Takes the work of all ranks since the last look. What no cut moves is no reason for one."""
+        """Add the work of all ranks since the last call. Work that no cut can move is omitted."""
         self._latest = window
         self.trigger.look(window.loads(MOVED), window.steps)
 
     @property
     def saved(self) -> float:
-        """By all cuts so far, s: what the work would have taken with the imbalance just before each cut instead of just
-        after it. What has grown since then is no fault of the cut.
+        """Time saved by all cuts so far, s: the difference of the work with the imbalance just before each cut and
+        just after it. Imbalance that has grown since then is not counted.
         """
         stretch = self.trigger.stretch
         if self._before is None or not stretch.steps:
@@ -93,14 +92,14 @@ class Balance:
         return self._saved + (self._before - stretch.halves[0]) * float(np.mean(stretch.work))
 
     def grown(self, sim: Simulation) -> bool:
-        """Whether this rank has more outside nodes than it may."""
+        """Return whether this rank has more outside nodes than its limit."""
         if self.case.balance.policy != "outside" or sim.contact is None:
             return False
         self._guard = self._guard or Guard(self.case.balance.alpha)
         return self._guard.grown(sim.contact.outside)
 
     def cause(self, sim: Simulation) -> str | None:
-        """Why to cut now, if so; the same on all ranks."""
+        """Return the reason to cut now, or None; equal on all ranks."""
         if self.comm.size == 1:
             return None
         cause = self.trigger.cause(sim.clock.step, sim.reduction.grown)
@@ -109,7 +108,7 @@ class Balance:
         return cause
 
     def move(self, sim: Simulation) -> tuple[Simulation, dict[str, Any]]:
-        """Cuts by the costs and moves what has to; the new simulation and what to tell. All ranks take part."""
+        """Cut by the costs and move tets; return the new simulation and the fields of the message. Collective."""
         began, before, cpu = time.monotonic(), self._latest, worked(self.comm)
         parcel = simulation.keep(sim)
         self.weigh(sim, parcel)
@@ -121,14 +120,14 @@ class Balance:
         cost = self.comm.broadcast(time.monotonic() - began)
         work = float(self.comm.maximum(np.array([worked(self.comm) - cpu]))[0])
         self._settle(now, cost, work)
-        told = {
+        message = {
             "before": {name: [s / max(before.steps, 1) for s in before.work[name]] for name in WORK} if before else {},
             "predicted": predicted, "tets": int(tets), "nodes": int(nodes), "cost": cost, "saved": self.saved,
         }  # fmt: skip
-        return now, told
+        return now, message
 
     def _settle(self, sim: Simulation, cost: float, work: float) -> None:
-        """Begins to count anew after a cut that took ``cost`` on the clock, and ``work`` of the slowest rank, s."""
+        """Reset the measurement after a cut that took ``cost`` s of wall time and ``work`` s of the slowest rank."""
         paid = self._before is None or self.saved - self._saved >= self.trigger.cost
         self.events, self.spent, self._saved = self.events + 1, self.spent + cost, self.saved
         self._before, self._latest = self.trigger.stretch.halves[1] if self.trigger.stretch.steps else None, None
@@ -137,8 +136,8 @@ class Balance:
         self._guard = Guard(self.case.balance.alpha, sim.contact.outside if sim.contact is not None else 0)
 
     def weigh(self, sim: Simulation, parcel: Parcel) -> None:
-        """Fills the ``weight`` of every tet of a parcel, s a step, by what ranks do at the same time: its own, and of
-        what is done round it the search and the rest. All ranks take part.
+        """Set the ``weight`` of every tet of a parcel, s a step, by phases between which ranks wait: its own, and
+        for its nodes the search and the rest of contact. Collective.
         """
         if self.case.balance.weights == "tets":
             return
@@ -156,7 +155,9 @@ class Balance:
 
 
 def _with_their_first_tets(parcel: Parcel, effort: "np.ndarray") -> dict[int, Floats]:
-    """By part (n, k): the ``effort`` (nodes, k) of all nodes whose tet of smallest id here it is."""
+    """Return by part (n, k) the ``effort`` (nodes, k) of the nodes whose tet of smallest id on this rank each tet
+    is.
+    """
     ids, first = parcel.nodes["id"], np.full(len(effort), np.iinfo(np.int64).max)
     corners = {part: located(ids, t["corners"]) for part, t in parcel.tets.items()}
     for part, table in parcel.tets.items():

@@ -1,12 +1,12 @@
-"""Checkpoints: a folder with a file a rank and a manifest, there whole and right, or not at all.
+"""Checkpoints: folders with a file a rank and a manifest, complete on disk or not present.
 
 ::
 
-    checkpoints/000001200/rank-0.h5 ...   what each rank keeps: columns of nodes, tets and other things by global ids
-                          manifest.json   step, time, the case, what all ranks know, bytes and sha256 of each file
+    checkpoints/000001200/rank-0.h5 ...   state of each rank: columns of nodes, tets and other things, by global ids
+                          manifest.json   step, time, the case, state common to all ranks, bytes and sha256 of each file
 
-The folder is written under another name, flushed to disk and renamed. Any number of ranks can read it. What makes it
-whole is in conoid.cases.output.checkpoints.
+The folder is written under another name, flushed to disk and renamed. Any number of ranks can read it. The
+conditions of a complete checkpoint are in conoid.cases.output.checkpoints.
 """
 
 import json
@@ -41,7 +41,7 @@ from ..parallel.comm import Comm
 from .parcel import Parcel, Table, take
 
 _KEPT = 2
-"""Checkpoints that stay; the older ones go."""
+"""Number of checkpoints that are kept. Chosen: one more than the latest, which may be damaged."""
 _FREE = {
     "run": {
         "ranks", "threads", "profile", "cut_scale", "max_steps", "max_wall_time", "checkpoint_every", "residual_limit",
@@ -49,11 +49,11 @@ _FREE = {
     },
     "contact": {"skin", "domain"},
 }  # fmt: skip
-"""Keys that may change when a run goes on: the answer does not depend on them."""
+"""Keys that may change when a run is resumed: the answer does not depend on them."""
 
 
 def write(parcel: Parcel, case: Case, folder: Path, step: int, t: float, comm: Comm) -> tuple[Path, int]:
-    """Writes a checkpoint of the run in ``folder``; its place and its bytes. All ranks take part."""
+    """Write a checkpoint of the run in ``folder``; return its folder and its bytes. Collective."""
     place = layout.checkpoint(folder, step)
     beside = place.with_suffix(".part")
     if comm.rank == 0:
@@ -77,7 +77,7 @@ def write(parcel: Parcel, case: Case, folder: Path, step: int, t: float, comm: C
 
 
 def _describe(beside: Path, manifest: Manifest) -> None:
-    """Writes the manifest and its sha256, flushed to disk."""
+    """Write the manifest and its sha256, flushed to disk."""
     for name, content in zip((MANIFEST, SEAL), sealed(manifest), strict=True):
         with (beside / name).open("wb") as file:
             file.write(content)
@@ -86,7 +86,7 @@ def _describe(beside: Path, manifest: Manifest) -> None:
 
 
 def forget(folder: Path, step: int = -1) -> None:
-    """Removes the checkpoints of ``folder`` beyond a step, and what was never finished; all of them without a step."""
+    """Remove the checkpoints of ``folder`` after a step, and unfinished ones; all of them if no step is given."""
     if step < 0:
         shutil.rmtree(folder / layout.CHECKPOINTS, ignore_errors=True)
     kept = {place.name for place in found(folder) if int(place.name) <= step}
@@ -96,9 +96,9 @@ def forget(folder: Path, step: int = -1) -> None:
 
 
 def latest(folder: Path) -> tuple[Path, Manifest, list[str]]:
-    """The latest checkpoint that is whole, its manifest, and a line about each later one, which is damaged.
+    """Return the latest complete checkpoint, its manifest, and a line for each later one, which is damaged.
 
-    Raises InputError when none is whole.
+    Raises InputError if none is complete.
     """
     damaged: list[str] = []
     for place in found(folder):
@@ -109,20 +109,20 @@ def latest(folder: Path) -> tuple[Path, Manifest, list[str]]:
             damaged.append(f"checkpoint {place.name} is damaged: {error}")
         else:
             return place, manifest, damaged
-    why = "; ".join(damaged) or "it has none"
-    raise InputError(f"--restart: {folder} has no checkpoint that is whole: {why}")
+    why = "; ".join(damaged) or "there is none"
+    raise InputError(f"--restart: {folder} has no complete checkpoint: {why}")
 
 
 def require_same(case: Case, manifest: Manifest) -> None:
-    """Raises InputError when the case differs from that of the checkpoint in what its answer depends on."""
+    """Raise InputError if the case differs from that of the checkpoint in a key on which the answer depends."""
     now, then = (_answering(data) for data in (json.loads(resolved_json(case)), manifest.case))
     for key in sorted({*now, *then}):
         if now.get(key) != then.get(key):
-            raise InputError(f"{key}: differs from the case of the checkpoint, and --restart goes on with that one")
+            raise InputError(f"{key}: differs from the case of the checkpoint, which --restart resumes")
 
 
 def _answering(case: dict[str, Any]) -> dict[str, Any]:
-    """The keys of a case that its answer depends on, those of ``run`` and ``contact`` one by one."""
+    """Return the keys of a case on which its answer depends, those of ``run`` and ``contact`` one by one."""
     found = {key: value for key, value in case.items() if key not in ("balance", "title", "description")}
     for table, free in _FREE.items():
         if isinstance(keys := found.get(table), dict):
@@ -132,7 +132,7 @@ def _answering(case: dict[str, Any]) -> dict[str, Any]:
 
 
 def read(place: Path, manifest: Manifest, comm: Comm) -> Parcel:
-    """This rank's share of a checkpoint: some of its files, or none of their rows."""
+    """Return this rank's share of a checkpoint: the contents of some of its files, or empty tables."""
     names = [file.name for file in manifest.files]
     mine = [_read_parcel(place / name) for name in names[comm.rank :: comm.size]]
     whole = Parcel.of(mine or [_nothing_of(_read_parcel(place / names[0]))])
@@ -141,7 +141,7 @@ def read(place: Path, manifest: Manifest, comm: Comm) -> Parcel:
 
 
 def _nothing_of(parcel: Parcel) -> Parcel:
-    """The names of all columns, without a row."""
+    """Return a parcel with all columns and no rows."""
     none = np.zeros(0, np.int64)
     return Parcel(
         {}, {name: np.zeros_like(words) for name, words in parcel.sums.items()}, take(parcel.nodes, none), {},
@@ -178,7 +178,7 @@ def _columns(group: "h5py.Group") -> Table:
 
 
 def _plain(value: Any) -> Any:
-    """As JSON takes it: arrays with their kind."""
+    """Return a value that JSON can represent; arrays with their type."""
     if isinstance(value, np.ndarray):
         return {"dtype": str(value.dtype), "values": value.tolist()}
     if isinstance(value, dict):
@@ -189,7 +189,7 @@ def _plain(value: Any) -> Any:
 
 
 def _rich(value: Any) -> Any:
-    """What ``_plain`` was given, tuples as lists."""
+    """Return the value that ``_plain`` was given, with tuples as lists."""
     if isinstance(value, dict):
         if value.keys() == {"dtype", "values"}:
             return np.array(value["values"], value["dtype"])

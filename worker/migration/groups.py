@@ -1,8 +1,8 @@
-"""Loads of parts of the mesh, told now and then: what another balance policy would have done follows from them.
+"""Loads of groups of tets, recorded at intervals: from them the effect of other balance policies is computed.
 
-``conoid replay-balance`` reads them (docs/performance/balance.md). A group is a fixed set of tets, cut out at the
-start, and of nodes and their copies; it goes with them from rank to rank. Counts are integers and the same for any
-number of ranks, but for candidates of edges and cracks whose nodes lie on other ranks.
+``conoid replay-balance`` reads them (docs/performance/balance.md). A group is a fixed set of tets, cut at the start,
+and of nodes and their copies; it moves with them between ranks. Counts are integers and equal for any number of
+ranks, except candidates of edges and cracks whose nodes are on several ranks.
 """
 
 import time
@@ -15,37 +15,37 @@ from ..simulation import Simulation
 from .meter import Meter
 
 _TIMES = 200
-"""Records of a run, at most, unless it is slow: then one each ``_PATIENCE``."""
+"""Largest number of records of a run, unless it is slow: then one each ``_PATIENCE``."""
 _PATIENCE = 10.0
 """s of wall time. Chosen."""
 _SHARE = 1.0 / 400.0
-"""Of the time of a run that records may take."""
+"""Share of the time of a run that records may take."""
 
 
 class Groups:
-    """Keeps the record of the groups of a run."""
+    """Makes the records of the groups of a run."""
 
     def __init__(self, sim: Simulation, cost: float) -> None:
-        """``cost``: of a cut as it is expected, s."""
+        """``cost``: expected cost of a cut, s."""
         self._cost = cost
         self._meter = Meter.of(sim)
         self._t = sim.clock.t
-        self._told = time.monotonic()
+        self._recorded = time.monotonic()
         self._took = 0.0
         """CPU time of the last record, s."""
         self._first = True
 
     def moved(self, sim: Simulation) -> None:
-        """Tets have moved: what the blocks have counted begins anew."""
+        """Reset the meter: tets have moved, and blocks count from zero."""
         self._meter = Meter.of(sim)
 
     def due(self, t: float, now: float) -> bool:
-        """Whether another record is due at time ``t`` and wall time ``now``; asked on rank 0 alone."""
-        since = now - self._told
+        """Return whether a record is scheduled at time ``t`` and wall time ``now``; called on rank 0."""
+        since = now - self._recorded
         return since * _SHARE > self._took and (t >= self._t or since > _PATIENCE)
 
     def record(self, sim: Simulation) -> dict[str, Any]:
-        """What to tell; all ranks take part."""
+        """Return the fields of the message. Collective."""
         began, model = worked(sim.comm), sim.model
         n, end = len(model.groups), sim.case.run.end_time
         counts = np.zeros((n, len(model.parts) + 2), np.int64)
@@ -60,15 +60,15 @@ class Groups:
         load = counts[:, :-2] @ costs.tet + costs.candidate * counts[:, -2]
         load += costs.fracture / max(places.sum(), 1) * places
         load, outside = sim.comm.sum(np.stack([np.rint(1e9 * load).astype(np.int64), counts[:, -1]]))
-        told: dict[str, Any] = {
+        message: dict[str, Any] = {
             "load": load.tolist(), "outside": outside.tolist(), "rank": round(1e9 * costs.rank),
         }  # fmt: skip
         if self._first:
-            told |= {"load": [0] * n, "rank": 0, "cost": self._cost}
-            told |= {"centres": model.groups[:, :3].tolist(), "tets": model.groups[:, 3].astype(np.int64).tolist()}
+            message |= {"load": [0] * n, "rank": 0, "cost": self._cost}
+            message |= {"centres": model.groups[:, :3].tolist(), "tets": model.groups[:, 3].astype(np.int64).tolist()}
         self.moved(sim)
         self._first = False
         self._t = end / _TIMES * (int(sim.clock.t * _TIMES / end) + 1)
-        self._told = time.monotonic()
+        self._recorded = time.monotonic()
         self._took = worked(sim.comm) - began
-        return told
+        return message

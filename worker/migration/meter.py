@@ -1,4 +1,4 @@
-"""What tets, candidates and ranks cost: CPU seconds of this run."""
+"""Costs of tets, candidates and ranks: CPU seconds of this run."""
 
 from dataclasses import dataclass
 from typing import Self
@@ -11,8 +11,8 @@ from ..model.state import Floats
 from ..simulation import Simulation
 
 _FARTHEST = 4.0
-"""Times the mean, or one over it: what candidates of one rank cost at most, and at least. Chosen: a rank
-with few candidates measures mostly noise."""
+"""Largest ratio of the cost of a candidate on one rank to the mean, and of the mean to it. Chosen: with few
+candidates the measurement is mostly noise."""
 
 
 @dataclass(frozen=True)
@@ -20,32 +20,32 @@ class Costs:
     """CPU seconds a step."""
 
     tet: Floats
-    """(parts,) of a tet."""
+    """(parts,) cost of a tet."""
     candidate: float
-    """Of one of this rank: candidates differ, and what they have cost in a place is the best guess for it."""
+    """Cost of a candidate on this rank: candidates differ, and the measured cost is the best estimate there."""
     fracture: float
-    """Of all fracture on this rank."""
+    """Cost of all fracture on this rank."""
     rank: float
-    """What is left, of each rank."""
+    """Remaining cost of each rank."""
 
 
 @dataclass
 class Meter:
-    """Measures costs since it was set."""
+    """Measures costs since it was made."""
 
     step: int
     seconds: dict[str, float]
-    """The timers when it was set."""
+    """Timers when it was made, s."""
     on_parts: Floats
-    """(parts,) CPU time of the passes over the tets by then, s."""
+    """(parts,) CPU time of the passes over the tets until then, s."""
 
     @classmethod
     def of(cls, sim: Simulation) -> Self:
-        """Set at the present."""
+        """Return a meter that starts now."""
         return cls(sim.clock.step, dict(sim.timers.seconds), on_parts(sim))
 
     def costs(self, sim: Simulation, effort: float) -> Costs:
-        """What things cost when this rank has ``effort`` candidates; all ranks take part."""
+        """Return the costs, if this rank has ``effort`` candidates. Collective."""
         tets, steps = np.zeros(len(self.on_parts)), max(sim.clock.step - self.step, 1)
         for block in sim.model.blocks:
             tets[block.part] = block.n
@@ -62,13 +62,15 @@ class Meter:
 
 
 def _candidates(had: Floats, took: Floats) -> Floats:
-    """(ranks,) cost of a candidate of each, by what all ranks had and took (ranks,)."""
+    """Return (ranks,) the cost of a candidate on each rank, from their numbers ``had`` and times ``took``, (ranks,)."""
     mean = took.sum() / max(had.sum(), 1.0)
     return np.asarray(np.clip(took / np.maximum(had, 1.0), mean / _FARTHEST, mean * _FARTHEST))
 
 
 def on_parts(sim: Simulation) -> Floats:
-    """(parts,) CPU time of the passes over the tets of each so far, s; that over one block alone is the phase."""
+    """Return (parts,) the CPU time of the passes over the tets of each part so far, s; with one block, that of the
+    phase.
+    """
     seconds, blocks = np.zeros(len(sim.model.parts)), sim.model.blocks
     for block in blocks:
         seconds[block.part] = block.seconds if len(blocks) > 1 else sim.timers.seconds["elements"]

@@ -1,4 +1,4 @@
-"""The model in a parcel, and a model from one."""
+"""Conversion of the model into a parcel and back."""
 
 from typing import Any
 
@@ -17,11 +17,11 @@ from .route import Arrived
 
 _NODAL = ("id", "part", "x0", "x", "v", "mass", "force", "stepping", "group")
 _OF_TETS = ("across", "bond", "weakest", "worn")
-"""Columns that a block has where the scene needs them."""
+"""Columns that a block has if the scene needs them."""
 
 
 def keep(model: Model, case: Case) -> Parcel:
-    """A parcel with the nodes and tets of this rank."""
+    """Return a parcel with the nodes and tets of this rank."""
     nodes = model.nodes
     known = {
         "parts": model.parts, "elements_global": model.elements_global, "nodes_global": model.nodes_global,
@@ -56,7 +56,7 @@ def _keep_block(block: Block, ids: Ints) -> Table:
 
 
 def resume(case: Case, arrived: Arrived, comm: Comm) -> Model:
-    """The model of what has arrived, whose tables are put in the order that tets and nodes have in it."""
+    """Return the model of the tables that have arrived, which are sorted in the order of its tets and nodes."""
     parcel, known = arrived.parcel, arrived.parcel.known
     values: dict[str, Any] = {
         name: np.ascontiguousarray(parcel.nodes[name]) for name in (*_NODAL, "marks") if name in parcel.nodes

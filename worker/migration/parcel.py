@@ -1,8 +1,8 @@
-"""A parcel: the complete state of some tets, of the nodes that they need, and of what goes with them, by global ids.
+"""Parcels: the complete state of some tets, of their nodes and of the data that belongs to them, by global ids.
 
-Every stage adds to a parcel what it must remember (``keep``), and takes it back from one (``resume``): on the same
-rank, on another, or in another process on another day. What can be computed again from the case and from the rest, to
-the same bits, is in no parcel.
+Every stage adds its state to a parcel (``keep``) and reads it from one (``resume``): on the same rank, on another
+rank, or in another process. Data that can be computed again from the case and from the parcel, to the same bits, is
+not in it.
 """
 
 import pickle
@@ -19,46 +19,46 @@ Table = dict[str, "np.ndarray"]
 
 
 def length(table: Table) -> int:
-    """Number of rows."""
+    """Return the number of rows."""
     return len(next(iter(table.values()))) if table else 0
 
 
 def take(table: Table, chosen: "np.ndarray") -> Table:
-    """Some of the rows."""
+    """Return the chosen rows."""
     return {name: column[chosen] for name, column in table.items()}
 
 
 def joined(tables: Sequence[Table]) -> Table:
-    """All rows of tables that have the same columns; tables without any are passed by."""
+    """Return all rows of tables that have the same columns; empty tables are skipped."""
     some = [table for table in tables if table]
     return {name: np.concatenate([table[name] for table in some]) for name in some[0]} if some else {}
 
 
 def once(table: Table, key: "np.ndarray") -> Table:
-    """The rows by ascending ``key``, the first of those that have the same."""
+    """Return the rows by ascending ``key``, the first of rows with equal keys."""
     return take(table, np.unique(key, return_index=True)[1])
 
 
 @dataclass
 class Parcel:
-    """See the module. ``known`` and the names of all columns are the same on all ranks."""
+    """State of tets and nodes, see the module. ``known`` and the names of all columns are equal on all ranks."""
 
     known: dict[str, Any] = field(default_factory=dict)
-    """What all ranks know alike: numbers and small arrays."""
+    """Numbers and small arrays that are equal on all ranks."""
     sums: dict[str, Ints] = field(default_factory=dict)
-    """What adds up over the ranks."""
+    """Words whose sums over the ranks count."""
     nodes: Table = field(default_factory=dict)
-    """A row a node; ``id`` (n,) among the columns, ascending when a parcel is whole. Where there is a column ``family``
-    (n,), the corners of a tet bring along all nodes of their families."""
+    """A row a node, with a column ``id`` (n,), ascending after routing. If there is a column ``family`` (n,), all
+    nodes of the families of a tet's corners go with the tet."""
     tets: dict[int, Table] = field(default_factory=dict)
-    """By part, a row a tet: ``id`` (n,), ``corners`` (n, 4) global ids, and the rest."""
+    """By part, a row a tet: ``id`` (n,), ``corners`` (n, 4) global ids of nodes, and its state."""
     rows: dict[str, Table] = field(default_factory=dict)
-    """Tables of other things. They go where their ``tet`` (k,) goes, or to the owner of their ``node`` (k,), or to
-    where they are, ``at`` (k, 3). Nodes ``with`` them (k, m), -1 for none, come along, rows of one
-    ``key`` (k,) are copies of each other."""
+    """Tables of other things. Their target is that of a tet, ``tet`` (k,), or the owner of a node, ``node`` (k,), or
+    the rank at a position, ``at`` (k, 3). Nodes ``with`` them (k, m), -1 for none, go along; rows of one ``key``
+    (k,) are copies of each other."""
 
     def packed(self) -> Ints:
-        """One flat message."""
+        """Return the parcel as one flat message."""
         data = pickle.dumps((self.known, self.sums, self.nodes, self.tets, self.rows), protocol=5)
         words = np.zeros(1 + -(-len(data) // 8), np.int64)
         words[0] = len(data)
@@ -67,12 +67,12 @@ class Parcel:
 
     @classmethod
     def unpacked(cls, words: Ints) -> "Parcel":
-        """What ``packed`` made one message of."""
+        """Return the parcel of a message of ``packed``."""
         return cls(*pickle.loads(words[1:].view(np.uint8)[: int(words[0])].data))
 
     @classmethod
     def of(cls, parcels: Sequence["Parcel"]) -> "Parcel":
-        """All of them as one; nodes that several hold are there once. At least one."""
+        """Return the union of at least one parcel; nodes in several parcels are in it once."""
         nodes = joined([p.nodes for p in parcels])
         parts = sorted({part for p in parcels for part in p.tets})
         names = sorted({name for p in parcels for name in p.rows})

@@ -1,8 +1,8 @@
-"""Where everything goes: a cut of all tets, parcels from rank to rank, and who holds and owns what afterwards.
+"""Redistribution: a cut of all tets, parcels from rank to rank, and the holders and owners of nodes afterwards.
 
-A box of the cut goes to the rank that has most of it already. Tets take along the nodes that they need. Who shares a
-node with whom is settled by a directory: the rank that a node's id falls to receives the ranks that hold it and sends
-each of them the others.
+A box of the cut goes to the rank that has most of its tets already. Tets take their nodes along. A distributed
+directory finds the ranks that share a node: the rank number id % ranks receives the holders of a node and sends each
+of them the others.
 """
 
 from dataclasses import dataclass
@@ -17,50 +17,49 @@ from ..parallel.decompose import Cut, bisect, place
 from ..parallel.ownership import Neighbour
 from .parcel import Parcel, Table, joined, length, once, take
 
-_NOBODY = np.iinfo(np.int64).max
-"""In place of the smallest tet of a rank that has none at a node."""
+_NO_TET = np.iinfo(np.int64).max
+"""Stands for the smallest tet of a rank that has no tet at a node."""
 
 
 @dataclass
 class Directory:
-    """This rank's share of the list of all nodes: those whose id falls to it."""
+    """This rank's share of the directory of all nodes: those with id % ranks equal to its number."""
 
     comm: Comm
     id: Ints
-    """(n,) ascending."""
+    """(n,) node ids, ascending."""
     owner: Indices
-    """(n,) who counts each: the rank of its tet of smallest id."""
+    """(n,) owner of each node: the rank of its tet of smallest id."""
 
     def owners(self, ids: Ints) -> Indices:
-        """(k,) owners of any nodes; all ranks take part."""
+        """Return (k,) the owners of any nodes. Collective."""
         home = ids % self.comm.size
         asked = self.comm.swap({rank: ids[home == rank] for rank in range(self.comm.size)})
-        told = self.comm.swap({
+        answers = self.comm.swap({
             rank: self.owner[np.searchsorted(self.id, want)].astype(np.int64) for rank, want in asked.items()
         })  # fmt: skip
         found = np.zeros(len(ids), np.int32)
-        for rank, answer in told.items():
+        for rank, answer in answers.items():
             found[home == rank] = answer
         return found
 
 
 @dataclass
 class Arrived:
-    """A parcel at the ranks that its contents go to, and who has what there."""
+    """A parcel after routing, with the holders and owners of its nodes."""
 
     parcel: Parcel
     owner: Indices
-    """(nodes,) rank that counts each of the parcel's nodes."""
+    """(nodes,) rank that owns each of the parcel's nodes."""
     border: Flags
-    """(nodes,) which are held by others, too."""
+    """(nodes,) which nodes other ranks hold, too."""
     neighbours: list[Neighbour]
     moved: tuple[int, int]
-    """Tets and nodes that came from another rank."""
+    """Numbers of tets and nodes that came from other ranks."""
 
 
 def route(parcel: Parcel, scale: tuple[float, float, float], comm: Comm) -> Arrived:
-    """Cuts all tets by their ``weight`` (n, 3), see Balance.weigh, and moves everything to where it belongs; all ranks
-    take part.
+    """Cut all tets by their ``weight`` (n, 3), see Balance.weigh, and send all data to its target. Collective.
 
     ``scale`` multiplies positions before the cut.
     """
@@ -84,8 +83,8 @@ def route(parcel: Parcel, scale: tuple[float, float, float], comm: Comm) -> Arri
 
 
 def _one_of_each(name: str, rows: Table) -> Table:
-    """The rows by ascending key, once each. Raises ConoidError when the copies of one are not equal: the answer would
-    depend on which of them is taken.
+    """Return the rows by ascending key, once each. Raises ConoidError if the copies of a row are not equal: the
+    answer would depend on the choice.
     """
     found = once(rows, rows["key"])
     at = np.searchsorted(found["key"], rows["key"])
@@ -96,7 +95,7 @@ def _one_of_each(name: str, rows: Table) -> Table:
 
 
 def _cut(parcel: Parcel, scale: Floats, comm: Comm) -> tuple[dict[int, Indices], list[Cut]]:
-    """Where every tet lies among the boxes of the cut, by part."""
+    """Return the box of the cut of every tet, by part, and the cuts. Collective."""
     nodes, points, ids, weights = parcel.nodes, [np.zeros((0, 3))], [np.zeros(0, np.int64)], [np.zeros((0, 3))]
     for table in parcel.tets.values():
         corners = located(nodes["id"], table["corners"])
@@ -109,7 +108,7 @@ def _cut(parcel: Parcel, scale: Floats, comm: Comm) -> tuple[dict[int, Indices],
 
 
 def _homes(places: dict[int, Indices], comm: Comm) -> Indices:
-    """(boxes,) the rank that each box goes to: the one that has most of its tets already, as far as that is free."""
+    """Return (boxes,) the rank of each box: the one that has most of its tets, if it has no box yet. Collective."""
     here = np.bincount(np.concatenate([np.zeros(0, np.int32), *places.values()]), minlength=comm.size)
     held = np.array(comm.share(here))
     home, free = np.full(comm.size, -1, np.int32), np.ones(comm.size, bool)
@@ -124,8 +123,8 @@ def _homes(places: dict[int, Indices], comm: Comm) -> Indices:
 def _share(
     parcel: Parcel, targets: dict[int, Indices], boxes: tuple[list[Cut], Indices], rank: int, scale: Floats
 ) -> Parcel:  # fmt: skip
-    """What goes to ``rank``, without what goes to owners of nodes, which are settled later; ``boxes``: the cuts, and
-    the rank that each box goes to.
+    """Return the data for ``rank``, except tables that go to owners of nodes; ``boxes``: the cuts, and the rank of
+    each box.
     """
     cuts, home = boxes
     tets = {part: take(table, targets[part] == rank) for part, table in parcel.tets.items()}
@@ -148,7 +147,7 @@ def _share(
 
 
 def _relatives(nodes: Table, corners: Ints) -> Ints:
-    """(k,) the nodes that are of the family of one of these ``corners``."""
+    """Return (k,) the nodes of the families of these ``corners``."""
     if "family" not in nodes or not len(corners):
         return corners[:0]
     families = unique(nodes["family"][among(corners, nodes["id"])])
@@ -156,23 +155,23 @@ def _relatives(nodes: Table, corners: Ints) -> Ints:
 
 
 def _settle(whole: Parcel, comm: Comm) -> tuple[Directory, list[Neighbour], Indices]:
-    """The directory, the neighbours of this rank, and who owns its nodes."""
+    """Return the directory, the neighbours of this rank, and the owners of its nodes. Collective."""
     ids = whole.nodes["id"]
-    smallest = np.full(len(ids), _NOBODY)
+    smallest = np.full(len(ids), _NO_TET)
     for table in whole.tets.values():
         np.minimum.at(smallest, located(ids, table["corners"]), table["id"][:, None])
     home, words = ids % comm.size, np.column_stack([ids, smallest])
-    told = comm.swap({rank: words[home == rank] for rank in range(comm.size)})
-    rows = [np.column_stack([w.reshape(-1, 2), np.full(len(w) // 2, rank)]) for rank, w in told.items()]
+    answers = comm.swap({rank: words[home == rank] for rank in range(comm.size)})
+    rows = [np.column_stack([w.reshape(-1, 2), np.full(len(w) // 2, rank)]) for rank, w in answers.items()]
     every = np.concatenate([np.zeros((0, 3), np.int64), *rows])
     every = every[np.lexsort((every[:, 2], every[:, 1], every[:, 0]))]
     first = np.r_[True, every[1:, 0] != every[:-1, 0]] if len(every) else np.zeros(0, bool)
     owners = every[first, 2]
     directory = Directory(comm, every[first, 0], owners.astype(np.int32))
     group = np.cumsum(first) - 1
-    back = {rank: _sharing(every, group, owners, rank) for rank in told}
-    answers = comm.swap(back)
-    shared = np.concatenate([np.zeros((0, 3), np.int64), *(w.reshape(-1, 3) for w in answers.values())])
+    back = {rank: _sharing(every, group, owners, rank) for rank in answers}
+    replies = comm.swap(back)
+    shared = np.concatenate([np.zeros((0, 3), np.int64), *(w.reshape(-1, 3) for w in replies.values())])
     shared = shared[np.lexsort((shared[:, 0], shared[:, 1]))]
     owner = np.full(len(ids), comm.rank, np.int32)
     owner[np.searchsorted(ids, shared[:, 0])] = shared[:, 2]
@@ -184,7 +183,7 @@ def _settle(whole: Parcel, comm: Comm) -> tuple[Directory, list[Neighbour], Indi
 
 
 def _sharing(every: Ints, group: Ints, owners: Ints, rank: int) -> Ints:
-    """(k, 3) node, other holder and owner, for the nodes that ``rank`` shares; ``group``: which node a row is of."""
+    """Return (k, 3) node, other holder and owner, for the nodes that ``rank`` shares; ``group``: node of each row."""
     held = np.zeros(len(owners), bool)
     held[group[every[:, 2] == rank]] = True
     rows = held[group] & (every[:, 2] != rank)
@@ -192,12 +191,12 @@ def _sharing(every: Ints, group: Ints, owners: Ints, rank: int) -> Ints:
 
 
 def _to_owners(parcel: Parcel, whole: Parcel, directory: Directory) -> None:
-    """Moves the tables that go to the owners of their nodes."""
+    """Send the tables that go to the owners of their nodes. Collective."""
     comm, names = directory.comm, sorted(name for name, table in parcel.rows.items() if "node" in table)
     owners = {name: directory.owners(parcel.rows[name]["node"]) for name in names}
     sends = {}
     for rank in range(comm.size):
         sends[rank] = Parcel(rows={name: take(parcel.rows[name], owners[name] == rank) for name in names})
-    told = [Parcel.unpacked(words) for words in comm.swap({r: p.packed() for r, p in sends.items()}).values()]
+    answers = [Parcel.unpacked(words) for words in comm.swap({r: p.packed() for r, p in sends.items()}).values()]
     for name in names:
-        whole.rows[name] = joined([p.rows[name] for p in told])
+        whole.rows[name] = joined([p.rows[name] for p in answers])
