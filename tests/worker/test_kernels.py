@@ -68,10 +68,24 @@ def tree(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_an_edited_source_of_a_kernel_names_another_folder(tree: Path, edited: str, another: bool) -> None:
     before = store.source_hash(tree)
     with (tree / f"{edited}.py").open("a") as file:
-        file.write("# edited\n")
+        file.write("EDITED = True\n")
     store.source_hash.cache_clear()
     assert (store.source_hash(tree) != before) == another
     assert (store.cache_folder(store.source_hash(tree)) != store.cache_folder(before)) == another
+
+
+def test_words_about_a_kernel_leave_its_folder_and_its_compiled_code(tree: Path, tmp_path: Path) -> None:
+    """A docstring or a comment moves the lines of a kernel, and numba finds it all the same."""
+    before, folder = store.source_hash(tree), tmp_path / "kernels"
+    ahead.compile_all(folder, lambda *_: None, tree, "tiny")
+    text = (tree / "above.py").read_text()
+    (tree / "above.py").write_text('"""Two kernels.\n\nOf one file.\n"""\n\n# a comment\n\n' + text)
+    store.source_hash.cache_clear()
+    assert store.source_hash(tree) == before
+    script = "import tiny.above as a; a.total.load(); print(*a.total.stats.cache_hits.values())"
+    environment = os.environ | {store.VARIABLE: str(folder)}
+    found = subprocess.run([sys.executable, "-c", script], env=environment, capture_output=True, text=True, check=True)
+    assert found.stdout.split() == ["1"]
 
 
 def test_a_copy_elsewhere_and_one_that_was_written_again_have_the_same_folder(tree: Path, tmp_path: Path) -> None:

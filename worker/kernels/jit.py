@@ -53,7 +53,7 @@ class _ModuleFolder(_CacheLocator):
     """Where numba keeps the kernels of a module: below the folder that the sources name (kernels/store.py)."""
 
     def __init__(self, function: Callable[..., Any], file: str) -> None:
-        self._py_file, self._line = file, function.__code__.co_firstlineno
+        self._py_file = file
         self._path = os.path.join(_folder(), function.__module__)
         os.makedirs(self._path, exist_ok=True)
 
@@ -66,8 +66,10 @@ class _ModuleFolder(_CacheLocator):
         return ""
 
     def get_disambiguator(self) -> str:
-        """Tells kernels of one name apart."""
-        return str(self._line)
+        """Part of the name of a kernel's files: empty, because numba's default, its line, changes with docstrings.
+        Kernels of one name share an index, in which numba finds them by their byte code.
+        """
+        return ""
 
     @classmethod
     def from_function(cls, function: Callable[..., Any], file: str) -> "_ModuleFolder | None":

@@ -12,6 +12,7 @@ import ast
 import hashlib
 import os
 import platform
+import re
 import sys
 from functools import cache
 from importlib.metadata import version
@@ -20,7 +21,9 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 VARIABLE = "NUMBA_CACHE_DIR"
 DECLARATION = "\n@njit("
-"""How a kernel begins in its source."""
+"""Text with which the declaration of a kernel begins in its source."""
+_PROSE = re.compile(rb'"""[\s\S]*?"""|#[^\n]*')
+"""Docstrings and comments of a source."""
 
 
 @cache
@@ -37,10 +40,15 @@ def module_hash(path: Path, root: Path) -> str:
 def _hashed(sources: set[Path], root: Path) -> str:
     h = hashlib.sha256()
     for source in sorted(sources):
-        h.update(f"{os.path.relpath(source, root)} ".encode() + source.read_bytes())
+        h.update(f"{os.path.relpath(source, root)} ".encode() + _code(source.read_bytes()))
     for part in (version("numba"), version("llvmlite"), version("numpy"), platform.python_version()):
         h.update(part.encode())
     return h.hexdigest()
+
+
+def _code(source: bytes) -> bytes:
+    """Return the lines of a source without docstrings, comments and empty lines, on which kernels do not depend."""
+    return b"\n".join(line.rstrip() for line in _PROSE.sub(b"", source).splitlines() if line.strip())
 
 
 def _named(sources: str) -> str:
