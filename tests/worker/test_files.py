@@ -94,8 +94,8 @@ def test_what_is_removed_while_a_run_goes_on_is_told_once(tmp_path: Path) -> Non
     shutil.rmtree(tmp_path / "frames")
     (tmp_path / "snapshots/000000.snap").rename(tmp_path / "snapshots/000001.snap")
     assert losses.found() == [
-        "frames: 2 files from 000000.vtkhdf to 000001.vtkhdf removed while the run goes on; what follows is written",
-        "snapshots: 000000.snap removed while the run goes on; what follows is written",
+        "frames: 2 files from 000000.vtkhdf to 000001.vtkhdf removed during the run; later files are written",
+        "snapshots: 000000.snap removed during the run; later files are written",
     ]
     assert losses.found() == []
 

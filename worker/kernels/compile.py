@@ -1,8 +1,9 @@
-"""All kernels compiled ahead, on several cores: ``python -m conoid.worker.kernels.compile``.
+"""Compilation of all kernels ahead of a run, on several cores: ``python -m conoid.worker.kernels.compile``.
 
-Modules whose sources have not changed since an earlier folder are linked from there. One child process a core compiles
-the kernels of the others into the cache folder, module after module. A module comes after those that it imports, so
-that no kernel is compiled twice. numba keeps files of its own for each kernel: children never write the same one.
+Modules whose sources have not changed since an earlier folder are linked from there. One child process a core
+compiles the kernels of the others into the cache folder, module after module. A module comes after those that it
+imports, so that no kernel is compiled twice. numba has separate files for each kernel: two children never write the
+same file.
 """
 
 import fcntl
@@ -24,28 +25,29 @@ from ..run.signals import REQUESTS
 from . import store
 
 Tell = Callable[[int, int], None]
-"""Is told every few seconds how many kernels are compiled, and of how many."""
+"""Callback for the progress, every few seconds: number of compiled kernels, and of all."""
 
 COMPLETE = "complete"
-"""The file in the cache folder that says that every kernel is there."""
+"""File in the cache folder that marks all kernels as compiled."""
 WORD_EVERY = 3.0
-"""s between two words of progress."""
+"""s between two reports of the progress. Chosen."""
 _MOST = 4
-"""Children at most: the longest chain of modules holds 27 % of the machine code."""
+"""Largest number of children: the longest chain of modules holds 27 % of the machine code."""
 _MOST_WORDS = 500
-"""Characters of numba's report: what is wrong comes first."""
+"""Characters of numba's report that are kept: the error comes first."""
 _PATIENCE = 900.0
-"""s that a module may take: the largest takes ten on an idle core."""
+"""Time limit of a module, s: the largest takes ten on an idle core."""
 _HASH = "hash"
-"""The file in a module's folder that says that all its kernels are there, and what they are made of."""
+"""File in a module's folder that marks all its kernels as compiled, and contains the hash of their sources."""
 _LOCK, _LOOK = "lock", 0.3
-"""The file that whoever compiles holds, and s between two checks of it: a tenth of WORD_EVERY."""
+"""Lock file of the program that compiles, and s between two tests of it: a tenth of WORD_EVERY."""
 
 
 def compile_all(folder: Path, tell: Tell, root: Path = store.ROOT, package: str = "conoid.worker") -> bool:
-    """Compiles every kernel below ``root`` that ``folder`` lacks; False when it lacks none. Raises CompileError.
+    """Compiles every kernel below ``root`` that ``folder`` lacks; returns False if none is missing. Raises
+    CompileError.
 
-    One program at a time: another one waits for it, and goes on where it was killed.
+    One program compiles at a time: another one waits for it, and continues if it is killed.
     """
     if (folder / COMPLETE).exists():
         return False
@@ -63,7 +65,7 @@ def compile_all(folder: Path, tell: Tell, root: Path = store.ROOT, package: str 
 
 
 class _Saying:
-    """Reports how many kernels have come into the folder, at once and then every ``WORD_EVERY`` s."""
+    """Reports the number of kernels in the folder, at once and then every ``WORD_EVERY`` s."""
 
     def __init__(self, tell: Tell, folder: Path, total: int) -> None:
         self._tell, self._folder, self._total = tell, folder, total
@@ -77,7 +79,7 @@ class _Saying:
 
 @contextmanager
 def _alone(folder: Path, said: _Saying) -> Iterator[None]:
-    """Inside, no other program compiles into the folder; the lock goes with its holder, however that ends."""
+    """Holds the lock of the folder, so that no other program compiles into it; the lock ends with the process."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         lock = (folder / _LOCK).open("w")
@@ -99,9 +101,9 @@ class _Module:
     """A file with kernels."""
 
     name: str
-    """As Python imports it, and as its folder is called."""
+    """Name for Python's import, and of its folder."""
     hash: str
-    """Of all that its kernels are made of."""
+    """Hash of all sources that its kernels depend on."""
 
     @classmethod
     def of(cls, path: Path, root: Path, package: str) -> "_Module":
@@ -109,8 +111,8 @@ class _Module:
         return cls(name, store.module_hash(path, root))
 
     def take_over(self, folder: Path) -> bool:
-        """Links its kernels from another folder beside ``folder`` that has them whole, unless they are there; whether
-        they are.
+        """Links its kernels from another folder beside ``folder``, unless they are in it; returns whether they are
+        complete.
         """
         own = folder / self.name
         if self._whole(own):
@@ -121,7 +123,7 @@ class _Module:
         return False
 
     def done(self, folder: Path) -> None:
-        """All its kernels are in the folder."""
+        """Marks its kernels in the folder as complete."""
         own = folder / self.name
         own.mkdir(exist_ok=True)
         (own / _HASH).write_text(self.hash)
@@ -133,7 +135,7 @@ class _Module:
             return False
 
     def _link(self, other: Path, own: Path) -> bool:
-        """False where files cannot be linked: the kernels are compiled then."""
+        """Returns False if files cannot be linked: the kernels are compiled then."""
         try:
             own.mkdir(exist_ok=True)
             for path in other.glob("*.nb[ci]"):
@@ -149,7 +151,9 @@ class _Module:
 
 
 def _order(files: set[Path]) -> dict[Path, set[Path]]:
-    """Of each file those that must come before it; the files that begin the longest chains of source come first."""
+    """Returns for each file those that must come before it; files that begin the longest chains of source come
+    first.
+    """
     needs = {path: _needed(path, files) for path in files}
     length = {path: len(path.read_text(encoding="utf-8")) for path in files}
     chain: dict[Path, int] = {}
@@ -159,12 +163,12 @@ def _order(files: set[Path]) -> dict[Path, set[Path]]:
 
 
 def _needed(path: Path, files: set[Path]) -> set[Path]:
-    """The ``files`` that ``path`` imports, at any depth."""
+    """Returns the ``files`` that ``path`` imports, at any depth."""
     return (store.reached([path]) & files) - {path}
 
 
 def _in_parallel(needs: dict[Path, set[Path]], folder: Path, said: _Saying, modules: dict[Path, _Module]) -> None:
-    """Compiles the files of ``needs``, each after those that it needs, by as many children as there are cores."""
+    """Compiles the files of ``needs``, each after those that it needs, with as many children as there are cores."""
     children: queue.SimpleQueue[_Child] = queue.SimpleQueue()
     number = min(_MOST, len(os.sched_getaffinity(0)), len(needs))
     done: set[Path] = set()
@@ -207,8 +211,8 @@ class _Child:
     errors: IO[bytes]
 
     def compile(self, module: str) -> None:
-        """Returns when all kernels of the module are in the cache. Raises CompileError, and StoppedError where the run
-        was asked to stop: launchers tell all processes of a rank.
+        """Returns when all kernels of the module are in the cache. Raises CompileError, and StoppedError if the run
+        was asked to stop: launchers send the signal to all processes of a rank.
         """
         assert self.process.stdin is not None
         assert self.process.stdout is not None
@@ -221,7 +225,7 @@ class _Child:
         raise CompileError(f"kernels of {module} cannot be compiled: {self._reason()}")
 
     def _reason(self) -> str:
-        """The last line that the child wrote, or how it ended."""
+        """Returns the last line that the child wrote, or its exit code."""
         code = self.process.wait()
         self.errors.seek(0)
         lines = self.errors.read().decode(errors="replace").strip().splitlines()
@@ -230,7 +234,7 @@ class _Child:
 
 @contextmanager
 def _child(folder: Path) -> Iterator[_Child]:
-    """Inside, a child lives that compiles into ``folder``; it ends too when this process dies."""
+    """Starts a child that compiles into ``folder``; it ends with the block, and when this process dies."""
     command = [sys.executable, "-m", "conoid.worker.kernels.compile", "--child"]
     environment = os.environ | {store.VARIABLE: str(folder), "NUMBA_NUM_THREADS": "1"}
     pipe = subprocess.PIPE
@@ -245,9 +249,10 @@ def _child(folder: Path) -> Iterator[_Child]:
 
 
 def _serve() -> int:
-    """The child: imports the modules named on stdin, compiles their kernels, and names each module when it is done.
+    """Runs the child: imports the modules named on standard input, compiles their kernels, and names each module when
+    it is done. Returns the exit code.
 
-    The answers alone go to standard output; what anybody prints goes to standard error. Returns the exit code.
+    Only the answers go to standard output; all other output goes to standard error.
     """
     import importlib
 
@@ -270,12 +275,12 @@ def _serve() -> int:
 
 
 def words(done: int, total: int) -> str:
-    """The progress as users read it."""
+    """Returns the progress as text."""
     return f"compiling kernels: {done} of {total}"
 
 
 def main() -> int:
-    """Compiles what is missing and reports the progress; the exit code."""
+    """Compiles missing kernels and reports the progress; returns the exit code."""
     try:
         fresh = compile_all(store.cache_folder(), lambda done, total: print(words(done, total), flush=True))
     except (CompileError, StoppedError) as error:

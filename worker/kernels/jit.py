@@ -1,11 +1,12 @@
-"""Kernels: functions that numba compiles for the signature that they are declared with, at their first call.
+"""Kernels: functions that numba compiles for their declared signature, at their first call.
 
-``numba.njit`` compiles a function with a signature where it is declared, or loads it from the cache: every rank would
-load every kernel of the worker at its start, whatever its scene. ``njit`` of this module, the one that knows numba,
-does the same at the first call, from Python or from another kernel.
+``numba.njit`` compiles a function with a signature at its declaration, or loads it from the cache: every rank would
+load every kernel of the worker at its start, whatever its scene. ``njit`` of this module, the only one that imports
+numba, does the same at the first call, from Python or from another kernel.
 
-numba counts who uses an array, atomically, for every array of every record that one kernel hands to another. A kernel
-that makes no array need not, and does not: that was three quarters of the narrow phase of a stack of plates.
+numba counts references to every array of every record that one kernel passes to another, with atomic operations. A
+kernel that makes no array needs no counts and has none: they were three quarters of the time of the narrow phase of
+a stack of plates.
 """
 
 import inspect
@@ -30,27 +31,29 @@ __all__ = ["DECLARED", "Kernel", "intrinsic", "njit", "packed", "prefetch", "rec
 
 _BLAS = "scipy.linalg"
 _TO_READ, _TO_SECOND, _DATA = 0, 2, 1
-"""Of LLVM's prefetch: to read, into the second level of the cache, data."""
+"""Arguments of LLVM's prefetch: for reading, into the second-level cache, of data."""
 FunctionIdentity._unique_ids = iter(lambda: int.from_bytes(os.urandom(8), "big"), None)  # type: ignore[assignment]
-"""Draws the numbers by which numba tells functions of one name apart, which it counts in each process. Of functions
-that are called the same in the objects of two kernels the first that is loaded serves both, so kernels that several
-processes have compiled could call each other's sorting, and crash (numba issue 10486)."""
+"""Random numbers by which numba distinguishes functions of one name; by default it counts them in each process. If
+two kernels from different processes have functions of one name and number, the first that is loaded serves both:
+kernels could call each other's sorting, and crash (numba issue 10486)."""
 _MAKERS = {
     "arange", "argsort", "array", "concatenate", "copy", "cumsum", "empty", "full", "ones", "sort", "unique", "zeros",
 }  # fmt: skip
-"""Functions and methods that make arrays, by their names. numba refuses to compile a kernel that makes some by others,
-or by assigning whole rows: it is declared with ``_nrt=True``."""
+"""Names of functions and methods that make arrays. numba refuses to compile a kernel that makes arrays by others, or
+by assigning whole rows, without reference counts: such a kernel is declared with ``_nrt=True``."""
 DECLARED: list["Kernel"] = []
-"""Every kernel of the modules that are imported."""
+"""All kernels of the imported modules."""
 
 
 def _folder() -> str:
-    """The folder of all kernels, empty where it has no name."""
+    """Returns the folder of all kernels, "" if it is not set."""
     return str(config.CACHE_DIR)  # type: ignore[attr-defined]
 
 
 class _ModuleFolder(_CacheLocator):
-    """Where numba keeps the kernels of a module: below the folder that the sources name (kernels/store.py)."""
+    """Locator for numba: folder of the kernels of a module, below the folder named by the sources
+    (kernels/store.py).
+    """
 
     def __init__(self, function: Callable[..., Any], file: str) -> None:
         self._py_file = file
@@ -58,22 +61,22 @@ class _ModuleFolder(_CacheLocator):
         os.makedirs(self._path, exist_ok=True)
 
     def get_cache_path(self) -> str:
-        """The folder."""
+        """Returns the folder."""
         return self._path
 
     def get_source_stamp(self) -> str:
-        """The same at any time: other sources have another folder."""
+        """Returns a constant: other sources have another folder."""
         return ""
 
     def get_disambiguator(self) -> str:
-        """Part of the name of a kernel's files: empty, because numba's default, its line, changes with docstrings.
-        Kernels of one name share an index, in which numba finds them by their byte code.
+        """Returns the part of a file name that numba's default sets to the line of the kernel: empty, since
+        docstrings move lines. Kernels of one name share an index, in which numba finds them by their byte code.
         """
         return ""
 
     @classmethod
     def from_function(cls, function: Callable[..., Any], file: str) -> "_ModuleFolder | None":
-        """None where the folder has no name, or cannot be made: numba then takes one of its own choice."""
+        """Returns None if the folder is not set or cannot be made: numba uses its own default then."""
         try:
             return cls(function, file) if _folder() else None
         except OSError:
@@ -92,20 +95,20 @@ class Kernel(CPUDispatcher):
     """A compiled function with one signature."""
 
     signature: Any = ""
-    """As it is declared: in numba's notation, or made of its ``types``."""
+    """Signature as declared: in numba's notation, or made of its ``types``."""
     _address: int | None = None
 
     @property
     def result(self) -> Any:
-        """The type of what it returns."""
+        """Type of the result."""
         return normalize_signature(self.signature)[1]  # type: ignore[no-untyped-call]
 
     def enable_caching(self) -> None:
-        """Keeps the kernel in the folder of its module."""
+        """Sets the folder of the module as cache of the kernel."""
         self._cache = _Cache(self.py_func)  # type: ignore[no-untyped-call]
 
     def load(self) -> None:
-        """Compiles the kernel, or loads it from the cache, and what it calls; once, whatever thread asks."""
+        """Compiles the kernel and the kernels that it calls, or loads them from the cache; once, from any thread."""
         with global_compiler_lock:
             if self.overloads:
                 return
@@ -116,7 +119,7 @@ class Kernel(CPUDispatcher):
 
     @property
     def address(self) -> int:
-        """Where its machine code begins, for calls that pass arguments as C does."""
+        """Address of its machine code, for calls with the calling convention of C."""
         if self._address is None:
             self.load()
             compiled: Any = next(iter(self.overloads.values()))
@@ -124,19 +127,23 @@ class Kernel(CPUDispatcher):
         return self._address
 
     def compile(self, sig: Any) -> Any:
-        """As numba asks for it when another kernel calls this one: for the declared signature, whatever ``sig`` is."""
+        """Returns the entry point for numba when another kernel calls this one: for the declared signature, whatever
+        ``sig`` is.
+        """
         self.load()
         (compiled,) = self.overloads.values()
         return compiled.entry_point  # type: ignore[attr-defined]
 
     def _compile_for_args(self, *args: Any, **kws: Any) -> "Kernel":
-        """As numba asks for it at the first call from Python. Loaded, it is called again, and checks its arguments."""
+        """Loads the kernel when numba asks for it at the first call from Python; numba then calls it again and
+        checks the arguments.
+        """
         self.load()
         return self
 
 
 def _makes_arrays(kernel: Kernel) -> bool:
-    """Whether a kernel makes arrays, or calls one that hands it some, and so has to count who uses them."""
+    """Returns whether a kernel makes arrays, or calls one that returns arrays, and so needs reference counts."""
     names, used = kernel.py_func.__code__.co_names, inspect.getclosurevars(kernel.py_func)
     known = [*used.nonlocals.values(), *used.globals.values()]
     known += [getattr(module, name, None) for module in known if isinstance(module, ModuleType) for name in names]
@@ -151,7 +158,7 @@ def _holds_arrays(kind: Any) -> bool:
 
 
 def njit(signature: Any, *, cache: bool = True, **options: Any) -> Callable[[Callable[..., Any]], Kernel]:
-    """Declares a kernel of that signature; ``options`` are numba's own."""
+    """Declares a kernel with that signature; ``options`` are numba's own."""
 
     def declare(function: Callable[..., Any]) -> Kernel:
         kernel = Kernel(function, targetoptions={"nopython": True, "boundscheck": None, **options})
@@ -165,19 +172,19 @@ def njit(signature: Any, *, cache: bool = True, **options: Any) -> Callable[[Cal
 
 
 def several(*kinds: Any) -> Any:
-    """The type of a tuple."""
+    """Returns the type of a tuple."""
     return types.Tuple(kinds)  # type: ignore[no-untyped-call]
 
 
 def record(name: type, *kinds: Any) -> Any:
-    """The type of a named tuple."""
+    """Returns the type of a named tuple."""
     if len(set(kinds)) == 1:
         return types.NamedUniTuple(kinds[0], len(kinds), name)  # type: ignore[no-untyped-call]
     return types.NamedTuple(kinds, name)  # type: ignore[no-untyped-call]
 
 
 packed: Any = cgutils.pack_array
-"""Makes LLVM's array of a list of values, for intrinsics."""
+"""Makes an LLVM array of a list of values, for intrinsics."""
 
 
 def _prefetch(_: Any, array: Any, index: Any) -> Any:
@@ -195,12 +202,12 @@ def _prefetch(_: Any, array: Any, index: Any) -> Any:
 
 
 prefetch: Any = intrinsic(_prefetch)
-"""In a kernel: has the cache line of a place of a one-dimensional array brought near; a place beyond its end does no
-harm. It changes no value."""
+"""In a kernel: load the cache line of an element of a one-dimensional array; an index beyond its end is harmless. It
+changes no value."""
 
 
 class _Loading:
-    """CPU and wall seconds of this thread in loading kernels; a kernel that another one loads is within its time."""
+    """CPU and wall time of this thread for loading kernels, s; nested loads count once."""
 
     def __init__(self) -> None:
         self.spent = self.passed = 0.0
@@ -222,9 +229,10 @@ _loading = _Loading()
 
 
 def _begin() -> None:
-    """Loads numba's own implementations, which the first kernel needs, without the BLAS of scipy, which none does.
+    """Loads numba's own implementations, which the first kernel needs, without the BLAS of scipy, which no kernel
+    needs.
 
-    Where scipy is installed numba would import all of its linear algebra for that.
+    If scipy is installed numba would import all of its linear algebra.
     """
     absent = _BLAS not in sys.modules
     if absent:
@@ -241,10 +249,10 @@ _begin()
 
 
 def cpu_time() -> float:
-    """CPU time of this thread so far without the loading of kernels, s: what the work itself costs, in any step."""
+    """Returns the CPU time of this thread so far without the loading of kernels, s."""
     return time.thread_time() - _loading.spent
 
 
 def wall_time() -> float:
-    """s on a clock of this process that stands still while kernels are loaded."""
+    """Returns the s of a clock of this process that stops while kernels are loaded."""
     return time.monotonic() - _loading.passed

@@ -1,4 +1,4 @@
-"""Kernels that a scene needs, loaded on all ranks at once before the first step.
+"""Loading of the kernels that a scene needs, on all ranks at once before the first step.
 
 A kernel is loaded at its first call (worker/kernels/jit.py), which takes 3 to 20 ms. Without this module the ranks
 would load the forty kernels of fracture one rank after the other, as cracks reach them, while all others wait. The
@@ -20,7 +20,7 @@ _WORKER = (__package__ or "").rpartition(".")[0]
 
 
 def preload(case: Case) -> None:
-    """Loads what contact, fracture and boundaries call, where the ``case`` has them."""
+    """Loads the kernels of contact, fracture and boundaries that the ``case`` uses."""
     needed = {
         "contact.": case.contact is not None,
         "fracture.": case.fractures,
@@ -36,7 +36,7 @@ def preload(case: Case) -> None:
 
 
 def called(module: ModuleType) -> Iterator[Kernel]:
-    """The kernels that functions and methods of a module name, as its own or as those of another module."""
+    """Yields the kernels that functions and methods of a module name, as its own or as those of another module."""
     loader = module.__loader__
     assert isinstance(loader, InspectLoader)
     whole = loader.get_code(module.__name__)
@@ -49,7 +49,7 @@ def called(module: ModuleType) -> Iterator[Kernel]:
 
 
 def _functions(code: CodeType, kernels: set[CodeType]) -> Iterator[CodeType]:
-    """What is defined within, at any depth, but for ``kernels``, which call others of their own."""
+    """Yields the functions that are defined in a code object, at any depth, except ``kernels``."""
     for constant in code.co_consts:
         if isinstance(constant, CodeType) and constant not in kernels:
             yield constant

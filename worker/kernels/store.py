@@ -1,10 +1,10 @@
-"""Where compiled kernels are kept.
+"""Folder of the compiled kernels.
 
-numba's disk cache does not see an edited callee in another file. The name of the cache folder is therefore a hash of
-every source that a kernel is made of (files with kernels, and what they import from the worker), the versions and the
-processor. Path and time of a source are not in it: equal sources share a folder. Below it each module has a folder of
-its own (worker/kernels/jit.py), named by a hash of the sources of its kernels: a new folder takes over unchanged
-modules of an earlier one. Rank 0 hashes the sources once a run and compiles what is missing
+numba's disk cache does not detect an edited callee in another file. The name of the cache folder is therefore a hash
+of the code of every source that kernels depend on (files with kernels, and their imports from the worker), the
+versions and the processor. Path and time of a source are not in it: equal sources share a folder. Below it each
+module has a folder of its own (worker/kernels/jit.py), named by a hash of the sources of its kernels: a new folder
+gets unchanged modules from an earlier one. Rank 0 hashes the sources once a run and compiles missing kernels
 (worker/kernels/compile.py); it sends the hash to the other ranks.
 """
 
@@ -28,12 +28,16 @@ _PROSE = re.compile(rb'"""[\s\S]*?"""|#[^\n]*')
 
 @cache
 def source_hash(root: Path = ROOT) -> str:
-    """A hash of the sources of all kernels below ``root``, and of the versions. 0.08 CPU seconds on an idle core."""
+    """Returns a hash of the sources of all kernels below ``root``, and of the versions. 0.08 CPU seconds on an idle
+    core.
+    """
     return _hashed(kernel_sources(root), root)
 
 
 def module_hash(path: Path, root: Path) -> str:
-    """A hash of what the kernels of a file are made of: it, what it imports, the versions and the processor."""
+    """Returns a hash of all that the kernels of a file depend on: its source, its imports, the versions and the
+    processor.
+    """
     return _named(f"{path.relative_to(root)} {_hashed(reached([path]), root)}")
 
 
@@ -47,7 +51,7 @@ def _hashed(sources: set[Path], root: Path) -> str:
 
 
 def _code(source: bytes) -> bytes:
-    """Return the lines of a source without docstrings, comments and empty lines, on which kernels do not depend."""
+    """Returns the lines of a source without docstrings, comments and empty lines, on which kernels do not depend."""
     return b"\n".join(line.rstrip() for line in _PROSE.sub(b"", source).splitlines() if line.strip())
 
 
@@ -56,18 +60,20 @@ def _named(sources: str) -> str:
 
 
 def cache_folder(sources: str | None = None) -> Path:
-    """The folder of this source tree's kernels on this machine; ``sources`` is ``source_hash()`` where it is known."""
+    """Returns the folder of this source tree's kernels on this machine; ``sources``: ``source_hash()`` if it is
+    known.
+    """
     base = os.environ.get("CONOID_CACHE_DIR") or Path.home() / ".cache" / "conoid"
     return Path(base) / "kernels" / _named(sources or source_hash())
 
 
 def kernel_sources(root: Path) -> set[Path]:
-    """The files below ``root`` that hold kernels, and those whose names they import from there, to any depth."""
+    """Returns the files below ``root`` with kernels, and the files whose names they import, to any depth."""
     return reached(kernel_files(root))
 
 
 def reached(paths: list[Path]) -> set[Path]:
-    """The files ``paths``, and those that they import relatively, to any depth."""
+    """Returns the files ``paths``, and those that they import relatively, to any depth."""
     found: set[Path] = set()
     waiting = list(paths)
     while waiting:
@@ -79,12 +85,12 @@ def reached(paths: list[Path]) -> set[Path]:
 
 
 def kernel_files(root: Path) -> list[Path]:
-    """The files below ``root`` that hold kernels."""
+    """Returns the files below ``root`` with kernels."""
     return [path for path in root.rglob("*.py") if DECLARATION in path.read_text(encoding="utf-8")]
 
 
 def imported(path: Path) -> list[Path]:
-    """Files that ``path`` imports relatively at its top level: what a kernel can see."""
+    """Returns the files that ``path`` imports relatively at its top level: all names that a kernel can use."""
     files = []
     for level, module, names in _imports(path.read_text(encoding="utf-8")):
         base = path.parents[level - 1].joinpath(*module.split("."))
@@ -94,7 +100,9 @@ def imported(path: Path) -> list[Path]:
 
 @cache
 def _imports(text: str) -> list[tuple[int, str, list[str]]]:
-    """Level, module and names of each relative import at the top level of a source; each source is parsed once."""
+    """Returns level, module and names of each relative import at the top level of a source; each source is parsed
+    once.
+    """
     found = [node for node in ast.parse(text).body if isinstance(node, ast.ImportFrom) and node.level > 0]
     return [(node.level, node.module or "", [alias.name for alias in node.names]) for node in found]
 
@@ -109,8 +117,8 @@ def _processor() -> str:
 
 
 def use_cache(sources: str | None = None) -> Path:
-    """Points numba to the folder, and returns it. Raises RuntimeError when numba has been imported before: it would
-    keep kernels beside their sources, and not see an edited callee.
+    """Sets numba's cache folder and returns it. Raises RuntimeError if numba was imported before: it would keep
+    kernels beside their sources, and not detect an edited callee.
     """
     folder = cache_folder(sources)
     if "numba" in sys.modules and os.environ.get(VARIABLE) != str(folder):

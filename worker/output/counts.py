@@ -1,9 +1,9 @@
-"""How large the model is and into what it has broken: with every report in which that has changed.
+"""Counts of a run for its reports: sizes of the model and fragments, sent when they have changed.
 
-To find the fragments all ranks look at all their tets (docs/reference/snapshots.md, "Between two snapshots"). So it is
-done when a facet has broken or a tet has left since the last time, and as often as a share of the wall time allows: in
-every report of a small model, every few seconds of a large one. Rank 0 decides, and its decision goes round with the
-loads.
+To find the fragments all ranks go through all their tets (docs/reference/snapshots.md, "Between two snapshots"). So
+it is done when a facet has broken or a tet was removed since the last time, and as often as a share of the wall time
+allows: in every report of a small model, every few seconds for a large one. Rank 0 decides, and its decision goes
+round with the loads.
 """
 
 import math
@@ -22,29 +22,31 @@ from ..simulation import Simulation
 from ..snapshots.table import by_size
 
 SHARE = 1.0 / 50.0
-"""Of the wall time, for finding fragments between frames. Chosen: a run of a minute takes a second longer."""
+"""Share of the wall time for finding fragments between frames. Chosen: a run of a minute takes a second longer."""
 
 
 class Counter:
-    """The counts of a run; all ranks take part in everything but ``due``."""
+    """The counts of a run. Every method is collective except ``due``."""
 
     def __init__(self) -> None:
         """Nothing has been counted."""
-        self._told: tuple[object, ...] = ()
+        self._sent: tuple[object, ...] = ()
         self._found: tuple[int, int] = (-1, -1)
-        """Facets broken and tets left when fragments were last found."""
+        """Numbers of broken facets and of tets when fragments were last found."""
         self._step = -1
-        """And the step."""
+        """Step in which they were last found."""
         self._again = -math.inf
-        """When they may be found again, as time.monotonic() has it, s."""
+        """Wall time from which they may be found again, as time.monotonic(), s."""
         self._smallest, self._sizes = 0, list[int]()
 
     def due(self, sim: Simulation, now: float, *, ending: bool) -> bool:
-        """Whether fragments are to be found; asked on rank 0. ``ending``: no report follows."""
+        """Return whether fragments are to be found; called on rank 0. ``ending``: this is the last report."""
         return sim.record is not None and _state(sim) != self._found and (ending or now >= self._again)
 
     def find(self, sim: Simulation) -> None:
-        """Finds the fragments and their sizes. The first time, which loads a kernel, is no measure of the next."""
+        """Find the fragments and their sizes. The first time loads a kernel, so its duration is not used for the
+        interval.
+        """
         if sim.record is None:
             return
         began, first = time.monotonic(), self._step < 0
@@ -54,15 +56,13 @@ class Counter:
         self._again = ended if first else ended + (ended - began) / SHARE
 
     def changed(self, sim: Simulation, cuts: int) -> dict[str, Any] | None:
-        """The fields of a message (messages.Counts), where they have changed; ``cuts``: how often tets have changed
-        ranks.
-        """
+        """Return the fields of a message (messages.Counts) if they have changed; ``cuts``: number of cuts so far."""
         model, record = sim.model, sim.record
         fragments = record.count if record is not None and record.count else len(set(bodies(sim.case)))
         now = model.elements_global, model.nodes_global, cuts, fragments, self._found
-        if now == self._told:
+        if now == self._sent:
             return None
-        self._told = now
+        self._sent = now
         held, shared = sim.comm.gather(sum(block.n for block in model.blocks)), sim.shared_nodes()
         return {
             "elements": model.elements_global, "nodes": model.nodes_global, "shared": shared, "fragments": fragments,
@@ -77,9 +77,10 @@ def _state(sim: Simulation) -> tuple[int, int]:
 
 
 def sizes(model: Model, labels: list[Ints], comm: Comm) -> tuple[int, list[int]]:
-    """How many fragments there are of each size (snapshots/table.by_size), on rank 0, elsewhere (0, []).
+    """Return the number of fragments of each size (snapshots/table.by_size) on rank 0, (0, []) on the others.
+    Collective.
 
-    ``labels``: for each block (n,) the fragment of each tet. All ranks take part.
+    ``labels``: for each block (n,) the fragment of each tet.
     """
     here = unique(np.concatenate([np.zeros(0, np.int64), *labels]))
     reach = np.full((len(here), 6), -np.inf)
@@ -91,7 +92,7 @@ def sizes(model: Model, labels: list[Ints], comm: Comm) -> tuple[int, list[int]]
 
 
 def _extents(pieces: list[tuple[Ints, Floats]]) -> Floats:
-    """(g,) the longest side of the box round each fragment, m, of its pieces on all ranks."""
+    """Return (g,) the longest side of the bounding box of each fragment, m, from its pieces on all ranks."""
     label, of = np.unique(np.concatenate([labels for labels, _ in pieces]), return_inverse=True)
     whole = np.full((len(label), 6), -np.inf)
     np.maximum.at(whole, of, np.concatenate([reach for _, reach in pieces]))
@@ -100,8 +101,8 @@ def _extents(pieces: list[tuple[Ints, Floats]]) -> Floats:
 
 @njit("void(float64[:, ::1], int32[::1], int32[::1], uint32[:, ::1], float64[:, ::1])", cache=True)
 def _reach(reach, last, of, tets, x):  # type: ignore[no-untyped-def]
-    """Raises ``reach`` (g, 6), high corners and negative low corners, by the nodes of tets of group ``of`` (n,); the
-    ``last`` (nodes,) group that each has been seen in.
+    """Raise ``reach`` (g, 6), upper corners and negative lower corners, to the nodes of tets of group ``of`` (n,);
+    ``last`` (nodes,): the group for which each node was last used.
     """
     for tet in range(len(tets)):
         group = of[tet]

@@ -1,8 +1,7 @@
-"""How far each tet is damaged, for frames: 0 whole, 1 done for.
+"""Damage of tets for frames: 0 intact, 1 failed.
 
-The largest one of three: the damage that its law counts; of the most damaged of its cohesive facets, the share of the
-fracture energy that is spent (1 where a facet has let go); of the plastic strain at which it erodes, the share that it
-has.
+It is the largest of three values: the damage of its law; the spent share of the fracture energy of its most damaged
+cohesive facet (1 for a facet that has failed); its plastic strain over that at which it erodes.
 """
 
 import numpy as np
@@ -19,7 +18,7 @@ from ..parallel.comm import Comm
 
 
 def damage(case: Case, model: Model, cohesion: Cohesion | None, comm: Comm) -> list[Floats] | None:
-    """For each block (n,) the damage of its tets; None where no part can be damaged so. All ranks take part."""
+    """Return for each block (n,) the damage of its tets; None if no part can be damaged. Collective."""
     if not damageable(case):
         return None
     limits = {i: p.erosion.plastic_strain for i, p in enumerate(case.parts) if p.erosion and p.erosion.plastic_strain}
@@ -34,10 +33,11 @@ def damage(case: Case, model: Model, cohesion: Cohesion | None, comm: Comm) -> l
 
 
 def spent_energy(f: Facets) -> Floats:
-    """(m,) share of the fracture energy that each facet has dissipated: 1 - (area left under the law) / energy.
+    """Return (m,) the share of the fracture energy that each facet has dissipated: 1 - (remaining area below the law) /
+    energy.
 
-    The area that is left under the law of a pair is strength share^2 critical / 2, share being what is left of the
-    traction (fracture/cohesive.py); a facet has three pairs.
+    The remaining area of a pair is strength share^2 critical / 2, with the remaining ``share`` of the traction
+    (fracture/cohesive.py); a facet has three pairs.
     """
     law, beyond = f.softening, np.maximum(f.state.top - f.softening.knee, 0.0)
     fallen = np.divide(beyond, law.critical, out=(beyond > 0.0).astype(float), where=law.critical > 0.0)
@@ -46,7 +46,9 @@ def spent_energy(f: Facets) -> Floats:
 
 
 def _facets(cohesion: Cohesion, comm: Comm) -> tuple[Ints, Floats]:
-    """Tets on either side (m, 2) of the facets of all ranks that still hold, and the shares that are spent."""
+    """Return the tets on either side (m, 2) of the cohesive facets of all ranks, and their spent shares (m,).
+    Collective.
+    """
     shares = comm.share((cohesion.facets.tets, spent_energy(cohesion.facets)))
     return np.concatenate([tets for tets, _ in shares]), np.concatenate([spent for _, spent in shares])
 
@@ -58,7 +60,7 @@ def _strained(block: Block, limit: float | None) -> Floats:
 
 
 def _broken(block: Block, held: Ints, spent: Floats) -> Floats:
-    """The most damaged facet of each tet: one that is broken and no longer held has let go."""
+    """Return (n,) the damage of the most damaged facet of each tet; 1 for a broken facet without cohesion."""
     order = np.argsort(block.id)
     values, holding = np.zeros(block.n), np.zeros(block.n, np.int64)
     for side in (0, 1):

@@ -1,7 +1,7 @@
-"""Fields of frames that a case asks for (``run.fields``): density, strain, strain rate, contact pressure.
+"""Fields of frames that a case requests (``run.fields``): density, strain, strain rate, contact pressure.
 
-They are made of positions and velocities alone, but for the impulses of contact since the frame before. Bits are those
-of a tet or a node by itself: neither ranks nor the order of tets matter.
+They are computed from positions and velocities, and the contact pressure from the impulses of contact since the
+frame before. Each value depends on its tet or node only, not on ranks or on the order of tets.
 """
 
 from typing import NamedTuple
@@ -13,28 +13,28 @@ from ..model.rows import MASS
 from ..model.state import Block, Floats, Ints, Nodes
 
 _ORDER = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))
-"""Of the components, as VTK has them."""
+"""Indices of the components in VTK's order."""
 
 
 _FACING = 0.5
-"""Cosine of the angle between an impulse and the inward normal of a face that it pushes, at least. Chosen: above it are
-impulses with friction up to a coefficient of 1.7 on a flat face, below it the sides of an edge of 90 degrees up to 0.6.
-"""
+"""Smallest cosine of the angle between an impulse and the inward normal of a face on which it acts. Chosen: above it
+are impulses with friction up to a coefficient of 1.7 on a flat face, below it the sides of an edge of 90 degrees up
+to 0.6."""
 
 
 class Wanted(NamedTuple):
-    """What a frame has besides."""
+    """Requested fields of a frame, and their data."""
 
     names: tuple[str, ...] = ()
-    """Of ``cases.schema.FrameField``."""
+    """Names of ``cases.schema.FrameField``."""
     impulses: Floats | None = None
-    """(nodes, 3) what contact and walls have given each node since the frame before, N s."""
+    """(nodes, 3) impulses of contact and walls on each node since the frame before, N s."""
     passed: float = 0.0
     """Time since the frame before, s; 0 for the first one."""
 
 
 def of_tets(names: tuple[str, ...], block: Block, nodes: Nodes) -> dict[str, Floats]:
-    """The fields of the tets of a block."""
+    """Return the fields of the tets of a block."""
     found: dict[str, Floats] = {}
     edges = _edges(nodes.x, block)
     if "density" in names:
@@ -51,8 +51,8 @@ def of_tets(names: tuple[str, ...], block: Block, nodes: Nodes) -> dict[str, Flo
 
 
 def logarithmic(F: Floats) -> Floats:
-    """(n, 3, 3) strains ln V of deformation gradients F = V R (n, 3, 3): 1/2 ln of the eigenvalues of F F^T, on its
-    axes (Hencky). Of tets that are turned inside out, as of their mirror images.
+    """Return (n, 3, 3) the strains ln V of deformation gradients F = V R (n, 3, 3): half the logarithm of the
+    eigenvalues of F F^T, on its axes (Hencky). An inverted tet has the strain of its mirror image.
     """
     squares, axes = np.linalg.eigh(_product(F, np.swapaxes(F, 1, 2)))
     logarithms = 0.5 * np.log(np.maximum(squares, np.finfo(float).tiny))
@@ -60,17 +60,19 @@ def logarithmic(F: Floats) -> Floats:
 
 
 def effective(strain: Floats) -> Floats:
-    """(n,) sqrt(2/3 e' : e') of the deviators e' of strains or their rates (n, 3, 3)."""
+    """Return (n,) sqrt(2/3 e' : e') of the deviators e' of strains or their rates (n, 3, 3)."""
     mean = (strain[:, 0, 0] + strain[:, 1, 1] + strain[:, 2, 2]) / 3.0
     deviator = strain - mean[:, None, None] * np.eye(3)
     return np.asarray(np.sqrt(2.0 / 3.0 * (deviator * deviator).sum(axis=(1, 2))))
 
 
 def contact_pressure(x: Floats, tets: Ints, impulses: Floats, passed: float) -> Floats:
-    """(nodes,) mean pressure of contact on the nodes of the surface, Pa: of the ``impulses`` (nodes, 3), N s, over the
-    time ``passed``, s, what is along the normal of the share of the surface that a node has in what is pushed, over
-    that area. A share is a third of each face; pushed is a face that the impulse meets at less than 60 degrees from its
-    normal, so that the sides of an edge do not count. 0 inside of bodies and of nodes without such a face.
+    """Return (nodes,) the mean contact pressure on the nodes of the surface, Pa; 0 inside of bodies and on nodes
+    without a loaded face.
+
+    It is the component of the ``impulses`` (nodes, 3), N s, along the normal of the loaded area of a node, over that
+    area and the time ``passed``, s. The loaded area is a third of each face whose inward normal is within 60 degrees
+    of the impulse, so that the sides of an edge do not count.
     """
     faces, share = boundary_faces(tets.astype(np.int32)), np.zeros((len(x), 3))
     outward = normals(x, faces) / 6.0
@@ -85,7 +87,9 @@ def contact_pressure(x: Floats, tets: Ints, impulses: Floats, passed: float) -> 
 
 
 def _edges(values: Floats, block: Block) -> Floats:
-    """(n, 3, 3) differences of nodal values (nodes, 3) from the first node of each tet to the others, a row each."""
+    """Return (n, 3, 3) differences of nodal values (nodes, 3) from the first node of each tet to the others, as
+    rows.
+    """
     corners = values[block.tets]
     return np.asarray(corners[:, 1:] - corners[:, :1])
 
@@ -95,12 +99,12 @@ def _determinant(rows: Floats) -> Floats:
 
 
 def _inverse_transposed(rows: Floats) -> Floats:
-    """(n, 3, 3) inverses, transposed, by cofactors."""
+    """Return (n, 3, 3) transposed inverses, by cofactors."""
     a, b, c = rows[:, 0], rows[:, 1], rows[:, 2]
     cofactors = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=1)
     return np.asarray(cofactors / _determinant(rows)[:, None, None])
 
 
 def _product(a: Floats, b: Floats) -> Floats:
-    """(n, 3, 3) products of matrices, in a fixed order of sums."""
+    """Return (n, 3, 3) products of matrices, with a fixed order of sums."""
     return a[:, :, 0, None] * b[:, None, 0] + a[:, :, 1, None] * b[:, None, 1] + a[:, :, 2, None] * b[:, None, 2]

@@ -1,6 +1,6 @@
-"""Frames: one VTKHDF file each (version 2.3, UnstructuredGrid), readable while the run goes on.
+"""Frames: one VTKHDF file each (version 2.3, UnstructuredGrid), readable during the run.
 
-A file is written beside its place, flushed to disk and renamed: whoever sees it sees all of it.
+A file is written under another name, flushed to disk and renamed: a visible file is complete.
 """
 
 import json
@@ -19,12 +19,12 @@ from ..parallel.comm import Comm
 from . import fields, hdf5
 
 _TETRA = 10
-"""VTK_TETRA, the type of a cell (vtkCellType.h)."""
+"""Cell type VTK_TETRA (vtkCellType.h)."""
 _PACKING = {"compression": "gzip", "compression_opts": 1, "shuffle": True}
 
 
 def von_mises(deviator: Floats) -> Floats:
-    """sqrt(3/2 s : s) of deviatoric stresses (6, n) in the order xx, yy, zz, yz, zx, xy."""
+    """Return sqrt(3/2 s : s) of deviatoric stresses (6, n) in the order xx, yy, zz, yz, zx, xy."""
     squares = (deviator[:3] ** 2).sum(axis=0) + 2.0 * (deviator[3:] ** 2).sum(axis=0)
     mises: Floats = np.sqrt(1.5 * squares)
     return mises
@@ -35,14 +35,14 @@ UNITS = {
     "temperature": "K", "plastic_strain": "1", "damage": "1", "density": "kg/m^3", "strain": "1",
     "effective_strain": "1", "strain_rate": "1/s", "contact_pressure": "Pa",
 }  # fmt: skip
-"""Of each field, an attribute ``unit`` of its data set; names and numbers have none."""
+"""Unit of each field, an attribute ``unit`` of its data set; names and numbers have none."""
 _NOTHING = fields.Wanted()
 _ORDER = [0, 1, 2, 5, 3, 4]
-"""Of the components of a stress as VTK has them, xx, yy, zz, xy, yz, zx, in ours (CONVENTIONS.md)."""
+"""Indices of the components in VTK's order, xx, yy, zz, xy, yz, zx, among those of the state (CONVENTIONS.md)."""
 
 
 def principal(stress: Floats) -> Floats:
-    """(n,) largest principal values of stresses (n, 6) in the order of VTK."""
+    """Return (n,) the largest principal values of stresses (n, 6) in VTK's order."""
     xx, yy, zz, xy, yz, zx = stress.T
     matrices = np.stack([xx, xy, zx, xy, yy, yz, zx, yz, zz], axis=1).reshape(-1, 3, 3)
     values: Floats = np.linalg.eigvalsh(np.where(np.isfinite(matrices), matrices, 0.0))[:, 2]
@@ -73,7 +73,7 @@ def _cells(block: Block, rank: int, fragment: Ints | None, damage: Floats | None
 def _share(
     model: Model, rank: int, labels: list[Ints] | None, damage: list[Floats] | None, wanted: fields.Wanted
 ) -> dict[str, Any]:
-    """What this rank gives to a frame."""
+    """Return this rank's part of a frame."""
     nodes = model.nodes
     cells = [
         _cells(block, rank, None if labels is None else each, None if damage is None else share)
@@ -94,8 +94,8 @@ def _share(
 def _by_block(
     model: Model, labels: list[Ints] | None, damage: list[Floats] | None
 ) -> Iterator[tuple[Block, Ints, Floats]]:  # fmt: skip
-    """Each block with what is known of its tets. A rank without tets (they have left, or others have them all) has a
-    block without any: every rank names all columns.
+    """Yield each block with the fragments and the damage of its tets; an empty block on a rank without tets, so that
+    every rank has all columns.
     """
     none: tuple[Ints, Floats] = np.zeros(0, np.int64), np.zeros(0)
     if not model.blocks:
@@ -109,10 +109,10 @@ def write(
     folder: Path, index: int, t: float, model: Model, comm: Comm, labels: list[Ints] | None = None,
     damage: list[Floats] | None = None, wanted: fields.Wanted = _NOTHING,
 ) -> str | None:  # fmt: skip
-    """Writes frame ``index``; on rank 0 returns its path relative to the run's folder, elsewhere None.
+    """Write frame ``index``; return its path relative to the run's folder on rank 0, None on the others. Collective.
 
-    ``labels``: for each block the fragment of each tet, where there are any; ``damage``: its damage, likewise;
-    ``wanted``: what else the case asks for.
+    ``labels``: for each block the fragment of each tet, or None; ``damage``: its damage, or None; ``wanted``:
+    further fields.
     """
     pieces = comm.gather(_share(model, comm.rank, labels, damage, wanted))
     if pieces is None:
@@ -156,7 +156,7 @@ def _write_grid(file: "h5py.File", pieces: list[dict[str, Any]], total: int, pas
 
 
 def _add(root: "h5py.Group", path: str, values: "np.ndarray") -> None:
-    """A field with its unit, and of a tensor its components."""
+    """Write a field with its unit, and the components of a tensor."""
     name, stored = path.partition("/")[2], root.create_dataset(path, data=values, **_PACKING)
     if name in UNITS:
         stored.attrs["unit"] = UNITS[name]

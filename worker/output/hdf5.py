@@ -1,7 +1,8 @@
-"""HDF5 files on disks that may be full: the library itself is not told of it.
+"""HDF5 files that are safe on a full disk.
 
-Where a write fails, HDF5 goes on with what it could not put down: it fails again at each object that is let go, where
-Python can only print that, and ends in a segmentation fault; or a file is taken for whole of which a part is missing.
+After a failed write HDF5 continues with the data that it could not write: it fails again at each object that is
+freed, which Python can only print, and ends in a segmentation fault; or a file looks complete of which a part is
+missing. So failures are recorded here and not passed to HDF5.
 """
 
 import errno
@@ -17,8 +18,8 @@ import h5py
 
 @contextmanager
 def created(path: Path) -> Iterator["h5py.File"]:
-    """A new HDF5 file, flushed to disk at the end. Raises OSError with the name of the file where it is not whole:
-    the first failure of the disk, whatever HDF5 has made of it.
+    """Open a new HDF5 file and flush it to disk at the end. Raises OSError with the name of the file if it is
+    incomplete: the first failure of the disk, whatever HDF5 did after it.
     """
     with open(path, "w+b", buffering=0, opener=_at_once) as raw:
         disk = _Disk(raw)
@@ -32,7 +33,9 @@ def created(path: Path) -> Iterator["h5py.File"]:
 
 
 def _at_once(path: str, flags: int) -> int:
-    """What is no regular file takes no HDF5 file: a pipe would keep the rank waiting, a device forgets."""
+    """Open a file without waiting. Raises OSError for a path that is not a regular file: a pipe would block the
+    rank, a device would not keep the data.
+    """
     handle = os.open(path, flags | os.O_NONBLOCK, 0o666)
     if not stat.S_ISREG(os.fstat(handle).st_mode):
         os.close(handle)
@@ -41,15 +44,15 @@ def _at_once(path: str, flags: int) -> int:
 
 
 class _Disk:
-    """A file as HDF5 asks for it. What is written after a failure is not written, and said to be."""
+    """A file object for HDF5. After a failure it discards what is written, and reports success."""
 
     def __init__(self, raw: Any) -> None:
         self._raw = raw
         self.failure: OSError | None = None
-        """The first."""
+        """The first failure."""
 
     def write(self, data: Any) -> int:
-        """Takes all of it."""
+        """Write all data, or discard it after a failure; return its size."""
         left = memoryview(data).cast("B")
         size = len(left)
         while self.failure is None and left:
@@ -60,7 +63,7 @@ class _Disk:
         return size
 
     def readinto(self, room: Any) -> int:
-        """Zeros where nothing was written."""
+        """Read into ``room``; zeros where nothing was written."""
         left = memoryview(room).cast("B")
         size = len(left)
         while left and (found := self._raw.readinto(left)):
@@ -69,13 +72,13 @@ class _Disk:
         return size
 
     def read(self, size: int) -> bytes:
-        """By which h5py knows a file."""
+        """Read ``size`` bytes; h5py recognises a file object by this method."""
         room = bytearray(size)
         self.readinto(room)
         return bytes(room)
 
     def truncate(self, size: int) -> int:
-        """Makes it as long, where that can be."""
+        """Set the size of the file if possible."""
         try:
             self._raw.truncate(size)
         except OSError as error:
@@ -83,12 +86,12 @@ class _Disk:
         return size
 
     def seek(self, offset: int, whence: int = 0) -> int:
-        """Where it is then."""
+        """Move the position and return it."""
         return int(self._raw.seek(offset, whence))
 
     def tell(self) -> int:
-        """Where it is."""
+        """Return the position."""
         return int(self._raw.tell())
 
     def flush(self) -> None:
-        """Nothing is held back."""
+        """Do nothing: no data is buffered."""

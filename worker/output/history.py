@@ -1,5 +1,5 @@
-"""history.csv: one line per sample: clock, ledger, momenta, parts, probes. At its end the same as
-history.parquet, where pyarrow is there.
+"""history.csv: one line a sample with clock, ledger, momenta, parts and probes; at the end the same as
+history.parquet, if pyarrow is installed.
 """
 
 import csv
@@ -16,11 +16,11 @@ from . import storage
 
 
 class History:
-    """Writes the lines, flushed one by one, behind those that are there."""
+    """Appends lines to the file and flushes each."""
 
     def __init__(self, folder: Path, further: Mapping[str, str]) -> None:
-        """``further``: names of columns of the parts and probes, with their units. A file that an earlier worker began
-        keeps the columns that it has.
+        """``further``: names of the columns of parts and probes, with their units. A file of an earlier attempt
+        keeps its columns.
         """
         self._path = folder / layout.HISTORY
         head = history.header({**history.COLUMNS, **further})
@@ -32,8 +32,8 @@ class History:
             self._writer.writerow(head)
 
     def write(self, step: int, t: float, dt: float, limiter: str, energy: Energy, extra: list[float]) -> None:
-        """One line; ``extra`` is momenta, parts and probes. Numbers are written so that they read back to the same
-        bits. Raises OSError, also when somebody has removed the file.
+        """Write one line; ``extra``: momenta, parts and probes. Numbers are written so that they are read back to
+        the same bits. Raises OSError, also if the file was removed.
         """
         storage.require(self._file, self._path)
         values = [*msgspec.structs.astuple(energy), *extra]
@@ -42,13 +42,13 @@ class History:
         self._file.flush()
 
     def close(self) -> None:
-        """Closes the file, and writes it as Parquet where that can be."""
+        """Close the file, and write it as Parquet if pyarrow is installed."""
         self._file.close()
         write_parquet(self._path)
 
 
 def _head(path: Path) -> list[str]:
-    """The first line of a table; empty where there is none."""
+    """Return the first line of a table; [] if there is no table."""
     if not path.exists():
         return []
     with path.open(newline="", encoding="utf-8") as file:
@@ -56,7 +56,9 @@ def _head(path: Path) -> list[str]:
 
 
 def extremes(folder: Path, names: Sequence[str]) -> dict[str, tuple[float, float]]:
-    """The smallest and the largest number of each of these columns; NaN where there is none, or no file any more."""
+    """Return the smallest and the largest number of each of these columns; NaN if the column is empty or the file
+    was removed.
+    """
     found = dict.fromkeys(names, (math.nan, math.nan))
     path = folder / layout.HISTORY
     if not names or not path.exists():
@@ -72,7 +74,9 @@ def extremes(folder: Path, names: Sequence[str]) -> dict[str, tuple[float, float
 
 
 def write_parquet(path: Path) -> Path | None:
-    """A history as Parquet beside it, with the unit of each column in its metadata; None where pyarrow is missing."""
+    """Write a history as Parquet beside it, with the unit of each column in its metadata; None if pyarrow is
+    missing.
+    """
     try:
         import pyarrow
         from pyarrow import csv as tables

@@ -1,4 +1,4 @@
-"""journal.jsonl, the truth of a run: every message numbered, written and flushed before anybody else receives it."""
+"""journal.jsonl, the complete record of a run: every message is numbered, written and flushed before it is sent on."""
 
 import contextlib
 import time
@@ -17,11 +17,11 @@ from . import storage
 
 M = TypeVar("M", bound=messages.Message)
 _MOST = 1 << 40
-"""Bytes of a journal: it has no limit of its own."""
+"""Largest size of a journal that is read, bytes: practically unlimited."""
 
 
 class _Head(msgspec.Struct):
-    """What every message has."""
+    """Fields of every message."""
 
     seq: int
     type: str
@@ -31,22 +31,22 @@ _head = msgspec.json.Decoder(_Head)
 
 
 class Listener(Protocol):
-    """Who is told of a message once it is in the journal."""
+    """Receiver of messages after they are in the journal."""
 
     def tell(self, message: messages.AnyMessage, blob: bytes = b"") -> None:
-        """Takes the message without waiting for anybody; ``blob``: the bytes of a snapshot, where there are any."""
+        """Receive a message without blocking; ``blob``: the bytes of a snapshot, or empty."""
 
 
 class Journal:
-    """Appends to the journal of a run folder, going on from the last number in it."""
+    """Appends to the journal of a run folder, with numbers that continue those in it."""
 
     def __init__(self, folder: Path, run: str, listener: Listener | None = None) -> None:
         self._path = path = folder / layout.JOURNAL
         self._run = run
         self.frames: set[int] = set()
-        """Indices of the frames that it lists."""
+        """Indices of the frames in the journal."""
         self.snapshots = 0
-        """One more than the largest number of a snapshot that it lists."""
+        """Number of the next snapshot, after those in the journal."""
         self._file = whole.appended(path)
         self._seq, content = 0, whole.read(path, _MOST)
         for line in content.splitlines():
@@ -61,8 +61,8 @@ class Journal:
         self._listener = listener
 
     def write(self, kind: type[M], step: int = 0, t: float = 0.0, blob: bytes = b"", **fields: Any) -> M:
-        """Writes one message and passes it on, with the ``blob`` of a snapshot. Raises OSError, also when somebody has
-        removed the file: what is written to it is nowhere.
+        """Write one message and send it on, with the ``blob`` of a snapshot. Raises OSError, also if the file was
+        removed: the message would be lost.
         """
         storage.require(self._file, self._path)
         self._seq += 1
@@ -75,7 +75,7 @@ class Journal:
         return message
 
     def starting(self, what: str) -> None:
-        """Says what the start is at."""
+        """Report a phase of the start-up."""
         self.write(messages.Status, state=State.STARTING, message=what)
 
     def close(self) -> None:
@@ -84,7 +84,7 @@ class Journal:
 
 
 def _number(line: bytes) -> int:
-    """Of a message, also of one that another version has written; 0 for what is none."""
+    """Return the number of a message, also of another version; 0 for a line that is no message."""
     try:
         return _head.decode(line).seq
     except (msgspec.DecodeError, UnicodeDecodeError):
@@ -92,7 +92,7 @@ def _number(line: bytes) -> int:
 
 
 def _written(content: bytes) -> Iterator[messages.AnyMessage]:
-    """The messages of a journal; a line that a crash has torn is passed over."""
+    """Yield the messages of a journal; lines damaged by a crash are skipped."""
     for line in content.splitlines():
         with contextlib.suppress(msgspec.DecodeError, UnicodeDecodeError):
             yield messages.from_json(line)

@@ -1,32 +1,32 @@
-"""What a run has written and somebody has removed while it goes on: that is told, and no reason to stop."""
+"""Output files of a run that are removed while it goes on: each gives a warning, and the run continues."""
 
 from pathlib import Path
 
 from conoid.cases.output import fragments, layout
 
 _KINDS = {layout.FRAMES: ".vtkhdf", fragments.FOLDER: ".csv", layout.SNAPSHOTS: ".snap"}
-"""Folders of a run, and how finished files in them end."""
+"""Folders of output, and suffixes of finished files in them."""
 
 
 class Losses:
-    """Compares what there is with what there was, time after time."""
+    """Compares the files in the folders of a run with those of the last call."""
 
     def __init__(self, folder: Path) -> None:
-        """Begins with what there is."""
+        """Record the files that exist now."""
         self._folder = folder
         self._seen = {kind: _names(folder / kind, ending) for kind, ending in _KINDS.items()}
 
     def found(self) -> list[str]:
-        """A line for each folder from which files have gone since the last call."""
-        told = []
+        """Return a warning for each folder from which files were removed since the last call."""
+        warnings = []
         for kind, ending in _KINDS.items():
             now = _names(self._folder / kind, ending)
             gone = sorted(self._seen[kind] - now)
             self._seen[kind] = now
             if gone:
                 which = gone[0] if len(gone) == 1 else f"{len(gone)} files from {gone[0]} to {gone[-1]}"
-                told.append(f"{kind}: {which} removed while the run goes on; what follows is written")
-        return told
+                warnings.append(f"{kind}: {which} removed during the run; later files are written")
+        return warnings
 
 
 def _names(folder: Path, ending: str) -> set[str]:

@@ -1,4 +1,4 @@
-"""The output of a run that goes on: what was written beyond its checkpoint is taken back, and written again alike."""
+"""Removal of output after the step of a checkpoint: a resumed run writes the same output again."""
 
 import csv
 import os
@@ -8,9 +8,8 @@ from conoid.cases.output import fragments, layout
 
 
 def rewind(folder: Path, step: int, frame: int) -> None:
-    """Takes lines of the history from ``step`` on, and of the genealogy from ``frame`` on, out of a run's folder.
-
-    At step 0 nothing is left of them.
+    """Remove lines of the history from ``step`` on and of the genealogy from ``frame`` on, in a run's folder; all
+    lines at step 0.
     """
     _keep_below(folder / layout.HISTORY, step)
     _keep_below(fragments.genealogy(folder), frame)
@@ -19,7 +18,7 @@ def rewind(folder: Path, step: int, frame: int) -> None:
 
 
 def _keep_below(path: Path, limit: int) -> None:
-    """The head of a table, and its whole lines whose first column is below ``limit``."""
+    """Keep the head of a table and its complete lines whose first column is below ``limit``."""
     if not path.exists():
         return
     if limit == 0:

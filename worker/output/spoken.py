@@ -1,4 +1,4 @@
-"""What a worker that nobody else watches says on its standard output: start, a line a percent, warnings, end."""
+"""Standard output of a worker that runs without a server: start, a line each percent, warnings, end."""
 
 import contextlib
 import sys
@@ -12,16 +12,16 @@ from conoid.cases.run import State
 
 
 class Speaker:
-    """Listens to the journal of a run on rank 0."""
+    """Prints the messages of a run's journal on rank 0."""
 
     def __init__(self, folder: Path) -> None:
-        """``folder`` is that of the run."""
+        """``folder``: of the run."""
         self._folder = folder
         self._percent = -1
-        self._told = set[str]()
+        self._warned = set[str]()
 
     def tell(self, message: messages.AnyMessage, blob: bytes = b"") -> None:
-        """Says what is new in a message."""
+        """Print the new information of a message."""
         match message:
             case messages.Status() if message.state == State.STARTING and message.message:
                 self._say(message, message.message)
@@ -29,8 +29,8 @@ class Speaker:
                 self._say(message, self._start(message))
             case messages.Progress():
                 self._progress(message)
-            case messages.Log() if message.level in {"warning", "error"} and message.text not in self._told:
-                self._told.add(message.text)
+            case messages.Log() if message.level in {"warning", "error"} and message.text not in self._warned:
+                self._warned.add(message.text)
                 self._say(message, f"{message.level}: {message.text}")
 
     def _start(self, started: messages.Started) -> str:
@@ -44,26 +44,26 @@ class Speaker:
         if whole <= self._percent:
             return
         self._percent = whole
-        t, end = alike((now.t, now.end_time), "s")
+        t, last = alike((now.t, now.end_time), "s")
         left = f"  left {duration(now.eta)}" if share < 1.0 else ""
         self._say(
             now,
-            f"{percent(share)}  t {t} of {end}  step {count(now.step)}  dt {si(now.dt, 's')} ({now.limiter}){left}  "
+            f"{percent(share)}  t {t} of {last}  step {count(now.step)}  dt {si(now.dt, 's')} ({now.limiter}){left}  "
             f"residual {rough(now.energy.residual)}",
         )
 
     def close(self, outcome: Outcome) -> None:
-        """Says how the run has ended, and where its results are."""
+        """Print how the run has ended, and where its results are."""
         why = outcome.message or outcome.cause or ""
-        told = f"{outcome.state}: {why}" if why else outcome.state
+        end = f"{outcome.state}: {why}" if why else outcome.state
         steps = f", {counted(outcome.steps, 'step')} in {duration(outcome.elapsed)}" if outcome.steps else ""
-        _write(f"{told}{steps}")
+        _write(f"{end}{steps}")
         for check in outcome.reference:
             verdict = "met" if check.passed else "missed"
             value = " of ".join(alike((check.value, check.expected), check.unit))
             _write(f"reference {verdict}: {check.name} {value}")
         for text in outcome.warnings:
-            if text not in self._told:
+            if text not in self._warned:
                 _write(f"warning: {text}")
         _write(f"results in {self._folder}: {layout.OUTCOME}, {layout.HISTORY}, {layout.JOURNAL}, {layout.LOGS}/")
 
@@ -72,6 +72,6 @@ class Speaker:
 
 
 def _write(text: str) -> None:
-    """A reader who has gone stops no run."""
+    """Print a line; a closed standard output does not stop the run."""
     with contextlib.suppress(OSError):
         print(text.replace("\n", "\\n"), file=sys.stdout, flush=True)

@@ -1,4 +1,4 @@
-"""Whether a failure is one of the run's files: the disk is full, over its quota or broken, or a file is gone."""
+"""Classification of errors of the run's files: a disk that is full, over its quota or broken, or a removed file."""
 
 import errno
 import os
@@ -9,7 +9,7 @@ _STORAGE = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EROFS, errno.
 
 
 def gone(error: BaseException, folder: Path) -> bool:
-    """True when a file below ``folder`` is the trouble: somebody has taken it away, or locked it up."""
+    """Return whether the error is about a file below ``folder`` that was removed or is not accessible."""
     if not isinstance(error, OSError) or not isinstance(error.filename, str | bytes):
         return False
     path = Path(os.fsdecode(error.filename))
@@ -17,13 +17,13 @@ def gone(error: BaseException, folder: Path) -> bool:
 
 
 def require(file: IO[Any], path: Path) -> None:
-    """Raises FileNotFoundError when nothing leads to an open ``file`` any more, which had this ``path``."""
+    """Raise FileNotFoundError if the open ``file`` with this ``path`` was removed."""
     if os.fstat(file.fileno()).st_nlink == 0:
         raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(path))
 
 
 def failed(error: BaseException) -> bool:
-    """True when a disk is behind ``error``, also where HDF5 has put the number of the failure into its text."""
+    """Return whether the cause of ``error`` is a disk, also if HDF5 gives the error number in its text."""
     if isinstance(error, OSError) and error.errno in _STORAGE:
         return True
     if any(f"errno = {number}," in str(error) for number in _STORAGE):

@@ -1,11 +1,10 @@
-"""Messages on Zenoh, from a thread of their own behind a bounded ring: the solver never waits for the network.
+"""Messages on Zenoh, sent by a thread with a bounded queue: the solver never waits for the network.
 
-A snapshot goes out with its bytes; when some wait already, the oldest of them goes without, and whoever wants it
-fetches it over HTTP.
+A snapshot is sent with its bytes; if several wait, the older ones are sent without, and readers fetch them over HTTP.
 
-``put`` reports no loss and may stall its caller, so it runs here; when the ring is full the oldest message is dropped,
-and a reader who sees the gap in ``seq`` refills it from the journal. Without a router the thread tries
-again now and then; the run does not mind.
+``put`` reports no loss and may block, so it runs in the thread; when the queue is full the oldest message is
+dropped, and a reader that finds a gap in ``seq`` reads the journal. Without a router the thread tries to connect at
+intervals; the run is not affected.
 """
 
 import json
@@ -20,34 +19,33 @@ from conoid.cases import messages
 from conoid.cases.output import keys
 
 _RING = 1024
-"""Messages that wait for the network. Chosen: more than a minute of a run, which sends some ten a
-second."""
+"""Messages that wait for the network. Chosen: more than a minute of a run, which sends some ten a second."""
 _BLOBS = 2
 """Snapshots that wait for the network with their bytes, a megabyte each. Chosen: one that is sent, and the newest."""
 _RETRY = 2.0
 """s between two attempts to reach a router. Chosen."""
 _LINGER = 1.0
-"""s that the last messages get to leave. Chosen: the journal has them."""
+"""s for sending the last messages at the end. Chosen: the journal has them."""
 
 log = logging.getLogger("conoid.worker")
 
 
 class Telemetry:
-    """Publishes what it is told."""
+    """Publishes messages."""
 
     def __init__(self, endpoint: str, prefix: str) -> None:
         self._endpoint = endpoint
         self._prefix = prefix
         self._ring: deque[messages.AnyMessage | messages.Fragments] = deque()
         self.dropped = self.bare = 0
-        """Messages that were not sent, and snapshots that were sent without their bytes."""
+        """Number of messages that were not sent, and of snapshots that were sent without their bytes."""
         self._wake = threading.Condition()
         self._closing = False
         self._thread = threading.Thread(target=self._work, name="telemetry", daemon=True)
         self._thread.start()
 
     def tell(self, message: messages.AnyMessage, blob: bytes = b"") -> None:
-        """Queues a message, a snapshot with its bytes; never waits for the network."""
+        """Queue a message, a snapshot with its bytes; never waits for the network."""
         whole = isinstance(message, messages.Snapshot) and blob
         with self._wake:
             if len(self._ring) == _RING:
@@ -59,14 +57,14 @@ class Telemetry:
             self._wake.notify()
 
     def _thin_out(self) -> None:
-        """Takes the bytes of all snapshots that wait but the newest."""
+        """Remove the bytes of all waiting snapshots except the newest ones."""
         waiting = [i for i, message in enumerate(self._ring) if isinstance(message, messages.Fragments)]
         for i in waiting[:-_BLOBS]:
             self._ring[i] = messages.without_blob(self._ring[i])  # type: ignore[arg-type]
             self.bare += 1
 
     def close(self) -> None:
-        """Gives the thread a moment to send what is left; it dies with the process if the network hangs."""
+        """Wait a moment for the last messages; the thread ends with the process if the network hangs."""
         with self._wake:
             self._closing = True
             self._wake.notify()

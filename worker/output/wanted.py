@@ -1,4 +1,4 @@
-"""What a frame has besides what every frame has, where the case asks for it."""
+"""Data of the further fields that a case requests for frames."""
 
 import numpy as np
 
@@ -10,14 +10,14 @@ from .fields import Wanted
 
 
 def wanted(sim: Simulation, index: int) -> Wanted:
-    """Of frame ``index``; it is asked once a frame."""
+    """Return the requested fields of frame ``index`` and their data; called once a frame."""
     run = sim.case.run
     return Wanted(run.fields, _impulses(sim), run.end_time / run.frames if index else 0.0)
 
 
 def _impulses(sim: Simulation) -> Floats | None:
-    """(nodes, 3) what contact and walls have given each node since this was last asked, N s; None where no frame has a
-    contact pressure.
+    """Return (nodes, 3) the impulses of contact and walls on each node since the last call, N s; None if no frame
+    has a contact pressure.
     """
     if "contact_pressure" not in sim.case.run.fields:
         return None

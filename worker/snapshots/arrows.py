@@ -1,4 +1,4 @@
-"""Velocities for arrows: of a few triangles that are spread evenly over what is drawn."""
+"""Arrows of velocity in a snapshot: at a few triangles that are spread evenly over the outline."""
 
 import numpy as np
 
@@ -6,16 +6,17 @@ from ..model.state import Floats, Ints
 from .outline import Outline
 
 _MOST = 1000
-"""Arrows. Chosen: more hide the body."""
+"""Largest number of arrows. Chosen: more would hide the body."""
 MOST_BYTES = _MOST * (4 + 3 * 4)
 _LEVELS = 6
-"""Grids of cells that are tried, from 2^6 along the longest side on."""
+"""Grids of cells that are tried, from 2^6 cells along the longest side down to one."""
 
 
 def chosen(drawn: Outline, velocity: Floats) -> dict[str, "np.ndarray"]:
-    """The arrays of a snapshot: which triangles, and their velocities; ``velocity`` (m, 3): of each, m/s.
+    """Return the arrays of a snapshot: triangles with an arrow, and their velocities; ``velocity`` (m, 3): of each
+    triangle, m/s.
 
-    They are the first ones of the cells of the finest grid that has ``_MOST`` cells with a triangle, at most.
+    They are the first triangles in the cells of the finest grid with at most ``_MOST`` occupied cells.
     """
     rows = np.zeros(0, np.int64)
     if len(drawn.tet):

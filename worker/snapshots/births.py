@@ -1,4 +1,4 @@
-"""When fragments came into being, as the frames of a run tell."""
+"""Times at which fragments were formed, from the genealogy that the frames of a run record."""
 
 from pathlib import Path
 
@@ -13,15 +13,15 @@ class Births:
     """Reads the genealogy of a run as it grows."""
 
     def __init__(self, folder: Path, end: float, frames: int) -> None:
-        """Of the run in ``folder`` with so many ``frames`` up to the time ``end``, s."""
+        """``folder``: of the run; ``frames``: their number up to the time ``end``, s."""
         self._folder, self._end, self._frames = folder, end, frames
         self._known: dict[int, float] = {}
         self._read = 0
 
     def at(self, t: float, numbers: Ints, initial: int, *, kept: bool = True) -> Floats:
-        """(g,) s, of fragments ``numbers`` at time ``t``: the first frame up to then that has them, or ``t`` itself; 0
-        for the ``initial`` ones, which were there at the start. Where no record of fragments is ``kept``, nobody knows
-        when the others came into being: NaN.
+        """Return (g,) the times, s, at which fragments ``numbers`` were formed: the first frame up to time ``t``
+        that has them, or ``t``; 0 for the ``initial`` ones. NaN for the others if no record of fragments is
+        ``kept``.
         """
         if not kept:
             return np.where(numbers < initial, 0.0, np.nan)
@@ -44,5 +44,5 @@ class Births:
                 self._known.setdefault(int(child), self._time(int(frame)))
 
     def _time(self, frame: int) -> float:
-        """As Clock.frame_time."""
+        """Return the time of a frame, as Clock.frame_time."""
         return self._end * (frame / self._frames) if frame < self._frames else self._end

@@ -1,4 +1,6 @@
-"""From a whole model to the bytes of a snapshot (cases/output/snapshot.py), and to those of all its tets."""
+"""Conversion of a whole model into the bytes of a snapshot (cases/output/snapshot.py), and of all its tets into
+theirs.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -20,21 +22,21 @@ from .share import Whole
 _VERTEX, _TRIANGLE = 6 + 4, 12 + 2 + 1
 """Bytes of a vertex, and of a triangle without its fields."""
 _HEADER = 200
-"""Bytes that an array takes in the header and in filling up, at most."""
+"""Largest number of bytes of an array in the header and in padding."""
 UNITS = {
     "speed": "m/s", "broken_faces": "", "plastic_strain": "", "temperature": "K", "damage": "", "mises": "Pa",
     "pressure": "Pa", "principal_stress": "Pa",
 }  # fmt: skip
-"""Fields, and their units. ``broken_faces`` is the share of a tet's faces that have broken."""
+"""Units of the fields. ``broken_faces`` is the share of a tet's faces that are broken."""
 
 
 _PERCENTILES = 0.0, 0.5, 99.5, 100.0
-"""Chosen: without a few extreme triangles the others are told apart."""
+"""Percentiles of the values of a field. Chosen: 0.5 % at each end are extremes."""
 
 
 @dataclass(frozen=True)
 class Budget:
-    """What a snapshot may hold: triangles, and bytes."""
+    """Limits of a snapshot: triangles, and bytes."""
 
     triangles: int = 50_000
     bytes: int = 1_000_000
@@ -42,26 +44,26 @@ class Budget:
 
 @dataclass(frozen=True)
 class Made:
-    """A snapshot, and what its journal line says besides."""
+    """A snapshot, and further fields of its journal line."""
 
     data: bytes
     tets: bytes
-    """All tets for sections, packed; empty where there are more than ``volume.MOST_TETS``, or none."""
+    """All tets for sections, packed; empty if there are none, or more than ``volume.MOST_TETS``."""
     triangles: int
     fragments: int
     smallest: int
-    """See ``table.by_size``, as the next."""
+    """First size, see ``table.by_size``."""
     sizes: list[int]
     fields: dict[str, list[float]]
-    """Of each field its least value, what 0.5 % and what 99.5 % of the triangles are below, and its largest."""
+    """For each field the smallest value, the 0.5 and the 99.5 percentile, and the largest value."""
 
 
 Births = Callable[[Ints], Floats]
-"""(g,) times of birth, s, of fragments with these numbers."""
+"""Callback that returns (g,) times of birth, s, of fragments with these numbers."""
 
 
 def made(whole: Whole, told: dict[str, Any], births: Births, budget: Budget) -> Made:
-    """The snapshot of a model. ``told``: n, step, t and ranks for the header."""
+    """Return the snapshot of a model. ``told``: n, step, t and ranks for the header."""
     labels = np.concatenate([np.zeros(0, np.int64), *connectivity.labels(whole.model, whole.held, SerialComm())])
     every = table.measured(whole, _numbers(whole, labels))
     columns, row = table.columns(every, births(every.label))
@@ -90,8 +92,10 @@ def made(whole: Whole, told: dict[str, Any], births: Births, budget: Budget) -> 
 
 
 def _numbers(whole: Whole, labels: Ints) -> Ints:
-    """(tets,) the number of the fragment of each. Where erosion alone parts bodies no record of them is kept: the
-    largest piece of each part has the number of the part, and every other one that of its first tet, behind those.
+    """Return (tets,) the number of the fragment of each tet.
+
+    If only erosion separates bodies there is no record of fragments: the largest piece of each part has the number
+    of the part, and every other piece that of its first tet, above those of the parts.
     """
     if whole.initial:
         return numbered(whole.numbers, labels, whole.next, SerialComm())[0]
@@ -105,7 +109,9 @@ def _numbers(whole: Whole, labels: Ints) -> Ints:
 
 
 def _tets(whole: Whole, header: Header, corners: Ints, values: dict[str, Floats], row: Ints) -> bytes:
-    """All tets; ``corners`` (tets, 4): places of their nodes, ``row`` (tets,): of the fragment of each."""
+    """Return all tets, packed; ``corners`` (tets, 4): indices of their nodes; ``row`` (tets,): of the fragment of
+    each.
+    """
     places = _in_box(whole.model.nodes.x, header.box)
     nodes, over, order = volume.ordered(places, corners)
     every = {"speed": volume.speed(whole.model.nodes.v, corners), **values}
@@ -122,7 +128,7 @@ def _packed(header: Header, arrays: dict[str, "np.ndarray"]) -> bytes:
 
 
 def _levels(of: dict[str, Floats]) -> tuple[dict[str, Field], dict[str, "np.ndarray"]]:
-    """What the header has of fields (m,), and their arrays."""
+    """Return the header entries of fields (m,), and their arrays."""
     fields, arrays = {}, {}
     for name, values in of.items():
         low, high, arrays[FIELD + name] = _in_bits(values)
@@ -131,13 +137,13 @@ def _levels(of: dict[str, Floats]) -> tuple[dict[str, Field], dict[str, "np.ndar
 
 
 def _ranges(of: dict[str, Floats]) -> dict[str, list[float]]:
-    """See ``Made.fields``."""
+    """Return ``Made.fields``."""
     known = {name: values[np.isfinite(values)] for name, values in of.items()}
     return {name: np.percentile(values, _PERCENTILES).tolist() for name, values in known.items() if len(values)}
 
 
 def _drawn(whole: Whole, drawn: Outline, row: Ints, box: Any) -> dict[str, "np.ndarray"]:
-    """The arrays of vertices and triangles but the fields; ``row`` (g,): of each fragment."""
+    """Return the arrays of vertices and triangles without the fields; ``row`` (g,): of each fragment."""
     return {
         "positions": _in_box(drawn.points, box), "triangles": drawn.triangles.astype(np.uint32),
         "vertex_fragment": row[drawn.fragment].astype(np.uint32), "triangle_rank": whole.rank[drawn.tet],
@@ -146,7 +152,7 @@ def _drawn(whole: Whole, drawn: Outline, row: Ints, box: Any) -> dict[str, "np.n
 
 
 def _fields(whole: Whole) -> dict[str, Floats]:
-    """(tets,) of each field but the speed."""
+    """Return (tets,) each field except the speed."""
     values = dict(whole.rows)
     if any(len(block.bond) for block in whole.model.blocks):
         shares = [(b.bond > 0).mean(axis=1) if len(b.bond) else np.zeros(b.n) for b in whole.model.blocks]
@@ -155,7 +161,7 @@ def _fields(whole: Whole) -> dict[str, Floats]:
 
 
 def _velocity(model: Model, drawn: Outline) -> Floats:
-    """(m, 3) m/s, the mean of the nodes that a triangle had at first."""
+    """Return (m, 3) the mean velocity of the original nodes of each triangle, m/s."""
     v = model.nodes.v[drawn.faces]
     return np.asarray((v[:, 0] + v[:, 1] + v[:, 2]) / 3.0)
 
@@ -170,21 +176,21 @@ def _parts(model: Model) -> "np.ndarray":
 
 
 def _box(points: Floats) -> Any:
-    """Low and high corner of the box round the points."""
+    """Return the lower and the upper corner of the bounding box of the points."""
     if not len(points):
         return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     return tuple(points.min(axis=0).tolist()), tuple(points.max(axis=0).tolist())
 
 
 def _in_box(points: Floats, box: Any) -> "np.ndarray":
-    """(v, 3) uint16 places in a box."""
+    """Return (v, 3) uint16 positions in a box."""
     low, high = np.array(box)
     places = np.rint((points - low) * (65535.0 / np.where(high > low, high - low, 1.0)))
     return np.asarray(np.clip(places, 0, 65535).astype(np.uint16))
 
 
 def _in_bits(values: Floats) -> tuple[float, float, "np.ndarray"]:
-    """The lowest and highest of values (m,), and uint8 levels between them."""
+    """Return the lowest and highest of values (m,), and uint8 levels between them."""
     low, high = float(values.min(initial=np.inf)), float(values.max(initial=-np.inf))
     if not low < high:
         return (low, low, np.zeros(len(values), np.uint8)) if len(values) else (0.0, 0.0, np.zeros(0, np.uint8))

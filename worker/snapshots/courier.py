@@ -1,4 +1,4 @@
-"""The side thread of a rank: takes shares to disk, and on rank 0 has the packer make snapshots of them."""
+"""Side thread of a rank: writes its shares to disk, and on rank 0 has the packer make snapshots of them."""
 
 import contextlib
 import json
@@ -20,14 +20,14 @@ from . import share
 from .share import Share
 
 _FAREWELL = 30.0
-"""s that the last snapshots may take after the last step. Chosen: a hundred times what one of 150,000 tets takes."""
+"""s for the last snapshots after the last step. Chosen: a hundred times what one of 150,000 tets takes."""
 _SECRETS = ("CONOID_ZENOH_USER", "CONOID_ZENOH_PASSWORD")
 
 log = logging.getLogger("conoid.worker")
 
 
 class Courier:
-    """Takes what the solver gives away; the solver never waits for it."""
+    """Queue and thread for the shares of a rank; the solver never waits for it."""
 
     def __init__(self, folder: Path, rank: int) -> None:
         self._folder, self._rank = folder, rank
@@ -35,18 +35,18 @@ class Courier:
         self._packer: subprocess.Popen[str] | None = None
         self._thread: threading.Thread | None = None
         self.answers: deque[tuple[dict[str, Any], bytes]] = deque()
-        """On rank 0: of each task its answer with the task's own words, and the snapshot; or the answer alone, with an
+        """On rank 0: for each task the answer with the fields of the task, and the snapshot; or the answer with an
         ``error``."""
         self.under_way = 0
-        """Tasks without an answer."""
+        """Number of tasks without an answer."""
 
     @property
     def packer(self) -> int | None:
-        """Number of the process that makes the snapshots, once there is one."""
+        """Id of the process that makes the snapshots, or None."""
         return None if self._packer is None else self._packer.pid
 
     def send(self, task: dict[str, Any], given: Share) -> None:
-        """A share for the snapshot ``task["n"]``."""
+        """Queue a share for the snapshot ``task["n"]``."""
         if self._thread is None:
             self._thread = threading.Thread(target=self._work, name="snapshots", daemon=True)
             self._thread.start()
@@ -54,14 +54,14 @@ class Courier:
         self._tasks.put((task, given))
 
     def close(self) -> None:
-        """Returns when all that was sent is done, or after a while."""
+        """Return when all tasks are done, or after a time limit."""
         if self._thread is not None:
             self._tasks.put(None)
             self._thread.join(_FAREWELL)
         self._end()
 
     def _end(self) -> None:
-        """Ends the packer; another is started for the next task."""
+        """End the packer; the next task starts another one."""
         if self._packer is not None:
             with contextlib.suppress(OSError):
                 self._packer.kill()
@@ -70,8 +70,10 @@ class Courier:
         self._packer = None
 
     def _work(self) -> None:
-        """Launchers send the requests to stop to all processes of a rank, and the packer has the last snapshot to make:
-        it holds back what this thread holds back, from its first moment on, and ends with its stdin.
+        """Work on the tasks of the queue.
+
+        Launchers send the requests to stop to all processes of a rank, and the packer must make the last snapshot:
+        it inherits the blocked signals of this thread from its start, and ends with its standard input.
         """
         signal.pthread_sigmask(signal.SIG_BLOCK, REQUESTS)
         while (task := self._tasks.get()) is not None:
@@ -86,7 +88,7 @@ class Courier:
                     self.answers.append(({**task[0], "error": str(error)}, b""))
 
     def _ask(self, task: dict[str, Any]) -> None:
-        """Has the packer make a snapshot. Raises OSError, ValueError."""
+        """Have the packer make a snapshot. Raises OSError, ValueError."""
         if self._packer is None:
             self._packer = _started(self._folder)
         assert self._packer.stdin is not None

@@ -1,8 +1,8 @@
-"""Fewer triangles for the same bodies: vertices of a cell of a grid become one (Rossignac and Borrel 1993).
+"""Decimation of the outline: vertices in one cell of a grid are merged (Rossignac and Borrel 1993).
 
-Each fragment has cells of its own size, half its extent at most, so that a small one keeps a shape while a large one
-becomes coarser; those with few triangles stay as they are. When there are more fragments than triangles for them, the
-smallest are left out. All that is decided follows from the whole model, so it does not know how many ranks there are.
+Each fragment has cells of its own size, at most half its extent, so that a small fragment keeps a shape while a
+large one becomes coarser; fragments with few triangles are unchanged. If there are more fragments than triangles for
+them, the smallest are omitted. All decisions depend on the whole model only, not on the number of ranks.
 """
 
 from collections.abc import Callable
@@ -14,19 +14,21 @@ from ..model.state import Floats, Ints
 from .outline import Outline
 
 _FINENESS = 2.0**0.25
-"""Between the cell sizes that are tried. Chosen: the budget is used up to a third at most."""
+"""Ratio of successive cell sizes. Chosen: at most a third of the budget is unused."""
 _LEAST = 8
-"""Triangles that the budget has for each fragment that is drawn, at least: two tets'. Chosen."""
+"""Smallest number of triangles in the budget for each fragment: those of two tets. Chosen."""
 _SIMPLE = 8
-"""Triangles up to which a fragment stays as it is. Chosen."""
+"""Number of triangles up to which a fragment is unchanged. Chosen."""
 _SIZES = 128
-"""Cell sizes that there are, from the whole box down: the last is 2^-32 of it."""
+"""Number of cell sizes, from the whole box down: the last is 2^-32 of it."""
 Fits = Callable[[Outline], bool]
-"""Whether an outline keeps to the budget."""
+"""Callback: whether an outline is within the budget."""
 
 
 def to_budget(outline: Outline, mass: Floats, most: int, fits: Fits) -> Outline:
-    """The finest outline that fits. ``mass`` (fragments,): the heaviest are drawn, ``most`` / 8 of them at most."""
+    """Return the finest outline within the budget. ``mass`` (fragments,): at most ``most`` / 8 fragments, the
+    heaviest, are drawn.
+    """
     if fits(outline):
         return outline
     outline = outline.chosen(np.flatnonzero(_heaviest(mass, most // _LEAST)[outline.fragment[outline.triangles[:, 0]]]))
@@ -47,7 +49,7 @@ def to_budget(outline: Outline, mass: Floats, most: int, fits: Fits) -> Outline:
 
 
 def _fewest(outline: Outline, mass: Floats, fits: Fits) -> Outline:
-    """Where no cells are coarse enough: half the fragments, until they fit."""
+    """Halve the number of fragments until the outline is within the budget, if no cells are coarse enough."""
     most = len(np.unique(outline.fragment))
     while most and not fits(outline):
         most //= 2
@@ -57,14 +59,14 @@ def _fewest(outline: Outline, mass: Floats, fits: Fits) -> Outline:
 
 
 def _heaviest(mass: Floats, most: int) -> "np.ndarray":
-    """(fragments,) which belong to the heaviest; of equal ones the first do."""
+    """Return (fragments,) which are among the heaviest; of equal ones the first."""
     chosen = np.zeros(len(mass), bool)
     chosen[np.argsort(-mass, kind="stable")[:most]] = True
     return chosen
 
 
 def _extents(outline: Outline, fragments: int) -> Floats:
-    """(fragments,) the longest side of the box round the vertices of each, m."""
+    """Return (fragments,) the longest side of the bounding box of the vertices of each, m."""
     low, high = np.full((fragments, 3), np.inf), np.full((fragments, 3), -np.inf)
     np.minimum.at(low, outline.fragment, outline.points)
     np.maximum.at(high, outline.fragment, outline.points)
@@ -72,7 +74,7 @@ def _extents(outline: Outline, fragments: int) -> Floats:
 
 
 def _level(outline: Outline, longest: float, most: int) -> int:
-    """The level of cells whose faces are about as many as the budget has: where the search begins."""
+    """Return the first level of the search: its cells have about as many faces as the budget has triangles."""
     a, b, c = (outline.points[outline.triangles[:, k]] for k in range(3))
     area = float(np.sqrt((np.cross(b - a, c - a) ** 2).sum(axis=1)).sum()) / 2.0
     size = max(np.sqrt(2.0 * area / most), 1e-9 * longest) if most else longest
@@ -80,8 +82,8 @@ def _level(outline: Outline, longest: float, most: int) -> int:
 
 
 def _merged(outline: Outline, extent: Floats, longest: float, level: int) -> Outline:
-    """With one vertex a cell, at the mean place of those that were there; triangles that have become lines, or double,
-    go.
+    """Return the outline with one vertex a cell, at the mean position of its vertices; degenerate and duplicate
+    triangles are removed.
     """
     size = np.minimum(longest * _FINENESS**-level, 0.5 * extent)
     count = np.bincount(outline.fragment[outline.triangles[:, 0]], minlength=len(extent))
@@ -102,7 +104,7 @@ def _merged(outline: Outline, extent: Floats, longest: float, level: int) -> Out
 
 
 def _distinct(triangles: Ints) -> Ints:
-    """The rows with three vertices that no row before them has."""
+    """Return the rows with three different vertices, without repetitions."""
     corners = np.sort(triangles, axis=1)
     whole = np.flatnonzero((corners[:, 1:] != corners[:, :-1]).all(axis=1))
     a, b, c = corners[whole].T

@@ -1,4 +1,4 @@
-"""Invariants of stresses for pictures: von Mises, pressure, largest principal stress."""
+"""Invariants of stresses for pictures: von Mises stress, pressure, largest principal stress."""
 
 import numpy as np
 
@@ -6,7 +6,8 @@ from ..model.state import Floats
 
 
 def of(rows: "np.ndarray") -> dict[str, Floats]:
-    """By name, (n,) Pa each; ``rows`` (7, n): deviatoric stress in the order xx, yy, zz, yz, zx, xy, and the pressure.
+    """Return the invariants by name, (n,) Pa each; ``rows`` (7, n): deviatoric stress in the order xx, yy, zz, yz, zx,
+    xy, and the pressure.
 
     The largest principal stress is 2 sqrt(J2/3) cos(a) - p with cos(3a) = (J3/2) (3/J2)^(3/2), 0 <= a <= pi/3
     (Malvern 1969, Introduction to the mechanics of a continuous medium, 3.3).

@@ -1,4 +1,4 @@
-"""The outline of fragments: the triangles that can be seen of them, also when they are drawn apart."""
+"""Outline of fragments: the triangles of their surface that are visible, also when fragments are drawn apart."""
 
 from dataclasses import dataclass
 
@@ -11,31 +11,31 @@ from ..model.state import WIDE, Block, Floats, Ints, Model
 
 @dataclass
 class Outline:
-    """Triangles over vertices of one fragment each."""
+    """Triangles; each vertex belongs to one fragment."""
 
     points: Floats
     """(v, 3) m."""
     fragment: Ints
-    """(v,) number of the vertex's fragment."""
+    """(v,) number of the fragment of each vertex."""
     triangles: Ints
     """(m, 3) vertices, anticlockwise seen from outside."""
     tet: Ints
-    """(m,) place of the triangle's tet in the model."""
+    """(m,) index of the tet of each triangle in the model."""
     faces: Ints
-    """(m, 3) places of the nodes that the triangle had at first."""
+    """(m, 3) indices of the original nodes of each triangle."""
 
     def chosen(self, rows: Ints) -> "Outline":
-        """The same with these triangles alone, and the vertices that they have."""
+        """Return the outline of these triangles and their vertices."""
         used, corners = np.unique(self.triangles[rows], return_inverse=True)
         triangles = corners.reshape(-1, 3)
         return Outline(self.points[used], self.fragment[used], triangles, self.tet[rows], self.faces[rows])
 
 
 def find(model: Model, fragment: Ints) -> Outline:
-    """The outline of a whole model; ``fragment`` (tets,) is the number of the fragment of each tet.
+    """Return the outline of a whole model; ``fragment`` (tets,): number of the fragment of each tet.
 
-    It has the faces without a tet behind them, those between two fragments, and the sides of open cracks; a crack
-    within a fragment that is closed is not seen.
+    It contains the exposed faces, the faces between two fragments, and the sides of open cracks; a closed crack
+    within a fragment is not visible.
     """
     ids = np.concatenate([np.zeros(0, np.int64), *(block.id for block in model.blocks)])
     order = np.argsort(ids)
@@ -49,7 +49,7 @@ def find(model: Model, fragment: Ints) -> Outline:
 
 
 def _seen(block: Block, known: Ints, fragments: Ints, own: Ints) -> "np.ndarray":
-    """(n, 4) which faces of a block are part of the outline; ``fragments`` are those of the ``known`` tets."""
+    """Return (n, 4) which faces of a block are part of the outline; ``fragments``: those of the ``known`` tets."""
     if not len(block.across):
         return np.asarray(across(block.tets.astype(np.int32)) < 0)
     seen = block.across < 0

@@ -1,8 +1,8 @@
-"""The process that makes snapshots of what the ranks give away: ``python -m conoid.worker.snapshots.packer FOLDER``.
+"""Process that makes snapshots of the shares of the ranks: ``python -m conoid.worker.snapshots.packer FOLDER``.
 
-A thread of the solver's process would take the interpreter from it again and again; this one takes what the machine has
-left, but for the last snapshot, for which the run waits. One task a line on stdin, one answer a line on stdout; it ends
-with its stdin. A snapshot is written beside its place, flushed to disk and renamed.
+A thread of the solver's process would hold the interpreter lock; this process uses idle cores, except for the last
+snapshot, for which the run waits. One task a line on standard input, one answer a line on standard output; it ends
+with its standard input. A snapshot is written under another name, flushed to disk and renamed.
 """
 
 import hashlib
@@ -22,21 +22,19 @@ from . import blob, share
 from .births import Births
 
 _NICE, _LOWEST = 10, 19
-"""By how much the priority is lowered: ranks have nine times the share of a core then. Chosen: the rest is enough. And
-the lowest there is.
-"""
+"""Decrease of the priority: ranks get nine times the share of a core. Chosen: the remainder is enough. And the
+lowest priority."""
 _TETS = 256_000_000
-"""Bytes of all tets of all snapshots of a run, about: those of early ones leave room for later ones. Chosen: a hundred
-times 150,000 tets in 2,900 fragments.
-"""
+"""Approximate limit of the bytes of all tets of all snapshots of a run; early ones leave room for later ones.
+Chosen: a hundred times 150,000 tets in 2,900 fragments."""
 _PATIENCE = 60.0
-"""s that the share of a rank may take to appear. Chosen: many times what a slow disk takes."""
+"""s for the share of a rank to appear. Chosen: many times what a slow disk takes."""
 _LOOK = 0.005
-"""s between two checks for a share. Chosen."""
+"""s between two tests for a share. Chosen."""
 
 
 def main(folder: Path) -> None:
-    """Makes one snapshot after the other."""
+    """Make snapshots until standard input ends."""
     births: Births | None = None
     with ThreadPoolExecutor(1, initializer=_step_back) as behind:
         for line in sys.stdin:
@@ -53,13 +51,13 @@ def main(folder: Path) -> None:
 
 
 def _step_back() -> None:
-    """Lowers the priority of this thread alone, which nobody but the superuser could take back."""
+    """Lower the priority of this thread; only the superuser could raise it again."""
     thread = threading.get_native_id()
     os.setpriority(os.PRIO_PROCESS, thread, min(os.getpriority(os.PRIO_PROCESS, thread) + _NICE, _LOWEST))
 
 
 def _made(folder: Path, task: dict[str, Any], births: Births) -> dict[str, Any]:
-    """What the journal has of a snapshot that is now in its place. Raises OSError, ValueError."""
+    """Make a snapshot and return the fields of its journal line. Raises OSError, ValueError."""
     paths = [layout.share(folder, task["n"], rank) for rank in range(task["ranks"])]
     try:
         whole = share.joined([_awaited(path) for path in paths], task["parts"])
@@ -82,7 +80,7 @@ def _made(folder: Path, task: dict[str, Any], births: Births) -> dict[str, Any]:
 
 
 def _with_tets(folder: Path, task: dict[str, Any], tets: bytes) -> int:
-    """Writes the tets of a snapshot where they have room; their bytes. Without them it has no sections."""
+    """Write the tets of a snapshot if there is room for them; return their bytes. Without them it has no sections."""
     if not tets or not _may_keep(folder, task, len(tets)):
         return 0
     try:
@@ -93,7 +91,7 @@ def _with_tets(folder: Path, task: dict[str, Any], tets: bytes) -> int:
 
 
 def _may_keep(folder: Path, task: dict[str, Any], size: int) -> bool:
-    """Whether ``size`` bytes of tets more leave room for those of later snapshots; the last one always has them."""
+    """Return whether ``size`` bytes of tets leave room for those of later snapshots; True for the last one."""
     if task["cause"] == "end":
         return True
     kept = sum(path.stat().st_size for path in (folder / layout.SNAPSHOTS).glob(f"*{layout.TETS_SUFFIX}"))

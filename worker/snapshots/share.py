@@ -1,4 +1,4 @@
-"""What a rank gives away for a snapshot: a copy of what fragments and their surface follow from, and nothing else.
+"""Shares: the data of a rank for a snapshot, a copy of the arrays from which fragments and their surface are computed.
 
 A share is a file that only the packer of the same run reads: names in one line, then the arrays.
 """
@@ -20,20 +20,22 @@ from ..model.state import Block, Floats, Ints, Model, Nodes
 from . import invariants
 
 ROWS = {"plastic_strain": PLASTIC_STRAIN, "temperature": TEMPERATURE, "damage": DAMAGE}
-"""Rows of the state of tets that become fields, where a block has them."""
+"""Rows of the state of tets that become fields, if a block has them."""
 _STRESSES = PRESSURE + 1 - S_XX
 _STRESS = slice(S_XX, PRESSURE + 1)
-"""Of the rows of the state: the deviatoric stress and the pressure."""
+"""Rows of the deviatoric stress and the pressure."""
 Share = dict[str, "np.ndarray"]
-"""Arrays by name; those of block k begin with ``k.``."""
+"""Arrays by name; the names of block k begin with ``k.``."""
 
 
 def copied(
     model: Model, held: Ints, counting: set[int], numbers: Sequence[Ints] = (), known: Sequence[int] = (0, 0)
 ) -> Share:
-    """A rank's share. ``held`` (m, 2): ids of tets that a cohesive facet still joins; ``counting``: parts whose law
-    counts damage; ``numbers``: for each block of the fragments of its tets in the last frame; ``known``: how many there
-    were at the start, and the next number.
+    """Return a rank's share.
+
+    ``held`` (m, 2): ids of tets that a cohesive facet connects; ``counting``: parts whose law has damage;
+    ``numbers``: for each block those of the fragments of its tets in the last frame; ``known``: number of fragments
+    at the start, and the next number.
     """
     nodes = model.nodes
     share = {"nodes": nodes.id.copy(), "x": nodes.x.copy(), "v": nodes.v.copy(), "held": held.copy()}
@@ -51,7 +53,7 @@ def copied(
 
 
 def write(path: Path, share: Share) -> None:
-    """Writes a share; it appears whole or not at all. Raises OSError that names it."""
+    """Write a share under another name and rename it. Raises OSError that names it."""
     beside = path.with_name(path.name + ".part")
     try:
         with named(path), beside.open("wb") as file:
@@ -65,7 +67,7 @@ def write(path: Path, share: Share) -> None:
 
 
 def read(path: Path) -> Share:
-    """Reads it back. Raises OSError, ValueError."""
+    """Read a share. Raises OSError, ValueError."""
     with path.open("rb") as file:
         names = json.loads(file.readline())
         return {name: np.load(file, allow_pickle=False) for name in names}
@@ -73,28 +75,28 @@ def read(path: Path) -> Share:
 
 @dataclass
 class Whole:
-    """The model of all ranks, in the order of global ids, as one rank would have it."""
+    """The model of all ranks, in the order of global ids, equal for any number of ranks."""
 
     model: Model
-    """Blocks by part, with ids, tets, faces and bonds alone."""
+    """Blocks by part, with ids, tets, faces and bonds only."""
     held: Ints
-    """(m, 2) see ``copied``."""
+    """(m, 2) pairs of tets, see ``copied``."""
     mass: Floats
-    """(tets,) kg, in the order of the blocks."""
+    """(tets,) mass, kg, in the order of the blocks."""
     rank: "np.ndarray"
-    """(tets,) uint16."""
+    """(tets,) uint16 rank."""
     rows: dict[str, Floats]
-    """(tets,) each of ``ROWS`` that some block has, 0 where it has not, and the invariants of the stress."""
+    """(tets,) each of ``ROWS`` that some block has, 0 in other blocks, and the invariants of the stress."""
     numbers: Ints
-    """(tets,) of the fragments of the last frame."""
+    """(tets,) numbers of the fragments in the last frame."""
     initial: int
-    """Fragments at the start, whose numbers are the first ones; 0 where nothing fractures."""
+    """Number of fragments at the start, which have the first numbers; 0 if nothing fractures."""
     next: int
-    """The next number of a fragment."""
+    """Next number of a fragment."""
 
 
 def joined(shares: Sequence[Share], parts: list[str]) -> Whole:
-    """The shares of all ranks, rank 0 first, as one model. A node comes from the first rank that has it."""
+    """Return the model of the shares of all ranks, rank 0 first. A node is taken from the first rank that has it."""
     ids, first = np.unique(np.concatenate([share["nodes"] for share in shares]), return_index=True)
     x, v = (np.concatenate([share[name] for share in shares])[first] for name in ("x", "v"))
     n = len(ids)
@@ -120,7 +122,7 @@ def joined(shares: Sequence[Share], parts: list[str]) -> Whole:
 
 
 def _block(shares: Sequence[Share], part: int, ids: Ints) -> tuple[Block, dict[str, "np.ndarray"]]:
-    """The tets of a part, by id, and their columns."""
+    """Return the tets of a part, by id, and their columns."""
     found = [
         (rank, {name.partition(".")[2]: share[name] for name in share if name.startswith(f"{k}.")}, share["nodes"])
         for rank, share in enumerate(shares)
@@ -152,7 +154,7 @@ def _block(shares: Sequence[Share], part: int, ids: Ints) -> tuple[Block, dict[s
 
 
 def _by_tet(stress: "np.ndarray", n: int) -> "np.ndarray":
-    """(n, 7) of (chunks, 7, CHUNK)."""
+    """Return (n, 7) from (chunks, 7, CHUNK)."""
     return stress.transpose(0, 2, 1).reshape(-1, _STRESSES)[:n]
 
 

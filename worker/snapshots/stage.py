@@ -1,7 +1,7 @@
-"""When a snapshot is due, and what it costs the solver: a copy (``share``), which a side thread takes (``courier``).
+"""Schedule of the snapshots. Their cost for the solver is a copy (``share``), which a side thread takes (``courier``).
 
-All ranks copy between the same two halves of a step, where frames are written too: rank 0 asks in the reduction of the
-step before.
+All ranks copy between the same two halves of a step, at the place where frames are written: rank 0 requests it in
+the reduction of the step before.
 """
 
 import math
@@ -22,27 +22,27 @@ from .courier import Courier
 from .share import copied
 
 _APART = 1.0
-"""s of wall time between two that are due by simulated time. Chosen: as often as people look."""
+"""s of wall time between two that are scheduled by simulated time. Chosen: people do not watch more often."""
 _SHARE = 1.0 / 200.0
-"""Of the time of a run that copies may take."""
+"""Share of the time of a run that copies may take."""
 _CROWDED = 1.0 / 20.0
-"""The same of a core, for the process that makes snapshots, where ranks have all cores: all wait for the one that
-shares its core. Chosen: a run takes a twentieth longer at most, and a body of 150,000 tets is still seen every 6 s."""
+"""Share of a core for the process that makes snapshots, if ranks use all cores: all ranks wait for the one on its
+core. Chosen: a run takes at most a twentieth longer, and a body of 150,000 tets still has a snapshot every 6 s."""
 
 _EARLY = 1e-6
-"""Of the time between two snapshots: far more than what rounding does."""
+"""Share of the time between two snapshots: much more than round-off."""
 
 
 class Snapshots:
-    """The snapshots of a run; ``journal`` exists on rank 0 only."""
+    """The snapshots of a run; ``journal``: None on all ranks except 0."""
 
     def __init__(self, sim: Simulation, folder: Path, journal: Journal | None) -> None:
-        """All ranks take part; numbers go on from those in the journal."""
+        """Collective; numbers continue those in the journal."""
         self._folder, self._journal, self._case, self._comm = folder, journal, sim.case, sim.comm
         self._n: int = sim.comm.broadcast(journal.snapshots if journal is not None else 0)
         self._courier = Courier(folder, sim.comm.rank)
         self.next_time = math.inf
-        """Until then, in simulated time, s, none is due but one that is asked for."""
+        """Simulated time, s, before which none is scheduled; requests are not limited by it."""
         self._wait(self._place(sim.clock) + 1)
         self._taken = self._took = self._packed = 0.0
         self._crowded = len(os.sched_getaffinity(0)) <= sim.comm.size
@@ -54,7 +54,7 @@ class Snapshots:
         sim.comm.barrier()
 
     def due(self, clock: Clock, now: float, *, look: bool) -> bool:
-        """Whether one is to be made of the next state; asked on rank 0. ``look``: whether somebody asks for one."""
+        """Return whether to make one of the next state; called on rank 0. ``look``: test for a request."""
         self._asked_for = self._asked_for or (look and (self._folder / layout.SNAPSHOT_REQUEST).exists())
         if self._courier.under_way:
             return False
@@ -63,11 +63,11 @@ class Snapshots:
 
     @property
     def asked_for(self) -> bool:
-        """Whether somebody has asked for one that is not made yet."""
+        """Whether one is requested that is not made yet."""
         return self._asked_for
 
     def look(self, sim: Simulation, *, due: bool, ending: bool) -> None:
-        """Gives away a copy of the present state when one is due, or when it is the first or the last."""
+        """Copy the present state if it is ``due``, or the first or the last."""
         wanted = self._case.run.snapshots > 0
         first = wanted and sim.clock.step == 0
         if not (due or first or (wanted and ending)):
@@ -83,7 +83,7 @@ class Snapshots:
         self._took = self._taken - began
 
     def tell(self) -> None:
-        """Reports those that have been made since the last call; on rank 0."""
+        """Write the messages of finished snapshots, on rank 0."""
         answers = self._courier.answers
         while answers:
             answer, data = answers.popleft()
@@ -101,20 +101,20 @@ class Snapshots:
             self._journal.write(messages.Snapshot, **told)
 
     def close(self) -> None:
-        """Waits for the last, and reports it; all ranks take part, and leave their cores to it."""
+        """Wait for the last snapshot and write its message. Collective; ranks leave their cores to the packer."""
         self._courier.close()
         self.tell()
         self._comm.await_all()
 
     def _wait(self, place: int) -> None:
-        """The next one is due at the evenly spaced time of that number; a little earlier it is asked whether it is."""
+        """Set the number of the next evenly spaced time, and a time a little earlier for the test."""
         self._next = place
         run = self._case.run
         if run.snapshots:
             self.next_time = (place - _EARLY) / run.snapshots * run.end_time
 
     def _place(self, clock: Clock) -> int:
-        """How many evenly spaced times have come."""
+        """Return how many evenly spaced times are reached."""
         run = self._case.run
         return math.floor(clock.t / run.end_time * run.snapshots) if run.snapshots else -1
 
@@ -135,14 +135,16 @@ class Snapshots:
 
 
 def pause(copying: float, packing: float, *, crowded: bool) -> float:
-    """Wall time between two snapshots, s, of which the last took the solver ``copying``, s of wall time, and the
-    process that makes them ``packing``, s of CPU time; ``crowded``: no core is left to that.
+    """Return the wall time between two snapshots, s.
+
+    ``copying``: s of wall time that the last one took the solver; ``packing``: s of CPU time of the process that
+    makes them; ``crowded``: no core is free for it.
     """
     return max(_APART, copying / _SHARE, packing / _CROWDED if crowded else 0.0)
 
 
 def _clear(folder: Path, n: int) -> None:
-    """Takes away what a killed worker left behind, and snapshots from ``n`` on, of which the journal does not tell."""
+    """Remove remains of a killed worker, and snapshots from ``n`` on, which are not in the journal."""
     place = folder / layout.SNAPSHOTS
     place.mkdir(exist_ok=True)
     for path in place.iterdir():

@@ -1,4 +1,4 @@
-"""The table of fragments in a snapshot: the heaviest first, and the rest in one row."""
+"""Table of the fragments in a snapshot: the heaviest first, and the rest in one row."""
 
 from dataclasses import dataclass
 
@@ -12,31 +12,31 @@ from ..parallel.comm import SerialComm
 from .share import Whole
 
 MOST_ROWS = 2048
-"""Fragments with a row of their own. Chosen: a tenth of the bytes of a snapshot, and more than anybody picks."""
+"""Fragments with a row of their own. Chosen: a tenth of the bytes of a snapshot, and more than a user selects."""
 
 
 @dataclass
 class Table:
-    """All fragments of a model, by ascending label; as ``fragments.table`` has them, to the bit."""
+    """All fragments of a model, by ascending label; equal to ``fragments.table`` to the bit."""
 
     label: Ints
-    """(g,)."""
+    """(g,) label."""
     of: Ints
-    """(tets,) number of the fragment of each tet."""
+    """(tets,) index of the fragment of each tet."""
     tets: Ints
-    """(g,)."""
+    """(g,) number of tets."""
     mass: Floats
-    """(g,) kg."""
+    """(g,) mass, kg."""
     centre: Floats
-    """(g, 3) m."""
+    """(g, 3) centre of mass, m."""
     velocity: Floats
-    """(g, 3) m/s."""
+    """(g, 3) velocity, m/s."""
     size: Floats
-    """(g,) longest side of the box round it, m."""
+    """(g,) longest side of the bounding box, m."""
 
 
 def measured(whole: Whole, labels: Ints) -> Table:
-    """The fragments; ``labels`` (tets,): of each tet, its fragment's."""
+    """Return the fragments; ``labels`` (tets,): label of the fragment of each tet."""
     groups = fragments.Groups(labels, SerialComm())
     nodes, n = whole.model.nodes, len(whole.mass)
     corners = np.concatenate([np.zeros((0, 4), np.int64), *(b.tets for b in whole.model.blocks)]).astype(np.int64).T
@@ -56,7 +56,7 @@ def measured(whole: Whole, labels: Ints) -> Table:
 
 
 def columns(table: Table, birth: Floats) -> tuple[dict[str, "np.ndarray"], Ints]:
-    """The arrays of a snapshot, and (g,) the row of each fragment. ``birth`` (g,): s."""
+    """Return the arrays of a snapshot, and (g,) the row of each fragment. ``birth`` (g,): time of birth, s."""
     order = np.argsort(-table.mass, kind="stable")
     listed, rest = order[:MOST_ROWS], order[MOST_ROWS:]
     row = np.empty(len(order), np.int64)
@@ -75,7 +75,7 @@ def columns(table: Table, birth: Floats) -> tuple[dict[str, "np.ndarray"], Ints]
 
 
 def _rest(table: Table, rest: Ints) -> dict[str, "np.ndarray"]:
-    """One row for the fragments ``rest``: sums and means; neither a size nor a birth."""
+    """Return one row for the fragments ``rest``: sums and means, no size and no birth."""
     mass = table.mass[rest]
     total = mass.sum()
     return {
@@ -87,8 +87,8 @@ def _rest(table: Table, rest: Ints) -> dict[str, "np.ndarray"]:
 
 
 def by_size(size: Floats) -> tuple[int, list[int]]:
-    """How many fragments there are of each ``size`` (g,), m: a first number k and counts, the i-th of those from
-    2^((k+i)/2) m on, up to the next. None without an extent is counted.
+    """Return the histogram of the ``size`` (g,), m, of fragments: a first number k and counts; count i is for sizes
+    from 2^((k+i)/2) m up to the next. Fragments without extent are omitted.
     """
     steps = np.floor(2.0 * np.log2(size[size > 0.0])).astype(np.int64)
     if not len(steps):
