@@ -1,1 +1,1 @@
-"""Meshes of 4-node tetrahedra: made, read, checked, ordered and cached. ``build.build`` is the way in."""
+"""Meshes of 4-node tetrahedra: made or read, checked, ordered and cached. The entry point is ``build.build``."""

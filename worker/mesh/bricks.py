@@ -1,4 +1,4 @@
-"""Hexahedra, wedges and pyramids of a file as tets, and what the user should know of it."""
+"""Cuts of hexahedra, wedges and pyramids of a file into tets, and notes for the user about them."""
 
 from collections import Counter
 from collections.abc import Iterator
@@ -15,29 +15,29 @@ from .model import Floats, Ids
 from .patterns import QUADS, skin
 
 _SEEN = 1e-6
-"""Of the volume: less is not told. Chosen: what rounding of coordinates to six digits makes."""
+"""Share of the volume below which no note is given. Chosen: the round-off of coordinates with six digits."""
 
 
 @dataclass(frozen=True, eq=False)
 class Bricks:
-    """Elements that are not cut yet, of all kinds in one list."""
+    """Elements that are not yet cut, of all kinds in one list."""
 
     nodes: Ids
-    """(m, 8) places of their corners, as of hexahedra."""
+    """(m, 8) indices of their corners, as of hexahedra."""
     numbers: Ids
     lines: Ids
     forms: list[Form]
-    """Of each kind, in order."""
+    """Form of each kind, in order."""
     counts: list[int]
 
     def called(self, k: int) -> str:
-        """``wedge 7 (line 12)``."""
+        """Return the name of an element: ``wedge 7 (line 12)``."""
         form = self.forms[int(np.searchsorted(np.cumsum(self.counts), k, side="right"))]
         return f"{form.word} {self.numbers[k]}" + (f" (line {self.lines[k]})" if self.lines[k] else "")
 
 
 def bricks(cells: list[Cells]) -> Bricks:
-    """Those of ``cells`` that are no tets. Raises MeshError for nodes that are one and cannot be."""
+    """Return the elements of ``cells`` that are not tets. Raises MeshError for coincident nodes that no form allows."""
     found = [each for each in cells if each.kind.form is not Form.TET]
     rows = [folded(each.corners[:, each.kind.form.inside]) for each in found]
     for each, (_, good) in zip(found, rows, strict=True):
@@ -55,8 +55,8 @@ def bricks(cells: list[Cells]) -> Bricks:
 
 
 def cut_up(some: Bricks, triangles: Ids, points: Floats) -> Cut:
-    """The tets of the elements, which have faces in common with ``triangles`` (k, 3) of other elements. MeshError for
-    an element that is inverted, flat or too distorted.
+    """Return the tets of the elements, which have faces in common with ``triangles`` (k, 3) of other elements.
+    Raises MeshError for an element that is inverted, flat or too distorted.
     """
     diagonals = _fitting(some.nodes, triangles)
     made = cut(some.nodes, points, diagonals)
@@ -70,7 +70,7 @@ def cut_up(some: Bricks, triangles: Ids, points: Floats) -> Cut:
 
 
 def _what(nodes: Ids, points: Floats, diagonals: int) -> str:
-    """What is wrong with an element that cannot be cut."""
+    """Return why an element cannot be cut."""
     at = points[nodes]
     volume = sum(float((np.cross(at[a] - at[0], at[b] - at[0]) * (at[c] - at[0])).sum()) for a, b, c in skin(diagonals))
     size = float(np.ptp(at, axis=0).max()) ** 3
@@ -80,7 +80,7 @@ def _what(nodes: Ids, points: Floats, diagonals: int) -> str:
 
 
 def _fitting(nodes: Ids, triangles: Ids) -> Ids:
-    """(m,) the diagonals of faces: by node numbers, but where elements with triangles have the other one."""
+    """Return (m,) the diagonals of faces: by node numbers, or as triangles of other elements require."""
     diagonals = pattern(nodes)
     if not len(triangles):
         return diagonals
@@ -95,7 +95,7 @@ def _fitting(nodes: Ids, triangles: Ids) -> Ids:
 
 
 def _known(faces: Ids, triangles: Ids) -> "np.ndarray":
-    """(m, k) which of the faces (m, k, 3) are among triangles, however these are turned."""
+    """Return (m, k) which of the faces (m, k, 3) are among triangles, in any rotation."""
     both = np.sort(np.concatenate([triangles, faces.reshape(-1, 3)]), axis=1)
     _, of = np.unique(both, axis=0, return_inverse=True)
     of = of.reshape(-1)
@@ -105,18 +105,20 @@ def _known(faces: Ids, triangles: Ids) -> "np.ndarray":
 
 
 def triangles_of(cells: list[Cells]) -> Ids:
-    """(k, 3) the triangular faces of elements; none where no element has a face with four corners."""
+    """Return (k, 3) the triangular faces of elements; none if no element has a face with four corners."""
     if not any(len(side) == 4 for each in cells for side in sides(each.kind.form)):
         return np.zeros((0, 3), np.int64)
     faces = [each.corners[:, side] for each in cells for side in sides(each.kind.form) if len(side) == 3]
     return np.concatenate([np.zeros((0, 3), np.int64), *faces])
 
 
-# What is told ---------------------------------------------------------------------------------------------------------
+# Notes ----------------------------------------------------------------------------------------------------------------
 
 
-def told(some: Bricks, made: Cut, points: Floats, volume: float) -> Iterator[str]:
-    """How many tets the elements have become, and what their warped faces mean for the ``volume`` of the tets."""
+def notes_of_cut(some: Bricks, made: Cut, points: Floats, volume: float) -> Iterator[str]:
+    """Return notes: the number of tets that the elements were cut into, and the effect of warped faces on the
+    ``volume``.
+    """
     if not len(some.numbers):
         return
     counts = Counter[Form]()
@@ -132,7 +134,7 @@ def told(some: Bricks, made: Cut, points: Floats, volume: float) -> Iterator[str
 
 
 def _warped(nodes: Ids, points: Floats) -> float:
-    """The volume that bilinear faces enclose beyond the triangles of the faces: of a face a twelfth of the product of
+    """Return the volume between bilinear faces and their triangles: for each face a twelfth of the triple product of
     three edges, with the sign of the diagonal, as it is the mean of both ways to cut it.
     """
     diagonals, total = pattern(nodes), 0.0
@@ -143,9 +145,9 @@ def _warped(nodes: Ids, points: Floats) -> float:
     return total
 
 
-def told_of_middles(cells: list[Cells], points: Floats, tags: Ids) -> Iterator[str]:
-    """That hexahedra, wedges and pyramids of second order are taken by their corners, and what volume that loses.
-    Raises MeshError where a node is not near the middle of its edge.
+def notes_of_middles(cells: list[Cells], points: Floats, tags: Ids) -> Iterator[str]:
+    """Return notes about hexahedra, wedges and pyramids of second order, of which only the corners are used, and the
+    volume that is lost. Raises MeshError if a node is not near the middle of its edge.
     """
     for each in cells:
         if each.kind.form is Form.TET or not each.kind.edges or not len(each.numbers):
@@ -162,7 +164,7 @@ def told_of_middles(cells: list[Cells], points: Floats, tags: Ids) -> Iterator[s
 
 
 def _volume(cells: Cells, points: Floats) -> float:
-    """Of elements with straight edges, about."""
+    """Return the approximate volume of elements with straight edges."""
     total, start = 0.0, points[cells.corners[:, 0]]
     for side in sides(cells.kind.form):
         a, b, c, d = (points[cells.corners[:, k]] - start for k in [*side, side[0]][:4])

@@ -1,4 +1,4 @@
-"""From a mesh in a case to the tets: the one way in. Made once, then found again by content."""
+"""Entry point of meshing: the tets of a mesh of a case, made once, then read from a cache by content."""
 
 import contextlib
 import hashlib
@@ -28,16 +28,16 @@ from .store import load, save
 from .structured import structured
 
 _CACHE_BYTES = 4 * 2**30
-"""When the cache is larger than this, the meshes that were not used for longest go."""
+"""Size of the cache above which the least recently used meshes are removed."""
 
 
 def build(
     mesh: Mesh, folder: Path, key: str = "mesh", limits: Limits | None = None, made: Callable[[], None] = lambda: None
 ) -> TetMesh:
-    """The tets of ``mesh``: checked, in Morton order, the same bits every time; ``made`` is called before one is made.
+    """Return the tets of ``mesh``: checked, in Morton order, the same bits every time. Raises MeshError.
 
-    ``folder`` is where a relative path of a mesh file starts, ``key`` that of the mesh in its case, for messages.
-    What needs gmsh, and every file, is handled by a child process within ``limits``. Raises MeshError.
+    ``folder``: where a relative path of a mesh file starts; ``key``: of the mesh in its case, for messages; ``made``
+    is called before a mesh is made. A child process within ``limits`` runs gmsh and reads files.
     """
     source = sources(mesh, folder, key)
     if not isinstance(mesh, MeshFile) and mesh.generator == "gmsh":
@@ -56,8 +56,8 @@ def build(
 def build_together(
     meshes: Mapping[str, Mesh], folder: Path, limits: Limits | None = None, made: Callable[[], None] = lambda: None
 ) -> list[TetMesh]:
-    """The tets of ``meshes``, by their keys, that have the nodes of their interfaces in common (mesh/together.py), as
-    ``build`` makes those of one. Raises MeshError.
+    """Return the tets of ``meshes``, by their keys, with common nodes at their interfaces (mesh/together.py). Raises
+    MeshError.
     """
     key = next(iter(meshes))
     _need_gmsh(key)
@@ -84,9 +84,7 @@ def _loaded(target: Path, count: int) -> list[TetMesh] | None:
 
 @contextlib.contextmanager
 def _writable(target: Path) -> Iterator[Path]:
-    """The place itself, or one of that name in a folder that goes afterwards: a cache that cannot be written costs
-    time, not the run.
-    """
+    """Yield the path itself, or one of that name in a temporary folder: an unwritable cache costs time, not the run."""
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         tempfile.TemporaryFile(dir=target.parent).close()
@@ -100,7 +98,7 @@ def _writable(target: Path) -> Iterator[Path]:
 
 
 def _changed(mesh: TetMesh) -> bool:
-    """Whether a file that the one of a mesh includes is another one now, or gone."""
+    """Return whether a file that the file of a mesh includes has changed or was removed."""
     for path, digest in mesh.origin.included if mesh.origin is not None else ():
         try:
             with whole.opened(path) as file:
@@ -112,7 +110,7 @@ def _changed(mesh: TetMesh) -> bool:
 
 
 def cache_folder() -> Path:
-    """Where meshes are kept: below ``CONOID_CACHE_DIR``, else ``~/.cache/conoid``."""
+    """Return the folder of cached meshes: below ``CONOID_CACHE_DIR``, else ``~/.cache/conoid``."""
     root = os.environ.get("CONOID_CACHE_DIR")
     return (Path(root) if root else Path.home() / ".cache" / "conoid") / "meshes"
 
@@ -141,7 +139,9 @@ def _need_gmsh(key: str) -> None:
 
 
 def _content(mesh: Mesh, found: Sources, key: str) -> str:
-    """sha256 over everything that decides the mesh: what is asked for, the files' bytes, our source, the versions."""
+    """Return the sha256 of all that determines the mesh: the request, the files' bytes, this package's source, the
+    versions.
+    """
     asked = mesh.model_dump(mode="json")
     for file in files_of({"parts": [{"mesh": asked}]}):
         _forget(asked, file.table[3:])
@@ -150,7 +150,7 @@ def _content(mesh: Mesh, found: Sources, key: str) -> str:
 
 
 def _forget(asked: Any, place: tuple[int | str, ...]) -> None:
-    """Where a file is and which it should be decides nothing: its bytes do."""
+    """Remove path and expected hash of a file from a request: only its bytes matter."""
     for step in place:
         asked = asked[step]
     asked.update(path="", sha256=None)
@@ -158,7 +158,9 @@ def _forget(asked: Any, place: tuple[int | str, ...]) -> None:
 
 @cache
 def _maker() -> str:
-    """The sources of this package, and of what it computes with, and the versions of what it calls."""
+    """Return the sources of this package and of what it computes with, and the versions of the libraries that it
+    calls.
+    """
     text, here = hashlib.sha256(), Path(__file__).parent
     used = [Path(str(module.__file__)) for module in (geometry, profile, ring, hashing, turning)]
     for path in [*sorted(here.rglob("*.py")), *used]:
@@ -175,7 +177,7 @@ def _versions(*packages: str) -> Iterator[str]:
 
 
 def _trim(folder: Path) -> None:
-    """Removes the meshes that were not used for longest until the rest fits."""
+    """Remove the least recently used meshes until the rest fits."""
     kept = sorted((file.stat().st_mtime, file.stat().st_size, file) for file in folder.glob("*.npz"))
     total = sum(size for _, size, _ in kept)
     for _, size, file in kept[:-1]:

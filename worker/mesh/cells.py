@@ -1,4 +1,4 @@
-"""Elements with a volume as files have them: tets, hexahedra, wedges and pyramids, of first or second order."""
+"""Volume elements of files: tets, hexahedra, wedges and pyramids, of first or second order."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ Edges = tuple[tuple[int, int], ...]
 
 
 class Form(Enum):
-    """A shape by its name in messages: its nodes at corners, and where these are in a hexahedron (``patterns``)."""
+    """A shape: its name in messages, its number of corners, and where these are in a hexahedron (``patterns``)."""
 
     TET = "tet", 4, (0, 1, 2, 2, 3, 3, 3, 3)
     HEXAHEDRON = "hexahedron", 8, (0, 1, 2, 3, 4, 5, 6, 7)
@@ -23,19 +23,19 @@ class Form(Enum):
     PYRAMID = "pyramid", 5, (0, 1, 2, 3, 4, 4, 4, 4)
 
     def __init__(self, word: str, corners: int, inside: tuple[int, ...]) -> None:
-        """From the row above."""
+        """Set the values of a row of the table above."""
         self.word, self.corners, self.inside = word, corners, np.array(inside)
 
     @property
     def several(self) -> str:
-        """``12 tets``, ``1 hexahedra``."""
+        """Return a count with the name: ``12 tets``, ``1 hexahedra``."""
         return "hexahedra" if self is Form.HEXAHEDRON else f"{self.word}s"
 
 
 @dataclass(frozen=True)
 class Kind:
-    """Elements of one form and order: ``edges`` have a node in their middle each, in this order, behind the corners;
-    ``nodes`` in all, of which those behind the middles of edges count for nothing.
+    """Elements of one form and order. ``edges`` have a node in their middle each, in this order, behind the corners;
+    ``nodes`` is the number of all nodes, of which those behind the middles of edges are ignored.
     """
 
     form: Form
@@ -49,15 +49,15 @@ class Cells:
 
     kind: Kind
     numbers: Ids
-    """(m,) what the file calls them."""
+    """(m,) numbers in the file."""
     nodes: Ids
     """(m, kind.nodes) tags of their nodes."""
     lines: Ids
-    """(m,) of the file, where they stand; 0 where nobody counts lines."""
+    """(m,) lines in the file; 0 if the reader counts no lines."""
 
     @property
     def corners(self) -> Ids:
-        """(m, corners) tags."""
+        """(m, corners) tags of the corners."""
         return self.nodes[:, : self.kind.form.corners]
 
     @property
@@ -67,16 +67,16 @@ class Cells:
         return self.nodes[:, first : first + len(self.kind.edges)]
 
     def called(self, k: int) -> str:
-        """``tet 7 (line 12)``."""
+        """Return the name of an element: ``tet 7 (line 12)``."""
         return f"{self.kind.form.word} {self.numbers[k]}" + (f" (line {self.lines[k]})" if self.lines[k] else "")
 
     def of(self, chosen: NDArray[np.bool_]) -> Self:
-        """Some of them."""
+        """Return the chosen elements."""
         return type(self)(self.kind, self.numbers[chosen], self.nodes[chosen], self.lines[chosen])
 
 
 def sides(form: Form) -> list[list[int]]:
-    """Corners of the faces of a form, three or four each, anticlockwise seen from outside."""
+    """Return the corners of the faces of a form, three or four each, anticlockwise seen from outside."""
     found = []
     for quad in form.inside[QUADS].tolist():
         different = [node for k, node in enumerate(quad) if node != quad[k - 1]]
@@ -86,7 +86,7 @@ def sides(form: Form) -> list[list[int]]:
 
 
 def cells(kind: Kind, numbers: Ids, nodes: Ids, lines: Iterable[int] | Ids = ()) -> Cells:
-    """Elements from what a reader has: flat or (m, kind.nodes) tags."""
+    """Return elements from a reader's data: flat or (m, kind.nodes) tags."""
     known = np.asarray(lines, np.int64) if not isinstance(lines, tuple) else np.zeros(len(numbers), np.int64)
     return Cells(kind, numbers, nodes.reshape(-1, kind.nodes), known)
 
@@ -98,4 +98,4 @@ TET10 = Kind(Form.TET, 10, ((0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3)))
 HEX20 = Kind(Form.HEXAHEDRON, 20, (*_RING, (4, 5), (5, 6), (6, 7), (7, 4), *_UP))
 WEDGE15 = Kind(Form.WEDGE, 15, ((0, 1), (1, 2), (2, 0), (3, 4), (4, 5), (5, 3), (0, 3), (1, 4), (2, 5)))
 PYRAMID13 = Kind(Form.PYRAMID, 13, (*_RING, (0, 4), (1, 4), (2, 4), (3, 4)))
-"""As Abaqus, LS-DYNA, Radioss and VTK have them."""
+"""Pyramid of 13 nodes as in Abaqus, LS-DYNA, Radioss and VTK."""

@@ -1,8 +1,8 @@
-"""The child process in which gmsh runs and foreign files are read: ``python -m conoid.worker.mesh.child``.
+"""Child process that runs gmsh and reads foreign files: ``python -m conoid.worker.mesh.child``.
 
-gmsh is GPL, and it and any parser may crash, hang or ask for all memory. So they get a process of their own with limits
-on memory, CPU time and wall time, an environment without secrets and an empty working folder. One JSON request on
-stdin; the mesh comes back as an .npz file, an error as one line on stderr.
+gmsh is GPL, and it and any parser may crash, hang or request all memory. So they run in a process of their own with
+limits on memory, CPU time and wall time, an environment without secrets and an empty working folder. One JSON
+request on standard input; the mesh is returned as an .npz file, an error as one line on standard error.
 """
 
 import ctypes
@@ -29,16 +29,16 @@ from ..run.signals import REQUESTS
 from .sources import Sources
 
 _PASSED_ON = ("HOME", "LANG", "LC_ALL", "LD_LIBRARY_PATH", "PATH", "PYTHONPATH", "TMPDIR", "VIRTUAL_ENV")
-"""The environment variables that the child gets."""
+"""Environment variables of the child."""
 
 _LOOK = 0.2
-"""Seconds between two checks of a child that is still at work."""
+"""s between two tests of a running child."""
 
 _FULL = 0.97
-"""A child with this share of its memory limit has no room left to say so."""
+"""Share of its memory limit above which a child may be unable to report that it is full."""
 
 _GRACE = 5
-"""CPU seconds between the signal that its time is used up and the end of a child. Chosen."""
+"""CPU s between the signal that the limit is reached and the end of a child. Chosen."""
 
 _DIES_WITH_PARENT = 1
 """Linux: prctl(PR_SET_PDEATHSIG)."""
@@ -46,14 +46,14 @@ _DIES_WITH_PARENT = 1
 
 @dataclass(frozen=True)
 class Limits:
-    """What a child may use: address space in bytes, CPU time and wall time in s."""
+    """Limits of a child: address space in bytes, CPU time and wall time in s."""
 
     memory: int = 12 * 2**30
     cpu: int = 900
     wall: int = 900
 
     def allowed(self) -> "Limits":
-        """These, or what a hard limit of this process (``ulimit -H``) leaves of them."""
+        """Return these limits, or lower hard limits of this process (``ulimit -H``)."""
         memory, cpu = (resource.getrlimit(which)[1] for which in (resource.RLIMIT_AS, resource.RLIMIT_CPU))
         none = resource.RLIM_INFINITY
         return replace(
@@ -64,11 +64,11 @@ class Limits:
 
 
 def run_child(mesh: Mesh | Mapping[str, Mesh], sources: Sources, target: Path, key: str, limits: Limits) -> None:
-    """Makes ``mesh`` (of the files in ``sources``) in a child process, which leaves it in ``target``; several, by their
-    keys, are meshed together, and left in ``beside(target, k)``.
+    """Make ``mesh`` (of the files in ``sources``) in a child process, which writes it to ``target``; several, by their
+    keys, are meshed together and written to ``beside(target, k)``.
 
-    Raises MeshError with the child's own line, or with the limit that it broke; StoppedError where the run was asked to
-    stop: launchers tell all processes of a rank.
+    Raises MeshError with the child's line, or with the limit that it exceeded; StoppedError if the run was asked to
+    stop: launchers send the signal to all processes of a rank.
     """
     limits = limits.allowed()
     request = {
@@ -94,9 +94,8 @@ def run_child(mesh: Mesh | Mapping[str, Mesh], sources: Sources, target: Path, k
 
 
 def _watched(child: subprocess.Popen[bytes], request: bytes, key: str, limits: Limits) -> bytes:
-    """What the child says on stderr, once it has ended. Ends it, and raises MeshError, when it breaks a limit.
-
-    Memory is looked at from here too: Python can turn in circles when not even an exception fits any more.
+    """Return the text of the child on standard error, once it has ended. Ends it, and raises MeshError, when it
+    exceeds a limit. Memory is tested from here, too: Python can loop for ever when even an exception does not fit.
     """
     last, message = time.monotonic() + limits.wall, request
     try:
@@ -114,7 +113,7 @@ def _watched(child: subprocess.Popen[bytes], request: bytes, key: str, limits: L
 
 
 def _address_space(process: int) -> int:
-    """Bytes, 0 where the system does not say (no /proc) or the process has just ended."""
+    """Return the address space, bytes; 0 if the system does not provide it (no /proc) or the process has just ended."""
     try:
         return int(Path(f"/proc/{process}/statm").read_text().split()[0]) * resource.getpagesize()
     except (OSError, IndexError, ValueError):
@@ -139,7 +138,7 @@ def _reason(key: str, code: int, errors: str, limits: Limits) -> str:
 
 
 def main() -> int:
-    """Answers the request on stdin; the exit code."""
+    """Answer the request on standard input; return the exit code."""
     request = json.load(sys.stdin)
     limits = Limits(**request["limits"])
     limit(limits)
@@ -153,16 +152,16 @@ def main() -> int:
             perform(mesh, key, sources, target)
     except InputError as error:
         text, keys = str(error), tuple(request["mesh"]) if request["joint"] else (key,)
-        return _told(text if text.startswith(keys) else f"{key}: {text}", ExitCode.BAD_INPUT)
+        return _failed(text if text.startswith(keys) else f"{key}: {text}", ExitCode.BAD_INPUT)
     except MemoryError:
-        return _told(_too_much_memory(key, limits), ExitCode.BAD_INPUT)
+        return _failed(_too_much_memory(key, limits), ExitCode.BAD_INPUT)
     except (Exception, SystemExit) as error:
-        return _told(f"{type(error).__name__}: {error}", ExitCode.CRASHED)
+        return _failed(f"{type(error).__name__}: {error}", ExitCode.CRASHED)
     return ExitCode.SUCCEEDED
 
 
 def perform(mesh: Mesh, key: str, sources: Sources, target: Path) -> None:
-    """Makes or reads, checks, orders and stores. Imports gmsh and numpy only now, within the limits."""
+    """Make or read a mesh, check, order and store it. Imports gmsh and numpy here, within the limits."""
     from .model import check
     from .order import morton_ordered
     from .store import save
@@ -183,12 +182,12 @@ def perform(mesh: Mesh, key: str, sources: Sources, target: Path) -> None:
 
 
 def beside(target: Path, k: int) -> Path:
-    """Where mesh ``k`` of several that are meshed together goes."""
+    """Return the path of mesh ``k`` of several that are meshed together."""
     return target.with_name(f"{target.stem}-{k}{target.suffix}")
 
 
 def perform_together(meshes: dict[str, Mesh], sources: Sources, target: Path) -> None:
-    """Makes meshes that have the nodes of their interfaces in common, by their keys, and stores each."""
+    """Make meshes with common nodes at their interfaces, by their keys, and store each."""
     from .model import check
     from .order import morton_ordered
     from .store import save
@@ -205,7 +204,7 @@ def perform_together(meshes: dict[str, Mesh], sources: Sources, target: Path) ->
 
 
 def limit(limits: Limits) -> None:
-    """Binds this process to ``limits``; on Linux it ends when its parent does."""
+    """Set the limits of this process; on Linux it ends when its parent does."""
     resource.setrlimit(resource.RLIMIT_AS, (limits.memory, limits.memory))
     hard = resource.getrlimit(resource.RLIMIT_CPU)[1]
     last = limits.cpu + _GRACE if hard == resource.RLIM_INFINITY else min(limits.cpu + _GRACE, hard)
@@ -215,7 +214,7 @@ def limit(limits: Limits) -> None:
         ctypes.CDLL(None).prctl(_DIES_WITH_PARENT, signal.SIGKILL)
 
 
-def _told(text: str, code: int) -> int:
+def _failed(text: str, code: int) -> int:
     print(" ".join(text.split()), file=sys.stderr)
     return code
 

@@ -1,9 +1,9 @@
-"""Hexahedra, wedges and pyramids cut into tets that meet face to face.
+"""Cuts of hexahedra, wedges and pyramids into tets that meet face to face.
 
-Each quadrilateral face is cut by the diagonal through the smallest of its four node numbers: both elements that have it
-cut it alike, on any rank, and there is always a cut of the element that has these diagonals (Dompierre, Labbe, Vallet,
-Camarero 1999, "How to subdivide pyramids, prisms and hexahedra into tetrahedra"). Of several the one with the longest
-stable step is taken. Where all are flat or far worse than that, a node in the middle of the element takes part.
+Each quadrilateral face is cut by the diagonal through the smallest of its four node numbers: both of its elements
+cut it alike, on any rank, and there is always a cut of the element with these diagonals (Dompierre, Labbe, Vallet,
+Camarero 1999, "How to subdivide pyramids, prisms and hexahedra into tetrahedra"). Of several cuts the one with the
+longest stable step is chosen. If all are flat or far worse, a node in the middle of the element is added.
 """
 
 from collections.abc import Iterator
@@ -16,28 +16,32 @@ from .model import FLAT, Floats, Ids, step_lengths, volume_and_area
 from .patterns import QUADS, cuts, skin
 
 _TOGETHER = 20_000
-"""Elements that are looked at at once. Chosen: 100 MB."""
+"""Elements that are processed at once. Chosen: 100 MB."""
 _NOTHING = np.zeros((0, 4), np.int64), np.zeros(0, np.int64), np.zeros(0, np.int64)
 _WORSE = 0.5
-"""A cut whose step is below this share of what a node in the middle allows gives way to that. Chosen: it makes twelve
-tets of an element where five or six would do, which half of the steps outweigh."""
+"""Share of the step with a node in the middle below which a cut is replaced by that. Chosen: it makes twelve tets of
+an element instead of five or six, a cost that half the number of steps outweighs."""
 
 
 @dataclass(frozen=True)
 class Cut:
-    """``tets`` (k, 4) of the elements ``owner`` (k,); nodes from the number of points on are ``middles`` (j, 3)."""
+    """``tets`` (k, 4) of the elements ``owner`` (k,); node numbers from the number of points on are ``middles`` (j,
+    3).
+    """
 
     tets: Ids
     owner: Ids
     middles: Floats
     of: Ids
-    """(j,) the elements in whose middle they are."""
+    """(j,) element of each middle node."""
     flat: Ids
-    """The elements that have no cut into tets with a volume."""
+    """Elements without a cut into tets of positive volume."""
 
 
 def cut(nodes: Ids, points: Floats, diagonals: Ids) -> Cut:
-    """Elements (m, 8), nodes repeated as ``cells.Form`` says, over ``points``, with these diagonals of faces (m,)."""
+    """Cut elements (m, 8), with repeated nodes as in ``cells.Form``, over ``points``, with these diagonals of faces
+    (m,).
+    """
     made = [_cut_alike(nodes, points, each, diagonals) for each in _portions(diagonals)]
     tets, owner, poor = (np.concatenate(column) for column in zip(*made, strict=True)) if made else _NOTHING
     more, of, middles, centred, flat = _around(nodes, points, diagonals, np.sort(poor))
@@ -45,28 +49,30 @@ def cut(nodes: Ids, points: Floats, diagonals: Ids) -> Cut:
 
 
 def pattern(nodes: Ids) -> Ids:
-    """(m,) the diagonals of the faces (see ``patterns.cuts``): through the smallest node, the first of equal ones."""
+    """Return (m,) the diagonals of the faces (see ``patterns.cuts``): through the smallest node, the first of equal
+    ones.
+    """
     rank = np.argsort(np.argsort(nodes, axis=1, kind="stable"), axis=1, kind="stable")
     second = rank[:, QUADS].argmin(axis=2) % 2
     return np.asarray((second << np.arange(len(QUADS))).sum(axis=1))
 
 
 def halves(quads: Ids) -> Ids:
-    """(2 n, 3) the triangles of quadrilaterals (n, 4), cut by the same rule."""
+    """Return (2 n, 3) the triangles of quadrilaterals (n, 4), cut by the same rule."""
     odd = (quads.argmin(axis=1) % 2 == 1)[:, None]
     rolled = np.where(odd, np.roll(quads, -1, axis=1), quads)
     return rolled[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3)
 
 
 def _portions(diagonals: Ids) -> Iterator[Ids]:
-    """Elements of one pattern, so many at once as fit into memory."""
+    """Yield elements of one pattern, as many at once as fit into memory."""
     for each in np.unique(diagonals):
         chosen = np.flatnonzero(diagonals == each)
         yield from np.split(chosen, range(_TOGETHER, len(chosen), _TOGETHER))
 
 
 def _cut_alike(nodes: Ids, points: Floats, some: Ids, diagonals: Ids) -> tuple[Ids, Ids, Ids]:
-    """Tets of the elements ``some``, whose these are, and the elements that are better cut round their middle."""
+    """Return the tets and owners of the elements ``some``, and the elements that are better cut round a middle node."""
     table = cuts(int(diagonals[some[0]]))
     if not len(table):
         return np.zeros((0, 4), np.int64), np.zeros(0, np.int64), some
@@ -80,8 +86,8 @@ def _cut_alike(nodes: Ids, points: Floats, some: Ids, diagonals: Ids) -> tuple[I
 
 
 def _around(nodes: Ids, points: Floats, diagonals: Ids, poor: Ids) -> tuple[Ids, Ids, Floats, Ids, Ids]:
-    """Tets of the elements ``poor`` with a node in their middle, whose these are, these nodes, the elements that have
-    one, and those that are flat.
+    """Return tets and owners of the elements ``poor`` with a middle node, these nodes, their elements, and those
+    that are flat.
     """
     found = [_spoked(nodes[[each]], points, int(diagonals[each])) for each in poor]
     good = np.array([_shortest(*each)[0] > 0 for each in found], bool)
@@ -96,8 +102,8 @@ def _around(nodes: Ids, points: Floats, diagonals: Ids, poor: Ids) -> tuple[Ids,
 
 
 def _spoked(nodes: Ids, points: Floats, diagonals: int) -> tuple[Floats, Ids, Ids]:
-    """Corners and middle (9 s, 3) of each element, and the tets (s, 12, 4) between its faces and its middle: by places
-    in these points and by nodes, of which -1 is the middle.
+    """Return corners and middle (9 s, 3) of each element, and the tets (s, 12, 4) between its faces and its middle:
+    by indices of these points, and by nodes, with -1 for the middle.
     """
     wheel = np.array([(a, c, b, 8) for a, b, c in skin(diagonals)], np.int64)
     different = np.array([(nodes[:, :k] != nodes[:, k, None]).all(axis=1) for k in range(8)]).T[..., None]
@@ -108,7 +114,9 @@ def _spoked(nodes: Ids, points: Floats, diagonals: int) -> tuple[Floats, Ids, Id
 
 
 def _shortest(points: Floats, tets: Ids, names: Ids) -> Floats:
-    """The shortest step length, m, of tets (..., k, 4), but of those that repeat a node; 0 where one has no volume."""
+    """Return the shortest step length, m, of tets (..., k, 4), without those that repeat a node; 0 if one has no
+    volume.
+    """
     length = step_lengths(points, tets)
     volume, area = volume_and_area(points, tets)
     length[volume <= FLAT * area * np.sqrt(area)] = 0.0
@@ -118,6 +126,6 @@ def _shortest(points: Floats, tets: Ids, names: Ids) -> Floats:
 
 
 def _repeats(tets: Ids) -> NDArray[np.bool_]:
-    """Which of the tets (..., 4) have one node twice."""
+    """Return which of the tets (..., 4) have a node twice."""
     ordered = np.sort(tets, axis=-1)
     return np.asarray((ordered[..., 1:] == ordered[..., :-1]).any(axis=-1))

@@ -1,4 +1,4 @@
-"""Triangular faces of tets. Face ``i`` lies opposite to node ``i`` and runs anticlockwise, seen from outside."""
+"""Triangular faces of tets. Face ``i`` is opposite to node ``i``, anticlockwise seen from outside."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +10,7 @@ FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]], np.int32)
 
 
 def boundary_faces(tets: Ints) -> Ints:
-    """(k, 3) nodes of the faces that belong to one tet only, outward, in the order of tet and local face."""
+    """Return (k, 3) nodes of the faces that belong to one tet only, outward, in the order of tet and local face."""
     faces = tets[:, FACES].reshape(-1, 3)
     group, size = _groups(faces)
     outer: Ints = faces[size[group] == 1]
@@ -18,8 +18,8 @@ def boundary_faces(tets: Ints) -> Ints:
 
 
 def same_side(tets: Ints) -> NDArray[np.int64]:
-    """(k, 2) tets, positively oriented, that lie on the same side of a face that both have: they overlap. Of more than
-    two on one side every two that follow each other.
+    """Return (k, 2) tets, positively oriented, on the same side of a common face: they overlap. Of more than two on
+    one side every two successive ones.
     """
     faces = tets[:, FACES].reshape(-1, 3)
     a, b, c = faces.T
@@ -33,7 +33,7 @@ def same_side(tets: Ints) -> NDArray[np.int64]:
 
 
 def across(tets: Ints) -> Ints:
-    """(n, 4) what lies behind each face: 4 * tet + local face of its other side, -1 where there is none."""
+    """Return (n, 4) the neighbour of each face: 4 * tet + local face of its other side, -1 for none."""
     group, size = _groups(tets[:, FACES].reshape(-1, 3))
     order = np.argsort(group, kind="stable")
     first = order[np.concatenate([[0], np.cumsum(size)[:-1]])]
@@ -46,18 +46,18 @@ def across(tets: Ints) -> Ints:
 
 
 def areas(points: Floats, faces: Ints) -> Floats:
-    """(k,) areas, m^2, of ``faces``, (k, 3)."""
+    """Return (k,) areas, m^2, of ``faces``, (k, 3)."""
     return np.asarray(np.linalg.norm(normals(points, faces), axis=1) / 2)
 
 
 def normals(points: Floats, faces: NDArray[np.integer]) -> Floats:
-    """(k, 3) outward normals of ``faces``, (k, 3), as long as twice the area, m^2."""
+    """Return (k, 3) outward normals of ``faces``, (k, 3), with length twice the area, m^2."""
     a, b, c = (points[faces[:, i]] for i in range(3))
     return np.asarray(np.cross(b - a, c - a))
 
 
 def _groups(faces: Ints) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Number of the distinct face that each row is, and how many rows each distinct face has."""
+    """Return the number of the distinct face of each row, and the number of rows of each distinct face."""
     low, middle, high = np.sort(faces, axis=1).astype(np.int64).T
     order = np.lexsort((high, low << 32 | middle))
     pair, last = (low << 32 | middle)[order], high[order]

@@ -1,4 +1,4 @@
-"""Degenerate hexahedra: eight nodes of which some are one, as decks write wedges, pyramids and tets."""
+"""Degenerate hexahedra, with repeated nodes, by which decks represent wedges, pyramids and tets."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,8 +11,8 @@ _TET = Form.TET.inside
 
 
 def folded(nodes: Ids) -> tuple[Ids, NDArray[np.bool_]]:
-    """Hexahedra (m, 8) with what has four different nodes as a tet, and which of them have a volume at all: nodes that
-    are one must hang together by edges, and no face may have two opposite corners in one.
+    """Return hexahedra (m, 8), those with four different nodes as tets, and which of them can have a volume:
+    repeated nodes must be connected by edges, and no face may have two equal opposite corners.
     """
     first = (nodes[:, :, None] == nodes[:, None, :]).argmax(axis=2)
     kinds, of = np.unique(first, axis=0, return_inverse=True)
@@ -28,7 +28,7 @@ def folded(nodes: Ids) -> tuple[Ids, NDArray[np.bool_]]:
 
 
 def _folds(first: Ids) -> bool:
-    """Whether the nodes that are one, given by the first place of each, can be: see ``folded``."""
+    """Return whether the repeated nodes, given by the first index of each, are allowed: see ``folded``."""
     reached = np.arange(8)
     for _ in range(8):
         for a, b in EDGES:

@@ -1,4 +1,4 @@
-"""gmsh, opened and closed properly. Only the child process gets here: gmsh is GPL and can crash."""
+"""Sessions of gmsh. They run in the child process only: gmsh is GPL and can crash."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -26,12 +26,14 @@ OPTIONS = {
     "Mesh.OptimizeThreshold": 0.45,
     "Mesh.RandomSeed": 1,
 }
-"""Of every mesh that is made; ``mesh/unstructured.py`` has why."""
+"""Options of every mesh that is made; the reasons are in ``mesh/unstructured.py``."""
 
 
 @contextmanager
 def session(options: Mapping[str, float]) -> Iterator[Any]:
-    """The gmsh module, silent, without the user's own settings; an error that it logs or raises becomes MeshError."""
+    """Yield the gmsh module, silent, without the user's own settings; an error that it logs or raises becomes
+    MeshError.
+    """
     import gmsh
 
     gmsh.initialize(readConfigFiles=False, run=False, interruptible=False)
@@ -51,12 +53,12 @@ def session(options: Mapping[str, float]) -> Iterator[Any]:
 
 
 def tet_mesh(gmsh: Any) -> TetMesh:
-    """The tets of the current model, and the nodes that they use."""
+    """Return the tets of the current model, and the nodes that they use."""
     return named_mesh(gmsh).mesh
 
 
 def named_mesh(gmsh: Any) -> NamedMesh:
-    """The same with gmsh's names of the nodes and tets; the nodes in the order of their names."""
+    """Return the same with gmsh's numbers of the nodes and tets; the nodes in the order of their numbers."""
     tags, corners = gmsh.model.mesh.getElementsByType(_TET)
     node_tags, coordinates, _ = gmsh.model.mesh.getNodes()
     nodes, points = np.asarray(node_tags, np.int64), coordinates.reshape(-1, 3)
@@ -64,5 +66,5 @@ def named_mesh(gmsh: Any) -> NamedMesh:
 
 
 def first_error(gmsh: Any) -> str | None:
-    """The first error in gmsh's log: it reads on after many of them."""
+    """Return the first error in gmsh's log: gmsh continues after many errors."""
     return next((line.removeprefix("Error: ") for line in gmsh.logger.get() if line.startswith("Error")), None)

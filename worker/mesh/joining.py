@@ -1,4 +1,6 @@
-"""Parts that bonds join by shared nodes: their nodes at one place become one node, their faces there an interface."""
+"""Parts that bonds join by shared nodes: their coincident nodes become one node, their coincident faces an
+interface.
+"""
 
 from collections.abc import Container, Mapping
 from itertools import combinations
@@ -13,15 +15,15 @@ from .model import Floats, Ids, Ints, Origin
 from .sharing import same_places
 
 _SAME = 1e-9
-"""Of the size of a body: nodes of structured meshes nearer than this are one. Chosen: far above rounding."""
+"""Share of the size of a body: nodes of structured meshes nearer than this are merged. Chosen: far above round-off."""
 
 Placed = tuple[int, Origin | None, Floats]
-"""Index of the first node of a part, where its mesh comes from, and its nodes (n, 3), m, as its part turns them."""
+"""Index of the first node of a part, origin of its mesh, and its nodes (n, 3), m, after the rotation of the part."""
 
 
 def joined(case: Case, placed: Mapping[int, Placed], n: int) -> Ids:
-    """(n,) the node that stands for each of the ``n`` nodes of the ``placed`` parts, by their numbers: the first of
-    those that bonds make one of. Raises InputError for a bond without nodes in common.
+    """Return (n,) the node that represents each of the ``n`` nodes of the ``placed`` parts, by their numbers: the
+    first of those that bonds merge. Raises InputError for a bond without common nodes.
     """
     edges = [np.zeros((0, 2), np.int64)]
     for k, _, i, j in shared_bonds(case):
@@ -32,7 +34,7 @@ def joined(case: Case, placed: Mapping[int, Placed], n: int) -> Ids:
                 raise InputError(_apart(case, k))
             edges.append(np.column_stack([first + p, second + q]))
     every = np.concatenate(edges)
-    from ..fracture.connectivity import components  # numba must know where its kernels are before it is imported
+    from ..fracture.connectivity import components  # numba must have its cache folder before it is imported
 
     if not len(every):
         return np.arange(n)
@@ -42,8 +44,8 @@ def joined(case: Case, placed: Mapping[int, Placed], n: int) -> Ids:
 
 
 def _refuse_open(case: Case, placed: Mapping[int, Placed], stands: Ids) -> None:
-    """Raises InputError for two parts of one body without a bond that lie face to face: they would come apart there,
-    and do not meet in contact. ``stands``: see ``joined``.
+    """Raise InputError for two parts of one body, without a bond between them, with coincident faces: they would
+    separate there without contact. ``stands``: see ``joined``.
     """
     body = bodies(case)
     numbers = {part.name: i for i, part in enumerate(case.parts)}
@@ -57,7 +59,7 @@ def _refuse_open(case: Case, placed: Mapping[int, Placed], stands: Ids) -> None:
 
 
 def _wide(x: Floats) -> bool:
-    """Whether some points (n, 3) are neither one nor on one line."""
+    """Return whether points (n, 3) are neither coincident nor collinear."""
     if len(x) < 3:
         return False
     d = x - x[0]
@@ -66,7 +68,7 @@ def _wide(x: Floats) -> bool:
 
 
 def _common(one: Origin | None, x: Floats, other: Origin | None, y: Floats) -> tuple[Ids, Ids]:
-    """Nodes of two parts that are one: those of one number in one file, or, of structured meshes, at one place."""
+    """Return the common nodes of two parts: equal numbers in one file or, in structured meshes, equal positions."""
     if one is not None and other is not None:
         return same_places(one, x, other, y)
     labels = np.column_stack([_lines(np.concatenate([a, b])) for a, b in zip(x.T, y.T, strict=True)])
@@ -78,7 +80,7 @@ def _common(one: Origin | None, x: Floats, other: Origin | None, y: Floats) -> t
 
 
 def _lines(values: Floats) -> Ids:
-    """(n,) a number for each of some coordinates, the same for those that differ by rounding alone."""
+    """Return (n,) a number for each coordinate, the same for those that differ by round-off."""
     order = np.argsort(values, kind="stable")
     steps = np.diff(values[order], prepend=values[order[:1]])
     numbers = np.empty(len(values), np.int64)
@@ -87,8 +89,8 @@ def _lines(values: Floats) -> Ids:
 
 
 def require_faces(case: Case, there: Container[int], across: Ints, tet_part: Ints) -> None:
-    """Raises InputError for a bond of parts that are ``there``, by number, without a face in common, and for parts of
-    one body without a bond that have one: ``across`` (tets, 4) of all tets, see ``faces.across``.
+    """Raise InputError for a bond of parts in ``there``, by number, without a common face, and for parts of one body
+    with a common face but without a bond. ``across``: (tets, 4) of all tets, see ``faces.across``.
     """
     tet, face = np.nonzero(across >= 0)
     pairs = np.column_stack([tet_part[tet], tet_part[across[tet, face] // 4]])

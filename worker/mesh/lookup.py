@@ -1,4 +1,4 @@
-"""The set of a mesh file that a case means by a name."""
+"""Search for the set of a mesh file that a name in a case refers to."""
 
 from collections.abc import Sequence
 
@@ -8,14 +8,14 @@ from ..errors import MeshError
 from .model import NodeSet
 
 _KINDS = {"nodes": False, "surface": True}
-"""Words before a colon that say which of two kinds is meant."""
+"""Words before a colon that select one of two kinds."""
 _SHOWN = 20
-"""Names in a message. Chosen: three lines of a terminal."""
+"""Number of names in a message. Chosen: three lines of a terminal."""
 
 
 def meant(sets: Sequence[NodeSet], name: str) -> NodeSet | None:
-    """The set; None where there is none of this name. Several that are the same are one, and those without a node of
-    the mesh are no others. Raises MeshError for a name that means two things.
+    """Return the set; None if there is none of this name. Several equal sets count as one, and sets without a node
+    of the mesh are ignored. Raises MeshError for an ambiguous name.
     """
     found = _called(sets, name)
     if not found and (kind := name.partition(":"))[0] in _KINDS:
@@ -30,7 +30,7 @@ def meant(sets: Sequence[NodeSet], name: str) -> NodeSet | None:
 
 
 def _called(sets: Sequence[NodeSet], name: str) -> list[NodeSet]:
-    """By name; of each kind in another case where none is called exactly so."""
+    """Return the sets of that name; of each kind with another case of letters if none matches exactly."""
     found = list[NodeSet]()
     for surfaces in (True, False):
         kind = [each for each in sets if (each.faces is not None) == surfaces]
@@ -49,6 +49,6 @@ def _same(one: NodeSet, other: NodeSet) -> bool:
 
 
 def known(sets: Sequence[NodeSet]) -> str:
-    """The names that there are, for messages."""
+    """Return the available names, for messages."""
     names = list(dict.fromkeys(each.names[0] for each in sets))
     return ", ".join([*names[:_SHOWN], *(["..."] if len(names) > _SHOWN else [])]) or "none"

@@ -1,4 +1,4 @@
-"""Meshes that are given tet by tet: shards that do not touch each other, and a pair with one face in common."""
+"""Meshes that are generated tet by tet: separate shards, and two tets with a common face."""
 
 import itertools
 import math
@@ -14,14 +14,16 @@ from ..model.hashing import uniform
 from .model import Floats, TetMesh
 
 _CORNERS = np.array([[1, 1, 1], [1, -1, -1], [-1, -1, 1], [-1, 1, -1]]) / math.sqrt(8.0)
-"""The regular tet of edge 1 about its centre, positive."""
+"""Corners of the regular tet of edge 1 about its centre, positive."""
 
 _RANDOM = 15
-"""Random numbers a shard: 3 turn it, 12 move its nodes."""
+"""Random numbers of a shard: 3 for its rotation, 12 for its nodes."""
 
 
 def shards(body: Shards) -> TetMesh:
-    """Each tet amid its own cube, turned by any rotation alike, its nodes moved after that."""
+    """Return shards, each in the middle of its own cube, with a uniformly random rotation and then random shifts of
+    the nodes.
+    """
     cubes = np.array(list(itertools.product(*map(range, body.count))), np.float64)
     random = uniform(np.arange(_RANDOM * len(cubes)), body.seed).reshape(-1, _RANDOM)
     turned = (rotations(random[:, :3])[:, None] * _CORNERS[:, None]).sum(axis=3)
@@ -31,7 +33,7 @@ def shards(body: Shards) -> TetMesh:
 
 
 def rotations(random: Floats) -> Floats:
-    """(n, 3, 3) rotations, all directions and angles alike, from numbers (n, 3) in [0, 1): Shoemake 1992."""
+    """Return (n, 3, 3) uniformly distributed rotations from numbers (n, 3) in [0, 1): Shoemake 1992."""
     one, two = np.sqrt(1.0 - random[:, 0]), np.sqrt(random[:, 0])
     a, b = 2.0 * math.pi * random[:, 1], 2.0 * math.pi * random[:, 2]
     (sine_a, cosine_a), (sine_b, cosine_b) = sines_and_cosines(a), sines_and_cosines(b)
@@ -45,7 +47,7 @@ def rotations(random: Floats) -> Floats:
 
 
 def two_tets(body: TwoTets) -> tuple[Floats, NDArray[np.int32]]:
-    """Points in the body's frame, m, and tets: the common face lies about the origin, across the third direction."""
+    """Return points in the body's frame, m, and tets: the common face is at the origin, across the third direction."""
     edge = body.element_size
     sine, cosine = sines_and_cosines(2.0 * math.pi / 3.0 * np.arange(3.0))
     face = edge / math.sqrt(3.0) * np.stack([cosine, sine, np.zeros(3)], axis=1)

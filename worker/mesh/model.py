@@ -1,4 +1,4 @@
-"""The tet mesh: nodes, tets, and what makes a mesh usable.
+"""Tet meshes: nodes, tets, and the checks of a usable mesh.
 
 Node order of a tet, positive: seen from node 3, nodes 0, 1, 2 run clockwise::
 
@@ -25,47 +25,47 @@ Ints = NDArray[np.int32]
 Ids = NDArray[np.int64]
 
 MAX_TETS = 50_000_000
-"""More than this is taken for a slip in ``element_size``, not for a wish."""
+"""Number of tets above which ``element_size`` is taken as a mistake."""
 
 REGULAR_STEP = 1.0 / math.sqrt(6.0)
 """Step length of the regular tet with edge 1: half its altitude."""
 
 FLAT = 1e-9
-"""A tet whose volume is below this share of (root of the sum of its squared face areas)^(3/2) has none. Chosen: a
-regular tet has 0.15, rounding of its nodes 1e-16."""
+"""A tet has no volume if the volume is below this share of (root of the sum of its squared face areas)^(3/2).
+Chosen: a regular tet has 0.15, round-off of its nodes 1e-16."""
 
 
 @dataclass(frozen=True, eq=False)
 class Origin:
-    """Where a mesh from a file comes from."""
+    """File from which a mesh was read."""
 
     file: str
-    """sha256 of the bytes of the file, and of those that it includes."""
+    """sha256 of the bytes of the file, and of the files that it includes."""
     nodes: Ids
-    """(n,) a number of each node that no other node of the file has."""
+    """(n,) number of each node, unique in the file."""
     notes: tuple[str, ...] = ()
-    """What of the file is not in the mesh, or is taken otherwise than one might think, a line each."""
+    """Contents of the file that are not in the mesh or are interpreted in an unexpected way, a line each."""
     included: tuple[tuple[str, str], ...] = ()
     """Path and sha256 of each further file that was read for it."""
 
 
 @dataclass(frozen=True, eq=False)
 class NodeSet:
-    """Nodes, or a surface, that the file of a mesh names."""
+    """A set of nodes or a surface in a mesh file."""
 
     names: tuple[str, ...]
-    """By which it may be called, the first one in lists."""
+    """Names in a case, the first one in lists."""
     nodes: Ints
-    """(k,) of the mesh, ascending; of a surface those of all its faces."""
+    """(k,) nodes of the mesh, ascending; of a surface those of all its faces."""
     faces: Ints | None = None
-    """(n, 3) of a surface: those that are outer faces of the mesh. None for a set of nodes."""
+    """(n, 3) faces of a surface that are outer faces of the mesh. None for a set of nodes."""
     inner: int = 0
-    """How many faces of the surface have all their nodes in the mesh and are no outer faces of it."""
+    """Number of faces of the surface with all nodes in the mesh that are not outer faces of it."""
 
 
 @dataclass(frozen=True, eq=False)
 class TetMesh:
-    """``points``: (n, 3) float64, m. ``tets``: (m, 4) int32 rows of node indices, positively oriented.
+    """A mesh: ``points`` (n, 3) float64, m; ``tets`` (m, 4) int32 node indices, positively oriented.
 
     Treat both arrays as read-only. Raises MeshError for another shape.
     """
@@ -73,9 +73,9 @@ class TetMesh:
     points: Floats
     tets: Ints
     origin: Origin | None = None
-    """None where the mesh was generated."""
+    """None for a generated mesh."""
     sets: tuple[NodeSet, ...] = ()
-    """What its file names, empty ones among them."""
+    """Sets of its file, with empty ones."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "points", np.ascontiguousarray(self.points, np.float64))
@@ -86,41 +86,42 @@ class TetMesh:
             raise MeshError(f"tets have the shape {self.tets.shape}; expected (m, 4)")
 
     def volumes(self) -> Floats:
-        """(m,) signed volumes, m^3."""
+        """Return (m,) signed volumes, m^3."""
         return volume_and_area(self.points, self.tets)[0]
 
     def step_lengths(self) -> Floats:
-        """(m,) 1 / sqrt(sum |grad N|^2), m, with the sign of the volume: the stable time step is this over the speed
-        of sound (lumped linear tets: omega_max^2 <= 4 c^2 sum |grad N|^2)."""
+        """Return (m,) 1 / sqrt(sum |grad N|^2), m, with the sign of the volume: the stable time step is this over
+        the speed of sound (lumped linear tets: omega_max^2 <= 4 c^2 sum |grad N|^2).
+        """
         return step_lengths(self.points, self.tets)
 
 
 @dataclass(frozen=True)
 class Names:
-    """What the file that a mesh came from calls its nodes, (n,), and tets, (m,)."""
+    """Numbers of the nodes, (n,), and tets, (m,), in the file of a mesh."""
 
     nodes: Ids
     tets: Ids
     lines: Ids | None = None
-    """(m,) of the file, where the tets stand; 0 where nobody counts lines."""
+    """(m,) lines of the tets in the file; 0 if the reader counts no lines."""
 
     def tet(self, index: int) -> str:
-        """``tet 7 (line 12)``."""
+        """Return the name of a tet: ``tet 7 (line 12)``."""
         line = "" if self.lines is None or not self.lines[index] else f" (line {self.lines[index]})"
         return f"tet {self.tets[index]}{line}"
 
 
 def step_lengths(points: Floats, tets: NDArray[np.integer]) -> Floats:
-    """Step lengths, m, of the tets (..., 4) over ``points``; see ``TetMesh.step_lengths``."""
+    """Return step lengths, m, of the tets (..., 4) over ``points``; see ``TetMesh.step_lengths``."""
     volume, area = volume_and_area(points, tets)
     return np.divide(3 * volume, area, out=np.zeros_like(volume), where=area > 0)
 
 
 def check(mesh: TetMesh, names: Names | None = None) -> TetMesh:
-    """The mesh itself when it can be computed with: else MeshError.
+    """Return the mesh if it can be computed with, else raise MeshError.
 
-    Finite coordinates, at least one tet, every index in range, every node used, every volume positive. Nodes and tets
-    are called by ``names`` when given, by their index from 0 otherwise.
+    Conditions: finite coordinates, at least one tet, every index in range, every node used, every volume positive.
+    Messages use ``names`` of nodes and tets if given, otherwise indices from 0.
     """
     points, tets = mesh.points, mesh.tets
     names = names or Names(np.arange(len(points)), np.arange(len(tets)))
@@ -157,7 +158,7 @@ def _check_volumes(mesh: TetMesh, names: Names) -> None:
 
 
 def volume_and_area(points: Floats, tets: NDArray[np.integer]) -> tuple[Floats, Floats]:
-    """Signed volume, m^3, and root of the sum of the four squared face areas, m^2."""
+    """Return signed volume, m^3, and root of the sum of the four squared face areas, m^2."""
     x, y, z = ([column[tets[..., i]] for i in range(4)] for column in points.T)
     e = [[x[i] - x[0], y[i] - y[0], z[i] - z[0]] for i in (1, 2, 3)]
     a, b, c = _cross(e[1], e[2]), _cross(e[2], e[0]), _cross(e[0], e[1])

@@ -1,4 +1,4 @@
-"""A mesh as its file has it: with the names of its nodes and tets there."""
+"""A mesh with the numbers of its nodes and tets in its file."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -12,18 +12,18 @@ from .model import Ids, Names, TetMesh
 
 @dataclass(frozen=True)
 class NamedMesh:
-    """A mesh, not yet checked, and what its file calls the nodes and tets."""
+    """An unchecked mesh, and the numbers of its nodes and tets in its file."""
 
     mesh: TetMesh
     names: Names
     places: Ids
-    """(n,) a number of each node that no other node of the file has."""
+    """(n,) number of each node, unique in the file."""
     notes: tuple[str, ...] = ()
-    """What of the file is not in the mesh, or is taken otherwise than one might think, a line each."""
+    """Contents of the file that are not in the mesh or are interpreted in an unexpected way, a line each."""
 
 
 def gathered(node_tags: Ids, points: Any, tet_tags: Ids, corners: Ids) -> NamedMesh:
-    """Tets given by node tags, (m, 4), as indices into the nodes that they use, in the order of the tags."""
+    """Return tets given by node tags, (m, 4), as indices into the nodes that they use, in the order of the tags."""
     order = np.argsort(node_tags, kind="stable")
     used, tets = np.unique(corners, return_inverse=True)
     place = np.searchsorted(node_tags, used, sorter=order)
@@ -38,8 +38,8 @@ def gathered(node_tags: Ids, points: Any, tet_tags: Ids, corners: Ids) -> NamedM
 
 
 def placed(tags: Ids, nodes: Ids, called: Callable[[int], str]) -> Ids:
-    """Node numbers (m, k) of a file as places in ``tags``. MeshError for one that is not there, of element ``called``
-    by its place.
+    """Return node numbers (m, k) of a file as indices into ``tags``. Raises MeshError for an unknown number, with
+    the name of the element, ``called`` with its index.
     """
     order = np.argsort(tags, kind="stable")
     found = np.minimum(np.searchsorted(tags, nodes, sorter=order), max(len(tags) - 1, 0))
@@ -51,7 +51,7 @@ def placed(tags: Ids, nodes: Ids, called: Callable[[int], str]) -> Ids:
 
 
 def refuse_repeated(what: str, numbers: Ids, where: str = "") -> None:
-    """MeshError where two nodes, or two elements, have the same number."""
+    """Raise MeshError if two nodes, or two elements, have the same number."""
     found, times = np.unique(numbers, return_counts=True)
     if len(found) < len(numbers):
         raise MeshError(f"{what} {found[times > 1][0]} is defined twice{where}")

@@ -1,4 +1,4 @@
-"""What of a deck is not in its mesh, or is taken otherwise: a line each."""
+"""Notes about contents of a deck that are not in its mesh or are interpreted in an unexpected way."""
 
 from collections import Counter
 from collections.abc import Iterable, Iterator
@@ -7,8 +7,8 @@ from .cells import Cells
 
 
 def notes(passed: Counter[str], volumes: Counter[str], joining: Counter[str], mark: str) -> Iterator[str]:
-    """How many elements without volume were ``passed`` over, how many ``volumes`` cannot be read, and which keywords
-    are ``joining`` bodies, by names that the deck writes behind a ``mark``.
+    """Return lines: the number of elements without volume that were ``passed`` over, the number of ``volumes`` that
+    cannot be read, and the keywords that are ``joining`` bodies, with the ``mark`` of the deck before their names.
     """
     for counts, said in (
         (passed, "elements that carry no volume are skipped"),
@@ -20,7 +20,7 @@ def notes(passed: Counter[str], volumes: Counter[str], joining: Counter[str], ma
 
 
 def by_corners(chosen: Iterable[Cells]) -> Iterator[str]:
-    """Hexahedra of second order, of which the corners are taken."""
+    """Return lines about hexahedra of second order, of which only the corners are used."""
     for each in chosen:
         if each.kind.nodes > 10 and len(each.numbers):
             yield f"{len(each.numbers):,} hexahedra of {each.kind.nodes} nodes are taken by their corners"

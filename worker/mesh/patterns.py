@@ -1,6 +1,6 @@
 """Cuts of a hexahedron into tets, by the diagonals of its faces.
 
-Nodes as in gmsh, Abaqus, LS-DYNA and VTK, positive; a wedge or a pyramid is one that repeats nodes::
+Nodes as in gmsh, Abaqus, LS-DYNA and VTK, positive; a wedge or a pyramid repeats nodes::
 
         7-------6
        /|      /|
@@ -21,11 +21,11 @@ from .faces import FACES
 QUADS = np.array([[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]])
 """Faces of a hexahedron, anticlockwise seen from outside."""
 EDGES = ((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7))
-"""Of a hexahedron."""
+"""Edges of a hexahedron."""
 MOST = 6
-"""Tets of a cut. Five have the middle of the hexahedron in one, six have a long diagonal."""
+"""Tets of a cut. A cut into five has a tet in the middle, a cut into six a long diagonal."""
 _CUBE = ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1))
-"""Its nodes."""
+"""Nodes of the hexahedron."""
 
 Triangle = tuple[int, int, int]
 Tet = tuple[int, int, int, int]
@@ -33,8 +33,10 @@ Tet = tuple[int, int, int, int]
 
 @cache
 def cuts(pattern: int) -> NDArray[np.int64]:
-    """(n, MOST, 4) the cuts without further nodes; bit f of ``pattern``: whether face f is cut from its second node to
-    its fourth, not from its first to its third. Rows 0, 0, 0, 0 fill one of five tets. n is 0 for some patterns.
+    """Return (n, MOST, 4) the cuts without further nodes.
+
+    Bit f of ``pattern``: whether face f is cut from its second node to its fourth instead of from its first to its
+    third. A row 0, 0, 0, 0 pads a cut into five. n is 0 for some patterns.
     """
     found = sorted(set(_completed(frozenset(_turned(face) for face in skin(pattern)), ())))
     table = np.zeros((len(found), MOST, 4), np.int64)
@@ -44,7 +46,7 @@ def cuts(pattern: int) -> NDArray[np.int64]:
 
 
 def skin(pattern: int) -> list[Triangle]:
-    """The twelve triangles of the faces, anticlockwise seen from outside, of which every two are one face."""
+    """Return the twelve triangles of the faces, anticlockwise seen from outside, two for each face."""
     found = []
     for bit, (a, b, c, d) in enumerate(QUADS.tolist()):
         found += [(b, c, d), (b, d, a)] if pattern >> bit & 1 else [(a, b, c), (a, c, d)]
@@ -52,9 +54,8 @@ def skin(pattern: int) -> list[Triangle]:
 
 
 def _completed(front: frozenset[Triangle], made: tuple[Tet, ...]) -> Iterator[tuple[Tet, ...]]:
-    """All cuts that begin with the tets ``made`` and fill what lies behind the triangles of the ``front``.
-
-    Positive tets whose faces cancel but for the faces of a body fill it once: nothing else is to be looked at.
+    """Yield all cuts that begin with the tets ``made`` and fill the volume behind the triangles of the ``front``.
+    Positive tets whose inner faces cancel fill a body once: no other test is needed.
     """
     if not front:
         yield tuple(sorted(made))
@@ -81,7 +82,7 @@ def _positive(tet: Tet) -> bool:
 
 
 def _turned(face: tuple[int, ...]) -> Triangle:
-    """The same triangle from its smallest node on."""
+    """Return the same triangle from its smallest node on."""
     first = face.index(min(face))
     a, b, c = face[first:] + face[:first]
     return a, b, c

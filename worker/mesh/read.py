@@ -1,9 +1,9 @@
-"""Reads mesh files. Runs in the child process: a file is somebody else's bytes.
+"""Reader of mesh files, for the child process: files are untrusted input.
 
-The readers are our own. gmsh takes a .msh file without a known header for a script, which can start programs; without a
-message it puts ghost cells among the elements, and all tets of an entity of the format 2.2 into the groups of any of
-them. meshio ends the process on an element type of .inp that it does not know, does not place instances and does not
-say which line is wrong.
+The readers are our own. gmsh takes a .msh file without a known header for a script, which can start programs; it
+puts ghost cells among the elements without a message, and all tets of an entity of the format 2.2 into the groups of
+any of them. meshio ends the process on an unknown element type of .inp, does not place instances and does not name
+the line of an error.
 """
 
 import hashlib
@@ -25,9 +25,10 @@ from .vtu.reading import read_vtu
 
 
 def read(file: MeshFile, path: Path, key: str = "mesh") -> TetMesh:
-    """The tets of ``path``, of ``file.group`` when given, in m, checked. MeshError, naming ``key``, when it cannot be.
+    """Return the tets of ``path``, of ``file.group`` when given, in m, checked. Raises MeshError, naming ``key``.
 
-    Nodes that no tet uses and everything that is not a volume are left out; other volumes than tets are refused.
+    Nodes that no tet uses and all elements without volume are omitted; volume elements that cannot be cut are
+    refused.
     """
     readers: dict[str, Callable[[Path, str | None, str], Content]] = {
         ".msh": read_msh, ".inp": read_inp, ".k": read_keyword, ".key": read_keyword, ".dyn": read_keyword,

@@ -1,19 +1,22 @@
-"""Coordinates of a file in metres, rounded once: 0.001 is no binary fraction, and a product with it rounds twice."""
+"""Conversion of coordinates into metres with one rounding: 0.001 is no binary fraction, and a product with it rounds
+twice.
+"""
 
 from fractions import Fraction
 
 from .model import Floats
 
 _SPLITTER = 2.0**27 + 1.0
-"""Cuts a float64 into two halves of 26 bits (Dekker 1971, Numer. Math. 18, 224)."""
+"""Splits a float64 into two halves of 26 bits (Dekker 1971, Numer. Math. 18, 224)."""
 _WHOLE = 2**53
-"""Whole numbers below it are exact as float64."""
+"""Integers below it are exact as float64."""
 
 
 def scaled(points: Floats, unit: float) -> Floats:
-    """Points in units of ``unit`` m, in m: ``points`` times the decimal number that ``unit`` stands for, rounded once.
+    """Return points in m from points in units of ``unit`` m: their product with the decimal number of ``unit``, rounded
+    once.
 
-    Where that decimal number is no fraction of whole numbers below 2^53 it is the product, which rounds twice.
+    If that number is not a fraction of integers below 2^53 the product rounds twice.
     """
     exact = Fraction(repr(unit))
     n, d = exact.numerator, exact.denominator
@@ -30,7 +33,7 @@ def scaled(points: Floats, unit: float) -> Floats:
 
 
 def _product(a: Floats, b: float) -> tuple[Floats, Floats]:
-    """The product as it is rounded, and exactly what the rounding left out (Dekker 1971)."""
+    """Return the rounded product and its exact rounding error (Dekker 1971)."""
     product, (a1, a2) = a * b, _halves(a)
     cut = _SPLITTER * b
     b1 = cut - (cut - b)

@@ -1,4 +1,6 @@
-"""Elements whose edges have a node in their middle: the volume that straight edges lose, and tets in eight."""
+"""Elements of second order, with a node in the middle of each edge: the volume that straight edges lose, and cuts of
+tets into eight.
+"""
 
 from collections.abc import Sequence
 from itertools import combinations, pairwise
@@ -13,21 +15,22 @@ from .model import FLAT, Floats, Ids, step_lengths, volume_and_area
 Way = Literal["eight", "corners"]
 
 LOST = 1e-3
-"""Of the volume: what the corners alone may lose before tets become eight. Chosen: as much of the mass is wrong then,
-and eight tets with half the step cost 16 times as much."""
+"""Share of the volume that straight edges may lose before tets are cut into eight. Chosen: the mass has the same
+error, and eight tets with half the step cost 16 times as much."""
 _OFF = 0.4
-"""Of the length of an edge: how far from its middle its node may be. Chosen: quarter points are 0.25 off, and an arc of
-90 degrees 0.21; the middle of another edge of a regular tet is 0.5 off, where another order of nodes was meant."""
+"""Largest distance of a node from the middle of its edge, over the length of the edge. Chosen: quarter points are
+0.25 off, and an arc of 90 degrees 0.21; the middle of another edge of a regular tet is 0.5 off, which indicates
+another order of nodes."""
 _CORNERS = ((0, 4, 6, 7), (4, 1, 5, 8), (6, 5, 2, 9), (7, 8, 9, 3))
 _LONG = ((4, 9), (6, 8), (7, 5))
-"""Opposite corners of what is left inside of the four: an octahedron."""
+"""Opposite corners of the octahedron that is left inside of the four corner tets."""
 _AT = np.array([[0.0, 0, 0], [2, 0, 0], [0, 2, 0], [0, 0, 2], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1],
                        [1, 0, 1], [0, 1, 1]])  # fmt: skip
-"""Nodes of a tet of ten."""
+"""Indices of the nodes of a tet of ten."""
 
 
 def checked(cells: Cells, points: Floats, tags: Ids) -> None:
-    """MeshError where a node is not near the middle of its edge; the cells' nodes are places in ``points``."""
+    """Raise MeshError if a node is not near the middle of its edge; the cells' nodes are indices into ``points``."""
     for (a, b), middle in zip(cells.kind.edges, cells.middles.T, strict=True):
         one, other = points[cells.corners[:, a]], points[cells.corners[:, b]]
         off, along = points[middle] - 0.5 * (one + other), other - one
@@ -41,10 +44,10 @@ def checked(cells: Cells, points: Floats, tags: Ids) -> None:
 
 
 def lost(cells: Cells, points: Floats) -> float:
-    """The volume, in that of ``points``, that the curved elements have more than those with straight edges, about.
+    """Return approximately the volume, in that of ``points``, between curved elements and those with straight edges.
 
-    A node in the middle of an edge bears a third of the area of each face that has it (exactly on triangles and on
-    quadrilaterals of eight nodes): the shape functions' integral there.
+    A node in the middle of an edge has a third of the area of each face with that edge (exactly on triangles and on
+    quadrilaterals of eight nodes): the integral of its shape function.
     """
     total = 0.0
     for side in sides(cells.kind.form):
@@ -57,14 +60,14 @@ def lost(cells: Cells, points: Floats) -> float:
 
 
 def _area(corners: Sequence[Floats]) -> Floats:
-    """(m, 3) of triangles or quadrilaterals, as a vector that points outwards."""
+    """Return (m, 3) area vectors of triangles or quadrilaterals, outward."""
     a, b, c, d = (*corners, corners[0])[:4]
     return np.asarray(0.5 * (np.cross(b - a, c - a) if len(corners) == 3 else np.cross(c - a, d - b)))
 
 
 def eight(nodes: Ids, points: Floats) -> Ids:
-    """(m, 8, 4) tets of each of the tets (m, 10): one at each corner, and four round one of three diagonals of what is
-    left: of that with the longest stable step, most often the shortest.
+    """Return (m, 8, 4) tets of each of the tets (m, 10): one at each corner, and four round one of three diagonals
+    of the octahedron between: the one with the longest stable step, most often the shortest.
     """
     every = np.stack([nodes[:, [*_CORNERS, *_inner(*long)]] for long in _LONG], axis=1)
     volume, area = volume_and_area(points, every)
@@ -74,7 +77,7 @@ def eight(nodes: Ids, points: Floats) -> Ids:
 
 
 def _inner(one: int, other: int) -> list[tuple[int, int, int, int]]:
-    """The tets round the diagonal between two nodes in the middle of edges, positive."""
+    """Return the tets round the diagonal between two nodes in the middle of edges, positive."""
     ring, found = [k for k in range(4, 10) if k not in (one, other)], []
     for p, q in combinations(ring, 2):
         volume = (np.cross(_AT[other] - _AT[one], _AT[p] - _AT[one]) * (_AT[q] - _AT[one])).sum()
@@ -84,7 +87,7 @@ def _inner(one: int, other: int) -> list[tuple[int, int, int, int]]:
 
 
 def refuse_halves(cells: Cells, tags: Ids) -> None:
-    """MeshError where two elements have an edge in common whose middle is another node in one of them."""
+    """Raise MeshError if two elements have a common edge with different middle nodes."""
     rows = np.concatenate([
         np.column_stack([np.sort(cells.corners[:, edge], axis=1), middle])
         for edge, middle in zip(cells.kind.edges, cells.middles.T, strict=True)

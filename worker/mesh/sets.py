@@ -1,4 +1,4 @@
-"""Sets of nodes and surfaces that a file names: what a case is ``on``."""
+"""Sets of nodes and surfaces in a file, to which a case refers by ``on``."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -13,20 +13,20 @@ from .model import Ids, Ints, NodeSet
 
 @dataclass(frozen=True, eq=False)
 class Named:
-    """A set as its file has it, by places of nodes in the whole file."""
+    """A set as it is in its file, with indices of nodes of the whole file."""
 
     names: tuple[str, ...]
-    """By which it may be called."""
+    """Names in a case."""
     nodes: Ids
-    """(k,) of a set of nodes."""
+    """(k,) nodes of a set of nodes."""
     faces: tuple[Ids, ...] | None = None
-    """Of a surface its triangles (n, 3) and quadrilaterals (n, 4), by their corners; None for a set of nodes."""
+    """Triangles (n, 3) and quadrilaterals (n, 4) of a surface, by their corners; None for a set of nodes."""
     free: bool = False
-    """Whether those faces alone are meant that are outer faces of the mesh."""
+    """Whether only those faces count that are outer faces of the mesh."""
 
 
 def surface(names: tuple[str, ...], faces: Iterable[Ids], free: bool = False) -> Named:
-    """A surface of faces (n, 3) and (n, 4), of which some of four corners may repeat one."""
+    """Return a surface of faces (n, 3) and (n, 4); faces of four corners may repeat one."""
     threes, fours = [np.zeros((0, 3), np.int64)], [np.zeros((0, 4), np.int64)]
     for each in faces:
         if each.shape[1] == 3:
@@ -40,7 +40,7 @@ def surface(names: tuple[str, ...], faces: Iterable[Ids], free: bool = False) ->
 
 
 def joined(names: tuple[str, ...], several: Sequence[Named]) -> Named:
-    """Sets of one kind as one."""
+    """Return the union of sets of one kind."""
     nodes = np.unique(np.concatenate([each.nodes for each in several]))
     if several[0].faces is None:
         return Named(names, nodes)
@@ -49,18 +49,18 @@ def joined(names: tuple[str, ...], several: Sequence[Named]) -> Named:
 
 
 class Members:
-    """What of the sets of a file belongs to a mesh."""
+    """The members of the sets of a file that are in a mesh."""
 
     def __init__(self, used: Ids, tets: Ints, edges: Ids) -> None:
-        """``used``: (n,) the place of each node in the file, ascending; ``tets``: (m, 4) of these. ``edges``: (k, 3)
-        places of two corners and of the node between them, where tets of ten nodes have become eight.
+        """``used``: (n,) the index of each node in the file, ascending; ``tets``: (m, 4) of these. ``edges``: (k, 3)
+        indices of two corners and of the node between them, if tets of ten nodes were cut into eight.
         """
         self._used = used
         self._outer = np.unique(np.sort(boundary_faces(tets), axis=1), axis=0)
         self._edges = edges[np.lexsort((edges[:, 1], edges[:, 0]))]
 
     def of(self, named: Named) -> NodeSet:
-        """The nodes of a set that are here, and the faces of a surface that are outer faces."""
+        """Return the nodes of a set that are in the mesh, and the faces of a surface that are outer faces."""
         if named.faces is None:
             nodes, there = self._indices(named.nodes)
             return NodeSet(named.names, np.unique(nodes[there]))
@@ -78,20 +78,20 @@ class Members:
         )
 
     def _indices(self, places: Ids) -> tuple[Ints, NDArray[np.bool_]]:
-        """Of nodes of the file in the mesh, and which are there."""
+        """Return the indices of nodes of the file in the mesh, and which are in it."""
         if not len(self._used):
             return np.zeros(places.shape, np.int32), np.zeros(places.shape, bool)
         found = np.minimum(np.searchsorted(self._used, places), len(self._used) - 1)
         return found.astype(np.int32), self._used[found] == places
 
     def _whole(self, faces: Ids) -> Ids:
-        """Those all of whose corners are there; each once."""
+        """Return the faces with all corners in the mesh; each once."""
         there = self._indices(faces)[1].all(axis=1)
         _, first = np.unique(np.sort(faces[there], axis=1), axis=0, return_index=True)
         return faces[there][np.sort(first)]
 
     def _parted(self, faces: Ids) -> tuple[Ints, NDArray[np.bool_]]:
-        """(n, k, 3) the triangles of each face, and whether all of these are outer faces of the mesh."""
+        """Return (n, k, 3) the triangles of each face, and whether all of them are outer faces of the mesh."""
         if faces.shape[1] == 4:
             ways = [halves(faces).reshape(-1, 2, 3), _other_halves(faces)]
         else:
@@ -111,14 +111,14 @@ class Members:
         return np.asarray(known[of[len(self._outer) :]].reshape(triangles.shape[:2]).all(axis=1))
 
     def _quarters(self, faces: Ids) -> Ids:
-        """(n, 4, 3) the triangles of faces whose edges have a node in their middle."""
+        """Return (n, 4, 3) the triangles of faces whose edges have a node in their middle."""
         a, b, c = faces.T
         p, q, r = (self._middle(one, other) for one, other in ((a, b), (b, c), (c, a)))
         rows = [(a, p, r), (p, b, q), (r, q, c), (p, q, r)]
         return np.stack([np.stack(row, axis=1) for row in rows], axis=1)
 
     def _middle(self, one: Ids, other: Ids) -> Ids:
-        """(n,) the nodes between nodes; one of these where there is none."""
+        """Return (n,) the nodes between pairs of nodes; one of the pair if there is none."""
         low, high = np.minimum(one, other), np.maximum(one, other)
         every = np.concatenate([self._edges[:, :2], np.column_stack([low, high])])
         _, of = np.unique(every, axis=0, return_inverse=True)
@@ -130,14 +130,14 @@ class Members:
 
 
 def _other_halves(quads: Ids) -> Ids:
-    """(n, 2, 3) the triangles of quadrilaterals by their other diagonal, as where a tet has one of them for a face."""
+    """Return (n, 2, 3) the triangles of quadrilaterals by their other diagonal, for tets with such a face."""
     odd = (quads.argmin(axis=1) % 2 == 0)[:, None]
     rolled = np.where(odd, np.roll(quads, -1, axis=1), quads)
     return rolled[:, [[0, 1, 2], [0, 2, 3]]]
 
 
 def members(named: Sequence[Named], used: Ids, tets: Ints, edges: Ids) -> tuple[NodeSet, ...]:
-    """The sets of a file as far as they are in a mesh (see ``Members``)."""
+    """Return the sets of a file restricted to a mesh (see ``Members``)."""
     if not named:
         return ()
     here = Members(used, tets, edges)

@@ -1,4 +1,4 @@
-"""Parts that are taken from one file and have nodes of it in common: they would come apart where it joins them."""
+"""Parts from one file with common nodes: without a bond they would separate there."""
 
 from collections.abc import Iterator, Sequence
 from itertools import combinations
@@ -11,14 +11,14 @@ from conoid.cases.model.schema import Case
 from .model import Floats, Ids, Origin
 
 _SAME = 1e-9
-"""Of the largest coordinate: nodes nearer than this are at one place. Chosen: rounding is a millionth of it."""
+"""Share of the largest coordinate: nodes nearer than this coincide. Chosen: round-off in files is a millionth."""
 
 Placed = tuple[int, Origin, Floats]
-"""Number of a part, where its mesh comes from, and its nodes (n, 3), m, as its part turns them."""
+"""Number of a part, origin of its mesh, and its nodes (n, 3), m, after the rotation of the part."""
 
 
 def shared_nodes(case: Case, parts: Sequence[Placed]) -> Iterator[str]:
-    """A line for every two parts of different bodies that share nodes of a file and have them at the same place."""
+    """Return an error for every two parts of different bodies that share coincident nodes of a file."""
     body = bodies(case)
     for (i, one, x), (j, other, y) in combinations(parts, 2):
         if body[i] == body[j]:
@@ -28,7 +28,7 @@ def shared_nodes(case: Case, parts: Sequence[Placed]) -> Iterator[str]:
 
 
 def same_places(one: Origin, x: Floats, other: Origin, y: Floats) -> tuple[Ids, Ids]:
-    """The nodes of two meshes, by their places in either, that have one number in one file and are at one place."""
+    """Return the nodes of two meshes, by their indices in each, that have one number in one file and coincide."""
     if one.file != other.file:
         return np.zeros(0, np.int64), np.zeros(0, np.int64)
     _, p, q = np.intersect1d(one.nodes, other.nodes, return_indices=True)

@@ -1,4 +1,4 @@
-"""Where the nodes of a body may go without changing its shape: nodes of a flat face in it, of a round one along it."""
+"""Constraints that keep the shape of a body when nodes move: nodes of a flat face stay in it, of a round one on it."""
 
 from dataclasses import dataclass
 from typing import Self
@@ -14,13 +14,14 @@ from .frame import block
 from .model import Floats, TetMesh
 
 _NEAR = 1e-9
-"""Nodes this near to a surface of the body, in lengths that ``scale`` makes of order one, are on it."""
+"""Largest distance of a node on a surface of the body, in lengths that ``scale`` makes of order one."""
 
 
 @dataclass(frozen=True)
 class Skin:
-    """``held``: (n, 3), coordinates that a node keeps. ``radius``: (n,), distance that it keeps from the axis (the
-    centre for a sphere), 0 for none. ``round``: how many of a, b, c that distance is made of."""
+    """``held``: (n, 3), fixed coordinates of a node. ``radius``: (n,), fixed distance from the axis (the centre for
+    a sphere), 0 for none. ``round``: number of the coordinates a, b, c that this distance is made of.
+    """
 
     held: NDArray[np.bool_]
     radius: Floats
@@ -28,7 +29,9 @@ class Skin:
 
     @classmethod
     def of(cls, body: Generated, mesh: TetMesh, scale: float) -> tuple[Self, Floats]:
-        """The skin of a ``mesh`` in the body's frame, lengths over ``scale``, and its points, put exactly on it."""
+        """Return the skin of a ``mesh`` in the body's frame, lengths over ``scale``, and its points, projected onto
+        it.
+        """
         points, round_in = mesh.points.copy(), 3 if isinstance(body, Sphere) else 2
         skin = np.zeros(len(points), bool)
         skin[boundary_faces(mesh.tets)] = True
@@ -44,11 +47,11 @@ class Skin:
         return cls(held, radius, round_in), points
 
     def movable(self, node: int) -> bool:
-        """Whether ``node`` can go anywhere at all."""
+        """Return whether ``node`` can move."""
         return int(self.held[node].sum()) + int(self.radius[node] > 0) < 3
 
     def allowed(self, node: int, start: Floats, places: Floats) -> Floats:
-        """The places (k, 3) nearest to ``places`` that ``node``, now at ``start``, may take."""
+        """Return the allowed positions (k, 3) of ``node``, now at ``start``, nearest to ``places``."""
         places = np.where(self.held[node], start, places)
         if self.radius[node] > 0:
             places[:, : self.round] *= (self.radius[node] / np.linalg.norm(places[:, : self.round], axis=1))[:, None]
@@ -56,7 +59,7 @@ class Skin:
 
 
 def _planes(body: Generated) -> dict[int, tuple[float, ...]]:
-    """The flat faces of a body: for each direction, where they stand, m."""
+    """Return the flat faces of a body: their positions, m, for each direction."""
     low, high = block(body)
     if isinstance(body, Box | Plate):
         return {i: (low[i], high[i]) for i in range(3)}

@@ -1,4 +1,4 @@
-"""A crack that is there from the start: the nodes on it are doubled, so that the faces on both sides are exposed."""
+"""Initial cracks: the nodes on a slit are doubled, so that the faces on both sides are exposed."""
 
 import numpy as np
 
@@ -8,13 +8,13 @@ from conoid.cases.shapes.geometry import across, bounds, index
 from .model import TetMesh
 
 _NEAR = 1e-6
-"""Of the element size: closer than this is on a plane."""
+"""Share of the element size within which a node is on a plane."""
 
 
 def opened(body: Box | Plate, mesh: TetMesh) -> TetMesh:
-    """The mesh with the nodes of the body's slit doubled; the copies belong to the tets on the positive side.
+    """Return the mesh with the nodes of the body's slit doubled; the copies belong to the tets on the positive side.
 
-    Nodes on the border of the slit keep both sides together, unless that border lies on the surface of the body.
+    Nodes on the border of the slit keep both sides together, unless that border is on the surface of the body.
     """
     slit = body.slit
     if slit is None:

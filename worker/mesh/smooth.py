@@ -1,7 +1,7 @@
-"""Moves nodes away from where they hold the time step down.
+"""Smoothing of the tets that limit the time step.
 
-An explicit run pays for its worst tet in every step. The tets with the shortest step length are taken in turn, worst
-first; one of their nodes is moved along the gradient of that length as far as the worst tet around the node gains.
+An explicit run pays for its worst tet in every step. The tets with the shortest step length are processed worst
+first; one of their nodes is moved along the gradient of that length as far as the worst tet at the node improves.
 Nodes on the boundary slide along it, so the body keeps its shape.
 """
 
@@ -13,31 +13,32 @@ import numpy as np
 from .model import Floats, Ids, TetMesh, step_lengths
 
 _MOVES = np.array([0.6, 0.3, 0.15, 0.07, 0.03])
-"""Tried moves, in step lengths of the worst tet."""
+"""Lengths of the tried moves, over the step length of the worst tet."""
 
 _GAIN = 1.01
-"""A move counts when the worst tet around the node grows by this factor."""
+"""Smallest factor of improvement of the worst tet at the node for which a move is made."""
 
 
 _MOST, _PATIENCE = 10_000, 4
-"""How many tets are looked at: in all, and for each one that starts too low."""
+"""Largest number of tets that are processed: in all, and for each one that starts too low."""
 
 _AHEAD = 1.25
-"""Tets that are this much better than one that cannot be helped are left alone: the time step is lost already."""
+"""Ratio to the step length of a tet that cannot be improved above which tets are not processed: the time step is
+limited already."""
 
 
 class Slides(Protocol):
-    """Where the nodes of a body may go without changing its shape."""
+    """Constraints on the nodes that keep the shape of a body."""
 
     def movable(self, node: int) -> bool:
-        """Whether ``node`` can go anywhere at all."""
+        """Return whether ``node`` can move."""
 
     def allowed(self, node: int, start: Floats, places: Floats) -> Floats:
-        """The places (k, 3) nearest to ``places`` that ``node``, now at ``start``, may take."""
+        """Return the allowed positions (k, 3) of ``node``, now at ``start``, nearest to ``places``."""
 
 
 def smoothed(mesh: TetMesh, skin: Slides, wanted: float) -> TetMesh:
-    """The mesh with step lengths below ``wanted``, m, raised where possible within a bounded number of moves."""
+    """Return the mesh with step lengths below ``wanted``, m, raised where possible within a bounded number of moves."""
     work = _Smoothing(mesh, skin, wanted)
     waiting = [(length, tet) for tet, length in enumerate(work.lengths.tolist()) if length < wanted]
     heapq.heapify(waiting)
@@ -55,7 +56,7 @@ def smoothed(mesh: TetMesh, skin: Slides, wanted: float) -> TetMesh:
 
 
 class _Smoothing:
-    """Points that move, and the step lengths that follow."""
+    """Moving points, and their step lengths."""
 
     def __init__(self, mesh: TetMesh, skin: Slides, wanted: float) -> None:
         self.points = mesh.points.copy()
@@ -67,7 +68,7 @@ class _Smoothing:
         self.first = np.concatenate([[0], np.cumsum(np.bincount(mesh.tets.ravel(), minlength=len(mesh.points)))])
 
     def raise_tet(self, tet: int) -> Ids:
-        """Moves one node of ``tet`` if that helps; the tets around that node, which have changed."""
+        """Move one node of ``tet`` if it improves the worst tet; return the changed tets at that node."""
         for node in self.tets[tet].tolist():
             if self.skin.movable(node):
                 star = self.by_node[self.first[node] : self.first[node + 1]]
@@ -90,14 +91,14 @@ class _Smoothing:
         return True
 
     def _slope(self, node: int, tet: int, small: float) -> Floats:
-        """Gradient of the step length of ``tet`` with the place of ``node``, by central differences."""
+        """Return the gradient of the step length of ``tet`` in the position of ``node``, by central differences."""
         shifts = small * np.concatenate([np.eye(3), -np.eye(3)])
         lengths = self._lengths_at(node, np.array([tet]), self.points[node] + shifts)[:, 0]
         slope: Floats = (lengths[:3] - lengths[3:]) / (2 * small)
         return slope
 
     def _lengths_at(self, node: int, tets: Ids, places: Floats) -> Floats:
-        """(k, s) step lengths of the s ``tets`` if ``node`` were at each of the k ``places``."""
+        """Return (k, s) step lengths of the s ``tets`` for ``node`` at each of the k ``places``."""
         corners = np.repeat(self.points[self.tets[tets]][None], len(places), axis=0)
         corners[:, self.tets[tets] == node] = places[:, None]
         return step_lengths(corners.reshape(-1, 3), np.arange(corners.size // 3).reshape(*corners.shape[:2], 4))

@@ -1,4 +1,4 @@
-"""From the elements of a file to a mesh of tets: one for all formats."""
+"""Conversion of the elements of a file into a mesh of tets, the same for all formats."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,28 +14,28 @@ from .second_order import Way
 from .sets import Named, members
 
 _SEEN = 1e-6
-"""Of the volume: less is not told. Chosen: what rounding of coordinates to six digits makes."""
+"""Share of the volume below which no note is given. Chosen: the round-off of coordinates with six digits."""
 
 
 @dataclass(frozen=True, eq=False)
 class Content:
-    """What a reader takes of a file, in its unit."""
+    """Data that a reader takes from a file, in the unit of the file."""
 
     tags: Ids
-    """(n,) what the file calls its nodes, for messages."""
+    """(n,) numbers of the nodes in the file, for messages."""
     points: Floats
-    """(n, 3)."""
+    """(n, 3) positions."""
     cells: list[Cells]
-    """Elements with a volume, by places in these arrays; the order of places decides how faces are cut."""
+    """Volume elements, by indices into these arrays; the order of indices decides how faces are cut."""
     named: list[Named] = field(default_factory=list)
     notes: tuple[str, ...] = ()
     included: tuple[Path, ...] = ()
-    """Other files that were read for it."""
+    """Further files that were read for it."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Tets:
-    """Tets, each of an element."""
+    """Tets with their elements."""
 
     nodes: Ids
     numbers: Ids
@@ -43,16 +43,15 @@ class _Tets:
     middles: Floats = field(default_factory=lambda: np.zeros((0, 3)))
     """(j, 3) nodes behind those of the file."""
     of: Ids = field(default_factory=lambda: np.zeros(0, np.int64))
-    """(j,) the element in whose middle each is."""
+    """(j,) element of each middle node."""
 
 
 def solid(content: Content, way: Way | None = None) -> NamedMesh:
-    """The mesh of all elements, positive tets that meet face to face, not yet checked. ``way``: of tets of ten nodes.
-
-    Raises MeshError for an element that is inverted, flat or too distorted.
+    """Return the mesh of all elements, positive tets that meet face to face, not yet checked. ``way``: cut of tets
+    of ten nodes. Raises MeshError for an element that is inverted, flat or too distorted.
     """
     tets = [each for each in content.cells if each.kind.form is Form.TET]
-    chosen, told = _ordered(content, tets, way)
+    chosen, remarks = _ordered(content, tets, way)
     some = bricks.bricks(content.cells)
     cut = bricks.cut_up(some, bricks.triangles_of(content.cells), content.points)
     made = [
@@ -60,10 +59,10 @@ def solid(content: Content, way: Way | None = None) -> NamedMesh:
         _Tets(cut.tets, some.numbers[cut.owner], some.lines[cut.owner], cut.middles, some.numbers[cut.of]),
     ]
     edges = _edges(tets) if chosen == "eight" else np.zeros((0, 3), np.int64)
-    told += bricks.told_of_middles(content.cells, content.points, content.tags)
+    remarks += bricks.notes_of_middles(content.cells, content.points, content.tags)
     volume = float(volume_and_area(np.concatenate([content.points, cut.middles]), cut.tets)[0].sum())
-    told += bricks.told(some, cut, content.points, volume)
-    return _gathered(content, made, edges, (*content.notes, *told))
+    remarks += bricks.notes_of_cut(some, cut, content.points, volume)
+    return _gathered(content, made, edges, (*content.notes, *remarks))
 
 
 def _gathered(content: Content, made: list[_Tets], edges: Ids, notes: tuple[str, ...]) -> NamedMesh:
@@ -84,7 +83,7 @@ def _gathered(content: Content, made: list[_Tets], edges: Ids, notes: tuple[str,
 
 
 def _ordered(content: Content, tets: list[Cells], way: Way | None) -> tuple[Way, list[str]]:
-    """What becomes of tets of ten nodes, and what the user should know of it."""
+    """Return the tets that tets of ten nodes become, and notes for the user."""
     curved = [each for each in tets if each.kind.edges and len(each.numbers)]
     if not curved:
         return "corners", []
@@ -100,10 +99,10 @@ def _ordered(content: Content, tets: list[Cells], way: Way | None) -> tuple[Way,
     more = sum(second_order.lost(each, content.points) for each in curved)
     share = more / (straight + more) if straight + more > 0 else 0.0
     chosen: Way = way or ("eight" if abs(share) > second_order.LOST and not others else "corners")
-    return chosen, [_told(sum(len(each.numbers) for each in curved), share, chosen, way is None and not others)]
+    return chosen, [_note(sum(len(each.numbers) for each in curved), share, chosen, way is None and not others)]
 
 
-def _told(many: int, share: float, chosen: Way, free: bool) -> str:
+def _note(many: int, share: float, chosen: Way, free: bool) -> str:
     loss = f"{100 * abs(share):.2g} % {'less' if share >= 0 else 'more'} volume than the curved elements"
     if chosen == "eight":
         what = f"eight tets of 4 nodes each; their corners alone would have {loss}"
@@ -123,13 +122,13 @@ def _tets(cells: Cells, points: Floats, tags: Ids, way: Way) -> _Tets:
 
 
 def _sorted(cells: Cells) -> Ids:
-    """(m, 6) the nodes in the middle of edges in the order of ``TET10``."""
+    """Return (m, 6) the nodes in the middle of edges in the order of ``TET10``."""
     places = {frozenset(edge): k for k, edge in enumerate(cells.kind.edges)}
     return cells.middles[:, [places[frozenset(edge)] for edge in TET10.edges]]
 
 
 def _edges(tets: list[Cells]) -> Ids:
-    """(k, 3) two corners, ascending, and the node between them."""
+    """Return (k, 3) two corners, ascending, and the node between them."""
     rows = [
         np.column_stack([np.sort(each.corners[:, edge], axis=1), middle])
         for each in tets

@@ -1,4 +1,4 @@
-"""The files that a mesh is made of: where they are, and which bytes they have."""
+"""Files of a mesh: their paths and their hashes."""
 
 import hashlib
 from collections.abc import Mapping
@@ -18,12 +18,14 @@ Sources = Mapping[str, Path]
 
 
 def sources(mesh: Mesh, folder: Path, key: str) -> dict[str, Path]:
-    """The files of the mesh at ``key`` whose case is in ``folder``. MeshError where one is not there."""
+    """Return the files of the mesh at ``key`` whose case is in ``folder``. Raises MeshError for a missing file."""
     return {named: _there(file, folder, named) for named, file in _named(mesh, key)}
 
 
 def digests(mesh: Mesh, found: Sources, key: str) -> list[str]:
-    """How each file ends and its sha256; MeshError where one is not the file that was meant."""
+    """Return the suffix of each file and its sha256. Raises MeshError for a file with another hash than given in the
+    case.
+    """
     return [f"{found[named].suffix.lower()} {_digest(found[named], file, named)}" for named, file in _named(mesh, key)]
 
 
@@ -32,7 +34,7 @@ def _named(mesh: Mesh, key: str) -> list[tuple[str, File]]:
 
 
 def below(key: str, place: Place) -> str:
-    """The key of a table below another one."""
+    """Return the key of a table below another one."""
     return f"{key}.{dotted(place)}" if place else key
 
 

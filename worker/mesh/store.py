@@ -1,4 +1,6 @@
-"""A mesh as an .npz file: written beside its place and renamed, so that a reader never meets half of one."""
+"""Storage of a mesh as an .npz file, which is written under another name and renamed: readers find complete files
+only.
+"""
 
 import os
 import tempfile
@@ -14,7 +16,7 @@ from .model import Ints, NodeSet, Origin, TetMesh
 
 
 def save(mesh: TetMesh, path: Path) -> None:
-    """Writes ``path``. Raises OSError when that is not possible."""
+    """Write ``path``. Raises OSError."""
     handle, name = tempfile.mkstemp(dir=path.parent, prefix=".writing-", suffix=".npz")
     try:
         with os.fdopen(handle, "wb") as file:
@@ -28,7 +30,7 @@ def save(mesh: TetMesh, path: Path) -> None:
 
 
 def load(path: Path) -> TetMesh | None:
-    """The mesh in ``path``; None when there is none, or when the file is damaged (every array has a checksum)."""
+    """Return the mesh in ``path``; None if there is none, or the file is damaged (every array has a checksum)."""
     try:
         with path.open("rb") as file, np.load(file, allow_pickle=False) as arrays:
             return TetMesh(arrays["points"], arrays["tets"], _origin(arrays), _sets(arrays))
@@ -51,7 +53,7 @@ def _origin(arrays: Mapping[str, NDArray[Any]]) -> Origin | None:
 
 
 def _of_sets(sets: tuple[NodeSet, ...]) -> dict[str, Any]:
-    """All sets in few arrays; a set of nodes has -1 faces."""
+    """Return all sets in few arrays; a set of nodes has -1 faces."""
     if not sets:
         return {}
     faces = [_no_faces() if each.faces is None else each.faces for each in sets]

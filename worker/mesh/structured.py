@@ -1,4 +1,4 @@
-"""The regular meshes kept for verification: hexahedra cut into 5 or 6 tets, in plain numpy.
+"""Regular meshes for verification: hexahedra cut into 5 or 6 tets, in plain numpy.
 
 A block is cut by planes. A solid cylinder is a square grid, mapped to the disk, times planes. A tube is rings times
 sectors times planes. ``element_size`` is rounded to whole divisions, at least one.
@@ -26,7 +26,7 @@ Lines = NDArray[np.int64]
 
 
 def structured(body: Generated, key: str = "mesh") -> TetMesh:
-    """The regular mesh of a body, all but a sphere; MeshError, naming ``key``."""
+    """Return the regular mesh of a body, except a sphere. Raises MeshError, naming ``key``."""
     refuse_impossible(body, key)
     if body.grading is not None:
         raise MeshError(f"{key}.grading: the structured generator has one element size; remove it, or use gmsh")
@@ -48,15 +48,16 @@ def structured(body: Generated, key: str = "mesh") -> TetMesh:
 
 
 def divisions(length: float, size: float) -> int:
-    """How many cells of about ``size`` lie along ``length``."""
+    """Return the number of cells of about ``size`` along ``length``."""
     return max(1, round(length / size))
 
 
 def disk(u: Floats, v: Floats) -> tuple[Floats, Floats]:
-    """The square [-1, 1]^2 on the unit disk: squares become circles, cut into equal angles (Shirley and Chiu 1997).
+    """Return the square [-1, 1]^2 mapped to the unit disk: squares become circles, cut into equal angles (Shirley and
+    Chiu 1997).
 
-    Areas keep their ratio everywhere. The square's corners become smooth, so a cell there needs its diagonal through
-    the corner: ``_mirrored`` sees to it.
+    The ratio of areas is the same everywhere. The square's corners become smooth, so a cell there needs its diagonal
+    through the corner, which ``_mirrored`` provides.
     """
     x, y = np.abs(u), np.abs(v)
     radius, less = np.maximum(x, y), np.minimum(x, y)
@@ -97,7 +98,7 @@ def _tube(body: Tube) -> tuple[Floats, list[int], list[Cells]]:
 
 
 def _circle(step: Lines, n: int) -> Floats:
-    """Cosine of ``step`` quarter turns / n, with exact zeros and ones."""
+    """Return the cosine of ``step`` quarter turns / n, with exact zeros and ones."""
     turn, rest = np.divmod(step, n)
     sine, cosine = sines_and_cosines(np.pi / 2 * rest / n)
     return np.choose(turn % 4, [cosine, -sine, -cosine, sine]) + 0.0
@@ -113,14 +114,16 @@ def _plain(count: int) -> Cells:
 
 
 def _mirrored(line: Lines) -> Cells:
-    """Cells of a line of node numbers around 0: near is the end closer to 0, so that the sides are mirror images."""
+    """Return cells of a line of node numbers around 0: near is the end closer to 0, so that both sides are mirror
+    images.
+    """
     low, high = np.arange(len(line) - 1), np.arange(1, len(line))
     inside = line[:-1] >= 0
     return np.where(inside, low, high), np.where(inside, high, low)
 
 
 def _cut(shape: list[int], cells: list[Cells], split: int) -> Ints:
-    """(m, 4) tets of all cells. Corner p + 2 q + 4 r of a cell is far along a, b, c where p, q, r is 1."""
+    """Return (m, 4) tets of all cells. Corner p + 2 q + 4 r of a cell is far along a, b, c if p, q, r is 1."""
     strides = (shape[1] * shape[2], shape[2], 1)
     ends = [[end * stride for end in cell] for cell, stride in zip(cells, strides, strict=True)]
     corner = [
@@ -141,13 +144,15 @@ def _cut(shape: list[int], cells: list[Cells], split: int) -> Ints:
 
 
 def _odd(numbers: list[Lines]) -> NDArray[np.bool_]:
-    """For each cell, whether its three numbers, one a direction, have an odd sum."""
+    """Return for each cell whether its three numbers, one a direction, have an odd sum."""
     a, b, c = np.ix_(*numbers)
     return np.asarray((a + b + c) % 2 == 1).ravel()
 
 
 def _six() -> list[tuple[int, int, int, int]]:
-    """The six ways from corner 0 to corner 7, one direction after the other (Kuhn): all share the long diagonal."""
+    """Return the six paths from corner 0 to corner 7, one direction after the other (Kuhn): all share the long
+    diagonal.
+    """
     tets = []
     for first, second, third in itertools.permutations((1, 2, 4)):
         even = (first, second, third) in ((1, 2, 4), (2, 4, 1), (4, 1, 2))

@@ -1,6 +1,6 @@
-"""Bodies meshed together, so that parts that touch have the nodes of their interface in common. In the child process.
+"""Meshing of several bodies together, with common nodes at their interfaces. It runs in the child process.
 
-OpenCASCADE cuts the bodies with each other (fragments): a face of two bodies is one face, and has one mesh. Each part
+OpenCASCADE cuts the bodies with each other (fragments): a face of two bodies is one face, with one mesh. Each part
 has its element size in its own volume, the smaller one at the interface.
 """
 
@@ -34,29 +34,29 @@ from .sources import Sources
 from .unstructured import draw
 
 _TURN = 2.0 * math.pi / 3.0
-"""About the line x = y = z: x becomes y, y becomes z, z becomes x."""
+"""Rotation about the line x = y = z: x becomes y, y becomes z, z becomes x."""
 
 _Solid = Cad | Combination
 Joint = Generated | _Solid
-"""What can be meshed together with others."""
+"""Bodies that can be meshed together."""
 
 
 @dataclass(frozen=True)
 class _Model:
-    """What is drawn into the current model of ``gmsh``."""
+    """Bodies drawn into the current model of ``gmsh``."""
 
     gmsh: Any
     bodies: Mapping[str, Joint]
-    """By the keys of their meshes."""
+    """Bodies by the keys of their meshes."""
     frame: Frame
-    """Of all: x, y, z from the origin."""
+    """Frame of all bodies: x, y, z from the origin."""
     volumes: Sequence[Sequence[int]]
     """Numbers of the volumes of each body."""
 
 
 def together(bodies: Mapping[str, Joint], sources: Sources, name: str) -> list[TetMesh]:
-    """The meshes of ``bodies``, by the keys of their meshes, of nodes of one numbering: ``name`` stands for the file
-    that they come from. MeshError, naming a key, when gmsh cannot make them.
+    """Return the meshes of ``bodies``, by the keys of their meshes, with nodes of one numbering; ``name``: the file
+    of their origin. Raises MeshError, naming a key, if gmsh cannot make them.
     """
     for key, body in bodies.items():
         if not isinstance(body, _Solid):
@@ -73,14 +73,14 @@ def together(bodies: Mapping[str, Joint], sources: Sources, name: str) -> list[T
 
 
 def _scale(gmsh: Any, bodies: Mapping[str, Joint], sources: Sources) -> float:
-    """About the extent of all, from which lengths are scaled."""
+    """Return approximately the extent of all bodies, the scale of lengths."""
     known = [corners for body in bodies.values() if not isinstance(body, _Solid) and (corners := bounds(body))]
     sizes = [extent(gmsh, body, sources, key) for key, body in bodies.items() if isinstance(body, _Solid)]
     return scale_of(max([*sizes, *np.ptp(np.array(known).reshape(-1, 3), axis=0).tolist()] if known else sizes))
 
 
 def _drawn(gmsh: Any, body: Joint, scale: float, sources: Sources, key: str) -> Solids:
-    """The volumes of a body where it lies in space, lengths over ``scale``."""
+    """Draw a body in its position in space, lengths over ``scale``; return its volumes."""
     occ, start = gmsh.model.occ, body.centre if isinstance(body, _Solid) else centre(body)
     before = set(occ.getEntities(3))
     if isinstance(body, _Solid):
@@ -98,14 +98,16 @@ def _drawn(gmsh: Any, body: Joint, scale: float, sources: Sources, key: str) -> 
 
 
 def _cuts(body: Joint, frame: Frame) -> list[Cut]:
-    """The planes on which a body is cut, in the frame of all."""
+    """Return the planes on which a body is cut, in the frame of all bodies."""
     start = body.centre if isinstance(body, _Solid) else centre(body)
     across = cut_by(body.sector, body.axis) if isinstance(body, _Solid) else cut_directions(body, body.axis)
     return [(d, start[d] / frame.scale) for d in across]
 
 
 def _fragments(occ: Any, drawn: list[Solids], keys: list[str]) -> list[list[int]]:
-    """Numbers of the volumes of each body, cut so that they have faces in common. MeshError where two overlap."""
+    """Return the numbers of the volumes of each body, cut so that they have faces in common. Raises MeshError if two
+    overlap.
+    """
     every = [(of, each) for of, made in enumerate(drawn) for each in made]
     entities = [each for _, each in every]
     _, became = occ.fragment(entities[:1], entities[1:])
@@ -118,7 +120,7 @@ def _fragments(occ: Any, drawn: list[Solids], keys: list[str]) -> list[list[int]
 
 
 def _sizes(model: _Model) -> None:
-    """The element size of each body in its volumes."""
+    """Set the element size of each body in its volumes."""
     gmsh, frame = model.gmsh, model.frame
     field, own, sizes = gmsh.model.mesh.field, [], list[float]()
     for body, tags in zip(model.bodies.values(), model.volumes, strict=True):
@@ -135,7 +137,7 @@ def _sizes(model: _Model) -> None:
 
 
 def _size(gmsh: Any, body: Joint, frame: Frame) -> int:
-    """The number of the field of a body's element size: one number, or by its grading."""
+    """Return the number of the field of a body's element size: one value, or by its grading."""
     if body.grading is not None:
         return graded(gmsh, body.element_size, body.grading, frame)
     field = gmsh.model.mesh.field
@@ -145,7 +147,7 @@ def _size(gmsh: Any, body: Joint, frame: Frame) -> int:
 
 
 def _part(model: _Model, made: TetMesh, names: Names, k: int, name: str) -> TetMesh:
-    """Body ``k``: its tets of all that are ``made``, whose nodes and tets gmsh calls ``names``."""
+    """Return the mesh of body ``k`` from all tets that are ``made``; ``names``: gmsh's numbers of nodes and tets."""
     elements = [model.gmsh.model.mesh.getElements(3, tag)[1] for tag in model.volumes[k]]
     own = np.concatenate([np.concatenate(each).astype(np.int64) for each in elements if len(each)])
     nodes, tets = np.unique(made.tets[np.isin(names.tets, own)], return_inverse=True)
@@ -154,7 +156,7 @@ def _part(model: _Model, made: TetMesh, names: Names, k: int, name: str) -> TetM
 
 
 def _notes(model: _Model, k: int) -> list[str]:
-    """What the user should know of a body of which only the mesh tells the sizes."""
+    """Return notes about a body whose sizes are known from the mesh only."""
     key, body = list(model.bodies.items())[k]
     if not isinstance(body, _Solid):
         return []

@@ -15,17 +15,17 @@ from .faces import normals
 from .model import Floats, Ids, Ints
 
 _MOST = 20_000
-"""Faces within the box round a generated body that are looked at. Chosen: half a second."""
+"""Largest number of faces within the box round a generated body that are tested. Chosen: half a second."""
 
 Surface = tuple[Floats, Ints]
 """Nodes (n, 3), m, and faces (k, 3), outward."""
 
 
 def touches(case: Case, surfaces: Mapping[int, Surface]) -> Iterator[Touch]:
-    """The pairs of parts that touch without a bond, of which at least one has a mesh from a file: ``surfaces`` of these
-    by part.
+    """Yield the pairs of parts that touch without a bond, of which at least one has a mesh from a file; ``surfaces``:
+    of these by part.
 
-    Two meshes from files touch where faces have the same corners; with a generated body all faces that lie on it count.
+    Two meshes from files touch in faces with the same corners; with a generated body all faces on its surface count.
     """
     for (i, one), (j, other) in combinations(surfaces.items(), 2):
         if not bonded(case, i, j) and (area := _matched(one, other)):
@@ -39,7 +39,7 @@ def touches(case: Case, surfaces: Mapping[int, Surface]) -> Iterator[Touch]:
 
 
 def _matched(one: Surface, other: Surface) -> float:
-    """Area, m^2, of the faces that both surfaces have."""
+    """Return the area, m^2, of the faces that both surfaces have."""
     grain = NEAR * max(float(np.ptp(points, axis=0).max()) for points, _ in (one, other))
     keys = [_corners(points, faces, grain) for points, faces in (one, other)]
     unique = [np.unique(key, axis=0, return_index=True) for key in keys]
@@ -50,14 +50,14 @@ def _matched(one: Surface, other: Surface) -> float:
 
 
 def _corners(points: Floats, faces: Ints, grain: float) -> Ids:
-    """(k, 9) corners of faces in whole grains, in one order."""
+    """Return (k, 9) corners of faces in integer multiples of the tolerance, in one order."""
     cells = np.floor(points / grain + 0.5).astype(np.int64)[faces]
     order = np.lexsort((cells[..., 2], cells[..., 1], cells[..., 0]), axis=1)
     return np.take_along_axis(cells, order[..., None], axis=1).reshape(len(faces), 9)
 
 
 def _lying(surface: Surface, body: Placed) -> float:
-    """Area, m^2, of the faces behind which a generated body begins."""
+    """Return the area, m^2, of the faces that are on the surface of a generated body."""
     points, faces = surface
     margin = NEAR * min(size(body), float(np.ptp(points, axis=0).max()))
     centres, across = points[faces].mean(axis=1), normals(points, faces)

@@ -1,6 +1,6 @@
-"""Unstructured meshes of the primitives, through gmsh (OpenCASCADE bodies, HXT Delaunay). Runs in the child process.
+"""Unstructured meshes of the primitives by gmsh (OpenCASCADE bodies, HXT Delaunay). They are made in the child process.
 
-HXT with an optimisation threshold of 0.45, then ``smooth``, was the best of what was tried: Delaunay and frontal
+HXT with an optimisation threshold of 0.45, then ``smooth``, was the best of all settings tried: Delaunay and frontal
 with the Netgen optimiser left worse tets and took two to four times as long. One thread and a fixed seed: the same
 request gives the same bits.
 """
@@ -25,7 +25,7 @@ from .smooth import smoothed
 
 
 def unstructured(body: Generated, key: str = "mesh") -> TetMesh:
-    """The gmsh mesh of a body. MeshError, naming ``key``, when gmsh cannot make it."""
+    """Return the gmsh mesh of a body. Raises MeshError, naming ``key``, if gmsh cannot make it."""
     if isinstance(body, Revolved | RingSector):
         return primitive(body, key)
     refuse_impossible(body, key)
@@ -45,7 +45,7 @@ def unstructured(body: Generated, key: str = "mesh") -> TetMesh:
 
 
 def draw(gmsh: Any, body: Generated, scale: float) -> None:
-    """The body in its frame, lengths over ``scale``: gmsh's tolerances are absolute."""
+    """Draw the body in its frame, lengths over ``scale``: gmsh's tolerances are absolute."""
     if isinstance(body, Plate | Cylinder | Tube | Sphere) and body.aligned and body.sector != "quarter":
         _draw_quarters(gmsh, body, scale)
     elif isinstance(body, Box | Plate):
@@ -60,8 +60,8 @@ def draw(gmsh: Any, body: Generated, scale: float) -> None:
 
 
 def _draw_quarters(gmsh: Any, body: Plate | Cylinder | Tube | Sphere, scale: float) -> None:
-    """A half or a whole of a quarter and its images, which share their faces: gmsh puts nodes on these faces and on the
-    axis, most of which smoothing leaves near them.
+    """Draw a half or a whole body as a quarter and its images, with common faces: gmsh puts nodes on these faces and
+    on the axis, most of which smoothing leaves near them.
     """
     occ = gmsh.model.occ
     draw(gmsh, body.model_copy(update={"sector": "quarter"}), scale)
@@ -74,7 +74,9 @@ def _draw_quarters(gmsh: Any, body: Plate | Cylinder | Tube | Sphere, scale: flo
 
 
 def _draw_sphere(occ: Any, body: Sphere, scale: float) -> None:
-    """A half has its pole amid the dome: with the poles on the rim, gmsh leaves short edges there."""
+    """Draw a sphere; a half has its pole in the middle of the dome: with poles on the rim gmsh leaves short edges
+    there.
+    """
     radius, right = body.radius / scale, math.pi / 2
     if body.sector == "half":
         dome = occ.addSphere(0, 0, 0, radius, angle1=0, angle2=right)

@@ -1,1 +1,1 @@
-"""Abaqus input files: text, keywords, element types, what the file defines, and the mesh that is chosen of it."""
+"""Reader of Abaqus input files: text, keywords, element types, definitions of a file, and the chosen mesh."""

@@ -1,4 +1,4 @@
-"""What a case chooses of an Abaqus input file: elements, by the piece of the model in which they are."""
+"""Selection of the elements of an Abaqus input file by a name in a case."""
 
 from collections import Counter
 from collections.abc import Iterator
@@ -16,7 +16,7 @@ Chosen = dict[int, Ids]
 
 
 def everything(pieces: list[Piece]) -> Chosen:
-    """All elements."""
+    """Return all elements."""
     return {place: _every(piece.mesh) for place, piece in enumerate(pieces)}
 
 
@@ -25,7 +25,7 @@ def _every(mesh: Scope) -> Ids:
 
 
 def grouped(deck: Deck, pieces: list[Piece], group: str, key: str) -> Chosen:
-    """The elements that a name means. Raises MeshError for a name of nothing, and for one of several things."""
+    """Return the elements of a name. Raises MeshError for an unknown or ambiguous name."""
     meant = list(_meant(deck, pieces, group))
     if not meant:
         known = ", ".join(sorted(_known(deck, pieces), key=str.casefold)) or "none"
@@ -41,7 +41,9 @@ def grouped(deck: Deck, pieces: list[Piece], group: str, key: str) -> Chosen:
 
 
 def _meant(deck: Deck, pieces: list[Piece], group: str) -> Iterator[tuple[str, Chosen]]:
-    """What a name may mean. A set of the model or the assembly hides sets of this name in parts, as in Abaqus."""
+    """Return the candidates for a name. A set of the model or the assembly hides sets of this name in parts, as in
+    Abaqus.
+    """
     outer = [(name.text, one) for name, one in deck.root.sets.meant(group)]
     for text, one in outer:
         yield (
@@ -83,7 +85,9 @@ def _part(scope: Scope) -> Scope:
 
 
 def _sets(scope: Scope, wanted: str) -> list[tuple[str, ElementSet]]:
-    """The sets that ``wanted`` may mean in an instance or a part: those of the instance hide those of its part."""
+    """Return the sets that ``wanted`` may refer to in an instance or a part: those of the instance hide those of its
+    part.
+    """
     for each in (scope, _part(scope)):
         if found := each.sets.meant(wanted):
             return [(name.text, one) for name, one in found]
@@ -91,7 +95,7 @@ def _sets(scope: Scope, wanted: str) -> list[tuple[str, ElementSet]]:
 
 
 def _members(pieces: list[Piece], scope: Scope, one: ElementSet, text: str, first: int = 0) -> Chosen:
-    """The elements of a set, by piece (numbered from ``first``). Raises MeshError where one is not defined."""
+    """Return the elements of a set, by piece (numbered from ``first``). Raises MeshError for an undefined element."""
     chosen: Chosen = {}
     places = {piece.scope.name.key: place for place, piece in enumerate(pieces)}
     for owner, numbers in one.members.items():
@@ -115,7 +119,7 @@ def _same(one: Chosen, other: Chosen) -> bool:
 
 
 def _known(deck: Deck, pieces: list[Piece]) -> set[str]:
-    """Every name that a group may have; a set that several parts have is written with the name of the part."""
+    """Return every name that a group may have; a set that several parts have is written with the name of the part."""
     names = {name.text for name, _ in deck.root.sets}
     owners = {_part(piece.scope).name.key: piece.scope for piece in pieces if piece.scope.line}
     sets = Counter(name.key for scope in owners.values() for name, _ in _part(scope).sets)

@@ -1,4 +1,4 @@
-"""Data lines of an Abaqus input file: elements, ranges of numbers, places and coordinates."""
+"""Data lines of an Abaqus input file: elements, ranges of numbers, positions and coordinates."""
 
 import math
 from array import array
@@ -13,13 +13,12 @@ from .elements import ElementType, Kind
 _AXIS = 7
 """Numbers of a rotation: two points and an angle."""
 _MOST_MADE = 20_000_000
-"""Numbers that one line of GENERATE may make. Chosen: more than a mesh has that a machine of some 100 GB can run."""
+"""Largest count of numbers of one line of GENERATE. Chosen: more than a mesh that a machine of some 100 GB can run."""
 
 
 def element_rows(lines: Iterator[tuple[int, str]], kind: ElementType) -> Iterator[tuple[int, list[str]]]:
-    """The first line and the fields of each element: its number and its nodes, over as many lines as these take.
-
-    A node that is left out stands for the ground, in elements without volume alone. Raises MeshError.
+    """Yield the first line and the fields of each element: its number and its nodes, which may take several lines.
+    An omitted node is the ground, which elements without volume only may have. Raises MeshError.
     """
     row: list[str] = []
     first = 0
@@ -49,7 +48,7 @@ def _expected(kind: ElementType) -> str:
 
 
 def numbers_of(line: int, text: str) -> "array[int]":
-    """The numbers that GENERATE makes of a first one, a last one and a step. Raises MeshError."""
+    """Return the numbers that GENERATE makes of a first one, a last one and a step. Raises MeshError."""
     items = fields(text)
     while len(items) > 2 and not items[-1]:
         items.pop()
@@ -67,14 +66,14 @@ def numbers_of(line: int, text: str) -> "array[int]":
 
 
 def _step(line: int, items: list[str]) -> int:
-    """The third number, which may be 0; 1 where there is none. Raises MeshError."""
+    """Return the third number, which may be 0; 1 if there is none. Raises MeshError."""
     if not items[2:]:
         return 1
     return int(items[2]) if is_whole(items[2]) else whole(line, items[2])
 
 
 def translation(line: int, text: str) -> tuple[float, ...]:
-    """By what an instance is moved. Raises MeshError."""
+    """Return the translation of an instance. Raises MeshError."""
     values = numbers(line, text)
     if len(values) > 3:
         raise MeshError(
@@ -85,7 +84,7 @@ def translation(line: int, text: str) -> tuple[float, ...]:
 
 
 def axis(line: int, text: str) -> tuple[float, ...]:
-    """Two points of the axis about which an instance is turned, and the angle in degrees. Raises MeshError."""
+    """Return two points of the axis of rotation of an instance, and the angle in degrees. Raises MeshError."""
     values = tuple(numbers(line, text))
     if len(values) != _AXIS:
         raise MeshError(f"line {line}: the second data line of *INSTANCE is a rotation, 7 numbers; found {len(values)}")
@@ -95,6 +94,6 @@ def axis(line: int, text: str) -> tuple[float, ...]:
 
 
 def cylindrical(radius: float, angle: float, height: float) -> tuple[float, float, float]:
-    """Cartesian coordinates of a point that is given by cylindrical ones, ``angle`` in degrees."""
+    """Return the Cartesian coordinates of a point in cylindrical ones, ``angle`` in degrees."""
     sine, cosine = sine_and_cosine(math.radians(angle))
     return radius * cosine, radius * sine, height

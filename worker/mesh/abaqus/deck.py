@@ -1,4 +1,4 @@
-"""Reads the keywords of an Abaqus input file that make a mesh, each in the scope where it stands."""
+"""Keywords of an Abaqus input file that define a mesh, each read into its scope."""
 
 from array import array
 from collections import Counter
@@ -17,19 +17,19 @@ from .scopes import OWN, ElementSet, Instance, Rows, Scope, Surface
 
 _ROOT = Label("", "")
 _NODE_VALUES = 6
-"""Coordinates of a node and the components of a normal, at most (Keywords Guide, *NODE)."""
+"""Largest number of coordinates of a node and components of a normal (Keywords Guide, *NODE)."""
 
 
 class Deck:
-    """The model of one file: what is in no part, the parts, and the instances."""
+    """The model of one file: definitions outside of parts, the parts, and the instances."""
 
     def __init__(self, path: Path) -> None:
-        """Reads all of ``path``. Raises MeshError with the number of the line that cannot be followed."""
+        """Read all of ``path``. Raises MeshError with the number of the line that is not understood."""
         self.root = Scope(_ROOT, 0)
         self.parts: Labelled[Scope] = Labelled()
         self.instances: Labelled[Instance] = Labelled()
         self.joining: Counter[str] = Counter()
-        """How often keywords that join, hold or remove bodies stand in the file."""
+        """Counts of keywords that join, hold or remove bodies."""
         self.unread: list[str] = []
         """Names of surfaces that are not made of elements or nodes."""
         self._here: Scope = self.root
@@ -98,7 +98,7 @@ class Deck:
         self._here = self.instances.add(name, Instance(name, block.line, part=part, move=move, axis=axis))
 
     def _placing(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        """The two data lines of *INSTANCE: a translation, then an axis with an angle; either may be empty."""
+        """Return the two data lines of *INSTANCE: a translation, then an axis with an angle; either may be empty."""
         lines = list(self._source.data())
         while lines and not lines[-1][1].strip():
             lines.pop()
@@ -190,7 +190,7 @@ class Deck:
         return instance
 
     def _member(self, one: ElementSet, instance: Instance | None, item: str, line: int, of_nodes: bool) -> None:
-        """Adds an element, or the elements of a set, of an instance or of this scope, to a set; or nodes."""
+        """Add an element, or the elements of a set, of an instance or of this scope, to a set; or nodes."""
         owner = OWN if instance is None else instance.name.key
         if is_whole(item):
             one.add(owner, array("q", [whole(line, item)]))
@@ -214,7 +214,7 @@ class Deck:
             raise MeshError(f"line {line}: {shortened(item)} is no {what} that is defined above")
 
     def _surface(self, block: Block) -> None:
-        """Kept as it is written; what it needs may be defined below."""
+        """Keep a surface as it is written; its elements may be defined below."""
         found = dict(block.parameters)
         kind, name = (found.get("TYPE") or "ELEMENT").upper(), found.get("NAME")
         if name is None or "COMBINE" in found or kind not in ("ELEMENT", "NODE"):
@@ -224,7 +224,7 @@ class Deck:
         self._here.surfaces.append(Surface(label(name), block.line, kind == "NODE", rows))
 
     def _qualified(self, item: str) -> tuple[Instance | None, str]:
-        """The instance and the rest of ``Bar-1.5`` or ``Bar-1.Set-1``, at the level of the assembly."""
+        """Return the instance and the rest of ``Bar-1.5`` or ``Bar-1.Set-1``, at the level of the assembly."""
         if self._here is self.root:
             for at in (i for i, sign in enumerate(item) if sign == "."):
                 start, rest = item[:at], item[at + 1 :]
@@ -251,7 +251,7 @@ _READERS: dict[str, Callable[[Deck, Block, dict[str, str]], None]] = {
 
 
 def _named(scope: Scope) -> str:
-    """``the part 'Bar' (line 7)``."""
+    """Return the name in messages: ``the part 'Bar' (line 7)``."""
     if not scope.line:
         return "the assembly"
     kind = "instance" if isinstance(scope, Instance) else "part"

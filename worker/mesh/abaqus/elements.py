@@ -1,4 +1,4 @@
-"""The element types of Abaqus and CalculiX: volumes that are read, other ones, and what carries no volume.
+"""Element types of Abaqus and CalculiX: volumes that are read, other volumes, and elements without volume.
 
 The names are those of the Elements Guide: a family, its number of nodes, and letters for variants.
 """
@@ -12,7 +12,7 @@ from ..cells import HEX8, HEX20, PYRAMID5, TET4, TET10, WEDGE6, WEDGE15, Form
 
 
 class Kind(Enum):
-    """What an element is for a mesh of tets."""
+    """Use of an element in a mesh of tets."""
 
     SOLID = "a volume that is read"
     VOLUME = "another volume"
@@ -33,7 +33,9 @@ FACES = {
 
 @dataclass(frozen=True)
 class ElementType:
-    """``name`` as in the file, in upper case; ``nodes``: of one element, None where the name does not say."""
+    """An element type: ``name`` as in the file, in upper case; ``nodes``: of one element, None if the name does not
+    contain it.
+    """
 
     name: str
     kind: Kind
@@ -41,7 +43,7 @@ class ElementType:
 
     @property
     def corners(self) -> int | None:
-        """Of an element of a surface, 3 or 4; None of others."""
+        """Corners of an element of a surface, 3 or 4; None for others."""
         plate = self.kind is Kind.EMPTY and _PLATE.fullmatch(self.name)
         return {3: 3, 6: 3, 4: 4, 8: 4, 9: 4}.get(self.nodes or 0) if plate else None
 
@@ -59,12 +61,12 @@ _PAIR = re.compile(
     r"(?:SPRING2|SPRINGA|DASHPOT2|DASHPOTA|JOINTC|JOINT[23]D|GAPUNIT?|GAPCYL|GAPSPHER|ITSUNI|ITSCYL|DRAG[23]D|FLINK)"
 )
 _NODES = {"STRI65": 6, "S4R5": 4, "S8R5": 8, "S9R5": 9}
-"""Where the last figure of a name says the degrees of freedom of a node."""
+"""Families whose last figure is the number of degrees of freedom of a node."""
 
 
 @cache
 def element_type(name: str) -> ElementType:
-    """The type that a file calls ``name``."""
+    """Return the type of this ``name``."""
     name = "".join(name.split()).upper()
     if found := _SOLID.fullmatch(name):
         return ElementType(name, Kind.SOLID, int(found[1]))

@@ -1,4 +1,4 @@
-"""The keywords of Abaqus and CalculiX input files, by what they mean to a mesh.
+"""Keywords of Abaqus and CalculiX input files, by their effect on a mesh.
 
 A word may be shortened as long as no other one begins like it (Analysis User's Guide, "Input syntax rules"). A word
 that is not listed is an error: it could make or move nodes.
@@ -32,8 +32,8 @@ MESH: dict[str, dict[str, bool]] = {
         "UNSORTED": False,
     },
 }
-"""Keywords that are read, with their parameters and whether these have a value. ``*SURFACE`` is, too: its other
-parameters mean nothing to a mesh."""
+"""Keywords that are read, with their parameters and whether these have a value. ``*SURFACE`` is read, too: its other
+parameters do not affect a mesh."""
 SURFACE = "SURFACE"
 
 REFUSED = _words(
@@ -43,7 +43,7 @@ REFUSED = _words(
     SUBSTRUCTURELOADCASE SYMMETRICMODELGENERATION SYMMETRICRESULTSTRANSFER SYSTEM
     """
 )
-"""Keywords that make, move or fetch nodes and elements, or change numbers, in ways that are not followed here."""
+"""Keywords that make, move or fetch nodes and elements, or change numbers, and are not supported."""
 
 ANALYSIS = _words(
     """
@@ -123,7 +123,7 @@ ANALYSIS = _words(
     VOIDNUCLEATION VOLUMETRICTESTDATA WAVE WEARCONTROLS WIND XFEM
     """
 )
-"""Keywords of materials, loads, steps and output: they and their data lines are passed over."""
+"""Keywords of materials, loads, steps and output: they and their data lines are skipped."""
 
 
 JOINING = {
@@ -167,14 +167,13 @@ JOINING = {
         "TIE",
     )
 }
-"""Keywords of ``ANALYSIS`` that join bodies, hold them together, move their nodes to each other, crack or remove them,
-as they are written. None of it is done here."""
+"""Keywords of ``ANALYSIS`` that join bodies, hold them together, move their nodes to each other, crack or remove
+them, as they are written. They have no effect here."""
 
 
 def known(block: Block, in_step: bool = False) -> str:
-    """The whole word of a keyword, of any of the three kinds. Raises MeshError for none, or for several.
-
-    In a step, where no mesh is made, a word that is not listed is one of the analysis.
+    """Return the whole word of a keyword of the three kinds. Raises MeshError for an unknown or ambiguous one. In a
+    step, where no mesh is defined, an unknown word counts as one of the analysis.
     """
     every = [*MESH, SURFACE, *REFUSED, *ANALYSIS]
     alike = [word for word in every if word.startswith(block.word)] if block.word else []
@@ -191,7 +190,9 @@ def known(block: Block, in_step: bool = False) -> str:
 
 
 def options(block: Block, word: str) -> dict[str, str]:
-    """The parameters of a mesh keyword by their whole names; empty text for those without value. Raises MeshError."""
+    """Return the parameters of a mesh keyword by their whole names; empty text for those without value. Raises
+    MeshError.
+    """
     found: dict[str, str] = {}
     for written, value in block.parameters:
         name = _parameter(block, word, written)
@@ -214,7 +215,7 @@ def _parameter(block: Block, word: str, written: str) -> str:
 
 
 def needed(block: Block, found: dict[str, str], word: str, name: str) -> str:
-    """The value of a parameter that must be there. Raises MeshError."""
+    """Return the value of a required parameter. Raises MeshError."""
     if name not in found:
         raise MeshError(f"line {block.line}: *{word} needs {name}=")
     return found[name]

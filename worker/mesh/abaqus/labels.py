@@ -1,7 +1,7 @@
 """Names in an Abaqus input file.
 
-Abaqus turns a name to upper case and drops its blanks, but keeps what stands in quotation marks as it is (Analysis
-User's Guide, "Input syntax rules"). A name that is found in no other way is found without regard to its case.
+Abaqus turns a name to upper case and removes its blanks, but keeps text in quotation marks unchanged (Analysis
+User's Guide, "Input syntax rules"). A name that is not found otherwise is searched without regard to its case.
 """
 
 from collections.abc import Iterator
@@ -20,7 +20,7 @@ class Label:
 
 
 def label(written: str) -> Label:
-    """The name that is ``written`` in a file."""
+    """Return the name of ``written`` text."""
     bare = written.strip()
     if len(bare) > 1 and bare[0] == bare[-1] == '"':
         return Label(bare[1:-1], bare[1:-1])
@@ -29,30 +29,32 @@ def label(written: str) -> Label:
 
 
 class Labelled(Generic[T]):
-    """What has a name in one scope of a file, by name, in the order of the file."""
+    """Named values of one scope of a file, in the order of the file."""
 
     def __init__(self) -> None:
-        """Holds nothing."""
+        """Empty."""
         self._found: dict[str, tuple[Label, T]] = {}
 
     def __iter__(self) -> Iterator[tuple[Label, T]]:
-        """Names and what they name."""
+        """Yield names and values."""
         return iter(self._found.values())
 
     def add(self, name: Label, value: T) -> T:
-        """Names a value; returns it."""
+        """Add a value with a name and return it."""
         self._found[name.key] = name, value
         return value
 
     def get(self, name: Label) -> T | None:
-        """What is called ``name``, else the only one whose name differs in case alone."""
+        """Return the value of ``name``, else the only one whose name differs in case alone."""
         if name.key in self._found:
             return self._found[name.key][1]
         alike = [value for each, value in self if each.key.casefold() == name.key.casefold()]
         return alike[0] if len(alike) == 1 else None
 
     def meant(self, wanted: str) -> list[tuple[Label, T]]:
-        """What ``wanted``, written outside of the file in any case, may mean: several where these differ in case."""
+        """Return the candidates for ``wanted``, a name from outside of the file in any case of letters; several if
+        these differ in case.
+        """
         words = {wanted.casefold(), _joined(wanted).casefold()}
         alike = [(name, value) for name, value in self if name.key.casefold() in words]
         exact = [(name, value) for name, value in alike if name.text == wanted]

@@ -1,4 +1,4 @@
-"""Node sets and surfaces of an Abaqus input file, and sets of elements of surfaces, as a case may be on them."""
+"""Node sets, surfaces and sets of surface elements of an Abaqus input file, for use by ``on`` in a case."""
 
 from array import array
 from collections.abc import Iterator
@@ -19,18 +19,18 @@ _NONE = np.zeros(0, np.int64)
 
 
 def named_sets(model: Placed) -> tuple[list[Named], list[str]]:
-    """The sets, and what of them is not read. A set of a part or an instance is ``Bar.CLAMP`` or ``Bar-1.CLAMP``, and
-    ``CLAMP``, too, where the assembly has none of this name.
+    """Return the sets, and remarks on those that are not read. A set of a part or an instance is ``Bar.CLAMP`` or
+    ``Bar-1.CLAMP``, and also ``CLAMP`` if the assembly has none of this name.
     """
-    told = nodes_of_elements(model.deck)
-    found = list(_sets(model, model.deck.root, None, told))
+    remarks = nodes_of_elements(model.deck)
+    found = list(_sets(model, model.deck.root, None, remarks))
     outer = {each.names[0].casefold() for each in found}
     of_parts: dict[tuple[int, str, bool], list[Named]] = {}
     for place, piece in enumerate(model.pieces):
         scope = piece.scope
         owners: list[Scope] = [] if not scope.line else [scope, scope.part] if isinstance(scope, Instance) else [scope]
         for owner in owners:
-            for each in _sets(model, owner, place, told):
+            for each in _sets(model, owner, place, remarks):
                 name = each.names[0]
                 of_parts.setdefault((id(owner), f"{owner.name.text}.{name}", each.faces is None), []).append(each)
                 if owner is not scope:
@@ -38,11 +38,11 @@ def named_sets(model: Placed) -> tuple[list[Named], list[str]]:
     for (_, name, _), several in of_parts.items():
         alone = several[0].names[0]
         found.append(joined((name, *([] if alone.casefold() in outer else [alone])), several))
-    return found, list(dict.fromkeys(told))
+    return found, list(dict.fromkeys(remarks))
 
 
-def _sets(model: Placed, scope: Scope, place: int | None, told: list[str]) -> Iterator[Named]:
-    """What a scope defines, as it is in the piece ``place``; None for what is in no part, or in the assembly."""
+def _sets(model: Placed, scope: Scope, place: int | None, remarks: list[str]) -> Iterator[Named]:
+    """Yield the sets of a scope for the piece ``place``; None for the model outside of parts, or the assembly."""
     for name, one in scope.node_sets:
         nodes = [model.nodes(at, _ids(one, owner)) for owner, at in _owners(model, scope, one, place)]
         yield Named((name.text,), np.unique(np.concatenate([_NONE, *nodes])))
@@ -50,7 +50,7 @@ def _sets(model: Placed, scope: Scope, place: int | None, told: list[str]) -> It
         try:
             yield _surface(model, scope, each, place)
         except MeshError as error:
-            told.append(f"the surface {each.name.text!r} is not read: {error}")
+            remarks.append(f"the surface {each.name.text!r} is not read: {error}")
     for name, one in scope.sets:
         faces = [face for owner, at in _owners(model, scope, one, place) for face in model.plates(at, _ids(one, owner))]
         if any(map(len, faces)):
@@ -78,7 +78,7 @@ def _surface(model: Placed, scope: Scope, given: Surface, place: int | None) -> 
 
 
 def _owners(model: Placed, scope: Scope, one: ElementSet, place: int | None) -> Iterator[tuple[str, int]]:
-    """Whose members a set has, and in which pieces these are."""
+    """Yield the scopes of the members of a set, and the pieces of each."""
     for owner in one.members:
         if owner == OWN and place is not None:
             yield owner, place
@@ -92,18 +92,18 @@ def _ids(one: ElementSet, owner: str) -> Ids:
 
 
 def nodes_of_elements(deck: Deck) -> list[str]:
-    """Fills the sets of nodes that are given by sets of elements; what is not defined."""
-    told = []
+    """Fill the sets of nodes that are given by sets of elements; return remarks on undefined sets."""
+    remarks = []
     for scope in (deck.root, *(part for _, part in deck.parts), *(each for _, each in deck.instances)):
         for one, name, line in scope.node_sets_of:
             elements = scope.sets.get(name)
             if elements is None:
-                told.append(f"line {line}: the set of elements {name.text!r} is not defined; its nodes are left out")
+                remarks.append(f"line {line}: the set of elements {name.text!r} is not defined; its nodes are left out")
                 continue
             for owner, numbers in elements.members.items():
                 mesh = scope if owner == OWN else next(each for _, each in deck.instances if each.name.key == owner)
                 one.add(owner, _nodes_of(mesh.mesh if isinstance(mesh, Instance) else mesh, np.array(numbers)))
-    return told
+    return remarks
 
 
 def _nodes_of(mesh: Scope, numbers: Ids) -> "array[int]":

@@ -1,4 +1,4 @@
-"""Elements of an Abaqus input file by places of their nodes, where these stand in the model."""
+"""Elements of an Abaqus input file with global indices of their nodes, in their position in the model."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ from .scopes import Piece
 
 @dataclass(frozen=True, eq=False)
 class Tags:
-    """Nodes of a piece: their numbers, ascending, and the place of the first one among all nodes."""
+    """Nodes of a piece: their numbers, ascending, and the index of the first one among all nodes."""
 
     numbers: Ids
     first: int
@@ -31,7 +31,7 @@ class Placed:
     tags: list[Tags]
 
     def solids(self, place: int, wanted: Ids | None = None) -> Iterator[Cells]:
-        """The elements of a piece that have a volume, all or the ``wanted`` numbers. Raises MeshError."""
+        """Return the volume elements of a piece, all or the ``wanted`` numbers. Raises MeshError."""
         tags = self.tags[place]
         for kind, rows in self.pieces[place].mesh.solids.items():
             made = cells(FORMS[kind.nodes or 0], _ids(rows.numbers), _ids(rows.nodes), _ids(rows.lines))
@@ -41,8 +41,8 @@ class Placed:
                 yield cells(made.kind, made.numbers, nodes, made.lines)
 
     def faces(self, place: int, wanted: Ids, side: str) -> Iterator[Ids]:
-        """Corners (n, 3) or (n, 4) of the faces ``side`` of elements: ``S3``; all of them where it is empty. Elements
-        of surfaces are their own faces. Raises MeshError for a name of a face that an element does not have.
+        """Return the corners (n, 3) or (n, 4) of the faces ``side`` of elements: ``S3``; all faces if it is empty.
+        Elements of surfaces are their own faces. Raises MeshError for a face that an element does not have.
         """
         for each in self.solids(place, wanted):
             known = FACES[each.kind.form]
@@ -51,7 +51,7 @@ class Placed:
         yield from self.plates(place, wanted)
 
     def plates(self, place: int, wanted: Ids | None = None) -> Iterator[Ids]:
-        """Corners of the elements of surfaces of a piece."""
+        """Return the corners of the surface elements of a piece."""
         tags = self.tags[place]
         for kind, rows in self.pieces[place].mesh.plates.items():
             numbers, nodes = _ids(rows.numbers), _ids(rows.nodes).reshape(-1, kind.corners or 1)
@@ -59,7 +59,7 @@ class Placed:
             yield placed(tags.numbers, nodes[chosen], _called(kind, numbers[chosen])) + tags.first
 
     def nodes(self, place: int, numbers: Ids) -> Ids:
-        """Places of nodes of a piece; those that are not defined are left out."""
+        """Return the indices of nodes of a piece, without undefined ones."""
         tags = self.tags[place]
         there = tags.numbers[np.isin(tags.numbers, numbers)]
         return np.asarray(np.searchsorted(tags.numbers, there) + tags.first, np.int64)

@@ -1,4 +1,4 @@
-"""What a case takes from an Abaqus input file: all of its elements, or those of a set, an instance or a part."""
+"""Selection from an Abaqus input file: all of its elements, or those of a set, an instance or a part."""
 
 import math
 from collections import Counter
@@ -23,10 +23,10 @@ from .scopes import Piece, Scope
 
 
 def read_inp(path: Path, group: str | None, key: str) -> Content:
-    """The elements of an .inp file, all or those that ``group`` names, in the unit of the file, and its sets.
+    """Return the elements of an .inp file, all or those of ``group``, in the unit of the file, and its sets.
 
-    ``group`` is an element set of the model or of the assembly, ``Bar-1.Set-1`` (a set of an instance or of a part), an
-    instance, a part, or a set that one part alone has. Raises MeshError, with the number of the line where there is
+    ``group`` is an element set of the model or of the assembly, ``Bar-1.Set-1`` (a set of an instance or of a part),
+    an instance, a part, or a set that one part alone has. Raises MeshError, with the number of the line if there is
     one. Nodes and elements are called by the numbers in the file.
     """
     try:
@@ -43,12 +43,12 @@ def read_inp(path: Path, group: str | None, key: str) -> Content:
     tags, points, places = _nodes(pieces)
     model = Placed(deck, pieces, places)
     every = [each for place, numbers in chosen.items() for each in model.solids(place, numbers)]
-    named, told = named_sets(model)
-    return Content(tags, points, every, named, (*_notes(deck, pieces, group), *told), tuple(deck.files[1:]))
+    named, remarks = named_sets(model)
+    return Content(tags, points, every, named, (*_notes(deck, pieces, group), *remarks), tuple(deck.files[1:]))
 
 
 def _nodes(pieces: list[Piece]) -> tuple[Ids, Floats, list[Tags]]:
-    """All nodes, those of each piece by ascending number, and where they are."""
+    """Return all nodes, those of each piece by ascending number, and their positions."""
     tags, points, places, first = [], [], list[Tags](), 0
     for piece in pieces:
         numbers = np.array(piece.mesh.nodes, np.int64)
@@ -61,7 +61,7 @@ def _nodes(pieces: list[Piece]) -> tuple[Ids, Floats, list[Tags]]:
 
 
 def _pieces(deck: Deck) -> Iterator[Piece]:
-    """What stands in the model. A file without instances has each part where it is."""
+    """Return the pieces of the model. In a file without instances each part is one."""
     if not deck.root.empty:
         yield Piece(deck.root, deck.root, _points(deck.root))
     for _, part in deck.parts if not list(deck.instances) else ():
@@ -76,7 +76,7 @@ def _points(scope: Scope) -> Floats:
 
 
 def _turned(points: Floats, axis: tuple[float, ...]) -> Floats:
-    """Points turned about a line (Rodrigues)."""
+    """Return points turned about a line (Rodrigues)."""
     start, end = np.array(axis[:3]), np.array(axis[3:6])
     along, arm = (end - start) / math.sqrt(((end - start) ** 2).sum()), points - start
     sine, cosine = sine_and_cosine(math.radians(axis[6]))
@@ -85,11 +85,11 @@ def _turned(points: Floats, axis: tuple[float, ...]) -> Floats:
     return turned
 
 
-# What is taken --------------------------------------------------------------------------------------------------------
+# Selection ------------------------------------------------------------------------------------------------------------
 
 
 def _refuse_volumes(pieces: list[Piece], chosen: Chosen) -> None:
-    """MeshError where elements are chosen that have a volume and are no tets."""
+    """Raise MeshError if volume elements are chosen that cannot be cut into tets."""
     for place, wanted in chosen.items():
         for kind, numbers in pieces[place].mesh.others.items():
             if kind.kind is Kind.EMPTY:
@@ -104,7 +104,7 @@ def _refuse_volumes(pieces: list[Piece], chosen: Chosen) -> None:
 
 
 def _notes(deck: Deck, pieces: list[Piece], group: str | None) -> Iterator[str]:
-    """What of the file is not in the mesh, in a line each."""
+    """Return remarks on contents of the file that are not in the mesh."""
     scopes = {id(scope): scope for scope in (deck.root, *(part for _, part in deck.parts))}
     scopes |= {id(piece.mesh): piece.mesh for piece in pieces}
     counts: Counter[ElementType] = Counter()
@@ -134,7 +134,7 @@ def _notes(deck: Deck, pieces: list[Piece], group: str | None) -> Iterator[str]:
 
 
 def _counted(counts: "Counter[ElementType]", kind: Kind) -> str:
-    """``12 S6, 1 CONN3D2``."""
+    """Return counts by type: ``12 S6, 1 CONN3D2``."""
     return ", ".join(f"{n} {each.name}" for each, n in sorted(counts.items(), key=_by_name) if each.kind is kind)
 
 

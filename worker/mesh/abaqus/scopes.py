@@ -1,4 +1,4 @@
-"""What an Abaqus input file defines: nodes, elements and sets, each in the part, the instance or the model it is in."""
+"""Definitions of an Abaqus input file: nodes, elements and sets, each in its part, its instance or the model."""
 
 from array import array
 from dataclasses import dataclass, field
@@ -11,22 +11,22 @@ from .elements import ElementType
 from .labels import Label, Labelled
 
 OWN = ""
-"""In the members of a set: the elements of the scope in which the set is defined."""
+"""Key, in the members of a set, of the scope in which the set is defined."""
 
 
 class ElementSet:
-    """Numbers of elements, or of nodes, by the key of the instance whose they are (``OWN``: of its own scope)."""
+    """Numbers of elements, or of nodes, by the key of their instance (``OWN``: of its own scope)."""
 
     def __init__(self) -> None:
-        """Holds nothing."""
+        """Empty."""
         self.members: dict[str, array[int]] = {}
 
     def add(self, owner: str, numbers: "array[int]") -> None:
-        """Adds elements of one owner."""
+        """Add elements of one owner."""
         self.members.setdefault(owner, array("q")).extend(numbers)
 
     def include(self, other: "ElementSet", owner: str = OWN) -> None:
-        """Adds what ``other`` holds now; its own elements are those of ``owner`` here."""
+        """Add the present contents of ``other``; its own elements become those of ``owner`` here."""
         for place, numbers in list(other.members.items()):
             self.add(owner if place == OWN else place, array("q", numbers))
 
@@ -37,11 +37,11 @@ class Rows:
 
     numbers: "array[int]" = field(default_factory=lambda: array("q"))
     nodes: "array[int]" = field(default_factory=lambda: array("q"))
-    """Those of each element, one after the other."""
+    """Nodes of each element, one after the other."""
     lines: "array[int]" = field(default_factory=lambda: array("q"))
 
     def extend(self, other: "Rows") -> None:
-        """Adds more of the type."""
+        """Add elements of the type."""
         self.numbers.extend(other.numbers)
         self.nodes.extend(other.nodes)
         self.lines.extend(other.lines)
@@ -49,7 +49,7 @@ class Rows:
 
 @dataclass
 class Surface:
-    """A ``*SURFACE`` as it is written: an element, or a set of them, and the name of a face in each line."""
+    """A ``*SURFACE`` as it is written: in each line an element, or a set of elements, and the name of a face."""
 
     name: Label
     line: int
@@ -60,19 +60,19 @@ class Surface:
 
 @dataclass
 class Scope:
-    """A part, an instance or the whole model: what stands between its keyword and the end of it."""
+    """A part, an instance or the whole model: the contents between its keyword and its end."""
 
     name: Label
     line: int
-    """Of its keyword in the file."""
+    """Line of its keyword in the file."""
     nodes: "array[int]" = field(default_factory=lambda: array("q"))
     points: "array[float]" = field(default_factory=lambda: array("d"))
     solids: dict[ElementType, Rows] = field(default_factory=dict)
-    """Elements with a volume, by type."""
+    """Volume elements, by type."""
     plates: dict[ElementType, Rows] = field(default_factory=dict)
-    """Elements of surfaces, which are among the others, by type."""
+    """Surface elements, which are among the others, by type."""
     others: "dict[ElementType, array[int]]" = field(default_factory=dict)
-    """Numbers of the elements that carry no volume, or are not read, by type."""
+    """Numbers of the elements without volume, or that are not read, by type."""
     sets: Labelled[ElementSet] = field(default_factory=Labelled)
     node_sets: Labelled[ElementSet] = field(default_factory=Labelled)
     node_sets_of: list[tuple[ElementSet, Label, int]] = field(default_factory=list)
@@ -86,31 +86,31 @@ class Scope:
 
     @property
     def volumes(self) -> int:
-        """How many elements with a volume it has."""
+        """Number of its volume elements."""
         return sum(len(rows.numbers) for rows in self.solids.values())
 
     def numbers(self) -> Ids:
-        """Of all elements, in the order of types."""
+        """Numbers of all elements, in the order of types."""
         every = (*(rows.numbers for rows in self.solids.values()), *self.others.values())
         return np.concatenate([np.zeros(0, np.int64), *(np.array(each, np.int64) for each in every)])
 
     def named_set(self, name: Label, among: Labelled[ElementSet] | None = None) -> ElementSet:
-        """The set of elements of this name, or that of nodes ``among`` these, made where there is none: a second
-        definition adds to the first.
+        """Return the set of elements of this name, or that of nodes ``among`` these; an empty one if there is none:
+        a second definition adds to the first.
         """
         sets = self.sets if among is None else among
         found = sets.get(name)
         return sets.add(name, ElementSet()) if found is None else found
 
     def check(self, where: str) -> None:
-        """Raises MeshError where two nodes, or two elements, have the same number."""
+        """Raise MeshError if two nodes, or two elements, have the same number."""
         refuse_repeated("node", np.array(self.nodes, np.int64), where)
         refuse_repeated("element", self.numbers(), where)
 
 
 @dataclass
 class Instance(Scope):
-    """A part in its place: the mesh of ``part``, or one of its own, moved and then turned."""
+    """A part in its position: the mesh of ``part``, or one of its own, moved and then turned."""
 
     part: Scope = field(default_factory=lambda: Scope(Label("", ""), 0))
     move: tuple[float, ...] = (0.0, 0.0, 0.0)
@@ -119,11 +119,11 @@ class Instance(Scope):
 
     @property
     def mesh(self) -> Scope:
-        """Where its nodes and elements stand."""
+        """Scope of its nodes and elements."""
         return self.part if self.empty else self
 
     def set_named(self, name: Label, of_nodes: bool = False) -> ElementSet | None:
-        """A set of its own, else of its part."""
+        """Return a set of its own, else of its part."""
         if of_nodes:
             return self.node_sets.get(name) or self.part.node_sets.get(name)
         return self.sets.get(name) or self.part.sets.get(name)
@@ -131,9 +131,9 @@ class Instance(Scope):
 
 @dataclass(frozen=True)
 class Piece:
-    """A body as it stands in the model: an instance, a part of a file without instances, or what is in no part."""
+    """A body in the model: an instance, a part of a file without instances, or the model outside of parts."""
 
     scope: Scope
     mesh: Scope
     points: Floats
-    """(n, 3), in the unit of the file."""
+    """(n, 3) positions, in the unit of the file."""

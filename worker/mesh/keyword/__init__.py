@@ -1,1 +1,1 @@
-"""LS-DYNA keyword decks: keywords, what the deck defines, sets, and the mesh that is chosen of it."""
+"""Reader of LS-DYNA keyword decks: keywords, definitions of a deck, sets, and the chosen mesh."""

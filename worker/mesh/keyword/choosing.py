@@ -1,4 +1,4 @@
-"""What sets of a keyword deck hold, and the elements that a case chooses by a name."""
+"""Contents of the sets of a keyword deck, and selection of elements by a name in a case."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -11,24 +11,24 @@ from .deck import Deck
 from .sets import Set
 
 DEEPEST = 20
-"""Sets within sets. Chosen: nobody has more than three."""
+"""Largest depth of sets within sets. Chosen: decks have up to three."""
 _KINDS = {"part": "PART", "set_part": "PART", "set_solid": "SOLID"}
-"""Words before a colon that say what a name is of."""
+"""Words before a colon that select the kind of a name."""
 
 
 @dataclass(frozen=True, eq=False)
 class Content:
-    """Arrays of a deck: nodes ``tags`` (n,), and of elements their numbers and parts (m,) and nodes."""
+    """Arrays of a deck: numbers ``tags`` (n,) of nodes, and numbers, parts (m,) and nodes of elements."""
 
     deck: Deck
     tags: Ids
     numbers: Ids
     parts: Ids
     of_part: Callable[[Ids], Ids] = field(repr=False)
-    """The nodes of some parts."""
+    """Return the nodes of some parts."""
 
     def members(self, kind: str, number: int, depth: int = 0) -> Ids:
-        """Ids of nodes, parts or elements in a set, those that are defined. Raises MeshError."""
+        """Return the ids of defined nodes, parts or elements in a set. Raises MeshError."""
         one = self.deck.sets.found[kind].get(number)
         if one is None or depth > DEEPEST or one.unread:
             why = "is not defined" if one is None else one.unread or "has itself among its members"
@@ -58,7 +58,7 @@ class Content:
         return np.union1d(np.array(list(self.deck.titles), np.int64), self.parts)
 
     def chosen(self, group: str, key: str) -> "np.ndarray":
-        """(m,) the elements that a name means: of a part or a set of parts or of solids, by title or id."""
+        """Return (m,) the elements of a name: of a part, a set of parts or a set of solids, by title or id."""
         meant = list(self._meant(group))
         if not meant:
             raise MeshError(f"{key}.group = {group!r}: no such part or set; known: {self._known()}")
@@ -105,7 +105,9 @@ class Content:
 
 
 def _ranged(numbers: Ids, every: Ids) -> Ids:
-    """Those of ``every`` that lie in ranges: the numbers of each, two or three, stand behind how many that are."""
+    """Return the ids of ``every`` in ranges. The list has the count of each range's numbers, two or three, before
+    them.
+    """
     step, found = int(numbers[0]), np.zeros(len(every), bool)
     for k in range(1, len(numbers) - step + 1, step):
         first, last, *by = numbers[k : k + step]

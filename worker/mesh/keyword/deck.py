@@ -1,4 +1,4 @@
-"""What a keyword deck defines: nodes, solid elements, parts and sets."""
+"""Definitions of a keyword deck: nodes, solid elements, parts and sets."""
 
 from array import array
 from collections import Counter
@@ -17,37 +17,37 @@ _TEN = (8,) * 10
 _EIGHT = (10,) * 8
 """Widths of fields: of a node, of the nodes of an element, of other cards (the manual, "*NODE", "*ELEMENT_SOLID")."""
 _OPTIONS = ("INERTIA", "CONTACT", "PRINT", "REPOSITION", "ATTACHMENT_NODES", "FIELD")
-"""Of ``*PART``; they add cards behind those of the part."""
+"""Options of ``*PART``, which add cards behind those of the part."""
 _MOST = 2**53
-"""Numbers of nodes and elements are below it."""
+"""Upper bound of the numbers of nodes and elements."""
 
 
 @dataclass
 class Solids:
-    """Elements with as many nodes each."""
+    """Elements with the same number of nodes."""
 
     numbers: "array[int]" = field(default_factory=lambda: array("q"))
     parts: "array[int]" = field(default_factory=lambda: array("q"))
     nodes: "array[int]" = field(default_factory=lambda: array("q"))
     lines: "array[int]" = field(default_factory=lambda: array("q"))
-    """0 in an included file."""
+    """Line of each; 0 in an included file."""
 
 
 class Deck:
-    """All of a deck and of the files that it includes."""
+    """The contents of a deck and of the files that it includes."""
 
     def __init__(self, path: Path) -> None:
-        """Reads it. Raises MeshError with the line that cannot be followed, CardError."""
+        """Read the deck. Raises MeshError with the line that is not understood, CardError."""
         self.nodes, self.points = array("q"), array("d")
         self.solids: dict[int, Solids] = {}
-        """By the number of nodes: 4, 8, 10, 20, 27."""
+        """Elements by the number of nodes: 4, 8, 10, 20, 27."""
         self.titles: dict[int, str] = {}
-        """Of parts by their ids."""
+        """Titles of parts by their ids."""
         self.sets = Sets()
         self.passed, self.volumes, self.joining = Counter[str](), Counter[str](), Counter[str]()
         """Cards of elements that are not read, and keywords that join bodies, by keyword."""
         self.held = 0
-        """Nodes with constraints of their own."""
+        """Number of nodes with constraints of their own."""
         deck = cards.Deck(path)
         for block in deck.blocks():
             self._take(block)
@@ -116,7 +116,7 @@ class Deck:
         rows.lines.append(0 if block.file else card.number)
 
     def _part(self, block: Block, single: bool) -> None:
-        """Two cards a part; with options one part and more cards."""
+        """Read parts of two cards each; with options one part and more cards."""
         rows = list(block.cards)
         while rows and not rows[-1].text.strip():
             rows.pop()

@@ -1,4 +1,4 @@
-"""The keywords of LS-DYNA, by what they mean to a mesh (Keyword User's Manual, volumes I to III)."""
+"""Keywords of LS-DYNA, by their effect on a mesh (Keyword User's Manual, volumes I to III)."""
 
 from collections.abc import Container
 
@@ -12,18 +12,18 @@ def _words(text: str) -> frozenset[str]:
 
 
 SOLIDS = {"": 8, "ORTHO": 8, "DOF": 8, "H20": 20, "H27": 27}
-"""Options of ``*ELEMENT_SOLID`` that are read, and the nodes of an element."""
+"""Options of ``*ELEMENT_SOLID`` that are read, and the number of nodes of an element."""
 FURTHER = {"ORTHO": 2, "DOF": 1}
-"""Cards that these have behind the nodes."""
+"""Number of cards that they have behind the nodes."""
 REFUSED = (
     "NODE_TRANSFORM", "NODE_MERGE", "NODE_REFLECT", "PART_DUPLICATE", "PART_MOVE", "PART_STACKED", "ELEMENT_GENERATE",
     "ELEMENT_SOLID", "ELEMENT_BLANKING", "STRUCTURED_MESH", "ALE_STRUCTURED_MESH", "MESH", "IGA",
 )  # fmt: skip
-"""Beginnings of keywords that make, move or join nodes and elements in ways that are not followed here."""
+"""Beginnings of keywords that make, move or join nodes and elements, and are not supported."""
 VOLUMES = ("ELEMENT_TSHELL", "ELEMENT_SPH", "ELEMENT_LANCING")
-"""Elements with a volume, or particles, that are not read."""
+"""Volume elements, or particles, that are not read."""
 JOINING = ("CONSTRAINED", "CONTACT", "RIGIDWALL", "RIGID", "ELEMENT_MASS", "ELEMENT_INERTIA")
-"""Beginnings of keywords that join bodies, hold them, or give them mass. None of it is done here."""
+"""Beginnings of keywords that join bodies, hold them, or give them mass. They have no effect here."""
 FAMILIES = _words(
     """
     AIRBAG ALE BATTERY BOUNDARY CASE CHEMISTRY CESE COMMENT COMPONENT CONSTRAINED CONTACT CONTROL CPM DAMPING DATABASE
@@ -36,7 +36,7 @@ FAMILIES = _words(
 
 
 def refuse(block: Block, read: Container[str]) -> None:
-    """MeshError for a keyword that is not ``read`` and could change the mesh."""
+    """Raise MeshError for a keyword that is not ``read`` and could change the mesh."""
     if block.name in read:
         return
     if block.name.startswith(REFUSED):

@@ -1,4 +1,4 @@
-"""The elements that a case takes from an LS-DYNA keyword deck: all solids, or those of a part or a set."""
+"""Selection from an LS-DYNA keyword deck: all solid elements, or those of a part or a set."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -17,14 +17,14 @@ from .choosing import DEEPEST, Content
 from .deck import Deck, Solids
 
 _KINDS = {4: TET4, 8: HEX8, 10: TET10, 20: Kind(Form.HEXAHEDRON, 20), 27: Kind(Form.HEXAHEDRON, 27)}
-"""By nodes; of hexahedra of more than eight the corners are the first eight."""
+"""Kinds by number of nodes; of hexahedra of more than eight the corners are the first eight."""
 
 
 def read_keyword(path: Path, group: str | None, key: str) -> solid.Content:
-    """The solid elements of a deck, all or those that ``group`` names, and its sets of nodes and segments.
+    """Return the solid elements of a deck, all or those of ``group``, and its sets of nodes and segments.
 
-    ``group`` is a part, a ``*SET_PART`` or a ``*SET_SOLID`` by its title or id; a number alone is that of a part, where
-    there is one. Raises MeshError, with the number of the line where there is one.
+    ``group`` is a part, a ``*SET_PART`` or a ``*SET_SOLID`` by its title or id; a number alone is that of a part, if
+    there is one. Raises MeshError, with the number of the line if there is one.
     """
     try:
         deck = Deck(path)
@@ -43,8 +43,8 @@ def read_keyword(path: Path, group: str | None, key: str) -> solid.Content:
     if group is None and deck.volumes:
         name, many = deck.volumes.most_common(1)[0]
         raise MeshError(f"{many} cards of *{name}, whose elements are not read; choose a part without them by group")
-    named, told = _named(content)
-    return solid.Content(tags, points, chosen, named, (*_notes(deck, chosen), *told), tuple(deck.files[1:]))
+    named, remarks = _named(content)
+    return solid.Content(tags, points, chosen, named, (*_notes(deck, chosen), *remarks), tuple(deck.files[1:]))
 
 
 def _cells(rows: Solids, many: int, tags: Ids) -> Cells:
@@ -68,8 +68,8 @@ def _content(deck: Deck, tags: Ids, every: list[Cells]) -> Content:
 
 
 def _named(content: Content) -> tuple[list[Named], list[str]]:
-    """Sets of nodes and of segments by title and id, and what of them is not read."""
-    found, told = list[Named](), list[str]()
+    """Return the sets of nodes and of segments by title and id, and remarks on those that are not read."""
+    found, remarks = list[Named](), list[str]()
     for kind in ("NODE", "SEGMENT"):
         for number, one in content.deck.sets.found[kind].items():
             names = tuple(filter(None, (one.title, str(number))))
@@ -80,12 +80,12 @@ def _named(content: Content) -> tuple[list[Named], list[str]]:
                 else:
                     found.append(surface(names, _segments(content, number)))
             except MeshError as error:
-                told.append(f"a set is not read: {error}")
-    return found, told
+                remarks.append(f"a set is not read: {error}")
+    return found, remarks
 
 
 def _segments(content: Content, number: int, depth: int = 0) -> Iterator[Ids]:
-    """Faces (1 or more, 3 or 4) of a set; a fourth node of 0 repeats the third."""
+    """Return the faces (1 or more, 3 or 4) of a set; a fourth node of 0 repeats the third."""
     one = content.deck.sets.found["SEGMENT"].get(number)
     if one is None or one.unread or depth > DEEPEST:
         why = "is not defined" if one is None else one.unread or "has itself among its members"
@@ -101,7 +101,7 @@ def _segments(content: Content, number: int, depth: int = 0) -> Iterator[Ids]:
 
 
 def _notes(deck: Deck, chosen: list[Cells]) -> Iterator[str]:
-    """What of the deck is not in the mesh, or is taken otherwise, in a line each."""
+    """Return remarks on contents of the deck that are not in the mesh or are interpreted in an unexpected way."""
     yield from omitted.notes(deck.passed, deck.volumes, deck.joining, "*")
     if deck.held:
         yield f"constraints of nodes (TC, RC of *NODE) are passed over: {deck.held} nodes"

@@ -1,4 +1,4 @@
-"""``*SET_NODE``, ``*SET_SEGMENT``, ``*SET_PART`` and ``*SET_SOLID`` of a keyword deck."""
+"""Sets of a keyword deck: ``*SET_NODE``, ``*SET_SEGMENT``, ``*SET_PART`` and ``*SET_SOLID``."""
 
 from dataclasses import dataclass, field
 
@@ -8,35 +8,35 @@ _WIDTHS = (10,) * 8
 _KINDS = ("NODE", "SEGMENT", "PART", "SOLID")
 _OPTIONS = ("TITLE", "LIST", "GENERATE", "INCREMENT", "COLUMN", "GENERAL", "ADD", "COLLECT", "SMOOTH")
 _FIRST = 1
-"""Cards before the members: the id of the set and attributes."""
+"""Number of cards before the members: id of the set and attributes."""
 _GENERAL = {"NODE": ("ALL", "NODE", "DNODE", "PART", "DPART"), "PART": ("ALL", "PART", "DPART"),
             "SOLID": ("ALL", "ELEM", "DELEM", "PART", "DPART"), "SEGMENT": ("SEG",)}  # fmt: skip
-"""First words of cards of ``_GENERAL`` that are followed; ``D``: taken out again."""
+"""First words of cards of ``_GENERAL`` that are supported; with ``D`` the members are removed."""
 MOST = 20_000_000
-"""Numbers that one range may make. Chosen: more than a mesh has that a machine of some 100 GB can run."""
+"""Largest count of numbers of one range. Chosen: more than a mesh that a machine of some 100 GB can run."""
 
 
 @dataclass
 class Set:
-    """A set as it is written: steps that add and take away, in order."""
+    """A set as it is written: steps that add and remove members, in order."""
 
     id: int
     title: str
     steps: list[tuple[str, list[int]]] = field(default_factory=list)
     """A word (``NODE``, ``DNODE``, ``RANGE``, ``PART``, ``ALL``, ``SET``, ``SEG``) and its numbers."""
     unread: str = ""
-    """Why it is not read."""
+    """Reason for which it is not read, or empty."""
 
 
 class Sets:
-    """By kind and id."""
+    """Sets by kind and id."""
 
     def __init__(self) -> None:
-        """There are none."""
+        """Empty."""
         self.found: dict[str, dict[int, Set]] = {kind: {} for kind in _KINDS}
 
     def take(self, block: Block) -> bool:
-        """Reads a block; whether it is one of a set. Raises CardError."""
+        """Read a block; return whether it is one of a set. Raises CardError."""
         name, options = block.parted(_OPTIONS)
         kind = name.removeprefix("SET_")
         if not name.startswith("SET_") or kind not in _KINDS:

@@ -1,1 +1,1 @@
-"""gmsh's .msh files, formats 4.1 and 2.2, text and binary: sections, blocks of elements, the mesh chosen of them."""
+"""Reader of gmsh's .msh files, formats 4.1 and 2.2, text and binary: sections, blocks of elements, the chosen mesh."""

@@ -1,4 +1,4 @@
-"""Nodes and blocks of elements, as a .msh file has them."""
+"""Nodes and blocks of elements of a .msh file."""
 
 from dataclasses import dataclass
 
@@ -7,7 +7,7 @@ from ..cells import HEX8, PYRAMID5, TET4, WEDGE6, Form, Kind
 from ..model import Floats, Ids
 
 VOLUME = 3
-"""Dimension of what has a volume."""
+"""Dimension of volumes."""
 
 _TYPES = {
     0: {15: 1},
@@ -19,7 +19,7 @@ _TYPES = {
         92: 64, 93: 125, 94: 216, 95: 343, 96: 512, 97: 729, 98: 1000, 99: 32, 106: 126, 107: 196, 108: 288, 109: 405,
         110: 550, 111: 24, 118: 30, 119: 55, 120: 91, 121: 140, 122: 204, 123: 285, 124: 385, 125: 21, 132: 1},
 }  # fmt: skip
-"""Nodes of the element types of gmsh by dimension (its source, GmshDefines.h)."""
+"""Number of nodes of gmsh's element types by dimension (its source, GmshDefines.h)."""
 _RING = ((0, 1), (0, 3), (0, 4), (1, 2), (1, 5), (2, 3), (2, 6), (3, 7), (4, 5), (4, 7), (5, 6), (6, 7))
 _OF_WEDGE = ((0, 1), (0, 2), (0, 3), (1, 2), (1, 4), (2, 5), (3, 4), (3, 5), (4, 5))
 _OF_PYRAMID = ((0, 1), (0, 3), (0, 4), (1, 2), (1, 4), (2, 3), (2, 4), (3, 4))
@@ -30,19 +30,19 @@ KINDS = {
     18: Kind(Form.WEDGE, 15, _OF_WEDGE), 13: Kind(Form.WEDGE, 18, _OF_WEDGE),
     19: Kind(Form.PYRAMID, 13, _OF_PYRAMID), 14: Kind(Form.PYRAMID, 14, _OF_PYRAMID),
 }  # fmt: skip
-"""Elements with a volume that are read (order of nodes: gmsh reference manual, "Node ordering")."""
+"""Volume elements that are read (order of nodes: gmsh reference manual, "Node ordering")."""
 TRIANGLES = frozenset((2, 9, 20, 21, 22, 23, 24, 25, 42, 43, 44, 45, 46))
 QUADRILATERALS = frozenset((3, 10, 16, 36, 37, 38, 39, 40, 41, 47, 48, 49, 50, 51))
-"""Elements of surfaces; their first nodes are the corners."""
+"""Surface elements whose first four nodes are the corners."""
 
 
 @dataclass(frozen=True)
 class Block:
-    """Elements of one type whose groups are the same."""
+    """Elements of one type and with the same groups."""
 
     kind: int
     numbers: Ids
-    """(m,) of the elements."""
+    """(m,) numbers of the elements."""
     nodes: Ids
     """(m, k) numbers of their nodes."""
     groups: frozenset[int]
@@ -50,18 +50,18 @@ class Block:
 
     @property
     def dimension(self) -> int:
-        """0 to 3."""
+        """Dimension, 0 to 3."""
         return shape_of(self.kind)[0]
 
     @property
     def name(self) -> str:
-        """Of the type, for messages."""
+        """Name of the type, for messages."""
         return f"type {self.kind} of gmsh"
 
 
 @dataclass(frozen=True)
 class Read:
-    """What a file has: ``nodes`` (n,) and ``points`` (n, 3), elements, and remarks on what is not in it."""
+    """The contents of a file: ``nodes`` (n,) and ``points`` (n, 3), elements, and remarks on omitted contents."""
 
     nodes: Ids
     points: Floats
@@ -70,7 +70,7 @@ class Read:
 
 
 def shape_of(kind: int) -> tuple[int, int]:
-    """Dimension and number of nodes of an element type. Raises MeshError."""
+    """Return the dimension and number of nodes of an element type. Raises MeshError."""
     for dimension, types in _TYPES.items():
         if kind in types:
             return dimension, types[kind]

@@ -1,4 +1,4 @@
-"""The mesh that a case takes from a .msh file: all of its tets, or those of a physical group."""
+"""Selection from a .msh file: all of its volume elements, or those of a physical group."""
 
 import re
 from collections.abc import Iterator
@@ -24,15 +24,15 @@ _LISTED = {
     "MeshFormat", "NodeData", "Nodes", "ParametricNodes", "Parametrizations", "PartitionedEntities", "Periodic",
     "PhysicalNames",
 }  # fmt: skip
-"""Sections of the format; those that hold no part of the mesh are passed over."""
+"""Sections of the format; those without a part of the mesh are skipped."""
 
 
 def read_msh(path: Path, group: str | None, key: str) -> Content:
-    """The elements of an .msh file, all or those of a physical group of volumes, and the physical groups of points,
-    curves and surfaces as sets.
+    """Return the elements of an .msh file, all or those of a physical group of volumes, and the physical groups of
+    points, curves and surfaces as sets.
 
-    ``group`` is the name of the physical group, or its number. Groups that have the same name are taken together.
-    Raises MeshError.
+    ``group`` is the name of the physical group, or its number. Groups with the same name are united. Raises
+    MeshError.
     """
     file = read_sections(path)
     found = read_version2(file) if file.version == "2.2" else read_version4(file)
@@ -56,7 +56,7 @@ def _cells(block: Block, tags: Ids) -> Cells:
 
 
 def _names(file: Sections) -> dict[tuple[int, int], str]:
-    """Names of physical groups by dimension and number."""
+    """Return the names of physical groups by dimension and number."""
     count, *lines = file.parts.get("PhysicalNames", b"0").decode("utf-8", "replace").strip().splitlines()
     read = [_NAME.fullmatch(line) for line in lines]
     found = {(int(line[1]), int(line[2])): line[3] for line in read if line is not None}
@@ -66,7 +66,7 @@ def _names(file: Sections) -> dict[tuple[int, int], str]:
 
 
 def _wanted(names: dict[tuple[int, int], str], volumes: list[Block], group: str, key: str) -> frozenset[int]:
-    """The numbers of the physical groups that ``group`` means. Raises MeshError."""
+    """Return the numbers of the physical groups of the name ``group``. Raises MeshError."""
     used = frozenset[int]().union(*(block.groups for block in volumes))
     here = {tag: name for (dimension, tag), name in names.items() if dimension == VOLUME}
     by_name = frozenset(tag for tag, name in here.items() if name == group)
@@ -92,7 +92,7 @@ def _refuse_others(chosen: list[Block]) -> None:
 
 
 def _once(chosen: list[Block]) -> list[Block]:
-    """The same, each element once: in the format 2.2 one that is in several groups stands there for each of them."""
+    """Return the blocks with each element once: in the format 2.2 an element is repeated for each of its groups."""
     found = []
     for kind in dict.fromkeys(block.kind for block in chosen):
         alike = [block for block in chosen if block.kind == kind]
@@ -107,7 +107,7 @@ def _once(chosen: list[Block]) -> list[Block]:
 
 
 def _notes(file: Sections, content: Read, wanted: frozenset[int] | None, group: str | None) -> Iterator[str]:
-    """What of the file is not in the mesh, or is taken together, in a line each."""
+    """Return remarks on contents of the file that are not in the mesh, or are united."""
     yield from content.notes
     if wanted is not None and len(wanted) > 1:
         yield f"the name {group!r} is that of the groups {', '.join(map(str, sorted(wanted)))}; they are taken together"

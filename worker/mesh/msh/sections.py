@@ -1,7 +1,6 @@
-"""The sections of a .msh file, and the numbers in one of them.
+"""Sections of a .msh file, and the numbers in a section. Layout: gmsh reference manual, "MSH file format".
 
-Layout: gmsh reference manual, "MSH file format". A section stands between ``$Name`` and ``$EndName``; in a binary file
-numbers are stored as they are in memory, names are text.
+A section is between ``$Name`` and ``$EndName``; in a binary file numbers are stored as in memory, names are text.
 """
 
 import warnings
@@ -19,21 +18,21 @@ from ..model import Floats, Ids
 VERSIONS = ("4.1", "2.2")
 _MARK = b"\xef\xbb\xbf"
 _SINGLE = ("MeshFormat", "PhysicalNames", "Entities", "PartitionedEntities", "Nodes", "ParametricNodes", "Elements")
-"""Sections of which a file has one."""
+"""Sections that a file has once."""
 _LARGEST = 2**53
-"""Whole numbers up to this one are exact as float64."""
+"""Integers up to this one are exact as float64."""
 
 
 @dataclass(frozen=True)
 class Sections:
-    """The file: its version, its sections by name, and the order of bytes where it is binary (else empty)."""
+    """A file: its version, its sections by name, and the byte order if it is binary (else empty)."""
 
     version: str
     parts: dict[str, bytes]
     order: str
 
     def numbers(self, name: str) -> "Numbers":
-        """The numbers of a section. Raises MeshError where it is missing."""
+        """Return a reader of the numbers of a section. Raises MeshError if the section is missing."""
         if name not in self.parts:
             raise MeshError(f"the file has no section ${name}")
         content = self.parts[name]
@@ -41,7 +40,9 @@ class Sections:
 
 
 def read_sections(path: Path) -> Sections:
-    """Divides a file. Raises MeshError for one that is no .msh file, is damaged, or is of another version."""
+    """Divide a file into sections. Raises MeshError for one that is no .msh file, is damaged, or has another
+    version.
+    """
     data = path.read_bytes().removeprefix(_MARK)
     parts: dict[str, bytes] = {}
     at = 0
@@ -97,42 +98,42 @@ def _formatted(parts: dict[str, bytes]) -> Sections:
 
 
 class Numbers(ABC):
-    """Reads numbers of a section one after the other. What does not fit raises MeshError."""
+    """Sequential reader of the numbers of a section. Raises MeshError for contents that do not fit."""
 
     def __init__(self, name: str, content: bytes, order: str) -> None:
-        """``content`` is what stands in the section ``name``; ``order`` that of its bytes."""
+        """``content``: bytes of the section ``name``; ``order``: their byte order."""
         self.name, self.content, self.order, self.at = name, content, order, 0
 
     def count(self) -> int:
-        """A number of things."""
+        """Read a count."""
         return int(self.sizes(1)[0])
 
     @abstractmethod
     def ints(self, n: int) -> Ids:
-        """(n,) whole numbers of 4 bytes."""
+        """Read (n,) integers of 4 bytes."""
 
     @abstractmethod
     def sizes(self, n: int) -> Ids:
-        """(n,) counts, or numbers of nodes and elements, of 8 bytes."""
+        """Read (n,) counts, or numbers of nodes and elements, of 8 bytes."""
 
     @abstractmethod
     def floats(self, n: int) -> Floats:
-        """(n,) floating point numbers."""
+        """Read (n,) floating point numbers."""
 
     @abstractmethod
     def close(self) -> None:
-        """Raises MeshError where numbers are left."""
+        """Raise MeshError if numbers are left."""
 
     def damaged(self, why: str) -> MeshError:
-        """The error of a section that does not hold what it says."""
+        """Return the error of a section whose contents do not agree with its counts."""
         return MeshError(f"the file is damaged or cut off: the section ${self.name} {why}")
 
 
 class Written(Numbers):
-    """As text."""
+    """Numbers as text."""
 
     def __init__(self, name: str, content: bytes) -> None:
-        """Reads all numbers of the section."""
+        """Read all numbers of the section."""
         super().__init__(name, content, "")
         with warnings.catch_warnings():
             warnings.simplefilter("error")
@@ -163,10 +164,10 @@ class Written(Numbers):
 
 
 class Stored(Numbers):
-    """As in memory; of the format 2.2 the counts are text (``line``)."""
+    """Numbers as in memory; in the format 2.2 the counts are text (``line``)."""
 
     def line(self) -> int:
-        """A count that is text, on a line of its own."""
+        """Read a count that is text, on a line of its own."""
         text, _, _ = self.content[self.at :].partition(b"\n")
         self.at += len(text) + 1
         if not text.strip().isdigit():
@@ -174,7 +175,7 @@ class Stored(Numbers):
         return int(text)
 
     def rows(self, n: int, layout: Any) -> NDArray[Any]:
-        """(n,) records of a layout of numpy."""
+        """Read (n,) records of a numpy layout."""
         kind = np.dtype(layout).newbyteorder(self.order)
         if n < 0 or self.at + n * kind.itemsize > len(self.content):
             raise self.damaged("has fewer numbers than it says")

@@ -14,7 +14,9 @@ _SURFACE = 2
 
 
 def named_sets(blocks: list[Block], names: Mapping[tuple[int, int], str], tags: Ids) -> Iterator[Named]:
-    """Of each name, or number of a group without one: nodes of points and curves, or the faces of a surface."""
+    """Yield for each name, or number of a group without one, the nodes of points and curves, or the faces of a
+    surface.
+    """
     groups = sorted({(each.dimension, tag) for each in blocks if each.dimension < VOLUME for tag in each.groups})
     called: dict[tuple[int, str], list[int]] = {}
     for dimension, tag in groups:

@@ -1,4 +1,4 @@
-"""Nodes and elements of the format 2.2: an element has one physical group; one in several stands there for each."""
+"""Nodes and elements of the format 2.2: an element has one physical group and is repeated for each further one."""
 
 from collections import defaultdict
 
@@ -10,11 +10,11 @@ from .blocks import Block, Read, shape_of
 from .sections import Numbers, Sections, Stored
 
 _PARAMETERS = {0: 0, 1: 1, 2: 2, 3: 0}
-"""Parametric coordinates of a node on an entity of a dimension."""
+"""Number of parametric coordinates of a node on an entity of each dimension."""
 
 
 def read_version2(file: Sections) -> Read:
-    """All nodes and elements. Raises MeshError."""
+    """Return all nodes and elements. Raises MeshError."""
     if "ParametricNodes" in file.parts:
         nodes, points = _parametric(file.numbers("ParametricNodes"))
     else:
@@ -41,7 +41,7 @@ def _nodes(numbers: Numbers) -> tuple[Ids, Floats]:
 
 
 def _parametric(numbers: Numbers) -> tuple[Ids, Floats]:
-    """Nodes with their entities, and with coordinates on these."""
+    """Read nodes with their entities and their parametric coordinates."""
     many = numbers.line() if isinstance(numbers, Stored) else numbers.count()
     tags, points = np.zeros(many, np.int64), np.zeros((many, 3))
     for i in range(many):

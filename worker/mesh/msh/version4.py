@@ -1,4 +1,4 @@
-"""Nodes and elements of the format 4.1: blocks of a geometric entity each, which has the physical groups."""
+"""Nodes and elements of the format 4.1: a block for each geometric entity, which has the physical groups."""
 
 from collections import defaultdict
 
@@ -13,7 +13,7 @@ Groups = dict[tuple[int, int], frozenset[int]]
 
 
 def read_version4(file: Sections) -> Read:
-    """All nodes and elements. Raises MeshError."""
+    """Return all nodes and elements. Raises MeshError."""
     groups: Groups = {}
     partitions: dict[int, frozenset[int]] = {}
     ghosts = frozenset[int]()
@@ -41,7 +41,9 @@ def _entities(numbers: Numbers) -> Groups:
 
 
 def _partitioned(numbers: Numbers) -> tuple[Groups, dict[int, frozenset[int]], frozenset[int]]:
-    """Groups of the parts of entities, the partitions of each part of a volume, and the entities of ghost cells."""
+    """Return groups of the parts of entities, the partitions of each part of a volume, and the entities of ghost
+    cells.
+    """
     found: Groups = {}
     partitions: dict[int, frozenset[int]] = {}
     numbers.sizes(1)
@@ -61,7 +63,7 @@ def _partitioned(numbers: Numbers) -> tuple[Groups, dict[int, frozenset[int]], f
 
 
 def _listed(numbers: Numbers) -> frozenset[int]:
-    """The physical groups of an entity; a negative one means the other orientation."""
+    """Return the physical groups of an entity; a negative number is the same group with reversed orientation."""
     return frozenset(np.abs(numbers.ints(numbers.count())).tolist())
 
 
@@ -81,7 +83,9 @@ def _nodes(numbers: Numbers) -> tuple[Ids, Floats]:
 
 
 def _elements(numbers: Numbers, groups: Groups, ghosts: frozenset[int]) -> tuple[list[Block], set[int]]:
-    """The blocks, and the volumes that have some. Ghost cells are copies of elements of another file, and left out."""
+    """Return the blocks, and the volumes with elements. Ghost cells are copies of elements of another file, and
+    omitted.
+    """
     many, total, *_ = numbers.sizes(4)
     found: list[Block] = []
     filled: set[int] = set()
@@ -103,7 +107,7 @@ def _elements(numbers: Numbers, groups: Groups, ghosts: frozenset[int]) -> tuple
 
 
 def _lacking(partitions: dict[int, frozenset[int]], filled: set[int]) -> list[str]:
-    """A remark on partitions none of whose elements are in the file."""
+    """Return a remark on partitions without elements in the file."""
     volumes = defaultdict(set)
     for tag, each in partitions.items():
         for partition in each:

@@ -1,1 +1,1 @@
-"""Bodies drawn with gmsh's OpenCASCADE kernel and meshed there. Only the child process gets here."""
+"""Bodies drawn and meshed with gmsh's OpenCASCADE kernel, in the child process only."""

@@ -1,7 +1,7 @@
-"""Solids of STEP and BREP files, through gmsh's OpenCASCADE kernel.
+"""Solids of STEP and BREP files, read with gmsh's OpenCASCADE kernel.
 
-The bytes that were checked are copied into the child's own empty folder and read from there: a name in them leads to no
-other file.
+The checked bytes are copied into the child's own empty folder and read from there, so that a name in them cannot
+refer to another file.
 """
 
 import re
@@ -21,19 +21,21 @@ from .printed import said
 from .step import length_units, solids_in
 
 MOST_BYTES = 256 * 2**20
-"""Of a file. Chosen: text of an assembly of thousands of parts; OpenCASCADE takes some ten times as much memory."""
+"""Largest size of a file. Chosen: text of an assembly of thousands of parts; OpenCASCADE needs some ten times as
+much memory."""
 _MILLIMETRE = Fraction(1, 1000)
-"""The unit in which OpenCASCADE is asked to read STEP files, whatever unit they are in."""
+"""Unit into which OpenCASCADE converts STEP files."""
 _SYNTAX = b"Incorrect Syntax"
-"""What OpenCASCADE prints, and goes on."""
+"""Text of an error after which OpenCASCADE continues."""
 _BREP, _BREP_END = b"CASCADE Topology V", re.compile(rb"\*\s*[+-]\d+ \d+\s*$")
-"""How a BREP file begins, within its first lines, and ends: the last shape, and the one that all others make."""
+"""Beginning of a BREP file, within its first lines, and its end: the last shape, and the shape that contains all
+others."""
 _READING = 120
-"""Seconds that OpenCASCADE may take to read a file: damaged ones can keep it for ever. Chosen."""
+"""s that OpenCASCADE may take to read a file: a damaged file can take for ever. Chosen."""
 
 
 def imported(gmsh: Any, form: CadForm, path: Path, frame: Frame, head: str) -> Solids:
-    """The chosen solids of a file in the frame of the model. MeshError, which begins with ``head``."""
+    """Return the chosen solids of a file in the frame of the model. Raises MeshError, which begins with ``head``."""
     occ = gmsh.model.occ
     every, unit = _read(gmsh, form, path, head)
     chosen = _chosen(gmsh, form, every, head)
@@ -48,7 +50,7 @@ def imported(gmsh: Any, form: CadForm, path: Path, frame: Frame, head: str) -> S
 
 
 def size_of(gmsh: Any, form: CadForm, path: Path, head: str) -> float:
-    """The largest extent of the chosen solids of a file, m, where they are in the file."""
+    """Return the largest extent of the chosen solids of a file, m, in the position of the file."""
     gmsh.model.add("size")
     every, unit = _read(gmsh, form, path, head)
     chosen = _chosen(gmsh, form, every, head)
@@ -59,7 +61,7 @@ def size_of(gmsh: Any, form: CadForm, path: Path, head: str) -> float:
 
 
 def _place(occ: Any, solids: Solids, factor: float, frame: Frame) -> None:
-    """From the coordinates of the file into the frame: a body is where its file has it."""
+    """Move solids from the coordinates of the file into the frame."""
     if factor != 1.0:
         occ.dilate(solids, 0, 0, 0, factor, factor, factor)
     steps = -("xyz".index(frame.axis) + 1) % 3
@@ -71,7 +73,7 @@ def _place(occ: Any, solids: Solids, factor: float, frame: Frame) -> None:
 
 
 def _read(gmsh: Any, form: CadForm, path: Path, head: str) -> tuple[Solids, Fraction]:
-    """All solids of a file, in the order of it, and the length of 1, m."""
+    """Return all solids of a file, in its order, and the length of 1, m."""
     data = _bytes(path, head)
     if data.lstrip().startswith(b"ISO-10303-21;"):
         kind, unit = "step", _step_unit(form, data, head)
@@ -114,7 +116,7 @@ def _bytes(path: Path, head: str) -> bytes:
 
 
 def _step_unit(form: CadForm, data: bytes, head: str) -> Fraction:
-    """OpenCASCADE turns the units of the file into the one that it is asked for."""
+    """Return the unit of the coordinates: OpenCASCADE converts the units of the file into the requested one."""
     said = length_units(data, head)
     if form.unit is not None and any(abs(float(unit) - form.unit) > 1e-9 * form.unit for unit in said):
         units = choices(sorted(si(float(unit), "m") for unit in said))
@@ -148,12 +150,12 @@ def _chosen(gmsh: Any, form: CadForm, solids: Solids, head: str) -> Solids:
 
 
 def _names(label: str) -> list[str]:
-    """By which a solid may be called: its label, ``Shapes/Bullet/Core``, and every end and part of it."""
+    """Return the names of a solid: its label, ``Shapes/Bullet/Core``, and every end and part of it."""
     steps = label.split("/")
     return [*("/".join(steps[n:]) for n in range(len(steps))), *steps[1:]]
 
 
 def _listed(solids: Solids, names: list[list[str]]) -> str:
-    told = [repr(known[-1]) if known[-1] else str(n) for n, known in enumerate(names, 1)]
-    more = ", ..." if len(told) > 20 else ""
-    return f"{len(solids)} solids: {', '.join(told[:20])}{more}"
+    listed = [repr(known[-1]) if known[-1] else str(n) for n, known in enumerate(names, 1)]
+    more = ", ..." if len(listed) > 20 else ""
+    return f"{len(solids)} solids: {', '.join(listed[:20])}{more}"

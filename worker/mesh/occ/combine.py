@@ -1,4 +1,4 @@
-"""Operands drawn into the frame of a model and combined there."""
+"""Boolean combinations of bodies, drawn into the frame of a model."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -18,10 +18,10 @@ AnyForm = Operand | CadForm | CombinedForm
 
 @dataclass(frozen=True)
 class Drawing:
-    """What is drawn into the current model of ``gmsh``, in ``frame``; files are found in ``sources``.
+    """Draws forms into the current model of ``gmsh``, in ``frame``; files are in ``sources``.
 
-    Several parts can be drawn into one model, each by ``solids``: what that returns are the part's volumes, and
-    ``occ.fragment`` of all of them, with its map from old to new volumes, makes their meshes meet.
+    Several parts can be drawn into one model, each by ``solids``, which returns the part's volumes; ``occ.fragment``
+    of all of them, with its map from old to new volumes, gives their meshes common nodes.
     """
 
     gmsh: Any
@@ -29,7 +29,7 @@ class Drawing:
     sources: Sources
 
     def solids(self, form: AnyForm, key: str) -> Solids:
-        """The volumes of a form that stands at ``key`` in its case, turned as it says; none where nothing is left."""
+        """Draw the form at ``key`` of its case, with its rotation; return its volumes, none if nothing is left."""
         occ = self.gmsh.model.occ
         if isinstance(form, CombinedForm):
             made = self._combined(form, key)
@@ -59,12 +59,12 @@ class Drawing:
 
 
 def _three(made: Any) -> Solids:
-    """The volumes of what a boolean operation returns."""
+    """Return the volumes among the results of a boolean operation."""
     return [each for each in made[0] if each[0] == 3]
 
 
 def extent(gmsh: Any, form: AnyForm, sources: Sources, key: str) -> float:
-    """About the largest extent of a form, m, from which lengths are scaled: more than it has, rather than less."""
+    """Return an upper estimate of the largest extent of a form, m, the scale of lengths."""
     if isinstance(form, CadForm):
         return size_of(gmsh, form, sources[key], f"{key}.path = {form.path!r}")
     if isinstance(form, CombinedForm):

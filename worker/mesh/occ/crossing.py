@@ -1,7 +1,7 @@
-"""Triangles of a surface that cross each other: candidates by cells, then separating axes.
+"""Triangles of a surface that cross each other: candidate pairs by cells, then separating axes.
 
-Two convex bodies do not overlap where on some axis their shadows do not; of two triangles it is enough to look along
-their normals, the products of an edge of each, and across their edges in the planes of both (Gottschalk, Lin and
+Two convex bodies do not overlap if their projections on some axis do not; for two triangles the axes are their
+normals, the products of an edge of each, and the normals of their edges in the planes of both (Gottschalk, Lin and
 Manocha 1996, SIGGRAPH, 171).
 """
 
@@ -13,17 +13,18 @@ from numpy.typing import NDArray
 from ..model import Floats
 
 _DEEP = 1e-6
-"""Of the extent of the surface: shadows that overlap by less touch. Chosen: files have six or seven digits."""
+"""Share of the extent of the surface: projections that overlap by less only touch. Chosen: files have six or seven
+digits."""
 _MOST = 10_000_000
-"""Entries of cells at most; the cells are made larger until it is kept. Chosen: a quarter of a GiB."""
+"""Largest number of entries of cells; the cells are enlarged to meet it. Chosen: a quarter of a GiB."""
 _CHUNK = 200_000
-"""Pairs that are looked at at once."""
+"""Pairs that are tested at once."""
 
 Pairs = NDArray[np.int64]
 
 
 def crossing(points: Floats, faces: Pairs) -> Pairs:
-    """(k, 2) pairs of ``faces`` (m, 3) over ``points`` (n, 3) that have more in common than corners and edges."""
+    """Return (k, 2) pairs of ``faces`` (m, 3) over ``points`` (n, 3) with more in common than corners and edges."""
     corners = points[faces]
     deep = _DEEP * float(np.ptp(points, axis=0).max())
     pairs = _near(corners, deep)
@@ -35,7 +36,7 @@ def crossing(points: Floats, faces: Pairs) -> Pairs:
 
 
 def _near(corners: Floats, deep: float) -> Pairs:
-    """(k, 2) pairs whose boxes overlap, each once, found by the cells that the boxes reach into."""
+    """Yield (k, 2) pairs with overlapping boxes, each once, found by the cells that the boxes touch."""
     low, high = corners.min(axis=1), corners.max(axis=1)
     start, extent = low.min(axis=0), float((high.max(axis=0) - low.min(axis=0)).max())
     many = max(1, math.isqrt(len(corners)) // 2)
@@ -69,7 +70,9 @@ def _near(corners: Floats, deep: float) -> Pairs:
 
 
 def _overlap(a: Floats, b: Floats, deep: float) -> NDArray[np.bool_]:
-    """(k,) whether triangles (k, 3, 3) overlap by more than ``deep`` along every axis that could separate them."""
+    """Return (k,) whether triangles (k, 3, 3) overlap by more than ``deep`` along every axis that could separate
+    them.
+    """
     sides_a, sides_b = (np.roll(t, -1, axis=1) - t for t in (a, b))
     normal_a, normal_b = (_unit(np.cross(s[:, 0], s[:, 1])) for s in (sides_a, sides_b))
     flat = (np.abs(((b - a[:, :1]) * normal_a[:, None]).sum(axis=2)) <= deep).all(axis=1)
@@ -86,14 +89,14 @@ def _overlap(a: Floats, b: Floats, deep: float) -> NDArray[np.bool_]:
 
 
 def _depth(a: Floats, b: Floats, axis: Floats) -> Floats:
-    """(k,) by how much the shadows of triangles on an axis overlap; below 0 where they are apart."""
+    """Return (k,) the overlap of the projections of triangles on an axis; negative if they are apart."""
     p, q = ((t * axis[:, None]).sum(axis=2) for t in (a, b))
     depth: Floats = np.minimum(p.max(axis=1) - q.min(axis=1), q.max(axis=1) - p.min(axis=1))
     return depth
 
 
 def _unit(vectors: Floats) -> Floats:
-    """Vectors of length 1; 0 stays 0, and so does what is next to it by rounding."""
+    """Return vectors of length 1; zeros for vectors of zero length within round-off."""
     length = np.sqrt((vectors**2).sum(axis=1, keepdims=True))
     tiny = length <= 1e-12 * max(float(length.max(initial=0.0)), 1e-300)
     unit: Floats = np.divide(vectors, length, out=np.zeros_like(vectors), where=~tiny)

@@ -23,7 +23,7 @@ from conoid.cases.shapes.profile import Arc, Profile, Segment, profile
 from .frame import Frame, Vector
 
 Solids = list[tuple[int, int]]
-"""gmsh's name of entities: dimension and number."""
+"""gmsh's identification of entities: dimension and number."""
 Angles = tuple[float, float]
 Form = (
     BoxForm | PlateForm | CylinderForm | TubeForm | SphereForm | ConeForm | OgiveForm | BallPiece
@@ -31,11 +31,11 @@ Form = (
 )  # fmt: skip
 
 ROUND: Angles = (0.0, 2.0 * math.pi)
-"""All angles of a body of revolution, rad."""
+"""Full range of angles of a body of revolution, rad."""
 
 
 def drawn(occ: Any, form: Form, frame: Frame, ranges: Sequence[Angles] = (ROUND,)) -> Solids:
-    """The form in the model's ``frame``; of a body of revolution or a ring sector the ``ranges`` of angles."""
+    """Draw the form in the model's ``frame``; a body of revolution or a ring sector in the ``ranges`` of angles."""
     scale, made = frame.scale, Solids()
     if isinstance(form, BoxForm):
         made = _box(occ, [x / scale for x in form.low], [x / scale for x in form.high])
@@ -55,7 +55,7 @@ def drawn(occ: Any, form: Form, frame: Frame, ranges: Sequence[Angles] = (ROUND,
 
 
 def into(occ: Any, solids: Solids, axis: Axis, start: Vector, frame: Frame) -> None:
-    """Moves solids whose own frame has its origin at ``start``, m, and its third direction along ``axis``."""
+    """Move solids whose own frame has its origin at ``start``, m, and its third direction along ``axis``."""
     steps = ((index(axis) + 1) - (index(frame.axis) + 1)) % 3
     if steps:
         occ.rotate(solids, 0, 0, 0, 1, 1, 1, steps * 2.0 * math.pi / 3.0)
@@ -65,7 +65,7 @@ def into(occ: Any, solids: Solids, axis: Axis, start: Vector, frame: Frame) -> N
 
 
 def turn(occ: Any, solids: Solids, by: Turn | None, frame: Frame) -> None:
-    """Turns solids of the model as a case says."""
+    """Turn solids of the model by the rotation of a case."""
     if by is not None:
         along = [0.0, 0.0, 0.0]
         along[frame.direction(by.axis)] = 1.0
@@ -104,7 +104,7 @@ def _ring(occ: Any, form: RingSectorForm, scale: float, begin: float, end: float
 
 
 def _revolved(occ: Any, outline: Profile, scale: float, begin: float, end: float) -> Solids:
-    """The area between the outline and the axis, turned about it."""
+    """Revolve the area between the outline and the axis about it."""
     segments = outline.segments
     low, high = (radius / scale for radius in outline.ends)
     start = occ.addPoint(0, 0, 0)
@@ -132,8 +132,8 @@ def _side(occ: Any, each: Segment, first: int, last: int, scale: float) -> int:
 
 
 def _in_thirds(occ: Any, sides: list[int]) -> Solids:
-    """A body whose surface is three faces, which meet in a tip: of one face alone gmsh makes two triangles on the same
-    three nodes there where the tip is slender.
+    """Draw a body with a surface of three faces that meet in a tip: with one face gmsh makes two triangles on the
+    same three nodes where the tip is slender.
     """
     third = _swept(occ, sides, 0.0, ROUND[1] / 3.0)
     others = [occ.copy(third) for _ in range(2)]
@@ -144,7 +144,7 @@ def _in_thirds(occ: Any, sides: list[int]) -> Solids:
 
 
 def _swept(occ: Any, sides: list[int], begin: float, end: float) -> Solids:
-    """What the area within ``sides`` covers from one angle to another, rad; the area itself goes."""
+    """Return the volume that the area within ``sides`` sweeps between two angles, rad; the area is removed."""
     area = occ.addPlaneSurface([occ.addCurveLoop(sides)])
     if begin:
         occ.rotate([(2, area)], 0, 0, 0, 0, 0, 1, begin)

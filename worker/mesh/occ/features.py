@@ -1,4 +1,4 @@
-"""Edges and rounds of a model that are smaller than its elements: tets there are as small."""
+"""Edges and rounds of a model that are smaller than its elements, which give equally small tets."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -11,11 +11,11 @@ from .draw import Solids
 from .frame import Frame
 
 _SHORT = 0.5
-"""Of the element size: edges below it are told. Chosen: a tet there has half the time step."""
+"""Share of the element size below which edges are reported. Chosen: a tet there has half the time step."""
 
 
 def small_features(gmsh: Any, element_size: float, frame: Frame, solids: Solids) -> Iterator[str]:
-    """A line each of short edges of ``solids``, and of fillets that the elements are too large for."""
+    """Yield lines about short edges of ``solids``, and fillets with a radius too small for the elements."""
     least = _SHORT * frame.length(element_size)
     faces = sorted(set(gmsh.model.getBoundary(solids, combined=False, oriented=False)))
     edges = sorted(set(gmsh.model.getBoundary(faces, combined=False, oriented=False)))
@@ -36,7 +36,7 @@ def small_features(gmsh: Any, element_size: float, frame: Frame, solids: Solids)
 
 
 def _radius(gmsh: Any, number: int) -> float:
-    """Smallest radius of curvature in the middle of a face; infinite of a plane."""
+    """Return the smallest radius of curvature in the middle of a face; infinite for a plane."""
     if gmsh.model.getType(2, number) == "Plane":
         return float("inf")
     low, high = gmsh.model.getParametrizationBounds(2, number)

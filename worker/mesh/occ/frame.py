@@ -1,4 +1,4 @@
-"""The coordinates in which a model is drawn: origin where sectors are cut, third direction along an axis, lengths of
+"""Coordinates in which a model is drawn: origin where sectors are cut, third direction along an axis, and lengths of
 order one, since the tolerances of gmsh and OpenCASCADE are absolute.
 """
 
@@ -25,24 +25,24 @@ class Frame:
 
     @property
     def directions(self) -> list[int]:
-        """Which of x, y, z the directions a, b, c are."""
+        """Indices of x, y, z for the directions a, b, c."""
         return [*across(self.axis), index(self.axis)]
 
     def place(self, point: Vector) -> Vector:
-        """A point of space, m, in the frame."""
+        """Return a point of space, m, in the frame."""
         a, b, c = ((point[d] - self.origin[d]) / self.scale for d in self.directions)
         return a, b, c
 
     def length(self, length: float) -> float:
-        """m, in lengths of the frame."""
+        """Return a length, m, in the scale of the frame."""
         return length / self.scale
 
     def direction(self, axis: Axis) -> int:
-        """Which of a, b, c runs along ``axis``."""
+        """Return the index of a, b, c that is along ``axis``."""
         return self.directions.index(AXES.index(axis))
 
     def to_space(self, points: Floats) -> Floats:
-        """Points (n, 3) of the frame in x, y, z; m. A zero becomes exactly the coordinate of the origin."""
+        """Return points (n, 3) of the frame in x, y, z; m. A zero becomes exactly the coordinate of the origin."""
         turned = np.empty_like(points)
         turned[:, self.directions] = points * self.scale
         moved: Floats = turned + np.array(self.origin)
@@ -50,5 +50,5 @@ class Frame:
 
 
 def scale_of(extent: float) -> float:
-    """A power of two near a length, m: lengths over it are of order one, and no bit of them is lost."""
+    """Return a power of two near a length, m: division by it is exact and gives lengths of order one."""
     return 2.0 ** round(math.log2(extent))

@@ -1,4 +1,4 @@
-"""Solids of one body that touch in edges or points alone: their nodes are one there, and nothing bears a moment."""
+"""Solids of one body that touch in edges or points only: they have common nodes there that carry no moment."""
 
 from collections.abc import Iterator
 from itertools import combinations
@@ -8,7 +8,7 @@ from .draw import Solids
 
 
 def hinges(gmsh: Any, solids: Solids) -> Iterator[str]:
-    """A line where some of the solids of a body are joined to the others by no face."""
+    """Yield a line if some solids of a body have no common face with the others."""
     faces = [_boundary(gmsh, [each]) for each in solids]
     lines = [_boundary(gmsh, sorted(each)) for each in faces]
     points = [_boundary(gmsh, sorted(each)) for each in lines]

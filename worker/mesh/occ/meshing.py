@@ -1,4 +1,6 @@
-"""From a drawn model, with its sizes set, to tets, whose nodes are moved from where they hold the time step down."""
+"""Meshing of a drawn model with its sizes set: tets by gmsh, whose nodes are moved to raise the smallest step
+lengths.
+"""
 
 from collections.abc import Sequence
 from typing import Any
@@ -13,18 +15,19 @@ from .frame import Frame
 from .sliding import Cut, Sliding
 
 WANTED = 0.75
-"""Step lengths below this share of a regular tet's with edge ``element_size`` are raised where possible."""
+"""Share of a regular tet's step length with edge ``element_size`` below which step lengths are raised where
+possible."""
 _OTHERS = ({"Mesh.Algorithm3D": 1}, {"Mesh.Algorithm3D": 1, "Mesh.Algorithm": 1})
-"""What is tried where gmsh fails: its Delaunay mesher in place of HXT, then triangles by MeshAdapt as well."""
+"""Further attempts if gmsh fails: its Delaunay mesher in place of HXT, then triangles by MeshAdapt as well."""
 
 
 def meshed(gmsh: Any, frame: Frame, element_size: float, cuts: Sequence[Cut]) -> TetMesh:
-    """The tets of the current model, m, in space, which is cut on the planes ``cuts`` of the frame."""
+    """Return the tets of the current model, m, in space; the model is cut on the planes ``cuts`` of the frame."""
     return with_names(gmsh, frame, element_size, cuts)[0]
 
 
 def with_names(gmsh: Any, frame: Frame, element_size: float, cuts: Sequence[Cut]) -> tuple[TetMesh, Names]:
-    """The same, and what gmsh calls its nodes and tets."""
+    """Return the same, and gmsh's numbers of its nodes and tets."""
     _generate(gmsh)
     found = named_mesh(gmsh)
     mesh = found.mesh
@@ -37,7 +40,7 @@ def with_names(gmsh: Any, frame: Frame, element_size: float, cuts: Sequence[Cut]
 
 
 def _generate(gmsh: Any) -> None:
-    """Tets in every volume; by another of gmsh's meshers where one fails. MeshError where all do."""
+    """Make tets in every volume; by another of gmsh's meshers if one fails. Raises MeshError if all fail."""
     for n, options in enumerate(({}, *_OTHERS)):
         for name, value in options.items():
             gmsh.option.setNumber(name, value)

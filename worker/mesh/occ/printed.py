@@ -1,4 +1,4 @@
-"""What a library prints on its own standard output."""
+"""Capture of the text that a library prints on standard output."""
 
 import os
 import tempfile
@@ -8,7 +8,7 @@ from contextlib import contextmanager
 
 @contextmanager
 def said() -> Iterator[bytearray]:
-    """The bytes that this process prints within the block, once it is over; they go nowhere else."""
+    """Collect the bytes that this process prints within the block; they are available after it."""
     text = bytearray()
     with tempfile.TemporaryFile() as file:
         before = os.dup(1)

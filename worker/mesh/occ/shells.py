@@ -1,4 +1,4 @@
-"""The closed surfaces that a surface of triangles is made of: outer ones, and those of cavities, which face inwards."""
+"""Closed surfaces of a set of triangles: outer surfaces, and those of cavities, which face inwards."""
 
 import math
 from dataclasses import dataclass
@@ -11,35 +11,37 @@ from ..model import Floats
 Triangles = NDArray[np.int64]
 
 _LOOKED_AT = 64
-"""Facets of a shell from which one looks whether it lies in others. Chosen."""
+"""Number of facets of a shell from which its position in other shells is tested. Chosen."""
 _IN = 1e-6
-"""Of the extent of the surface: how far within its own shell the point is from which one looks."""
+"""Distance inside of its own shell of the tested point, over the extent of the surface."""
 
 
 @dataclass(frozen=True)
 class Surface:
-    """``points`` (n, 3) in units of the file, ``faces`` (k, 3), ``shell`` (n,) which closed surface a point is of."""
+    """``points`` (n, 3) in units of the file, ``faces`` (k, 3), ``shell`` (n,) closed surface of each point."""
 
     points: Floats
     faces: Triangles
     shell: Triangles
 
     def volume(self) -> float:
-        """What lies within, cubic units; cavities are left out."""
+        """Enclosed volume, cubic units, without cavities."""
         return _volume(self.points[self.faces])
 
     def corners(self, shell: int) -> Floats:
-        """(k, 3, 3) corners of the facets of a shell."""
+        """Return (k, 3, 3) corners of the facets of a shell."""
         found: Floats = self.points[self.faces[self.shell[self.faces[:, 0]] == shell]]
         return found
 
     def volumes(self) -> list[float]:
-        """Of each shell, cubic units; below 0 of a cavity."""
+        """Volume of each shell, cubic units; negative for a cavity."""
         return [_volume(self.corners(shell)) for shell in range(int(self.shell.max()) + 1)]
 
 
 def shells(n: int, faces: Triangles) -> Triangles:
-    """(n,) the number of the closed surface that each point is of, from 0: by the least point that it is joined to."""
+    """Return (n,) the number of the closed surface of each point, from 0: by the smallest point that it is connected
+    to.
+    """
     least = np.arange(n)
     while True:
         known = least.copy()
@@ -50,7 +52,7 @@ def shells(n: int, faces: Triangles) -> Triangles:
 
 
 def nested(surface: Surface) -> list[list[int]]:
-    """The shells of each body: the outer one, and those of its cavities."""
+    """Return the shells of each body: the outer one, and those of its cavities."""
     volumes = surface.volumes()
     outer = [shell for shell, volume in enumerate(volumes) if volume > 0.0]
     bodies = {shell: [shell] for shell in outer}
@@ -63,8 +65,8 @@ def nested(surface: Surface) -> list[list[int]]:
 
 
 def astray(surface: Surface) -> Floats | None:
-    """A point of a shell that lies where it may not: an outer one in another body, a cavity in none. None where all
-    are right; facets are looked at here and there.
+    """Return a point of a shell in a wrong position: an outer shell inside of another body, or a cavity outside of
+    all. None if all are right; a sample of facets is tested.
     """
     volumes = surface.volumes()
     if len(volumes) == 1:
@@ -93,8 +95,9 @@ def _winds(corners: Floats, point: Floats) -> bool:
 
 
 def _winding(corners: Floats, point: Floats) -> float:
-    """How often a shell goes round a point: its solid angle (van Oosterom and Strackee 1983, IEEE Trans. Biomed. Eng.
-    30, 125) over 4 pi."""
+    """Return the winding number of a shell about a point: its solid angle (van Oosterom and Strackee 1983, IEEE
+    Trans. Biomed. Eng. 30, 125) over 4 pi.
+    """
     a, b, c = (corners - point).transpose(1, 0, 2)
     p, q, r = (np.sqrt((x * x).sum(axis=1)) for x in (a, b, c))
     over = (a * np.cross(b, c)).sum(axis=1)

@@ -1,4 +1,4 @@
-"""Sizes of elements in the current model: one size, or a grading of it."""
+"""Sizes of elements in the current model: one size, or a grading."""
 
 from typing import Any
 
@@ -7,12 +7,12 @@ from conoid.cases.model.grading import Grading
 from .frame import Frame
 
 GMSH_SIZE = 0.87
-"""gmsh's size over ``element_size``. HXT leaves 4 tets in its size cubed; this makes 6 in element_size^3, as the
-structured generator has, and a mean edge of 1.15 element_size."""
+"""gmsh's size over ``element_size``. HXT makes 4 tets in the cube of its size; this makes 6 in element_size^3, as
+the structured generator does, and a mean edge of 1.15 element_size."""
 
 
 def set_size(gmsh: Any, element_size: float, grading: Grading | None, frame: Frame) -> None:
-    """The size of the whole model."""
+    """Set the size of the whole model."""
     sizes = [element_size] if grading is None else [element_size, grading.far_size]
     if grading is not None:
         gmsh.model.mesh.field.setAsBackgroundMesh(graded(gmsh, element_size, grading, frame))
@@ -21,8 +21,8 @@ def set_size(gmsh: Any, element_size: float, grading: Grading | None, frame: Fra
 
 
 def graded(gmsh: Any, element_size: float, grading: Grading, frame: Frame) -> int:
-    """The number of gmsh's field of a size that is a linear function of the distance from a point, a line along an
-    axis, or a sphere or cylinder.
+    """Return the number of gmsh's field of a size that is a linear function of the distance from a point, a line
+    along an axis, or a sphere or cylinder.
     """
     origin = frame.place(grading.origin)
     along = None if grading.axis is None else frame.direction(grading.axis)

@@ -1,4 +1,6 @@
-"""Where the nodes of a drawn body may go without changing its shape: along the faces and edges of its model."""
+"""Constraints that keep the shape of a drawn body when nodes move: nodes slide along the faces and edges of its
+model.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -10,19 +12,18 @@ from numpy.typing import NDArray
 from ..model import Floats, Ids
 
 NEAR = 1e-9
-"""Nodes this near to a plane on which a body is cut are on it, in lengths of order one."""
+"""Largest distance of a node on a plane on which a body is cut, in lengths of order one."""
 
 Cut = tuple[int, float]
-"""A plane on which a body is cut: its direction, and where it cuts that."""
+"""A plane on which a body is cut: its direction and its position."""
 Nearest = Callable[[Floats], Floats]
-"""The points (k, 3) of an entity nearest to others."""
+"""Callback that returns the points (k, 3) of an entity nearest to given points."""
 
 
 @dataclass(frozen=True)
 class Sliding:
-    """``entity``: (n,) number of what each node is on in ``nearest``, -1 within the body, -2 at a corner.
-
-    ``held``: (n, 3) coordinates that a node keeps besides: those of the planes on which the body is cut.
+    """``entity``: (n,) index in ``nearest`` of the entity of each node, -1 inside of the body, -2 at a corner.
+    ``held``: (n, 3) fixed coordinates of a node on the planes on which the body is cut.
     """
 
     entity: NDArray[np.int32]
@@ -31,8 +32,8 @@ class Sliding:
 
     @classmethod
     def of(cls, gmsh: Any, tags: Ids, points: Floats, cuts: Sequence[Cut]) -> tuple[Self, Floats]:
-        """That of the current model with its mesh, for nodes called ``tags`` at ``points``, and the points, put exactly
-        on the planes of ``cuts``.
+        """Return the constraints of the current model with its mesh, for nodes ``tags`` at ``points``, and the
+        points, projected onto the planes of ``cuts``.
         """
         entity, nearest = np.full(len(tags), -1, np.int32), list[Nearest]()
         for dimension, number in gmsh.model.getEntities():
@@ -50,11 +51,11 @@ class Sliding:
         return cls(entity, tuple(nearest), held), points
 
     def movable(self, node: int) -> bool:
-        """Whether ``node`` can go anywhere at all."""
+        """Return whether ``node`` can move."""
         return bool(self.entity[node] != -2)
 
     def allowed(self, node: int, start: Floats, places: Floats) -> Floats:
-        """The places (k, 3) nearest to ``places`` that ``node``, now at ``start``, may take."""
+        """Return the allowed positions (k, 3) of ``node``, now at ``start``, nearest to ``places``."""
         on = self.entity[node]
         if on >= 0:
             places = self.nearest[on](places)
@@ -71,7 +72,7 @@ def _nearest(gmsh: Any, dimension: int, number: int) -> Nearest:
 
 
 def _flat(gmsh: Any, number: int) -> Nearest:
-    """A plane needs no search: the point at the middle of its parameters, and its normal."""
+    """Return the point at the middle of the parameters of a plane, and its normal; other faces need a search."""
     low, high = gmsh.model.getParametrizationBounds(2, number)
     middle = 0.5 * (np.asarray(low) + np.asarray(high))
     origin = np.asarray(gmsh.model.getValue(2, number, middle), np.float64)

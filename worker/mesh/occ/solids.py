@@ -1,4 +1,4 @@
-"""Combinations of shapes, solids of CAD files and closed surfaces, as tets."""
+"""Meshes of combinations of shapes, solids of CAD files and closed surfaces."""
 
 import hashlib
 from dataclasses import dataclass, replace
@@ -25,7 +25,7 @@ from .stl import read_stl
 from .surface import enclose
 
 _TETS_PER_CUBE = 6.0
-"""Tets in a volume of element_size^3."""
+"""Number of tets in a volume of element_size^3."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class _Made:
 
 
 def measured(mesh: Measured, sources: Sources, key: str) -> TetMesh:
-    """The mesh of a body whose sizes nothing tells before. MeshError, naming ``key``, where there is none."""
+    """Return the mesh of a body whose size is known only from its geometry. Raises MeshError, naming ``key``."""
     if isinstance(mesh, Stl):
         made = _of_surface(mesh, sources, key)
     elif isinstance(mesh, Cad | Combination):
@@ -59,8 +59,8 @@ def _of_solid(mesh: Cad | Combination, sources: Sources, key: str) -> _Made:
 
 
 def draw_solid(gmsh: Any, mesh: Cad | Combination, frame: Frame, sources: Sources, key: str) -> Solids:
-    """The volumes of a body in the ``frame`` of the model, which has its centre and its axis: its sector, with faces in
-    common where its solids touch. MeshError where nothing is left, or where it would have too many tets.
+    """Draw a body in the ``frame`` of the model, which has its centre and its axis; return the volumes of its
+    sector, with common faces where its solids touch. Raises MeshError if nothing is left, or for too many tets.
     """
     occ = gmsh.model.occ
     solids = joined(occ, sector(occ, Drawing(gmsh, frame, sources).solids(mesh, key), mesh), key)
@@ -84,7 +84,7 @@ def _of_surface(mesh: Stl, sources: Sources, key: str) -> _Made:
 
 
 def sector(occ: Any, solids: Solids, mesh: Solid) -> Solids:
-    """What is on the positive sides of the planes at which a solid is cut."""
+    """Return the part on the positive sides of the planes at which a solid is cut."""
     cuts = cut_by(mesh.sector, mesh.axis)
     if not cuts or not solids:
         return solids
@@ -97,8 +97,8 @@ def sector(occ: Any, solids: Solids, mesh: Solid) -> Solids:
 
 
 def joined(occ: Any, solids: Solids, key: str) -> Solids:
-    """Solids with faces in common where they touch: their meshes have nodes in common there. MeshError where one lies
-    in another.
+    """Return solids with common faces where they touch: their meshes have common nodes there. Raises MeshError if
+    one is inside of another.
     """
     if len(solids) < 2:
         return solids

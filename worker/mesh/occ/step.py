@@ -1,4 +1,4 @@
-"""What the text of a STEP file (ISO 10303-21) says: whether it is whole, in which unit it is, what it refers to."""
+"""Text of a STEP file (ISO 10303-21): completeness, unit and references to other files."""
 
 import re
 from fractions import Fraction
@@ -6,7 +6,7 @@ from fractions import Fraction
 from ...errors import MeshError
 
 _TEXT = re.compile(rb"'(?:[^']|'')*'|/\*.*?\*/", re.DOTALL)
-"""Strings and comments, which may hold anything."""
+"""Strings and comments, with any contents."""
 _UNITS = re.compile(rb"GLOBAL_UNIT_ASSIGNED_CONTEXT\s*\(\s*\(([^)]*)\)")
 _NAME = re.compile(rb"#(\d+)")
 _DEFINED = re.compile(rb"[;\s]#(\d+)\s*=")
@@ -15,7 +15,7 @@ _SI = re.compile(rb"SI_UNIT\s*\(\s*(?:\.(\w+)\.|\$)\s*,\s*\.METRE\.\s*\)")
 _BASED = re.compile(rb"CONVERSION_BASED_UNIT\s*\([^,]*,\s*#(\d+)\s*\)")
 _MEASURE = re.compile(rb"LENGTH_MEASURE\s*\(\s*([-+0-9.Ee]+)\s*\)\s*,\s*#(\d+)")
 _ELSEWHERE = re.compile(rb"\b(DOCUMENT_FILE|EXTERNAL_SOURCE|EXTERNALLY_DEFINED_\w+)\s*\(|;\s*(REFERENCE)\s*;")
-"""What stands for geometry of other files: documents (AP 203, 214, 242), and the section of edition 3."""
+"""References to geometry in other files: documents (AP 203, 214, 242), and the section of edition 3."""
 _PREFIXES = {
     b"EXA": 18, b"PETA": 15, b"TERA": 12, b"GIGA": 9, b"MEGA": 6, b"KILO": 3, b"HECTO": 2, b"DECA": 1, b"": 0,
     b"DECI": -1, b"CENTI": -2, b"MILLI": -3, b"MICRO": -6, b"NANO": -9, b"PICO": -12,
@@ -23,8 +23,8 @@ _PREFIXES = {
 
 
 def length_units(data: bytes, head: str) -> set[Fraction]:
-    """The lengths of 1 in the file, m: of each of its contexts. MeshError, which begins with ``head``, where the file
-    is cut off, damaged or refers to others.
+    """Return the lengths of 1 in the file, m, for each of its contexts. Raises MeshError, which begins with
+    ``head``, if the file is cut off, damaged or refers to others.
     """
     if not data.rstrip().endswith(b"END-ISO-10303-21;"):
         raise MeshError(f"{head}: the STEP file is cut off: it does not end with END-ISO-10303-21;")
@@ -42,7 +42,7 @@ def length_units(data: bytes, head: str) -> set[Fraction]:
 
 
 def solids_in(data: bytes) -> int:
-    """How many solids the file defines; an assembly may have one of them more than once."""
+    """Return the number of solids that the file defines; an assembly may contain one of them several times."""
     return len(_SOLID.findall(_TEXT.sub(b"''", data)))
 
 
@@ -52,7 +52,7 @@ def _entity(text: bytes, name: bytes) -> bytes:
 
 
 def _length(text: bytes, name: bytes, depth: int) -> Fraction | None:
-    """The unit that an entity stands for, m; None where it is none of length. An inch is based on another unit."""
+    """Return the unit of an entity, m; None if it is not a length. An inch is based on another unit."""
     entity = _entity(text, name)
     if found := _SI.search(entity):
         power = _PREFIXES.get(found[1] or b"", 0)

@@ -1,4 +1,6 @@
-"""STL files, text and binary: one closed surface whose triangles face outwards and do not meet but at their edges."""
+"""STL files, text and binary: one closed surface whose triangles face outwards and have only edges and corners in
+common.
+"""
 
 import struct
 from pathlib import Path
@@ -11,13 +13,15 @@ from .crossing import crossing
 from .shells import Surface, Triangles, astray, shells
 
 MOST_FACETS = 1_000_000
-"""Chosen: a minute of looking for those that cross each other."""
+"""Largest number of facets. Chosen: the search for crossing facets takes a minute."""
 _HEAD, _FACET = 84, 50
-"""Bytes of a binary file before its facets, and of each of them."""
+"""Bytes of a binary file before its facets, and of each facet."""
 
 
 def read_stl(path: Path, head: str) -> Surface:
-    """The surface in a file. MeshError, which begins with ``head``, where it encloses nothing or is damaged."""
+    """Return the surface in a file. Raises MeshError, which begins with ``head``, if it encloses no volume or is
+    damaged.
+    """
     try:
         data = path.read_bytes() if path.stat().st_size <= _HEAD + _FACET * 6 * MOST_FACETS else b""
     except OSError as error:
@@ -44,7 +48,9 @@ def read_stl(path: Path, head: str) -> Surface:
 
 
 def _is_binary(data: bytes) -> bool:
-    """By its size, or by bytes that no text has: the head of a binary file may begin with ``solid``, too."""
+    """Return whether a file is binary, by its size, or by bytes that no text has: the head of a binary file may
+    begin with ``solid``, too.
+    """
     if len(data) < _HEAD:
         return False
     sized = len(data) == _HEAD + _FACET * struct.unpack_from("<I", data, 80)[0]
@@ -77,7 +83,7 @@ def _text(data: bytes, head: str) -> Floats:
 
 
 def _refuse_open(points: Floats, faces: Triangles, head: str) -> None:
-    """Each edge belongs to two facets, which go along it in opposite senses."""
+    """Raise MeshError unless each edge belongs to two facets with opposite directions of it."""
     if not len(faces):
         raise MeshError(f"{head}: the STL file has no facet")
     same = np.unique(np.sort(faces, axis=1), axis=0, return_counts=True)[1]

@@ -1,4 +1,4 @@
-"""A closed surface of triangles as a model of gmsh: faces between its edges, and the volumes within."""
+"""Conversion of a closed surface of triangles into a model of gmsh: faces between its edges, and the volumes inside."""
 
 import math
 from typing import Any
@@ -12,8 +12,8 @@ _TRIANGLE = 2
 
 
 def enclose(gmsh: Any, surface: Surface, factor: float, edge_angle: float) -> None:
-    """Puts a surface, lengths times ``factor``, into the current model: its smooth faces, cut at edges sharper than
-    ``edge_angle``, rad, as gmsh can parametrise them, and one volume within each outer shell.
+    """Put a surface, lengths times ``factor``, into the current model: smooth faces, cut at edges sharper than
+    ``edge_angle``, rad, as gmsh can parametrise them, and one volume inside of each outer shell.
     """
     tags = np.arange(1, len(surface.points) + 1)
     gmsh.model.addDiscreteEntity(2, 1)

@@ -1,1 +1,1 @@
-"""Radioss starter decks: blocks, what the deck defines, groups and surfaces, and the mesh that is chosen of it."""
+"""Reader of Radioss starter decks: blocks, definitions of a deck, groups and surfaces, and the chosen mesh."""

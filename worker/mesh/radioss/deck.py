@@ -1,4 +1,4 @@
-"""What a starter deck defines: nodes, elements with a volume, parts, subsets, groups of nodes and surfaces."""
+"""Definitions of a starter deck: nodes, volume elements, parts, subsets, groups of nodes and surfaces."""
 
 from array import array
 from collections import Counter
@@ -16,17 +16,17 @@ def _words(text: str) -> frozenset[str]:
 
 
 SOLIDS = {"BRICK": 8, "TETRA4": 4, "TETRA10": 10, "PENTA6": 6, "BRIC20": 20}
-"""Elements that are read, and their nodes (Reference Guide, "Elements")."""
+"""Elements that are read, and their number of nodes (Reference Guide, "Elements")."""
 NODES_A_LINE = {"TETRA10": 10, "BRIC20": 8}
-"""Of elements that take several lines; those of a tet stand below its number."""
+"""Nodes in a line of elements with several lines; those of a tet are below its number."""
 VOLUMES = ("SHEL16", "SPHCEL", "QUAD", "TRIA")
-"""Elements with a volume, or particles, that are not read."""
+"""Volume elements, or particles, that are not read."""
 PLATES = ("SHELL", "SH3N", "BEAM", "TRUSS", "SPRING", "XELEM", "RIVET")
 """Elements without volume."""
 REFUSED = ("TRANSFORM", "CNODE", "MERGE", "SUBMODEL", "ADMESH", "MADYMO", "XREF", "REFSTA", "EREF", "INISTA")
-"""Keywords that make, move or join nodes and elements, or fetch their state, in ways that are not followed here."""
+"""Keywords that make, move or join nodes and elements, or fetch their state, and are not supported."""
 JOINING = ("INTER", "RBODY", "RBE2", "RBE3", "RWALL", "RLINK", "MPC", "GJOINT", "CYL_JOINT", "BCS", "ADMAS", "LAG_MUL")
-"""Keywords that join bodies, hold them, or give them mass. None of it is done here."""
+"""Keywords that join bodies, hold them, or give them mass. They have no effect here."""
 GROUPS = ("GRNOD", "SURF")
 """First words of groups of nodes and of surfaces."""
 FAMILIES = _words(
@@ -63,20 +63,20 @@ class Group:
 
 
 class Deck:
-    """All of a deck."""
+    """The contents of a deck."""
 
     def __init__(self, path: Path) -> None:
-        """Reads it. Raises MeshError with the line that cannot be followed."""
+        """Read the deck. Raises MeshError with the line that is not understood."""
         self.nodes, self.points = array("q"), array("d")
         self.solids: dict[str, Solids] = {}
         self.titles: dict[int, str] = {}
-        """Of parts by their numbers."""
+        """Titles of parts by their numbers."""
         self.subset_of: dict[int, int] = {}
-        """The subset of each part."""
+        """Subset of each part."""
         self.subsets: dict[int, tuple[str, list[int]]] = {}
-        """Title and subsets within it."""
+        """Title and inner subsets of each subset."""
         self.groups: dict[tuple[str, int], Group] = {}
-        """By first word and number."""
+        """Groups by first word and number."""
         self.passed, self.volumes, self.joining = Counter[str](), Counter[str](), Counter[str]()
         """Lines of elements that are not read, and keywords that join bodies, by first word."""
         self.included = Included(path)

@@ -1,4 +1,4 @@
-"""The elements that a case takes from a Radioss starter deck: all with a volume, or those of a part or a subset."""
+"""Selection from a Radioss starter deck: all volume elements, or those of a part or a subset."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -16,15 +16,15 @@ from .deck import KNOWN, Deck, Group
 
 _KINDS = {"BRICK": HEX8, "TETRA4": TET4, "TETRA10": TET10, "PENTA6": WEDGE6, "BRIC20": Kind(Form.HEXAHEDRON, 20)}
 _DEEPEST = 20
-"""Groups within groups, and subsets within subsets. Chosen: nobody has more than five."""
+"""Largest depth of groups within groups, and subsets within subsets. Chosen: decks have up to five."""
 
 
 def read_radioss(path: Path, group: str | None, key: str) -> Content:
-    """The elements of a starter deck that have a volume, all or those that ``group`` names, and its groups of nodes and
-    surfaces as sets.
+    """Return the volume elements of a starter deck, all or those of ``group``, and its groups of nodes and surfaces as
+    sets.
 
-    ``group`` is a part, or a subset with those within it, by title or number; a number alone is that of a part, where
-    there is one. Raises MeshError, with the number of the line where there is one.
+    ``group`` is a part, or a subset with those within it, by title or number; a number alone is that of a part, if
+    there is one. Raises MeshError, with the number of the line if there is one.
     """
     deck = Deck(path)
     numbers = np.array(deck.nodes, np.int64)
@@ -37,16 +37,17 @@ def read_radioss(path: Path, group: str | None, key: str) -> Content:
     if group is None and deck.volumes:
         word, many = deck.volumes.most_common(1)[0]
         raise MeshError(f"{many} lines of /{word}, whose elements are not read; choose a part without them by group")
-    named, told = reader.named()
+    named, remarks = reader.named()
     points = np.array(deck.points).reshape(-1, 3)[order]
-    return Content(reader.tags, points, chosen, named, (*_notes(deck, chosen), *told), tuple(deck.included.files[1:]))
+    notes = (*_notes(deck, chosen), *remarks)
+    return Content(reader.tags, points, chosen, named, notes, tuple(deck.included.files[1:]))
 
 
 _NONE = np.zeros(0, np.int64)
 
 
 class _Reader:
-    """The arrays of a deck, and what its groups mean."""
+    """Arrays of a deck, and the contents of its groups."""
 
     def __init__(self, deck: Deck, tags: Ids) -> None:
         self.deck, self.tags = deck, tags
@@ -60,11 +61,11 @@ class _Reader:
         return cells(made.kind, made.numbers, placed(self.tags, made.nodes, made.called), made.lines)
 
     def both(self) -> Iterator[tuple[Cells, Ids]]:
-        """Elements and their parts."""
+        """Return elements and their parts."""
         return zip(self.cells, self.of, strict=True)
 
     def parts(self, group: str, key: str) -> Ids:
-        """The parts that a name means. Raises MeshError for none, or for two things that differ."""
+        """Return the parts of a name. Raises MeshError for an unknown or ambiguous name."""
         word, colon, name = group.partition(":")
         kinds = [word] if colon and word in ("part", "subset") else ["part", "subset"]
         name = name if len(kinds) == 1 and colon else group
@@ -88,15 +89,15 @@ class _Reader:
         return [self.within(number) for number in _named(titles, name)]
 
     def within(self, subset: int, depth: int = 0) -> set[int]:
-        """The parts of a subset and of those within it. Raises MeshError."""
+        """Return the parts of a subset and of those within it. Raises MeshError."""
         if subset not in self.deck.subsets or depth > _DEEPEST:
             raise MeshError(f"the subset {subset} {'is not defined' if depth <= _DEEPEST else 'is within itself'}")
         own = {part for part, of in self.deck.subset_of.items() if of == subset}
         return own.union(*(self.within(each, depth + 1) for each in self.deck.subsets[subset][1]))
 
     def named(self) -> tuple[list[Named], list[str]]:
-        """Groups of nodes and surfaces, and what of them is not read."""
-        found, told = list[Named](), list[str]()
+        """Return the groups of nodes and surfaces, and remarks on those that are not read."""
+        found, remarks = list[Named](), list[str]()
         for (word, number), group in self.deck.groups.items():
             names = tuple(filter(None, (group.title, str(number))))
             try:
@@ -105,8 +106,8 @@ class _Reader:
                 else:
                     found.append(surface(names, self._faces(number), free="SEG" not in group.kind))
             except MeshError as error:
-                told.append(f"a group is not read: {error}")
-        return found, told
+                remarks.append(f"a group is not read: {error}")
+        return found, remarks
 
     def _group(self, word: str, number: int, depth: int) -> Group:
         group = self.deck.groups.get((word, number))
@@ -117,7 +118,7 @@ class _Reader:
         return group
 
     def _nodes(self, number: int, depth: int = 0) -> Ids:
-        """Places of the nodes of a group; a number below zero takes away."""
+        """Return the indices of the nodes of a group; a negative number removes a node."""
         group, found = self._group("GRNOD", number, depth), np.zeros(len(self.tags), bool)
         for _, row in group.rows:
             if group.kind == "GRNOD/GENE":
@@ -139,7 +140,7 @@ class _Reader:
         return np.concatenate([_NONE, *(each.nodes[np.isin(of, parts)].ravel() for each, of in self.both())])
 
     def _faces(self, number: int, depth: int = 0) -> list[Ids]:
-        """Corners (n, 3) and (n, 4) of the faces of a surface: of parts all that their elements have."""
+        """Return corners (n, 3) and (n, 4) of the faces of a surface; for parts all faces of their elements."""
         group, found = self._group("SURF", number, depth), list[Ids]()
         if group.kind == "SURF/SEG":
             rows = [(line, [*row[1:], 0, 0, 0, 0][:4]) for line, row in group.rows]
@@ -166,6 +167,6 @@ def _named(titles: dict[int, str], name: str) -> list[int]:
 
 
 def _notes(deck: Deck, chosen: list[Cells]) -> Iterator[str]:
-    """What of the deck is not in the mesh, or is taken otherwise, in a line each."""
+    """Return remarks on contents of the deck that are not in the mesh or are interpreted in an unexpected way."""
     yield from omitted.notes(deck.passed, deck.volumes, deck.joining, "/")
     yield from omitted.by_corners(chosen)

@@ -1,7 +1,7 @@
-"""The elements that a case takes from a .vtu file: all with a volume, or those with a value in an array of cells.
+"""Selection from a .vtu file: all volume elements, or those with a value in an array of cells.
 
-The reader is our own: VTK's warns of a damaged file on a stream and goes on with what it has, and meshio ends on arrays
-that it does not know.
+The reader is our own: VTK's reports a damaged file on a stream and continues with partial contents, and meshio ends
+on unknown arrays.
 """
 
 from collections.abc import Iterator
@@ -21,24 +21,24 @@ _KINDS = {
     10: TET4, 12: HEX8, 13: WEDGE6, 14: PYRAMID5, 24: TET10, 25: HEX20, 26: WEDGE15, 27: PYRAMID13, 11: HEX8,
     29: Kind(Form.HEXAHEDRON, 27),
 }  # fmt: skip
-"""Types of VTK with a volume that are read (vtkCellType.h)."""
+"""VTK's volume types that are read (vtkCellType.h)."""
 _FACES = {5: 3, 9: 4, 22: 3, 23: 4, 28: 4, 8: 4}
 """Types of surfaces, and their corners."""
 _EMPTY = frozenset((0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 21, 22, 23, 28, 30, 34, 35, 36))
 """Types without volume."""
 _VOXEL, _PIXEL = 11, 8
-"""Their corners stand in the order of x, y, z."""
+"""Order of the corners of a voxel, x first, then y, then z."""
 _ORDER = {_VOXEL: [0, 1, 3, 2, 4, 5, 7, 6], _PIXEL: [0, 1, 3, 2]}
 _MIRRORED = {6: [0, 2, 1, 3, 5, 4], 15: [0, 2, 1, 3, 5, 4, 8, 7, 6, 11, 10, 9, 12, 14, 13]}
-"""Wedges: VTK's text has their first triangle face outwards, most programs write it inwards."""
+"""Order for wedges: in VTK's text their first triangle faces outwards, most programs write it inwards."""
 
 
 def read_vtu(path: Path, group: str | None, key: str) -> Content:
-    """The elements of a .vtu file with a volume, all or those of ``group``; arrays of whole numbers of points are sets
-    of nodes (those with a value other than 0), and the values of arrays of cells are surfaces.
+    """Return the volume elements of a .vtu file, all or those of ``group``; integer arrays of points are sets of nodes
+    (those with a value other than 0), and the values of arrays of cells are surfaces.
 
-    ``group`` is ``array:value``, or a value where one array of cells alone has whole numbers. Nodes and elements are
-    called by their places from 0. Raises MeshError.
+    ``group`` is ``array:value``, or a value if one array of cells alone has integers. Nodes and elements are called
+    by their indices from 0. Raises MeshError.
     """
     grid = Grid(path)
     n, m = grid.points_count, grid.cells_count
@@ -89,7 +89,7 @@ def _rows(
 
 
 def _of(ends: Ids, nodes: Ids, some: Ids, size: int, kind: int) -> Ids:
-    """(k, size) nodes of cells of one type. MeshError where one has another number of them."""
+    """Return (k, size) nodes of cells of one type. Raises MeshError if one has another number of them."""
     sizes = np.diff(ends, prepend=0)[some]
     if (sizes != size).any():
         k = np.flatnonzero(sizes != size)[0]
