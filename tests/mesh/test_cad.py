@@ -58,7 +58,7 @@ def test_a_file_says_its_unit(folder: Path, step: str, change: Any, unit: float,
         mesh = made(path, change(step), element_size=2.0 * unit, unit=given)
         assert mesh.volumes().sum() == pytest.approx((CUBE + ROD + PLATE) * unit**3, rel=0.01)
         assert mesh.points.max(axis=0) == pytest.approx(np.array([23.0, 10.0, 10.0]) * unit, rel=1e-9)
-    with pytest.raises(MeshError, match=r"^mesh.path = 'unit.step': unit = 25.0 mm, but the STEP file says "):
+    with pytest.raises(MeshError, match=r"^mesh.path = 'unit.step': unit = 25.0 mm, but the STEP file is in "):
         made(path, change(step), unit="25 mm")
 
 

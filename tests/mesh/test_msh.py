@@ -157,16 +157,16 @@ def test_other_volumes_are_refused_where_they_are_chosen(tmp_path: Path) -> None
         (
             "$Nodes\n5",
             "$Nodes\n6",
-            r"the file is damaged or cut off: the section \$Nodes has fewer numbers than it says",
+            r"the file is damaged or cut off: the section \$Nodes has fewer numbers than its counts",
         ),
-        ("$Nodes\n5", "$Nodes\n4", r"the section \$Nodes has more numbers than it says"),
+        ("$Nodes\n5", "$Nodes\n4", r"the section \$Nodes has more numbers than its counts"),
         ("$Nodes\n5", "$Nodes\n-1", r"the section \$Nodes has fewer numbers"),
         ("10 0 0 0", "10 0 x 0", r"the section \$Nodes has a word that is no number"),
         ("10 0 0 0", "10.5 0 0 0", r"the section \$Nodes has a node whose number is not whole"),
         ("20 1 0 0", "10 1 0 0", "node 10 is defined twice"),
         ("101 4 2 2", "100 4 2 2", "element 100 is defined twice"),
         ("10 30 20 50", "10 30 20 60", "tet 101 uses node 60, which is not defined"),
-        ("$Elements\n2", "$Elements\n3", r"the section \$Elements has fewer numbers than it says"),
+        ("$Elements\n2", "$Elements\n3", r"the section \$Elements has fewer numbers than its counts"),
         ("101 4 2 2 1", "101 4 2.5 2 1", r"the section \$Elements has 2.5 where a whole number is expected"),
         ("101 4 ", "101 999 ", "it has elements of the type 999 of gmsh, which is not read"),
         ("$EndNodes", "$EndNode", r"the section \$Nodes has no end"),
@@ -179,7 +179,7 @@ def test_other_volumes_are_refused_where_they_are_chosen(tmp_path: Path) -> None
         (
             "$Nodes",
             '$PhysicalNames\n2\n3 1 "a"\n$EndPhysicalNames\n$Nodes',
-            r"the section \$PhysicalNames does not hold",
+            r"the section \$PhysicalNames is wrong",
         ),
     ],
 )

@@ -1,1 +1,1 @@
-"""What probes measure that is no mean over tets: pushes, sums over nodes, what is behind a target, shapes."""
+"""Probes and references: means over tets, and gauges of forces, sums over nodes, fragments and shapes."""

@@ -97,8 +97,8 @@ class Probes:
         self._counted: list[int] | None = None
         """Number of tets of each block when ``_found`` was made."""
         self._found: list[tuple[str, Block, Ints, slice, slice]] = []
-        """For each mean and block with tets of it: the field, the block, the indices of the tets, and the slices of
-        the summed values that are field times mass, and mass."""
+        """Entries for each mean and block with tets of it: the field, the block, the indices of the tets, and slices
+        of the summed values that are field times mass, and mass."""
         self._starts = np.zeros(1, np.int64)
         """First value of each sum."""
 

@@ -134,7 +134,7 @@ def _reason(key: str, code: int, errors: str, limits: Limits) -> str:
     if -code == signal.SIGALRM:
         return f"{key}: its file keeps OpenCASCADE for more than two minutes; is it damaged?"
     memory = limits.memory / 2**30
-    return f"{key}: the mesh process {how} (memory limit {memory:.3g} GiB): {lines[-1] if lines else 'it said nothing'}"
+    return f"{key}: the mesh process {how} (memory limit {memory:.3g} GiB): {lines[-1] if lines else 'no message'}"
 
 
 def main() -> int:

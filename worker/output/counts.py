@@ -29,7 +29,7 @@ class Counter:
     """The counts of a run. Every method is collective except ``due``."""
 
     def __init__(self) -> None:
-        """Nothing has been counted."""
+        """No count is made yet."""
         self._sent: tuple[object, ...] = ()
         self._found: tuple[int, int] = (-1, -1)
         """Numbers of broken facets and of tets when fragments were last found."""

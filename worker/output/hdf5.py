@@ -1,8 +1,9 @@
 """HDF5 files that are safe on a full disk.
 
 After a failed write HDF5 continues with the data that it could not write: it fails again at each object that is
-freed, which Python can only print, and ends in a segmentation fault; or a file looks complete of which a part is
-missing. So failures are recorded here and not passed to HDF5.
+freed, which Python can only print, and
+ends in a segmentation fault; or a file opens as complete although a part is missing. So failures are recorded here and
+not passed to HDF5.
 """
 
 import errno

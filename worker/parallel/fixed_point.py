@@ -123,7 +123,7 @@ def _whole(words: Ints) -> Floats:
     """Return (..., k) the sums of limbs (..., 2, k) in quanta of the low limb, rounded once."""
     high, low = words[..., 0, :], words[..., 1, :]
     over = high + (low >> _LIMB_BITS)
-    if over.size and max(int(over.max()), -int(over.min())) < 2**53:  # exact, so that the sum is what rounds
+    if over.size and max(int(over.max()), -int(over.min())) < 2**53:  # exact, so that the sum rounds once
         return np.asarray(over * _LIMB + (low & ((1 << _LIMB_BITS) - 1)))
     pairs = zip(high.reshape(-1).tolist(), low.reshape(-1).tolist(), strict=True)
     return np.array([float((a << _LIMB_BITS) + b) for a, b in pairs]).reshape(high.shape)

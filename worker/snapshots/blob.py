@@ -55,7 +55,7 @@ class Made:
     """First size, see ``table.by_size``."""
     sizes: list[int]
     fields: dict[str, list[float]]
-    """For each field the smallest value, the 0.5 and the 99.5 percentile, and the largest value."""
+    """Of each field the smallest value, the 0.5 and the 99.5 percentile, and the largest value."""
 
 
 Births = Callable[[Ints], Floats]

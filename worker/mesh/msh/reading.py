@@ -61,7 +61,7 @@ def _names(file: Sections) -> dict[tuple[int, int], str]:
     read = [_NAME.fullmatch(line) for line in lines]
     found = {(int(line[1]), int(line[2])): line[3] for line in read if line is not None}
     if count.strip() != str(len(lines)) or len(found) != len(lines):
-        raise MeshError("the file is damaged: the section $PhysicalNames does not hold what it says")
+        raise MeshError("the file is damaged: the count of the section $PhysicalNames is wrong")
     return found
 
 

@@ -153,14 +153,14 @@ class Written(Numbers):
 
     def floats(self, n: int) -> Floats:
         if n < 0 or self.at + n > len(self.values):
-            raise self.damaged("has fewer numbers than it says")
+            raise self.damaged("has fewer numbers than its counts")
         found = self.values[self.at : self.at + n]
         self.at += n
         return found
 
     def close(self) -> None:
         if self.at < len(self.values):
-            raise self.damaged("has more numbers than it says")
+            raise self.damaged("has more numbers than its counts")
 
 
 class Stored(Numbers):
@@ -178,7 +178,7 @@ class Stored(Numbers):
         """Read (n,) records of a numpy layout."""
         kind = np.dtype(layout).newbyteorder(self.order)
         if n < 0 or self.at + n * kind.itemsize > len(self.content):
-            raise self.damaged("has fewer numbers than it says")
+            raise self.damaged("has fewer numbers than its counts")
         found = np.frombuffer(self.content, kind, n, self.at)
         self.at += n * kind.itemsize
         return found
@@ -197,4 +197,4 @@ class Stored(Numbers):
 
     def close(self) -> None:
         if self.content[self.at :].strip():
-            raise self.damaged("has more numbers than it says")
+            raise self.damaged("has more numbers than its counts")

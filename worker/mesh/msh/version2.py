@@ -77,7 +77,7 @@ def _elements(numbers: Numbers) -> Rows:
             following, rest = 1, numbers.ints(tags + shape_of(kind)[1])
             rows = np.concatenate([[number], rest])[None]
         if following < 1 or following > many or tags < 0:
-            raise numbers.damaged("has other elements than it says")
+            raise numbers.damaged("has another number of elements than its count")
         _sort(found, kind, tags, rows)
         many -= following
     numbers.close()

@@ -120,7 +120,7 @@ def _step_unit(form: CadForm, data: bytes, head: str) -> Fraction:
     said = length_units(data, head)
     if form.unit is not None and any(abs(float(unit) - form.unit) > 1e-9 * form.unit for unit in said):
         units = choices(sorted(si(float(unit), "m") for unit in said))
-        raise MeshError(f"{head}: unit = {si(form.unit, 'm')}, but the STEP file says {units}; remove or mend the key")
+        raise MeshError(f"{head}: unit = {si(form.unit, 'm')}, but the STEP file is in {units}; remove or mend the key")
 
     return _MILLIMETRE
 
