@@ -1,6 +1,7 @@
 """Writes .msh and .inp files with gmsh in random options: ``python gmsh_files.py FOLDER SEED COUNT``.
 
-A process of its own, since gmsh is GPL. ``truth.json`` says what each group of each file holds, from gmsh's own model.
+A process of its own, since gmsh is GPL. ``truth.json`` contains the members of each group of each file,
+from gmsh's own model.
 """
 
 import itertools

@@ -11,7 +11,7 @@ from conoid.worker.mesh.model import Ints, TetMesh
 
 @dataclass(frozen=True)
 class Quality:
-    """Step lengths, m: ``worst`` decides the time step, ``mean`` is what the mesh could do if all tets were alike."""
+    """Step lengths, m: ``worst`` limits the time step, ``mean`` would limit it if all tets were alike."""
 
     worst: float
     mean: float

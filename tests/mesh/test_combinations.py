@@ -38,7 +38,7 @@ def made(body: Combination) -> TetMesh:
 
 
 def by_chance(body: Combination, seed: int) -> tuple[float, float]:
-    """Volume by points at random, m^3, and its standard deviation: of what ``cases`` says is inside."""
+    """Return a Monte Carlo estimate of the volume inside according to ``cases``, m^3, and its standard deviation."""
     holds, box = inside(body), box_of(body)
     assert holds is not None
     low, high = np.array(box or ((-2.0,) * 3, (2.0,) * 3))
@@ -51,7 +51,9 @@ def by_chance(body: Combination, seed: int) -> tuple[float, float]:
 
 
 def assert_volume(seed: int) -> None:
-    """That of the mesh is that by chance, as far as chance tells and as facets cut off round bodies."""
+    """The volume of the mesh agrees with the Monte Carlo estimate, up to its deviation and to the volume that facets
+    cut off round bodies.
+    """
     body = combination(tree(seed))
     volume, off = by_chance(body, seed)
     if volume < 1e-3:

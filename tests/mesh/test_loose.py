@@ -50,7 +50,7 @@ def test_two_tets_share_a_face(axis: str) -> None:
 
 
 def test_two_tets_lean() -> None:
-    """The free corners stand on a line through the centre of the common face; volumes and bounds are as told."""
+    """The free corners are on a line through the centre of the common face; volumes and bounds are as estimated."""
     made = TwoTets.model_validate({"shape": "two_tets", "element_size": 0.2, "axis": "y", "lean": "50 deg"})
     mesh = check(structured(made))
     free = mesh.points[np.setxor1d(mesh.tets[0], mesh.tets[1])]

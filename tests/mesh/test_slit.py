@@ -39,7 +39,7 @@ def crack(made: Box | Plate, mesh: TetMesh) -> tuple[Floats, Floats]:
 @pytest.mark.parametrize("axis", ["x", "y", "z"])
 @pytest.mark.parametrize("written", [FROM_ONE_SIDE, INSIDE], ids=["edge", "inside"])
 def test_both_sides_are_exposed(written: dict[str, Any], axis: str, split: int) -> None:
-    """With the area of the rectangle each, facing each other; but for corner faces with all nodes on the border."""
+    """Each side has the area of the rectangle and faces the other; except corner faces with all nodes on the border."""
     shift = "xyz".index(axis) - "xyz".index(written["slit"]["axis"])
     turned = {
         key: tuple(np.roll(value, shift).tolist()) if key in ("low", "high") else value

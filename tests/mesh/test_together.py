@@ -108,7 +108,7 @@ def test_a_core_that_fills_a_jacket(axis: str) -> None:
 
 
 def test_solids_of_a_step_file_are_two_parts_of_one_body(tmp_path: Path) -> None:
-    """What ``validate`` finds is what the run has; a part of the body that no file has is meshed with them."""
+    """The run has the numbers that ``validate`` finds; a part of the body without a file is meshed with them."""
     (tmp_path / "s.step").write_text(written(tmp_path)[0])
     core, jacket = (
         {"shape": "cad", "path": "s.step", "solids": [name], "element_size": "2 mm"} for name in ("Core", "Jacket")

@@ -123,7 +123,7 @@ def test_round_surfaces_are_round() -> None:
 
 
 def test_millimetres_are_meshed_as_metres_are() -> None:
-    """gmsh's tolerances are absolute; our scale is a power of two, so the mesh is the same but for its size."""
+    """gmsh's tolerances are absolute; our scale is a power of two, so the mesh is the same except for its size."""
     large = build(body("box", low=(0, 0, 0), high=(1.0, 0.5, 0.5), element_size=0.125), HERE)
     small = build(body("box", low=(0, 0, 0), high=(2.0**-10, 2.0**-11, 2.0**-11), element_size=2.0**-13), HERE)
     assert np.array_equal(large.tets, small.tets)

@@ -12,7 +12,7 @@ from conoid.worker.parallel.tags import Tag
 
 
 def talk(comm: Comm) -> list[tuple[str, dict[str, int]]]:
-    """What this rank counts of each verb."""
+    """Return the counts of this rank for each operation."""
     right, left = (comm.rank + 1) % comm.size, (comm.rank - 1) % comm.size
     out, into = np.zeros((5, 3), np.int64), np.zeros((5, 3), np.int64)
     words, result = np.zeros(9, np.int64), np.zeros(9, np.int64)

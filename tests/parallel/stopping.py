@@ -1,4 +1,4 @@
-"""Under mpiexec: a worker that is told to stop before a step. The arguments: the step, then those of the worker."""
+"""Under mpiexec: a worker that gets a stop request before a step. Arguments: the step, then those of the worker."""
 
 import sys
 

@@ -1,4 +1,4 @@
-"""A rank uses as many of its threads as make its regions shorter, and says once where that is fewer."""
+"""Choice of the number of threads: as many as make regions shorter, with one message if fewer than given."""
 
 import numpy as np
 import pytest
@@ -21,7 +21,7 @@ def test_more_threads_are_taken_where_they_are_worth_it(spans: list[float], thre
 
 
 def steps(team: Team, chosen: Choice, number: int) -> tuple[list[str], "np.ndarray"]:
-    """What is said in so many steps of a region of twelve tasks, and how often each was done."""
+    """Return the messages of so many steps of a region of twelve tasks, and how often each task was done."""
     done, table = np.zeros(120_000, np.int64), Arguments(*KINDS)
     tasks = np.column_stack([np.arange(0, 120_000, 10_000), np.arange(10_000, 130_000, 10_000)])
     said = []

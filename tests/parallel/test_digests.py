@@ -21,13 +21,13 @@ SHORT = {
     "taylor_copper": "3 us", "triaxial_glass": "2 us", "free_tets": "5 us",
 }  # fmt: skip
 """Shipped cases whose meshes are made without gmsh, and until when they run here."""
-GIVEN = ("breaking", "eroding", "meeting")
+GIVEN = ("breaking", "eroding", "colliding")
 """Scenes of this folder, to their ends."""
 EVERYWHERE = [*SHORT, *GIVEN, *(f"shattering_{form}" for form in ("standard", "nodal", "split"))]
 PLAIN = "-AVX2,-FMA,-AVX2_Usable,-FMA_Usable"
-"""What of the C library has to go, by the names that its versions have for it."""
+"""Settings that disable optimised functions of the C library, by their names in its versions."""
 AT_ONCE = ("model=instant", "delay=0")
-"""How the bodies of ``shattering`` break."""
+"""Fracture of the bodies of ``shattering``."""
 
 
 def shattering() -> str:

@@ -1,4 +1,6 @@
-"""How a run ends: whatever happens, soon, with the right code, with a reason on disk, and with nobody left behind."""
+"""Ends of a run: whatever happens it ends soon, with the right exit code, with a reason on disk, and without
+remaining processes.
+"""
 
 import os
 import signal
@@ -55,7 +57,7 @@ def test_a_signal_to_the_launcher_cancels_the_run(number: signal.Signals, tmp_pa
 
 
 def test_a_file_in_the_folder_cancels_the_run_and_a_second_worker_keeps_out(tmp_path: Path) -> None:
-    """As a batch system runs it: there a signal alone is an interruption."""
+    """The worker runs as in a batch system, where a signal alone is an interruption."""
     folder = tmp_path / "run"
     words = command(2, "free_spin", "--out", str(folder), *LONG, "--interruptible")
     with started(words) as launcher:

@@ -1,4 +1,4 @@
-"""What breaks, breaks alike on any number of ranks: digest, history and counts, to the bit."""
+"""Fracture on any number of ranks: equal digests, histories and counts, to the bit."""
 
 from collections import defaultdict
 from collections.abc import Callable
@@ -60,7 +60,7 @@ def test_what_breaks_is_the_same_on_any_number_of_ranks(name: str, ranks: int, b
 
 
 def frame_fields(folder: Path) -> dict[str, bytes]:
-    """The fields of the tets and nodes in the last frame, but for the rank."""
+    """Return the fields of the tets and nodes in the last frame, except the rank."""
     with h5py.File(sorted((folder / layout.FRAMES).glob("*.vtkhdf"))[-1]) as file:
         groups = [file["VTKHDF"][group] for group in ("CellData", "PointData")]
         return {name: each[...].tobytes() for data in groups for name, each in data.items() if name != "rank"}
@@ -97,8 +97,8 @@ def shared(sim: Simulation) -> dict[str, Any]:
 
 
 def test_all_ranks_know_who_shares_what_separates() -> None:
-    """After every split: the lists of two ranks are the same, in the same order, each node once; all who push or hold
-    a node that any rank pushes are among those who sum it; and what a rank has not, it receives, once.
+    """After every split: the lists of two ranks are the same, in the same order, each node once; all ranks that push
+    or hold a node that any rank pushes take part in its sum; a rank receives each node that it lacks once.
     """
     case, ranks = parse_case(read_data(CASE)), 3
 

@@ -1,4 +1,4 @@
-"""A case that was made of a deck answers as one that was written by hand, to the bit."""
+"""A case made from a deck and the same case written directly have equal results, to the bit."""
 
 import sys
 from pathlib import Path

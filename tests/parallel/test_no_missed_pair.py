@@ -1,8 +1,8 @@
-"""No missed pair: on any number of ranks every meeting is found that all pairs of the whole surface give, once.
+"""No missed pair: any number of ranks finds every active contact that all pairs of the whole surface give, once.
 
-The ranks are threads. What they detect in a step is written down, each meeting with its nodes and, to the bit, its
-weights, its normal and what is wanted of it, before restitution. On one rank the same kernels are given every node with
-every face, and every edge with every edge, instead of what the search has found.
+The ranks are threads. The active contacts of a step are recorded, each with its nodes and, to the bit, its weights,
+its normal and its target, before restitution. On one rank the same kernels get every node with every face, and every
+edge with every edge, instead of the candidate pairs.
 """
 
 from collections import Counter
@@ -41,10 +41,10 @@ STEPS, EVERY = 60, 3
 CLOSER = {
     "crossed_bars": ("parts[0].velocity[2]=100", "parts[1].velocity[2]=-100"),
     "hertz_spheres": ("parts[0].velocity[2]=100", "parts[1].velocity[2]=-100"),
-    "meeting": ("parts[0].velocity[2]=800", "parts[2].velocity[2]=-800"),
+    "colliding": ("parts[0].velocity[2]=800", "parts[2].velocity[2]=-800"),
 }
 """Speeds at which some bodies touch, or much of them, in so few steps."""
-OURS = ("meeting", "eroding")
+OURS = ("colliding", "eroding")
 """Scenes of this folder."""
 QUICK = ("eroding", "crossed_bars", "sliding_block")
 """Some of seconds: what is laid bare, edges, and steps without energy to give back."""
@@ -61,17 +61,17 @@ def case_of(name: str, *changes: str) -> Case:
 
 CASES = {name: case_of(name) for name in sorted(shipped())}
 NAMES = [*OURS, *(name for name, case in CASES.items() if case.in_contact and not case.fractures)]
-"""Where nothing separates: the surface of all pairs is made anew at each look, without the cracks of the search."""
+"""Scenes without separation: the surface of all pairs is made again in each test, without the cracks of the search."""
 
 
 def written(met: ContactRows, ids: "np.ndarray") -> Met:
-    """The meetings, by the global ids of their nodes."""
+    """Return the active contacts, by the global ids of their nodes."""
     columns = ids[met.nodes], met.weights, met.normals, met.wanted[:, None]
     return Counter(tuple(np.ascontiguousarray(row).tobytes() for row in rows) for rows in zip(*columns, strict=True))
 
 
 class Found:
-    """The meetings of a rank at each step."""
+    """The active contacts of a rank at each step."""
 
     def __init__(self, sim: Simulation) -> None:
         assert sim.contact is not None
@@ -85,7 +85,9 @@ class Found:
         )
 
     def run(self) -> dict[int, Met]:
-        """Of some steps, each with the meetings that this rank computed; boundaries and forces act as ever."""
+        """Take some steps and record the active contacts that this rank computed; boundaries and forces act as
+        usual.
+        """
         step.prepare(self.sim)
         for _ in range(STEPS):
             step.first_half(self.sim)
@@ -95,7 +97,7 @@ class Found:
 
 
 class Brute(Found):
-    """And, on one rank, those of all pairs of the surface now and then."""
+    """A rank that also records the active contacts of all pairs of the surface in some steps."""
 
     def __init__(self, sim: Simulation) -> None:
         super().__init__(sim)
@@ -172,7 +174,7 @@ def brute(case: Case) -> Brute:
 
 
 def found(case: Case, ranks: int) -> dict[int, Met]:
-    """The meetings of all ranks together at each step."""
+    """Return the active contacts of all ranks together at each step."""
 
     def one(comm: Comm) -> dict[int, Met]:
         return Found(simulation.build(case, Path(), comm)).run()
@@ -188,7 +190,7 @@ def found(case: Case, ranks: int) -> dict[int, Met]:
     "name", [name if name in QUICK else pytest.param(name, marks=pytest.mark.slow) for name in NAMES]
 )
 def test_every_pair_that_meets_is_found_once_on_any_number_of_ranks(name: str) -> None:
-    """And what one rank finds in the steps between is found by all of them, too."""
+    """The contacts that one rank finds in the steps between are found by all of them, too."""
     case = case_of(name)
     whole = brute(case)
     assert sum(map(bool, whole.all.values())) > len(whole.all) // 3
@@ -201,7 +203,7 @@ def test_every_pair_that_meets_is_found_once_on_any_number_of_ranks(name: str) -
 
 
 def missed(case: Case) -> int:
-    """Meetings of all pairs that one rank has not found."""
+    """Return active contacts of all pairs that one rank has not found."""
     whole = brute(case)
     return sum((met - whole.at[number]).total() for number, met in whole.all.items())
 

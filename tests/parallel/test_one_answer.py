@@ -144,13 +144,13 @@ high = ["1 m", "1 m", "1 m"]
 
 
 EVERYTHING = [f"everything_{form}" for form in FORMS]
-MEETING = ["meeting_arbitrary", "meeting_box"]
-"""Four bodies collide, turn and rub, seen by either contact domain (meeting.toml)."""
+COLLIDING = ["colliding_arbitrary", "colliding_box"]
+"""Four bodies collide, turn and rub, seen by either contact domain (colliding.toml)."""
 ERODING = ["eroding_arbitrary", "eroding_box"]
 """A rod goes through two plates and hundreds of tets leave, seen by either contact domain (eroding.toml)."""
 SHEDDING = "shedding"
 """A slab that is pressed on tears itself apart until nothing carries the pressure (shedding.toml)."""
-SCENES = [*EVERYTHING, *MEETING, *ERODING, SHEDDING]
+SCENES = [*EVERYTHING, *COLLIDING, *ERODING, SHEDDING]
 NAMES = sorted([*SHORT, *SCENES])
 
 
@@ -160,7 +160,7 @@ def arguments(name: str, folder: Path) -> list[str]:
     case = name
     if name in EVERYTHING:
         case, words = str(folder.parent / "everything.toml"), [f"numerics.pressure={name.partition('_')[2]}"]
-    if name in [*MEETING, *ERODING, SHEDDING]:
+    if name in [*COLLIDING, *ERODING, SHEDDING]:
         file, _, domain = name.partition("_")
         case, words = str(Path(__file__).with_name(f"{file}.toml")), [f"contact.domain={domain or 'arbitrary'}"]
     sets = [word for change in words for word in ("--set", change)]
@@ -230,9 +230,9 @@ def test_the_runs_are_worth_comparing(name: str, answers: Answers) -> None:
     if name in SCENES:
         assert end.energy.plastic > 0.01 * end.energy.initial
         assert end.energy.contact != 0.0
-    if name in EVERYTHING + MEETING:
+    if name in EVERYTHING + COLLIDING:
         assert end.energy.elastic > 0.001 * end.energy.initial
-    if name in MEETING:
+    if name in COLLIDING:
         assert end.energy.contact > 0.001 * end.energy.initial
         assert end.energy.friction > 0.001 * end.energy.initial
     if name in ERODING:
@@ -244,10 +244,10 @@ def test_the_runs_are_worth_comparing(name: str, answers: Answers) -> None:
 
 @pytest.mark.slow
 def test_other_runs_have_other_digests(answers: Answers) -> None:
-    """But which ghosts a rank has seen does not matter."""
+    """The ghosts that a rank has do not change the digest."""
     digests = {name: outcome(answers(1, name)).digest for name in NAMES}
     assert len(set(digests.values())) == len(NAMES) - 2
-    assert len({digests[name] for name in MEETING}) == len({digests[name] for name in ERODING}) == 1
+    assert len({digests[name] for name in COLLIDING}) == len({digests[name] for name in ERODING}) == 1
 
 
 def test_the_answer_is_the_same_again(answers: Answers, tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""What a team would take: the greedy list schedule by plain Python, and the tasks of regions that are timed."""
+"""Estimate of the time of a team: the greedy list schedule in plain Python, and the tasks of regions that are timed."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ from .counted import KINDS, count
 
 
 def schedule(took: list[int], threads: int, begins: list[int]) -> int:
-    """When the last task ends; each goes to the thread that is free first."""
+    """Return the end of the last task; each task goes to the thread that is free first."""
     free, last = begins[:threads], 0
     for each in took:
         first = free.index(min(free))

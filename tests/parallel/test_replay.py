@@ -1,4 +1,4 @@
-"""A recorded run: what it tells of its groups, and its replay."""
+"""A recorded run: the records of its groups, and its replay."""
 
 import json
 import subprocess

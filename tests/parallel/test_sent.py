@@ -1,4 +1,4 @@
-"""What ranks count of their messages, against communications of known size; alike under MPI and in threads."""
+"""Counts of the messages of ranks, against communications of known size; equal under MPI and in threads."""
 
 import json
 import pickle

@@ -1,4 +1,6 @@
-"""Snapshots of a run say what its tables say, on any number of ranks; those of a killed run are whole or not told."""
+"""Snapshots of a run agree with its tables, on any number of ranks; those in the journal of a killed run are
+complete.
+"""
 
 import csv
 import hashlib
@@ -32,7 +34,7 @@ def told(folder: Path) -> list[Snapshot]:
 
 
 def whole(folder: Path, message: Snapshot) -> bytes:
-    """The bytes of a snapshot, which are as the journal tells."""
+    """Return the bytes of a snapshot, which agree with the journal."""
     data = (folder / message.path).read_bytes()
     assert (len(data), hashlib.sha256(data).hexdigest()) == (message.bytes, message.sha256)
     assert message.path == str(layout.snapshot(folder, message.n).relative_to(folder))
@@ -48,7 +50,7 @@ def arrays(data: bytes) -> dict[str, Any]:
 
 
 def spread(folder: Path, kind: type[Counts | Snapshot]) -> tuple[int, int, list[int]]:
-    """How many fragments the last message of a kind counts, and of which sizes."""
+    """Return the number of fragments and their sizes in the last message of a kind."""
     lines = (folder / layout.JOURNAL).read_bytes().splitlines()
     last = [message for message in map(from_json, lines) if isinstance(message, kind)][-1]
     return last.fragments, last.smallest, last.sizes

@@ -1,4 +1,6 @@
-"""A run whose stable step falls by orders says so, with the tet and what helps, on any number of ranks."""
+"""A stable step that falls by orders of magnitude gives a warning with the tet and the remedy, on any number of
+ranks.
+"""
 
 from pathlib import Path
 

@@ -166,7 +166,7 @@ def test_a_run_survives_being_killed(kills: int, whole: Made, tmp_path: Path) ->
 
 
 def killed_and_ended(draw: random.Random, words: list[str], folder: Path, most: int) -> int:
-    """How often a run was killed, at most, before it came to its end."""
+    """Return how often a run was killed, at most, before it ended."""
     killed = 0
     while not (folder / layout.OUTCOME).exists() or outcome(folder).state != "succeeded":
         again = ["--restart"] if list((folder / layout.CHECKPOINTS).glob("*[0-9]")) else []
@@ -196,7 +196,7 @@ def test_a_checkpoint_is_asked_for_by_a_file(whole: Made, breaking: Callable[[in
 
 
 def refused(words: Sequence[str]) -> str:
-    """What a worker says that does not go on."""
+    """Return the message of a worker that refuses to resume."""
     launched = ended(command(1, *words, "--restart"))
     assert launched.returncode == 2
     return launched.stderr.strip()
@@ -218,7 +218,7 @@ def test_what_cannot_go_on_says_why(tmp_path: Path) -> None:
 
 
 def test_a_run_that_has_succeeded_stays_as_it_is(tmp_path: Path) -> None:
-    """It was told as failed by the attempt to go on with it."""
+    """The attempt to resume it would otherwise replace the outcome by a failure."""
     words = ["two_tets", "--out", str(tmp_path / "run"), "--set", "run.end_time=1 us", "--set", "run.frames=0"]
     assert ended(command(1, *words)).returncode == 0
     before = {path: path.read_bytes() for path in (tmp_path / "run").iterdir() if path.is_file()}

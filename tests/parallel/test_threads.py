@@ -30,7 +30,7 @@ def told(table):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=False)
 def count(table, first, end, thread):  # type: ignore[no-untyped-def]
-    """Counts each number of its range, and keeps who has done it."""
+    """Count each number of the range, and record the thread that has done it."""
     done, who = _counts(table)
     for k in range(first, end):
         done[k] += 1

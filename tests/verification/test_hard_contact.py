@@ -101,7 +101,9 @@ def travellers(n: int, speed: float) -> tuple[Floats, Floats]:
 @pytest.mark.parametrize("shake", [0.0, 0.2])
 @pytest.mark.parametrize("speed", [0.037, 0.41])
 def test_a_node_slides_over_edges_and_vertices_as_on_a_plane(speed: float, shake: float) -> None:
-    """It is neither lost nor held twice: every step gives back the load, to round-off, and nothing along the plane."""
+    """The node is neither lost nor held twice: every step returns the load, to round-off, and no force along the
+    plane.
+    """
     load = 1e-3 * speed
     slide = Slide(*facets(shake), *travellers(120, speed))
     v = slide.nodes[1].copy()
@@ -253,7 +255,8 @@ def misjudged(seeds: range) -> tuple[int, list[int]]:
     """Number of shots that hit, and the seeds of those that were pushed too early, too late or at all; grazing ones may
     be.
 
-    Grazing is what half a per cent more or less of either body's size decides; a hundredth of a face is near enough.
+    A shot is grazing if half a per cent more or less of either body's size decides; a hundredth of a face is near
+    enough.
     """
     hits, wrong = 0, []
     for seed in seeds:
@@ -306,8 +309,8 @@ def volume_in_common(case: Case) -> common_volume.CommonVolume:
 
 @pytest.mark.slow
 def test_crossed_blades_do_not_cut_into_each_other() -> None:
-    """One tet thick, edge on edge. With edges between two tets that let go at 0.05 of their length 34 tets ended with
-    more than a tenth in the other blade, 4.9e-3 of all at the surface.
+    """The blades are one tet thick, edge on edge. If edges between two tets were released at 0.05 of their length,
+    34 tets ended with more than a tenth in the other blade, 4.9e-3 of all at the surface.
     """
     blade = {"shape": "box", "element_size": 0.5e-3, "generator": "structured"}
     upper = {"low": [-4.8e-3, -0.15e-3, 0.05e-3], "high": [5.2e-3, 0.35e-3, 5.05e-3]}
@@ -437,10 +440,10 @@ def test_irregular_plates_keep_the_pressure_of_their_impact() -> None:
 def test_what_is_brittle_keeps_the_pressure_of_its_impact(
     name: str, speed: float, sweeps: int | None, share: tuple[float, float]
 ) -> None:
-    """It is between what is broken and what is whole has (1.38 as much), near the former where all has broken. Faster
-    than a tenth of the speed of waves 0.56 of it is lost with two sweeps, so that the check can fail. Of the lower
-    one 0.6 are left at 200 m/s where cracks begin from nothing in every step, and 0.72 in glass where edges of which
-    one face is closed do not meet others.
+    """The pressure is between that of broken and of intact bodies (1.38 as much), near the former if all has broken.
+    Faster than a tenth of the speed of waves 0.56 of it is lost with two sweeps, so that the check can fail. Of the
+    lower one 0.6 are left at 200 m/s if cracks begin from nothing in every step, and 0.72 in glass if edges of which
+    one face is closed have no contact with others.
     """
     low, high = share
     found = dust.measure(dust.flyer(name, speed, sweeps, wide=0.3e-3, long=(1.5e-3, 1.5e-3), end=0.15e-6), 0.07e-6)

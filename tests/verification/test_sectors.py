@@ -33,7 +33,7 @@ def test_a_sector_is_the_whole_while_a_rod_is_used_up(sector: str) -> None:
 
 @pytest.mark.parametrize("sector", ["quarter", "half"])
 def test_a_sector_is_the_whole_for_the_target_where_debris_strikes_and_leaves(sector: str) -> None:
-    """What still flies at the end, a tenth of the rod, differs by the few nodes that have just struck."""
+    """The debris in motion at the end, a tenth of the rod, differs by the few nodes that have just hit."""
     part, whole = end(sector, "strike"), end("full", "strike")
     assert part.near[0] < 3.0 * whole.near[0]
     assert part.target == pytest.approx(whole.target, rel=0.03)

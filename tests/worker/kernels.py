@@ -1,6 +1,7 @@
-"""What the tests ask of the kernels, and how it is asked of the worker as it is: a changed signature changes this file.
+"""Adapter between the tests and the kernels of the worker: a changed signature changes this file.
 
-A ``Patch`` is a built simulation of one part on one rank, with plain arrays in and out; ``run`` takes its time steps.
+A ``Patch`` is a built simulation of one part on one rank, with plain arrays in and out; ``run`` takes its time
+steps.
 """
 
 import math
@@ -215,7 +216,7 @@ def around(boundary: Boundary, look: Callable[[Floats, Floats], None]) -> None:
 
 
 def run(sim: Simulation, watch: Watch | None = None, steps: int = -1) -> Simulation:
-    """Steps to the end time, or ``steps`` steps; ``watch`` looks at each time n, and is told v(n-1/2)."""
+    """Take steps to the end time, or ``steps`` steps; ``watch`` is called at each time n with v(n-1/2)."""
     step.prepare(sim)
     while True:
         before = sim.model.nodes.v.copy()

@@ -43,7 +43,7 @@ def tick(sim: Simulation, gone: "np.ndarray | None" = None) -> float:
 
 
 def on(ranks: int, case: schema.Case, meshes: Sequence[TetMesh], work: Callable[[Simulation], T]) -> list[T]:
-    """What ``work`` makes of the simulation of each rank."""
+    """Return the result of ``work`` on the simulation of each rank."""
     ready = iter(meshes)
     with patch.object(assembly, "build_mesh", lambda *_, **__: next(ready)):
         return on_ranks(ranks, lambda comm: work(simulation.build(case, Path(), comm)))

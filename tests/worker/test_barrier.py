@@ -1,4 +1,4 @@
-"""What keeps a tet of an averaged form from being squeezed to nothing: its potential, and scenes that ended without."""
+"""The potential that keeps a tet of an averaged form from zero volume, and scenes that ended without it."""
 
 from itertools import pairwise
 from pathlib import Path

@@ -163,7 +163,7 @@ def test_a_body_at_rest_on_a_wall_stays_there() -> None:
 
 
 def test_a_body_that_is_pressed_on_a_wall_is_at_rest_there_at_the_end() -> None:
-    """As at all times before: the last velocities have the impulses of the wall, too."""
+    """The last velocities contain the impulses of the wall, as at all times before."""
     floor, load = wall(0.0, (0.0, 0.0, 1.0)), {**PULL, "stress": (0.0, 0.0, -1e8), **TOP}
     sim = build(scene(STEEL, end=2e-6, boundaries=(floor, load)), [MESH])
     run(sim)
@@ -187,7 +187,7 @@ def test_nodes_on_a_symmetry_plane_stay_on_it(axis: str, at: float) -> None:
 
 
 def test_a_body_through_a_symmetry_plane_is_refused() -> None:
-    """It would lie in its own mirror image."""
+    """The body would be inside of its own mirror image."""
     even = block((2, 2, 2), 1e-3)
     for at in (0.4e-3, 1.3e-3):
         message = (
@@ -217,7 +217,7 @@ def test_motion_across_a_symmetry_plane_is_refused(drive: dict[str, Any]) -> Non
 
 
 def test_a_body_may_fly_at_a_symmetry_plane() -> None:
-    """No node starts on it, which is told; what arrives is thrown back."""
+    """The plane gives a warning, since no node starts on it; nodes that reach it are reflected."""
     plane = {"kind": "symmetry", "axis": "z", "at": -1e-5}
     sim = with_boundary(plane, velocity=(0.0, 0.0, -100.0), end=1.5e-6)
     assert sim.warnings[-1] == (
@@ -470,7 +470,9 @@ def test_a_traction_without_a_face_is_refused() -> None:
 
 @pytest.mark.parametrize("ranks", [1, 3])
 def test_a_traction_leaves_with_the_tets_of_its_faces(ranks: int) -> None:
-    """What they leave behind flies on: a force that stayed would drive their nodes, of hardly any mass, for ever."""
+    """The nodes of removed tets move on; with a remaining force they would accelerate for ever, since their mass is
+    tiny.
+    """
     top = {frozenset(face.tolist()) for face in boundary_faces(MESH.tets) if (MESH.points[face][:, 2] > 2.9e-3).all()}
     loaded = {e: [c for c in top if c <= set(tet.tolist())] for e, tet in enumerate(MESH.tets)}
     gone = np.array([e for e, faces in loaded.items() if faces][::2])
@@ -541,7 +543,9 @@ def ramped(t: float) -> tuple[float, float]:
 
 @pytest.mark.parametrize("steps", ["even", "uneven"])
 def test_a_velocity_over_time_leads_nodes_along_its_integral(steps: str) -> None:
-    """Exactly at every n, with steps of any size; the ledger closes, but for what the change of steps costs."""
+    """The position is exact at every n, with steps of any size; the ledger closes, except for the cost of changing
+    steps.
+    """
     spec = {"kind": "velocity", "low": (0.0, 0.0, 2.9e-3), "high": (1.0, 1.0, 1.0), "z": 7.0, "course": RAMP}
     sim = build(scene(STEEL, end=3e-6, boundaries=(spec,), dt_growth=2.0), [MESH])
     nodes, rows = sim.model.nodes, MESH.points[:, 2] > 2.9e-3

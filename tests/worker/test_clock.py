@@ -10,7 +10,9 @@ from conoid.worker.clock import Clock
 
 
 def steps_of(clock: Clock, limits: list[float]) -> list[tuple[float, float, bool]]:
-    """Runs the clock to its end as the loop does; time, step ahead and whether a frame was due, at each n."""
+    """Run the clock to its end as the loop does; return time, step ahead and whether a frame is scheduled, at each
+    n.
+    """
     seen = []
     n = 0
     while True:
@@ -89,7 +91,7 @@ def test_time_is_compensated_over_a_million_steps() -> None:
 
 
 def test_at_the_end_stands_the_step_that_would_follow() -> None:
-    """As long as the last one, where stability allows."""
+    """The next step is as long as the last one, if that is stable."""
     for limits in ([3e7], [3e7] * 30 + [6e7] * 100):
         clock = Clock(1e-6, 0.9, 1.05, 2)
         steps = [dt for _, dt, _ in steps_of(clock, limits)]

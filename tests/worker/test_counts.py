@@ -51,7 +51,7 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
 
 
 def breaking(clock: Clock, cost: float) -> Any:
-    """What the counter sees of a simulation in which finding fragments takes ``cost``, s."""
+    """Return the parts of a simulation that the counter reads, in which finding fragments takes ``cost``, s."""
     model = SimpleNamespace(elements_global=10, nodes_global=5, parts=["one"], blocks=[], nodes=None)
 
     def look() -> None:

@@ -122,7 +122,7 @@ def met(sim: Simulation, steps: int = STEPS) -> list[Compressed]:
 
 @pytest.fixture(scope="module")
 def alone() -> Compressed:
-    """What one rank meets."""
+    """Return the result of one rank."""
     ((found,),) = on(1, CASE, [MESH], met)
     return found
 

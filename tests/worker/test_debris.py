@@ -39,7 +39,7 @@ def fallen(
 
 
 def test_a_node_without_tets_stays_outside_of_the_part_that_it_comes_from() -> None:
-    """It falls into the pit that its tets have left, and comes to rest on the bottom of it."""
+    """The node falls into the pit of the removed tets and comes to rest on its bottom."""
     sim, node = fallen({})
     assert sim.contact is not None
     assert sim.model.nodes.x[node, 2] > 2.9 * MM

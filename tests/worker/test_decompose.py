@@ -110,7 +110,7 @@ def nosed(n: int, tip: float) -> tuple[Floats, Floats]:
 
 @pytest.mark.parametrize("parts", [2, 3, 4])
 def test_every_phase_is_shared_evenly(parts: int) -> None:
-    """Where one phase lies at one end, as contact does, a cut across the axis gives one part all of it."""
+    """One phase is at one end, as contact is: a cut across the axis would give one part all of it."""
     points, weights = nosed(20_000, 0.5)
     owner, _ = decompose.bisect(points, np.arange(len(points)), weights, parts, SerialComm())
     shares = np.array([np.bincount(owner, w, parts) for w in weights.T])

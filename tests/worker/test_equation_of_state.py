@@ -165,7 +165,7 @@ def test_there_is_no_pressure_beyond_the_pole() -> None:
 @pytest.mark.parametrize("spall", [None, 1e9])
 @pytest.mark.parametrize("form", FORMS)
 def test_a_tet_that_passes_the_pole_ends_the_run(form: Form, spall: float | None) -> None:
-    """With one line that names it and says how far it is compressed; it went on with whatever pressure before."""
+    """The message names the tet and its compression; without it the run would go on with a meaningless pressure."""
     case = scene(COPPER_GAS.model_copy(update={"spall": spall}), form)
     sim = build(case, [free_tets(1, 5)])
     step.prepare(sim)

@@ -120,7 +120,7 @@ def test_the_accounts_close_for_a_spinning_body_without_contact(form: Form, node
 
 @pytest.mark.parametrize("material", [COPPER_GAS, COPPER, STEEL_42CRMO4])
 def test_the_heat_of_what_leaves_is_counted_where_its_pressure_sees_heat(material: Material) -> None:
-    """What the line ``eroded`` may be below zero by: 2 J of viscosity in each tet, nothing for another pressure."""
+    """Lower bound of the line ``eroded``: 2 J of viscosity in each tet, zero for a pressure without heat."""
     sim = alone(block((2, 2, 2), MM), material=material)
     part = sim.model.blocks[0]
     part.state[:, rows.WORK_VISCOUS] = 2.0
@@ -214,7 +214,7 @@ def plan(meshes: Sequence[TetMesh], seed: int, rounds: int) -> list[Ints]:
 
 @pytest.mark.parametrize("ranks", [1, 3, 4])
 def test_the_surface_follows_what_is_left(ranks: int) -> None:
-    """After each of many removals it is what the faces of the tets that are left give from scratch."""
+    """The surface after each of many removals equals the one computed from the remaining tets."""
     case, meshes = scene_of_two()
     offset = len(meshes[0].points)
     tets = np.concatenate([meshes[0].tets, meshes[1].tets + np.int32(offset)])
@@ -372,7 +372,7 @@ def test_a_rank_that_has_lost_all_its_tets_goes_on(ranks: int, form: Form) -> No
 @pytest.mark.parametrize("erosion", [EROSION, REMOVE], ids=["particles", "remove"])
 @pytest.mark.parametrize("left", [1, 0], ids=["one part", "all parts"])
 def test_a_run_outlives_its_tets(left: int, erosion: schema.Erosion) -> None:
-    """And the accounts close, better than to first order of the step, though a loaded face is left alone at once."""
+    """The accounts close, better than to first order of the step, although a loaded face loses its load at once."""
     worst = []
     for safety in (0.8, 0.2):
         case, meshes = scene_of_two()
@@ -411,7 +411,7 @@ def test_probes_of_what_has_left_are_no_number() -> None:
 
 @pytest.mark.parametrize("erosion", [EROSION, REMOVE], ids=["particles", "remove"])
 def test_no_reference_of_what_has_left_is_met(erosion: schema.Erosion) -> None:
-    """Nothing is as large as was expected, however wide the tolerance; particles have a speed."""
+    """No reference is met, however wide its tolerance; particles have a speed."""
     quantities: tuple[Any, ...] = ("plastic_strain_max", "stress_max", "extent", "radius", "speed_mean")
     wide: dict[str, Any] = {"part": "body0", "value": 0.0, "tolerance": 1e9, "source": "-"}
     specs = [schema.Reference(quantity=q, axis="z" if q in quantities[2:] else None, **wide) for q in quantities]
@@ -463,7 +463,7 @@ def test_mirrors_hold_what_starts_off_the_plane_or_may_leave_it() -> None:
 
 @pytest.mark.parametrize("ranks", [1, 2])
 def test_damage_that_takes_no_tet_is_told(ranks: int) -> None:
-    """A band that is narrower than a tet: nothing is said of little damage, nor once something has left."""
+    """The band of damage is narrower than a tet; little damage gives no warning, nor does any after a removal."""
     damaged = materials.JohnsonCookDamage(D1=0.05, D2=3.44, D3=-2.12, D4=0.002, D5=0.61)
     assert STEEL_42CRMO4.strength is not None
     law = STEEL_42CRMO4.strength.model_copy(update={"damage": damaged})

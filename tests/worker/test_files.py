@@ -101,7 +101,7 @@ def test_what_is_removed_while_a_run_goes_on_is_told_once(tmp_path: Path) -> Non
 
 
 def test_a_journal_and_a_history_that_are_removed_take_no_more_lines(tmp_path: Path) -> None:
-    """What is written to an open file that has no name is nowhere, and the run would end as if all were there."""
+    """Lines written to an open file without a name would be lost, and the run would end as if they existed."""
     journal, table = Journal(tmp_path, "r"), History(tmp_path, {})
     journal.starting("at first")
     (tmp_path / layout.JOURNAL).unlink()
@@ -135,7 +135,7 @@ def test_parquet_has_the_same_numbers_and_the_units(tmp_path: Path) -> None:
 
 
 def without_tets(nodes: int) -> Model:
-    """What a rank has that others, or erosion, have left without tets; ``nodes`` of all ranks."""
+    """Return the model of a rank without tets, because of other ranks or erosion; ``nodes`` of all ranks."""
     none, points, force, no = np.zeros(0, np.int32), np.zeros((0, 3)), np.zeros((0, 3), np.int64), np.zeros(0)
     mine = Nodes(np.zeros(0, np.int64), none, none, np.zeros(0, bool), points, points, points, no, force, no)
     return Model(mine, nodes_global=nodes)

@@ -1,4 +1,4 @@
-"""Flat tets with averaged pressures: they resist as in the standard form, and nothing else knows of them."""
+"""Flat tets with averaged pressures: they resist as in the standard form, and other tets are not affected."""
 
 from functools import cache
 
@@ -64,7 +64,9 @@ def lowest(form: Form, aspect: float, speed: float, seed: int) -> tuple[float, f
 @pytest.mark.parametrize("form", AVERAGED)
 @pytest.mark.parametrize(("aspect", "seed"), [(3e-3, 1), (3e-3, 2), (1e-2, 3)])
 def test_a_flat_tet_is_not_crushed(form: Form, aspect: float, seed: int) -> None:
-    """It loses no more volume than in the standard form; with a mean over nodes it was crushed in each of these."""
+    """The tet loses no more volume than in the standard form; with a mean over nodes it was crushed in each of
+    these.
+    """
     volume, residual = lowest(form, aspect, 200.0, seed)
     assert volume > lowest("standard", aspect, 200.0, seed)[0] - 0.02
     assert residual < 1e-4
@@ -100,7 +102,9 @@ def test_what_is_flat() -> None:
 @pytest.mark.parametrize("form", AVERAGED)
 @pytest.mark.parametrize("material", [COPPER, COPPER_GAS], ids=["copper", "gas"])
 def test_an_even_compression_has_one_pressure(material: "object", form: Form) -> None:
-    """A flat tet has that of its neighbours, whose means it does not disturb; but for e^2 / 12, e = 3e-4 in a step."""
+    """A flat tet has the pressure of its neighbours and does not change their means; up to e^2 / 12, e = 3e-4 in a
+    step.
+    """
     mesh, _ = flattened((3, 3, 3), 1e-3)
     patch = Patch(mesh, material, form)  # type: ignore[arg-type]
     assert patch.block.flat.any()
@@ -126,7 +130,7 @@ def test_three_ranks_have_the_answer_of_one(form: Form) -> None:
 
 
 def test_the_mark_goes_with_its_tet() -> None:
-    """When others leave the block."""
+    """The mark stays correct when other tets are removed from the block."""
     mesh, flat = flattened((3, 3, 3), 1e-3)
     body = Patch(mesh, COPPER, "nodal").block
     marked = set(body.id[body.flat])

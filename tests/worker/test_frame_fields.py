@@ -127,7 +127,7 @@ def test_the_pressure_of_contact_carries_the_weight(
 
 
 def _force(pressure: Floats, points: Floats, tets: "np.ndarray", nodes: "np.ndarray", height: float) -> float:
-    """What the pressure is on the face at this height, by the shares of its nodes."""
+    """Return the force on the face at this height, from the pressure and the shares of its nodes."""
     total = 0.0
     for tet in tets:
         face = [n for n in tet if abs(points[n, 2] - height) < 1e-9]

@@ -114,7 +114,7 @@ def _three() -> tuple[schema.Case, list[TetMesh]]:
 
 @pytest.mark.parametrize("ranks", [1, 3])
 def test_what_parts_push_each_other_with_is_the_change_of_their_momentum(ranks: int, tmp_path: Path) -> None:
-    """What one gives another it loses, to the bit; all that a part gets changes its momentum; through a checkpoint."""
+    """Action equals reaction, to the bit; the sum over all partners is the change of momentum; through a checkpoint."""
     case, meshes = _three()
 
     def momenta(sim: Simulation) -> Floats:

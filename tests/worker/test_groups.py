@@ -1,4 +1,4 @@
-"""What a run tells of its groups, and what tets, candidates and ranks cost."""
+"""Records of the groups of a run, and the costs of tets, candidates and ranks."""
 
 from typing import Any
 
@@ -161,7 +161,7 @@ def test_a_cut_that_one_look_calls_for_is_weighed_by_what_was_measured_before_it
 
 
 def test_candidates_cost_what_they_have_cost_where_they_are() -> None:
-    """Within a factor of four of the mean: who has next to none learns nothing from what it took."""
+    """The cost is within a factor of four of the mean: a rank with few candidates measures mostly noise."""
     assert _candidates(np.array([4.0, 1.0]), np.array([10.0, 10.0])) == pytest.approx([2.5, 10.0])
     assert _candidates(np.array([4.0, 4.0]), np.array([8.0, 12.0])) == pytest.approx([2.0, 3.0])
     assert _candidates(np.array([100.0, 0.0]), np.array([10.0, 10.0])) == pytest.approx([0.1, 0.8])

@@ -1,4 +1,4 @@
-"""What cannot be written ends with an error that names the file, in a process that lives."""
+"""Failed writes of HDF5 files: an error names the file, and the process survives."""
 
 import subprocess
 import sys

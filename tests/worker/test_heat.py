@@ -15,7 +15,7 @@ STEEL_4340 = library()["steel_4340"]
 
 @pytest.mark.parametrize("form", ["nodal", "split"])
 def test_a_free_tet_has_its_own_heat(form: Form) -> None:
-    """Its nodes have no other tet: the pressure is that of the standard form, but for the third order of the strain."""
+    """The nodes have no other tet: the pressure is that of the standard form, up to the third order of the strain."""
     pressures = []
     for each in ("standard", form):
         tet = free_tets(1, 5)

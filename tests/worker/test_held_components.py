@@ -1,4 +1,6 @@
-"""A boundary says itself which velocities it holds: contact, erosion and the start of a run ask no type."""
+"""Velocity components that a boundary holds: contact, erosion and the start of a run read them from the boundary,
+not from its type.
+"""
 
 import ast
 from pathlib import Path

@@ -97,7 +97,7 @@ def test_small_strains_keep_their_digits() -> None:
 
 
 def test_the_law_is_henckys_to_the_third_order() -> None:
-    """J s = 2 G dev ln V but for an eighth of the difference at half of the strain."""
+    """The difference of J s and 2 G dev ln V falls to an eighth at half of the strain."""
     wrong = []
     for size in (0.2, 0.1, 0.05):
         _, F = deformed(5, size)
@@ -211,7 +211,7 @@ def rung(material: Material) -> tuple[float, float]:
 
 @pytest.mark.parametrize("material", [STEEL, HARD], ids=["from the shape", "by rates"])
 def test_what_rings_keeps_its_energy(material: Material) -> None:
-    """And the pressure, which is summed, stays what the volume says."""
+    """The pressure, which is summed, stays the function of the volume."""
     energy, apart = rung(material)
     print(f"energy {energy:.6f}; pressure {apart:.1e}")
     assert energy == pytest.approx(1.0, abs=1e-3)

@@ -1,4 +1,4 @@
-"""How bodies move at the start: velocity, spin, stretch, and a random part that no cut of the mesh can change."""
+"""Initial motion of bodies: velocity, spin, stretch, and a random part that does not depend on the cut of the mesh."""
 
 from typing import Any
 

@@ -81,7 +81,9 @@ def random_states(n: int, seed: int) -> tuple[Patch, dict[str, Floats], float]:
 
 
 def slope(strain: Floats, d: Floats, dt: float) -> Floats:
-    """How much the flow stress of cold metal rises with the increment, over 3 G: large where hardening begins."""
+    """Return the slope of the flow stress of cold metal over the plastic increment, over 3 G: large at the start of
+    hardening.
+    """
     hardening = LAW.n * LAW.B * strain ** (LAW.n - 1.0) * (1.0 + LAW.C * np.log(np.maximum(d / dt, 1.0)))
     return np.asarray((hardening + np.where(d > dt, LAW.C * (LAW.A + LAW.B * strain**LAW.n) / d, 0.0)) / (3.0 * SHEAR))
 
@@ -161,7 +163,7 @@ def test_increments_take_few_steps() -> None:
 
 
 def excess(d: float, q: float, strain: float, temperature: float, density: float, dt: float) -> float:
-    """What the return has to bring to zero."""
+    """Return the function whose root the return mapping finds."""
     left = q - 3.0 * SHEAR * d
     return float(left - flow_stress(strain + d, d / dt, temperature + HEAT / density * d * left))
 

@@ -23,7 +23,7 @@ LAW = JohnsonCook(
     taylor_quinney=0.0, damage=DAMAGED,
 )  # fmt: skip
 STEEL = Material(density=7830.0, elastic=Elastic(young=205e9, poisson=0.29), strength=LAW)
-"""It does not harden and does not warm up: all that the fracture strain depends on stays."""
+"""A steel without hardening and heating: all arguments of the fracture strain are constant."""
 RATE, DT, TEMPERATURE = 2e4, 1e-8, 600.0
 
 
@@ -122,7 +122,7 @@ def fast_shear(softening: float) -> tuple[float, float]:
 
 
 def test_weldox_loses_strength_before_it_breaks_in_fast_shear_by_its_damage_alone() -> None:
-    """Where the flow stress still rises a shear band does not narrow: without softening nothing localises."""
+    """A shear band does not narrow while the flow stress rises: no localisation without softening."""
     (plain, fracture), (softer, _) = fast_shear(0.0), fast_shear(0.3)
     print(f"largest flow stress at {plain:.2f}, with softening at {softer:.2f}; fracture at {fracture:.2f}")
     assert plain > 1.1 * fracture

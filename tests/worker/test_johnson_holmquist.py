@@ -19,7 +19,7 @@ from .meshes import Floats, block, free_tets
 NAMES = ("float_glass_jh2", "alumina_995_jh2", "boron_carbide_jh2", "silicon_carbide_jh2")
 RATE = 1e5
 SOFT = 2e-6
-"""Overstress of the reference, over 3 G: it is a Maxwell element, so that an ODE says it all."""
+"""Overstress of the reference, over 3 G: a Maxwell element, so that one ODE is the solution."""
 
 
 def constants(name: str) -> tuple[Material, JohnsonHolmquist, float, float]:
@@ -43,7 +43,7 @@ def strengths(law: JohnsonHolmquist, p: float, rate: float) -> tuple[float, floa
 def reference(name: str, strain: float) -> tuple[Floats, Floats]:
     """Times, and (5, n) deviator along z, bulking, damage, plastic strain, pressure: the law as an ODE, by scipy.
 
-    A tet is shortened to e^-strain and let go by a quarter of that.
+    A tet is shortened to e^-strain and then released by a quarter of that.
     """
     _, law, bulk, shear = constants(name)
 

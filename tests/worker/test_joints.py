@@ -180,7 +180,7 @@ def test_pressure_on_all_sides_of_two_parts_leaves_their_interface_alone() -> No
 
 
 def test_nodes_of_two_parts_are_of_both() -> None:
-    """What selects by part takes them for either; mass, motion and energy of each part are those of its tets."""
+    """Selections by part find the nodes in both parts; mass, motion and energy of each part are those of its tets."""
     moved = {"kind": "velocity", "parts": ["upper"], "z": "7 m/s", "low": [-1, -1, -1], "high": [1, 1, 1]}
     case = joint(("alumina", "steel"), boundaries=[moved], lower={"velocity": [0, 0, "3 m/s"]},
                  upper={"velocity": [0, 0, "3 m/s"]})  # fmt: skip

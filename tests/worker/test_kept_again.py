@@ -30,12 +30,12 @@ OTHER = ("contact.skin=0.08", "contact.domain=box")
 
 
 class Course(NamedTuple):
-    """What a run has been."""
+    """History of a run."""
 
     lines: list[Energy]
     """Of the ledger, a step each."""
     impulses: list[float]
-    """What contact has given each part, N s."""
+    """Impulses of contact on each part, N s."""
     digest: str | None
     broken: int
 

@@ -157,7 +157,7 @@ def used(n):  # type: ignore[no-untyped-def]
 
 
 def test_only_kernels_that_make_arrays_or_are_handed_some_count_who_uses_them() -> None:
-    """And what one of them makes is let go, whoever has read it."""
+    """Arrays that one of them makes are freed, whichever kernel has read them."""
     pages, many = Path("/proc/self/statm"), 1_000_000
     assert used(10) == 20.0
     assert [kernel.targetoptions["_nrt"] for kernel in (made, read, used)] == [True, False, True]
@@ -208,7 +208,7 @@ def test_all_kernels_are_compiled_and_the_progress_is_told(tree: Path, tmp_path:
 
 
 def test_modules_that_have_not_changed_are_linked_from_an_earlier_folder(tree: Path, tmp_path: Path) -> None:
-    """And their ranks load them from there."""
+    """A process that uses the folder loads them from there."""
     folders = [tmp_path / "cache" / name for name in ("first", "second", "third")]
     text = "import numpy as np; from tiny.above import scale; x = np.ones(2); scale(x); "
     text += "print(x, sum(scale.stats.cache_hits.values()))"
@@ -333,7 +333,7 @@ def test_numba_is_not_imported_before_its_cache_has_a_name() -> None:
 
 
 def test_no_two_processes_call_a_function_the_same() -> None:
-    """What numba compiles for a kernel has a name of its own in every process: objects of several are loaded."""
+    """The objects of several processes are loaded together, so the functions in them need unique names."""
     ask = "from conoid.worker.kernels import jit; from numba.core.bytecode import FunctionIdentity as F; "
     ask += "print(next(F._unique_ids))"
     told = [subprocess.run([sys.executable, "-c", ask], capture_output=True, text=True, check=True) for _ in range(2)]

@@ -121,7 +121,7 @@ def test_a_free_body_keeps_its_momentum_in_the_ledger() -> None:
 
 
 def test_the_parts_are_what_the_ledger_sums_up() -> None:
-    """Two plastic bodies that do not meet: one flies, the other meets the wall; one part alone is not told of."""
+    """Two plastic bodies without contact: one moves freely, the other hits the wall; a single part has no row."""
     one = scene(COPPER, "standard", end=4e-6, viscosity={}, **FLIGHT)
     part = one.parts[0]
     slow = part.model_copy(update={"name": "slow", "velocity": (0.0, 0.0, 40.0)})
@@ -196,7 +196,7 @@ def test_errors_are_shares_of_the_largest_energy_there_has_been() -> None:
 
 
 def named_safety(sim: Simulation) -> float:
-    """What the warning of ``stepping`` names; 0 where there is none."""
+    """Return dt_safety as named in the warning of ``stepping``; 0 if there is no warning."""
     for text in sim.ledger.warnings(sim.case.numerics.dt_safety):
         if text.startswith("the line stepping"):
             return float(text.partition("numerics.dt_safety = ")[2].split()[0])

@@ -22,7 +22,7 @@ MM = 1e-3
 
 
 def length(mesh: TetMesh, axis: int, at: tuple[float, float]) -> float:
-    """What a line passes of a mesh, m."""
+    """Return the length of a line inside of a mesh, m."""
     _, span = spans(mesh.points, mesh.tets.astype(np.uint32), axis, at)
     assert (span[:, 1] > span[:, 0]).all()
     return float((span[:, 1] - span[:, 0]).sum())
@@ -110,7 +110,7 @@ def test_a_hole_through_the_last_plate_beside_the_line_is_not_one_on_it() -> Non
 
 
 def test_the_depth_is_the_mean_of_three_lines() -> None:
-    """What is left ends at 2, 6 and 13 mm on these, at 30 mm on the others."""
+    """The hole ends at 2, 6 and 13 mm on these lines, at 30 mm on the others."""
     ends = dict(zip(MEASURED, (2.0, 6.0, 13.0), strict=True))
     left = {line: [(0, ends[line], 22.0)] if line in ends else [(1, 30.0, 44.0)] for line in range(len(LINES))}
     solid = {line: [*some, (1, 22.0, 44.0), (2, 44.0, 66.0)] if line in ends else [*some, (2, 44.0, 66.0)]

@@ -40,7 +40,7 @@ def flight(x: Floats, v: Floats, axes: list[int], at: list[float], sides: Floats
 
 
 def folded(x: Floats, low: float, high: float) -> Floats:
-    """Where a point on a line between two mirrors is seen that would be at ``x`` without them."""
+    """Return the position between two mirrors of a point that would be at ``x`` without them."""
     length = high - low
     within = np.mod(x - low, 2.0 * length)
     return np.asarray(low + np.where(within > length, 2.0 * length - within, within))

@@ -1,4 +1,4 @@
-"""Where tets go when they are cut anew: to the rank that has most of their box."""
+"""Targets of the boxes of a new cut: the rank that has most of the box."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What regions select of meshes that are turned, moved, scaled and rounded, against counts in whole numbers."""
+"""Selections of regions in meshes that are turned, moved, scaled and rounded, against counts in integers."""
 
 import random
 from decimal import Decimal
@@ -76,7 +76,7 @@ class Scene:
         return [f"{(x * PER_MM[self.unit]).normalize():f} {self.unit}" for x in point]
 
     def place(self, planes: list[int]) -> list[Decimal]:
-        """Where the node with these numbers is after the turn."""
+        """Return the position of the node with these numbers after the turn."""
         x = [a + k * self.size for a, k in zip(self.low, planes, strict=True)]
         i, j = (("xyz".index(self.axis) + k) % 3 for k in (1, 2))
         for _ in range(self.quarters):
@@ -246,7 +246,9 @@ BAR = {"shape": "box", "low": [0, 0, 0], "high": [2e-3, 2e-3, 2e-3], "element_si
 
 
 def beside_a_plane(points: Any, at: str) -> tuple[int, tuple[str, ...]]:
-    """How many nodes of a bar from a file, given from its points, m, start on a plane across x, and the warnings."""
+    """Return the number of nodes of a bar from a file, given from its points, m, that start on a plane across x, and
+    the warnings.
+    """
     made = structured(case_of(BAR).parts[0].mesh)  # type: ignore[arg-type]
     plane = {"kind": "symmetry", "axis": "x", "at": at}
     case = case_of({"shape": "file", "path": "a.inp", "unit": "1 mm"}, plane)

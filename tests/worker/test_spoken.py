@@ -1,4 +1,4 @@
-"""A worker without a server says on its standard output what it does."""
+"""Standard output of a worker without a server."""
 
 from pathlib import Path
 from typing import Any

@@ -53,9 +53,8 @@ def test_bound_is_never_above_the_exact_limit(poisson: float) -> None:
 
 
 def test_bound_of_the_regular_tet() -> None:
-    """Edge 1 m, nu = 0.3, by hand: |grad N|^2 = 3/2 at each node, so the bound is 1 / (c sqrt 6).
-
-    The fastest mode breathes: strain energy 9/2 K V e^2, kinetic energy 3/16 rho V (de/dt)^2, with r^2 = 3/8.
+    """Edge 1 m, nu = 0.3, derived: |grad N|^2 = 3/2 at each node, so the bound is 1 / (c sqrt 6). The fastest mode
+    is volumetric: strain energy 9/2 K V e^2, kinetic energy 3/16 rho V (de/dt)^2, with r^2 = 3/8.
     """
     patch = one(TetMesh(REGULAR, np.array([[0, 1, 2, 3]], np.int32)), 0, 0.3)
     patch.advance(0.0)
@@ -167,7 +166,9 @@ def test_viscous_bound_shrinks_with_the_rate() -> None:
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("rate", [-1e9, 1e9])
 def test_no_tet_changes_its_volume_by_more_than_a_quarter_in_a_step(rate: float, form: Form) -> None:
-    """From the first step on, for the pass in no time knows the rate, too; a slow motion leaves the step as it was."""
+    """The limit holds from the first step, since the first pass, of zero time, has the rate; a slow motion does not
+    change the step.
+    """
     tet = TetMesh(1e-3 * REGULAR, np.array([[0, 1, 2, 3]], np.int32))
     limits = []
     for each in (0.0, 1e-3 * rate, rate):

@@ -1,5 +1,5 @@
-"""The line ``elastic`` of the ledger is what the stresses store, for every law and pressure form, whatever has flowed,
-torn, crumbled or left.
+"""The line ``elastic`` of the ledger equals the energy of the stresses, for every law and pressure form, after plastic
+flow, tension failure, crushing or erosion.
 
 p^2 / 2K + s:s / 4G of the present volume, summed here with numpy: strains are small, no law has heat.
 """
@@ -51,11 +51,11 @@ LAWS = {
 }
 SPEED = 60.0
 SHARE = 2e-3
-"""Of the kinetic energy of the start: how far the line may be off. By hand 1e-3 at most."""
+"""Allowed difference over the kinetic energy of the start: at most 1e-3 follows from the strains."""
 
 
 def sheared(sim: Simulation) -> float:
-    """What the deviatoric stresses of all tets store, J."""
+    """Return the energy of the deviatoric stresses of all tets, J."""
     (part,) = sim.model.blocks
     square = sum((1.0 if row <= S_ZZ else 2.0) * part.row(row) ** 2 for row in range(S_XX, S_XY + 1))
     volume = formulas.volumes(sim.model.nodes.x[part.tets.astype(np.int64)])
@@ -63,7 +63,7 @@ def sheared(sim: Simulation) -> float:
 
 
 def stored(sim: Simulation) -> float:
-    """What the stresses of all tets store, J; where the pressure is of the nodes, what those of the nodes store."""
+    """Return the energy of the stresses of all tets, J; with a nodal pressure, that of the nodes."""
     (part,) = sim.model.blocks
     tets = part.tets.astype(np.int64)
     if isinstance(sim.elements, AveragedElements) and sim.elements._kinds.any():
@@ -146,7 +146,9 @@ def test_no_pores_pay_for_dilation(form: Form) -> None:
 
 @pytest.mark.parametrize("form", FORMS)
 def test_it_is_while_tets_leave(form: Form) -> None:
-    """And ``eroded`` is what those had stored that have left, kinetic energy none: their nodes fly on."""
+    """The line ``eroded`` equals the energy that was stored in removed tets, without kinetic energy: their nodes
+    move on.
+    """
     seen, initial = shaken(COPPER, form, Erosion(plastic_strain=0.05))
     assert max(abs(energy.elastic - there) for energy, there in seen) < SHARE * initial
     eroded = np.array([energy.eroded for energy, _ in seen])

@@ -1,4 +1,4 @@
-"""What is read of mesh files before a run: numbers of the mesh as its part places it, every refusal, shared nodes."""
+"""Survey of mesh files before a run: measurements with the rotation of the part, all errors, shared nodes."""
 
 import subprocess
 import sys

@@ -116,8 +116,9 @@ def ball(spall: float | None) -> simulation.Simulation:
 
 @pytest.mark.parametrize("spall", [None, SPALL])
 def test_a_copper_sphere_that_is_torn_apart_keeps_its_energy_and_its_tets(spall: float | None) -> None:
-    """It had lost 12 % of the energy and a ninth of its tets by 1 us. Without a cut-off single tets still swell until
-    erosion takes them by their volume, but the energy is kept."""
+    """An earlier version lost 12 % of the energy and a ninth of the tets by 1 us. Without a cut-off single tets still
+    swell until erosion removes them by their volume, but the energy is kept.
+    """
     sim = ball(spall)
     residuals: list[float] = []
 

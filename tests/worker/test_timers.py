@@ -14,7 +14,7 @@ from conoid.worker.parallel.team import TASK, team
 
 @dataclass
 class Team:
-    """What timers ask of a team."""
+    """A team with the attributes that timers read."""
 
     within: float = 0.0
     helped: float = 0.0
@@ -22,7 +22,7 @@ class Team:
 
 
 class Clocks:
-    """CPU time and wall time that pass when they are told to."""
+    """CPU time and wall time that the test advances."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.cpu, self.wall, self.comm, self.team = 0.0, 0.0, SerialComm(), Team()

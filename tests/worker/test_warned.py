@@ -131,7 +131,9 @@ def test_both_refuse_the_same(data: Any, words: str, folder: Path) -> None:
 @pytest.mark.parametrize("shift", [(0, 0, 0), (1, 0, 0), (0.13, 0.21, 0.4), (1.2, 1.3, 1.1)])
 @pytest.mark.parametrize("contact", ["none", {}])
 def test_what_is_there_twice_is_refused_by_both(shift: Any, contact: Any, folder: Path) -> None:
-    """As much of 8 mm^3 as the shift leaves; exact where the tets coincide, else a half of a layer of tets off."""
+    """The common volume is the part of 8 mm^3 that the shift leaves: exact if the tets coincide, else off by half a
+    layer of tets.
+    """
     write(folder / "bar.inp", (0, 0, 0), shift)
     made = parse_case(case() | {"contact": contact})
     said = r"parts\[0\].mesh: pieces of 'bar' that share no node overlap: about [0-9.e-]+ of 1.6e-08 m\^3 counts twice"

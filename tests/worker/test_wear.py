@@ -28,7 +28,7 @@ VOLUME, FREQUENCY = 1e-9, 1e6
 
 
 def differ(one: Floats, two: Floats) -> "np.ndarray":
-    """Where the bits do."""
+    """Return where the bits differ."""
     return np.asarray(one.view(np.int64) != two.view(np.int64))
 
 
