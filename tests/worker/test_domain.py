@@ -201,7 +201,7 @@ def test_pieces_of_a_part_that_do_not_meet_are_told(second: str, more: str, told
     mesh = "mesh = { shape = 'file', path = 'two.inp', unit = '1 mm' }"
     case = parse_toml(f"name='two'\n{more}\nrun={{end_time='1 us'}}\n[[parts]]\nname='body'\nmaterial='steel'\n{mesh}")
     _, piece = domain.build(case, tmp_path, SerialComm())
-    assert [text.partition(", and they do not meet")[0] for text in piece.warnings] == [
+    assert [text.partition(", without contact between them")[0] for text in piece.warnings] == [
         "parts[0].mesh: 2 pieces that share no node"
     ] * told
 
