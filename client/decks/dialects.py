@@ -73,5 +73,5 @@ def _told(path: Path) -> str:
     if first.startswith(_LSDYNA):
         return "lsdyna"
     raise UsageError(
-        f"{path}: neither an LS-DYNA keyword deck, an Abaqus input file nor a Radioss starter; --format says"
+        f"{path}: neither an LS-DYNA keyword deck, an Abaqus input file nor a Radioss starter; --format gives"
     )

@@ -89,7 +89,7 @@ def _checked(data: dict[str, Any]) -> list[str]:
     return []
 
 
-# What people are told -------------------------------------------------------------------------------------------------
+# The account for users ---------------------------------------------------------------------------------------------
 
 
 def lines(found: Imported, target: str) -> list[str]:

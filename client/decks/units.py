@@ -1,4 +1,4 @@
-"""The consistent unit systems of decks: named by the user, by the deck, or told from the density of steel.
+"""The consistent unit systems of decks: named by the user, by the deck, or found from the density of steel.
 
 A deck has numbers without units. A number and its dimension become text with a unit, as cases have it: the digits stay
 those of the deck, and ``cases.units`` converts them exactly.
@@ -136,7 +136,7 @@ def named(text: str) -> System:
 
 _WANTED = "expected a length, a mass and a time, such as 'mm,t,s', 'mm,kg,ms', 'm,kg,s', 'cm,g,us'"
 
-# Told from steel ------------------------------------------------------------------------------------------------------
+# Found from steel --------------------------------------------------------------------------------------------------
 
 _STEEL, _NEAR = 7850.0, 0.04
 """Density of steel, kg/m^3, and its tolerance: 7,536 to 8,164, no other common metal is in this range."""

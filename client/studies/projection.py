@@ -1,4 +1,4 @@
-"""What a run on P ranks would take with a core for each thread: projected from CPU seconds and messages, rank by rank,
+"""Time of a run on P ranks with a core for each thread: projected from CPU seconds and messages, rank by rank,
 report by report.
 
 ::
@@ -6,9 +6,9 @@ report by report.
     T_P = sum over windows ( max over ranks (work) + max over ranks (messages * latency + bytes / bandwidth)
                              + collectives * 2 ceil(log2 P) * latency + bytes put into them by all / bandwidth )
 
-A window is what lies between two reports of the worker; work is the CPU time of a rank but for its waiting. Within a
+A window is the time between two reports of the worker; work is the CPU time of a rank without waiting. Within a
 window ranks are taken to wait for each other once, and no message is hidden behind work. Of a run whose tasks were
-timed one after the other (``--use project`` of the worker) work is what a rank would take with so many threads.
+timed one after the other (``--use project`` of the worker) work is the time of a rank with so many threads.
 """
 
 import re

@@ -100,7 +100,7 @@ def read(messages: Iterable[AnyMessage], policy: str = "") -> Record:
             costs.append(message.cost)
             happened.cut(message.step, message.cost)
     if first is None or len(moments) < 2:
-        raise ClientError("this run has not told the loads of its groups")
+        raise ClientError("the journal of this run has no loads of groups")
     cost = sum(costs) / len(costs) if costs else expected
     return Record(first.centres, first.tets, moments, cost, happened)
 

@@ -129,7 +129,7 @@ def _run(case: Path, trial: Trial, overrides: Sequence[str], folder: Path, secon
         try:
             child.wait(seconds)
         finally:
-            child.terminate()  # mpiexec tells its ranks
+            child.terminate()  # mpiexec signals its ranks
             child.wait()
     _succeeded(folder)
 

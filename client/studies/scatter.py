@@ -46,7 +46,7 @@ def runs_needed(deviation: float, difference: float, confidence: float = CONFIDE
     if deviation == 0.0:
         return 1
     if difference == 0.0:
-        raise ValueError("no number of runs tells a difference of nothing")
+        raise ValueError("a difference of 0 cannot be detected by any number of runs")
     a, b = _NORMAL.inv_cdf(0.5 + 0.5 * confidence), _NORMAL.inv_cdf(power)
     return max(2, math.ceil(2.0 * ((a + b) * deviation / difference) ** 2 + 0.25 * a * a))
 

@@ -1,4 +1,4 @@
-"""A small valid case to spoil, and the reading of what is then said."""
+"""A small valid case for tests to modify, and the problems of the modified case."""
 
 from typing import Any
 
@@ -49,12 +49,12 @@ source = "None"
 
 
 def rod(*overrides: str) -> dict[str, Any]:
-    """The rod as plain data, changed."""
+    """The rod as plain data, with changes."""
     return apply_overrides(toml_data(ROD), overrides)
 
 
 def problems(*overrides: str) -> list[Problem]:
-    """What is said of the rod, changed; it must not be accepted."""
+    """The problems of the rod with changes that must make it invalid."""
     with pytest.raises(CaseError) as caught:
         parse_case(rod(*overrides))
     assert str(caught.value).splitlines() == [str(problem) for problem in caught.value.problems]
@@ -62,5 +62,5 @@ def problems(*overrides: str) -> list[Problem]:
 
 
 def said(*overrides: str) -> dict[str, str]:
-    """What is said of each key of the rod, changed."""
+    """The problems of the rod with changes, by key."""
     return {problem.key: problem.message for problem in problems(*overrides)}

@@ -1,4 +1,4 @@
-"""When to cut anew: the rules by hand."""
+"""Criteria for a new decomposition: tests with computed loads."""
 
 import pytest
 
@@ -16,7 +16,7 @@ def test_what_is_lost_and_the_imbalance() -> None:
 
 
 def test_measured_cuts_when_more_is_lost_than_a_cut_costs() -> None:
-    """1 s a step is lost, a cut costs 10 s."""
+    """Each step loses 1 s, a decomposition costs 10 s."""
     trigger = Trigger(Balance(policy="measured"), 10.0)
     trigger.look(ODD, 10)
     assert trigger.cause(10, False) is None, "10 s do not exceed 10 s"
@@ -27,7 +27,7 @@ def test_measured_cuts_when_more_is_lost_than_a_cut_costs() -> None:
 
 
 def test_measured_begins_to_count_anew_after_a_cut() -> None:
-    """What was lost before it is past, and what the cut has left counts like everything: the next may mend it."""
+    """Loss before a decomposition is not counted again, loss that it leaves is: the next one may remove it."""
     trigger = Trigger(Balance(policy="measured"), 10.0)
     trigger.look(ODD, 50)
     trigger.settle(50, 4.0)
@@ -39,7 +39,7 @@ def test_measured_begins_to_count_anew_after_a_cut() -> None:
 
 
 def test_measured_does_not_count_what_ranks_lose_in_turn() -> None:
-    """First one has more, then the other: no cut would help."""
+    """First one rank has more work, then the other: no decomposition would help."""
     trigger = Trigger(Balance(policy="measured"), 10.0)
     for step in range(0, 1000, 10):
         trigger.look(ODD if step % 20 else ODD[::-1], 10)
@@ -77,7 +77,7 @@ def test_a_rank_that_has_not_been_cut_remembers_its_first_count() -> None:
 
 
 def test_cuts_that_do_not_pay_become_rare() -> None:
-    """Each in a row doubles what has to be lost; one that pays makes it the cost of a cut again."""
+    """Each unprofitable decomposition doubles the required loss; a profitable one resets it to the cost."""
     trigger = Trigger(Balance(), 1.0)
     waited = []
     for paid in (False, False, False, True):
@@ -91,7 +91,7 @@ def test_cuts_that_do_not_pay_become_rare() -> None:
 
 
 def test_a_stretch_tells_its_beginning_from_its_end() -> None:
-    """Even for 100 steps, then 1 s a step in favour of one: halves of 1 and 1.5, whatever the windows are."""
+    """Equal loads for 100 steps, then 1 s per step more on one rank: halves of 1 and 1.5, for any windows."""
     for window in (1, 3, 10, 50):
         stretch = Stretch()
         for step in range(0, 200, window):

@@ -1,4 +1,4 @@
-"""Bonds: what a case may say of parts that hold together, and one line for each slip."""
+"""Keys of bonds: valid cases, and one line for each error."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""Cross-field checks: each fault of a scene is found, and a sound scene has none."""
+"""Checks between keys: each error of a scene is found, and a valid scene has none."""
 
 import pytest
 
@@ -123,7 +123,7 @@ def test_a_fault_is_named(overrides: list[str], key: str, message: str) -> None:
 
 
 def test_what_flies_at_a_symmetry_plane_need_not_lie_on_it() -> None:
-    """The rod moves down: to a plane below it, not to one above."""
+    """The rod moves down: towards a plane below it, not towards one above."""
     parse_case(rod("boundaries[0]={kind='symmetry', axis='z', at='-1 mm'}"))
     assert "boundaries[0].at" in said("boundaries[0]={kind='symmetry', axis='z', at='40 mm'}")
 

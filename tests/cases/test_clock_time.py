@@ -1,4 +1,4 @@
-"""The time by the clock of ranks and threads, by hand, and what is told of its assumptions."""
+"""Wall time of ranks and threads against computed values, with its assumptions in words."""
 
 import io
 

@@ -1,4 +1,4 @@
-"""A brittle material of tension alone that an impact would crush: told before the run, with the law that can."""
+"""Warning about a brittle material without compressive failure that an impact would crush."""
 
 import math
 from typing import Any
@@ -30,7 +30,7 @@ def shot(material: str = "alumina", speed: float = 800.0, **case: Any) -> dict[s
 
 
 def crushed(data: dict[str, Any]) -> dict[str, str]:
-    """What is told of compression, by key."""
+    """The warnings about compression, by key."""
     case = parse_case(data)
     found = doubts(data, case, estimate(case))
     return {each.key: each.message for each in found if "crushed" in each.message}
@@ -47,7 +47,7 @@ def test_griffith_of_a_plane_wave_is_on_his_parabola() -> None:
 
 
 def test_the_stress_of_an_impact_is_that_of_two_impedances() -> None:
-    """Two like plates of glass at 100 m/s: Z v / 2 in both."""
+    """Two equal plates of glass at 100 m/s: Z v / 2 in both."""
     glass = library()["soda_lime"]
     z = math.sqrt(glass.density * (glass.elastic.bulk + 4.0 / 3.0 * glass.elastic.shear))
     data = shot("soda_lime", 100.0)

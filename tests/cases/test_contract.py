@@ -1,4 +1,4 @@
-"""Messages, outcome, states and keys: what crosses the borders between the houses."""
+"""Messages, outcome, states and Zenoh keys: the contract between the houses."""
 
 import typing
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""How many cores a process may use, by control groups of both versions; how ranks and threads are told."""
+"""Number of cores that a process may use, by control groups of both versions; ranks and threads in words."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Estimates against the meshes that are really made, and against runs that were measured."""
+"""Estimates against generated meshes, and against measured runs."""
 
 import math
 import subprocess
@@ -67,7 +67,7 @@ STEPS = {
     "branching_plate": 920, "glass_steel_bar": 4271, "glass_steel_demo": 682,
     "glass_ball_cohesive": 224, "glass_ball_jh2": 308, "triaxial_glass": 808, "plugging_weldox": 6440,
 }  # fmt: skip
-"""Steps that the shipped cases were seen to take."""
+"""Measured numbers of steps of the shipped cases."""
 
 
 def mesh(written: dict[str, Any], **more: Any) -> Generated:
@@ -181,12 +181,12 @@ HARD = {
     "ball_into_stack": 2.4, "stretched_bar": 2.2, "tile": 2.3, "wedge": 3.5, "scissors": 3.8, "slit": 1.2,
     "pressed_on_a_slope": 1.8, "bursting_ring": 12.8, "joint_of_two_glasses": 7.0,
 }  # fmt: skip
-"""CPU s of steps that the hard cases that break took (docs/verification/accuracy.md)."""
+"""Measured CPU s of steps of the hard cases with fracture (docs/verification/accuracy.md)."""
 
 
 @pytest.mark.parametrize("hard", [hard for hard in suite() if hard.name in HARD], ids=lambda hard: hard.name)
 def test_what_breaks_takes_what_lies_between_the_two_estimates(hard: Hard) -> None:
-    """Half of the first at the least, and half as much again as the second at the most."""
+    """Between half of the first value and one and a half times the second."""
     expected = estimate(parse_case(apply_overrides(read_data(hard.path), hard.changes)))
     assert expected.core_seconds is not None
     took = HARD[hard.name] + START
@@ -289,7 +289,7 @@ FLATTENED = {
 
 @pytest.mark.parametrize(("bar", "measured"), FLATTENED.items())
 def test_bars_that_flatten_take_no_more_steps_than_expected(bar: tuple[float, int, float], measured: float) -> None:
-    """And more than 3 in 8 of what is expected: they may harden."""
+    """More than 3 in 8 of the estimate: the bars may harden."""
     case = parse_case(flattening.data_of(*bar))
     (speed,) = impact_speeds(case)
     assert 0.99 < shrinkage(case, case.parts[0], speed) / measured < 2.7
@@ -313,7 +313,8 @@ HARD_STEPS = {
     "flying_debris": 241,
     "needle": 1088,
 }
-"""Steps that hard cases were seen to take whose step falls most (docs/verification/energy_lines.md)."""
+"""Measured numbers of steps of the hard cases with the largest reduction of the step
+(docs/verification/energy_lines.md)."""
 
 
 @pytest.mark.parametrize(("name", "steps"), HARD_STEPS.items())

@@ -1,4 +1,4 @@
-"""Numbers as people read them: one table for Python and for the page."""
+"""Numbers in words: one table for Python and for the page."""
 
 import ast
 import json
@@ -28,7 +28,7 @@ def test_what_is_not_known_or_has_no_end() -> None:
 
 
 OWN = {"studies/chart.py", "drawing/films.py"}
-"""Coordinates in SVG and options of ffmpeg, which nobody reads. Messages about decks repeat the numbers of the deck."""
+"""Exceptions: coordinates in SVG, options of ffmpeg, and messages about decks, which repeat the numbers of the deck."""
 
 
 def test_no_module_of_the_client_writes_numbers_on_its_own() -> None:

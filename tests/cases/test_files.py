@@ -1,4 +1,4 @@
-"""The files that a case names, and where a run finds them."""
+"""The files that a case names, and their place for a run."""
 
 from pathlib import Path
 from typing import Any

@@ -1,4 +1,4 @@
-"""How fast bodies meet, and how many sweeps of contact that asks for."""
+"""Impact speeds of bodies, and the number of contact sweeps at these speeds."""
 
 from typing import Any
 
@@ -13,7 +13,7 @@ TOUGH = {**BRITTLE, "strength": {"model": "linear_hardening", "yield_stress": 20
 
 
 def meeting(speed: float, contact: dict[str, Any] | None = None, **other: Any) -> Case:
-    """A block of steel that flies at one at rest, c = 5,917 m/s."""
+    """A moving block of steel and one at rest, c = 5,917 m/s."""
     cube = {"shape": "box", "low": [0, 0, 0], "high": [1e-3] * 3, "element_size": 5e-4}
     away = {**cube, "low": [0, 0, 2e-3], "high": [1e-3, 1e-3, 3e-3]}
     return parse_case(
@@ -42,7 +42,7 @@ def meeting(speed: float, contact: dict[str, Any] | None = None, **other: Any) -
     ],
 )
 def test_what_meets_fast_gets_more_sweeps(case: Case, least: int, most: int) -> None:
-    """From a fifth of the speed of waves on."""
+    """Above a fifth of the wave speed."""
     assert sweeps(case) == (least, most)
 
 
@@ -57,7 +57,7 @@ def test_what_is_driven_together_and_breaks_gets_more_sweeps() -> None:
 
 
 def test_a_traction_presses_what_is_at_rest() -> None:
-    """Nothing moves yet, and all of it will."""
+    """All nodes are at rest at the start, and all are driven later."""
     rest = meeting(0.0, material="glass", fracture={})
     pushed = {"kind": "traction", "parts": ["b"], "pressure": 1e8}
     assert sweeps(bounded(rest, pushed)).least == 40

@@ -1,4 +1,4 @@
-"""The material library: nothing without a source, and the constants that others rely on."""
+"""The material library: every constant has a source, and the constants that tests rely on."""
 
 import math
 from collections.abc import Iterator

@@ -1,4 +1,4 @@
-"""From text to a case: every error at once, each one line under the key that the user wrote."""
+"""Reading of cases: every error at once, each one line under the key that the user wrote."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""Areas on which tractions act, before there is a mesh: against formulas, and against meshes that are made."""
+"""Estimated areas of tractions against formulas and against generated meshes."""
 
 import math
 from typing import Any

@@ -1,4 +1,4 @@
-"""Primitives that overlap are told before anything is meshed, together with everything else; what touches does not."""
+"""Overlapping primitives are found before meshing, together with all other errors; touching ones are valid."""
 
 from pathlib import Path
 from typing import Any
@@ -24,7 +24,7 @@ def scene(one: dict[str, Any], other: dict[str, Any], **more: Any) -> dict[str, 
 
 
 def told(data: dict[str, Any]) -> list[str]:
-    """What is said of overlap."""
+    """The problems of overlap."""
     try:
         parse_case(data)
     except CaseError as error:

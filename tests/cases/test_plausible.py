@@ -1,4 +1,5 @@
-"""What a slip of units makes is told: bare numbers, odd constants, speeds, sizes, places; shipped cases are sound."""
+"""Warnings about probable errors of units: bare numbers, unusual constants, speeds, sizes and places; shipped cases
+have none."""
 
 import math
 import time
@@ -367,7 +368,7 @@ def test_the_box_of_a_probe_that_has_no_room_for_a_tet_is_told(side: float, warn
     ids=["elastic", "nodal", "flows"],
 )  # fmt: skip
 def test_the_form_split_is_named_where_a_part_may_stay_elastic(changes: dict[str, Any], named: bool) -> None:
-    """It damps elastic motion: tests/verification/test_pressure_modes.py has how much."""
+    """``split`` damps elastic motion, as tests/verification/test_pressure_modes.py measures."""
     data = target() | {"numerics": changes["numerics"]}
     for part in data["parts"]:
         part["material"] = changes.get("material", part["material"])

@@ -1,4 +1,4 @@
-"""The reference of the keys: complete, as the models have it, and true of what the reader accepts."""
+"""The reference of keys: complete, generated from the models, and consistent with the reader."""
 
 import json
 import re

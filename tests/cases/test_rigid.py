@@ -1,4 +1,4 @@
-"""Keys of rigid parts and of walls: what is refused, in one line, and which part could be rigid."""
+"""Keys of rigid parts and of walls: errors in one line, and suggestions of rigid parts."""
 
 from dataclasses import replace
 from typing import Any
@@ -108,7 +108,7 @@ def test_a_rigid_part_costs_no_tets_and_no_steps_before_a_run() -> None:
 
 
 def test_a_stiff_part_could_be_rigid() -> None:
-    """Steel on rubber, not steel on steel; a rigid one is told nothing."""
+    """Steel on rubber, not steel on steel; no suggestion for a rigid part."""
 
     def told(*overrides: str) -> list[str]:
         case = parse_case(scene(*overrides))
@@ -121,9 +121,7 @@ def test_a_stiff_part_could_be_rigid() -> None:
 
 
 def test_a_part_that_stayed_elastic_could_have_been_rigid() -> None:
-    """Told after the run: not of one that has yielded, has strained or has much of the energy, nor of one with a bond,
-    which no rigid part can have.
-    """
+    """Suggestions after the run: not for a part that has yielded, has much strain or energy, or has a bond."""
     case = parse_case(scene("parts[0].rigid=false"))
     ball, block = Strained(600, 2e-4, 0.01, False), Strained(400, 0.05, 0.99, False)
     (line,) = could_be_rigid(case, [ball, block], "stability: tet 7 of ball")

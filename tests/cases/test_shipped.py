@@ -1,4 +1,4 @@
-"""The shipped cases: sound, and every derived reference number worked out again from its formula."""
+"""The shipped cases: valid, and every derived reference value computed again from its formula."""
 
 import math
 from collections.abc import Callable
@@ -296,7 +296,8 @@ def test_plastic_bar_wave() -> None:
 
 
 def test_triaxial_glass() -> None:
-    """The strength by Mohr's circles, and no cap below it; the tolerance is what the one of the sides makes."""
+    """The strength by Mohr's circles, and no cap below it; the tolerance is the effect of that of the lateral
+    pressure."""
     law = library()["soda_lime_mohr_coulomb"].strength
     assert isinstance(law, MohrCoulomb)
     sides = -reference("triaxial_glass", "lateral").value
@@ -400,7 +401,8 @@ def test_spall_glass() -> None:
 
 
 def test_a_spall_of_eighty_layers_in_one_dimension() -> None:
-    """The rear's velocity falls by the pull-back, less what the mesh smears, when the theory says so; not unbroken."""
+    """The velocity of the rear falls by the pull-back, reduced by the mesh, at the theoretical time; not without
+    fracture."""
     glass, flyer, layers = library()["soda_lime"], 5e-3, 80
     assert glass.brittle is not None
     c, h, v = wave_speed(glass), flyer / layers, np.zeros((3 * layers, 2))

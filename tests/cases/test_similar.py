@@ -1,4 +1,4 @@
-"""Names near a misspelt one are told wherever a name is chosen from a list."""
+"""Suggestions of similar names in the error of every choice from a list."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""What a case has and has not, and what of its cost is whose."""
+"""Stages that a case has or lacks, and the distribution of its cost over them."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Which generated bodies touch without a gap: about what area, and a warning where nothing acts between them."""
+"""Generated bodies that touch without a gap: approximate area, and a warning where no force acts between them."""
 
 import math
 from typing import Any

@@ -181,7 +181,7 @@ def test_submit_show_ls_get(user: Path) -> None:
     assert some.exit_code == 1
     assert "has no nothing.csv" in some.stderr
     assert some.stdout.split() == ["there/history.csv"]
-    assert conoid("replay-balance", "last").stderr == "conoid: this run has not told the loads of its groups\n"
+    assert conoid("replay-balance", "last").stderr == "conoid: the journal of this run has no loads of groups\n"
 
 
 @pytest.mark.parametrize(

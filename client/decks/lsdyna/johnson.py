@@ -35,7 +35,7 @@ def simplified(fields: Fields, context: Context) -> Made:
         "m": 1.0, "melt_temperature": "2000 K", "specific_heat": "1000 J/kg/K", "taylor_quinney": 0.0,
     }  # fmt: skip
     fields.entry.remark(
-        "differs", "no heat", "the law there knows no temperature: no work becomes heat here (taylor_quinney = 0), so "
+        "differs", "no heat", "the law there has no temperature: no work becomes heat here (taylor_quinney = 0), so "
         "that melt_temperature and specific_heat have no meaning",
     )  # fmt: skip
     return Made({**elastic(fields, context), "strength": law}, failing(fields.real("PSFAIL")))

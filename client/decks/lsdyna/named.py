@@ -23,10 +23,10 @@ class Numbered:
         """Sets and curves that have not been used."""
         for number, found in (*self.node_sets.items(), *self.segments.items()):
             if not found.entry.decided:
-                found.entry.leave(f"set {number} is used by nothing that is translated")
+                found.entry.leave(f"set {number} is not used by any translated keyword")
         for _, entry in (*self.part_sets.values(), *self.curves.values()):
             if not entry.decided:
-                entry.leave("used by nothing that is translated")
+                entry.leave("not used by any translated keyword")
 
     def nodes(self, number: int, entry: Entry) -> Chosen:
         """Returns the node set of a number; 0 means all nodes. Raises ValueError."""

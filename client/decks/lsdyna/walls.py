@@ -100,7 +100,7 @@ def _driven(scene: Scene, fields: Fields, table: dict[str, Any]) -> None:
 
 
 def _stand(scene: Scene, fields: Fields, table: dict[str, Any]) -> None:
-    """What all walls have in common: whom they stop, when, and their friction."""
+    """Returns the common keys of all walls: stopped nodes, times, and friction."""
     fields.refuse("NSIDEX BOXID BIRTH", "exceptions, boxes and times are not translated")
     if 0.0 < fields.real("DEATH") < scene.end:
         fields.refuse("DEATH", "the wall goes before the run ends; here it stays")

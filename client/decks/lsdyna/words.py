@@ -22,10 +22,10 @@ LEFT: dict[str, str] = {
     "CONTROL_SOLID": "how the other code computes solids",
     "CONTROL_UNITS": "units are those of --units",
     "INTERFACE_SPRINGBACK": "output for another run",
-    "DEFINE_BOX": "used by nothing that is translated",
-    "DEFINE_COORDINATE": "used by nothing that is translated",
-    "DEFINE_VECTOR": "used by nothing that is translated",
-    "DEFINE_TABLE": "used by nothing that is translated",
+    "DEFINE_BOX": "not used by any translated keyword",
+    "DEFINE_COORDINATE": "not used by any translated keyword",
+    "DEFINE_VECTOR": "not used by any translated keyword",
+    "DEFINE_TABLE": "not used by any translated keyword",
 }
 """Omitted keywords by the words that they begin with."""
 

@@ -2,7 +2,7 @@
 
 _OUTPUT = "output: a run writes frames, history.csv and probes"
 _HOW = "how the other code computes"
-_USED = "used by nothing that is translated"
+_USED = "not used by any translated keyword"
 
 LEFT: dict[str, str] = {
     "ANALY": _HOW, "DEF_SOLID": _HOW, "DEF_SHELL": _HOW, "DEFAULT": _HOW, "IOFLAG": _OUTPUT, "RANDOM": _HOW,
