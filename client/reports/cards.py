@@ -38,12 +38,12 @@ def strip(ended: Outcome | None, noun: str, number: int | None) -> str:
 
 
 def references(ended: Outcome | None) -> str:
-    """Each reference with its value, what is expected, the deviation, the verdict and the source."""
+    """Returns each reference with its value, expected value, deviation, verdict and source."""
     return html.references(ended)
 
 
 def results(ended: Outcome | None) -> str:
-    """The last value of each probe and its extremes."""
+    """Returns the last value and the extremes of each probe."""
     rows = []
     for probe in ended.probes if ended is not None else ():
         last, least, most = alike((probe.value, probe.least, probe.most), probe.unit)
@@ -52,13 +52,13 @@ def results(ended: Outcome | None) -> str:
 
 
 def warnings(ended: Outcome | None) -> str:
-    """What the run has warned of."""
+    """Returns the warnings of the run."""
     told = ended.warnings if ended is not None else []
     return f"<ul class=warnings tabindex=0>{''.join(f'<li>{escape(line)}</li>' for line in told)}</ul>" if told else ""
 
 
 def case(told: dict[str, object]) -> str:
-    """What the case is about, and its parts."""
+    """Returns title, description and parts of the case."""
     parts = told.get("parts")
     rows = []
     for part in parts if isinstance(parts, list) else []:
@@ -75,7 +75,7 @@ def case(told: dict[str, object]) -> str:
 
 
 def cost(ended: Outcome | None) -> str:
-    """What the run took, and beside it how far off it is."""
+    """Returns the cost of the run and its errors."""
     if ended is None:
         return ""
     updates = (ended.steps or 0) * (ended.elements or 0)
@@ -101,7 +101,7 @@ def cost(ended: Outcome | None) -> str:
 
 
 def energy(result: Result, ended: Outcome | None) -> str:
-    """The ledger and the energies of the parts at the end."""
+    """Returns the ledger and the energies of the parts at the end."""
     rows = []
     if ended is not None and ended.energy is not None:
         terms = ((name, getattr(ended.energy, name)) for name in ended.energy.__struct_fields__ if name != "residual")
@@ -112,7 +112,7 @@ def energy(result: Result, ended: Outcome | None) -> str:
 
 
 def _parts(result: Result) -> str:
-    """The energy of each part at the end of the history; nothing where there is one part alone."""
+    """Returns the energy of each part at the end of the history; empty for a case with one part."""
     try:
         told = by_part(result.history)
     except UnfinishedError:
@@ -125,7 +125,7 @@ def _parts(result: Result) -> str:
 
 
 def fragments(result: Result) -> str:
-    """What the fragments are as a whole, and the laws of their masses and extents."""
+    """Returns the totals of the fragments, and the laws of their masses and extents."""
     said = summary(result)
     if said is None:
         return ""
@@ -149,7 +149,7 @@ def _laws(what: str, fits: Sequence[Fit], unit: str) -> list[list[str]]:
 
 
 def balance(result: Result, ended: Outcome | None) -> str:
-    """The cuts of the mesh in the course of the run."""
+    """Returns the balance events of the run."""
     cuts = [message for message in result.messages if isinstance(message, Balance)]
     if not cuts:
         return ""

@@ -34,7 +34,7 @@ PAPER = {
 
 @dataclass
 class Course:
-    """What a run has told of its ranks."""
+    """Loads of the ranks over time."""
 
     times: list[float] = field(default_factory=list)
     """s."""
@@ -70,7 +70,7 @@ def course(messages: Sequence[AnyMessage]) -> Course:
 
 
 def balance(told: Course, title: str, case: str, out: Path) -> None:
-    """Outside nodes of each rank over time with the cuts, and CPU time by phase and rank, as a PNG."""
+    """Draws surface nodes of each rank with the balance events, and CPU time by phase and rank, as a PNG."""
     figure = balance_figure(told)
     figure.suptitle(title, fontsize=11, color=_INK)
     figure.supxlabel(PAPER.get(case, ""), fontsize=8, color=_INK)
@@ -78,7 +78,7 @@ def balance(told: Course, title: str, case: str, out: Path) -> None:
 
 
 def balance_figure(told: Course) -> Figure:
-    """Outside nodes of each rank over time with the cuts, and CPU time by phase and rank."""
+    """Draws surface nodes of each rank with the balance events, and CPU time by phase and rank."""
     figure = Figure(figsize=(11, 4.8), layout="constrained")
     left, right = figure.subplots(1, 2)
     _outside(left, told)

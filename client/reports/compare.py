@@ -1,4 +1,4 @@
-"""Two runs side by side: keys that differ, how each ended, what became of the fragments."""
+"""Comparison of two runs: keys that differ, outcomes, fragments."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -62,7 +62,7 @@ class Value(msgspec.Struct, frozen=True):
 
 @dataclass(frozen=True)
 class Comparison:
-    """What two runs have in common, and what not."""
+    """Result of a comparison of two runs."""
 
     names: tuple[str, str]
     same_answer: bool
@@ -134,7 +134,7 @@ def _references(a: Result, b: Result) -> list[Value]:
 
 
 def _last(a: Result, b: Result) -> list[Value]:
-    """The last line of the columns of both histories that no outcome has: momentum, probes."""
+    """Returns the last values of columns of both histories that no outcome has: momentum, probes."""
     try:
         first, second = a.history, b.history
     except UnfinishedError:
@@ -146,7 +146,7 @@ def _last(a: Result, b: Result) -> list[Value]:
 
 
 def common(a: Columns, b: Columns) -> list[str]:
-    """Columns of numbers that both have."""
+    """Returns the columns of numbers that both have."""
     return [name for name, values in a.items() if name in b and not isinstance(values, list)]
 
 
@@ -188,7 +188,7 @@ def _sizes(a: Result, b: Result) -> list[Value]:
 
 
 def summary(result: Result) -> Summary | None:
-    """What the last table of fragments says as a whole; None where there is none."""
+    """Returns the totals of the last table of fragments; None without one."""
     if not result.fragment_tables:
         return None
     table = result.fragments_of()

@@ -76,7 +76,7 @@ def _largest(curves: dict[str, Sequence[float]]) -> dict[str, Sequence[float]]:
 
 
 def steps(told: Columns) -> Figure:
-    """The length of the time step, in the colour of what holds it down."""
+    """Draws the length of the time step in the colour of its limiter."""
     figure, (axes,) = _panels(1)
     held = [_limiter(text) for text in told["limiter"] if isinstance(text, str)] or [""] * told.rows
     often = sorted(set(held), key=lambda name: -held.count(name))[:_LIMITERS]
@@ -97,7 +97,8 @@ def _limiter(text: str) -> str:
 
 
 def fragments(tables: Sequence[Columns]) -> Figure:
-    """How many there are in each frame, the share of the largest one, and N(m) of the last frame with its laws."""
+    """Draws the number of fragments in each frame, the share of the largest one, and N(m) of the last frame with its
+    laws."""
     if not tables or not any(table.rows for table in tables):
         raise ClientError("this run has no tables of fragments: nothing in it can break")
     figure, (left, right) = _panels(2)
@@ -153,7 +154,7 @@ def overlaid(runs: Mapping[str, Columns], names: Sequence[str], spare: int = 0) 
 
 
 def _dashed(runs: Mapping[str, Columns]) -> str:
-    """Which run has which dash."""
+    """Draws the legend of dashes and runs."""
     return ", ".join(f"{run} {mark}" for run, mark in zip(runs, ("——", "– –", "· ·"), strict=False))
 
 

@@ -25,7 +25,7 @@ _INK, _FAINT = "#1d2733", "#b5bcc4"
 
 
 def pictures(result: Result, fields: Sequence[str], at: Callable[[str], None]) -> str:
-    """Each field at some times, and the last one on a cut; what cannot be drawn is said."""
+    """Draws each field at some times, and the last one on a section; a failure is one line."""
     frames = [frame.index for frame in result.frames]
     if not frames or not fields:
         return ""

@@ -112,7 +112,7 @@ def _head(name: str, title: str, case: str, ended: Outcome | None) -> str:
 
 
 def _now(result: Result, ended: Outcome | None) -> str:
-    """What stands beside the body."""
+    """Returns the column beside the body."""
     known = Live(result.folder.name)
     for message in result.messages if _has_journal(result) else ():
         known.take(message)
@@ -123,7 +123,7 @@ def _now(result: Result, ended: Outcome | None) -> str:
 
 
 def _charts(result: Result, ended: Outcome | None, say: Callable[[str], None]) -> str:
-    """Charts and the tables that belong to them."""
+    """Returns the charts and their tables."""
     say("energy")
     found = [_card("Cost and error", cards.cost(ended)), *_energy(result, ended)]
     say("fragments")
