@@ -209,7 +209,7 @@ def test_views_need_no_numpy() -> None:
 
 
 def test_where_erosion_alone_parts_bodies_the_largest_piece_is_the_part() -> None:
-    """It keeps its number when others come and go; these have the number of their first tet."""
+    """The piece keeps its number when others come and go; these have the number of their first tet."""
     body = shattered(5, 9)
     label, whole = pieces(body), replace(body.whole(1), initial=0)
     data = blob.made(whole, {**TOLD, "ranks": 1}, lambda numbers: np.zeros(len(numbers)), Budget()).data
