@@ -1,4 +1,4 @@
-"""Bodies for the tests of contact: scenes of several blocks, their pieces on some ranks, clouds of nodes and faces."""
+"""Bodies for the tests of contact: cases of several blocks, their pieces on some ranks, tables of nodes and faces."""
 
 from collections.abc import Sequence
 from itertools import product
@@ -40,7 +40,8 @@ def rotation(axis: Sequence[float], angle: float) -> Floats:
 
 
 def meeting_of(motions: Sequence[dict[str, Any]], contact: dict[str, Any] | None = None, **keys: Any) -> schema.Case:
-    """A case of as many parts, body0, body1 ..., as there are ``motions`` (velocity, spin), and their contact."""
+    """Returns a case with a part, body0, body1 ..., for each of the ``motions`` (velocity, spin), in contact with
+    each other."""
     parts = tuple(
         schema.Part(name=f"body{i}", material="metal", mesh=DUMMY, **motion) for i, motion in enumerate(motions)
     )
@@ -48,7 +49,7 @@ def meeting_of(motions: Sequence[dict[str, Any]], contact: dict[str, Any] | None
 
 
 def pieces_of(case: schema.Case, meshes: Sequence[TetMesh], ranks: int = 1) -> list[tuple[domain.Piece, Model]]:
-    """What each rank holds of a scene whose parts have these meshes."""
+    """Returns the piece of each rank of a scene whose parts have these meshes."""
     ready = iter(meshes)
     with patch.object(assembly, "build_mesh", lambda *_, **__: next(ready)):
         whole = assembly.assemble(case, Path())
@@ -58,7 +59,7 @@ def pieces_of(case: schema.Case, meshes: Sequence[TetMesh], ranks: int = 1) -> l
 def surface_of(
     piece: domain.Piece, model: Model, comm: Comm | None = None, planes: Flags | None = None, edges: bool = True
 ) -> Surface:
-    """The surface of a rank's piece; ``planes`` (nodes, planes): which nodes are on which symmetry plane."""
+    """Returns the surface of a rank's piece; ``planes`` (nodes, planes): membership of nodes in symmetry planes."""
     on_planes = np.zeros((model.nodes.n, 0), bool) if planes is None else planes
     none = np.zeros((0, 3), np.int32)
     nothing = CrackSides(none, none), none
@@ -76,7 +77,7 @@ def nodes_of(x: Floats, v: Floats | None = None, part: Indices | None = None) ->
 
 
 def sheet(cells: int, size: float) -> tuple[Floats, Indices]:
-    """Nodes and triangles, looking up, of a square sheet at z = 0."""
+    """Returns nodes and triangles, normals up, of a square sheet at z = 0."""
     grid = np.array(list(product(range(cells + 1), range(cells + 1))), float) * size
     a = (np.array(list(product(range(cells), range(cells)))) @ [cells + 1, 1])[:, None]
     faces = np.concatenate([a + np.array([0, cells + 1, cells + 2]), a + np.array([0, cells + 2, 1])])

@@ -1,4 +1,4 @@
-"""What the tests ask of the contact kernels, and how it is asked of them: a changed signature changes this file."""
+"""Calls of the contact kernels for the tests: a changed signature changes this file only."""
 
 from types import SimpleNamespace
 from typing import Any
@@ -34,7 +34,7 @@ from .bodies import Indices
 
 
 def every_pair(tested: "np.ndarray", things: int) -> Indices:
-    """(p, 2) every owned with every thing, sorted by owned, then by thing."""
+    """(p, 2) every one of the nodes ``tested`` with every one of the ``things``, sorted by node, then by thing."""
     return np.column_stack([np.repeat(tested, things), np.tile(np.arange(things), len(tested))]).astype(np.int32)
 
 
@@ -50,8 +50,8 @@ def edge_sizes(x: Floats, edges: Indices) -> Floats:
 
 
 def edge_depths(x: Floats, edges: Indices) -> Floats:
-    """(e,) how deep they hold, m: DEEP of their length and of the lowest height of the tets of their faces, but no less
-    than DEEP_SELF of their length.
+    """(e,) greatest depth of a contact, m: DEEP of their length and of the lowest height of the tets of their faces,
+    at least DEEP_SELF of their length.
     """
     (a, b, c, d, e, f), size = edges.T, edge_sizes(x, edges)
     low = np.minimum(lowest_heights(x[np.stack([a, b, c, e], 1)]), lowest_heights(x[np.stack([a, b, d, f], 1)]))
@@ -59,7 +59,7 @@ def edge_depths(x: Floats, edges: Indices) -> Floats:
 
 
 def lowest_heights(tets: Floats) -> Floats:
-    """(n,) of tets (n, 4, 3), m: three volumes over the largest face."""
+    """(n,) lowest heights of tets (n, 4, 3), m: three volumes over the largest face."""
     volumes = np.abs(np.linalg.det(tets[:, 1:] - tets[:, :1])) / 6.0
     one, two, three = (tets[:, [[0, 0, 0, 1], [1, 1, 2, 2], [2, 3, 3, 3]][k]] for k in range(3))
     areas = 0.5 * np.linalg.norm(np.cross(two - one, three - one), axis=2)
@@ -67,18 +67,18 @@ def lowest_heights(tets: Floats) -> Floats:
 
 
 def many(met: ContactRows) -> int:
-    """How many active contacts there are."""
+    """Number of active contacts."""
     return len(met.nodes)
 
 
 def taken(met: ContactRows, rows: "np.ndarray") -> ContactRows:
-    """Some of the active contacts, in this order."""
+    """Returns some of the active contacts, in this order."""
     return ContactRows(*(column[rows] for column in met))
 
 
 def moments(out: Floats) -> Floats:
-    """(n, 12) means of n and of n n (xx, yy, zz, yz, zx, xy) of the normals (n, faces, 3) of nodes' faces, which rise
-    nowhere.
+    """(n, 12) means of n and of n n (xx, yy, zz, yz, zx, xy) of the normals (n, faces, 3) of nodes' faces, with zero
+    mean direction to the faces.
     """
     squares = np.einsum("nfi,nfj->nij", out, out) / out.shape[1]
     pairs = [squares[:, i, j] for i, j in ((0, 0), (1, 1), (2, 2), (1, 2), (2, 0), (0, 1))]
@@ -86,38 +86,39 @@ def moments(out: Floats) -> Floats:
 
 
 def step_of(x: Floats, v: Floats, part: "np.ndarray", dt: float, mu: Floats | None = None) -> Step:
-    """The step ahead of slots at ``x`` with velocities ``v``; no friction unless ``mu`` (parts, parts) says so."""
+    """Returns the step ahead of slots at ``x`` with velocities ``v``; without ``mu`` (parts, parts) there is no
+    friction."""
     friction = np.zeros((9, 9)) if mu is None else mu
     return Step.of(x, v, part.astype(np.int32), friction, PUSH_OUT, dt)
 
 
 def slot_table(first: Indices, normals: Floats, left: Floats, course: Floats) -> SlotTable:
-    """Slots that are all on the surface; see tables.SlotTable."""
+    """Returns slots that are all on the surface; see tables.SlotTable."""
     n = len(first)
     return SlotTable(normals, np.ones(n, bool), first, left, course, np.zeros(n, bool))
 
 
 def face_table(corners: Indices, size: Floats, left: Floats) -> FaceTable:
-    """Exposed faces, by ascending id."""
+    """Returns exposed faces, by ascending id."""
     n, none = len(corners), np.zeros(len(corners), bool)
     return FaceTable(corners, size, np.arange(n), ~none, left, none.copy())
 
 
 def edge_table(corners: Indices, size: Floats, deep: Floats, left: Floats) -> EdgeTable:
-    """Edges between exposed faces."""
+    """Returns edges between exposed faces."""
     n = len(corners)
     return EdgeTable(corners, size, deep, np.ones(n, bool), left, np.zeros(n, bool))
 
 
 def pair_table(pairs: Indices) -> PairTable:
-    """Pairs none of which has been tested."""
+    """Returns pairs that have not been tested yet."""
     table = PairTable()
     table.add(np.asarray(pairs, np.int32))
     return table
 
 
 def faces_met(pairs: Pairs, slots: SlotTable, faces: FaceTable, step: Step, end: float) -> tuple[ContactRows, int]:
-    """The contacts of nodes and faces, and how many pairs were tested: ``pairs.active`` begins with them."""
+    """Returns the contacts of nodes and faces, and the number of tested pairs: ``pairs.active`` begins with them."""
     n = len(pairs.rows)
     room, depth, found = ContactRows.room(n), np.zeros(n), np.arange(n, dtype=np.int32)
     tested = int(face_kernels.due(pairs, slots, faces, end + step.beyond, 0, n))
@@ -129,7 +130,7 @@ def faces_met(pairs: Pairs, slots: SlotTable, faces: FaceTable, step: Step, end:
 
 
 def edges_met(pairs: Pairs, edges: EdgeTable, step: Step, course: Floats, end: float) -> tuple[ContactRows, int]:
-    """The contacts of edges, and how many pairs were tested: ``pairs.active`` begins with them."""
+    """Returns the contacts of edges, and the number of tested pairs: ``pairs.active`` begins with them."""
     room = ContactRows.room(len(pairs.rows))
     met, tested = edge_kernels.edge_edge(room, 0, pairs, edges, step, course, end, 0, len(pairs.rows))
     return taken(room, np.arange(met)), int(tested)
@@ -139,8 +140,7 @@ def node_face(
     x: Floats, v: Floats, faces: Indices, pairs: Indices, dt: float, part: "np.ndarray | None" = None,
     mu: Floats | None = None, out: Floats | None = None, normals: Floats | None = None,
 ) -> ContactRows:  # fmt: skip
-    """The nodes that pass a face; the tested are of another part unless ``part`` says something else.
-
+    """Returns the contacts of nodes that pass a face; the nodes are of another part unless ``part`` is given.
     ``out`` (n, faces, 3): unit normals of a node's faces, all of one area, zero for a node without faces; or
     ``normals`` (n, 12), see SlotTable.
     """
@@ -159,7 +159,7 @@ def node_face(
 def edge_edge(
     x: Floats, v: Floats, edges: Indices, pairs: Indices, dt: float, mu: Floats | None = None, *, never: int = 0
 ) -> ContactRows:  # fmt: skip
-    """The edges that pass an edge; ``never``: how many of the pairs cannot."""
+    """Returns the contacts of edges that pass an edge; ``never``: number of pairs that are deactivated for good."""
     table = pair_table(pairs)
     of = edge_table(edges, edge_sizes(x, edges), edge_depths(x, edges), np.zeros(len(edges)))
     step = step_of(x, v, np.zeros(len(x)), dt, mu)
@@ -169,7 +169,7 @@ def edge_edge(
 
 
 def column(n: int) -> ContactRows:
-    """``n`` nodes one behind the other along x, each in touch with the next one."""
+    """Returns ``n`` nodes in a row along x, each in touch with the next one."""
     nodes = np.column_stack([np.arange(1, n), np.arange(n - 1), np.arange(n - 1), np.arange(n - 1)]).astype(np.int32)
     weights, normals = np.tile([1.0, -1.0, 0.0, 0.0], (n - 1, 1)), np.tile([1.0, 0.0, 0.0], (n - 1, 1))
     none = np.full(n - 1, -1, np.int32)
@@ -185,7 +185,7 @@ def unit(random: np.random.Generator, n: int) -> Floats:
 def network(
     seed: int, meetings: int = 30, nodes: int = 25, friction: float = 0.0, wanted: float = 0.0, one_normal: bool = False
 ) -> tuple[ContactRows, Floats, Floats]:
-    """Random meetings that share nodes, of nodes with faces and of edges; velocities, and masses of 1000:1."""
+    """Returns random contacts that share nodes, of nodes with faces and of edges; velocities, and masses of 1000:1."""
     random = np.random.default_rng(seed)
     rows = np.array([random.choice(nodes, 4, replace=False) for _ in range(meetings)], np.int32).reshape(-1, 4)
     share, s, t = random.dirichlet(np.ones(3), meetings), random.uniform(size=meetings), random.uniform(size=meetings)
@@ -206,8 +206,8 @@ class Solver:
         self, met: ContactRows, v: Floats, mobility: Floats, scale: float = 2.0**40, active: ActiveSet | None = None,
         stops: Stops | None = None,
     ) -> None:  # fmt: skip
-        """``active``: of another step, to be used again; ``stops``: all nodes are at the origin,
-        the first is of part 0, the others of part 1.
+        """``active``: arrays of another step, to be used again; ``stops``: all nodes are at the origin, the first is
+        of part 0, the others of part 1.
         """
         self.met, self.v, self.scale, n = met, v.copy(), scale, len(v)
         self.unsettled = np.zeros(2, np.int64)
@@ -221,7 +221,7 @@ class Solver:
         self.begin(np.zeros((n, 3)))
 
     def begin(self, x: Floats) -> None:
-        """A step begins, with the nodes at ``x``."""
+        """Begins a step, with the nodes at ``x``."""
         self._surface_nodes.x, met = x, self.met
         rows = ActiveRows(met, np.arange(many(met), dtype=np.int32), n=many(met))
         alone = SharedSums([], SerialComm()).agree(rows, self._surface_nodes.local)
@@ -237,14 +237,14 @@ class Solver:
         return push
 
     def sweep(self, times: int = 1) -> Floats:
-        """The velocities after some plain sweeps."""
+        """Returns the velocities after ``many`` plain sweeps."""
         for _ in range(times):
             self.active.sweep(1)
             self._leave()
         return self.v
 
     def step(self, sweeps: int) -> Floats:
-        """The velocities after a step of so many sweeps, which have momentum."""
+        """Returns the velocities after a step of ``many`` sweeps with momentum."""
         self.active.sweep(sweeps)
         self._leave()
         return self.v
@@ -255,18 +255,18 @@ class Solver:
 
     @property
     def kept(self) -> Kept:
-        """What the contacts keep of the step; before it there was something else."""
+        """Returns the stored impulses of the step; the arrays had other values before."""
         kept = Kept(*np.full((2, many(self.met), 4), np.nan))
         self.active.store(kept)
         return kept
 
     def resume(self, kept: Kept, ratio: float = 1.0) -> None:
-        """Begins with ``ratio`` times what was ``kept``."""
+        """Warm start with ``ratio`` times the impulses ``kept``."""
         self.active.resume(kept, ratio)
         self._leave()
 
     def heat(self, v_old: Floats) -> float:
-        """Work of friction, J, of the contacts that were pushed from the velocities ``v_old``."""
+        """Returns the work of friction, J, of the contacts with an impulse, from the velocities ``v_old``."""
         friction = Tally(np.ones(2))
         self.active.heat(friction, v_old)
         return float(friction.total(SerialComm())[0])

@@ -1,6 +1,5 @@
-"""Several ranks in one process: a thread each, and a communicator that keeps what the worker's protocol promises.
-
-A rank that fails wakes all others, so that a test ends with the first error instead of waiting for it.
+"""Several ranks in one process: a thread each, with a communicator that implements the protocol of the worker. A
+rank that fails wakes all others, so that a test ends with the first error instead of a timeout.
 """
 
 import threading
@@ -19,11 +18,11 @@ Floats = npt.NDArray[np.float64]
 T = TypeVar("T")
 _TRADE_TAG = 91
 _PATIENCE = 60.0
-"""s; a rank that waits longer for another than this has been forgotten by it."""
+"""Timeout, s, of a rank that waits for another one."""
 
 
 class World:
-    """What the ranks share."""
+    """State that the ranks share."""
 
     def __init__(self, size: int) -> None:
         self.size = size
@@ -34,17 +33,17 @@ class World:
 
     @property
     def unread(self) -> list[tuple[int, int, int]]:
-        """Source, target and tag of what still lies there."""
+        """Source, target and tag of the messages that were not received."""
         return [name for name, box in self._mail.items() if not box.empty()]
 
     def box(self, source: int, target: int, tag: int) -> SimpleQueue[Ints]:
-        """Where messages lie; the same for both, whoever asks first."""
+        """Returns the place of messages; the same object for both ranks."""
         with self._lock:
             return self._mail.setdefault((source, target, tag), SimpleQueue())
 
 
 class ThreadComm:
-    """One rank of a world."""
+    """Communicator of one rank."""
 
     def __init__(self, world: World, rank: int) -> None:
         self._world = world
@@ -128,14 +127,14 @@ class ThreadComm:
 
 
 class Finished:
-    """A communication that is over."""
+    """Request of a finished communication."""
 
     def finish(self) -> None:
         pass
 
 
 class Mail:
-    """Messages of fixed partners and buffers, as often as wanted; a message of the wrong length is an error."""
+    """Persistent messages of fixed partners and buffers; a message of the wrong length is an error."""
 
     def __init__(
         self, world: World, comm: ThreadComm, sends: list[tuple[int, Ints]], receives: list[tuple[int, Ints]], tag: int
@@ -160,7 +159,7 @@ class Mail:
 
 
 def on_ranks(size: int, work: Callable[[ThreadComm], T]) -> list[T]:
-    """What ``work`` returns on each of ``size`` ranks, which have to fetch all that is sent to them."""
+    """Returns the result of ``work`` on each of ``size`` ranks, which have to receive all messages sent to them."""
     world = World(size)
 
     def one(rank: int) -> T:
@@ -175,5 +174,5 @@ def on_ranks(size: int, work: Callable[[ThreadComm], T]) -> list[T]:
     errors = [error for error in (future.exception() for future in futures) if error is not None]
     for error in sorted(errors, key=lambda error: isinstance(error, threading.BrokenBarrierError)):
         raise error
-    assert not world.unread, "messages that nobody has waited for"
+    assert not world.unread, "messages that no rank has received"
     return [future.result() for future in futures]

@@ -1,12 +1,12 @@
-"""One tet of 1 m, the shard of which the tests of candidate pairs make clouds."""
+"""One tet of 1 m, of which the tests of candidate pairs make clouds."""
 
 import numpy as np
 
 CORNERS = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
 FACES = np.array([[0, 2, 1, 3], [0, 1, 3, 2], [1, 2, 3, 0], [0, 3, 2, 1]])
-"""(4, 4) counter-clockwise seen from outside, the node opposite last."""
+"""(4, 4) corners, counter-clockwise seen from outside, the opposite node last."""
 EDGES = np.array([
     [0, 1, 2, 3, 3, 2], [0, 2, 3, 1, 1, 3], [0, 3, 1, 2, 2, 1],
     [1, 2, 0, 3, 3, 0], [1, 3, 2, 0, 0, 2], [2, 3, 0, 1, 1, 0],
 ])  # fmt: skip
-"""(6, 6) ends, the third nodes of the two faces, and those opposite."""
+"""(6, 6) ends, the third nodes of the two faces, and the opposite ones."""

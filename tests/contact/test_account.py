@@ -1,4 +1,4 @@
-"""Contact gives back no more energy than it has taken, whatever the step."""
+"""Contact gives back no more energy than it has taken, for any step."""
 
 from pathlib import Path
 
@@ -22,12 +22,13 @@ from .ranks import on_ranks
 SPHERES = (
     "run.frames=0", "run.end_time=27e-6", "parts[0].mesh.element_size=0.2e-3", "parts[1].mesh.element_size=0.2e-3"
 )  # fmt: skip
-"""Hertz's spheres, elastic and without viscosity, on a coarse mesh, to where they turn round."""
+"""Hertz's spheres, elastic and without viscosity, on a coarse mesh, to the turning point."""
 
 
 @pytest.mark.parametrize("safety", [1.0, 0.9, 0.5])
 def test_spheres_that_meet_get_no_energy_from_contact(safety: float) -> None:
-    """Nodes sank in under a small force and were pushed out under a large one: 9e-4 of the energy came from nothing."""
+    """Before the account, nodes sank in under a small force and were pushed out under a large one, which added 9e-4
+    of the energy."""
     data = apply_overrides(read_data(shipped_path("hertz_spheres")), [*SPHERES, f"numerics.dt_safety={safety}"])
     sim, lines = simulation.build(parse_case(data), Path(), SerialComm()), list[float]()
 
@@ -43,9 +44,9 @@ def test_spheres_that_meet_get_no_energy_from_contact(safety: float) -> None:
 
 @pytest.mark.parametrize("mu", [0.1, 0.8])
 def test_the_ledger_has_the_same_half_of_friction_and_of_the_normal_impulse(mu: float) -> None:
-    """A block that slides over another and is pressed on it. The line of the first moment has the half of the first
-    impulses that is done with the initial velocities: friction to contact as mu times the speed of sliding to that of
-    closing. When the second half of the last impulses is booked, all is done.
+    """A block slides over another one and is pressed on it. The line of the first time has half of the work of the
+    first impulses, with the initial velocities: friction to contact as mu times the sliding speed to the closing
+    speed. After the second half of the last impulses all work is booked.
     """
     size, sliding, closing = 1e-3, 15.0, 5.0
     low, high = block((4, 4, 2), size, seed=1), block((3, 3, 2), size, seed=2)
@@ -64,7 +65,7 @@ def test_the_ledger_has_the_same_half_of_friction_and_of_the_normal_impulse(mu: 
 
 
 def test_contact_that_makes_energy_ends_the_run() -> None:
-    """More of it than run.made_limit, over what came in."""
+    """The energy from contact is above run.made_limit, relative to the incoming energy."""
     low, high = block((2, 2, 2), 1e-3), block((2, 2, 2), 1e-3)
     case = meeting_of([{}, {"velocity": (0.0, 0.0, -5.0)}], {}, end=1e-7)
     sim = build(case, [low, moved(high, (0.0, 0.0, 2.1e-3))])
@@ -86,7 +87,7 @@ def test_contact_that_makes_energy_ends_the_run() -> None:
 
 
 def test_the_cost_of_an_impulse_is_the_work_between_two_half_steps() -> None:
-    """Nodes of 1 and 3 kg and two without a weight; the second contact is not pushed."""
+    """Nodes of 1 and 3 kg and two without weight; the second contact has no impulse."""
     before, v = np.zeros((4, 3)), np.zeros((4, 3))
     before[:2, 0], v[:2, 0] = (2.0, -1.0), (-1.0, 0.0)
     loaded, active, account = Loaded.of(2, 1), ActiveNodes.of(4), Account(1.0)
@@ -102,12 +103,12 @@ def test_the_cost_of_an_impulse_is_the_work_between_two_half_steps() -> None:
 
 
 def booked(account: Account, taken: float, early: float = 0.0) -> None:
-    """A step in which contact has taken so much, J."""
+    """Returns the decision of a step in which contact has taken ``taken``, J."""
     account.words[0] += np.rint(np.array([taken, early]) * account.scale).astype(np.int64)
 
 
-def test_what_has_not_been_taken_is_not_given_back() -> None:
-    """Only while there is twice the most that a step has given back so far."""
+def test_contact_gives_back_no_energy_that_it_has_not_taken() -> None:
+    """Only while the balance is at least twice the largest energy given back in one step."""
     account = Account(1.0)
     assert account.settle(account.words)
     for taken, early, may in (
@@ -118,7 +119,7 @@ def test_what_has_not_been_taken_is_not_given_back() -> None:
 
 
 @pytest.mark.parametrize("ranks", [2, 3])
-def test_all_ranks_decide_alike_and_a_run_that_goes_on_as_before(ranks: int) -> None:
+def test_all_ranks_and_a_restarted_run_decide_alike(ranks: int) -> None:
     def decide(comm: Comm) -> tuple[bool, bool, float]:
         account = Account(1.0)
         booked(account, 1.0 if comm.rank == 0 else -0.03125)

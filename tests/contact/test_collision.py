@@ -1,4 +1,4 @@
-"""Bodies that collide: momentum, energy, and one answer whatever the search, the cut or the frame."""
+"""Bodies that collide: momentum, energy, and one answer for any search, cut and frame of reference."""
 
 import math
 from collections.abc import Callable
@@ -29,7 +29,7 @@ MESHES = [
     block((3, 3, 3), SIZE, seed=1),
     moved(block((2, 3, 2), 1.2 * SIZE, seed=2), (3.89 * SIZE, 0.4 * SIZE, 0.6 * SIZE), rotation((1, 2, 3), 0.5)),
 ]
-"""Two blocks that do not match, the second one turned, a corner of it nearly on the face of the first."""
+"""Two blocks whose meshes do not match, the second one turned, a corner of it nearly on the face of the first."""
 MOTIONS: list[dict[str, Any]] = [
     {"velocity": (60.0, 5.0, 0.0), "spin": {"centre": (1.5 * SIZE,) * 3, "rate": (3e3, 0.0, 1e4)}},
     {"velocity": (-70.0, 0.0, 10.0)},
@@ -42,7 +42,7 @@ def case_of(**contact: Any) -> schema.Case:
 
 
 def state_of(sim: Simulation) -> tuple[str | None, int]:
-    """The digest, and how often there was a search."""
+    """Returns the digest, and the number of searches."""
     assert sim.contact is not None
     return digest(sim.model, sim.comm, []), sim.contact.searches.many
 
@@ -52,7 +52,7 @@ def answer(case: schema.Case, watch: Watch | None = None) -> tuple[str | None, i
 
 
 def momenta(sim: Simulation) -> tuple[Floats, Floats]:
-    """Linear and angular, correctly rounded sums; x(n) x m v(n+1/2) is what the leapfrog keeps."""
+    """Linear and angular, correctly rounded sums; the leapfrog conserves x(n) x m v(n+1/2)."""
     nodes = sim.model.nodes
     p = nodes.mass[:, None] * nodes.v
     columns = np.column_stack([p, np.cross(nodes.x, p)])
@@ -62,7 +62,8 @@ def momenta(sim: Simulation) -> tuple[Floats, Floats]:
 
 @pytest.mark.parametrize("friction", [0.0, 0.3])
 def test_a_collision_keeps_the_momentum(friction: float) -> None:
-    """Linear to round-off; angular up to the gap over which impulses act, which is no lever along the normal."""
+    """Linear momentum to round-off; angular momentum up to the moment of the gaps over which impulses act, which is
+    zero along the normal."""
     sim = build(case_of(friction=friction), MESHES)
     assert sim.contact is not None
     linear, angular = momenta(sim)
@@ -100,7 +101,7 @@ BOUNDARIES: dict[str, Any] = {
 @pytest.mark.parametrize("friction", [0.0, 0.2])
 @pytest.mark.parametrize("kind", BOUNDARIES)
 def test_the_ledger_closes_where_boundaries_hold_what_contact_pushes(kind: str, friction: float) -> None:
-    """What holds a node takes the impulse; a node on a symmetry plane stays there, to the bit."""
+    """The supports of held nodes take the impulse; a node on a symmetry plane stays there, to the bit."""
     motions: list[dict[str, Any]] = [{"velocity": (50.0, 0.0, 0.0)}, {}]
     sim = build(meeting_of(motions, {"friction": friction}, end=3e-6, boundaries=BOUNDARIES[kind]), FLAT)
     lines: list[Energy] = []
@@ -126,8 +127,8 @@ def test_equal_runs_have_equal_digests() -> None:
     assert answer(case_of(friction=0.3)) == answer(case_of(friction=0.3))
 
 
-def test_a_search_in_every_step_finds_no_more_than_one_now_and_then() -> None:
-    """To the bit: the list of candidates never lacks a pair until the next search."""
+def test_a_search_in_every_step_changes_no_bit() -> None:
+    """To the bit: the candidate list lacks no pair until the next search."""
 
     def search(sim: Simulation, before: Floats) -> None:
         assert sim.contact is not None
@@ -138,7 +139,7 @@ def test_a_search_in_every_step_finds_no_more_than_one_now_and_then() -> None:
     assert often[1] > 5 * seldom[1]
 
 
-def test_a_search_that_is_due_in_the_end_does_no_harm() -> None:
+def test_a_search_at_the_end_of_a_run_changes_no_bit() -> None:
     def search(sim: Simulation, before: Floats) -> None:
         assert sim.contact is not None
         sim.contact.searches.due = sim.clock.t + 1.5 * sim.clock.dt > END
@@ -152,7 +153,7 @@ def test_the_skin_changes_no_bit(skin: float) -> None:
 
 
 def on_threads(ranks: int, case: schema.Case, work: Callable[[Simulation], Any], meshes: list[TetMesh]) -> list[Any]:
-    """What ``work`` makes of the simulation on each of some ranks."""
+    """Returns the result of ``work`` on each of some ranks."""
     ready = iter(meshes)
 
     def one(comm: Comm) -> Any:
@@ -168,7 +169,8 @@ def on_threads(ranks: int, case: schema.Case, work: Callable[[Simulation], Any],
 @pytest.mark.parametrize("kind", ["arbitrary", "box"])
 @pytest.mark.parametrize("ranks", [2, 3, 5])
 def test_any_number_of_ranks_gives_the_same_bits(ranks: int, kind: str) -> None:
-    """With friction and edges, whichever faces the ranks send each other. They search together, one rank less often."""
+    """With friction and edges, for any faces that the ranks send each other. All search together; one rank searches
+    less often."""
     whole = answer(case_of(friction=0.3))
     case = case_of(friction=0.3, domain=kind)
     parts = on_threads(ranks, case, lambda sim: state_of(run(sim)), MESHES)
@@ -205,8 +207,8 @@ def test_bodies_that_never_meet_move_as_if_there_were_no_contact() -> None:
     assert digest(one.model, SerialComm(), []) == digest(two.model, SerialComm(), [])
 
 
-def test_a_collision_in_flight_is_that_at_rest() -> None:
-    """Seen by somebody who flies along, but for the round-off of positions."""
+def test_a_common_velocity_does_not_change_a_collision() -> None:
+    """A common velocity changes nothing, except the round-off of positions."""
     results = []
     drift = np.array([200.0, -300.0, 100.0])
     for flight in (0.0 * drift, drift):
@@ -217,7 +219,7 @@ def test_a_collision_in_flight_is_that_at_rest() -> None:
 
 
 def crossed(edges: bool) -> float:
-    """Mean velocity along z, m/s, of the upper of two bars that meet with an edge each, crosswise, 1e-5 s later."""
+    """Mean velocity along z, m/s, of the upper of two bars that collide with an edge each, crosswise, 1e-5 s later."""
     bar = block((6, 2, 2), SIZE, 0.0)
     meshes = [moved(bar, (0.0, 0.0, 0.0), rotation((1, 0, 0), np.pi / 4))]
     turn = rotation((0, 0, 1), np.pi / 2) @ rotation((1, 0, 0), np.pi / 4)
@@ -241,7 +243,7 @@ THIN = tuple({"kind": "symmetry", "axis": "z", "at": at} for at in (0.0, SIZE))
 
 @pytest.mark.parametrize("ranks", [1, 3])
 def test_bodies_one_tet_thick_between_two_symmetry_planes_do_not_pass_each_other(ranks: int) -> None:
-    """At 20 m/s each they meet after 0.25 us; 8 us later they would overlap by 0.3 mm."""
+    """At 20 m/s each they are in contact after 0.25 us; 8 us later they would overlap by 0.3 mm."""
     case = meeting_of([{"velocity": (20.0, 0.0, 0.0)}, {"velocity": (-20.0, 0.0, 0.0)}], end=8e-6, boundaries=THIN)
 
     def ended(sim: Simulation) -> tuple[float, float, str | None]:
@@ -271,7 +273,7 @@ def test_only_a_face_in_one_symmetry_plane_is_no_surface() -> None:
 
 @pytest.mark.parametrize(("parts", "named"), [(("body1",), "body1"), ((), "body0")])
 def test_a_part_whose_faces_all_lie_on_symmetry_planes_is_named(parts: tuple[str, ...], named: str) -> None:
-    """Also where no part has a face at all."""
+    """Also when no part has a face at all."""
     cube = block((2, 2, 2), SIZE, shake=0.0)
     planes = tuple(
         schema.Symmetry(kind="symmetry", axis=axis, at=at, parts=parts)
@@ -284,15 +286,15 @@ def test_a_part_whose_faces_all_lie_on_symmetry_planes_is_named(parts: tuple[str
 
 
 def collided(share: float) -> tuple[Simulation, list[Energy], Floats]:
-    """Two blocks that do not match run into each other; ledgers and drift of the momentum."""
+    """Two blocks that do not match collide; returns ledgers and drift of the momentum."""
     sim, lines = build(case_of(restitution=share), MESHES), []
     start = np.concatenate(momenta(sim))
     run(sim, lambda sim, before: lines.append(sim.ledger.close(before)))
     return sim, lines, np.concatenate(momenta(sim)) - start
 
 
-def test_an_impact_of_bodies_from_which_all_comes_back_takes_nothing() -> None:
-    """Many nodes and edges at once; momentum stays, and the books close."""
+def test_an_impact_with_restitution_1_takes_no_energy() -> None:
+    """Many nodes and edges at once; momentum is conserved, and the energy balance closes."""
     taken = []
     for share in (0.0, 0.5, 1.0):
         sim, lines, drift = collided(share)
@@ -331,7 +333,7 @@ def test_the_force_of_contact_is_what_changes_the_momentum(gap: float) -> None:
 
 
 def _momenta_of_parts(sim: Simulation) -> Floats:
-    """(6,) of v(n+1/2), of body0 and body1, kg m/s."""
+    """(6,) momentum from v(n+1/2), of body0 and body1, kg m/s."""
     nodes = sim.model.nodes
     p = nodes.mass[:, None] * nodes.v
     return np.array([math.fsum(column) for part in range(2) for column in p[nodes.part == part].T])
@@ -347,7 +349,7 @@ def test_the_answer_with_restitution_is_the_same_on_three_ranks() -> None:
 
 @pytest.mark.parametrize(("gap", "restitution"), [(0.0, 0.0), (0.1, 0.0), (0.1, 1.0), (2.5, 0.0), (2.5, 1.0)])
 def test_the_step_in_which_fast_bodies_meet_first_is_short(gap: float, restitution: float) -> None:
-    """At 10 km/s, from a ``gap`` of so many edges: what contact gives to a node moves it by half of a tet at most."""
+    """At 10 km/s, from a ``gap`` of so many edges: the impulse of contact moves a node by half of a tet at most."""
     striker = moved(block((2, 2, 2), SIZE, seed=2), ((3.0 + gap) * SIZE, 0.4 * SIZE, 0.6 * SIZE))
     case = meeting_of([{}, {"velocity": (-1e4, 0.0, 0.0)}], {"restitution": restitution}, end=1e-6)
     sim = build(case, [block((3, 3, 3), SIZE, seed=1), striker])

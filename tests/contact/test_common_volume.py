@@ -1,4 +1,4 @@
-"""Volume that bodies or fragments have in common is found, whether a node is inside of another or not."""
+"""The common volume of bodies or fragments is measured, whether a node is inside of another body or not."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ REGULAR = np.array([[1.0, 1.0, 1.0], [-1.0, 1.0, -1.0], [1.0, -1.0, -1.0], [-1.0
 
 
 def common(one: Floats, other: Floats) -> float:
-    """Over the volume of the first."""
+    """Common volume over the volume of the first tet."""
     rooms = np.empty((2, 81, 4, 3))
     whole = float(np.linalg.det(one[1:] - one[:1]))
     return float(intersection(rooms[0], rooms[1], np.ascontiguousarray(one), np.ascontiguousarray(other))) / whole
@@ -39,7 +39,7 @@ def common(one: Floats, other: Floats) -> float:
     ],
 )
 def test_what_two_tets_have_in_common(one: Floats, other: Floats, share: float | None) -> None:
-    """None: counted by points on a fine grid. No node of either needs to be in the other."""
+    """Without an expected value: counted by points on a fine grid. No node of either needs to be in the other."""
     both = (
         common(one, other),
         common(other, one) * np.linalg.det(other[1:] - other[:1]) / np.linalg.det(one[1:] - one[:1]),
@@ -51,7 +51,7 @@ def test_what_two_tets_have_in_common(one: Floats, other: Floats, share: float |
 
 
 def sampled(one: Floats, other: Floats) -> float:
-    """The same by points of a grid."""
+    """The same value from points of a grid."""
     low, high, n = other.min(axis=0), other.max(axis=0), 120
     low, high = np.maximum(low, one.min(axis=0)), np.minimum(high, one.max(axis=0))
     axes = [a + (np.arange(n) + 0.5) / n * (b - a) for a, b in zip(low, high, strict=True)]
@@ -71,7 +71,7 @@ def test_random_tets_by_points_of_a_grid() -> None:
 
 
 def turned(tet: Floats) -> Floats:
-    """Not inside out."""
+    """Corners of a tet that is not inverted."""
     return tet if np.linalg.det(tet[1:] - tet[:1]) > 0.0 else tet[[0, 2, 1, 3]]
 
 
@@ -80,7 +80,7 @@ LOWER, UPPER = block((4, 4, 4), 1e-3, shake=0.0), moved(block((2, 2, 2), 1e-3, s
 
 
 def sunk(sim: Simulation, depth: float) -> CommonVolume:
-    """Of a block of 2 x 2 mm that has come ``depth``, m, into the top of one of 4 x 4 mm."""
+    """Result for a block of 2 x 2 mm that has sunk ``depth``, m, into the top of one of 4 x 4 mm."""
     sim.model.nodes.x[sim.model.nodes.part == 1, 2] -= 0.5e-3 + depth
     return seen(sim)
 
@@ -92,7 +92,7 @@ def seen(sim: Simulation) -> CommonVolume:
 
 @pytest.mark.parametrize("depth", [-0.1e-3, 0.0, 0.02e-3, 0.3e-3, 0.9e-3])
 def test_a_block_that_has_sunk_into_another(depth: float) -> None:
-    """All is in tets that have a corner on the surface, of either: the volume counts twice."""
+    """All of it is in tets with a corner on the surface, of either block: the volume counts twice."""
     found, deep = sunk(build(CASE, [LOWER, UPPER]), depth), max(depth, 0.0)
     whole = 4.0**3 - core() + 8.0
     assert found.share * whole == pytest.approx(2 * 4.0 * deep / 1e-3, rel=1e-6)
@@ -101,7 +101,7 @@ def test_a_block_that_has_sunk_into_another(depth: float) -> None:
 
 
 def core() -> float:
-    """Volume of the tets of the larger block that have no corner on its surface, mm^3."""
+    """Volume of the tets of the larger block without a corner on its surface, mm^3."""
     outer = np.any((LOWER.points < 1e-9) | (LOWER.points > 4e-3 - 1e-9), axis=1)
     return float((~np.asarray(outer)[LOWER.tets].any(axis=1)).sum()) / 6.0
 
@@ -125,7 +125,7 @@ def test_bars_that_cross_without_a_node_inside() -> None:
 
 
 def test_loose_tets_of_one_part_that_meets_itself() -> None:
-    """Nothing breaks there and no fragments are known: what has no node in common is apart."""
+    """Without fracture there are no fragments: tets without a common node count."""
     mesh = block((2, 1, 1), 1e-3, shake=0.0)
     loose = TetMesh(mesh.points[mesh.tets].reshape(-1, 3), np.arange(4 * len(mesh.tets), dtype=np.int32).reshape(-1, 4))
     centres = np.repeat(loose.points.reshape(-1, 4, 3).mean(axis=1), 4, axis=0)

@@ -1,4 +1,4 @@
-"""Cracks and families: tables that change by what has happened, not by what there is."""
+"""Cracks and families: updates of their tables."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ from conoid.worker.model.topology import Split
 
 
 def cracks_of(n: int) -> Cracks:
-    """``n`` cracks whose columns all tell which one it is; no side is here."""
+    """Returns ``n`` cracks, each with its number in all columns, with no side on this rank."""
     number = np.arange(n)
     found = Cracks.none(np.arange(0))
     tets, nodes = np.column_stack([2 * number, 2 * number + 1]), np.repeat(number[:, None], 3, axis=1)
@@ -43,9 +43,9 @@ def test_a_crack_that_comes_after_others_have_opened_stands_behind_those_that_ar
     assert cracks.places[3].tolist() == [-1] * 6
 
 
-def test_who_gets_both_sides_of_a_crack_has_what_the_first_side_has() -> None:
-    """Ranks that have had a side each begin with different nodes, and the last bit of a normal depends on that; and the
-    one with the first side has computed the crack."""
+def test_a_rank_with_both_sides_of_a_crack_has_the_row_of_the_first() -> None:
+    """Ranks with one side each begin with different nodes, on which the last bit of a normal depends; and the rank
+    of the first side has computed the crack."""
     ids, places, zeros = np.array([10, 11, 12]), np.zeros(3, np.int32), np.zeros((3, 3))
     none, force = np.zeros(3), zeros.astype(np.int64)
     nodes = Nodes(ids, places, places, np.ones(3, bool), zeros, zeros, zeros, none, force, none)
@@ -80,7 +80,7 @@ def test_every_copy_has_the_candidates_of_its_parent() -> None:
     assert sorted(inherited(family, first, following, pairs).tolist()) == [[4, 7], [4, 9], [5, 7], [5, 9]]
 
 
-def test_a_family_tells_where_the_copies_of_a_node_begin_and_end() -> None:
+def test_a_family_has_the_first_and_the_last_copy_of_a_node() -> None:
     family = Family(*families(np.array([[3, 6], [3, 7], [-1, 5], [4, -1], [1, 8]], np.int32), 9))
     assert family.first.tolist() == [-1, 2, -1, 0, -1, -1, -1, -1, -1]
     assert family.member.tolist() == [[6, 0], [7, 1], [8, 1]]
@@ -93,7 +93,7 @@ def test_a_family_tells_where_the_copies_of_a_node_begin_and_end() -> None:
 def test_edges_that_had_both_ends_in_common_are_a_pair_once_they_have_none(
     second: tuple[int, int], now: tuple[int, int]
 ) -> None:
-    """Whatever way either runs: it was two pairs where they ran against each other."""
+    """Edges of any direction: once there were two pairs if they were opposite."""
     family = Family(*families(np.array([[0, 3], [1, 4]], np.int32), 6))
     old = np.array([[0, 1, 2, 5], [*second, 2, 5]], np.int32)
     after = np.array([[0, 1, 2, 5], [*now, 2, 5]], np.int32)

@@ -1,4 +1,5 @@
-"""The contact domain: whatever touches another rank's boxes is sent; cells send no more than bounding boxes do."""
+"""The contact domain: everything that touches another rank's boxes is sent; cells send no more than bounding boxes
+do."""
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ KINDS = ("box", "arbitrary")
 
 
 class Share:
-    """Boxes of one rank: of its nodes and edges, of its faces, of its edges; some ranks may have none of a kind."""
+    """Boxes of one rank: of its nodes and edges, of its faces, of its edges; some ranks have none of a kind."""
 
     def __init__(self, rank: int, seed: int, ranks: int) -> None:
         random = np.random.default_rng([seed, rank])
@@ -39,7 +40,7 @@ def chosen(kind: str, shares: list[Share], edge: float) -> list[dict[int, list[F
 
 
 def touched(things: Boxes, askers: Boxes) -> Flags:
-    """(things,) which of them touch a box of the askers', by looking at all pairs."""
+    """(things,) which of them touch a box of the askers', by comparing all pairs."""
     low, high = askers.low[None], askers.high[None]
     touch = np.asarray(((things.low[:, None] <= high) & (things.high[:, None] >= low)).all(axis=2))
     return np.asarray(touch.any(axis=1))
@@ -78,7 +79,7 @@ def test_cells_choose_no_more_than_boxes_and_less_in_all(edge: float) -> None:
     assert counts["arbitrary"] < 0.9 * counts["box"]
 
 
-def test_a_rank_that_needs_nothing_is_not_named() -> None:
+def test_a_rank_that_needs_no_ghosts_is_left_out() -> None:
     shares = [Share(0, 1, 1), Share(1, 1, 1)]
     for boxes in (shares[1].askers, shares[1].faces, shares[1].edges):
         boxes.low += 100.0
@@ -88,7 +89,7 @@ def test_a_rank_that_needs_nothing_is_not_named() -> None:
 
 
 def faces_received(kind: str, drift: float, ranks: int = 3) -> int:
-    """Faces that all ranks have from others for two blocks that approach at 10 m/s, and drift in x, y and z, m/s."""
+    """Number of ghost faces of all ranks for two blocks that approach at 10 m/s, and drift in x, y and z, m/s."""
     meshes = [
         block((4, 4, 4), 1e-3),
         moved(block((3, 3, 3), 1e-3), (1e-3, 1e-3, 4.5e-3), rotation((1, 2, 0), 0.2)),
@@ -112,5 +113,5 @@ def faces_received(kind: str, drift: float, ranks: int = 3) -> int:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_flying_together_sends_no_more_than_standing_still(kind: str) -> None:
+def test_a_common_velocity_sends_no_more_ghosts(kind: str) -> None:
     assert faces_received(kind, 1000.0) == faces_received(kind, 0.0)

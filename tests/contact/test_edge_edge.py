@@ -1,4 +1,4 @@
-"""Edges and edges: who meets in the step ahead, and that convex bodies which come to overlap always meet."""
+"""Contacts of edges in the step ahead; convex bodies that come to overlap always have one."""
 
 import numpy as np
 import pytest
@@ -13,12 +13,12 @@ from .kernels import edge_edge, every_pair, lowest_heights, many, node_face
 ONE = np.array([[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, -1.0], [0.0, -1.0, -1.0]])
 """An edge along x on the back of a body: its two ends, the third nodes of its two faces."""
 EDGES = np.array([[0, 1, 2, 3, 3, 2], [4, 5, 6, 7, 7, 6]], np.int32)
-"""Of two tets."""
+"""Opposite nodes of two tets."""
 PAIR = np.array([[0, 1]], np.int32)
 
 
 def turned(angle: float, width: float = 1.0) -> Floats:
-    """``ONE`` turned upside down, at an angle about z; faces of slope 1 / ``width``."""
+    """``ONE`` upside down, at an angle about z; faces of slope 1 / ``width``."""
     other = ONE * np.array([1.0, width, 1.0])
     return np.asarray(other @ rotation((1, 0, 0), np.pi).T @ rotation((0, 0, 1), angle).T)
 
@@ -76,16 +76,16 @@ def test_edges_that_cross_beyond_an_end_do_not_meet() -> None:
 
 
 def crossings(ends: Floats) -> tuple[Floats, Floats]:
-    """Where edges of ``ends`` (..., 4, 3), two each, cross: as shares of the lengths of both, (...)."""
+    """Crossing points of edges of ``ends`` (..., 4, 3), two each, as shares of the lengths of both, (...)."""
     u, w, r = ends[..., 1, :] - ends[..., 0, :], ends[..., 3, :] - ends[..., 2, :], ends[..., 2, :] - ends[..., 0, :]
     uu, uw, ww, ur, wr = ((a * b).sum(axis=-1) for a, b in ((u, u), (u, w), (w, w), (u, r), (w, r)))
     return (ww * ur - uw * wr) / (uu * ww - uw * uw), (uw * ur - uu * wr) / (uu * ww - uw * uw)
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_edges_that_cross_beyond_an_end_do_so_while_ends_move_by_less_than_is_told(seed: int) -> None:
-    """Ends near each other, at any angle. The most that is told is not far from what is true: ends that move by 20
-    times as much let some of them cross between their ends.
+def test_edges_that_cross_beyond_an_end_do_so_while_ends_move_by_less_than_the_bound(seed: int) -> None:
+    """Ends near each other, at any angle. The bound is not far from the exact value: ends that move by 20 times as
+    much let some edges cross between their ends.
     """
     random = np.random.default_rng(seed)
     ends = random.normal(size=(400, 4, 3))
@@ -107,7 +107,7 @@ def test_edges_that_cross_beyond_an_end_do_so_while_ends_move_by_less_than_is_to
 
 
 def test_edges_meet_where_they_cross_not_where_they_end_the_step() -> None:
-    """The upper edge slides off sideways in the same step, after it has passed; or has come from there."""
+    """The upper edge slides off sideways in the same step, after it has passed; or comes from there."""
     x = np.concatenate([ONE, turned(np.pi / 2) + np.array([0.5, 0.0, 0.1])])
     for sideways, found in ((0.9, 1), (1.1, 0), (-1.0, 1)):
         v = np.concatenate([np.zeros((4, 3)), np.tile([sideways, 0.0, -0.2], (4, 1))])
@@ -124,7 +124,8 @@ def test_a_concave_edge_meets_nothing() -> None:
 
 @pytest.mark.parametrize(("tilt", "found"), [(0.0, 1), (0.7, 1), (0.85, 0), (-0.7, 1), (-0.85, 0), (np.pi, 0)])
 def test_an_edge_meets_only_what_comes_between_its_faces(tilt: float, found: int) -> None:
-    """The faces of the lower edge fall by 45 degrees: turned by more, one of them looks up, and nodes meet it."""
+    """The faces of the lower edge fall by 45 degrees: turned by more, one of them faces up, and has contacts with
+    nodes."""
     assert many(meets(tilt=tilt)) == found
 
 
@@ -142,7 +143,7 @@ def test_edges_meet_when_they_pass_or_are_near_and_not_too_deep(gap: float, spee
 
 @pytest.mark.parametrize(("gap", "found"), [(-0.95 * DEEP_SELF, 1), (-1.05 * DEEP_SELF, 0)])
 def test_edges_of_flat_tets_hold_to_a_share_of_their_length(gap: float, found: int) -> None:
-    """A tenth as high as the tets above, edges of 2 m."""
+    """Tets a tenth as high as those above, edges of 2 m."""
     flat = np.array([1.0, 1.0, 0.1])
     x = np.concatenate([ONE * flat, turned(np.pi / 2) * flat + np.array([0.0, 0.0, 2.0 * gap])])
     assert many(edge_edge(x, np.zeros((8, 3)), EDGES, PAIR, 1.0)) == found
@@ -167,7 +168,8 @@ def test_edges_between_two_tets_hold_to_a_quarter_of_the_lower_one(thick: float,
 
 @pytest.mark.parametrize("order", [1, -1])
 def test_the_opposite_edges_of_a_flat_tet_do_not_meet(order: int) -> None:
-    """They are as deep behind each other as it is thick; two such edges of two tets have passed each other."""
+    """The edges are behind each other by the thickness of the tet; two such edges of two tets have passed each
+    other."""
     flat = np.array([[-1.0, 0.0, 0.01], [1.0, 0.0, 0.01], [0.0, -1.0, -0.01], [0.0, 1.0, -0.01]])
     one, two = [0, 1, 3, 2, 2, 3], [2, 3, 1, 0, 0, 1]
     v = np.zeros((8, 3))
@@ -177,7 +179,7 @@ def test_the_opposite_edges_of_a_flat_tet_do_not_meet(order: int) -> None:
     assert many(edge_edge(np.concatenate([flat, flat]), v, apart, PAIR, 1.0)) == 1
 
 
-def test_what_is_wanted_ends_the_step_with_edges_that_touch() -> None:
+def test_the_target_velocity_ends_the_step_with_edges_that_touch() -> None:
     for gap, speed in ((0.1, -0.5), (-0.05, -0.5)):
         met = meets(gap=gap, speed=speed, angle=0.8)
         assert gap + 1.0 * met.wanted[0] == pytest.approx(0.9 * min(gap, 0.0), abs=1e-12)
@@ -188,7 +190,7 @@ _OUT = ((1, 2, 3, 0), (0, 3, 2, 1), (0, 1, 3, 2), (0, 2, 1, 3))
 
 
 def surface_of(tet: "np.ndarray") -> tuple[Indices, Indices]:
-    """Faces and edges, as the worker keeps them, of a positive tet of these nodes."""
+    """Faces and edges, in the form of the worker, of a positive tet of these nodes."""
     faces = np.array([[tet[k] for k in row] for row in _OUT], np.int32)
     edges = []
     for i in range(4):
@@ -212,7 +214,7 @@ RIDGES = np.concatenate([surface_of(tet)[1] for tet in TETS])
 
 
 def overlap(x: Floats, y: Floats) -> bool:
-    """Whether two tets (4, 3) have a point in common: no face and no two edges have a plane between them."""
+    """Whether two tets (4, 3) have a common point: no face and no two edges have a separating plane."""
     sides = [np.array([p[j] - p[i] for i in range(4) for j in range(i + 1, 4)]) for p in (x, y)]
     axes = [np.cross(p[[1, 0, 0, 0]] - p[[2, 3, 1, 2]], p[[3, 2, 3, 1]] - p[[2, 3, 1, 2]]) for p in (x, y)]
     axes.append(np.cross(sides[0][:, None], sides[1][None]).reshape(-1, 3))
@@ -222,7 +224,7 @@ def overlap(x: Floats, y: Floats) -> bool:
 
 
 def approach(random: np.random.Generator) -> tuple[Floats, Floats]:
-    """Two tets a little before they meet, and the way (3,) on which the second comes; it begins to overlap there."""
+    """Two tets a little before contact, and the motion (3,) of the second, in which they begin to overlap."""
     while True:
         pair = random.normal(size=(2, 4, 3))
         volumes = np.linalg.det(pair[:, 1:] - pair[:, :1])
@@ -243,7 +245,7 @@ def approach(random: np.random.Generator) -> tuple[Floats, Floats]:
 
 
 def meet(x: Floats, step: Floats) -> tuple[int, int]:
-    """Nodes that meet faces, edges that meet edges, when the second tet moves by ``step``."""
+    """Numbers of contacts of nodes and of edges when the second tet moves by ``step``."""
     v = np.concatenate([np.zeros((4, 3)), np.tile(step, (4, 1))])
     pairs = [every_pair(TETS[i], 4) + np.array([0, 4 * (1 - i)], np.int32) for i in (0, 1)]
     nodes = sum(many(node_face(x, v, FACES, p, 1.0, np.repeat([0, 1], 4))) for p in pairs)
@@ -251,16 +253,15 @@ def meet(x: Floats, step: Floats) -> tuple[int, int]:
 
 
 def lowest_altitude(x: Floats) -> float:
-    """Of the two tets, m."""
+    """Corners of the two tets, m."""
     return float(lowest_heights(x[TETS]).min())
 
 
 @pytest.mark.parametrize(("share", "late"), [(0.5, 3), (0.05, 0)])
 def test_convex_bodies_that_come_to_overlap_in_a_step_meet_in_it(share: float, late: int) -> None:
-    """Any tets, any way, steps of a share of the lowest altitude (half of it is the longest that contact allows).
-
-    Half of them begin with two edges alone. Edges are looked at where they are closest at the end of a step: a pair
-    in a thousand of the longest steps is found in the step after.
+    """Any tets, any direction, steps of a share of the lowest altitude (half of it is the longest that contact
+    allows). Half of the collisions begin with two edges alone. Edges that do not cross in a step are tested at its
+    end only: a pair in a thousand of the longest steps is found one step later.
     """
     random, alone, missed = np.random.default_rng(1), 0, 0
     for _ in range(200):

@@ -1,7 +1,8 @@
-"""Bodies that meet with one face each, equal or nearly: all their nodes come down on the border of the other's face.
+"""Bodies that collide with one face each, equal or nearly equal.
 
-None of them is ever inside of the other body where that grows narrower behind its face, so that nothing would be met
-any more once they have gone by; and edges cross there in the plane of both faces, on the limit of what they may meet.
+All nodes of one have their feet on the border of the other's face. None of them is ever inside of the other body if
+that becomes narrower behind its face, so contacts are not found later; and edges cross in the plane of both faces,
+at the limit of their contacts.
 """
 
 import numpy as np
@@ -14,10 +15,10 @@ from ..worker.meshes import Floats
 from .bodies import meeting_of
 
 MANY = 25
-"""Pairs, each on its own."""
+"""Number of pairs, each computed on its own."""
 APART, MM = 8.0, 1e-3
 CORNERS = np.array([[1.0, 0.0], [-0.5, 0.75**0.5], [-0.5, -(0.75**0.5)]])
-"""Of a face of circumradius 1."""
+"""Corners of a face of circumradius 1."""
 POINTS = np.random.default_rng(7).dirichlet([0.6] * 4, 200)
 """Area coordinates of points of a tet, many of them near its border."""
 
@@ -29,14 +30,14 @@ def turned(degrees: float) -> Floats:
 
 
 def tets(corners: list[Floats], heights: float) -> TetMesh:
-    """A tet on each of the faces (3, 3), mm, with its tip ``heights`` above their middle, or below."""
+    """A tet on each of the faces (3, 3), mm, with its tip ``heights`` above or below their middle."""
     points = np.concatenate([np.vstack([face, face.mean(axis=0) + np.array([0.0, 0.0, heights])]) for face in corners])
     rows = np.arange(len(points), dtype=np.int32).reshape(-1, 4)
     return TetMesh(MM * points, rows if heights > 0.0 else rows[:, [0, 2, 1, 3]])
 
 
 def common(one: Floats, two: Floats) -> float:
-    """The share of POINTS of a tet, corners (4, 3), that are inside of another one, by more than 0.01 of it."""
+    """Share of POINTS of a tet, corners (4, 3), that are inside of another one by more than 0.01 of it."""
     inside = np.linalg.solve((two[1:] - two[0]).T, (POINTS @ one - two[0]).T).T
     return float((np.column_stack([inside, 1.0 - inside.sum(axis=1)]).min(axis=1) > 0.01).mean())
 

@@ -1,7 +1,7 @@
-"""Bodies that pass along each other's free edges: flush, or nearer than a node is taken to be on a face.
+"""Bodies that pass each other's free edges: flush, or nearer than the tolerance of a node on a face.
 
-A node beside a convex edge is in front of one of the two faces there, and so not in the body, however little it is
-beyond the border of the other one.
+A node beside a convex edge is in front of one of its two faces, and so not in the body, however little it is beyond
+the border of the other face.
 """
 
 import numpy as np
@@ -26,7 +26,7 @@ def box(cells: tuple[int, int, int], size: float, low: tuple[float, float, float
 
 
 def passed(*meshes: TetMesh) -> Simulation:
-    """The first one has flown at the others along x, without friction."""
+    """The first body collides with the others along x, without friction."""
     motions = [{"velocity": (SPEED, 0.0, 0.0)}, *({} for _ in meshes[1:])]
     return run(build(meeting_of(motions, end=END), meshes))
 
@@ -60,14 +60,14 @@ def test_bars_fly_past_each_other_side_by_side() -> None:
 
 @pytest.mark.parametrize("depth", [0.0, 0.1, 1.0, 5.9])
 def test_what_is_lower_than_the_top_of_the_plate_meets_it(depth: float) -> None:
-    """Head-on with tops that are flush, and by less of the height, to a tenth of a millimetre."""
+    """Head-on with tops that are flush, and with a lower overlap, down to a tenth of a millimetre."""
     low = -6.0 + depth
     assert speed(passed(box((5, 5, 3), 2.0, (-4.0, -5.0, low)), PLATE)) < 0.9 * SPEED
 
 
 @pytest.mark.parametrize("above", [0.0, 0.001])
 def test_what_slides_on_a_floor_meets_the_wall_at_its_end(above: float) -> None:
-    """Of one body, concave: a node in front of the floor comes in through the wall."""
+    """Of one body, concave: a node in front of the floor enters through the wall."""
     whole = box((12, 6, 6), 2.0, (-6.0, -6.0, -6.0))
     middles = whole.points[whole.tets].mean(axis=1)
     tets = whole.tets[(middles[:, 0] > 8.0 * MM) | (middles[:, 2] < 0.0)]
@@ -91,9 +91,9 @@ def ridge(node: float) -> TetMesh:
 
 @pytest.mark.parametrize("node", [0.23, 0.26, 0.35, 0.44, 0.53])
 def test_a_leaning_ridge_slides_down_a_rim(node: float) -> None:
-    """A thin block is pressed against the ridge by its weight and gives way to it. Where the top of the block caught
-    a node of the ridge that came by some 1e-3 of a face behind the rim, 164, 9, 23 and 120 mJ came from outside
-    instead of 0.7; not at 0.26.
+    """A thin block is pressed against the ridge by its weight and yields to it. Where the top of the block caught a
+    node of the ridge some 1e-3 of a face behind the rim, the external work was 164, 9, 23 and 120 mJ instead of 0.7;
+    not at 0.26.
     """
     drive = {"kind": "velocity", "parts": ("body0",), "x": 0.0, "y": 0.0, "z": -20.0}
     held = {"kind": "symmetry", "axis": "z", "at": -0.25 * MM, "parts": ("body1",)}

@@ -1,4 +1,4 @@
-"""Ghosts: messages keep every bit, and all ranks that hold or push a node agree on who they are."""
+"""Ghosts: messages keep every bit, and all ranks that share a node with impulses have the same lists."""
 
 from collections import defaultdict
 from itertools import permutations
@@ -29,7 +29,7 @@ def random_nodes(random: np.random.Generator, n: int) -> SurfaceNodes:
 
 
 def same(one: SurfaceNodes, two: SurfaceNodes) -> bool:
-    """All but ``local``, bit by bit."""
+    """All columns except ``local``, bit by bit."""
     names = ("id", "owner", "part", "mobility", "x", "v")
     return all(
         getattr(one, name).dtype == getattr(two, name).dtype
@@ -113,8 +113,9 @@ def test_a_fetched_node_is_its_owners(ranks: int) -> None:
 
 @pytest.mark.parametrize("ranks", [1, 2, 3, 5, 8])
 @pytest.mark.parametrize("share", [0.0, 0.05, 0.5])
-def test_all_who_hold_or_push_a_node_see_the_same_lists(ranks: int, share: float) -> None:
-    """Of nodes that anybody pushes: its owner, its holders and its pushers, each pair of them with the same ids."""
+def test_all_ranks_of_a_node_have_the_same_lists(ranks: int, share: float) -> None:
+    """Nodes with a contact on any rank: the owner, the holders and the ranks with contacts, each pair of them with
+    the same ids."""
     models, neighbours = models_of(ranks)
     random = np.random.default_rng([ranks, int(100 * share)])
     owner = {int(i): int(o) for m in models for i, o in zip(m.nodes.id, m.nodes.owner, strict=True)}
@@ -171,7 +172,7 @@ def test_copies_follow_their_owners_whenever_they_are_refreshed(ranks: int) -> N
     on_ranks(ranks, work)
 
 
-def test_one_rank_has_no_company() -> None:
+def test_one_rank_shares_no_nodes() -> None:
     (model,), _ = models_of(1)
     ids = model.nodes.id[:5]
     assert ghosts.members(ids, np.zeros(5, np.int32), [], model.nodes, SerialComm()) == {}

@@ -1,4 +1,4 @@
-"""Nodes that contact has not held are found, with how deep they are."""
+"""Nodes inside of other bodies are found, with their depth."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ SIZE = 1e-3
 
 
 def sunk(depth: float) -> Simulation:
-    """A small block that has come ``depth``, m, into the top of a larger one, between four nodes there."""
+    """A small block that has sunk ``depth``, m, into the top of a larger one, between four nodes there."""
     lower, upper = block((4, 4, 4), SIZE, shake=0.0), block((2, 2, 2), 0.4 * SIZE, shake=0.0)
     case = meeting_of([{}, {}], end=2e-7)
     sim = build(case, [lower, moved(upper, (1.13 * SIZE, 1.08 * SIZE, 4.5 * SIZE))])
@@ -37,13 +37,13 @@ def test_what_is_apart_in_touch_or_hardly_deep_is_not_inside(depth: float) -> No
 
 @pytest.mark.parametrize("depth", [0.2 * SIZE, 0.3 * SIZE])
 def test_the_lower_nodes_of_a_block_are_as_deep_as_it_has_sunk(depth: float) -> None:
-    """Nine nodes; those in tets without a face on top count by their distance from the nearest face of the tet, which
-    may be slight.
+    """Nine nodes; those in tets without a face on top count by their distance from the nearest face of the tet,
+    which may be small.
     """
     sim = sunk(depth)
     found = seen(sim)
     assert sim.contact is not None
-    assert found.looked == 5**3 - 3**3 + 3**3 - 1
+    assert found.tested == 5**3 - 3**3 + 3**3 - 1
     assert 0 < found.nodes <= 9
     assert found.buried == 0
     assert found.deepest * sim.contact.exterior.size == pytest.approx(depth, rel=1e-9)
@@ -55,13 +55,13 @@ def test_what_has_gone_through_the_outermost_tets_is_buried() -> None:
     assert found.nodes > 9
     assert found.buried > 0
     [line] = found.warnings
-    assert line.startswith(f"contact has let {found.nodes} of {found.looked} nodes into other bodies")
+    assert line.startswith(f"{found.nodes} of {found.tested} nodes are inside of other bodies")
     assert f"{found.buried} of them through the outermost tets" in line
 
 
 @pytest.mark.parametrize(("depth", "buried"), [(0.025 * SIZE, False), (0.1 * SIZE, True)])
 def test_what_touches_a_surface_whose_tets_are_flat_is_not_inside(depth: float, buried: bool) -> None:
-    """The top layer of the larger block is a hundredth as thick as it was: the tets below it have no corner on the
+    """The top layer of the larger block is a hundredth as thick as before: the tets below it have no corner on the
     surface.
     """
     sim = sunk(depth)
@@ -72,8 +72,8 @@ def test_what_touches_a_surface_whose_tets_are_flat_is_not_inside(depth: float, 
     assert (seen(sim).nodes > 0) == buried
 
 
-def test_fragments_of_one_part_are_as_good_as_bodies() -> None:
-    """Two halves of a body that nothing holds together; and a body that is whole is inside of nothing."""
+def test_fragments_of_one_part_are_treated_as_bodies() -> None:
+    """Two separate halves of a body; and an unbroken body is inside of nothing."""
     sim = sunk(0.3 * SIZE)
     assert sim.contact is not None
     one = [np.zeros(b.n, np.int64) for b in sim.model.blocks]
@@ -90,8 +90,8 @@ def test_parts_that_do_not_meet_may_be_in_each_other() -> None:
 
 
 def test_nodes_on_faces_between_tets_are_inside() -> None:
-    """A cube that has sunk into its like: all nodes of either are on edges and faces of tets of the other, those in
-    the middle of the two faces and of the body in none but these.
+    """A cube that has sunk into an equal one: all nodes of either are on edges and faces of tets of the other, and
+    those in the middle of the two faces and of the body on these only.
     """
     cube = block((2, 2, 2), SIZE, shake=0.0)
     sim = build(meeting_of([{}, {}], end=2e-7), [cube, moved(cube, (0.0, 0.0, 2.0 * SIZE))])
@@ -103,7 +103,7 @@ def test_nodes_on_faces_between_tets_are_inside() -> None:
 
 
 def test_no_node_is_deeper_than_it_is_away_from_a_corner_on_the_surface() -> None:
-    """The only open face of a tet is far; beside its other corner the surface belongs to the neighbours."""
+    """The only open face of a tet is far; at its other corner the surface belongs to the neighbours."""
     corners = np.vstack([np.zeros(3), np.eye(3)])[None]
     opened, outer = np.array([[True, False, False, False]]), np.array([[False, True, True, True]])
     near = np.full((1, 3), 0.1)
@@ -113,7 +113,7 @@ def test_no_node_is_deeper_than_it_is_away_from_a_corner_on_the_surface() -> Non
 
 
 def test_how_far_points_are_from_triangles() -> None:
-    """Over the middle, beyond an edge, behind a corner, and of a triangle without an area."""
+    """Over the middle, beyond an edge, behind a corner, and of a triangle of zero area."""
     triangle = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
     points = np.array([[0.2, 0.2, -0.3], [0.5, -0.4, 0.3], [-3.0, 0.0, 4.0], [0.5, 0.0, 2.0]])
     corners = np.array([triangle, triangle, triangle, triangle[[0, 1, 1]]])

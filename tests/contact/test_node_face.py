@@ -1,4 +1,4 @@
-"""Nodes and faces: who meets in the step ahead, where, and what is asked of them."""
+"""Contacts of nodes and faces in the step ahead: which, where, and with which target velocity."""
 
 import numpy as np
 import pytest
@@ -36,7 +36,7 @@ def foot(x: Floats, corners: Floats) -> Floats:
 
 
 class Expected:
-    """One meeting in the words of the docstrings, or None of it."""
+    """One contact by the formulas of the docstrings, or None."""
 
     def __init__(self, x: Floats, v: Floats, s: int, face: "np.ndarray", size: float, own: bool, dt: float) -> None:
         three, then = face[:3], x + dt * v
@@ -71,8 +71,8 @@ def random_scene(seed: int, nodes: int = 40, faces: int = 12) -> tuple[Floats, F
 def expected(
     x: Floats, v: Floats, faces: Indices, part: "np.ndarray", tested: "np.ndarray", dt: float
 ) -> list[Expected]:
-    """Rows in order: by node, then by face; a node that is deep in several faces is held by the nearest of these, but
-    not by one of a part to whose front it is nearer."""
+    """Rows in order: by node, then by face; a node inside of several faces of a part has contact with the nearest of
+    these, and with none of a part to whose front it is nearer."""
     sizes, rows = face_sizes(x, faces), []
     for s in tested:
         mine = [Expected(x, v, s, f, sizes[i], part[s] == part[f[0]], dt) for i, f in enumerate(faces)]
@@ -98,7 +98,7 @@ def test_a_node_inside_of_two_parts_is_held_by_the_nearest_face_of_each() -> Non
 
 
 @pytest.mark.parametrize("dt", [1.0, 0.1, 1e-3])
-def test_meetings_are_those_of_the_formulas(dt: float) -> None:
+def test_contacts_are_those_of_the_formulas(dt: float) -> None:
     count = 0
     for seed in range(8):
         x, v, faces, part = random_scene(seed)
@@ -120,7 +120,7 @@ def test_meetings_are_those_of_the_formulas(dt: float) -> None:
 
 
 @pytest.mark.parametrize("gap", [0.3, 0.0, -0.05, -0.2])
-def test_what_is_wanted_ends_the_step_on_the_face_or_takes_back_a_tenth_of_the_depth(gap: float) -> None:
+def test_the_target_velocity_ends_the_step_on_the_face_or_corrects_a_tenth_of_the_depth(gap: float) -> None:
     x = np.concatenate([TRIANGLE, [[0.3, 0.25, gap]]])
     v = np.zeros_like(x)
     v[4] = 0.5, -0.2, -7.0
@@ -133,7 +133,7 @@ def test_what_is_wanted_ends_the_step_on_the_face_or_takes_back_a_tenth_of_the_d
 
 
 def met_from(start: Floats, speed: Floats, dt: float = 1.0, own: bool = False, below: float = -1.0) -> ContactRows:
-    """Meetings of one node with the triangle, whose tet reaches down to ``below``."""
+    """Contacts of one node with the triangle, whose tet reaches down to ``below``."""
     x = np.concatenate([TRIANGLE, start[None]])
     x[3, 2] = below
     v = np.concatenate([np.zeros((4, 3)), speed[None]])
@@ -148,8 +148,8 @@ def met_from(start: Floats, speed: Floats, dt: float = 1.0, own: bool = False, b
         (-0.099, False, -0.2, True), (-0.101, False, -0.2, False),
     ],
 )  # fmt: skip
-def test_a_node_deeper_than_the_limit_is_not_met(gap: float, own: bool, below: float, meets: bool) -> None:
-    """A quarter of the face's size; a twentieth on one part; half the height of the tet behind it."""
+def test_a_node_deeper_than_the_limit_has_no_contact(gap: float, own: bool, below: float, meets: bool) -> None:
+    """A quarter of the face's size; a twentieth for one part; half the height of the tet behind it."""
     assert (many(met_from(np.array([0.3, 0.3, gap]), np.zeros(3), own=own, below=below)) == 1) == meets
 
 
@@ -167,9 +167,9 @@ def test_a_node_that_stays_near_is_watched(gap: float, meets: bool) -> None:
         ([(0.96, 0.28, 0), (0.96, -0.28, 0)], False),
     ],
 )  # fmt: skip
-def test_a_node_meets_what_its_faces_look_at(faces: list[tuple[float, ...]], meets: bool) -> None:
-    """Not the rim of a bar the side of another of the same width, nor the surface under a block its front; a blunt edge
-    and a sharp one do, and a node without faces.
+def test_a_node_is_in_contact_with_the_faces_that_it_faces(faces: list[tuple[float, ...]], meets: bool) -> None:
+    """Not the rim of a bar with the side of another of the same width, nor the surface below a block with its front;
+    a blunt edge and a sharp one do, and a node without faces.
     """
     x, v = np.concatenate([TRIANGLE, [[0.3, 0.3, -0.01]]]), np.zeros((5, 3))
     out = np.zeros((5, len(faces), 3))
@@ -183,7 +183,7 @@ FLAKE = np.array([[0.0, 0.0, 0.0], [-0.9, 0.9, 0.3], [-0.2, -0.9, 0.4], [-0.8, -
 
 @pytest.mark.parametrize(("height", "own"), [(0.01, True), (0.01, False), (-0.01, True), (-0.1, False)])
 def test_the_lowest_corner_of_a_flake_meets_what_it_enters(height: float, own: bool) -> None:
-    """Whatever the mean of its normals, before it is inside and when it is."""
+    """Any mean of its normals, before it is inside and when it is."""
     x, v = np.concatenate([TRIANGLE, FLAKE + np.array([0.3, 0.3, height])]), np.zeros((8, 3))
     v[4:, 2] = -0.05
     sums, faces = np.zeros((8, normals.COLUMNS), np.int64), (FACES + 4).astype(np.int32)
@@ -196,7 +196,7 @@ def test_the_lowest_corner_of_a_flake_meets_what_it_enters(height: float, own: b
 
 @pytest.mark.parametrize(("height", "own", "meets"), [(0.01, False, True), (0.01, True, False), (-0.1, False, False)])
 def test_a_node_of_another_part_meets_what_it_passes_from_outside(height: float, own: bool, meets: bool) -> None:
-    """Where one of its faces faces the face, though their mean does not, and they do not rise."""
+    """Some normal of the node faces the face, though their mean does not, and its faces do not rise."""
     x, v, out = np.concatenate([TRIANGLE, [[0.3, 0.3, height]]]), np.zeros((5, 3)), np.zeros((5, 3, 3))
     v[4, 2], out[4] = -0.05, [(0.6, 0.0, 0.8), (-0.6, 0.0, 0.8), (0.0, 0.8, -0.6)]
     part = np.array([0] * 4 + [0 if own else 1])
@@ -215,7 +215,7 @@ def test_a_node_beside_an_acute_edge_is_not_inside() -> None:
 
 
 def test_a_node_in_a_convex_corner_is_held_by_the_nearest_face() -> None:
-    """In the corner of a cube, three faces about one node: deep, or by less than a node is taken to be on a face."""
+    """In the corner of a cube, three faces at one node: deep, or by less than the tolerance of a node on a face."""
     ((piece, model),) = pieces_of(meeting_of([{}], {"self_contact": ("body0",)}), [block((1, 1, 1), shake=0.0)])
     faces = surface_of(piece, model).faces.nodes.astype(np.int32)
     for depth in (np.array([0.03, 0.02, 0.04]), np.array([3e-4, 2e-4, 4e-4])):
@@ -226,8 +226,8 @@ def test_a_node_in_a_convex_corner_is_held_by_the_nearest_face() -> None:
 
 
 @pytest.mark.parametrize("gap", [0.0, 5e-4, -5e-4, -0.05])
-def test_a_sliding_node_is_handed_over_between_coplanar_facets(gap: float) -> None:
-    """Always met, at the point where it is; by one facet wherever it is inside of one, or deep."""
+def test_a_sliding_node_changes_between_coplanar_facets(gap: float) -> None:
+    """Always in contact, at the point where it is; with one facet wherever it is inside of one, or deep."""
     x, faces = sheet(6, 1.0)
     faces = np.column_stack([faces, np.full(len(faces), len(x))]).astype(np.int32)
     random = np.random.default_rng(3)
@@ -255,7 +255,7 @@ def test_a_sliding_node_is_handed_over_between_coplanar_facets(gap: float) -> No
 
 
 def crossings(start: Floats, path: Floats, corners: Floats) -> tuple["np.ndarray", Floats]:
-    """Exact: which straight paths pass which triangles from the front, and the area coordinates (n, f, 3) where."""
+    """Exact: straight paths that pass triangles from the front, and the area coordinates (n, f, 3) there."""
     a, b, c = (corners[None, :, k] for k in range(3))
     normal = np.cross(b - a, c - a)
     before = ((start[:, None] - a) * normal).sum(axis=2)
@@ -270,11 +270,10 @@ def crossings(start: Floats, path: Floats, corners: Floats) -> tuple["np.ndarray
 
 
 @pytest.mark.parametrize("seed", range(10))
-def test_no_fast_node_passes_a_closed_surface_unmet(seed: int) -> None:
-    """10^4 nodes each, any direction, speed and start outside of a flying body; paths longer than the body too.
-
-    Pairs come from the search. The first face that a node passes is among those that it meets; a face that it passes
-    beside is not.
+def test_no_fast_node_passes_a_closed_surface_without_contact(seed: int) -> None:
+    """10^4 nodes each, any direction, speed and start outside of a moving body; paths longer than the body too.
+    Pairs come from the search. The first face that a node passes is among its contacts; a face that it passes beside
+    is not.
     """
     random = np.random.default_rng(seed)
     ((piece, model),) = pieces_of(

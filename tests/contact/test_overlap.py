@@ -1,4 +1,4 @@
-"""Bodies that overlap at the start are refused with the place and the depth, or moved apart without a stress."""
+"""Bodies that overlap at the start are refused with place and depth, or moved apart without a stress."""
 
 from typing import Any
 
@@ -67,7 +67,7 @@ def test_bodies_are_moved_apart_without_a_stress(across: float) -> None:
 
 
 def test_bodies_are_moved_apart_by_no_more_than_they_overlap() -> None:
-    """A ridge of the dent is nearest to a corner node of the smaller block: its foot lies on the far side alone."""
+    """A ridge of the dent is nearest to a corner node of the smaller block, but its foot lies on the far side."""
     wide, small = block((4, 4, 2), SIZE, shake=0.0), block((4, 4, 3), 0.8 * SIZE, shake=0.0)
     low = np.array([-2 * SIZE, -2 * SIZE, 0.0])
     bodies = [
@@ -88,7 +88,7 @@ WIDE = block((4, 4, 4), SIZE, shake=0.0)
 
 
 def test_bodies_that_are_one_cannot_be_pushed_apart() -> None:
-    """No node is inside the other body: each rests on a face of it."""
+    """No node is inside the other body: each lies on a face of it."""
     with pytest.raises(InputError, match=TOO_DEEP):
         pushed(WIDE, WIDE)
 
@@ -110,7 +110,7 @@ def test_bodies_that_overlap_by_elements_cannot_be_pushed_apart(depth: float, ac
 @pytest.mark.parametrize("cells", [1, 4])
 @pytest.mark.parametrize("depth", [0.01, 0.5])
 def test_the_rims_of_bodies_with_sides_in_one_plane_are_pushed_apart_too(cells: int, depth: float) -> None:
-    """They lie on faces of the other body's sides, and sink in all the same."""
+    """The nodes lie on faces of the other body's sides, but sink in."""
     body = block((cells, cells, 4), SIZE, shake=0.0)
     sim = pushed(body, TetMesh(body.points + np.array([0.0, 0.0, (4.0 - depth) * SIZE]), body.tets))
     lower, upper = np.split(sim.model.nodes.x[:, 2], 2)
@@ -146,7 +146,8 @@ def beside_wedge(cells: int, moved: float = 0.0) -> TetMesh:
 
 @pytest.mark.parametrize("cells", [(6, 5), (1, 2), (5, 6), (7, 5), (3, 7), (11, 9)])
 def test_a_corner_on_the_rim_of_two_slanted_sides_touches(cells: tuple[int, int]) -> None:
-    """It may face neither side by the mean of its normals, and was said to lie 3.15 mm deep: at the far side."""
+    """The corner may face neither side by the mean of its normals; a depth of 3.15 mm was reported, from the far
+    side."""
     case = meeting_of([{}, {"velocity": (0.0, 0.0, 0.0)}], {}, end=1e-7)
     build(case, [wedge(cells[0]), beside_wedge(cells[1])])
     with pytest.raises(InputError, match=r"overlaps .* by 4\.7e-05 m"):

@@ -1,4 +1,5 @@
-"""A pair that is left alone would not have met: random flights, knocks and cracks, against testing every pair."""
+"""Deactivated pairs are not in contact: random motions, jumps of velocity and cracks, compared with tests of all
+pairs."""
 
 from pathlib import Path
 
@@ -34,23 +35,23 @@ from .shards import CORNERS, EDGES, FACES
 
 SHARDS, STEPS = 60, 40
 SHORT = 8
-"""Steps between two sets of short lines."""
+"""Steps between two renewals of the short lines."""
 
 
 def apart(one: "np.ndarray", two: "np.ndarray") -> Indices:
-    """(p, 2) all rows of ``one`` with all of ``two`` that are of another shard."""
+    """(p, 2) all rows of ``one`` with all of ``two`` of another shard."""
     pairs = np.stack(np.meshgrid(np.arange(len(one)), np.arange(len(two)), indexing="ij"), axis=-1).reshape(-1, 2)
     return np.asarray(pairs[one[pairs[:, 0]] != two[pairs[:, 1]]], np.int32)
 
 
 def wake(pairs: Pairs) -> Pairs:
-    """Nothing is known of any pair."""
+    """Sets all pairs to untested."""
     pairs.until[:], pairs.speed[:], pairs.turned[:] = -np.inf, np.nan, False
     return pairs
 
 
 def known_of(pairs: Pairs, one: Flags, two: Flags) -> Flags:
-    """(p,) pairs of which something is known, and neither thing has changed by the flags ``one`` and ``two``."""
+    """(p,) pairs with valid bounds and without a change by the flags ``one`` and ``two``."""
     return np.asarray(~np.isneginf(pairs.until) & ~one[pairs.rows[:, 0]] & ~two[pairs.rows[:, 1]])
 
 
@@ -58,10 +59,10 @@ class Tables:
     """Pairs of nodes and faces, and of edges, and the contacts of a step."""
 
     def __init__(self, nodes: Indices, ridges: Indices, every: bool) -> None:
-        """``every``: no pair is left alone."""
+        """``every``: no pair is deactivated."""
         self.node_face, self.edge_edge, self._every = pair_table(nodes), pair_table(ridges), every
         self.tested, self.unforced = 0, 0
-        """Pairs that have been tested, and those of which something was known."""
+        """Pairs that were tested, and those of them with valid bounds."""
 
     def meet(self, shards: "Shards", dt: float) -> list[ContactRows]:
         """The active contacts of a step, of either kind."""
@@ -81,9 +82,8 @@ class Tables:
 
 
 class Shards:
-    """Tets that fly, turn, are knocked about and break; some faces and nodes are no surface at first.
-
-    Nodes face outward from the corner of their tet, more or less, and one in four everything.
+    """Tets that move, rotate, get other velocities and break; some faces and nodes are not on the surface at first.
+    Nodes face outward from the corner of their tet, roughly, and one in four faces everything.
     """
 
     def __init__(self, seed: int, violence: float) -> None:
@@ -105,7 +105,7 @@ class Shards:
         self.settle()
 
     def settle(self) -> None:
-        """Nothing is fresh."""
+        """Clears all flags of changes."""
         self.face_fresh, self.edge_fresh = np.zeros(len(self.faces), bool), np.zeros(len(self.edges), bool)
         self.node_fresh = np.zeros(len(self.x), bool)
 
@@ -122,7 +122,7 @@ class Shards:
         return apart(self.shard, self.face_shard), ridges[ridges[:, 0] < ridges[:, 1]]
 
     def tables(self, first: Indices, dt: float) -> tuple[SlotTable, FaceTable, EdgeTable, Step]:
-        """Slots, faces, edges and the step, as kernels take them."""
+        """Slots, faces, edges and the step, as records for kernels."""
         reference, part = self.reference, self.shard % 3
         slots = slot_table(first, self.normals, reference.short.left, reference.short.course)
         slots = slots._replace(on_surface=self.on_surface, fresh=self.node_fresh)
@@ -137,7 +137,7 @@ class Shards:
         self.v = self.v + self.violence * self.draw.normal(0.0, 1.0, self.v.shape) * some
 
     def uncover(self) -> None:
-        """More faces, edges and nodes become surface; some nodes get other mean normals."""
+        """Adds faces, edges and nodes to the surface; some nodes get other mean normals."""
         faces = self.draw.uniform(size=len(self.faces)) < 0.02
         edges = self.draw.uniform(size=len(self.edges)) < 0.02
         nodes = self.draw.uniform(size=len(self.x)) < 0.02
@@ -147,7 +147,7 @@ class Shards:
         self.normals[nodes] = self.facing(self.draw.normal(size=(int(nodes.sum()), 3)))
 
     def split(self, *tables: Tables) -> None:
-        """Some corners separate: a copy goes off with half of the faces and edges; one edge goes altogether."""
+        """Separates some corners: a copy leaves with half of the faces and edges; one edge vanishes."""
         n = len(self.x)
         some = self.draw.choice(n, 3, replace=False)
         copies = np.arange(n, n + 3, dtype=np.int32)
@@ -169,7 +169,7 @@ class Shards:
             table.node_face.add(more)
 
     def renew(self, *tables: Tables) -> None:
-        """The pairs of some nodes and faces are dropped and found again."""
+        """Removes the pairs of some nodes and faces, and adds them again."""
         nodes, faces = (self.draw.uniform(size=len(of)) < 0.05 for of in (self.x, self.faces))
         for table in tables:
             rows = table.node_face.rows
@@ -178,7 +178,7 @@ class Shards:
             table.node_face.add(again)
 
     def begin(self, dt: float, short: bool, *tables: Tables) -> None:
-        """A step begins; ``short``: with new lines to measure from."""
+        """Begins a step; ``short``: with new short lines."""
         self.reference.advance(dt)
         if short:
             self.reference.shorten(self.x)
@@ -198,8 +198,8 @@ def equal(one: list[ContactRows], two: list[ContactRows]) -> bool:
 
 
 def flown(seed: int, violence: float, blind: bool = False) -> tuple[int, int, float, float]:
-    """Steps whose contacts differ from those of all pairs, contacts, and shares of the pairs: those tested, and
-    those tested although nothing had changed; ``blind``: as if nothing ever left its line.
+    """Number of steps whose contacts differ from those of all pairs, number of contacts, and shares of the pairs:
+    tested, and tested without a change; ``blind``: as if no slot ever left its line.
     """
     shards = Shards(seed, violence)
     some, every = (Tables(*shards.pairs(), every=flag) for flag in (False, True))
@@ -226,10 +226,8 @@ def flown(seed: int, violence: float, blind: bool = False) -> tuple[int, int, fl
 
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("violence", [0.0, 0.02, 0.5])
-def test_a_pair_that_is_left_alone_does_not_meet(seed: int, violence: float) -> None:
-    """In every step the same contacts, to the bit. Most pairs are tested when something has changed, and hardly ever
-    besides.
-    """
+def test_a_deactivated_pair_is_not_in_contact(seed: int, violence: float) -> None:
+    """In every step the same contacts, to the bit. Most tested pairs have changed, and few others are tested."""
     wrong, met, tested, unforced = flown(seed, violence)
     assert wrong == 0
     assert met > 20
@@ -238,7 +236,7 @@ def test_a_pair_that_is_left_alone_does_not_meet(seed: int, violence: float) -> 
 
 
 def test_contacts_are_missed_where_leaving_a_line_does_not_count() -> None:
-    """The check above can fail."""
+    """Proof that the check above can fail."""
     assert sum(flown(seed, 0.5, blind=True)[0] for seed in range(4)) > 0
 
 
@@ -253,7 +251,7 @@ class Pair:
         self.face_fresh, self.node_fresh = np.zeros(1, bool), np.zeros(5, bool)
 
     def tested(self) -> int:
-        """How many pairs the next step tests."""
+        """Number of pairs that the next step tests."""
         still = np.zeros_like(self.x)
         slots = slot_table(self.first, np.zeros((5, 9)), self.left, still)
         slots = slots._replace(fresh=self.node_fresh, on_surface=self.on_surface)
@@ -275,7 +273,7 @@ def test_a_pair_is_tested_again_when_something_has_changed(cause: str) -> None:
     assert pair.tested() == 1
 
 
-def test_a_node_that_has_left_its_line_by_less_than_the_slack_is_left_alone() -> None:
+def test_a_pair_stays_deactivated_while_its_node_departs_by_less_than_the_slack() -> None:
     pair = Pair()
     pair.tested()
     pair.left[0] = 8.5
@@ -296,7 +294,7 @@ def test_a_pair_that_is_no_surface_is_tested_when_it_becomes_some(kind: str) -> 
 
 
 def columns_of(table: PairTable) -> Floats:
-    """(p, 9) all that is kept of each pair."""
+    """(p, 9) all columns of each pair."""
     return np.column_stack([table.rows, table.until, table.speed, table.turned, table.kept])
 
 
@@ -339,7 +337,7 @@ def test_pairs_are_carried_over_to_other_numbers_in_the_order_of_the_first_with_
 
 
 def test_the_chains_of_pairs_hold_each_pair_of_a_node_once() -> None:
-    """Also of pairs that have been added behind others."""
+    """Also of pairs that were added behind others."""
     table, first = random_table(1), np.full(20, -1, np.int32)
     table.hang(first, 0)
     table.add(np.array([[3, 16], [3, 17], [4, 16]], np.int32))
@@ -378,7 +376,7 @@ def test_how_far_a_slot_leaves_its_line_is_the_larger_of_the_steps_beginning_and
 
 
 def test_lines_are_taken_over_by_other_slots() -> None:
-    """New slots begin where they are; those that were there stay on their lines, whatever the time."""
+    """New slots begin at their positions; the others keep their lines, at any time."""
     draw = np.random.default_rng(4)
     old = Lines(draw.normal(size=(4, 3)), draw.normal(size=(4, 3)))
     old.begin_anew(np.arange(4) < 2, draw.normal(size=(4, 3)), 1.0)
@@ -395,7 +393,7 @@ def test_lines_are_taken_over_by_other_slots() -> None:
 
 
 def test_a_body_that_breaks_comes_to_the_same_when_every_pair_is_tested(monkeypatch: pytest.MonkeyPatch) -> None:
-    """To the bit: pairs of copies and of faces with new corners among them."""
+    """To the bit, including pairs of copies and of faces with new corners."""
     case = parse_case(read_data(Path(__file__).parents[1] / "parallel" / "breaking.toml"))
     arrays = PairTable.arrays
 

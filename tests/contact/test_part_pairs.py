@@ -1,4 +1,4 @@
-"""How fine the impulses of contact are: as the lighter of two that meet asks for, whatever else is in the scene."""
+"""Quantum of the impulses of contact: set by the lighter of two parts in contact, independent of other parts."""
 
 import numpy as np
 import pytest
@@ -33,7 +33,7 @@ def losses(size: float, away: float, hit: bool) -> Floats:
     return seen[-1]
 
 
-def test_a_huge_body_elsewhere_changes_nothing_of_an_impact() -> None:
+def test_a_huge_body_elsewhere_does_not_change_an_impact() -> None:
     near, far = (losses(size, 0.2, hit=False) for size in (1e-3, 10.0))
     assert near[1] > 0.01 * near[0]
     assert far == pytest.approx(near, rel=1e-9)
@@ -45,8 +45,8 @@ def test_a_huge_body_is_hit_as_a_large_one() -> None:
     assert huge == pytest.approx(large, rel=1e-6)
 
 
-def test_the_lighter_of_those_that_meet_counts() -> None:
-    """Parts 0 and 1 meet, 2 meets itself, 3 is left out; held nodes give as much as they get."""
+def test_the_lighter_of_two_parts_in_contact_counts() -> None:
+    """Parts 0 and 1 are in contact, 2 with itself, 3 with none; held nodes transmit any impulse."""
     sizes = enumerate((1.0, 3.0, 2.0, 9.0))
     sim = build(meeting_of([{}] * 4), [moved(block((1, 1, 1), size), (20.0 * k, 0.0, 0.0)) for k, size in sizes])
     nodes = sim.model.nodes

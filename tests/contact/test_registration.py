@@ -1,8 +1,8 @@
-"""Registration of what has changed: no pair is missed or found twice, in any order of strays, cracks and surfaces.
+"""Registration of changes: no pair is missed or found twice, in any order of departures, cracks and surfaces.
 
-Shards fly about and are knocked. Some are hidden, as the sides of cracks are; what they leave their lines by is not
-watched until they are searched. All pairs of what is searched are measured in every step. Shards hardly turn: what
-happens to those that do is for the sift to say (test_swept_filter.py).
+Shards move and get other velocities. Some are hidden, as the sides of cracks are; their distances from their lines
+are not measured until they are in the broad phase. All pairs in the broad phase are measured in every step. Shards
+hardly rotate: test_swept_filter.py has those that do.
 """
 
 from types import SimpleNamespace
@@ -31,15 +31,15 @@ from .shards import CORNERS, EDGES, FACES
 
 SHARDS, STEPS, SKIN = 50, 40, 0.2
 SEEDS = (0, 1, 4, 5)
-"""Among them worlds in which each of the faults below is seen."""
+"""Seeds: some of their worlds show each of the faults below."""
 ALLOWED = np.array([[True, True, True], [True, True, False], [True, False, False]])
-"""Which of three parts meet."""
+"""Parts that may be in contact, of three."""
 SIDES = np.array([[k for k in range(4) if {a, b} <= set(FACES[k, :3])] for a, b, *_ in EDGES])
 """(6, 2) the faces of a tet at each of its edges."""
 
 
 class World:
-    """Shards, and the scene of those that are here."""
+    """Shards, and the scene of those on this rank."""
 
     def __init__(self, seed: int) -> None:
         self.draw, first, shard = np.random.default_rng(seed), 4 * np.arange(SHARDS), np.arange(SHARDS)
@@ -59,7 +59,7 @@ class World:
         self.scene = self.search(None)
 
     def search(self, old: Scene | None) -> Scene:
-        """The scene of the shards that are here, with what ``old`` knows of it."""
+        """Returns the scene of the shards on this rank, with the state of ``old``."""
         shards = np.flatnonzero(self.here)
         faces, edges, nodes = (self.rows(shards, many) for many in (4, 6, 4))
         shown = np.repeat(self.shown, 4)
@@ -85,31 +85,31 @@ class World:
         return now
 
     def measure(self, now: Scene) -> None:
-        """How far everything has left its lines."""
+        """Measures the distances from the lines."""
         of, faces, edges = now.surface_nodes, now.faces.corners, now.edges.corners
         self.deviation.measure(now.reference, of.x, of.v, faces, edges, now.slots.tracked)
 
     @staticmethod
     def rows(shards: "np.ndarray", many: int) -> "np.ndarray":
-        """Rows of things of which each shard has as many."""
+        """Rows of the things of ``some`` shards, which all have the same number of them."""
         return np.asarray((many * shards[:, None] + np.arange(many)).reshape(-1))
 
     def knock(self) -> None:
-        """Some shards get another velocity, some nodes by themselves."""
+        """Some shards get another velocity, and some single nodes."""
         shards, nodes = self.draw.uniform(size=(SHARDS, 1)) < 0.2, self.draw.uniform(size=(len(self.v), 1)) < 0.05
         self.v = self.v + np.repeat(self.draw.normal(0.0, 0.35, (SHARDS, 3)) * shards, 4, axis=0)
         self.v = self.v + self.draw.normal(0.0, 0.02, self.v.shape) * nodes
 
     def some(self, flags: Flags, share: float) -> "np.ndarray":
-        """A share of the flagged shards."""
+        """Returns a share of the flagged shards."""
         return np.flatnonzero(flags & (self.draw.uniform(size=SHARDS) < share))
 
     def foresee(self) -> None:
-        """The faces of some hidden shards are searched."""
+        """Adds the faces of some hidden shards to the broad phase."""
         self.scene.enliven(self.scene.rows_of(self.rows(self.some(self.here & ~self.shown, 0.1), 4)))
 
     def open(self) -> None:
-        """Some hidden shards become surface, foreseen or not."""
+        """Adds some hidden shards to the surface, foreseen or not."""
         shards = self.some(self.here & ~self.shown, 0.1)
         self.shown[shards] = True
         self.opened += len(shards)
@@ -117,14 +117,14 @@ class World:
         self.scene.slots.on_surface[:] = np.repeat(self.shown, 4)[self.scene.surface_nodes.id]
 
     def another_surface(self) -> None:
-        """Some shards leave, others come, and hidden ones are uncovered; what is known of the rest is carried over."""
+        """Removes some shards, adds others and uncovers hidden ones; the state of the rest is copied."""
         gone, come, bare = self.some(self.here, 0.1), self.some(~self.here, 0.3), self.some(~self.shown, 0.2)
         self.here[gone], self.here[come], self.shown[bare] = False, True, True
         self.opened += len(bare)
         self.scene = self.search(self.scene)
 
     def begin(self, dt: float) -> None:
-        """A step begins as the stage of contact has it begin; in some another rank registers what has strayed."""
+        """Begins a step as the stage of contact does; in some steps another rank registers departed slots."""
         now, of = self.scene, self.scene.surface_nodes
         of.x[:], of.v[:] = self.x[of.id], self.v[of.id]
         now.reference.advance(dt)
@@ -135,7 +135,7 @@ class World:
             self.registered += 1
 
     def step(self, number: int) -> None:
-        """Whatever may happen before a step, and the step."""
+        """Makes random changes and a step."""
         dt = float(self.draw.uniform(0.02, 0.04))
         self.knock()
         if self.scene.reference.end + dt > self.scene.reference.until:
@@ -154,7 +154,7 @@ class World:
 
 
 def matrix(rows: Indices, one: int, two: int) -> Flags:
-    """(one, two) the pairs as flags; none may stand in the table twice."""
+    """(one, two) the pairs as flags; none may be in the table twice."""
     counts = np.zeros((one, two), int)
     np.add.at(counts, tuple(rows.T), 1)
     assert counts.max(initial=0) <= 1
@@ -162,18 +162,19 @@ def matrix(rows: Indices, one: int, two: int) -> Flags:
 
 
 def common(one: Indices, two: Indices) -> Flags:
-    """(n, m) whether two things have a corner in common."""
+    """(n, m) whether two things have a common corner."""
     return np.asarray((one[:, None, :, None] == two[None, :, None, :]).any(axis=(2, 3)))
 
 
 def allowed(now: Scene, one: Indices, two: Indices) -> Flags:
-    """(n, m) whether things with these corners are of parts that meet."""
+    """(n, m) whether things with these corners are of parts that may be in contact."""
     part = now.surface_nodes.part
     return np.asarray(ALLOWED[part[one[:, 0]][:, None], part[two[:, 0]][None, :]])
 
 
 def near_faces(now: Scene) -> Flags:
-    """(slots, faces) searched, and nearer than half of what the skin and the depth have left; of parts that meet."""
+    """(slots, faces) pairs in the broad phase, nearer than half of the remaining skin and depth; of parts that may
+    be in contact."""
     x, left, part = now.surface_nodes.x, now.reference.searched.left, now.surface_nodes.part
     corners, nodes = now.faces.corners[:, :3], np.arange(now.surface_nodes.n, dtype=np.int32)[:, None]
     deep = np.where(part[:, None] == part[corners[:, 0]][None], DEEP_SELF, DEEP) * now.faces.size
@@ -185,7 +186,7 @@ def near_faces(now: Scene) -> Flags:
 
 
 def near_edges(now: Scene) -> Flags:
-    """(edges, edges) the same of two edges, that of lower rank first."""
+    """(edges, edges) the same for two edges, that of lower rank first."""
     ends, rank = now.edges.corners[:, :2], now.edges.rank
     left = now.reference.searched.left[ends].max(axis=1)
     deep = np.minimum(now.edges.deep[:, None], now.edges.deep[None])
@@ -195,8 +196,8 @@ def near_edges(now: Scene) -> Flags:
 
 
 def check(now: Scene) -> Ints:
-    """No pair is missed, none is there twice or has a corner in common, or is of what is not searched; and all that
-    is searched is near its lines. Returns how many pairs of either kind are near.
+    """Checks that no pair is missed, none is there twice, has a common corner or is outside of the broad phase, and
+    that all slots in it are near their lines. Returns the numbers of near pairs of either kind.
     """
     corners, ends = now.faces.corners[:, :3], now.edges.corners[:, :2]
     nodes = np.arange(now.surface_nodes.n, dtype=np.int32)[:, None]
@@ -216,7 +217,7 @@ def check(now: Scene) -> Ints:
 
 
 def flown(seed: int) -> World:
-    """A world after its steps, each of which has been checked."""
+    """Returns a world after its steps, each of which has been checked."""
     world = World(seed)
     for number in range(STEPS):
         world.step(number)
@@ -225,7 +226,7 @@ def flown(seed: int) -> World:
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_what_has_changed_is_registered_whatever_happens(seed: int) -> None:
-    """Strays, foreseen cracks, exposed faces, surfaces that take over pairs, searches from nothing."""
+    """Departures, foreseen cracks, exposed faces, new scenes that keep pairs, searches from nothing."""
     world = flown(seed)
     assert world.registered > 10
     assert world.carried > 3
@@ -234,7 +235,7 @@ def test_what_has_changed_is_registered_whatever_happens(seed: int) -> None:
 
 
 def fails() -> bool:
-    """Whether something is missed in one of the worlds."""
+    """Whether a pair is missed in one of the worlds."""
     for seed in SEEDS:
         try:
             flown(seed)
@@ -244,7 +245,8 @@ def fails() -> bool:
 
 
 def test_slots_that_are_searched_for_the_first_time_need_new_lines() -> None:
-    """The check can fail: they have flown unwatched, and nobody knows how far their old lines are."""
+    """Proof that the check can fail: such slots have moved unmeasured, and the distance from their old lines is
+    unknown."""
     with patch.object(registration, "register_new", _blind(registration.register_new)):
         assert fails()
     with patch.object(registration, "renew", _blind(registration.renew)):
@@ -252,7 +254,7 @@ def test_slots_that_are_searched_for_the_first_time_need_new_lines() -> None:
 
 
 def _blind(function: Any) -> Any:
-    """``function`` with a scene that takes nobody's slots for new ones."""
+    """Returns ``function`` with a scene in which no slots are new."""
 
     def called(now: Scene, *rest: Any) -> None:
         settle = now.settle_live
@@ -262,8 +264,8 @@ def _blind(function: Any) -> Any:
     return called
 
 
-def test_a_surface_has_to_take_over_who_is_watched() -> None:
-    """The check can fail: lines that begin anew without a search lead elsewhere than the pairs were found along."""
+def test_a_new_scene_has_to_copy_the_tracked_slots() -> None:
+    """Proof that the check can fail: lines that begin anew without a search differ from those of the pairs."""
     carry = registration.carry
 
     def forgetful(now: Scene, old: Scene) -> None:
@@ -276,7 +278,7 @@ def test_a_surface_has_to_take_over_who_is_watched() -> None:
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_pairs_that_are_found_again_keep_their_impulses(seed: int) -> None:
-    """Through strays, and to another surface: with the nodes and faces that they are of, by their ids."""
+    """Through departures, and to another scene: by the ids of their nodes and faces."""
     world = World(seed)
     for number in range(20):
         now = world.scene
@@ -292,14 +294,14 @@ def test_pairs_that_are_found_again_keep_their_impulses(seed: int) -> None:
 
 
 def named(now: Scene) -> dict[tuple[int, int], Floats]:
-    """What each pair of a node and a face, ids, has kept."""
+    """Stored impulse of each pair of a node and a face, by ids."""
     node, face = now.node_face.rows.T
     names = zip(now.surface_nodes.id[node].tolist(), now.faces.id[face].tolist(), strict=True)
     return dict(zip(names, now.node_face.kept.copy(), strict=True))
 
 
 def test_a_slot_that_is_knocked_beyond_the_skin_in_one_step_finds_what_it_passes() -> None:
-    """A shard at rest flies off so fast, after a while, that a step takes it through a face that was out of reach."""
+    """A shard at rest gets, after a while, a velocity that takes it through a distant face in one step."""
     world = World(0)
     world.here[:], world.shown[:] = False, False
     world.here[:2], world.shown[:2], world.v[:] = True, True, 0.0

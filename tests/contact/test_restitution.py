@@ -1,4 +1,4 @@
-"""What comes back from an impact (Cirak and West 2005): energy and momentum, of one contact and of many."""
+"""Restitution (Cirak and West 2005): energy and momentum, for one contact and for many."""
 
 from pathlib import Path
 
@@ -19,7 +19,7 @@ from .kernels import Solver, column
 
 
 def every(met: ContactRows) -> Indices:
-    """The numbers of all rows."""
+    """Numbers of all rows."""
     return np.arange(len(met.nodes), dtype=np.int32)
 
 
@@ -29,7 +29,7 @@ def energy(v: Floats, mobility: Floats) -> float:
 
 @pytest.mark.parametrize("share", [0.0, 0.3, 1.0])
 def test_a_node_parts_from_a_face_with_a_share_of_its_speed(share: float) -> None:
-    """Masses of 1, 2, 3 and 4; it loses (1 - e^2) of the energy of the approach, and momentum stays."""
+    """Masses of 1, 2, 3 and 4; it loses (1 - e^2) of the energy of the approach, and momentum is conserved."""
     nodes, weights = np.array([[0, 1, 2, 3]], np.int32), np.array([[1.0, -0.2, -0.3, -0.5]])
     normals, wanted = np.array([[0.0, 0.6, 0.8]]), np.zeros(1)
     met = ContactRows(nodes, weights, normals, wanted, np.zeros(1), np.full(1, -1, np.int32))
@@ -44,8 +44,9 @@ def test_a_node_parts_from_a_face_with_a_share_of_its_speed(share: float) -> Non
     assert ((after - v) / mobility).sum(axis=0) == pytest.approx(np.zeros(3), abs=1e-10)
 
 
-def test_a_contact_that_was_parting_is_given_nothing() -> None:
-    """Elastic forces close it again at twice the speed: it may fall back by what it has come, and no impulse pays."""
+def test_a_contact_that_was_opening_gets_no_energy() -> None:
+    """Elastic forces close it again at twice the speed: it may return the distance that it has opened, without an
+    impulse."""
     nodes, weights = np.array([[0, 1, 2, 3]], np.int32), np.array([[1.0, -0.2, -0.3, -0.5]])
     normals, wanted = np.array([[0.0, 0.6, 0.8]]), np.zeros(1)
     met = ContactRows(nodes, weights, normals, wanted, np.zeros(1), np.full(1, -1, np.int32))
@@ -62,8 +63,8 @@ def test_a_contact_that_was_parting_is_given_nothing() -> None:
     assert met.wanted[0] == -3.0
 
 
-def test_contacts_that_share_nodes_take_nothing_together() -> None:
-    """A column that closes everywhere: all relative velocities turn round, and the energy stays."""
+def test_contacts_that_share_nodes_conserve_energy() -> None:
+    """A column that closes everywhere: all relative velocities are reversed, and the energy is conserved."""
     v = np.zeros((6, 3))
     v[:, 0] = -np.array([0.0, 1.0, 3.0, 4.0, 4.5, 7.0])
     mobility = np.repeat(np.array([1.0, 2.0, 0.5, 1.0, 3.0, 1.0])[:, None], 3, axis=1)
@@ -90,8 +91,9 @@ mesh = { shape = "sphere", centre = [X, Y, Z], radius = 4e-3, element_size = 1e-
 """
 
 
-def test_glancing_balls_that_rebound_are_given_no_energy() -> None:
-    """Whole balls of glass at 120 m/s: steps that follow the impacts up and down at 5 % a step gave 5 % of it."""
+def test_glancing_balls_that_rebound_get_no_energy() -> None:
+    """Whole balls of glass at 120 m/s: with steps that vary by 5 % a step during the impacts, 5 % of the energy was
+    added."""
     text = BALLS
     for name, side, y, z in (("left", -1.0, 1.5e-3, 3e-4), ("right", 1.0, -1.5e-3, 0.0)):
         values = {"NAME": name, "SPEED": -120.0 * side, "X": 4.02e-3 * side, "Y": y, "Z": z}
@@ -104,12 +106,12 @@ def test_glancing_balls_that_rebound_are_given_no_energy() -> None:
     initial = lines[0].initial
     assert max(line.elastic for line in lines) > 0.3 * initial
     assert min(line.stepping for line in lines) > -1e-2 * initial
-    assert min(line.contact for line in lines) > -1e-2 * initial, "half of it is what sweeps of friction leave undone"
+    assert min(line.contact for line in lines) > -1e-2 * initial, "half of it is the residual of the sweeps of friction"
     assert min(line.contact + line.friction for line in lines) > -1e-3 * initial
 
 
-def test_layers_that_rebound_take_and_give_nothing() -> None:
-    """Five sweeps leave -4e-3 of the energy undone, ten 3e-4, the forty that are the default with restitution 2e-8."""
+def test_layers_that_rebound_conserve_energy() -> None:
+    """Five sweeps leave -4e-3 of the energy, ten 3e-4, the forty of the default with restitution 2e-8."""
     case = load.read_case(load.shipped_path("plate_stack"))
     assert case.contact is not None
     contact = case.contact.model_copy(update={"restitution": 1.0})

@@ -1,5 +1,5 @@
-"""Ridges that meet: bodies do not pass into each other where two edges cross, however small the angle, and whether the
-edges are there from the start or made by flow.
+"""Ridges that collide: bodies do not enter each other where two edges cross, at any angle, for edges of the start
+and edges made by flow.
 """
 
 from itertools import product
@@ -32,7 +32,7 @@ def tet(points: Floats) -> TetMesh:
 
 
 def deep(x: Floats, y: Floats) -> float:
-    """How far two tets (4, 3) overlap along the way on which they do least, m; negative when they are apart."""
+    """Overlap of two tets (4, 3) along the direction in which it is least, m; negative when they are apart."""
     sides = [np.array([p[j] - p[i] for i in range(4) for j in range(i + 1, 4)]) for p in (x, y)]
     axes = [np.cross(p[[1, 0, 0, 0]] - p[[2, 3, 1, 2]], p[[3, 2, 3, 1]] - p[[2, 3, 1, 2]]) for p in (x, y)]
     every = np.concatenate([*axes, np.cross(sides[0][:, None], sides[1][None]).reshape(-1, 3)])
@@ -45,7 +45,8 @@ def deep(x: Floats, y: Floats) -> float:
 
 @pytest.mark.parametrize("angle", [0.5, 3.0, 30.0])
 def test_tets_that_come_ridge_on_ridge_do_not_pass_into_each_other(angle: float) -> None:
-    """Degrees between the ridges: at 2.9 and less they met as nodes and faces only, of which none is in the way."""
+    """Degrees between the ridges: at 2.9 and less there were contacts of nodes and faces only, none of which
+    resists."""
     over = ROOF @ rotation((1, 0, 0), np.pi).T @ rotation((0, 0, 1), np.radians(angle)).T + [0.0, 0.0, 0.01 * SIZE]
     motions = [{"velocity": (0.0, 0.0, 30.0)}, {"velocity": (0.0, 0.0, -30.0)}]
     sim = build(meeting_of(motions, end=4e-6), [tet(ROOF), tet(over)])
@@ -69,8 +70,8 @@ def folded(angle: float) -> Floats:
 
 
 def test_tets_that_flow_has_folded_do_not_pass_into_each_other() -> None:
-    """Their tops are flat at the start and folded by 80 degrees since: the middles met nothing, for their nodes are far
-    away."""
+    """Their tops are flat at the start and folded by 80 degrees later: the middles had no contact, because their
+    nodes are far away."""
     half_turn = rotation((1, 0, 0), np.pi).T @ rotation((0, 0, 1), 0.5 * np.pi).T
     gap = [0.0, 0.0, 0.01 * SIZE]
     motions = [{"velocity": (0.0, 0.0, 30.0)}, {"velocity": (0.0, 0.0, -30.0)}]
@@ -102,7 +103,7 @@ MEETING = Path(__file__).parents[1] / "parallel" / "meeting.toml"
 
 
 def flown(comm: Comm, folder: Path, stops: tuple[int, ...]) -> tuple[str | None, int]:
-    """Digest of the scene, and how many edges flow has made sharp; kept and resumed at ``stops``, steps."""
+    """Digest of the scene, and number of edges that flow has made sharp; kept and resumed at ``stops``, steps."""
     case = parse_case(apply_overrides(read_data(MEETING), ["run.frames=0", "balance.weights=tets"]))
     sim = simulation.build(case, Path(), comm)
     step.prepare(sim)

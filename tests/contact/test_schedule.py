@@ -1,4 +1,4 @@
-"""No answer depends on when a search happens, nor on what it takes up besides what meets."""
+"""No answer depends on the steps of searches, nor on what they include besides active contacts."""
 
 from collections.abc import Iterator
 from functools import cache
@@ -11,7 +11,7 @@ from conoid.cases.load import apply_overrides, parse_case, read_data
 from conoid.worker import simulation, step
 from conoid.worker.accounts.digest import digest
 from conoid.worker.contact.broad_phase import searches
-from conoid.worker.contact.narrow_phase import cracks
+from conoid.worker.contact.narrow_phase import crack_contact
 from conoid.worker.contact.scene import surface_motion
 from conoid.worker.contact.surface import exposure
 from conoid.worker.parallel.comm import Comm, SerialComm
@@ -25,7 +25,7 @@ CRUSHED = "../../cases/hard/crush_cohesive"
 
 
 def stepping(name: str, steps: int, comm: Comm, every: int = 0, *changes: str) -> Iterator[Simulation]:
-    """A scene after each of its first ``steps``; ``every``: a search at least each so many of them."""
+    """A scene after each of its first ``steps``; ``every``: a search at least every so many steps."""
     case = parse_case(apply_overrides(read_data(SCENES / f"{name}.toml"), ["run.frames=0", *changes]))
     sim = simulation.build(case, Path(), comm)
     assert sim.contact is not None
@@ -47,7 +47,7 @@ def ran(name: str, comm: Comm, every: int = 0, *changes: str) -> tuple[str | Non
 
 @cache
 def alone(name: str) -> tuple[str | None, int]:
-    """One rank, as it comes."""
+    """Returns the result on one rank."""
     return ran(name, SerialComm())
 
 
@@ -67,7 +67,7 @@ def test_no_answer_depends_on_how_often_is_searched(name: str) -> None:
 
 
 def doubled(sim: Simulation) -> int:
-    """How many candidate pairs of a rank stand in their tables more than once."""
+    """Number of candidate pairs of a rank that are in their tables more than once."""
     assert sim.contact is not None
     scene = sim.contact.searches.scene
     assert scene is not None
@@ -76,8 +76,9 @@ def doubled(sim: Simulation) -> int:
 
 
 @pytest.mark.parametrize("ranks", [1, 3])
-def test_no_pair_stands_twice(ranks: int) -> None:
-    """It would push twice, until a search; edges did that ran against each other between two nodes that separated."""
+def test_no_pair_is_listed_twice(ranks: int) -> None:
+    """Such a pair would have two impulses, until a search; edges of opposite direction between two separated nodes
+    did."""
     found = on_ranks(ranks, lambda comm: [doubled(sim) for sim in stepping(CRUSHED, 40, comm)])
     assert found == [[0] * 40] * ranks
 
@@ -85,7 +86,7 @@ def test_no_pair_stands_twice(ranks: int) -> None:
 @pytest.mark.parametrize("foreseen", [0.0, 0.9])
 def test_no_answer_depends_on_which_cracks_a_search_foresees(monkeypatch: pytest.MonkeyPatch, foreseen: float) -> None:
     one = alone("breaking")[0]
-    monkeypatch.setattr(cracks, "_FORESEEN", foreseen)
+    monkeypatch.setattr(crack_contact, "_FORESEEN", foreseen)
     assert ran("breaking", SerialComm())[0] == one
 
 
@@ -94,9 +95,9 @@ def test_no_answer_depends_on_which_cracks_a_search_foresees(monkeypatch: pytest
 def test_no_answer_depends_on_which_tets_a_search_expects_to_leave(
     monkeypatch: pytest.MonkeyPatch, ranks: int, share: float
 ) -> None:
-    """All, few or none: what is laid bare by a tet that was not expected to leave is taken up by a search."""
-    usual, many = exposure.TIRING, on_ranks(ranks, lambda comm: ran("eroding", comm))[0][1]
-    monkeypatch.setattr(exposure, "TIRING", share)
+    """All, few or none: faces exposed by a tet that was not expected to erode are added by a search."""
+    usual, many = exposure.NEAR_EROSION, on_ranks(ranks, lambda comm: ran("eroding", comm))[0][1]
+    monkeypatch.setattr(exposure, "NEAR_EROSION", share)
     other, more = on_ranks(ranks, lambda comm: ran("eroding", comm))[0]
     assert other == alone("eroding")[0]
     assert (more > many) == (share > usual)
@@ -105,19 +106,19 @@ def test_no_answer_depends_on_which_tets_a_search_expects_to_leave(
 @pytest.mark.parametrize("name", STEPS)
 def test_no_answer_depends_on_the_horizon(monkeypatch: pytest.MonkeyPatch, name: str) -> None:
     one = alone(name)[0]
-    monkeypatch.setattr(surface_motion, "_LOOKS", surface_motion._LOOKS[:1])
+    monkeypatch.setattr(surface_motion, "_HORIZONS", surface_motion._HORIZONS[:1])
     assert ran(name, SerialComm())[0] == one
 
 
 @pytest.mark.parametrize(("ranks", "changes"), [(2, ("contact.skin=0.15",)), (3, ("contact.domain=box",))])
-def test_nor_on_either_on_several_ranks(ranks: int, changes: tuple[str, ...]) -> None:
-    """Every rank searches when one of them must; what it is sent depends on the skin and the contact domain."""
+def test_no_answer_on_several_ranks_depends_on_the_skin_or_the_domain(ranks: int, changes: tuple[str, ...]) -> None:
+    """Every rank searches when one of them must; the ghosts depend on the skin and the contact domain."""
     one = alone("breaking")[0]
     assert on_ranks(ranks, lambda comm: ran("breaking", comm, 5, *changes))[0][0] == one
 
 
-def test_what_a_search_looks_ahead_ends_with_one_search(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Not with one that keeps the end, a step or two away, and another one behind it."""
-    monkeypatch.setattr(surface_motion, "_LOOKS", surface_motion._LOOKS[:1])
-    good_for = surface_motion._LOOKS[0] - searches._AHEAD
+def test_a_horizon_ends_with_one_search(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Not with one that keeps the end, a step or two away, and another one after it."""
+    monkeypatch.setattr(surface_motion, "_HORIZONS", surface_motion._HORIZONS[:1])
+    good_for = surface_motion._HORIZONS[0] - searches._AHEAD
     assert ran("meeting", SerialComm())[1] <= 1 + STEPS["meeting"] / good_for

@@ -1,4 +1,4 @@
-"""Candidates: never one too few, each once, and in memory that does not know how far things fly."""
+"""Candidate pairs: none is missed, each is found once, and memory does not depend on distances."""
 
 import tracemalloc
 from collections.abc import Iterator
@@ -21,7 +21,7 @@ NEVER_SELF = ~np.eye(3, dtype=bool)
 
 
 class Cloud:
-    """Random things: nodes, faces and edges of sizes up to 100:1, in three parts that fly; some far and fast ones."""
+    """Random things: nodes, faces and edges of sizes up to 100:1, in three parts that move; some far away and fast."""
 
     def __init__(self, seed: int, n: int = 36) -> None:
         random = np.random.default_rng(seed)
@@ -61,14 +61,14 @@ def clouds() -> Iterator[Cloud]:
 
 
 def reached(cloud: Cloud, small: Primitives, large: Primitives, distance: Floats) -> Flags:
-    """(small, large) pairs that may meet and come within reach, by their distances (looks, small, large)."""
+    """(small, large) pairs of parts in contact that come within reach, by their distances at the times TIMES."""
     near = distance.min(axis=0) < small.reach[:, None] + large.reach[None, :]
     of = [cloud.part[things.corners[:, 0]] for things in (small, large)]
     return np.asarray(near & NEVER_SELF[of[0][:, None], of[1][None, :]])
 
 
 def as_matrix(pairs: Indices, rows: int, columns: int) -> Flags:
-    """The pairs as flags; none may stand in the list twice."""
+    """The pairs as flags; none may be in the list twice."""
     counts = np.zeros((rows, columns), int)
     np.add.at(counts, tuple(pairs.T), 1)
     assert counts.max(initial=0) <= 1
@@ -106,7 +106,7 @@ def test_no_edge_that_comes_near_an_edge_is_missed_and_each_pair_is_found_once()
 
 @pytest.mark.parametrize("seed", range(20))
 def test_two_ranks_that_see_each_others_edges_find_every_pair_once_between_them(seed: int) -> None:
-    """Each has its own edges first, then copies of the other's, whose order it does not know."""
+    """Each has its own edges first, then copies of the other's, in any order."""
     cloud, n = Cloud(seed), 36
     half = np.random.default_rng(seed).permutation(n)
     total = np.zeros((n, n), int)
@@ -126,7 +126,7 @@ def test_two_ranks_that_see_each_others_edges_find_every_pair_once_between_them(
 
 
 def test_candidates_are_the_boxes_that_touch() -> None:
-    """No list is much longer than it must be: boxes around the paths, seen by somebody who flies along."""
+    """No list is much longer than necessary: boxes around the paths, in a moving frame."""
     for seed in range(50):
         cloud = Cloud(seed)
         frame = cloud.v.mean(axis=0)
@@ -144,7 +144,7 @@ def test_candidates_are_the_boxes_that_touch() -> None:
 
 
 def test_each_pair_is_found_once_where_all_meet_all() -> None:
-    """Ten times as many pairs as there is room for at first: a walk is broken off and goes on."""
+    """Ten times as many pairs as there is room for at first: the search is interrupted and continued."""
     n = 120
     cloud = Cloud(5, n)
     huge = Primitives(cloud.faces.corners, np.full(n, 1e5))
@@ -171,7 +171,7 @@ def test_only_parts_that_meet_are_candidates() -> None:
 
 
 @pytest.mark.parametrize("empty", ["small", "large", "both"])
-def test_nothing_meets_nothing(empty: str) -> None:
+def test_without_primitives_there_are_no_candidates(empty: str) -> None:
     cloud = Cloud(1)
     none = Primitives(np.zeros((0, 3), np.int32), np.zeros(0))
     small = cloud.nodes if empty == "large" else none
@@ -180,7 +180,8 @@ def test_nothing_meets_nothing(empty: str) -> None:
 
 
 def peak_of(away: float, coarse: int = 40) -> tuple[int, int]:
-    """Bytes that the search needs for two sheets, a hundredth of whose nodes is ``away``, and the pairs it finds."""
+    """Bytes that the search needs for two sheets, of which a hundredth of the nodes is ``away``, and the pairs it
+    finds."""
     (x0, _), (x1, faces1) = sheet(40, 1.0), sheet(coarse, 40.0 / coarse)
     x1, faces1 = x1 + np.array([0.0, 0.0, 0.1]), faces1 + np.int32(len(x0))
     x = np.concatenate([x0, x1])
@@ -207,7 +208,7 @@ def test_memory_does_not_follow_the_extent() -> None:
 
 @pytest.mark.parametrize("coarse", [4, 400])
 def test_memory_stays_with_the_number_of_things_where_sizes_differ_tenfold(coarse: int) -> None:
-    """Faces ten times as large, or as small, as what they meet: bytes a candidate or thing as with equal ones."""
+    """Faces ten times as large, or as small, as their partners: bytes per candidate or thing as with equal ones."""
     equal, pairs = peak_of(0.0)
     other, their_pairs = peak_of(0.0, coarse)
     assert other / (their_pairs + 2 * coarse * coarse) < 4.0 * equal / (pairs + 2 * 40 * 40)
@@ -215,7 +216,7 @@ def test_memory_stays_with_the_number_of_things_where_sizes_differ_tenfold(coars
 
 @pytest.mark.parametrize("size", [1e2, 1e3, 1e4])
 def test_memory_does_not_follow_a_huge_thing(size: float) -> None:
-    """A long edge across two sheets of short ones: nothing is filled with points of the others' distance."""
+    """A long edge across two sheets of short ones: memory is not filled with cells of the others' distance."""
     (x0, faces), (x1, _) = sheet(20, 1.0), sheet(20, 1.0)
     short = faces[:, :2]
     x = np.concatenate([x0, x1 + np.array([0.0, 0.0, 0.1]), [[-size, -size, -size], [size, size, size]]])
@@ -245,7 +246,7 @@ def cells_of(table: Table, low: Floats, high: Floats) -> set[int]:
 def test_position_codes_have_every_box_once_in_each_cell_that_it_touches(
     spread: tuple[float, ...], edge: float
 ) -> None:
-    """And the entries of a hash lie side by side. Some boxes are wide, one is a point."""
+    """The entries of a hash are contiguous. Some boxes are wide, one is a point."""
     random = np.random.default_rng(2)
     low: Floats = random.uniform(0.0, 1.0, (400, 3)) * np.array(spread)
     high: Floats = low + edge * random.uniform(0.0, 3.0, (400, 3)) * (
@@ -271,7 +272,7 @@ def test_position_codes_have_every_box_once_in_each_cell_that_it_touches(
 
 
 def test_a_hash_holds_few_codes() -> None:
-    """Of the cells of a full cube, of a layer and of a line: the most entries that a walk passes over at a code."""
+    """Largest number of entries of one hash, for the cells of a full cube, of a layer and of a line."""
     for shape in ((16, 16, 16), (64, 64, 1), (4096, 1, 1), (1, 1, 4096)):
         low: Floats = np.ascontiguousarray(np.argwhere(np.ones(shape)) + 0.25)
         table = buckets.sort(low, low + 0.5, 1.0)

@@ -1,4 +1,4 @@
-"""Sums over the nodes that ranks share: those that are pushed, whoever pushes and whoever holds them."""
+"""Sums over the nodes that ranks share, for any ranks with contacts and any ranks that hold a node."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,8 @@ NODES, RANKS = 400, 4
 
 
 def scene(seed: int) -> tuple["np.ndarray", "np.ndarray", "np.ndarray"]:
-    """(ranks, nodes) which rank may push or holds a node, which holds it, and which pushes it in this step."""
+    """(ranks, nodes) ranks that may have a contact of a node or hold it, that hold it, and that have a contact in
+    this step."""
     draw = np.random.default_rng(seed)
     held = draw.uniform(size=(RANKS, NODES)) < 0.3
     known = held | (draw.uniform(size=(RANKS, NODES)) < 0.4)
@@ -23,14 +24,14 @@ def scene(seed: int) -> tuple["np.ndarray", "np.ndarray", "np.ndarray"]:
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_who_pushes_or_holds_a_node_has_the_sum_of_all_and_nothing_else_is_sent(seed: int) -> None:
+def test_ranks_that_need_a_sum_have_it_and_nothing_else_is_sent(seed: int) -> None:
     known, held, pushed = scene(seed)
     given = np.random.default_rng(seed + 10).integers(-(2**40), 2**40, (RANKS, NODES, 3)) * pushed[:, :, None]
 
     def rank(comm: Comm) -> tuple["np.ndarray", int]:
         me = comm.rank
         slots = np.random.default_rng(me).permutation(NODES).astype(np.int32)
-        """Of each node: every rank numbers them in its own way."""
+        """Numbers of each node: every rank numbers them in its own way."""
         both = [np.flatnonzero(known[me] & known[other]) for other in range(RANKS)]
         company = SharedSums([Neighbour(k, slots[both[k]]) for k in range(RANKS) if k != me], comm)
         local = np.full(NODES, -1, np.int32)
@@ -64,7 +65,7 @@ def test_who_pushes_or_holds_a_node_has_the_sum_of_all_and_nothing_else_is_sent(
 
 
 def _concerned(known: "np.ndarray", held: "np.ndarray", pushed: "np.ndarray", me: int) -> "np.ndarray":
-    """(nodes,) of which this rank sends or receives sums."""
+    """(nodes,) nodes of which this rank sends or receives sums."""
     concerned = np.zeros(NODES, bool)
     for other in range(RANKS):
         if other != me:

@@ -1,4 +1,4 @@
-"""The kernels of the impulse solver against plain Python that reads as the formula, to the last bit."""
+"""Kernels of the impulse solver compared with plain Python that reads like the formula, to the last bit."""
 
 import numpy as np
 import pytest
@@ -14,8 +14,8 @@ _QUANTA, _SCALE = 2.0**30, 2.0**40
 
 
 def scene(seed: int) -> tuple[ContactRows, Floats, Floats]:
-    """Nodes on faces, edges and cracks, most without friction and some held, in a cloud that hardly closes: half of the
-    contacts are idle at first, and some of them are woken by others.
+    """Nodes on faces, edges and cracks, most without friction and some held, in a cloud that hardly closes: half of
+    the contacts are idle at first, and some of them are loaded later.
     """
     random = np.random.default_rng(seed)
     rows = np.array([random.choice(NODES, 4, replace=False) for _ in range(CONTACTS)], np.int32)
@@ -34,7 +34,7 @@ def scene(seed: int) -> tuple[ContactRows, Floats, Floats]:
 
 
 class Plain:
-    """Every contact in every sweep."""
+    """Sweeps of every contact."""
 
     def __init__(self, met: ContactRows, v: Floats, mobility: Floats) -> None:
         self.met, self.v, self.mobility = met, v.copy(), mobility
@@ -69,7 +69,7 @@ class Plain:
         self.v = np.where(impulse != 0, self.v + impulse * (self.mobility / _SCALE), self.v)
 
     def resume(self, kept: Kept, ratio: float) -> None:
-        """Begins with what is kept of pairs and cracks."""
+        """Warm start from the stored impulses of pairs and cracks."""
         met, changes = self.met, np.zeros((CONTACTS, 3))
         for p in np.flatnonzero(met.pair != -1):
             share, last = (0.8, kept.pairs[p]) if met.pair[p] >= 0 else (1.0, kept.cracks[p])
@@ -80,7 +80,7 @@ class Plain:
         self.give(changes)
 
     def sweep(self, ahead: float = 0.0) -> None:
-        """One sweep, of whose changes along the normals as much again as ``ahead`` says is done at once."""
+        """One sweep; the changes along the normals are extrapolated by the factor ``ahead``."""
         self.give(np.array([self.change(p, ahead) for p in range(CONTACTS)]))
 
     def change(self, p: int, ahead: float) -> Floats:
@@ -111,7 +111,7 @@ def _dot(a: Floats, b: Floats) -> float:
 @pytest.mark.parametrize("resumed", [False, True])
 @pytest.mark.parametrize("seed", range(12))
 def test_kernels_have_the_bits_of_the_formula(seed: int, resumed: bool) -> None:
-    """Idle contacts are passed over and cracks have two nodes: without a change of any bit."""
+    """Idle contacts are skipped and cracks have two nodes: without a change of any bit."""
     met, v, mobility = scene(seed)
     plain, solver = Plain(met, v, mobility), Solver(met, v, mobility, _SCALE)
     if resumed:
@@ -140,7 +140,7 @@ def test_a_step_has_the_bits_of_sweeps_with_momentum(seed: int) -> None:
         assert (solver.push == plain.push).all()
 
 
-def test_idle_contacts_are_passed_over_until_others_wake_them() -> None:
+def test_idle_contacts_are_skipped_until_others_load_them() -> None:
     """The scenes of the test above have both."""
     idle = np.array([[CONTACTS - len(rows) for rows in loaded(seed)] for seed in range(12)])
     assert (idle[:, -1] > 0).all()
@@ -148,7 +148,7 @@ def test_idle_contacts_are_passed_over_until_others_wake_them() -> None:
 
 
 def loaded(seed: int) -> list["np.ndarray"]:
-    """Which contacts have asked for an impulse, after every sweep."""
+    """Contacts that have asked for an impulse, after every sweep."""
     solver, rows = Solver(*scene(seed), _SCALE), []
     for _ in range(SWEEPS):
         solver.sweep()
@@ -157,7 +157,7 @@ def loaded(seed: int) -> list["np.ndarray"]:
 
 
 def test_slots_are_used_again() -> None:
-    """A second step with the same arrays, and other nodes, is as the first with its own."""
+    """A second step with the same arrays, and other nodes, gives the result of new arrays."""
     first, second = scene(1), scene(2)
     alone, solver = Solver(*second, _SCALE), Solver(*first, _SCALE)
     solver.sweep(SWEEPS)

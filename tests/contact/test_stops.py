@@ -1,4 +1,4 @@
-"""Walls and planes of symmetry within the sweeps: contact knows that what they hold gives no way."""
+"""Walls and planes of symmetry within the sweeps: nodes that they hold do not yield."""
 
 import numpy as np
 import pytest
@@ -22,7 +22,7 @@ def wall(normal: Floats, side: float = 1.0, at: float = 0.0, friction: float = 0
 
 
 def pressed(stops: Stops, speed: float = 1.0, n: int = 3, mobility: Floats | None = None) -> Solver:
-    """A row of nodes in touch along x, of which the last one runs towards the first, and that one at the wall."""
+    """A row of nodes in touch along x; the last one moves towards the first, which is at the wall."""
     v = np.zeros((n, 3))
     v[-1, 0] = -speed
     solver = Solver(column(n), v, np.ones((n, 3)) if mobility is None else mobility, stops=stops)
@@ -31,8 +31,8 @@ def pressed(stops: Stops, speed: float = 1.0, n: int = 3, mobility: Floats | Non
 
 
 @pytest.mark.parametrize("stops", [wall(np.array([2.0, 0.0, 0.0])), wall(np.array([-1.0, 0.0, 0.0]), side=-1.0)])
-def test_what_is_pressed_on_a_wall_has_no_way_to_give(stops: Stops) -> None:
-    """The impulse of the last goes through all of them into the wall, which is yet to give it back to the first."""
+def test_a_node_between_a_wall_and_a_body_does_not_yield(stops: Stops) -> None:
+    """The impulse of the last passes through all of them into the wall, which returns it to the first afterwards."""
     v = pressed(stops).v
     assert v[:, 0] == pytest.approx([-1.0, 0.0, 0.0], abs=5e-3)
     assert (v[:, 1:] == 0.0).all()
@@ -44,22 +44,22 @@ def test_without_a_wall_they_share_the_impulse() -> None:
 
 
 def test_a_wall_does_not_pull() -> None:
-    """What leaves it, or is as far from it as it goes in the step, is let alone."""
+    """A node that moves away from it, or is further from it than its motion in the step, is not changed."""
     assert pressed(wall(np.array([1.0, 0.0, 0.0])), speed=-1.0).v[:, 0].tolist() == [0.0, 0.0, 1.0]
     away = wall(np.array([1.0, 0.0, 0.0]), at=-0.2)
     assert pressed(away, speed=0.3).v[:, 0] == pytest.approx([-0.1] * 3, abs=1e-4)
 
 
 def test_a_slanted_wall_stops_along_what_is_free() -> None:
-    """A node that a plane of symmetry holds along y is pushed along x alone: it stops there."""
+    """A node that a plane of symmetry holds along y gets an impulse along x only: it stops there."""
     mobility = np.ones((3, 3))
     mobility[0, 1] = 0.0
     v = pressed(wall(np.array([1.0, 1.0, 0.0])), mobility=mobility).v
     assert v[:, 0] == pytest.approx([-1.0, 0.0, 0.0], abs=5e-3)
 
 
-def test_a_stop_that_pushed_too_much_takes_it_back() -> None:
-    """The first node flies at the wall, and a contact takes it away again, faster than the wall has to stop it."""
+def test_a_stop_reduces_an_impulse_that_was_too_large() -> None:
+    """The first node moves to the wall, and a contact moves it away again, faster than the wall has to stop it."""
     v = np.array([[-1.0, 0.0, 0.0], [3.0, 0.0, 0.0]])
     solver = Solver(column(2), v, np.ones((2, 3)), stops=wall(np.array([1.0, 0.0, 0.0])))
     solver.step(60)
@@ -73,7 +73,8 @@ def test_a_stop_that_pushed_too_much_takes_it_back() -> None:
 
 @pytest.mark.parametrize(("friction", "left"), [(0.0, 0.5), (0.2, 0.4), (0.6, 0.2), (2.0, 0.0)])
 def test_friction_at_a_wall_takes_what_its_push_allows(friction: float, left: float) -> None:
-    """Of a node that another presses at the wall, both with 0.5 m/s along it; the other sticks to it and tells."""
+    """A node that another presses on the wall, both with 0.5 m/s along it; the other sticks to it, so that its
+    velocity shows the friction."""
     v = np.array([[0.0, 0.5, 0.0], [-1.0, 0.5, 0.0]])
     met = column(2)._replace(friction=np.full(1, 10.0))
     solver = Solver(met, v, np.ones((2, 3)), stops=wall(np.array([1.0, 0.0, 0.0]), friction=friction))
@@ -81,7 +82,7 @@ def test_friction_at_a_wall_takes_what_its_push_allows(friction: float, left: fl
 
 
 def test_walls_and_planes_hold_the_parts_that_they_name_on_their_side() -> None:
-    """Bodies above and below a plane, and one in two pieces on both sides of it, which sweeps leave to the plane."""
+    """Bodies above and below a plane, and one in two pieces on both sides of it, which is left to the boundary."""
     both = TetMesh(
         np.concatenate([CUBE.points, CUBE.points - [0.0, 0.0, 3.0]]),
         np.concatenate([CUBE.tets, CUBE.tets + len(CUBE.points)]),

@@ -1,4 +1,4 @@
-"""The surface: every exposed face once, outward; every edge, and which are sharp: where faces meet at an angle."""
+"""The surface: every exposed face once, outward; every edge, and the sharp ones: where faces enclose an angle."""
 
 from collections import Counter
 from typing import NamedTuple
@@ -117,7 +117,7 @@ def test_nodes_of_the_skin_and_no_others_are_flagged() -> None:
 
 
 def test_sharp_edges_of_a_box_are_its_twelve_edges() -> None:
-    """Subdivided by the mesh; diagonals of its flat faces are none."""
+    """Subdivided by the mesh; diagonals of its flat faces are not sharp."""
     found, model = whole(shuffled(block(CELLS, SIZE), 4))
     x, edges = model.nodes.x0, sharp_ones(found)
     assert found.edges.n == 1.5 * found.faces.n
@@ -164,7 +164,7 @@ def test_a_symmetry_plane_has_neither_faces_nor_edges(planes: list[int], edges: 
     assert found.flags.any()
 
 
-def test_no_edges_are_looked_for_when_none_are_wanted() -> None:
+def test_without_edge_contact_there_are_no_edges() -> None:
     found, _ = whole(block(CELLS, SIZE), edges=False)
     assert found.edges.n == len(found.far) == len(found.far_owner) == 0
 
@@ -199,7 +199,7 @@ def test_far_nodes_are_those_of_its_edges_that_a_rank_does_not_hold(ranks: int) 
 
 
 def test_concave_edges_belong_to_the_list_too() -> None:
-    """They are sharp; which way they point is for the meetings to say."""
+    """Concave edges are sharp; whether an edge is convex is tested by the narrow phase."""
     found, model = whole(cubes(CUBES[3]))
     edges = sharp_ones(found)
     inner = (model.nodes.x0[edges.nodes[:, :2]][..., :2] == 1.0).all(axis=(1, 2))

@@ -1,4 +1,4 @@
-"""How many sweeps a step gets: by what the last one of the step before has changed."""
+"""Adaptive sweep count: by the change of the last sweep of the previous step."""
 
 import numpy as np
 import pytest
@@ -11,8 +11,8 @@ from .kernels import Solver, column
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_what_is_unsettled_is_what_the_last_sweep_has_changed(seed: int) -> None:
-    """Two plain sweeps, in units of 2^16 quanta, which every node is rounded down to."""
+def test_the_residual_is_the_change_by_the_last_sweep(seed: int) -> None:
+    """Two plain sweeps, in units of 2^16 quanta, to which every node is rounded down."""
     v = np.random.default_rng(seed).normal(size=(20, 3))
     solver = Solver(column(20), v, np.ones((20, 3)))
     solver.sweep()
@@ -25,7 +25,7 @@ def test_what_is_unsettled_is_what_the_last_sweep_has_changed(seed: int) -> None
 
 
 def share(links: int, sweeps: int) -> float:
-    """What the last of so many sweeps changes, when one end of a row of nodes in touch runs into the others."""
+    """Change by the last of so many sweeps, when one end of a row of nodes in touch runs into the others."""
     v = np.zeros((links, 3))
     v[0, 0] = 1.0
     solver = Solver(column(links), v, np.ones((links, 3)))
@@ -40,7 +40,7 @@ def test_a_long_row_needs_more_sweeps() -> None:
 
 
 def steps(need: SweepCount, shares: Floats) -> list[int]:
-    """Sweeps after steps that were unsettled by these shares."""
+    """Sweep counts after steps with these residuals."""
     found = []
     for one in shares:
         need.agree(np.array([round(1e6 * one), 1_000_000]))
@@ -48,8 +48,8 @@ def steps(need: SweepCount, shares: Floats) -> list[int]:
     return found
 
 
-def test_sweeps_follow_what_is_unsettled() -> None:
-    """Up by a quarter, at least by one, down by one, and not beyond the bounds; without an impulse as they were."""
+def test_the_sweep_count_follows_the_residual() -> None:
+    """Up by a quarter, at least by one, down by one, and within the bounds; unchanged without an impulse."""
     need = SweepCount(Sweeps(5, 12))
     assert need.sweeps == 5
     assert steps(need, np.full(6, 0.002)) == [6, 7, 8, 10, 12, 12]
@@ -63,8 +63,8 @@ def test_a_number_that_is_given_stays() -> None:
     assert steps(SweepCount(Sweeps(3, 3)), np.array([0.5, 0.5, 0.0001])) == [3, 3, 3]
 
 
-def test_a_run_tells_if_sweeps_have_left_too_much() -> None:
-    """Of all impulses, so that a first step or a weak one says nothing; what goes on knows all of it."""
+def test_a_run_warns_if_the_residual_is_too_large() -> None:
+    """Relative to all impulses of the run, so that a first or weak step has no effect; a restart keeps the sums."""
     few, own = SweepCount(Sweeps(5, 5)), SweepCount(Sweeps(5, 40))
     for need in (few, own):
         need.agree(np.array([9, 10]))

@@ -1,4 +1,4 @@
-"""Sweeps: exact for one meeting, never too much for many, blind to their order, and no impulse is lost or made."""
+"""Sweeps: exact for one contact, no overshoot for many, independent of their order, and no impulse is lost or added."""
 
 import numpy as np
 import pytest
@@ -13,18 +13,18 @@ SEEDS = range(40)
 
 
 def energy(v: Floats, mobility: Floats) -> float:
-    """Kinetic, J, of what can move."""
+    """Kinetic energy, J, of the components that can move."""
     mass = np.divide(1.0, mobility, out=np.zeros_like(mobility), where=mobility > 0.0)
     return float(0.5 * (mass * v * v).sum())
 
 
 def rates(met: ContactRows, v: Floats) -> Floats:
-    """(n, 3) relative velocity at each meeting."""
+    """(n, 3) relative velocity at each contact."""
     return np.asarray(np.einsum("pk,pki->pi", met.weights, v[met.nodes]))
 
 
 def speeds(met: ContactRows, v: Floats) -> Floats:
-    """(n,) along the normals."""
+    """(n,) relative velocity along the normals."""
     return np.asarray((rates(met, v) * met.normals).sum(axis=1))
 
 
@@ -51,14 +51,14 @@ def dense(met: ContactRows, v: Floats, mobility: Floats) -> Floats:
 
 
 def alone(seed: int, friction: float = 0.0) -> tuple[ContactRows, Floats, Floats]:
-    """One meeting of a random network, turned so that it must push."""
+    """One contact of a random network, oriented so that it needs an impulse."""
     met, v, mobility = network(seed, 1, 4, friction)
     v *= np.sign(-speeds(met, v)[0])
     return met, v, mobility
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_one_meeting_is_solved_in_one_sweep(seed: int) -> None:
+def test_one_contact_is_solved_in_one_sweep(seed: int) -> None:
     """Any masses and weights; some components held."""
     met, v, mobility = alone(seed)
     random = np.random.default_rng(seed)
@@ -83,8 +83,8 @@ def test_impulses_add_up_to_exactly_nothing_and_act_along_the_normals(seed: int)
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_a_meeting_never_pulls(seed: int) -> None:
-    """Not after any sweep; and one that separates by itself is left alone, to the bit."""
+def test_a_contact_never_pulls(seed: int) -> None:
+    """After any sweep; and a contact that opens by itself is not changed, to the bit."""
     met, v, mobility = network(seed, wanted=20.0, friction=0.4)
     solver = Solver(met, v, mobility)
     for _ in range(20):
@@ -95,8 +95,9 @@ def test_a_meeting_never_pulls(seed: int) -> None:
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_a_push_that_was_too_much_is_taken_back(seed: int) -> None:
-    """The sum over the sweeps cannot be negative, a sweep can: at the end no meeting pushes that has opened."""
+def test_an_impulse_that_was_too_large_is_reduced(seed: int) -> None:
+    """The sum over the sweeps cannot be negative, the change of a sweep can: at the end no open contact has an
+    impulse."""
     met, v, mobility = network(seed)
     solver = Solver(met, v, mobility)
     solver.sweep(4000)
@@ -108,7 +109,8 @@ def test_a_push_that_was_too_much_is_taken_back(seed: int) -> None:
 @pytest.mark.parametrize("wanted", [0.0, 10.0])
 @pytest.mark.parametrize("seed", SEEDS)
 def test_kinetic_energy_never_rises_where_nothing_overlaps(seed: int, wanted: float) -> None:
-    """After no number of sweeps; components held at rest included. Where nothing moves away, from sweep to sweep."""
+    """After any number of sweeps; also with components held at rest. Where nothing is prescribed to move, from sweep
+    to sweep."""
     met, v, mobility = network(seed, wanted=wanted)
     mobility *= np.random.default_rng(seed).uniform(size=mobility.shape) > 0.1
     v[mobility == 0.0] = 0.0
@@ -125,7 +127,7 @@ def test_kinetic_energy_never_rises_where_nothing_overlaps(seed: int, wanted: fl
 @pytest.mark.parametrize("held", [0.0, 0.2])
 @pytest.mark.parametrize("friction", [0.1, 0.5, 2.0])
 def test_kinetic_energy_never_rises_with_friction(friction: float, held: float, along_axes: bool) -> None:
-    """Also where the friction of one meeting acts along the normal of the next."""
+    """Also where the friction of one contact acts along the normal of the next."""
     worst = 0.0
     for seed in range(60):
         met, v, mobility = network(seed, friction=friction)
@@ -140,7 +142,7 @@ def test_kinetic_energy_never_rises_with_friction(friction: float, held: float, 
 
 @pytest.mark.parametrize("friction", [0.0, 0.1, 0.5, 2.0])
 def test_kinetic_energy_never_rises_in_a_step(friction: float) -> None:
-    """Whatever the number of its sweeps, which have momentum."""
+    """Any number of sweeps, with momentum."""
     worst = 0.0
     for seed in range(40):
         met, v, mobility = network(seed, friction=friction, wanted=5.0 if seed % 2 else 0.0)
@@ -153,7 +155,7 @@ def test_kinetic_energy_never_rises_in_a_step(friction: float) -> None:
 
 @pytest.mark.parametrize(("many", "plain"), [(10, 20), (20, 60)])
 def test_momentum_does_what_many_more_plain_sweeps_do(many: int, plain: int) -> None:
-    """Ten contacts at a node: what is left of the error, in the norm of the kinetic energy."""
+    """Ten contacts at a node: the remaining error, in the norm of the kinetic energy."""
     left = np.zeros(2)
     for seed in range(10):
         met, v, mobility = network(seed, meetings=60)
@@ -165,7 +167,7 @@ def test_momentum_does_what_many_more_plain_sweeps_do(many: int, plain: int) -> 
 
 @pytest.mark.parametrize("friction", [0.0, 0.5])
 @pytest.mark.parametrize("seed", SEEDS)
-def test_the_order_of_meetings_changes_no_bit(seed: int, friction: float) -> None:
+def test_the_order_of_contacts_changes_no_bit(seed: int, friction: float) -> None:
     met, v, mobility = network(seed, friction=friction)
     order = np.random.default_rng(seed).permutation(many(met))
     other = taken(met, order)
@@ -237,8 +239,8 @@ def test_friction_is_bounded_by_mu_times_the_normal_impulse(mu: float) -> None:
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_one_meeting_sticks_when_it_can_and_slides_when_it_must(seed: int) -> None:
-    """Sticks: no relative velocity is left. Slides: against the motion, with mu times the normal impulse."""
+def test_one_contact_sticks_when_it_can_and_slides_when_it_must(seed: int) -> None:
+    """Sticks: no relative velocity remains. Slides: against the motion, with mu times the normal impulse."""
     met, v, mobility = alone(seed)
     met.friction[:] = 1e3
     assert np.abs(rates(met, Solver(met, v, mobility).sweep(1))).max() < 1e-7
@@ -253,8 +255,8 @@ def test_one_meeting_sticks_when_it_can_and_slides_when_it_must(seed: int) -> No
 
 
 @pytest.mark.parametrize("seed", range(10))
-def test_friction_knows_no_direction(seed: int) -> None:
-    """Turned together, nodes push as they did."""
+def test_friction_is_isotropic(seed: int) -> None:
+    """Rotated as a whole, nodes get the rotated impulses."""
     met, v, mobility = alone(seed, friction=0.4)
     turn = rotation(unit(np.random.default_rng(seed), 1)[0], 1.0)
     before = Solver(met, v, mobility).sweep(3)
@@ -265,7 +267,7 @@ def test_friction_knows_no_direction(seed: int) -> None:
 @pytest.mark.parametrize("mu", [0.0, 0.2, 50.0])
 @pytest.mark.parametrize("seed", SEEDS)
 def test_energy_lost_is_friction_heat_and_the_work_of_the_normal_impulse(seed: int, mu: float) -> None:
-    """Of one meeting: -1/2 push (speed before + speed after), and neither is negative."""
+    """Of one contact: -1/2 push (speed before + speed after), and neither is negative."""
     met, v, mobility = alone(seed, friction=mu)
     solver = Solver(met, v, mobility)
     after = solver.sweep(4)
@@ -280,7 +282,7 @@ def test_energy_lost_is_friction_heat_and_the_work_of_the_normal_impulse(seed: i
 
 @pytest.mark.parametrize(("cracks", "share"), [(False, 0.8), (True, 1.0)])
 def test_a_step_begins_with_the_impulses_of_the_one_before(cracks: bool, share: float) -> None:
-    """Friction whole, across the normal as it is now, and the push along it in part, or of cracks whole."""
+    """Friction whole, across the present normal, and the normal impulse in part, or for cracks whole."""
     met, v, mobility = network(7, friction=0.4)
     if cracks:
         met.nodes[:, 2:], met.weights[:] = met.nodes[:, 1:2], (1.0, -1.0, 0.0, 0.0)
@@ -295,7 +297,7 @@ def test_a_step_begins_with_the_impulses_of_the_one_before(cracks: bool, share: 
 
 
 def test_a_node_that_has_become_lighter_begins_with_less() -> None:
-    """With as much speed as before: an eighth of the mass on either side, an eighth of the impulse."""
+    """With the same speed as before: an eighth of the mass on either side, an eighth of the impulse."""
     met, v, mobility = network(7, friction=0.4)
     heavy, same, light = Solver(met, v, mobility), Solver(met, v, mobility), Solver(met, v, 8.0 * mobility)
     heavy.sweep(2000)

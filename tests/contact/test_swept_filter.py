@@ -1,4 +1,4 @@
-"""Sifted pairs: what goes does not come near on the way, and most of what stays away goes."""
+"""Swept filter: removed pairs do not come near during the horizon, and most pairs that stay away are removed."""
 
 import numpy as np
 import pytest
@@ -14,8 +14,8 @@ TIMES = np.linspace(0.0, HORIZON, 41)
 
 
 def flights(seed: int, many: int, turn: float) -> tuple[Floats, Floats]:
-    """(pairs, 2, many, 3) positions and velocities of two things of ``many`` corners about 1 m long: each flies about
-    its length and turns by about ``turn``, rad.
+    """(pairs, 2, many, 3) positions and velocities of two things of ``many`` corners about 1 m long: each moves by
+    about its length and rotates by about ``turn``, rad.
     """
     draw = np.random.default_rng(seed)
     shape = draw.normal(size=(PAIRS, 2, many, 3))
@@ -28,7 +28,7 @@ def flights(seed: int, many: int, turn: float) -> tuple[Floats, Floats]:
 
 
 def wrong_edges(seed: int, turn: float) -> tuple[int, float]:
-    """How many pairs of edges go that come nearer than half the skin, and the share that goes."""
+    """Number of removed pairs of edges that come nearer than half the skin, and the removed share."""
     x, v = flights(seed, 2, turn)
     ends = np.arange(4 * PAIRS, dtype=np.int32).reshape(-1, 2)
     pairs = np.arange(2 * PAIRS, dtype=np.int32).reshape(-1, 2)
@@ -44,14 +44,14 @@ def wrong_edges(seed: int, turn: float) -> tuple[int, float]:
 
 
 @pytest.mark.parametrize("turn", [0.0, 0.1, 0.5, 1.0])
-def test_no_edges_go_that_come_near_on_the_way(turn: float) -> None:
+def test_no_edges_are_removed_that_come_near(turn: float) -> None:
     wrong, share = wrong_edges(1, turn)
     assert share > 0.3
     assert wrong == 0
 
 
 def wrong_faces(seed: int, turn: float) -> tuple[int, float]:
-    """The same of nodes and faces."""
+    """The same for nodes and faces."""
     x, v = flights(seed, 3, turn)
     corners = np.arange(6 * PAIRS, dtype=np.int32).reshape(PAIRS, 2, 3)
     faces = np.column_stack([corners[:, 1], corners[:, 1, :1]]).astype(np.int32)
@@ -66,14 +66,14 @@ def wrong_faces(seed: int, turn: float) -> tuple[int, float]:
 
 
 @pytest.mark.parametrize("turn", [0.0, 0.1, 0.5, 1.0])
-def test_no_node_goes_that_comes_near_a_face_on_the_way(turn: float) -> None:
+def test_no_node_is_removed_that_comes_near_a_face(turn: float) -> None:
     wrong, share = wrong_faces(1, turn)
     assert share > 0.3
     assert wrong == 0
 
 
-def test_edges_that_turn_into_each_other_and_away_again_do_not_go() -> None:
-    """They are 0.13 m apart after a twelfth of the way; the place of the crossing is beyond an end at beginning, middle
+def test_edges_that_come_near_between_two_moments_are_not_removed() -> None:
+    """The edges are 0.13 m apart after a twelfth of the horizon; the crossing is beyond an end at beginning, middle
     and end.
     """
     x = np.array([[-1.0, 1.175, -1.896], [-0.046, 0.775, -0.536], [0.263, 1.232, -0.359], [-0.201, 1.28, -0.777]])

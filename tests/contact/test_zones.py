@@ -1,4 +1,5 @@
-"""Zones: boxes with about as many nodes each; and a step by many threads is that by one, to the bit."""
+"""Zones of the surface nodes: boxes with about as many nodes; and a step on many threads equals that on one, to the
+bit."""
 
 from itertools import pairwise
 from types import SimpleNamespace
@@ -16,7 +17,7 @@ from .kernels import Solver, network
 
 
 def nodes_of(x: "np.ndarray") -> Any:
-    """What zones ask of a surface_nodes."""
+    """Surface nodes as zones read them."""
     return SimpleNamespace(x=x, n=len(x))
 
 
@@ -70,7 +71,7 @@ def test_sets_of_one_colour_share_no_node() -> None:
 @pytest.mark.parametrize("threads", [2, 5])
 @pytest.mark.parametrize("seed", range(3))
 def test_impulses_of_many_threads_are_those_of_one(threads: int, seed: int) -> None:
-    """Of contacts within zones and across them, with friction and with impulses that were kept."""
+    """Of contacts within zones and across them, with friction and with stored impulses."""
     met, v, mobility = network(seed, friction=0.3)
     ends = []
     for many in (1, threads):

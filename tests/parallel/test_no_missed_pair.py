@@ -105,7 +105,7 @@ class Brute(Found):
 
     def meet(self, now: Scene, give: float, dt: float) -> None:
         if self.sim.clock.step % EVERY == 0:
-            if self.sim.clock.step % self.contact._scheme.looks == 0:
+            if self.sim.clock.step % self.contact._scheme.interval == 0:
                 self.contact.exterior.sharpen(now, self.contact._scheme.sharp)
             sides = self._sides()
             step = self._step(sides, give, dt)

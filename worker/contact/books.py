@@ -16,8 +16,8 @@ from .scene.scene import Scene
 
 
 class Books:
-    """Sums of the energies and impulses. One half of the work of an impulse is booked in the step that applies it,
-    with v(n+1/2), and the other half in the next one, with v(n-1/2)."""
+    """Sums of the energies and impulses. One half of the work of an impulse, with v(n-1/2), is booked in the step
+    that applies it, the other half, with v(n+1/2), in the next one."""
 
     def __init__(self, nodes: int, case: Case, impulse: float, energy: float, team: Team) -> None:
         """``impulse``, N s, and ``energy``, J: upper bounds at one node in one step."""

@@ -30,7 +30,7 @@ class Exterior:
         self._model, self._neighbours, self._comm, self._edges = model, neighbours, comm, edges
         self._bounds = bounds
         self.cracks = Cracks.none(model.nodes.id)
-        self._tiring: Ints | None = None
+        self._near_erosion: Ints | None = None
         """Ids, ascending, of the local tets that the last search expected to erode; None before any tet has eroded."""
         self.surface = self._build(np.zeros(model.nodes.n, bool), np.zeros(0, np.int64))
         self.size = typical(self.surface.faces.size, comm)
@@ -87,8 +87,8 @@ class Exterior:
         """
         model, neighbours, comm = self._model, self._neighbours, self._comm
         sides, covered = self.cracks.foresee(), np.zeros((0, 3), np.int32)
-        if self._tiring is not None:
-            covered = exposure.covered(model.blocks, self._tiring, neighbours, comm)
+        if self._near_erosion is not None:
+            covered = exposure.covered(model.blocks, self._near_erosion, neighbours, comm)
         found = surface.build(model, self._planes, neighbours, comm, self._edges, sides, covered)
         found.flags[: len(flags)] |= flags
         found.sharpen(turned)
@@ -105,12 +105,12 @@ class Exterior:
         exposure.WORDS) of this rank. ``loose`` (nodes,): nodes without tets that stay in the model; ``removed``
         (nodes,): nodes that leave it. Returns whether a search must add faces that the scene lacks. Collective.
         """
-        if self._tiring is None:
-            self._tiring = np.zeros(0, np.int64)
-        known = among(self._tiring, gone[:, 0])
-        told = self._comm.join(np.column_stack([known, gone]).reshape(-1)).reshape(-1, 1 + exposure.WORDS)
-        laid = exposure.laid(told[:, 1:])
-        exposure.lay(self._model.blocks, laid.bare)
+        if self._near_erosion is None:
+            self._near_erosion = np.zeros(0, np.int64)
+        known = among(self._near_erosion, gone[:, 0])
+        received = self._comm.join(np.column_stack([known, gone]).reshape(-1)).reshape(-1, 1 + exposure.WORDS)
+        laid = exposure.exposed_by(received[:, 1:])
+        exposure.expose(self._model.blocks, laid.bare)
         flags, local = self.surface.flags, self._model.nodes.places(laid.nodes)
         flags[local[local >= 0]] = True
         flags |= loose
@@ -120,7 +120,7 @@ class Exterior:
         self.turn()
         if scene is not None:
             scene.node_face.wake()
-        if scene is None or not told[:, 0].all():
+        if scene is None or not received[:, 0].all():
             return True
         scene.uncover(laid.gone, laid.bare, scene.own.place[removed])
         self.show(scene, scene.own.local)
@@ -138,9 +138,9 @@ class Exterior:
 
     def take_up(self) -> None:
         """Builds the surface with everything that may become surface before the next search. Collective."""
-        if self._tiring is not None:
-            self._tiring = exposure.tiring(self._model.blocks)
-        if self._broken or self._tiring is not None:
+        if self._near_erosion is not None:
+            self._near_erosion = exposure.near_erosion(self._model.blocks)
+        if self._broken or self._near_erosion is not None:
             self.surface = self._build(self.surface.flags, self.surface.turned)
 
     def age(self) -> bool:
@@ -190,22 +190,22 @@ class Exterior:
         shares = normals.shares(nodes.x, sides.reshape(-1, 3), self.size).reshape(-1, 2 * normals.SHARE)
         return np.column_stack([cracks.foreseen[rows], cracks.faces[rows], nodes.id[sides], shares])
 
-    def open(self, told: Ints, scene: Scene | None) -> bool:
+    def open(self, received: Ints, scene: Scene | None) -> bool:
         """Makes surface of the cracks of all ranks, rows of ``widened``; returns whether the scene lacks any of
         them."""
-        told = told.reshape(-1, _WORDS)
-        nodes, sides = self._model.nodes, told[:, 3:9].reshape(-1, 3)
+        received = received.reshape(-1, _WORDS)
+        nodes, sides = self._model.nodes, received[:, 3:9].reshape(-1, 3)
         local = nodes.places(sides)
-        normals.add(self._moments, told[:, 9:].reshape(-1, normals.SHARE), local)
+        normals.add(self._moments, received[:, 9:].reshape(-1, normals.SHARE), local)
         local = np.unique(local[local >= 0])
         self.surface.flags[local] = True
-        faces = np.sort(told[:, 1:3].reshape(-1))
+        faces = np.sort(received[:, 1:3].reshape(-1))
         self.cracks.open(faces, self._model.blocks)
         if scene is not None:
             scene.expose(faces)
             scene.slots.fresh[self.show(scene, local)] = True
             scene.cracks = self.cracks.places
-        return bool((told[:, 0] == 0).any())
+        return bool((received[:, 0] == 0).any())
 
     def narrow(self) -> list[tuple[Block, Corners]]:
         """Blocks with broken facets, and the corners of their narrow sides; see corner_contact.py."""

@@ -30,7 +30,7 @@ def friction(case: Case) -> Floats:
     return mu
 
 
-def itself(case: Case, mu: Floats) -> Flags:
+def self_contact(case: Case, mu: Floats) -> Flags:
     """(parts,) whether each part may be in contact with itself or with another part of its body; ``mu``: result of
     ``friction``.
     """

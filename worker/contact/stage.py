@@ -26,6 +26,7 @@ from ..rigid.stage import Rigid
 from . import part_pairs
 from .books import Books
 from .broad_phase.searches import Searches
+from .effort import effort
 from .exterior import Exterior
 from .narrow_phase.detection import Ahead, Detected, Detection
 from .narrow_phase.tables import PUSH_OUT
@@ -35,10 +36,6 @@ from .solver.stops import Stops
 from .solver.sweep_count import SweepCount
 from .surface import normals, sharp
 
-_SURFACE, _LISTED, _TESTED, _ACTIVE = 9.0, 0.1, 3.0, 4.0
-"""Cost of a step for a surface node (searches and registrations, averaged), a listed pair, a tested pair or crack,
-and an active contact: 450, 3, 150 and 200 ns, from the profile of the shattering bar to 40 us on one rank, in units
-of 50 ns."""
 _FORESIGHT = 32
 """Steps between two checks of the crack widths."""
 
@@ -48,7 +45,7 @@ class _Scheme:
     """Settings of contact, constant over the run."""
 
     restitution: float
-    looks: int
+    interval: int
     """Steps between two searches for edges that became sharp."""
     sharp: Floats
     """(parts,) cosine of the angle from which on an edge is sharp."""
@@ -57,8 +54,8 @@ class _Scheme:
     def of(cls, case: Case) -> "_Scheme":
         assert case.contact is not None
         some = np.array(pressed(case))
-        looks = sharp.PRESSED if some.any() else normals.EVERY
-        return cls(case.contact.restitution, looks, np.where(some, sharp.BENT, sharp.SHARP))
+        interval = sharp.PRESSED if some.any() else normals.EVERY
+        return cls(case.contact.restitution, interval, np.where(some, sharp.BENT, sharp.SHARP))
 
 
 class Contact:
@@ -128,21 +125,9 @@ class Contact:
 
     def effort(self) -> Floats:
         """(nodes, 2) cost of contact by node on this rank, in units of 50 ns: of searches, and of the narrow phase
-        and solver."""
-        n = len(self.on_surface)
-        search, push = _SURFACE * self.on_surface, np.zeros(n)
-        if (now := self.searches.scene) is not None:
-            nodes, firsts = now.node_face.rows[:, 0], now.edges.corners[now.edge_edge.rows[:, 0], 0]
-            cracks = now.cracks[now.cracks[:, 0] >= 0, 0]
-            tested = np.concatenate([nodes[now.node_face.tested], firsts[now.edge_edge.tested], cracks])
-            for effort, weight, slots in (
-                (search, _LISTED, np.concatenate([nodes, firsts])),
-                (push, _TESTED, tested),
-                (push, _ACTIVE, now.active.nodes[:, 0]),
-            ):
-                at = now.surface_nodes.local[slots]
-                effort += weight * np.bincount(at[at >= 0], minlength=n)
-        return np.column_stack([search, push])
+        and solver.
+        """
+        return effort(self.searches.scene, self.on_surface)
 
     def impulses(self) -> Floats:
         """(parts, 3) impulses of contact on each part so far, N s. Collective."""
@@ -200,9 +185,9 @@ class Contact:
     def open_cracks(self) -> None:
         """Makes surface of the cracks that became wide. Collective."""
         with self._timers.phase("contact"):
-            told = self._comm.join(self.exterior.widened(self.found.opening))
+            received = self._comm.join(self.exterior.widened(self.found.opening))
             self.found.opening = self.found.opening[:0]
-            self.searches.due |= self.exterior.open(told, self.searches.scene)
+            self.searches.due |= self.exterior.open(received, self.searches.scene)
 
     def separate(self, split: Split) -> None:
         """Follows the separation of nodes; called on all ranks, see topology_updates.py for those that exchange
@@ -224,7 +209,7 @@ class Contact:
             self.books.book_resumed(state, self.exterior.motion.mobility)
             return
         with self._timers.phase("contact"):
-            now.look(state)
+            now.store_before(state)
             self.books.book(now, self._active.places)
             now.slots.total[:] = 0
 
@@ -295,7 +280,7 @@ class Contact:
         if step % _FORESIGHT == 0:
             self.searches.foresee()
         redraw = step % normals.EVERY == 0
-        if step % self._scheme.looks == 0:
+        if step % self._scheme.interval == 0:
             self.exterior.sharpen(now, self._scheme.sharp)
         ahead = Ahead(dt, self._clock.longest, self.exterior.size, 1.0 + self._scheme.restitution)
         self.detection.detect(now, self.exterior, self.searches.mu, give, ahead, redraw, self.found.stray)

@@ -6,7 +6,7 @@ Each task writes its rows from an offset of its own on, and their number into ``
 from ..kernels.jit import njit, types
 from ..parallel.arguments import reader
 from ..parallel.team import TASK
-from .narrow_phase import closing_speed, corner_contact, cracks, edge_edge, node_face
+from .narrow_phase import closing_speed, corner_contact, crack_contact, edge_edge, node_face
 from .narrow_phase.corner_contact import NARROW
 from .narrow_phase.tables import CONTACT_ROWS, EDGES, FACES, PAIRS, SLOTS, STEP
 from .solver import impulse_work, loading, restitution, slot_numbers, stops, sweeps
@@ -78,10 +78,10 @@ def edge_edge_pairs(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def across_cracks(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``cracks.across``."""
+    """``crack_contact.across``."""
     out, base, opening, some, typical, step, counts, wide = _across(table)
     k = first // CRACKS_OF_A_TASK
-    counts[k], wide[k] = cracks.across(out, base, opening, some, typical, step, first, stop)
+    counts[k], wide[k] = crack_contact.across(out, base, opening, some, typical, step, first, stop)
 
 
 @njit(TASK, cache=True)

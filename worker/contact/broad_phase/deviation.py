@@ -1,4 +1,4 @@
-"""How far slots, faces and edges leave their reference motions in a step: passes that the threads of a rank share."""
+"""Distances of slots, faces and edges from their reference motions in a step: passes of the threads of a rank."""
 
 import numpy as np
 
@@ -36,7 +36,7 @@ def _corners(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 
 class Deviation:
-    """Measures it for the scenes of a rank, one after the other."""
+    """Passes over the slots, faces and edges of the scenes of a rank."""
 
     def __init__(self, team: Team) -> None:
         self._slots = Pass(team, _slots, *_LEAVE, size=_SLOTS)
@@ -46,9 +46,9 @@ class Deviation:
     def measure(
         self, motion: ReferenceMotion, x: Floats, v: Floats, faces: Indices, edges: Indices, tracked: Flags
     ) -> float:  # fmt: skip
-        """Set how far slots at ``x`` (slots, 3) with velocities before contact ``v`` (slots, 3), and what has them as
-        corners, leave their lines in the step and ``motion.beyond``; return the most of any of ``tracked`` (slots,)
-        from the line that is searched, m.
+        """Sets the distances of the slots at ``x`` (slots, 3), with velocities before contact ``v`` (slots, 3), and
+        of the faces and edges at them, from their lines in the step and ``motion.beyond``. Returns the largest
+        distance of ``tracked`` (slots,) ones from their lines of the search, m.
         """
         n, dt, searched, short = len(x), motion.end - motion.t + motion.beyond, motion.searched, motion.short
         most = self._scratch.of("most", self._slots.many(n), np.float64)

@@ -119,8 +119,8 @@ class ReferenceMotion:
 
 @njit(f"void({_V1}, {_V2}, {_V2}, {_V2}, {_V2}, float64, float64, int64, int64)", cache=True)
 def leave(left, line, course, x, v, t, dt, first, stop):  # type: ignore[no-untyped-def]
-    """How far the slots from ``first`` to ``stop`` leave their lines in a step ``dt`` from ``t`` on: positions ``x``
-    and velocities ``v`` before contact, (slots, 3) each.
+    """Sets the distances of the slots from ``first`` to ``stop`` from their lines in a step ``dt`` from ``t`` on:
+    positions ``x`` and velocities ``v`` before contact, (slots, 3) each.
     """
     for a in range(first, stop):
         now, then = 0.0, 0.0
@@ -134,7 +134,7 @@ def leave(left, line, course, x, v, t, dt, first, stop):  # type: ignore[no-unty
 
 @njit(f"float64({_V1}, boolean[::1], int64, int64)", cache=True)
 def farthest(left, some, first, stop):  # type: ignore[no-untyped-def]
-    """The largest of what ``some`` (slots,) of the slots from ``first`` to ``stop`` leave their lines, m."""
+    """Largest distance of ``some`` (slots,) of the slots from ``first`` to ``stop`` from their lines, m."""
     most = 0.0
     for a in range(first, stop):
         most = max(most, left[a] if some[a] else 0.0)
@@ -143,7 +143,8 @@ def farthest(left, some, first, stop):  # type: ignore[no-untyped-def]
 
 @njit(f"void({_V1}, {_N2}, int64, {_V1}, int64, int64)", cache=True)
 def largest(out, corners, many, left, first, stop):  # type: ignore[no-untyped-def]
-    """The largest of what the first ``many`` corners of the rows from ``first`` to ``stop`` leave their lines."""
+    """Sets the largest distance of the first ``many`` corners of each row from ``first`` to ``stop`` from their
+    lines."""
     for f in range(first, stop):
         most = 0.0
         for k in range(many):

@@ -218,9 +218,15 @@ def _meet(small, large, i, j):  # type: ignore[no-untyped-def]
 def _ask(out, n, asked, table, small, large, part, allowed):  # type: ignore[no-untyped-def]
     """Finds the small primitives near each large one in the buckets that its box touches.
 
-    A pair counts only in the cell that contains the lowest corner of the intersection of its two boxes, and so once.
     On entry ``out`` has ``n`` pairs, and ``asked`` large primitives are finished; returns both anew, when all are
-    finished or ``out`` is full.
+    finished or ``out`` is full. Conditions of a pair, numbered at the ends of lines:
+
+        +-----------+          1. The entry has the code of the cell, not only its hash.
+        |     +-----|----+     2. The two boxes overlap.
+        |     |     |    |     3. The cell contains the lowest corner, x, of the intersection of the boxes: a pair is
+        |     x-----+    |        found in one cell only.
+        +-----+----------+     4. The small primitive has the lower rank.
+                               5. Their parts may be in contact, and they have no common corner.
     """
     few_low, few_high, box_low, box_high = small.low, small.high, large.low, large.high
     few, many, rank, order = small.corners, large.corners, small.rank, large.rank
@@ -229,12 +235,12 @@ def _ask(out, n, asked, table, small, large, part, allowed):  # type: ignore[no-
     every, others = small.some, large.some
     first, last = np.empty(3, np.int64), np.empty(3, np.int64)
     for at in range(asked, len(others)):
-        before, cells = n, 1
+        before, cells = n, 1  # the cells of its box
         for i in range(3):
             first[i] = bucket_of(box_low[at, i], origin[i], inverse, shape[i])
             last[i] = bucket_of(box_high[at, i], origin[i], inverse, shape[i])
             cells *= last[i] - first[i] + 1
-        alone = cells > len(every)
+        alone = cells > len(every)  # a box of so many cells is compared with every small primitive
         if alone:
             last[:] = first
         for z in range(first[2], last[2] + 1):
@@ -246,22 +252,22 @@ def _ask(out, n, asked, table, small, large, part, allowed):  # type: ignore[no-
                         bucket = bucket_at(code, bits)
                         begin, end = np.int64(start[bucket]), np.int64(start[bucket + 1])
                     apart = end - begin
-                    if x == first[0] and y == first[1] and z == first[2]:
+                    if x == first[0] and y == first[1] and z == first[2]:  # once: boxes without entries
                         end += len(every) if alone else len(wide)
                     for p in range(begin, end):
                         if p - begin < apart:
-                            if codes[p] != code:
+                            if codes[p] != code:  # 1
                                 continue
                             b = things[p]
                         else:
                             b = p - begin if alone else wide[p - begin - apart]
-                        if few_low[b, 0] > box_high[at, 0] or few_low[b, 1] > box_high[at, 1]:
+                        if few_low[b, 0] > box_high[at, 0] or few_low[b, 1] > box_high[at, 1]:  # 2
                             continue
                         if few_low[b, 2] > box_high[at, 2] or few_high[b, 0] < box_low[at, 0]:
                             continue
                         if few_high[b, 1] < box_low[at, 1] or few_high[b, 2] < box_low[at, 2]:
                             continue
-                        if p - begin < apart:
+                        if p - begin < apart:  # 3
                             if bucket_of(max(few_low[b, 0], box_low[at, 0]), origin[0], inverse, shape[0]) != x:
                                 continue
                             if bucket_of(max(few_low[b, 1], box_low[at, 1]), origin[1], inverse, shape[1]) != y:
@@ -269,9 +275,9 @@ def _ask(out, n, asked, table, small, large, part, allowed):  # type: ignore[no-
                             if bucket_of(max(few_low[b, 2], box_low[at, 2]), origin[2], inverse, shape[2]) != z:
                                 continue
                         i, j = every[b], others[at]
-                        if len(rank) > 0 and rank[i] >= order[j]:
+                        if len(rank) > 0 and rank[i] >= order[j]:  # 4
                             continue
-                        if not allowed[part[few[i, 0]], part[many[j, 0]]] or _meet(few, many, i, j):
+                        if not allowed[part[few[i, 0]], part[many[j, 0]]] or _meet(few, many, i, j):  # 5
                             continue
                         if n == len(out):
                             return before, at

@@ -15,7 +15,8 @@ from ...parallel.comm import Comm
 from ...parallel.ownership import Neighbour
 from .. import part_pairs
 from ..exterior import Exterior
-from ..narrow_phase.cracks import AGE, widening
+from ..narrow_phase.crack_contact import widening
+from ..narrow_phase.cracks import AGE
 from ..scene import layout
 from ..scene.near_surface import HALO, Rules
 from ..scene.scene import Scene
@@ -68,16 +69,18 @@ class Searches:
         return bool(np.nanmax(self.mu, initial=0.0) > 0.0)
 
     @cached_property
-    def _itself(self) -> Flags:
+    def _self_contact(self) -> Flags:
         """(parts,) whether the body of each may be in contact with itself."""
-        return part_pairs.itself(self._case, self.mu)
+        return part_pairs.self_contact(self._case, self.mu)
 
     @property
     def rules(self) -> Rules:
         """Parameters of the searches."""
         contact, size = self._case.contact, self._exterior.size
         assert contact is not None
-        return Rules(contact.domain, ~np.isnan(self.mu), 2.0 * size, contact.skin * size, HALO * size, self._itself)
+        return Rules(
+            contact.domain, ~np.isnan(self.mu), 2.0 * size, contact.skin * size, HALO * size, self._self_contact
+        )
 
     def keep(self, parcel: Parcel) -> None:
         """Adds the stored impulses of pairs to the ``parcel``; the candidates are found again by a search."""
@@ -116,7 +119,7 @@ class Searches:
         if old is not None and goes_on:
             registration.carry(now, old)
         self._connect(now, nodes)
-        now.look(nodes)
+        now.store_before(nodes)
         exterior.show(now, now.own.local)
         now.enliven(np.flatnonzero(now.faces.exposed).astype(np.int32))
         self.foresee(anew=True)
@@ -171,13 +174,13 @@ class Searches:
         if self.scene is None:
             return
         nodes, here = self._model.nodes, self._exterior.motion.here(self._model.nodes)
-        heard = gather(split, self.scene, here, self._comm)
-        if heard is None:
+        update = gather(split, self.scene, here, self._comm)
+        if update is None:
             return
         follower = SplitUpdate(self.scene, here, nodes)
-        follower.follow(heard, self._exterior.cracks, self._model.blocks, self._neighbours)
+        follower.follow(update, self._exterior.cracks, self._model.blocks, self._neighbours)
         if self._comm.size > 1:
-            follower.share(heard, self._neighbours)
+            follower.share(update, self._neighbours)
 
     def pushed(self, nodes: Ints) -> Flags:
         """(k,) which of the local ``nodes`` (k,) had an impulse of contact in the last step."""

@@ -25,7 +25,7 @@ from .inside import outermost
 LARGE = 0.1
 """Share of the volume of a tet: tets with more of it in others are counted. Chosen: curved bodies of flat facets
 that touch have a hundredth in common."""
-_TOLD, _MOST = 0.01, 0.5
+_SHARED, _MOST = 0.01, 0.5
 """Limits of the warning: common volume over the volume of all these tets, like the lines of the ledger, and over
 that of one of them. Chosen."""
 _WORDS = 19
@@ -52,12 +52,12 @@ class CommonVolume:
     @property
     def warnings(self) -> list[str]:
         """One line if the common volume is above the limits."""
-        if self.share <= _TOLD and self.largest <= _MOST:
+        if self.share <= _SHARED and self.largest <= _MOST:
             return []
         return [
             f"{self.large} of {self.tets} tets at surfaces lie in other bodies or fragments by more than a tenth of "
-            f"their volume, one by {self.largest:.2g} of it, all together by {self.share:.2g}: contact has not held "
-            "them; compare with a finer mesh there"
+            f"their volume, one by {self.largest:.2g} of it, all together by {self.share:.2g}: "
+            "compare with a finer mesh there"
         ]
 
 
@@ -69,22 +69,22 @@ def measure(contact: Contact, model: Model, labels: list[Ints] | None, comm: Com
     fragments = labels or [np.full(block.n, block.part, np.int64) for block in model.blocks]
     own = _at_surface(contact, model, fragments)
     whole = exact_sums(comm, np.column_stack([_volumes(_corners(own)), np.ones(len(own))]))
-    told = _reaching(own, model, comm)
-    corners = _corners(told)
+    received = _reaching(own, model, comm)
+    corners = _corners(received)
     points = np.concatenate([model.nodes.x, corners.reshape(-1, 3)])
     places = np.arange(model.nodes.n, len(points), dtype=np.int32).reshape(-1, 4)
-    part = np.concatenate([model.nodes.part, np.repeat(told[:, 2].astype(np.int32), 4)])
+    part = np.concatenate([model.nodes.part, np.repeat(received[:, 2].astype(np.int32), 4)])
     allowed = ~np.isnan(contact.searches.mu)
-    quanta = np.zeros(len(told), np.int64)
+    quanta = np.zeros(len(received), np.int64)
     for block, fragment in zip(model.blocks, fragments, strict=True):
         tets = np.ascontiguousarray(block.tets, np.int32)
         one, other = (Primitives(each, np.zeros(len(each))) for each in (places, tets))
         pairs = search.find(one, other, points, np.zeros_like(points), part, allowed, 0.0, None)
         if len(block.bond):
-            pairs = pairs[told[pairs[:, 0], 1] != fragment[pairs[:, 1]]]
-        _cut(quanta, pairs, told[:, 3:7], corners, model.nodes.id[tets], model.nodes.x[tets])
+            pairs = pairs[received[pairs[:, 0], 1] != fragment[pairs[:, 1]]]
+        _cut(quanta, pairs, received[:, 3:7], corners, model.nodes.id[tets], model.nodes.x[tets])
     some = quanta > 0
-    found = np.column_stack([told[some, 0], quanta[some], _volumes(corners[some]).view(np.int64)])
+    found = np.column_stack([received[some, 0], quanta[some], _volumes(corners[some]).view(np.int64)])
     found = comm.join(found.reshape(-1)).reshape(-1, 3)
     tets, of = np.unique(found[:, 0], return_inverse=True)
     shares, volumes = np.zeros(len(tets), np.int64), np.zeros(len(tets))
@@ -114,8 +114,8 @@ def _reaching(own: Ints, model: Model, comm: Comm) -> Ints:
     hulls = comm.join(_hull(model.nodes.x[None]).view(np.int64)).view(np.float64).reshape(-1, 6)
     low, high = np.split(_hull(_corners(own)), 2, axis=1)
     touch = [((low <= hull[3:]) & (high >= hull[:3])).all(axis=1) for hull in hulls]
-    told = comm.swap({rank: own[some].reshape(-1) for rank, some in enumerate(touch) if some.any()})
-    return np.concatenate([np.zeros(0, np.int64), *told.values()]).reshape(-1, _WORDS)
+    received = comm.swap({rank: own[some].reshape(-1) for rank, some in enumerate(touch) if some.any()})
+    return np.concatenate([np.zeros(0, np.int64), *received.values()]).reshape(-1, _WORDS)
 
 
 def _hull(points: Floats) -> Floats:
@@ -124,9 +124,9 @@ def _hull(points: Floats) -> Floats:
     return np.concatenate([least, most], axis=1)
 
 
-def _corners(told: Ints) -> Floats:
+def _corners(received: Ints) -> Floats:
     """(n, 4, 3) corners of received tets, m."""
-    return np.ascontiguousarray(told[:, 7:]).view(np.float64).reshape(-1, 4, 3)
+    return np.ascontiguousarray(received[:, 7:]).view(np.float64).reshape(-1, 4, 3)
 
 
 def _volumes(corners: Floats) -> Floats:

@@ -40,7 +40,7 @@ a regular tet."""
 class Inside:
     """Result, equal on all ranks."""
 
-    looked: int
+    tested: int
     """Number of nodes tested."""
     nodes: int
     """Number of those inside of another body or fragment, or without tets and inside of their own part, deeper than
@@ -63,7 +63,7 @@ class Inside:
         if self.nodes > self.buried:
             how.append(f"{'the others ' if self.buried else ''}up to {self.deepest:.2g} of a face deep")
         return [
-            f"contact has let {self.nodes} of {self.looked} nodes into other bodies or fragments, {', '.join(how)}: "
+            f"{self.nodes} of {self.tested} nodes are inside of other bodies or fragments, {', '.join(how)}: "
             "compare with a finer mesh there"
         ]
 
@@ -127,13 +127,13 @@ def _seen(outer: Flags, model: Model, fragments: list[Ints], comm: Comm) -> _See
     """Gathers the ``outer`` nodes (nodes,) of all ranks. Collective."""
     nodes = model.nodes
     some = nodes.owned & outer
-    told = comm.join(np.column_stack([nodes.id, nodes.part, nodes.x.view(np.int64)])[some]).reshape(-1, _WORDS)
+    received = comm.join(np.column_stack([nodes.id, nodes.part, nodes.x.view(np.int64)])[some]).reshape(-1, _WORDS)
     here = np.full(nodes.n + 1, -1, np.int64)  # the last entry is for nodes that this rank does not hold
     for block, fragment in zip(model.blocks, fragments, strict=True):
         here[block.tets] = fragment[:, None]
-    known = here[nodes.places(told[:, 0])].astype(np.float64)
-    x = np.ascontiguousarray(told[:, 2:]).view(np.float64)
-    return _Seen(told[:, 1].astype(np.int32), comm.maximum(known).astype(np.int64), x)
+    known = here[nodes.places(received[:, 0])].astype(np.float64)
+    x = np.ascontiguousarray(received[:, 2:]).view(np.float64)
+    return _Seen(received[:, 1].astype(np.int32), comm.maximum(known).astype(np.int64), x)
 
 
 def outermost(contact: Contact) -> Flags:

@@ -20,21 +20,26 @@ from ...model.cache_lines import LINE
 from ...model.state import INTACT, Bits, Indices, Tets
 from ..geometry import VECTOR, at, cross, dot, height, minus
 from ..surface.families import CORNERS
-from ..surface.sharp import SHARP
+from .corner_rows import (
+    CORNER,
+    FF,
+    FG,
+    GG,
+    INWARD,
+    MANY,
+    ROWS,
+    SQUARE,
+    TO_F,
+    TO_G,
+    TWIN,
+    WORD,
+    measure,
+    set_vector,
+    under,
+    vector,
+)
 from .tables import CONTACT_ROWS, DEEP_SELF, STEP, needed
 
-_BENT = 1.0 - SHARP * SHARP
-"""Square of the sine of the angle between two faces of a smooth surface: the limit of sharp edges."""
-_MANY = 64
-"""Number of corners in one block of rows: 10 kB, which stay in the first-level cache."""
-_WORD = 8
-"""Flags in a word, and numbers in the longest vector register."""
-_CORNER, _TO_F, _TO_G, _INWARD = (_MANY * row for row in (0, 3, 6, 9))
-"""Rows of three components: the corner; from it to the ends of the other two edges of the side, clockwise seen from
-outside; the inward normal of the side."""
-_SQUARE, _FF, _GG, _FG, _TWIN = (_MANY * row for row in (12, 13, 14, 15, 16))
-"""Rows: square of the normal, dot products of the two edges, and the number of the corner's twin among the members."""
-_ROWS = 17
 _SOON, _NEXT = 16, 8
 """Distances of the prefetches, in corners: of the numbers of the nodes of a side, and of their positions."""
 _LATER = np.array([0, 1, 2, 0, 1])
@@ -121,59 +126,6 @@ def _beside(r, inward, e, f, g, opened):  # type: ignore[no-untyped-def]
     return False
 
 
-@njit(f"{VECTOR}(float64[::1], int64, int64)", cache=True, forceinline=True)
-def _of(w, row, i):  # type: ignore[no-untyped-def]
-    """Returns the vector of corner ``i``."""
-    return w[row + i], w[row + _MANY + i], w[row + 2 * _MANY + i]
-
-
-@njit(f"void(float64[::1], int64, int64, {VECTOR})", cache=True, forceinline=True)
-def _set(w, row, i, a):  # type: ignore[no-untyped-def]
-    """Sets the vector of corner ``i`` to ``a``."""
-    w[row + i], w[row + _MANY + i], w[row + 2 * _MANY + i] = a
-
-
-@njit(types.void(_F1, _I), cache=True, error_model="numpy")
-def _measure(w, n):  # type: ignore[no-untyped-def]
-    """Computes the edges, normals and dot products of the first ``n`` corners, whose edges are still positions of
-    their ends."""
-    for row in (_TO_F, _TO_G):
-        to, o = w[row:], w[_CORNER:]
-        for i in range(n):
-            to[i] -= o[i]
-            to[_MANY + i] -= o[_MANY + i]
-            to[2 * _MANY + i] -= o[2 * _MANY + i]
-    for i in range(n):
-        f = w[_TO_F + i], w[_TO_F + _MANY + i], w[_TO_F + 2 * _MANY + i]
-        g = w[_TO_G + i], w[_TO_G + _MANY + i], w[_TO_G + 2 * _MANY + i]
-        m = cross(f, g)
-        w[_INWARD + i], w[_INWARD + _MANY + i], w[_INWARD + 2 * _MANY + i] = m
-        w[_SQUARE + i], w[_FF + i], w[_GG + i], w[_FG + i] = dot(m, m), dot(f, f), dot(g, g), dot(f, g)
-
-
-@njit(types.void(types.uint8[::1], _F1, _I, _I, _F, _F, _F), cache=True, error_model="numpy")
-def _under(flags, w, n, member, x, y, z):  # type: ignore[no-untyped-def]
-    """Flags those of the first ``n`` corners whose side is above the ``member`` at x, y, z, with its foot on the side.
-
-    A foot beyond an edge counts while a neighbouring face, bent by less than the angle of a sharp edge, would still
-    be above it; one behind the corner does not.
-    """
-    for i in range(n):
-        r = x - w[_CORNER + i], y - w[_CORNER + _MANY + i], z - w[_CORNER + 2 * _MANY + i]
-        along_f = dot((w[_TO_F + i], w[_TO_F + _MANY + i], w[_TO_F + 2 * _MANY + i]), r)
-        along_g = dot((w[_TO_G + i], w[_TO_G + _MANY + i], w[_TO_G + 2 * _MANY + i]), r)
-        below = dot((w[_INWARD + i], w[_INWARD + _MANY + i], w[_INWARD + 2 * _MANY + i]), r)
-        of_f, of_g = w[_GG + i] * along_f - w[_FG + i] * along_g, w[_FF + i] * along_g - w[_FG + i] * along_f
-        beyond = _BENT * dot(r, r) * w[_SQUARE + i]
-        flags[i] = (
-            (below > 0.0)
-            & (w[_TWIN + i] != member)
-            & (of_f + of_g <= w[_SQUARE + i])
-            & ((of_f >= 0.0) | ((along_g > 0.0) & (of_f * of_f <= beyond * w[_GG + i])))
-            & ((of_g >= 0.0) | ((along_f > 0.0) & (of_g * of_g <= beyond * w[_FF + i])))
-        )
-
-
 @njit(
     _I(CONTACT_ROWS, STEP, _I, _I),
     cache=True,
@@ -213,71 +165,96 @@ def _pushed_out(out, step, first, stop):  # type: ignore[no-untyped-def]
     return n - first
 
 
+@njit(types.void(_F1, _N2, _N1, _I, _I, _N2, _N1, _N1, types.float64[:, :]), cache=True, forceinline=True)
+def _gather(w, rest, corners, head, many, cracks, among, place, ahead):  # type: ignore[no-untyped-def]
+    """Writes the positions of ``many`` corners from ``head`` on, and of the other nodes of their sides, to the rows
+    ``w``, and the three local nodes of each to ``rest``.
+    """
+    for i in range(many):
+        _bring(corners, head + i, cracks, place, ahead)
+        m = corners[head + i]
+        c, h, k = m >> 3, m >> 2 & 1, m & 3
+        p, w[TWIN + i] = cracks[c, 3 * h + k], among[cracks[c, 3 - 3 * h + k]]
+        f, g = cracks[c, 3 * h + _LATER[k + 2 - h]], cracks[c, 3 * h + _LATER[k + 1 + h]]
+        rest[i, 0], rest[i, 1], rest[i, 2] = p, f, g
+        set_vector(w, CORNER, i, at(ahead, place[p]))
+        set_vector(w, TO_F, i, at(ahead, place[f]))
+        set_vector(w, TO_G, i, at(ahead, place[g]))
+
+
+# Corner p of the narrow side (p, f, g) of a tet with top t; member d of the family of p, at p until it separated:
+#
+#            g                      r = d - p at the end of the step, inward = (f - p) x (g - p), into the tet
+#           / \                     below = inward . r: > 0 behind the side
+#          /   \                    foot: share w_f = (g.g)(f.r) - (f.g)(g.r) of f over the square of inward,
+#         / o d \                         w_g = (f.f)(g.r) - (f.g)(f.r) of g, 1 - w_f - w_g of p
+#        p ----- f
+#          \ | /                    Conditions of a contact of d with the side, in the order of the tests in entering:
+#            t                      1. Its part may be in contact with itself.
+#                                   2. d is below the side at the end of the step, with its foot on it, and is not the
+#                                      twin of p across the facet (under): that one has a contact across the crack.
+#                                   3. d is not above another open side of the corner, or nearer to it (_beside).
+#                                   4. It was no deeper than DEEP_SELF at the beginning of the step (_pushed_out).
+# A node of the side that has not separated is common to both pieces and gets the weight 0. Its weight is
+# redistributed to the other nodes (docs/theory/fracture.md, "Contact").
+
+
 @njit(
     _I(CONTACT_ROWS, _I, _I, NARROW, CORNERS, STEP, _I, _I),
     cache=True,
     error_model="numpy",
 )
 def entering(out, base, each, narrow, of, step, first, stop):  # type: ignore[no-untyped-def]
-    """Nodes that would come in through a narrow side of a tet at a corner that they were one with, their twins across
-    left out: of the families ``of`` a block from ``first`` to ``stop``.
+    """Writes contacts of separated nodes with the narrow sides at their former corner, of the families ``of`` a block
+    from ``first`` to ``stop``.
 
-    They are rows of ``out``, ``each`` for every corner of the block in the mean: from ``base`` and ``each`` times the
-    first corner of the first family on. Returns how many there are; where there are more than that, not all have a row.
-    A node of the side that has not separated gets no weight, and the others its share.
+    They are rows of ``out``, from ``base`` plus ``each`` times the number of corners before the first family on, up to
+    ``each`` for every corner in the mean. Returns their number; if it is larger than the room, not all have a row.
+    Numbers at the ends of lines: conditions listed above.
     """
     ahead, part, mu, nodes, weights = step.ahead, step.part, step.mu, out.nodes, out.weights
     members, begin, among, corners, start = of
     cracks, sides, tets, across, bond, ring, place = narrow
     begins, end = base + each * start[first], base + each * start[stop]
     n = begins
-    w, flags, some = np.zeros(_ROWS * _MANY), np.zeros(_MANY, np.uint8), np.empty(_WORD, np.int64)
-    words, rest = flags.view(np.uint64), np.empty((_MANY, 3), np.int32)
+    w, flags, some = np.zeros(ROWS * MANY), np.zeros(MANY, np.uint8), np.empty(WORD, np.int64)
+    words, rest = flags.view(np.uint64), np.empty((MANY, 3), np.int32)
     for family in range(first, stop):
         kind = part[place[members[begin[family]]]]
-        if not mu[kind, kind] >= 0.0:
+        if not mu[kind, kind] >= 0.0:  # 1
             continue
-        for head in range(start[family], start[family + 1], _MANY):
-            many = min(start[family + 1] - head, _MANY)
-            full = (many + _WORD - 1) // _WORD
-            for i in range(many):
-                _bring(corners, head + i, cracks, place, ahead)
-                m = corners[head + i]
-                c, h, k = m >> 3, m >> 2 & 1, m & 3
-                p, w[_TWIN + i] = cracks[c, 3 * h + k], among[cracks[c, 3 - 3 * h + k]]
-                f, g = cracks[c, 3 * h + _LATER[k + 2 - h]], cracks[c, 3 * h + _LATER[k + 1 + h]]
-                rest[i, 0], rest[i, 1], rest[i, 2] = p, f, g
-                _set(w, _CORNER, i, at(ahead, place[p]))
-                _set(w, _TO_F, i, at(ahead, place[f]))
-                _set(w, _TO_G, i, at(ahead, place[g]))
-            for i in range(many, full * _WORD):
-                w[_CORNER + i] = np.nan
-            _measure(w, full * _WORD)
+        for head in range(start[family], start[family + 1], MANY):
+            many = min(start[family + 1] - head, MANY)
+            full = (many + WORD - 1) // WORD
+            _gather(w, rest, corners, head, many, cracks, among, place, ahead)
+            for i in range(many, full * WORD):
+                w[CORNER + i] = np.nan
+            measure(w, full * WORD)
             for member in range(begin[family], begin[family + 1]):
                 d = place[members[member]]
                 x, y, z = at(ahead, d)
-                _under(flags, w, full * _WORD, member, x, y, z)
+                under(flags, w, full * WORD, member, x, y, z)  # 2
                 for word in range(full):
                     if words[word] == 0:
                         continue
                     found = 0
-                    for i in range(word * _WORD, word * _WORD + _WORD):
+                    for i in range(word * WORD, word * WORD + WORD):
                         some[found] = i
                         found += flags[i]
                     for u in range(found):
                         i = some[u]
-                        p, f, g, o = rest[i, 0], rest[i, 1], rest[i, 2], _of(w, _CORNER, i)
-                        r, to_f, to_g = minus((x, y, z), o), _of(w, _TO_F, i), _of(w, _TO_G, i)
+                        p, f, g, o = rest[i, 0], rest[i, 1], rest[i, 2], vector(w, CORNER, i)
+                        r, to_f, to_g = minus((x, y, z), o), vector(w, TO_F, i), vector(w, TO_G, i)
                         c, h = corners[head + i] >> 3, corners[head + i] >> 2 & 1
                         e = sides[c, h, 1]
                         opened = _opened(tets, across, bond, e, f, g)
                         if opened:
                             to_top = minus(at(ahead, place[tets[e, sides[c, h, 2]]]), o)
-                            if _beside(r, _of(w, _INWARD, i), to_top, to_f, to_g, opened):
+                            if _beside(r, vector(w, INWARD, i), to_top, to_f, to_g, opened):  # 3
                                 continue
                         along_f, along_g = dot(to_f, r), dot(to_g, r)
-                        w_f = max(w[_GG + i] * along_f - w[_FG + i] * along_g, 0.0) / w[_SQUARE + i]
-                        w_g = max(w[_FF + i] * along_g - w[_FG + i] * along_f, 0.0) / w[_SQUARE + i]
+                        w_f = max(w[GG + i] * along_f - w[FG + i] * along_g, 0.0) / w[SQUARE + i]
+                        w_g = max(w[FF + i] * along_g - w[FG + i] * along_f, 0.0) / w[SQUARE + i]
                         if n < end:
                             nodes[n, 0], nodes[n, 1], nodes[n, 2], nodes[n, 3] = d, place[p], place[f], place[g]
                             weights[n, 0], weights[n, 1], weights[n, 2] = 1.0 - w_f - w_g, w_f, w_g
@@ -286,4 +263,4 @@ def entering(out, base, each, narrow, of, step, first, stop):  # type: ignore[no
                         n += 1
     if n > end:
         return n - begins
-    return _pushed_out(out, step, begins, n)
+    return _pushed_out(out, step, begins, n)  # 4

@@ -12,32 +12,19 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ...kernels.jit import njit, prefetch, types
+from ...kernels.jit import njit
 from ...migration.parcel import Table, once
-from ...model.cache_lines import LINE
 from ...model.state import WIDE, Block, Flags, Floats, Indices, Ints, Nodes, extended
 from ...model.topology import Split
-from ..geometry import at, cross, dot, half, minus, plus
 from ..scene.split_pairs import touching
 from ..surface.families import Corners, Families, by_family
 from ..surface.records import CrackSides
-from .tables import CONTACT_ROWS, CRACK, DEEP_SELF, NEAR, STEP, needed
 
-_WIDE = 0.2
-"""Share of the typical size of a face: width from which on the sides of a crack are surface. At 0.1, 33 of 38
-searches in the first 500 steps of the glass bar are caused by cracks that open without having been included in a
-search; at 0.2, 2 of 32.
-"""
-_FORESEEN = 0.5
-"""Share of that width from which on the faces of a crack are in the broad phase, so that they have their pairs when
-it opens."""
 AGE, _YOUNG = 16, 0.3
 """Steps between two checks whether cracks become aged, and the share of young cracks from which on all do
 (docs/theory/contact.md, "Edges at cracks")."""
 _KEPT = 12
 """Columns of the stored impulses of a crack."""
-_AHEAD = 8
-"""Distance of the prefetch of the nodes, in cracks."""
 
 
 @dataclass
@@ -193,27 +180,6 @@ class Cracks:
         return {name: column for name, column in vars(self).items() if name not in ("families", "_corners")}
 
 
-@njit("int64[::1](int32[:, ::1], float64[:, ::1], float64)", cache=True)
-def widening(cracks, x, typical):  # type: ignore[no-untyped-def]
-    """Rows of the ``cracks`` (m, 6), slots, that are so wide at the positions ``x`` (slots, 3) that their faces must
-    enter the broad phase; ``typical``: size of a face, m.
-    """
-    rows, n = np.empty(len(cracks), np.int64), 0
-    for c in range(len(cracks)):
-        if cracks[c, 0] < 0:
-            continue
-        most = 0.0
-        for k in range(3):
-            p, q, apart = cracks[c, k], cracks[c, 3 + k], 0.0
-            for i in range(3):
-                apart += (x[q, i] - x[p, i]) ** 2
-            most = max(most, apart)
-        if most >= (_FORESEEN * _WIDE * typical) ** 2:
-            rows[n] = c
-            n += 1
-    return rows[:n].copy()
-
-
 @njit("int64[::1](int64[:], int64[::1])", cache=True)
 def named(ids, wanted):  # type: ignore[no-untyped-def]
     """Rows of ``ids`` that are among the ascending ``wanted``."""
@@ -238,55 +204,3 @@ def computed(rows, nodes, sides):  # type: ignore[no-untyped-def]
             some[n] = c
             n += 1
     return some[:n].copy()
-
-
-@njit(
-    types.UniTuple(types.int64, 2)(  # type: ignore[no-untyped-call]
-        CONTACT_ROWS, types.int64, types.int64[::1], types.int32[:, ::1], types.float64, STEP, types.int64, types.int64
-    ),
-    cache=True,
-    error_model="numpy",
-)
-def across(out, base, opening, cracks, typical, step, first, stop):  # type: ignore[no-untyped-def]
-    """Nodes across the ``cracks`` (m, 6; -1 for those that do not count) from ``first`` to ``stop`` that close on each
-    other: rows of ``out`` from ``base + 3 first`` on.
-
-    ``typical``: size of a face, m. Returns how many, and how many of the cracks have become so wide that they open;
-    ``opening`` (m,) says which, from ``first`` on.
-    """
-    x, v, part, mu, dt = step.x, step.v, step.part, step.mu, step.dt
-    n, wide = base + 3 * first, first
-    for c in range(first, stop):
-        for k in range(6):
-            near = max(cracks[min(c + _AHEAD, len(cracks) - 1), k], 0)
-            prefetch(x, LINE * near)
-            prefetch(v, 3 * near)
-        if cracks[c, 0] < 0:
-            continue
-        start = plus(at(x, cracks[c, 0]), at(x, cracks[c, 3]))
-        e = half(minus(plus(at(x, cracks[c, 1]), at(x, cracks[c, 4])), start))
-        f = half(minus(plus(at(x, cracks[c, 2]), at(x, cracks[c, 5])), start))
-        m = cross(e, f)
-        twice = np.sqrt(dot(m, m))
-        size, m = np.sqrt(twice), (m[0] / twice, m[1] / twice, m[2] / twice)
-        most = 0.0
-        for k in range(3):
-            p, q = cracks[c, k], cracks[c, 3 + k]
-            if p == q:
-                continue
-            width = minus(at(x, q), at(x, p))
-            most = max(most, dot(width, width))
-            gap0, speed = dot(m, width), dot(m, minus(at(v, q), at(v, p)))
-            gap1 = gap0 + dt * speed
-            if not (gap1 <= NEAR * size and gap0 >= -DEEP_SELF * size and mu[part[p], part[q]] >= 0.0):
-                continue
-            out.nodes[n, 0], out.nodes[n, 1], out.nodes[n, 2], out.nodes[n, 3] = q, p, p, p
-            out.weights[n, 0], out.weights[n, 1], out.weights[n, 2], out.weights[n, 3] = 1.0, -1.0, 0.0, 0.0
-            out.normals[n, 0], out.normals[n, 1], out.normals[n, 2] = m
-            out.wanted[n] = speed + needed(gap0, gap1, speed, step.give, dt)
-            out.friction[n], out.pair[n] = mu[part[p], part[q]], CRACK - (3 * c + k)
-            n += 1
-        if most >= (_WIDE * typical) ** 2:
-            opening[wide] = c
-            wide += 1
-    return n - base - 3 * first, wide - first

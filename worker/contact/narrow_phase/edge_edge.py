@@ -37,7 +37,7 @@ _SOON, _NEXT = 16, 8
 """Distances of the prefetches, in pairs: of the numbers of the ends, and of their positions."""
 _X2, _V2, _N2 = "float64[:, :]", "float64[:, ::1]", "int32[:, ::1]"
 _SECTOR = f"Tuple((float64, {VECTOR}, {VECTOR}))"
-_I = types.int64
+_I, _F, _N1 = types.int64, types.float64, types.int32[::1]
 
 
 @njit(f"{_SECTOR}({VECTOR}, {_X2}, {_V2}, {_N2}, int64, float64)", cache=True, error_model="numpy")
@@ -137,30 +137,84 @@ def _opposite(edges, one, two):  # type: ignore[no-untyped-def]
     return (a == c and b == d) or (a == d and b == c)
 
 
+# Edges ab and cd at the moment tau dt at which their lines cross, x = x(n) + tau (x(n+1) - x(n)); tau = 1 if they do
+# not cross in the step. u = b - a, w = d - c, r = c - a.
+#
+#               d                 point s of ab: a + s u       s = ((w.w)(u.r) - (u.w)(w.r)) / A
+#              /                  point t of cd: c + t w       t = ((u.w)(u.r) - (u.u)(w.r)) / A
+#     a ------x------- b          A = (u.u)(w.w) - (u.w)^2 = |u x w|^2
+#            /
+#           c                     m = u x w / |u x w|;  gap = m . (c + t w - a - s u), linear in the velocities:
+#                                 weights (1 - t, t, s - 1, -s) of c, d, a, b
+#
+#           m (or -m)             The normal has to point out of both bodies (Gauss map of convex edges): n1, n2 are the
+#      n1   |   n2                normals of the two faces of an edge, and m lies between them to within _FLUSH, as
+#        \  |  /                  -m does between those of the other edge
+#     ____\_|_/____               (docs/theory/contact.md, "Which point" and "Sharp edges").
+#    face 1   face 2
+#
+# Conditions of a contact, in the order of the tests in edge_edge:
+# 1. Both edges exist (the two ends of an edge that vanished are one node) and admit contact, and they are not the
+#    opposite edges of one tet. Otherwise the pair is deactivated until that changes.
+# 2. No bond ties all four nodes.
+# 3. The lines are not parallel: A > _PARALLEL^2 (u.u)(w.w).
+# 4. They cross within both edges: _END <= s, t <= 1 - _END.
+# 5. With one sign of m the gap is at most NEAR of an edge at the end of the step, and at its beginning at least minus
+#    the depth of the edges.
+# 6. That normal points out of both bodies (_points_out).
+# 7. A penetration is not deeper than the present shape of the tets allows (_deep).
+
+
+@njit(
+    types.int64(
+        types.int32[:, ::1], types.float64[::1], types.float64[::1], types.float64[::1], types.boolean[::1], _N1, _F, _I
+    ),
+    cache=True,
+)
+def _due(rows, until, speed, left, fresh, active, end, many):  # type: ignore[no-untyped-def]
+    """Selects the first ``many`` of the pairs ``rows`` to be tested, in ``active``; returns their number."""
+    n = 0
+    for p in range(many):
+        one, two = rows[p, 0], rows[p, 1]
+        active[n] = p
+        n += fresh[one] | fresh[two] | (not until[p] > left[one] + left[two] + speed[p] * end)
+    return n
+
+
+@njit(
+    f"Tuple((float64, {VECTOR}, {VECTOR}, {VECTOR}))({_X2}, {_X2}, int64, int64, int64, int64)",
+    cache=True,
+    forceinline=True,
+)
+def _crossing(x, ahead, a, b, c, d):  # type: ignore[no-untyped-def]
+    """Share tau of the step after which the lines ab and cd cross, 1 if they do not in the step; and u, w, r then."""
+    u0, w0, r0 = minus(at(x, b), at(x, a)), minus(at(x, d), at(x, c)), minus(at(x, c), at(x, a))
+    u, w = minus(at(ahead, b), at(ahead, a)), minus(at(ahead, d), at(ahead, c))
+    r = minus(at(ahead, c), at(ahead, a))
+    before, after = _volume(u0, w0, r0), _volume(u, w, r)
+    if not before * after < 0.0:
+        return 1.0, u, w, r
+    share = before / (before - after)
+    return share, beyond(u0, share, minus(u, u0)), beyond(w0, share, minus(w, w0)), beyond(r0, share, minus(r, r0))
+
+
 @njit(
     types.UniTuple(_I, 2)(CONTACT_ROWS, _I, PAIRS, EDGES, STEP, types.float64[:, ::1], types.float64, _I, _I),  # type: ignore[no-untyped-call]
     cache=True,
     error_model="numpy",
 )
 def edge_edge(out, base, pairs, edges, step, course, end, first, stop):  # type: ignore[no-untyped-def]
-    """Edges that pass an edge, of the pairs from ``first`` to ``stop``: rows of ``out`` from ``base + first`` on;
-    returns how many, and how many pairs were tested, ``pairs.active`` from ``first`` on.
+    """Writes contacts of edges with edges, of the pairs from ``first`` to ``stop``: rows of ``out`` from
+    ``base + first`` on; returns their number, and the number of tested pairs, ``pairs.active`` from ``first`` on.
 
-    An edge whose ends are one node has gone. The opposite edges of a flat tet do not pass each other: it is as thick as
-    they are apart. Pairs of these, and of what is no surface, are left alone until that changes.
-
-    ``course`` (slots, 3): velocities of the reference motions, m/s; ``end``: of the step, s after the search.
+    ``course`` (slots, 3): velocities of the reference motions, m/s; ``end``: of the step, s after the search. Numbers
+    at the ends of lines: conditions of a contact, listed above.
     """
     rows, until, speed, active = pairs.rows[first:], pairs.until[first:], pairs.speed[first:], pairs.active[first:]
-    meets, fresh = edges.meets, edges.fresh
-    corners, size, left = edges.corners, edges.size, edges.left
+    meets, fresh, corners, size, left = edges.meets, edges.fresh, edges.corners, edges.size, edges.left
     nodes, weights, normals, wanted = out.nodes, out.weights, out.normals, out.wanted
-    x, v, ahead, dt = step.x, step.v, step.ahead, step.dt
-    due, n, tested = 0, base + first, 0
-    for p in range(stop - first):
-        one, two = rows[p, 0], rows[p, 1]
-        active[due] = p
-        due += fresh[one] | fresh[two] | (not until[p] > left[one] + left[two] + speed[p] * end)
+    x, v, ahead, dt, n, tested = step.x, step.v, step.ahead, step.dt, base + first, 0
+    due = _due(rows, until, speed, left, fresh, active, end, stop - first)
     for q in range(due):
         p, soon, later = active[q], active[min(q + _NEXT, due - 1)], active[min(q + _SOON, due - 1)]
         for k in range(2):
@@ -171,35 +225,27 @@ def edge_edge(out, base, pairs, edges, step, course, end, first, stop):  # type:
         if fresh[one] or fresh[two]:
             until[p], speed[p] = -np.inf, np.nan
         a, b, c, d = corners[one, 0], corners[one, 1], corners[two, 0], corners[two, 1]
-        if not (meets[one] and meets[two]) or a == b or c == d or _opposite(corners, one, two):
+        if not (meets[one] and meets[two]) or a == b or c == d or _opposite(corners, one, two):  # 1
             until[p], speed[p] = np.inf, 0.0
             continue
         active[tested] = first + p
         tested += 1
-        if len(step.tied) > 0 and bonded(step, a, b, c, d):
+        if len(step.tied) > 0 and bonded(step, a, b, c, d):  # 2
             continue
         known = not np.isnan(until[p])
-        if known:  # left alone while it cannot meet
+        if known:  # deactivated while it cannot be in contact: slack > left_1 + left_2 + U t (pairs.py)
             if np.isnan(speed[p]):
                 speed[p] = _fastest(course, a, b, c, d)
             slack = segments(at(ahead, a), at(ahead, b), at(ahead, c), at(ahead, d))
             slack -= _ROUND * max(size[one], size[two]) + min(edges.deep[one], edges.deep[two])
             until[p] = slack - left[one] - left[two] + speed[p] * end if slack > _WORTH * size[one] else np.nan
-        u0, w0, r0 = minus(at(x, b), at(x, a)), minus(at(x, d), at(x, c)), minus(at(x, c), at(x, a))
-        u, w = minus(at(ahead, b), at(ahead, a)), minus(at(ahead, d), at(ahead, c))
-        r = minus(at(ahead, c), at(ahead, a))
-        before, after = _volume(u0, w0, r0), _volume(u, w, r)
-        share = 1.0
-        if before * after < 0.0:
-            share = before / (before - after)
-            u, w = beyond(u0, share, minus(u, u0)), beyond(w0, share, minus(w, w0))
-            r = beyond(r0, share, minus(r, r0))
+        share, u, w, r = _crossing(x, ahead, a, b, c, d)
         uu, uw, ww, ur, wr = dot(u, u), dot(u, w), dot(w, w), dot(u, r), dot(w, r)
         area = uu * ww - uw * uw
-        if not area > _PARALLEL * _PARALLEL * uu * ww:
+        if not area > _PARALLEL * _PARALLEL * uu * ww:  # 3
             continue
         s, t = (ww * ur - uw * wr) / area, (uw * ur - uu * wr) / area
-        if not (min(s, t) >= _END and max(s, t) <= 1.0 - _END):
+        if not (min(s, t) >= _END and max(s, t) <= 1.0 - _END):  # 4
             if known and share == 1.0 and np.isnan(until[p]):
                 slack = beyond_ends(u, w, r, s, t)
                 if slack > _SPARE * size[one]:
@@ -209,23 +255,22 @@ def edge_edge(out, base, pairs, edges, step, course, end, first, stop):  # type:
         m = m[0] / length, m[1] / length, m[2] / length
         gap0, gap1 = _apart(m, x, v, a, b, c, d, s, t, 0.0), _apart(m, x, v, a, b, c, d, s, t, dt)
         near, deep = NEAR * min(size[one], size[two]), min(edges.deep[one], edges.deep[two])
-        if (gap1 > near or gap0 < -deep) and (-gap1 > near or -gap0 < -deep):
+        if (gap1 > near or gap0 < -deep) and (-gap1 > near or -gap0 < -deep):  # 5, either sign
             continue
-        sector, sign = _sector(u, x, v, corners, one, h), 1.0
-        if not _points_out(sector, m, 1.0):
-            sign = -1.0
-            if not _points_out(sector, m, -1.0):
-                continue
+        sector = _sector(u, x, v, corners, one, h)
+        sign = 1.0 if _points_out(sector, m, 1.0) else -1.0
+        if sign < 0.0 and not _points_out(sector, m, -1.0):  # 6, first body
+            continue
         gap0, gap1 = sign * gap0, sign * gap1
-        if gap1 > near or gap0 < -deep:
+        if gap1 > near or gap0 < -deep:  # 5, this sign
             continue
-        if not _points_out(_sector(w, x, v, corners, two, h), m, -sign):
+        if not _points_out(_sector(w, x, v, corners, two, h), m, -sign):  # 6, second body
             continue
-        if gap0 < 0.0 and gap0 < -min(_deep(x, edges, one), _deep(x, edges, two)):
+        if gap0 < 0.0 and gap0 < -min(_deep(x, edges, one), _deep(x, edges, two)):  # 7
             continue
         nodes[n, 0], nodes[n, 1], nodes[n, 2], nodes[n, 3] = c, d, a, b
         weights[n, 0], weights[n, 1], weights[n, 2], weights[n, 3] = 1.0 - t, t, s - 1.0, -s
-        rate = 0.0
+        rate = 0.0  # n . sum(w_k v_k)
         for k in range(3):
             normals[n, k] = sign * m[k]
             rate += normals[n, k] * ((1.0 - t) * v[c, k] + t * v[d, k] - (1.0 - s) * v[a, k] - s * v[b, k])

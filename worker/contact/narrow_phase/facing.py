@@ -11,9 +11,9 @@ TOUCHING = 1e-3
 """Share of the size of a face: a node deeper than this has contact with the nearest face of that part only."""
 FACING = 0.1
 """A node faces a face when the cosines between the face's normal and those of the node's own faces have a mean minus
-deviation below -FACING, and a mean below FACING; or when its own faces rise from it by a mean slope whose sine
-exceeds FACING. So a corner of a flake that is the lowest of its tet faces the plane below, for any mean of its three
-normals."""
+deviation below -FACING, and either a mean below FACING, or the node's own faces rise from the face by a mean slope
+whose sine exceeds FACING. So a corner of a flake that is the lowest of its tet faces the plane below, for any mean
+of its three normals."""
 _SOME = 0.25
 """A node of another part that passes a face from outside has contact with it when the mean minus deviation is below
 -_SOME: then one of its faces certainly faces it. Without a negative cosine this is at least (1 - sqrt(2)) / 2 =
@@ -127,6 +127,17 @@ def outside(pairs, first, faces, x, part, p, depth, strayed, end):  # type: igno
     return False
 
 
+# Node s at a convex edge between its face g and another face f of the same part, seen along the edge:
+#
+#          s                 s is in front of f and beside g, if
+#      ____ o                1. f is exposed, of that part, and near (_asked), and has a corner in common with g;
+#     /    \ f               2. the edge is convex: g lies behind f, sum of the depths of its corners > _BEHIND of g;
+#    / g    \                3. s slides along f rather than along g, no deeper below f than RIM, or it is nearer to f
+#   /        \                  than to g at the end of the step and no deeper than TOUCHING; and within NEAR of f;
+#                            4. s faces f, and its foot is on f.
+# (docs/theory/contact.md, "Beside a free edge")
+
+
 @njit(
     types.boolean(PAIRS, types.int32[::1], FACES, STEP, types.float64[:, ::1], types.int64, _F, _F, _F, _F),
     cache=True,
@@ -150,21 +161,21 @@ def in_front(pairs, first, faces, step, normals, p, gap0, gap1, strayed, end):  
             continue
         f = rows[q, 1]
         i, j, k = corners[f, 0], corners[f, 1], corners[f, 2]
-        if a not in (i, j, k) and b not in (i, j, k) and c not in (i, j, k):
+        if a not in (i, j, k) and b not in (i, j, k) and c not in (i, j, k):  # 1
             continue
         o, e, h = at(ahead, i), at(ahead, j), at(ahead, k)
         m = plane(faces, ahead, f)
         behind = dot(m, minus(at(ahead, a), o)) + dot(m, minus(at(ahead, b), o)) + dot(m, minus(at(ahead, c), o))
-        if not behind < -_BEHIND * size[g]:
+        if not behind < -_BEHIND * size[g]:  # 2
             continue
         above, _ = height(point, o, e, h)
         before, _ = height(at(step.x, s), at(step.x, i), at(step.x, j), at(step.x, k))
         least, along = min(before, above), abs(above - before)
         slides = along < abs(gap1 - gap0) and along <= _SLIDES * size[f] and least > -RIM * size[f]
-        if not ((slides or (above > gap1 and least > -TOUCHING * size[f])) and above <= NEAR * size[f]):
+        if not ((slides or (above > gap1 and least > -TOUCHING * size[f])) and above <= NEAR * size[f]):  # 3
             continue
         every, some = facing(normals, s, m)
-        if not (every if part[s] == body else some) <= 0.0:
+        if not (every if part[s] == body else some) <= 0.0:  # 4
             continue
         on, _ = foot(minus(point, o), minus(e, o), minus(h, o))
         if on:

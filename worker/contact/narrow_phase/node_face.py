@@ -147,19 +147,53 @@ def due(pairs, slots, faces, end, first, stop):  # type: ignore[no-untyped-def]
     return m
 
 
+# Node s and face f = (i, j, k) of unit normal m at the end of the step. ahead = x(n) + dt v: positions without contact.
+#
+#        s (n)                         gap0 = m(n) . (s - i) at x(n), with the normal m(n) of the face then
+#         o                            gap1 = m . (s - i) at ``ahead``
+#          \            ^ m            tau = gap0 / (gap0 - gap1): share of the step after which s is in the plane;
+#           \           |                   0 if it is behind the plane already, 1 if it does not reach it
+#   i -------x----------- j, k         x: foot of s at tau, with the area coordinates b = (b_i, b_j, b_k)
+#             \                        gap: dt m . sum(w_k v_k) + const with w = (1, -b_i, -b_j, -b_k) of s, i, j, k
+#              o s (n+1)                    (docs/theory/contact.md, "Impulses, not springs")
+#
+# Conditions of a contact, in the order of the tests in node_face (docs/theory/contact.md, "Which point", "Beside a free
+# edge" and "Face on face"):
+# 1. No bond ties all four nodes.
+# 2. The gap is at most NEAR of the face at the end of the step.
+# 3. The normals are compatible: node s faces the face (facing.facing), so that the rim of a bar is not in contact with
+#    the side of another bar of the same width, nor the surface below a block that slides with the front of the block.
+# 4. If only one of its own faces faces the face, it passes the face from outside: gap0 >= -NEAR of the face.
+# 5. Its foot at tau is on the face, and it is no deeper than ``reach`` of the face and half the altitude of its tet.
+# 6. It is not beside a convex edge, in front of another face there (facing.in_front).
+# 7. If it is inside by more than TOUCHING, it is not nearer to the front of another face (facing.outside).
+# A node inside of several faces of a part keeps its contact with the nearest one (``nearest``).
+
+
+@njit(f"void({_N2}, {_N2}, {_V2}, {_X2}, int32[::1], int64, int64)", cache=True, forceinline=True)
+def _bring(rows, corners, normals, x, active, q, last):  # type: ignore[no-untyped-def]
+    """Prefetches the data of the pairs after position ``q`` of ``active``, up to ``last``."""
+    soon, later = active[min(q + _NEXT, last)], active[min(q + _SOON, last)]
+    prefetch(corners, 4 * rows[later, 1])
+    prefetch(normals, 12 * rows[later, 0])
+    prefetch(normals, 12 * rows[later, 0] + 11)
+    prefetch(x, LINE * rows[later, 0])
+    for k in range(3):
+        prefetch(x, LINE * corners[rows[soon, 1], k])
+
+
 @njit(
     types.Tuple((_I, _F))(CONTACT_ROWS, types.float64[::1], _I, PAIRS, SLOTS, FACES, STEP, _F, _I, _I),  # type: ignore[no-untyped-call]
     cache=True,
     error_model="numpy",
 )
 def node_face(out, depth, base, pairs, slots, faces, step, end, first, stop):  # type: ignore[no-untyped-def]
-    """Nodes that pass a face, of the pairs in ``pairs.active`` from ``first`` to ``stop``: rows of ``out`` from
-    ``base + first`` on; returns how many, and the largest square of a speed over the altitude of a tet, 1/s^2, of those
-    that will meet in the next step (``_coming``).
+    """Writes contacts of nodes with faces, of the pairs in ``pairs.active`` from ``first`` to ``stop``: rows of ``out``
+    from ``base + first`` on; returns their number, and the largest square of a speed over the altitude of a tet, 1/s^2,
+    of the pairs that will be in contact in the next step (``_coming``).
 
-    A node meets a face that it faces: the rim of a bar not the side of another one of the same width, the surface under
-    a block that slides not its front, which stands across. ``depth`` (room,): of a node that is inside, by which the
-    nearest face of each part is taken (``nearest``), m; else 0. ``end``: of the step, s after the search.
+    ``depth`` (room,): depth of a node that is inside, m, else 0; of the faces of a part the nearest one keeps it
+    (``nearest``). ``end``: of the step, s after the search. Numbers at the ends of lines: conditions listed above.
     """
     rows, until, speed, turned, active = pairs.rows, pairs.until, pairs.speed, pairs.turned, pairs.active
     corners, size, left = faces.corners, faces.size, faces.left
@@ -168,21 +202,18 @@ def node_face(out, depth, base, pairs, slots, faces, step, end, first, stop):  #
     x, v, ahead, part = step.x, step.v, step.ahead, step.part
     chains, n, most = slots.first, base + first, 0.0
     for q in range(first, stop):
-        p, soon, later = active[q], active[min(q + _NEXT, stop - 1)], active[min(q + _SOON, stop - 1)]
-        prefetch(corners, 4 * rows[later, 1])
-        prefetch(normals, 12 * rows[later, 0])
-        prefetch(normals, 12 * rows[later, 0] + 11)
-        prefetch(x, LINE * rows[later, 0])
-        for k in range(3):
-            prefetch(x, LINE * corners[rows[soon, 1], k])
+        p = active[q]
+        _bring(rows, corners, normals, x, active, q, stop - 1)
         s, f = rows[p, 0], rows[p, 1]
         i, j, k = corners[f, 0], corners[f, 1], corners[f, 2]
-        if len(step.tied) > 0 and bonded(step, s, i, j, k):
+        if len(step.tied) > 0 and bonded(step, s, i, j, k):  # 1
             continue
         m = plane(faces, ahead, f)
         gap1 = dot(m, minus(at(ahead, s), at(ahead, i)))
         reach = DEEP_SELF if part[s] == part[i] else DEEP
-        if not np.isnan(until[p]):  # left alone while it cannot meet
+        if not np.isnan(
+            until[p]
+        ):  # deactivated while it cannot be in contact: slack > left_1 + left_2 + U t (pairs.py)
             a, b, c = at(course, i), at(course, j), at(course, k)
             rate = max(distance(at(course, s), a), distance(at(course, s), b), distance(at(course, s), c))
             slack = _distance(ahead, s, i, j, k) - (_ROUND + max(reach, NEAR)) * size[f]
@@ -193,32 +224,32 @@ def node_face(out, depth, base, pairs, slots, faces, step, end, first, stop):  #
                 rate = max(distance(a, b), distance(a, c))
             speed[p], turned[p] = rate, bends
             until[p] = slack - strayed[s] - left[f] + rate * end if slack > _WORTH * size[f] else np.nan
-        if not gap1 <= NEAR * size[f]:
+        if not gap1 <= NEAR * size[f]:  # 2
             if step.beyond > 0.0:
                 most = max(most, _coming(step, normals, faces, s, f, m, gap1))
             continue
         every, some = facing(normals, s, m)
-        if not (every if part[s] == part[i] else some) <= 0.0:
+        if not (every if part[s] == part[i] else some) <= 0.0:  # 3
             continue
         gap0, now = height(at(x, s), at(x, i), at(x, j), at(x, k))
-        if not (every <= 0.0 or gap0 >= -NEAR * size[f]):
+        if not (every <= 0.0 or gap0 >= -NEAR * size[f]):  # 4
             continue
         passes, b = _passes(x, ahead, corners, s, f, now, gap0, gap1, reach * size[f])
-        if not passes:
+        if not passes:  # 5
             continue
         leaves, until_end = np.inf if other[s] else strayed[s], end + step.dt
         sides = minus(at(x, j), at(x, i)), minus(at(x, k), at(x, i))
         beside = min(b[0], b[1], b[2]) <= RIM and not reaches_over(normals, s, b, sides[0], sides[1], size[f])
-        if beside and in_front(pairs, chains, faces, step, normals, p, gap0, gap1, leaves, until_end):
+        if beside and in_front(pairs, chains, faces, step, normals, p, gap0, gap1, leaves, until_end):  # 6
             continue
         depth[n] = 0.0
         if gap0 < -TOUCHING * size[f]:
-            if outside(pairs, chains, faces, x, part, p, -gap0, leaves, until_end):
+            if outside(pairs, chains, faces, x, part, p, -gap0, leaves, until_end):  # 7
                 continue
             depth[n] = -gap0
         nodes[n, 0], nodes[n, 1], nodes[n, 2], nodes[n, 3] = s, i, j, k
         weights[n, 0], weights[n, 1], weights[n, 2], weights[n, 3] = 1.0, -b[0], -b[1], -b[2]
-        rate = 0.0
+        rate = 0.0  # m . sum(w_k v_k)
         for a in range(3):
             out_normals[n, a] = m[a]
             rate += m[a] * (v[s, a] - (b[0] * v[i, a] + b[1] * v[j, a] + b[2] * v[k, a]))
@@ -230,9 +261,9 @@ def node_face(out, depth, base, pairs, slots, faces, step, end, first, stop):  #
 
 @njit(_I(_N1, CONTACT_ROWS, types.float64[::1], PAIRS, FACES, _N1, _N1), cache=True)
 def nearest(found, out, depth, pairs, faces, part, holder):  # type: ignore[no-untyped-def]
-    """Of the contacts ``found``, rows of ``out``, those that hold: a node that is inside of
-    several faces of a part is held by the nearest of them, of two as near by that of the lower id. Returns how many;
-    ``holder`` (slots,): -1, and so again.
+    """Keeps those of the contacts ``found``, rows of ``out``, that count: a node inside of several faces of a part has
+    contact with the nearest one, of two at the same depth with that of the lower id. Returns their number; ``holder``
+    (slots,): working array, -1 before and after.
     """
     earlier, m = np.empty(len(found), np.int32), 0
     for q in range(len(found)):

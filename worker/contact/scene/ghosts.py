@@ -87,8 +87,8 @@ def members(used: Ints, owners: Indices, holders: list[Neighbour], nodes: Nodes,
     table = np.sort(np.concatenate([table, _rows(every[_begins(every)], comm.rank, comm)]))
     node, holder = table // comm.size, table % comm.size
     group = np.cumsum(_begins(node)) - 1
-    told = comm.swap({member: _company(node, holder, group, member) for member in ranks(holder)})
-    pairs = np.concatenate([np.zeros((0, 2), np.int64), *(words.reshape(-1, 2) for words in told.values())])
+    received = comm.swap({member: _company(node, holder, group, member) for member in ranks(holder)})
+    pairs = np.concatenate([np.zeros((0, 2), np.int64), *(words.reshape(-1, 2) for words in received.values())])
     pairs = pairs[np.lexsort((pairs[:, 0], pairs[:, 1]))]
     return {other: pairs[pairs[:, 1] == other, 0] for other in ranks(pairs[:, 1]) if other != comm.rank}
 

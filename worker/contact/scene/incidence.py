@@ -1,7 +1,7 @@
-"""Which faces and edges have a slot as a corner: so that a split is followed where it is, and not through the scene.
+"""Faces and edges by their corners: the rows of a scene that a split can change, without a pass over the whole scene.
 
-A scene has the same faces and edges from one search to the next. As nodes separate their corners become copies, so the
-rows with a corner that was a slot of the search are known for all of its copies.
+A scene keeps its faces and edges from one search to the next. When nodes separate, corners become copies, so the rows
+of a copy are among those of the slot that it was at the search.
 """
 
 import numpy as np
@@ -28,7 +28,7 @@ class Incidence:
 
 @njit(several(_I1, _N1)(_N2, _I), cache=True)
 def _by_slot(corners, slots):  # type: ignore[no-untyped-def]
-    """Where the rows of each of the ``slots`` begin, (slots + 1,), and the rows."""
+    """Returns the offsets of the rows of each of the ``slots``, (slots + 1,), and the rows."""
     begin, many = np.zeros(slots + 1, np.int64), corners.shape[1]
     for r in range(len(corners)):
         for k in range(many):

@@ -32,7 +32,7 @@ class Rules:
     without being candidates."""
     halo: float
     """Skin for slots of different ranks, m."""
-    itself: Flags
+    self_contact: Flags
     """(parts,) whether the body of each part may be in contact with itself."""
 
 

@@ -76,7 +76,7 @@ class Scene:
         if not same([*messages.copies.sends, *messages.copies.receives], [*sends, *receives]):
             messages.copies.take(sends, receives)
 
-    def look(self, nodes: Nodes) -> None:
+    def store_before(self, nodes: Nodes) -> None:
         """Stores v(n-1/2), before the kick."""
         slot_numbers.gather(self.slots.before, nodes.v, self.own.slots, self.own.local)
         self.messages.copies.note(nodes)
@@ -105,8 +105,8 @@ class Scene:
         rows = np.column_stack([keys, kept.view(np.int64)])
         if comm.size > 1:
             owner = nodes.owner[nodes.places(keys[:, 0])]
-            told = comm.swap({int(rank): rows[owner == rank] for rank in np.unique(owner)})
-            rows = np.concatenate([rows[:0], *(words.reshape(-1, 6) for words in told.values())])
+            received = comm.swap({int(rank): rows[owner == rank] for rank in np.unique(owner)})
+            rows = np.concatenate([rows[:0], *(words.reshape(-1, 6) for words in received.values())])
         local, face = nodes.places(rows[:, 0]), places(self.faces.id, rows[:, 1])
         node = self.own.place[local]
         here = (local >= 0) & (node >= 0) & (face >= 0)

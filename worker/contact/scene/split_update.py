@@ -33,29 +33,29 @@ class SplitUpdate:
         found = _located(ids.ravel(), self._nodes.id, own.place, own.far_ids, own.far)
         return np.asarray(found.reshape(ids.shape))
 
-    def follow(self, heard: TopologyUpdate, cracks: Cracks, blocks: list[Block], neighbours: list[Neighbour]) -> None:
+    def follow(self, update: TopologyUpdate, cracks: Cracks, blocks: list[Block], neighbours: list[Neighbour]) -> None:
         """Updates faces, edges, candidate pairs, and the slots of the cracks."""
-        rows = split_pairs.touching(cracks.nodes, _flagged(self._nodes.id, heard.rows.id))
+        rows = split_pairs.touching(cracks.nodes, _flagged(self._nodes.id, update.rows.id))
         near, apart = cracks.beside(rows, blocks)
         rows = computed(rows, cracks.nodes, cracks.sides)
-        self._join(heard, neighbours)
+        self._join(update, neighbours)
         self._hold(_lacking(near, rows, cracks.nodes, self._scene.own.place))
-        family = Family(*split_pairs.families(self.places(heard.family), self._scene.surface_nodes.n))
-        became = self.places(heard.became)
+        family = Family(*split_pairs.families(self.places(update.family), self._scene.surface_nodes.n))
+        became = self.places(update.became)
         self._candidates(family)
-        self._faces(heard, became, family)
-        self._edges(heard, became, family)
+        self._faces(update, became, family)
+        self._edges(update, became, family)
         self._across(cracks, rows, apart)
 
-    def _join(self, heard: TopologyUpdate, neighbours: list[Neighbour]) -> None:
+    def _join(self, update: TopologyUpdate, neighbours: list[Neighbour]) -> None:
         """Adds the families of the scene's nodes and of nodes that other ranks hold to the scene, and updates the
         mobilities of all separated nodes.
         """
-        local, have = self._nodes.places(heard.family[:, 0]), self.places(heard.family[:, 0]) >= 0
+        local, have = self._nodes.places(update.family[:, 0]), self.places(update.family[:, 0]) >= 0
         for other in neighbours:
             _mark(have, local, other.nodes)
-        rows, at = heard.rows, self.places(heard.rows.id)
-        self._add(rows.take(_joining(rows.id, at, heard.family, have)))
+        rows, at = update.rows, self.places(update.rows.id)
+        self._add(rows.take(_joining(rows.id, at, update.family, have)))
         at = self.places(rows.id)
         self._scene.surface_nodes.mobility[at[at >= 0]] = rows.mobility[at >= 0]
 
@@ -90,13 +90,13 @@ class SplitUpdate:
         self._hold(local[(local >= 0) & (scene.own.place[local] < 0)])
         scene.connect([Neighbour(rank, self.places(ids)) for rank, ids in sorted(shared.items())], nodes, comm)
 
-    def share(self, heard: TopologyUpdate, neighbours: list[Neighbour]) -> None:
+    def share(self, update: TopologyUpdate, neighbours: list[Neighbour]) -> None:
         """Updates the lists of shared nodes without a message. A copy is shared by the ranks that share its parent,
         since the same ranks hold it, send it and have contacts of it; and a separated node is shared by all ranks
         that hold it, since it may get impulses across the crack.
         """
         messages, surface_nodes, nodes = self._scene.messages, self._scene.surface_nodes, self._nodes
-        family = heard.family[np.argsort(heard.family[:, 1])]
+        family = update.family[np.argsort(update.family[:, 1])]
         local, at = nodes.places(family), self.places(family)
         held, there = np.zeros(nodes.n, bool), np.zeros(surface_nodes.n, bool)
         company, none = {some.rank: some for some in messages.company.neighbours}, np.zeros(0, np.int32)
@@ -126,12 +126,12 @@ class SplitUpdate:
         scene.reference.add(rows.x, rows.course)
         scene.own.add(first, rows)
 
-    def _faces(self, heard: TopologyUpdate, became: Indices, family: Family) -> None:
+    def _faces(self, update: TopologyUpdate, became: Indices, family: Family) -> None:
         """Replaces the corners of faces by their copies, and adds pairs with the nodes that left a face."""
         faces, slots, surface_nodes = self._scene.faces, self._scene.slots, self._scene.surface_nodes
         near = faces.incidence.at(slots.root[family.pairs[:, 0]])
         rows, old = split_pairs.follow_faces(
-            near, faces.corners, faces.fresh, faces.id, family.first, surface_nodes.id, heard.key, became
+            near, faces.corners, faces.fresh, faces.id, family.first, surface_nodes.id, update.key, became
         )  # fmt: skip
         if not len(rows):
             return
@@ -142,12 +142,12 @@ class SplitUpdate:
         )  # fmt: skip
         self._add_pairs(pairs[:n])
 
-    def _edges(self, heard: TopologyUpdate, became: Indices, family: Family) -> None:
+    def _edges(self, update: TopologyUpdate, became: Indices, family: Family) -> None:
         """Removes edges whose faces have separated, and adds pairs with the edges that left their ends."""
         edges, surface_nodes = self._scene.edges, self._scene.surface_nodes
         near = edges.incidence.at(self._scene.slots.root[family.pairs[:, 0]])
         rows, old, gone = split_pairs.follow_edges(
-            near, edges.corners, edges.fresh, edges.sides, family.first, surface_nodes.id, heard.key, became
+            near, edges.corners, edges.fresh, edges.sides, family.first, surface_nodes.id, update.key, became
         )  # fmt: skip
         some = edges.live[rows] & ~gone & self._meets(old[:, 0])
         if some.any():
@@ -159,7 +159,7 @@ class SplitUpdate:
 
     def _meets(self, places: Indices) -> Flags:
         """(n,) whether the bodies of the nodes ``places`` may be in contact with themselves."""
-        return np.asarray(self._scene.rules.itself[self._scene.surface_nodes.part[places]])
+        return np.asarray(self._scene.rules.self_contact[self._scene.surface_nodes.part[places]])
 
     def _candidates(self, family: Family) -> None:
         """Copies candidate pairs, normals and flags of parents to their copies."""

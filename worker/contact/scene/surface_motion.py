@@ -12,7 +12,7 @@ from ..surface.surface import Surface
 from . import ghosts
 from .near_surface import HALO, NearSurface
 
-_LOOKS = np.array([10.0, 20.0, 40.0, 80.0, 160.0, 300.0])
+_HORIZONS = np.array([10.0, 20.0, 40.0, 80.0, 160.0, 300.0])
 """Horizons of a search, in steps."""
 _SWEPT = 8.0
 """Largest mean number of cells that a node may sweep: two along each axis."""
@@ -109,12 +109,12 @@ class SurfaceMotion:
         v = surface_nodes.course[surface_nodes.places(owned)]
         sums = exact_sums(self._comm, np.column_stack([v, np.ones(len(v))]))
         if sums[3] == 0.0:
-            return float(_LOOKS[0]), np.zeros(3)
+            return float(_HORIZONS[0]), np.zeros(3)
         drift = sums[:3] / sums[3]
-        paths = np.linalg.norm(v - drift, axis=1)[:, None] * (dt / self._size) * _LOOKS
+        paths = np.linalg.norm(v - drift, axis=1)[:, None] * (dt / self._size) * _HORIZONS
         swept = np.rint(np.minimum((1.0 + paths) ** 3, 2.0**30)).sum(axis=0)
         total = self._comm.sum(np.append(swept, len(v)).astype(np.int64))
-        return float(_LOOKS[total[:-1] <= _SWEPT * total[-1]].max(initial=_LOOKS[0])), np.asarray(drift)
+        return float(_HORIZONS[total[:-1] <= _SWEPT * total[-1]].max(initial=_HORIZONS[0])), np.asarray(drift)
 
 
 @njit(

@@ -37,13 +37,13 @@ def gather(split: Split, scene: Scene, here: SurfaceNodes, comm: Comm) -> Topolo
     parents, copies = split.copies.parents, split.first + np.arange(split.copies.n)
     table = np.column_stack([split.key, here.id[split.node]])
     local = np.column_stack([parents, copies]).astype(np.int32)
-    told = _told(split, scene, here, table, local) if split.touched[comm.rank] else {}
-    heard = [words for words in comm.trade(told, sources).values() if len(words)]
-    if not (split.copies.n or heard):
+    messages = _messages(split, scene, here, table, local) if split.touched[comm.rank] else {}
+    received = [words for words in comm.trade(messages, sources).values() if len(words)]
+    if not (split.copies.n or received):
         return None
     family, rows = here.id[local], here.take(np.unique(local))
-    if heard:
-        for words in heard:
+    if received:
+        for words in received:
             ends = 2 + 2 * np.cumsum(words[:2])
             table = np.concatenate([table, words[2 : ends[0]].reshape(-1, 2)])
             family = np.concatenate([family, words[ends[0] : ends[1]].reshape(-1, 2)])
@@ -52,13 +52,13 @@ def gather(split: Split, scene: Scene, here: SurfaceNodes, comm: Comm) -> Topolo
     return TopologyUpdate(table[:, 0].copy(), table[:, 1].copy(), family, rows)
 
 
-def _told(split: Split, scene: Scene, here: SurfaceNodes, table: Ints, local: Indices) -> dict[int, Ints]:
+def _messages(split: Split, scene: Scene, here: SurfaceNodes, table: Ints, local: Indices) -> dict[int, Ints]:
     """Messages by rank: rows of ``table`` (TopologyUpdate.key and became), families, and their nodes; ``local`` (c,
     2): families of this rank.
     """
-    told, flags = {}, np.zeros(here.n, bool)
+    messages, flags = {}, np.zeros(here.n, bool)
     for other in scene.messages.copies.sends:
-        told[other.rank] = np.zeros(0, np.int64)
+        messages[other.rank] = np.zeros(0, np.int64)
         some = meets(flags, other.nodes, local)
         if len(some):
             flags[some] = True
@@ -66,10 +66,10 @@ def _told(split: Split, scene: Scene, here: SurfaceNodes, table: Ints, local: In
             flags[some] = False
             packed = ghosts.pack_nodes(here.take(np.unique(local[some])))
             lengths = np.array([len(round_it), len(some)])
-            told[other.rank] = np.concatenate([
+            messages[other.rank] = np.concatenate([
                 lengths, round_it.reshape(-1), here.id[local[some]].reshape(-1), packed.reshape(-1)
             ])  # fmt: skip
-    return told
+    return messages
 
 
 @njit("int64[::1](boolean[::1], int32[::1], int32[:, ::1])", cache=True)

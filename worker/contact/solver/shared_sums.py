@@ -58,7 +58,7 @@ class SharedSums:
         if not self.neighbours:
             return self._nothing
         assert self._exchange is not None
-        _tell(self._out, self._every, self._ends, self._words, contacts.nodes, local)
+        _flag(self._out, self._every, self._ends, self._words, contacts.nodes, local)
         self._exchange.begin()
         self._exchange.finish()
         sends, receives, counts = _agreed(self._out, self._in, self._every, self._ends, self._words)
@@ -113,7 +113,7 @@ def _parts(words: Ints, ranks: list[int], counts: Ints) -> list[tuple[int, Ints]
 
 
 @njit("void(int64[::1], int32[::1], int64[::1], int64[::1], int32[:, ::1], int32[::1])", cache=True)
-def _tell(out, nodes, ends, words, contacts, local):  # type: ignore[no-untyped-def]
+def _flag(out, nodes, ends, words, contacts, local):  # type: ignore[no-untyped-def]
     """Writes bits of the shared nodes of each rank into ``out``: first whether this rank has an active contact of
     the node, then whether it needs the sum."""
     pushed = np.zeros(len(local), np.bool_)
@@ -168,7 +168,7 @@ def _pack(out, rows, words, first, columns):  # type: ignore[no-untyped-def]
 
 
 @njit("void(int64[:, ::1], int64, int32[::1], int64[:, ::1], int64)", cache=True)
-def _add(words, first, rows, heard, columns):  # type: ignore[no-untyped-def]
+def _add(words, first, rows, received, columns):  # type: ignore[no-untyped-def]
     for r in range(len(rows)):
         for i in range(columns):
-            words[rows[r], first + i] += heard[r, i]
+            words[rows[r], first + i] += received[r, i]

@@ -203,7 +203,7 @@ class ActiveSet:
         the ``parts`` (parts, 3) and to the residual ``unsettled`` (2,); returns whether there was any impulse.
         """
         room, n = self._room, len(self.places)
-        stops.let_go(room.active, room.braced)
+        stops.release(room.active, room.braced)
         many = self._passes.leave.many(n)
         left, pushes = self._scratch.zeros("left", many, 3), self._scratch.zeros("pushes", many, *parts.shape)
         some = surface_nodes.local, state.part, state.owned

@@ -161,7 +161,7 @@ def stop(active, braced):  # type: ignore[no-untyped-def]
 
 
 @njit(types.void(NODES, BRACED), cache=True)
-def let_go(active, braced):  # type: ignore[no-untyped-def]
+def release(active, braced):  # type: ignore[no-untyped-def]
     """Removes the impulses of all stops."""
     for r in range(braced.many[0]):
         for i in range(3):

@@ -14,7 +14,7 @@ _ENOUGH = 0.5
 """Share of the target below which the count falls by one."""
 _MORE = 4
 """Inverse of the share by which the count grows in a step."""
-_TOLD = 2.0
+_WARNED = 2.0
 """Multiple of _SETTLED for the residual of the whole run from which on there is a warning. Chosen."""
 
 
@@ -42,9 +42,9 @@ class SweepCount:
     @property
     def warnings(self) -> list[str]:
         """One line if the residual of the run is above the limit."""
-        if not self._changed > _TOLD * _SETTLED * self._impulse:
+        if not self._changed > _WARNED * _SETTLED * self._impulse:
             return []
-        left, limit = 100.0 * self._changed / self._impulse, 100.0 * _TOLD * _SETTLED
+        left, limit = 100.0 * self._changed / self._impulse, 100.0 * _WARNED * _SETTLED
         advice = "leave contact.sweeps out, or raise it" if self._given else "compare with contact.sweeps = 100"
         return [
             f"the last sweep of contact in a step has still changed its impulses by {left:.2g} % in the mean, above "

@@ -97,10 +97,7 @@ def momentum(k, many):  # type: ignore[no-untyped-def]
 @njit(types.void(NODES, LOADED, _F, _F, _I), cache=True, error_model="numpy")
 def sweep(active, loaded, ahead, scale, k):  # type: ignore[no-untyped-def]
     """Adds the corrections of the loaded contacts of set ``k`` to the impulses of their nodes; those of one contact add
-    up to zero. ``ahead``: Nesterov's factor.
-
-    Normal: p = max(0, p_old + (wanted - u) / R), extrapolated by ahead (p - p_last). Friction: the tangential
-    impulse t - u_t / R_t, scaled back to |t| <= mu p.
+    up to zero. ``ahead``: Nesterov's factor. Row norms R and R_t: docs/theory/contact.md, "Several contacts of a node".
     """
     values, words = active.moving, active.moving_words
     first = loaded.begin[k]
@@ -108,7 +105,7 @@ def sweep(active, loaded, ahead, scale, k):  # type: ignore[no-untyped-def]
     rate, change = np.empty(3), np.empty(3)
     for q in range(loaded.many[k]):
         a, b, c, d = slots[q, 0], slots[q, 1], slots[q, 2], slots[q, 3]
-        speed = 0.0
+        speed = 0.0  # rate = sum(w_k v_k), u = n . rate
         for i in range(3):
             if c < 0:
                 rate[i] = 0.0 + values[a, V + i] - values[b, V + i]
@@ -117,6 +114,7 @@ def sweep(active, loaded, ahead, scale, k):  # type: ignore[no-untyped-def]
                 rate[i] = rate[i] + tangent[q, 2] * values[c, V + i] + tangent[q, 3] * values[d, V + i]
             speed += normal[q, i] * rate[i]
         old, mu = normal[q, PUSH], normal[q, MU]
+        # p = max(0, p_old + (wanted - u) / R), extrapolated by ahead (p - p_last)
         least = max(0.0, old + (normal[q, WANTED] - speed) / normal[q, ROW_NORM])
         push = max(0.0, least + ahead * (least - normal[q, LAST]))
         normal[q, LAST] = least
@@ -125,7 +123,7 @@ def sweep(active, loaded, ahead, scale, k):  # type: ignore[no-untyped-def]
         normal[q, PUSH] = push
         for i in range(3):
             change[i] = (push - old) * normal[q, i]
-        if mu > 0.0:
+        if mu > 0.0:  # t = t_old - (rate - u n) / R_t, scaled back to |t| <= mu p
             size = 0.0
             for i in range(3):
                 rate[i] = tangent[q, PUSH_T + i] - (rate[i] - speed * normal[q, i]) / tangent[q, ROW_NORM_T]
@@ -135,7 +133,7 @@ def sweep(active, loaded, ahead, scale, k):  # type: ignore[no-untyped-def]
             for i in range(3):
                 change[i] += factor * rate[i] - tangent[q, PUSH_T + i]
                 tangent[q, PUSH_T + i] = factor * rate[i]
-        for i in range(3):
+        for i in range(3):  # node k gets w_k (dp n + dt) in quanta, the first one minus the sum of the others
             if c < 0:
                 rest = np.int64(np.rint(-change[i] * scale))
             else:

@@ -15,7 +15,7 @@ from ...model.state import Floats, Indices, Ints
 from ..surface.records import SurfaceNodes
 
 _SAMPLE = 8192
-"""Number of nodes by which boxes are halved: a sample of more."""
+"""Largest sample of the nodes by which boxes are halved."""
 _PER_THREAD = 4
 """Zones per thread: contacts are not spread evenly, and a thread that has finished its zones takes one of another
 thread. Chosen.

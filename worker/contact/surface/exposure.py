@@ -18,7 +18,7 @@ from ...model.state import LAID_BARE, Block, Flags, Indices, Ints
 from ...parallel.comm import Comm
 from ...parallel.ownership import Neighbour
 
-TIRING = 0.5
+NEAR_EROSION = 0.5
 """Share of the plastic strain or damage at erosion. Of the tets eroded in the case long_rod to 20 us, 1.6 to 5.7 %
 were below it 50 to 200 steps before (counts of one run)."""
 WORDS = 9
@@ -36,14 +36,14 @@ class Exposure(NamedTuple):
     """Ids of the nodes of the faces behind them."""
 
 
-def tiring(blocks: list[Block]) -> Ints:
+def near_erosion(blocks: list[Block]) -> Ints:
     """Ids, ascending, of the local tets near erosion."""
     found = [np.zeros(0, np.int64)]
     for block in blocks:
         tired = np.zeros(block.n, bool)
         for row, limit in ((PLASTIC_STRAIN, block.life[STRAIN]), (DAMAGE, block.life[DAMAGED])):
             if len(block.worn) and block.has(row) and limit < np.inf:
-                tired |= block.row(row) > TIRING * limit
+                tired |= block.row(row) > NEAR_EROSION * limit
         found.append(block.id[tired])
     return np.sort(np.concatenate(found))
 
@@ -52,8 +52,8 @@ def covered(blocks: list[Block], tired: Ints, neighbours: list[Neighbour], comm:
     """(k, 3) block, row and face of this rank's tets behind tets near erosion, ``tired``, of this rank and its
     neighbours. Collective.
     """
-    told = comm.swap({other.rank: tired for other in neighbours})
-    every = np.unique(np.concatenate([tired, *told.values()]))
+    received = comm.swap({other.rank: tired for other in neighbours})
+    every = np.unique(np.concatenate([tired, *received.values()]))
     sides = [np.zeros((0, 3), np.int32)]
     for b, block in enumerate(blocks):
         rows, faces = np.nonzero((block.across >= 0) & among(every, block.across // 4))
@@ -66,7 +66,7 @@ def leaving(block: Block, worn: Ints, ids: Ints) -> Ints:
     return np.column_stack([block.id[worn], block.across[worn], ids[block.tets[worn]]])
 
 
-def laid(rows: Ints) -> Exposure:
+def exposed_by(rows: Ints) -> Exposure:
     """Returns the faces exposed by the erosion of the tets of ``rows`` (k, WORDS), of all ranks."""
     gone = np.sort((4 * rows[:, :1] + np.arange(4)).reshape(-1))
     behind, nodes = rows[:, 1:5], rows[:, 5:][:, FACES]
@@ -74,7 +74,7 @@ def laid(rows: Ints) -> Exposure:
     return Exposure(gone, np.sort(behind[bare]), np.unique(nodes[bare]))
 
 
-def lay(blocks: list[Block], bare: Ints) -> None:
+def expose(blocks: list[Block], bare: Ints) -> None:
     """Marks the local faces among ``bare``, ids, ascending, as exposed by erosion."""
     tets = np.unique(bare // 4)
     for block in blocks:
