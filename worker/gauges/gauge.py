@@ -13,7 +13,7 @@ from ..rigid.stage import Rigid
 
 
 class Scene(NamedTuple):
-    """The parts of a simulation that gauges read, on this rank."""
+    """The parts of a simulation on this rank that gauges read."""
 
     model: Model
     contact: Contact | None
@@ -32,7 +32,7 @@ class Gauge(Protocol):
         """Return the present values by the number of the probe; ``v`` (nodes, 3): velocities now, m/s."""
 
     def keep(self) -> Any:
-        """Return the state for a checkpoint, equal on all ranks: numbers and arrays in lists."""
+        """Return the state of the gauges for a checkpoint: numbers and arrays in lists, equal on all ranks."""
 
     def resume(self, known: Any) -> None:
-        """Set the state of ``keep``."""
+        """Set the state of the gauges to ``keep``."""

@@ -13,19 +13,20 @@ from ..model.state import Floats, Ints, Model, Tets
 from ..parallel.comm import Comm
 
 LINES = np.arange(1, 11) / 10.0
-"""Distances of the lines from the axis, over the radius of the part; voids of each are joined to those of the next."""
+"""Distances of the lines from the axis, divided by the radius of the part. Voids of neighbouring lines are joined."""
 MEASURED = (0, 2, 4)
-"""Lines whose depths are averaged: at 0.1, 0.3 and 0.5 of the radius."""
+"""Indices in ``LINES`` of the lines whose depths are averaged: the lines at 0.1, 0.3 and 0.5 of the radius."""
 _TOUCHING = 1e-6
-"""Largest gap, over the radius, that counts as closed: the distance by which lines are moved aside (``spans``)."""
+"""Largest gap, divided by the radius, that counts as closed. It is the distance by which ``spans`` moves lines
+aside."""
 
 
 def spans(x: Floats, tets: Tets, axis: int, at: tuple[float, float]) -> tuple[Ints, Floats]:
-    """Return the tets that a line along ``axis`` passes, (k,), and (k, 2) the interval inside of each along the axis,
+    """Return the tets that a line along ``axis`` passes, (k,), and (k, 2) the interval of the line inside of each tet,
     m.
 
-    ``at``: position of the line in the two directions across. It is moved aside by some 1e-6 of its distance from
-    the axis: a line in a face would be in two tets.
+    ``at``: position of the line in the two directions normal to ``axis``. The line is moved aside by some 1e-6 of
+    its distance from the axis: a line that lies in a face would be in two tets.
     """
     i, j = (axis + 1) % 3, (axis + 2) % 3
     aside = 1e-6 * max(map(abs, at))
@@ -50,9 +51,8 @@ def spans(x: Floats, tets: Tets, axis: int, at: tuple[float, float]) -> tuple[In
 
 
 def passed(x: Floats, tets: Tets, part: Ints, axis: int, radius: float) -> Floats:
-    """Return (k, 4) line, part, and the interval, m, for every tet on a line; ``part`` (n,): of the tets.
-
-    The lines lie between the two directions across the axis, where every sector of a body has tets.
+    """Return (k, 4) line, part and interval, m, for every tet on a line; ``part`` (n,): the part of each tet. The
+    lines are placed between the two directions normal to the axis, where every sector of a body has tets.
     """
     rows = [np.zeros((0, 4))]
     for line, share in enumerate(LINES):
@@ -63,10 +63,10 @@ def passed(x: Floats, tets: Tets, part: Ints, axis: int, radius: float) -> Float
 
 
 def passed_by(model: Model, name: str, along: str, comm: Comm) -> tuple[Floats, float]:
-    """Return the intervals of the lines in the other parts than ``name`` (see ``passed``), and its radius, m.
-    Collective.
+    """Return the intervals of the lines in the parts other than ``name`` (see ``passed``), and the radius of ``name``,
+    m.
 
-    The part comes from below; otherwise the axis is reversed.
+    Collective. If the part lies above the other parts on the axis, the axis is reversed: the part always starts below.
     """
     nodes, axis = model.nodes, "xyz".index(along)
     mine = nodes.in_part(model.parts.index(name))
@@ -90,7 +90,9 @@ def _maximum(comm: Comm, values: Floats) -> float:
 
 
 def thickness(rows: Floats, parts: int) -> Floats:
-    """Return (measured lines, parts) the length of each line in each part, m; ``rows``: see ``passed``."""
+    """Return (measured lines, parts) the length of each line inside of each part, m; ``rows``: the result of
+    ``passed``.
+    """
     total = np.zeros((len(LINES), parts))
     np.add.at(total, (rows[:, 0].astype(int), rows[:, 1].astype(int)), rows[:, 3] - rows[:, 2])
     return total[list(MEASURED)]
@@ -100,8 +102,9 @@ def depth(rows: Floats, thick: Floats, radius: float) -> float:
     """Return the part of the thickness ``thick`` (measured lines, parts), m, that lies in front of the end of the hole,
     m.
 
-    The hole comes from below. The remaining thickness of each part is from the end of the hole to the rear of the
-    part, cavities included; the rear is the furthest point on any line, since a cavity may have opened it on some.
+    The hole starts at the low end of the axis. The remaining thickness of each part is the distance from the end of
+    the hole to the rear of the part. This distance includes cavities. The rear is the furthest point of the part on
+    any line, since a cavity may have opened the rear on some lines.
     """
     rears = np.full(thick.shape[1], -np.inf)
     np.maximum.at(rears, rows[:, 1].astype(int), rows[:, 3])
@@ -124,7 +127,7 @@ def bottoms(rows: Floats, tolerance: float) -> Floats:
 
 
 def _voids(spans: Floats, tolerance: float) -> Floats:
-    """Return (v, 2) the intervals of a line outside of all bodies, without the one behind the last body."""
+    """Return (v, 2) the intervals of a line outside of all bodies. The interval beyond the last body is omitted."""
     spans = spans[np.argsort(spans[:, 0])]
     reach = np.concatenate([[-np.inf], np.maximum.accumulate(spans[:, 1])])
     starts = np.append(spans[:, 0], np.inf)
@@ -134,6 +137,6 @@ def _voids(spans: Floats, tolerance: float) -> Floats:
 
 
 def _overlap(one: Floats, two: Floats, tolerance: float) -> "np.ndarray":
-    """Return (v, w) whether voids of two lines overlap."""
+    """Return (v, w) whether each of v voids of one line overlaps each of w voids of another line."""
     low, high = np.maximum(one[:, None, 0], two[:, 0]), np.minimum(one[:, None, 1], two[:, 1])
     return np.asarray(high > low + tolerance)

@@ -67,7 +67,7 @@ def field(block: Block, name: str, model: Model, places: Ints) -> Floats:
 
 
 def _gauges(case: Case, scene: Scene) -> list[Gauge]:
-    """Return the gauges of the probes of a case."""
+    """Return the gauges that measure the probes of a case."""
     kinds = {kind(probe.field) for probe in case.probes}
     every: tuple[tuple[tuple[str, ...], Callable[[Case, Scene], Gauge]], ...] = (
         (PUSHES, Pushes), (SUMS, NodeSums), (("fragment_velocity", "fragment_mass"), Flying), (SHAPES, Shapes),
@@ -84,7 +84,7 @@ class Probes:
         self._gauges = _gauges(case, scene)
         self._sums = NodeSums(case, scene)
         self.sums = any(isinstance(gauge, NodeSums) for gauge in self._gauges)
-        """Whether there are sums over nodes, for which velocities at time n are computed."""
+        """Whether some probe is a sum over nodes. Such probes need the velocities at time n."""
         other = (*PUSHES, *SUMS, *BEYOND, *SHAPES)
         self._means = [k for k, name in enumerate(self._fields) if kind(name) not in other]
         model = scene.model
@@ -93,17 +93,19 @@ class Probes:
             k: [_inside(case, case.probes[k], block, model, x) for block, x in zip(model.blocks, centres, strict=True)]
             for k in self._means
         }
-        """Global ids of the tets of each mean, for each block."""
+        """Global ids of the tets of each probe that is a mean, for each block."""
         self._counted: list[int] | None = None
         """Number of tets of each block when ``_found`` was made."""
         self._found: list[tuple[str, Block, Ints, slice, slice]] = []
-        """Entries for each mean and block with tets of it: the field, the block, the indices of the tets, and slices
-        of the summed values that are field times mass, and mass."""
+        """Entries for each mean and each block with tets of this mean. An entry has the field, the block, the
+        indices of the tets, and two slices of the summed values: field times mass, and mass."""
         self._starts = np.zeros(1, np.int64)
-        """First value of each sum."""
+        """Index of the first value of each sum."""
 
     def require_tets(self, case: Case) -> None:
-        """Raise InputError, on every rank, for a mean without a tet, or a sum over a box or a set without a node."""
+        """Raise InputError, on every rank, for a mean without a tet, or for a sum over a box or a set without a
+        node.
+        """
         some = [k for k, probe in enumerate(case.probes) if kind(probe.field) in SUMS]
         boxes = [k for k in some if case.probes[k].low is not None or case.probes[k].on is not None]
         tets = [sum(len(ids) for ids in self._chosen[k]) for k in self._means]
@@ -123,19 +125,19 @@ class Probes:
                 )
 
     def keep(self) -> list[Any]:
-        """Return the state for a checkpoint, equal on all ranks."""
+        """Return the state of the gauges for a checkpoint, equal on all ranks."""
         return [gauge.keep() for gauge in self._gauges]
 
     def resume(self, known: list[Any]) -> None:
-        """Set the state of ``keep``."""
+        """Set the state of the gauges to ``keep``."""
         for gauge, own in zip(self._gauges, known, strict=True):
             gauge.resume(own)
 
     def measure(self, v: Floats | None = None) -> Floats:
         """Return (probes,) the present values, equal for any number of ranks; NaN if all tets of a probe were removed.
-        Collective.
 
-        ``v`` (nodes, 3): velocities at time n for sums, if those of the model are half a step ahead.
+        Collective. ``v`` (nodes, 3): velocities at time n for sums; needed if the velocities of the model are half a
+        step ahead.
         """
         if not self.names:
             return np.zeros(0)
@@ -149,7 +151,7 @@ class Probes:
         return np.array([found[k] for k in range(len(self.names))])
 
     def _columns(self) -> Ragged:
-        """Return for each mean the field times mass, and the mass, of its tets."""
+        """Return for each mean two sums over its tets: field times mass, and mass."""
         if self._counted != (counted := [block.n for block in self._model.blocks]):
             self._find()
             self._counted = counted
@@ -178,7 +180,7 @@ class Probes:
 
 
 def _centres(block: Block, model: Model) -> Floats:
-    """Return (3, tets) initial centres, m."""
+    """Return (3, tets) the centres of the tets in the initial configuration, m."""
     return np.array([x[block.tets].sum(axis=1) for x in model.nodes.x0.T.copy()]) / 4.0
 
 

@@ -1,4 +1,4 @@
-"""Rays from a point across an axis to matter: the shape of a hole round the axis."""
+"""Rays normal to an axis from a point to the nearest matter. They measure the shape of a hole round the axis."""
 
 import numpy as np
 
@@ -7,11 +7,14 @@ from ..mesh.faces import FACES
 from ..model.state import Floats, Tets
 
 RAYS = 360
-"""Number of rays. Chosen: a hole with a hundred tets on its circumference has three or four rays for each."""
+"""Number of rays. This value was chosen: a hole with a hundred tets on its circumference has three or four rays for
+each tet."""
 
 
 def directions(axis: int) -> Floats:
-    """Return (RAYS, 3) unit vectors across an axis; none is in a coordinate plane, which may be one of symmetry."""
+    """Return (RAYS, 3) unit vectors normal to an axis. No vector lies in a coordinate plane, which may be a plane of
+    symmetry.
+    """
     angles: Floats = (np.arange(RAYS, dtype=float) + 0.5) * (2.0 * np.pi / RAYS)
     sines, cosines = sines_and_cosines(angles)
     found = np.zeros((RAYS, 3))
@@ -20,9 +23,11 @@ def directions(axis: int) -> Floats:
 
 
 def reach(x: Floats, tets: Tets, origin: Floats, axis: int) -> Floats:
-    """Return (RAYS,) the distance of matter from ``origin`` (3,) along each ray across an axis, m; infinite for none.
+    """Return (RAYS,) the distance of matter from ``origin`` (3,) along each ray normal to an axis, m; infinite without
+    matter.
 
-    A ray is inside of a tet while it is behind the planes of all its faces (Cyrus and Beck).
+    A point of a ray is inside of a tet if it is on the inner side of the planes of all faces of the tet (Cyrus and
+    Beck).
     """
     along = x[tets][:, :, axis]
     corners = x[tets[(along.min(axis=1) <= origin[axis]) & (along.max(axis=1) >= origin[axis])]]

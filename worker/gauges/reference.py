@@ -23,7 +23,9 @@ _STRESSES = ("stress_xx", "stress_yy", "stress_zz", "stress_yz", "stress_zx", "s
 
 
 def thicknesses(sim: Simulation) -> list[list[list[float]]]:
-    """Return for every reference of a penetration the initial thicknesses, m, by line and part; [] for the others.
+    """Return the initial thicknesses, m, by line and part, for every reference of a penetration; [] for the other
+    references.
+
     Collective, equal on all ranks.
     """
     parts = len(sim.model.parts)
@@ -34,8 +36,9 @@ def thicknesses(sim: Simulation) -> list[list[list[float]]]:
 
 
 def measure(sim: Simulation, folder: Path, thick: list[list[list[float]]]) -> list[Check]:
-    """Return the result of every reference of the case; ``thick``: ``thicknesses`` at the start. Collective, equal
-    on all ranks.
+    """Return the result of every reference of the case; ``thick``: the result of ``thicknesses`` at the start.
+
+    Collective, equal on all ranks.
     """
     fields = {probe.name: probe.field for probe in sim.case.probes}
     pairs = zip(sim.case.reference, thick, strict=True)

@@ -19,12 +19,14 @@ from .gauge import Scene
 
 _AXES = "xyz"
 _DAMAGED = 0.5
-"""Damage of a tet above which it counts as broken. Chosen: damage rises from 0 to 1 within few steps."""
+"""Damage of a tet above which the tet counts as broken. This value was chosen: damage rises from 0 to 1 within few
+steps."""
 
 
 class Shapes:
-    """The probes of shapes on this rank. Their state is that of the start: thicknesses, rays that hit matter, areas
-    of faces.
+    """The probes of shapes on this rank.
+
+    Their state is measured at the start: thicknesses, rays that hit matter, areas of faces.
     """
 
     def __init__(self, case: Case, scene: Scene) -> None:
@@ -98,8 +100,9 @@ class Shapes:
         return -float(low), float(high)
 
     def _areas(self, probe: Probe, axis: int, ends: tuple[float, float], sound: Any) -> list[float]:
-        """Return the initial areas, m^2, of the faces of tets at the two ends of the part; ``sound``: (n,) for each
-        block of the part, the tets that count; None for all.
+        """Return the initial areas, m^2, of the faces of tets at the two ends of the part.
+
+        ``sound``: (n,) for each block of the part, which tets count; None: all tets count.
         """
         x, near, columns = self._scene.model.nodes.x0, self._scene.model.slack, []
         for b, block in enumerate(self._blocks(probe)):
@@ -112,7 +115,7 @@ class Shapes:
         return [float(v) for v in exact_sums(self._scene.comm, np.concatenate([np.zeros((0, 2)), *columns]))]
 
     def _sound(self, probe: Probe) -> Any:
-        """Return (n,) for each block of the part the undamaged tets of its heaviest fragment."""
+        """Return (n,) for each block of the part which tets are undamaged tets of the heaviest fragment of the part."""
         scene, model = self._scene, self._scene.model
         cohesion = scene.fracture.cohesion if scene.fracture is not None else None
         damaged = damage(self._case, model, cohesion, scene.comm)

@@ -1,4 +1,6 @@
-"""Probes of sums over nodes: mass, momentum, energy and centre of mass, of all nodes or of those beyond a plane."""
+"""Probes of sums over nodes: mass, momentum, energy and centre of mass. The sum covers all nodes or the nodes beyond
+a plane.
+"""
 
 import math
 from typing import Any
@@ -24,7 +26,7 @@ def ahead(beyond: Beyond, x: Floats) -> Floats:
 
 
 def way(beyond: Beyond) -> float:
-    """Return the sign of the direction away from the plane."""
+    """Return the sign of the direction that points away from the plane."""
     return 1.0 if beyond.side == "above" else -1.0
 
 
@@ -48,9 +50,7 @@ class NodeSums:
         pass
 
     def started(self, probe: Probe) -> Flags:
-        """Return (nodes,) the nodes that were in the box of a probe at the start and are in its set, of those that
-        this rank owns.
-        """
+        """Return (nodes,) which nodes owned by this rank were in the box of a probe at the start and are in its set."""
         model, nodes = self._scene.model, self._scene.model.nodes
         part = model.parts.index(probe.part)
         inside = Region.of(probe).holds(nodes.x0.T, model.slack[part])
@@ -59,7 +59,7 @@ class NodeSums:
         return np.asarray(nodes.owned & nodes.in_part(part) & inside)
 
     def chosen(self, probe: Probe) -> Flags:
-        """Return (nodes,) the nodes of a probe that this rank owns."""
+        """Return (nodes,) which nodes of a probe this rank owns."""
         nodes, erosion, found = self._scene.model.nodes, self._scene.erosion, self.started(probe)
         if erosion is not None:
             found &= ~erosion.removed
@@ -68,8 +68,8 @@ class NodeSums:
         return np.asarray(found)
 
     def _of_bodies(self, v: Floats) -> dict[int, float]:
-        """Return the values of probes of whole rigid parts, whose inertia and centre may differ from those of their
-        nodes.
+        """Return the values of probes of whole rigid parts. The inertia and centre of a rigid part may differ from
+        the sums over its nodes.
         """
         found: dict[int, float] = {}
         rigid, clock = self._scene.rigid, self._scene.clock
@@ -84,7 +84,7 @@ class NodeSums:
         return found
 
     def _columns(self, probe: Probe, v: Floats) -> tuple[Floats, Floats]:
-        """Return (nodes,) the terms of the sum, and the terms of its divisor."""
+        """Return (nodes,) the terms of the sum, and (nodes,) the terms of the divisor of the sum."""
         nodes, field = self._scene.model.nodes, kind(probe.field)
         mass = np.where(self.chosen(probe), nodes.mass_of(self._scene.model.parts.index(probe.part)), 0.0)
         if field in ("mass", "residual_mass"):

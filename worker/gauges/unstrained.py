@@ -1,6 +1,4 @@
-"""Parts of a finished run that were strained so little that they could have been rigid
-(cases/warnings/unstrained.py).
-"""
+"""Parts of a finished run with strains so small that the parts could have been rigid (cases/warnings/unstrained.py)."""
 
 from collections.abc import Iterator
 from pathlib import Path

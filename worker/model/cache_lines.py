@@ -5,7 +5,7 @@ import numpy as np
 from .state import Floats
 
 LINE = 8
-"""Words of a cache line of 64 bytes."""
+"""Number of 64-bit words in a cache line of 64 bytes."""
 
 
 def cache_lines(n: int) -> Floats:

@@ -1,4 +1,4 @@
-"""Buffers with spare room, for arrays that grow by a few rows at a time or are filled anew in every step."""
+"""Buffers with spare capacity, for arrays to which rows are appended or that are filled again in every step."""
 
 from typing import Any
 
@@ -6,8 +6,10 @@ import numpy as np
 
 
 class Scratch:
-    """Buffers, by name, of arrays that are filled anew in every step. An array keeps its address while its length
-    does not change, so that tables of arguments (parallel/arguments.py) that contain it stay valid.
+    """Buffers, by name, of arrays that are filled again in every step.
+
+    An array keeps its address while its length does not change, so that tables of arguments (parallel/arguments.py)
+    that contain the array stay valid.
     """
 
     def __init__(self) -> None:
@@ -15,7 +17,9 @@ class Scratch:
         self._some: dict[str, np.ndarray] = {}
 
     def of(self, name: str, n: int, kind: "type[np.generic]" = np.int64, *columns: int) -> Any:
-        """Return an uninitialised (n, *columns) array; a name always has the same type and columns."""
+        """Return an uninitialised (n, *columns) array. Every call with the same name must have the same type and
+        columns.
+        """
         some = self._some.get(name)
         if some is None or n != len(some):
             room = self._rooms.get(name)
@@ -25,7 +29,7 @@ class Scratch:
         return some
 
     def zeros(self, name: str, n: int, *columns: int) -> Any:
-        """Return the same, of int64 zeros."""
+        """Return a (n, *columns) array of int64 zeros."""
         some = self.of(name, n, np.int64, *columns)
         some.fill(0)
         return some
@@ -37,15 +41,15 @@ def same_memory(one: np.ndarray, two: np.ndarray) -> bool:
 
 
 class Rooms:
-    """Buffers of some columns of a table: columns with spare room are not copied when rows are appended."""
+    """Buffers of some columns of a table. A column with spare capacity is not copied when rows are appended."""
 
     def __init__(self, *names: str) -> None:
         """``names``: attributes of the table that are columns."""
         self._rooms: dict[str, np.ndarray | None] = dict.fromkeys(names)
 
     def of(self, table: object, more: int) -> list[Any]:
-        """Return the buffers; each begins with a column of ``table`` and has room for at least ``more`` rows behind
-        it.
+        """Return the buffers; each begins with a column of ``table`` and has capacity for at least ``more`` further
+        rows.
         """
         for name, room in self._rooms.items():
             column = getattr(table, name)
@@ -56,7 +60,9 @@ class Rooms:
         return list(self._rooms.values())
 
     def append(self, table: object, more: int, **rows: Any) -> None:
-        """Append ``more`` rows to the columns of ``table``: for each column an array, or one value for all rows."""
+        """Append ``more`` rows to the columns of ``table``. Each argument is an array for one column, or one value
+        for all new rows.
+        """
         for room, name in zip(self.of(table, more), self._rooms, strict=True):
             n = len(getattr(table, name))
             room[n : n + more] = rows[name]

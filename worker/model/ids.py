@@ -7,11 +7,13 @@ _Ids = npt.NDArray[np.int64] | npt.NDArray[np.int32]
 _Places = npt.NDArray[np.int32]
 
 _BISECTION = 32
-"""Number of table entries that take as long to fill as one bisection."""
+"""Number of table entries that take as long to fill as one bisection takes."""
 
 
 def located(known: _Ids, wanted: _Ids) -> _Places:
-    """Return the positions of ``wanted`` ids in the ascending ``known``, in their shape; all must be in it."""
+    """Return the positions of ``wanted`` ids in the ascending ``known``, in the shape of ``wanted``. Every id must
+    be in ``known``.
+    """
     if _few(known, wanted):
         return np.searchsorted(known, wanted).astype(np.int32)
     table = np.empty(known[-1] + 1, np.int32)
@@ -20,8 +22,8 @@ def located(known: _Ids, wanted: _Ids) -> _Places:
 
 
 def places(known: _Ids, wanted: _Ids) -> _Places:
-    """Return the positions of ``wanted`` ids in the ascending ``known``, in their shape; -1 for ids that are not in
-    it.
+    """Return the positions of ``wanted`` ids in the ascending ``known``, in the shape of ``wanted``; -1 for ids not
+    in ``known``.
     """
     if not len(known):
         return np.full(wanted.shape, -1, np.int32)
@@ -35,7 +37,7 @@ def places(known: _Ids, wanted: _Ids) -> _Places:
 
 
 def among(known: _Ids, wanted: _Ids) -> npt.NDArray[np.bool_]:
-    """Return which of ``wanted`` ids are in the ascending ``known``, in their shape."""
+    """Return which of the ``wanted`` ids are in the ascending ``known``, in the shape of ``wanted``."""
     return np.asarray(places(known, wanted) >= 0)
 
 
@@ -50,7 +52,7 @@ def unique(ids: _Ids) -> npt.NDArray[np.int64]:
 
 
 class IdIndex:
-    """Positions of ids in a list of any order."""
+    """Positions of ids in a list, which may have any order."""
 
     def __init__(self, ids: _Ids) -> None:
         """``ids`` (n,): distinct."""
@@ -58,7 +60,9 @@ class IdIndex:
         self._known = ids[self._order]
 
     def places(self, wanted: _Ids) -> _Places:
-        """Return the positions of ``wanted`` ids in the list, in their shape; -1 for ids that are not in it."""
+        """Return the positions of ``wanted`` ids in the list, in the shape of ``wanted``; -1 for ids that are not in
+        the list.
+        """
         at = places(self._known, wanted)
         return np.where(at >= 0, self._order[at], -1).astype(np.int32) if len(self._order) else at
 

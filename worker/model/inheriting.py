@@ -9,8 +9,10 @@ from ..kernels.jit import njit
     cache=True,
 )
 def inherit(part, x0, x, v, mass, force, stepping, parents, masses, n):  # type: ignore[no-untyped-def]
-    """Set the rows from ``n`` on of nodal columns: copies of ``parents`` (k,) with zero force and zero energy
-    booked, that take ``masses`` (k,), kg, from their parents.
+    """Set the rows from ``n`` on of nodal columns.
+
+    The new rows are copies of ``parents`` (k,) with zero force and zero lost energy. Each copy takes its mass
+    ``masses`` (k,), kg, from its parent.
     """
     for c in range(len(parents)):
         a = parents[c]

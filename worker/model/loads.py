@@ -1,5 +1,5 @@
-"""Loads on faces of tets, as lists from which each rank takes its own: constant nodal forces, and faces under a
-pressure.
+"""Loads on faces of tets: constant nodal forces, and faces under a pressure. Each rank selects its own rows from the
+lists.
 """
 
 from dataclasses import dataclass
@@ -14,20 +14,20 @@ class Load:
     """Constant forces on corners of tets, ordered by tet."""
 
     place: Ints
-    """(m,) index in the list of the whole model."""
+    """(m,) index of the force in the list of forces of the whole model."""
     tets: Ints
-    """(m,) global ids."""
+    """(m,) global ids of the tets."""
     nodes: Ints
-    """(m,) global ids."""
+    """(m,) global ids of the nodes."""
     force: Floats
-    """(m, 3) force, N."""
+    """(m, 3) force on the node, N."""
 
     def take(self, chosen: Flags) -> "Load":
         """Return the chosen forces."""
         return Load(self.place[chosen], self.tets[chosen], self.nodes[chosen], self.force[chosen])
 
     def here(self, nodes: Ints, tets: Ints) -> "Load":
-        """Return the part of a rank with these nodes and tets: all forces on its nodes."""
+        """Return the forces of a rank that has these nodes and tets: all forces on its nodes."""
         return self.take(np.isin(self.nodes, nodes))
 
 
@@ -36,9 +36,9 @@ class LoadedFaces:
     """Faces under a pressure that acts along the current normal."""
 
     tets: Ints
-    """(m,) global ids."""
+    """(m,) global ids of the tets of the faces."""
     nodes: Ints
-    """(m, 3) global ids, anticlockwise from outside."""
+    """(m, 3) global ids of the nodes of each face, anticlockwise seen from outside."""
     scale: float
     """Quanta per newton of the nodal forces; the same on all ranks."""
 
@@ -47,5 +47,5 @@ class LoadedFaces:
         return LoadedFaces(self.tets[chosen], self.nodes[chosen], self.scale)
 
     def here(self, nodes: Ints, tets: Ints) -> "LoadedFaces":
-        """Return the part of a rank with these nodes and tets: the faces of its tets."""
+        """Return the faces of a rank that has these nodes and tets: the faces of its tets."""
         return self.take(np.isin(self.tets, tets))

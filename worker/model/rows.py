@@ -1,5 +1,7 @@
-"""Rows of the element state. Rows up to DISTORTION exist in every block, the others where a material or a pressure form
-needs them; some rows have another meaning in other materials.
+"""Numbers of the rows of the element state.
+
+Rows up to DISTORTION exist in every block. The other rows exist where a material or a pressure form needs them. Some
+numbers have another meaning in other materials.
 """
 
 S_XX, S_YY, S_ZZ, S_YZ, S_ZX, S_XY = range(6)
@@ -9,9 +11,9 @@ PRESSURE = 6
 VISCOUS = 7
 """Bulk-viscosity pressure q, Pa."""
 MASS = 8
-"""Mass, kg."""
+"""Mass of the tet, kg."""
 WORK = 9
-"""Work of the stress since the start, without the viscous part, J."""
+"""Work of the stress since the start, without the work of the viscous part, J."""
 WORK_VISCOUS = 10
 """Work of the bulk viscosity since the start, J."""
 DISTORTION = 11
@@ -24,36 +26,38 @@ WORK_AVERAGED = 13
 """The part of WORK that the pressure has not done on the averaged volume, J (averaged pressure forms;
 elements/mean.py)."""
 VOLUME_RATIO = 14
-"""Current over initial volume, by the dilatation from which the pressure is computed."""
+"""Ratio of the current to the initial volume. It is computed from the dilatation that also gives the pressure."""
 PLASTIC_STRAIN = 15
 """Effective plastic strain."""
 WORK_PLASTIC = 16
 """Plastic work since the start, J."""
 YIELD = 17
-"""Flow stress at vanishing rate, Pa: no plastic flow below it."""
+"""Flow stress at vanishing strain rate, Pa. Below this stress there is no plastic flow."""
 FLOW = 18
-"""Flow stress of the last plastic step, Pa: the first guess of the next one."""
+"""Flow stress of the last plastic step, Pa. It is the initial guess of the next plastic step."""
 BULKING = 18
 """Bulking pressure, Pa (Johnson-Holmquist)."""
 DILATION = 18
-"""Volume strain of the plastic flow in the last step (Mohr-Coulomb); below zero once it is part of the nodal mean
-(averaged pressure forms)."""
+"""Volume strain of the plastic flow in the last step (Mohr-Coulomb). It is set below zero after it was added to the
+nodal mean (averaged pressure forms)."""
 TEMPERATURE = 19
 """Temperature, K."""
 DAMAGE = 20
-"""Damage, from 0 (intact) to 1 (failed), in laws that have it."""
+"""Damage, from 0 (intact) to 1 (failed), in material laws with damage."""
 PORES = 21
-"""Volume of the pores opened by a tension cut-off over that of the solid matter; with a linear pressure the logarithm
-of one plus that."""
+"""Volume of the pores opened by a tension cut-off, divided by the volume of the solid matter. With a linear pressure
+the row has the logarithm of one plus this ratio."""
 HEAT = 22
-"""Energy from which the pressure of a tet is computed, over the bulk modulus at rest, m^3: its own for a flat tet, a
-mean over its nodes for the others (averaged pressure forms, if the equation of state depends on energy)."""
+"""Energy from which the pressure of a tet is computed, divided by the initial bulk modulus, m^3. A flat tet has its
+own energy, every other tet a mean over its nodes. Used in averaged pressure forms if the equation of state depends
+on energy."""
 BULKING_STEP = 22
-"""Bulking of the last step, Pa, that is not yet part of the nodal mean (Johnson-Holmquist, averaged pressure forms)."""
+"""Bulking pressure of the last step, Pa, that is not yet in the nodal mean (Johnson-Holmquist, averaged pressure
+forms)."""
 CORNERS = 23
-"""First of four rows: current over initial volume at each node of a tet, from which the pressure there is computed
-(Johnson-Holmquist, averaged pressure forms)."""
+"""First of four rows, one for each node of a tet: ratio of the current to the initial volume at this node. The
+pressure at the node is computed from this ratio (Johnson-Holmquist, averaged pressure forms)."""
 NODAL_WORK = 23
-"""The part of the work that is in the nodal mean of HEAT, J."""
+"""Work of the tet that is already in the nodal mean of HEAT, J."""
 WORKS = WORK, WORK_VISCOUS, WORK_PLASTIC, WORK_AVERAGED
-"""Rows that the energy ledger sums up over the tets, with those of removed tets."""
+"""Rows that the energy ledger sums up over all tets, including removed tets."""

@@ -1,4 +1,4 @@
-"""Nodes that have tets of several parts, as bonds by shared nodes make them, and the mass of each part in them."""
+"""Nodes with tets of several parts, which bonds by shared nodes make, and the mass of each part in these nodes."""
 
 from dataclasses import dataclass, field
 
@@ -16,27 +16,30 @@ Flags = npt.NDArray[np.bool_]
 
 @dataclass
 class Shares:
-    """A row for each part of each node that has several parts, ordered by node and part. No rows without such nodes."""
+    """Table with a row for each part of each node that has several parts, ordered by node and part.
+
+    The table is empty if no node has several parts.
+    """
 
     node: Indices = field(default_factory=lambda: np.zeros(0, np.int32))
-    """(k,) local index."""
+    """(k,) local index of the node."""
     part: Indices = field(default_factory=lambda: np.zeros(0, np.int32))
     """(k,) index of the part."""
     mass: Floats = field(default_factory=lambda: np.zeros(0))
-    """(k,) part of the mass of the node that comes from tets of the part, kg."""
+    """(k,) mass of the node that comes from tets of the part, kg."""
     rank: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
-    """(parts,) precedence of the parts: where a node can count for one part only, as in contact, that of the lowest
-    rank is its representative part; (0,) if no bond makes such nodes."""
+    """(parts,) precedence of the parts; (0,) if no bond makes nodes of several parts. Contact and similar stages
+    count a node for one part only: its representative part, which is its part of lowest rank."""
 
     @property
     def fraction(self) -> Floats:
-        """Return (k,) the share of the node's mass."""
+        """Return (k,) the mass of the row divided by the mass of the node."""
         whole = np.bincount(self.node, self.mass, minlength=1)
         return np.asarray(self.mass / whole[self.node])
 
     @property
     def key(self) -> Ints:
-        """Return (k,) node and part as one integer, ascending."""
+        """Return (k,) node and part of each row as one integer, ascending."""
         return self.node.astype(np.int64) * MOST_PARTS + self.part
 
     def take(self, chosen: "np.ndarray") -> "Shares":
@@ -44,28 +47,33 @@ class Shares:
         return Shares(self.node[chosen], self.part[chosen], self.mass[chosen], self.rank)
 
     def members(self, part: Indices) -> tuple[Ints, Indices]:
-        """Return (m,) nodes and (m,) their parts: all nodes with their representative ``part`` (n,), and behind them
-        the nodes of several parts once more for each other part.
+        """Return (m,) nodes and (m,) their parts.
+
+        First come all nodes with their representative ``part`` (n,). Then come further rows for nodes of several
+        parts, one row for each of their other parts.
         """
         more = self.part != part[self.node]
         return np.concatenate([np.arange(len(part)), self.node[more]]), np.concatenate([part, self.part[more]])
 
     def of_nodes(self, local: Indices) -> "Shares":
-        """Return the rows of the nodes that have a new index in ``local`` (nodes,), -1 for none, with this index."""
+        """Return the rows of the nodes with a new index in ``local`` (nodes,), with this index. ``local`` is -1 for
+        omitted nodes.
+        """
         some = local[self.node] >= 0
         return Shares(local[self.node[some]], self.part[some], self.mass[some], self.rank)
 
     def standing(self) -> tuple[Indices, Indices]:
-        """Return the nodes of the rows, each once, and their representative parts."""
+        """Return the distinct nodes of the rows, and the representative part of each node."""
         order = np.lexsort((self.rank[self.part], self.node)) if len(self.node) else np.zeros(0, np.int64)
         nodes, first = np.unique(self.node[order], return_index=True)
         return nodes, self.part[order][first]
 
     def follow(self, node: Indices, part: Indices, mass: Floats) -> "tuple[Shares, Indices, Indices]":
-        """Return the shares after a separation of nodes, and the touched nodes with their representative parts.
+        """Return the shares after a separation of nodes, and the changed nodes with their representative parts.
 
-        The arguments have a row for each tet at each touched node: its new ``node`` (r,), its ``part`` and the mass
-        that the node has from it, kg, in an order that does not depend on the cut.
+        The arguments have a row for each tet at each changed node: its new ``node`` (r,), its ``part``, and the mass
+        that the node has from the tet, kg. The order of the rows does not depend on the division of the tets among
+        the ranks.
         """
         found, at = np.unique(node.astype(np.int64) * MOST_PARTS + part, return_inverse=True)
         nodes, parts = np.divmod(found, MOST_PARTS)
@@ -89,8 +97,8 @@ def shared(node: "np.ndarray", part: "np.ndarray", mass: Floats, rank: Ints) -> 
 
 
 def ranks(case: Case) -> Ints:
-    """Return (parts,) ``Shares.rank``: parts that are in contact first; (0,) in a case without shared nodes between
-    parts.
+    """Return (parts,) ``Shares.rank``; (0,) in a case without shared nodes between parts. Parts that are in contact
+    come first.
     """
     if not shared_bonds(case):
         return np.zeros(0, np.int64)

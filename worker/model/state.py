@@ -21,19 +21,19 @@ Indices = npt.NDArray[np.int32]
 Flags = npt.NDArray[np.bool_]
 Bits = npt.NDArray[np.uint8]
 Tets = npt.NDArray[np.uint32]
-"""Unsigned: numba omits the test for negative indices."""
+"""Type of local indices. It is unsigned, so numba omits the test for negative indices."""
 
 CHUNK = 376
-"""Elements of a chunk."""
+"""Number of elements in a chunk."""
 
 INTACT, BROKEN, WIDE = range(3)
-"""State of a facet between two tets: intact; broken; broken and so wide open that both sides are surface."""
+"""States of a facet between two tets: intact; broken; broken and so wide open that both sides are surface."""
 LAID_BARE = -2
-"""``Block.across`` of a face that erosion has exposed; -1 for one that was exposed at the start."""
+"""Value of ``Block.across`` for a face that erosion has exposed. A face that was exposed at the start has -1."""
 
 
 def extended(array: "np.ndarray", rows: "np.ndarray") -> "np.ndarray":
-    """Return ``array`` with ``rows`` appended, in the free room of its buffer or in a new one half as large again."""
+    """Return ``array`` with ``rows`` appended, in its buffer if that has capacity, else in a larger buffer."""
     n, m = len(array), len(array) + len(rows)
     if n == m:
         return array
@@ -51,11 +51,11 @@ class Nodes:
     """Nodal arrays of one rank: ``n`` nodes, in the order of their global ids."""
 
     id: Ints
-    """(n,) global ids."""
+    """(n,) global ids of the nodes."""
     part: Indices
     """(n,) index of the part; for a node of several parts (``shares``) its representative part."""
     owner: Indices
-    """(n,) rank that owns the node: sums over nodes count it there."""
+    """(n,) rank that owns the node. Sums over nodes count the node on this rank only."""
     owned: npt.NDArray[np.bool_]
     """(n,) whether this rank owns the node."""
     x0: Floats
@@ -73,12 +73,12 @@ class Nodes:
     scale: float = 1.0
     """Quanta per newton of ``force``."""
     group: Indices = field(default_factory=lambda: np.zeros(0, np.int32))
-    """(n,) see Model.groups; a copy has the group of its parent. (0,) if loads of groups are not recorded."""
+    """(n,) group of the node (Model.groups); (0,) without records of groups. A copy has the group of its parent."""
     marks: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
-    """(n,) bit set of the sets of mesh files that contain the node (scene/marks.py); a copy has that of its parent.
-    (0,) if the case refers to no set."""
+    """(n,) bits: sets of mesh files that contain the node (scene/marks.py); (0,) if the case refers to no set. A
+    copy has the bits of its parent."""
     shares: Shares = field(default_factory=Shares)
-    """Nodes that belong to several parts."""
+    """Masses of the nodes that belong to several parts."""
     _inherited: Rooms = field(
         default_factory=lambda: Rooms("part", "x0", "x", "v", "mass", "force", "stepping"), init=False
     )
@@ -94,7 +94,7 @@ class Nodes:
         return ids_of.places(self.id, ids)
 
     def among(self, chosen: Flags) -> Flags:
-        """Return (n,) which nodes have a tet of the ``chosen`` parts (parts,)."""
+        """Return (n,) which nodes have a tet of one of the ``chosen`` parts (parts,)."""
         found: Flags = chosen[self.part]
         found[self.shares.node[chosen[self.shares.part]]] = True
         return found
@@ -118,8 +118,8 @@ class Nodes:
         return mass
 
     def grow(self, copies: "Copies") -> None:
-        """Append copies of nodes: each has the state of its parent, and takes its mass from it."""
-        # It imports numba, which must not be imported before kernels/store.py has set its cache folder.
+        """Append copies of nodes: each copy has the state of its parent, and takes its mass from its parent."""
+        # This module imports numba, which must not be imported before kernels/store.py has set its cache folder.
         from .inheriting import inherit
 
         n, m = self.n, self.n + copies.n
@@ -137,22 +137,22 @@ class Nodes:
 
 @dataclass
 class Copies:
-    """New nodes of a separation, in ascending order of global id, behind all nodes of the rank."""
+    """New nodes of a separation, in ascending order of global id. They are appended to the nodes of the rank."""
 
     parents: Ints
-    """(n,) local index of the node that each was separated from."""
+    """(n,) local index of the parent, the node from which each copy was separated."""
     id: Ints
-    """(n,) global ids."""
+    """(n,) global ids of the copies."""
     owner: Indices
-    """(n,) rank that owns the node."""
+    """(n,) rank that owns the copy."""
     owned: Flags
-    """(n,) whether this rank owns the node."""
+    """(n,) whether this rank owns the copy."""
     mass: Floats
-    """(n,) mass, kg."""
+    """(n,) mass of the copy, kg."""
 
     @property
     def n(self) -> int:
-        """Number of copies."""
+        """Number of copies on this rank."""
         return len(self.id)
 
 
@@ -165,7 +165,7 @@ class Block:
     part: int
     n: int
     tets: Tets
-    """(n, 4) local nodes."""
+    """(n, 4) local indices of the nodes of each tet."""
     id: Ints
     """(n,) global tet ids."""
     state: Floats
@@ -180,34 +180,34 @@ class Block:
     temperature: float = 293.15
     """Initial temperature, K; the temperature of every tet if the material has no row for it."""
     across: Indices = field(default_factory=lambda: np.zeros((0, 4), np.int32))
-    """(n, 4) the neighbour of each face at the start, 4 * global tet id + local face; -1 for an exposed face,
-    LAID_BARE for a face that erosion has exposed; (0, 4) in scenes without contact and fracture."""
+    """(n, 4) the neighbour of each face at the start, 4 * global tet id + local face. -1: a face exposed at the
+    start; LAID_BARE: a face exposed by erosion. (0, 4) in scenes without contact and fracture."""
     bond: Bits = field(default_factory=lambda: np.zeros((0, 4), np.uint8))
-    """(n, 4) INTACT, BROKEN or WIDE; (0, 4) where the part does not fracture."""
+    """(n, 4) state of the facet at each face, INTACT, BROKEN or WIDE; (0, 4) where the part does not fracture."""
     weakest: Floats = field(default_factory=lambda: np.zeros(0))
-    """(n,) smallest strength of the faces of each tet, Pa; (0,) where the part does not fracture."""
+    """(n,) smallest strength of the four faces of each tet, Pa; (0,) where the part does not fracture."""
     hot: Bits = field(default_factory=lambda: np.zeros(0, np.uint8))
-    """(n,) bit k: the tet's own traction on face k exceeds ``weakest``."""
+    """(n,) bit k is set if the traction of the tet alone on face k exceeds ``weakest``."""
     flat: Flags = field(default_factory=lambda: np.zeros(0, bool))
-    """(n,) flat tets, whose volume strain is not averaged (elements/flat.py); (0,) if there is none."""
+    """(n,) which tets are flat (elements/flat.py) and have no averaged volume strain; (0,) without flat tets."""
     shear_weight: float = 0.0
-    """Weight of the shear traction against the normal traction in the criterion of fracture."""
+    """Weight of the shear traction relative to the normal traction in the fracture criterion."""
     worn: Flags = field(default_factory=lambda: np.zeros(0, bool))
-    """(n,) tets that are to be removed; (0,) if the part does not erode."""
+    """(n,) which tets are to be removed; (0,) if the part does not erode."""
     life: Floats = field(default_factory=lambda: np.zeros(5))
     """Limits of erosion (elements/wear.py)."""
     rigid: bool = False
-    """Whether the part is rigid: passes over elements omit it."""
+    """Whether the part is rigid. Passes over elements omit a rigid part."""
     seconds: float = 0.0
     """CPU time of the passes over the block, s; counted if the rank has several blocks."""
     group: Indices = field(default_factory=lambda: np.zeros(0, np.int32))
-    """(n,) see Model.groups; (0,) if loads of groups are not recorded."""
+    """(n,) group of the tet (Model.groups); (0,) without records of groups."""
     moved: int = 0
-    """Number of tets removed so far; for each another tet may have moved to another chunk."""
+    """Number of tets removed so far. At each removal another tet may have moved to another chunk."""
     quiet: Ints = field(default_factory=lambda: np.zeros((0, 3), np.int64))
     """(chunks, 3) record of chunks at rest (elements/rest.py)."""
     own_averages: Tets | None = None
-    """(n, 4) see ``averages``; None if they are the nodes."""
+    """(n, 4) indices ``averages`` of the nodal means; None if the means belong to the nodes themselves."""
 
     @property
     def averages(self) -> Tets:
@@ -220,11 +220,11 @@ class Block:
         return -(-self.n // CHUNK)
 
     def __post_init__(self) -> None:
-        """Views of ``state``, which stays the same array."""
+        """Views of ``state``. The array object ``state`` is never replaced."""
         self.flat_state: Floats = self.state.reshape(-1)
         """The whole state as one row."""
         self.rows = int(self.state.shape[1])
-        """Rows of the state of a chunk."""
+        """Number of rows of the state of a chunk."""
 
     def row(self, row: int) -> Floats:
         """Return (n,) a copy of one row of the state."""
@@ -232,7 +232,7 @@ class Block:
 
     def at(self, row: int, places: "np.ndarray") -> Floats:
         """Return (k,) a copy of one row of the state for the tets ``places`` (k,)."""
-        further = (int(self.state.shape[1]) - 1) * CHUNK  # words between the parts of a row in two chunks
+        further = (int(self.state.shape[1]) - 1) * CHUNK  # words between a row of two chunks
         return np.asarray(self.state.reshape(-1)[places + (places // CHUNK * further + row * CHUNK)])
 
     def has(self, row: int) -> bool:
@@ -245,7 +245,7 @@ class Block:
         return bare | (self.bond == WIDE) if len(self.bond) else bare
 
     def drop(self, gone: Ints) -> None:
-        """Remove the tets with these local indices; tets from the end fill the gaps."""
+        """Remove the tets with these local indices; tets from the end of the block fill the gaps."""
         left = self.n - len(gone)
         holes, movers = gone[gone < left], np.setdiff1d(np.arange(left, self.n), gone)
         tables = self.tets, self.id, self.across, self.worn, self.group, self.flat, self.own_averages
@@ -272,25 +272,24 @@ class Model:
     elements_global: int = 0
     """Number of tets of all ranks that are not eroded."""
     nodes_global: int = 0
-    """Number of nodes of all ranks; for when it is up to date see ``StepReduction.nodes``."""
+    """Number of nodes of all ranks. ``StepReduction.nodes`` describes when this number is up to date."""
     part_starts: Ints = field(default_factory=lambda: np.zeros(1, np.int64))
     """Global id of the first tet of each part."""
     mean_volumes: Floats = field(default_factory=lambda: np.zeros(0))
     """(parts,) mean volume of a tet at the start, m^3."""
     size: float = 0.0
-    """Largest absolute coordinate of the whole mesh at the start, m: scale of the round-off in positions."""
+    """Largest absolute coordinate of the whole mesh at the start, m. It determines the round-off of positions."""
     slack: Floats = field(default_factory=lambda: np.zeros(0))
-    """(parts,) tolerance for nodes in a region: distance outside of it that still counts as inside, m
-    (cases/shapes/region.py)."""
+    """(parts,) distance, m, outside of a region at which a node still counts as inside (cases/shapes/region.py)."""
     rounding: Floats = field(default_factory=lambda: np.zeros(0))
-    """(parts,) tolerance for nodes on a plane of symmetry: distance that still counts as on it, m."""
+    """(parts,) distance, m, from a plane of symmetry at which a node still counts as on the plane."""
     groups: Floats = field(default_factory=lambda: np.zeros((0, 4)))
     """(groups, 4) centre, m, and number of tets of each group at the start. A group is a set of neighbouring tets
-    whose load is recorded (migration/groups.py); groups do not depend on the number of ranks."""
+    with a recorded load (migration/groups.py). Groups do not depend on the number of ranks."""
 
 
 def chunked(values: Floats) -> Floats:
-    """Return (n,) values as (chunks, CHUNK), padded with the last value, which is safe as a divisor."""
+    """Return (n,) values as (chunks, CHUNK). The last value pads the last chunk; it is a safe divisor."""
     chunks = -(-len(values) // CHUNK)
     filled = np.empty(chunks * CHUNK)
     filled[: len(values)] = values

@@ -8,11 +8,13 @@ import numpy as np
 from .state import Copies, Indices, Ints
 
 KEY = 2**31
-"""Larger than any global tet id."""
+"""Factor larger than any global tet id."""
 
 
 def keys(nodes: Ints, tets: Ints) -> Ints:
-    """Return (n,) the ids of a node and a tet as one integer, in lexicographic order."""
+    """Return (n,) the ids of a node and a tet as one integer. The integers have the lexicographic order of the
+    pairs.
+    """
     return np.asarray(nodes * KEY + tets)
 
 
@@ -20,13 +22,14 @@ class KeptByNode(Protocol):
     """An object with arrays by node that is updated when nodes separate."""
 
     def grow(self, split: "Split", ids: Ints) -> None:
-        """Extend the arrays by the copies of a split; ``ids``: global ids of the local nodes."""
+        """Extend the arrays indexed by node by the copies of a split; ``ids``: global ids of the local nodes."""
 
 
 @dataclass
 class Split:
-    """Separation of nodes in one step, on one rank: the tets at each separated node of this rank, and their new
-    nodes.
+    """Separation of nodes in one step, on one rank.
+
+    It has the tets at each separated node of this rank, and the new nodes of these tets.
     """
 
     copies: Copies
@@ -35,16 +38,16 @@ class Split:
     touched: Ints
     """(ranks,) nonzero for ranks that have a node of the breaking facets."""
     key: Ints
-    """(r,) node and tet, as one integer of their global ids (``keys``), for each tet whose node became a copy;
+    """(r,) key of each tet whose node became a copy: one integer of the global ids of node and tet (``keys``);
     ascending."""
     node: Indices
-    """(r,) local index of the copy."""
+    """(r,) local index of the copy of the node of each row."""
     place: Indices
-    """(r,) index of the tet in its block, -1 for a tet of another rank."""
+    """(r,) index of the tet in its block; -1 for a tet of another rank."""
     corner: Indices
-    """(r,) corner of the tet, 0 to 3."""
+    """(r,) corner of the tet at which the node is, 0 to 3."""
     block: Indices
-    """(r,) index of the block."""
+    """(r,) index of the block of the tet."""
 
     @classmethod
     def elsewhere(cls, first: int, touched: Ints) -> Self:
@@ -54,7 +57,7 @@ class Split:
         return cls(copies, first, touched, words, places, places, places, places)
 
     def followed(self, nodes: Indices, ids: Ints, tets: Ints) -> Indices:
-        """Return the new local nodes for ``nodes`` (n, k), local, of tets of global ids ``tets`` (n,).
+        """Return the new local nodes for ``nodes`` (n, k), local, of tets with global ids ``tets`` (n,).
 
         ``ids``: global ids of the local nodes.
         """
@@ -65,5 +68,5 @@ class Split:
         return np.where(self.key[at] == wanted, self.node[at], nodes).astype(np.int32)
 
     def followed_sides(self, nodes: Indices, ids: Ints, tets: Ints) -> Indices:
-        """Return the same for facets: ``nodes`` (n, 6), three for each side, of ``tets`` (n, 2)."""
+        """Return the new local nodes of facets: ``nodes`` (n, 6), three for each side, of ``tets`` (n, 2)."""
         return np.concatenate([self.followed(nodes[:, 3 * k : 3 * k + 3], ids, tets[:, k]) for k in (0, 1)], axis=1)
