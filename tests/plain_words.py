@@ -42,7 +42,6 @@ NOT_YET: dict[str, int] = {
     "client": 4,
     "client/commands": 1,
     "client/decks": 14,
-    "client/drawing": 44,
     "client/local": 2,
     "client/remote": 2,
     "client/reports": 31,

@@ -1,1 +1,1 @@
-"""Pictures of frames: ``picture`` asks for them, ``render`` draws them in a process of its own."""
+"""Pictures of frames. ``picture`` describes a picture; ``render`` draws the picture in a process of its own."""

@@ -1,4 +1,6 @@
-"""Arrows on the surface: a few of the vectors, evenly over the picture, of what is nearest to the camera."""
+"""Vectors on the surface of the body as arrows. A few vectors are drawn, one in each cell of a grid over the
+picture: the vector nearest to the camera.
+"""
 
 from collections.abc import Sequence
 from typing import Any
@@ -10,18 +12,20 @@ from .camera import Camera
 from .shot import Shot
 
 _ACROSS = 22
-"""Arrows along the longer side of a panel. Chosen."""
+"""Number of arrows along the longer side of a panel. Chosen value."""
 _LONGEST = 1.8
-"""Times the distance of two arrows, the length of the longest. Chosen."""
+"""Length of the longest arrow over the distance of two arrows. Chosen value."""
 
 
 def longest(shots: Sequence[Shot]) -> float:
-    """The longest vector of all shots."""
+    """Returns the length of the longest vector of all shots."""
     return max(float(np.linalg.norm(vectors, axis=1).max()) for shot in shots for _, vectors in [_all(shot)])
 
 
 def on(shot: Shot, eye: Camera, aspect: float, most: float) -> Any | None:
-    """The arrows on a shot, of which one of length ``most`` is the longest; None where nothing moves."""
+    """Returns the arrows of a shot, or None if no vector is above 2 % of ``most``. A vector of length ``most`` has
+    the longest arrow.
+    """
     places, vectors = _all(shot)
     step = 2.0 * eye.half * max(aspect, 1.0) / _ACROSS
     cell = np.floor(np.stack([places @ eye.right, places @ eye.above], axis=1) / step).astype(np.int64)

@@ -1,6 +1,5 @@
-"""Where the camera of a picture stands, how the panels are laid out, and what is a round length; numpy only.
-
-The projection is parallel, so that lengths across the view are the same everywhere and a bar of a length is true.
+"""Position of the camera, number of columns of panels, and round lengths; numpy only. The projection is parallel: a
+length across the view has the same size in pixels everywhere, and the scale bar is valid for the whole picture.
 """
 
 import math
@@ -18,24 +17,26 @@ from .picture import Picture
 Array: TypeAlias = "np.ndarray[Any, np.dtype[np.float64]]"
 
 FROM = (1.0, -1.55, 0.62)
-"""Direction from the body to the camera where nothing else decides: from the front, the right and above. Chosen."""
+"""Default direction from the body to the camera: from the front, the right and above. Chosen value."""
 _ASIDE = 1.55
-"""How much more the camera looks at a plane of symmetry than at the other sides. Chosen."""
+"""Component of the direction to the camera along the normal of a plane of symmetry; along other sides it is 1.
+Chosen value."""
 _LONG = 2.2
-"""Times its second extent, from which on a body is long, and lies along the picture. Chosen."""
+"""Ratio of the first to the second extent above which a body is long. A long body lies horizontally in the picture.
+Chosen value."""
 _ALONG = (0.45, 0.5)
-"""Components of the direction to the camera along a long body and from the third side, where the one from the side that
-it shows is 1.55. Chosen."""
+"""Components of the direction to the camera along a long body and along the axis that points upwards. The component
+along the side that faces the camera is 1.55. Chosen values."""
 _FILL = 0.84
-"""Share of a panel that the body takes up. Chosen."""
+"""Fraction of a panel that the body fills. Chosen value."""
 _SCALE = 0.28
-"""Largest share of a panel's width that the bar of a length takes up. Chosen."""
+"""Largest length of the scale bar over the width of a panel. Chosen value."""
 
 
 @dataclass(frozen=True)
 class Camera:
-    """A parallel view: unit vectors to the camera, to the right and upwards; ``half`` is half the height that a panel
-    shows, m, and within ``deep`` of the centre, m, lies all of the body.
+    """A camera with parallel projection. ``towards``, ``right`` and ``above`` are unit vectors. ``half`` is half the
+    height that a panel shows, m. All of the body lies within the distance ``deep`` of the centre, m.
     """
 
     centre: Array
@@ -47,10 +48,11 @@ class Camera:
 
 
 def settled(picture: Picture, bounds: Array) -> Picture:
-    """The picture with a camera; ``bounds`` (3, 2): lowest and highest coordinates of the body, m.
+    """Returns the picture with a camera and an upward direction; ``bounds`` (3, 2): lowest and highest coordinates of
+    the body, m.
 
-    As it was asked for; else from the side where planes of symmetry can be seen, or from the front right and above. A
-    long body lies along the picture, unless it was said what is up.
+    A camera of the user stays. The default camera sees the planes of symmetry, or the front, the right side and the
+    top. A long body lies horizontally, unless the user gave an upward direction.
     """
     if picture.camera is not None:
         return picture
@@ -66,7 +68,7 @@ def settled(picture: Picture, bounds: Array) -> Picture:
 
 
 def _before(sides: dict[int, float]) -> tuple[float, float, float]:
-    """To a camera that sees the sides, -1 or 1, across x and y."""
+    """Returns the direction to a camera that sees the given sides (-1 or 1) across x and y."""
     if not sides:
         return FROM
     x, y = sides.get(0, 0.8), sides.get(1, -0.8)
@@ -74,8 +76,10 @@ def _before(sides: dict[int, float]) -> tuple[float, float, float]:
 
 
 def _beside(along: int, sides: dict[int, float]) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """To a camera that sees a body along one axis from its side, the low end at the left, and what is up there: z; of a
-    body along z the side that is not shown, so that planes of symmetry are seen from the front and from above.
+    """Returns the direction to a camera that sees a long body from its side, and the upward direction.
+
+    The low end of the body is at the left of the picture and z points upwards. For a body along z, the side that is
+    not shown points upwards: planes of symmetry are seen from the front and from above.
     """
     if along < 2:
         shown, upper, face, top = 1 - along, 2, sides.get(1 - along, 1.0 if along else -1.0), 1.0
@@ -89,7 +93,9 @@ def _beside(along: int, sides: dict[int, float]) -> tuple[tuple[float, ...], tup
 
 
 def axes(direction: Sequence[float], up: Sequence[float] | None) -> tuple[Array, Array, Array]:
-    """Unit vectors to the camera, to the right and upwards; ``up`` is z, or y where the camera looks along z."""
+    """Returns the unit vectors to the camera, to the right and upwards. The default of ``up`` is z, or y for a camera
+    along z.
+    """
     towards = np.array(direction, float) / np.linalg.norm(direction)
     for above in (np.array(up, float) if up is not None else np.array([0.0, 0.0, 1.0]), np.array([0.0, 1.0, 0.0]),
                   np.array([1.0, 0.0, 0.0])):  # fmt: skip
@@ -101,7 +107,9 @@ def axes(direction: Sequence[float], up: Sequence[float] | None) -> tuple[Array,
 
 
 def reach(points: Sequence[Array], right: Array, above: Array) -> tuple[float, float, Array]:
-    """Width and height of the smallest box round all points as they are seen, and its centre in space."""
+    """Returns width and height of the smallest rectangle round all points in the view, and the centre of the points
+    in space.
+    """
     seen = [np.stack([each @ right, each @ above]) for each in points if len(each)]
     low = np.min([each.min(axis=1) for each in seen], axis=0)
     high = np.max([each.max(axis=1) for each in seen], axis=0)
@@ -112,7 +120,7 @@ def reach(points: Sequence[Array], right: Array, above: Array) -> tuple[float, f
 
 
 def panels(n: int, body: tuple[float, float], room: tuple[float, float]) -> int:
-    """Into how many columns ``n`` panels are laid so that a body of this width and height is drawn largest."""
+    """Returns the number of columns for ``n`` panels with which a body of this width and height is drawn largest."""
     width, height = body
 
     def largest(columns: int) -> float:
@@ -123,7 +131,9 @@ def panels(n: int, body: tuple[float, float], room: tuple[float, float]) -> int:
 
 
 def place(points: Sequence[Array], every: Sequence[Array], picture: Picture, aspect: float) -> Camera:
-    """A camera that sees all ``points`` in a panel whose width over height is ``aspect``, and is before ``every``."""
+    """Returns a camera whose panel shows all ``points`` and that stands outside of ``every``; ``aspect`` is the
+    width of the panel over its height.
+    """
     towards, right, above = axes(picture.camera or FROM, picture.up)
     width, height, centre = reach(points, right, above)
     half = 0.5 * max(height, width / aspect, 1e-30) / _FILL / picture.look.zoom
@@ -132,12 +142,12 @@ def place(points: Sequence[Array], every: Sequence[Array], picture: Picture, asp
 
 
 def round_length(most: float) -> float:
-    """The largest of 1, 2, 5, 10 ... that is at most ``most``."""
+    """Returns the largest of the numbers 1, 2, 5, 10 ... that is at most ``most``."""
     power = 10.0 ** math.floor(math.log10(most))
     return next(factor * power for factor in (5.0, 2.0, 1.0) if factor * power <= most * (1.0 + 1e-9))
 
 
 def scale_bar(camera: Camera, aspect: float, room: float = math.inf) -> tuple[float, str]:
-    """A round length in m that fits below the body and in ``room``, m, and how it is written."""
+    """Returns a round length of at most ``room``, m, for the scale bar below the body, and its text."""
     length = round_length(min(_SCALE * 2.0 * camera.half * aspect, room))
     return length, exact(length, "m", 3)

@@ -1,4 +1,4 @@
-"""What stands beside the bodies: title, colour bar or legend, axes, the bar of a length."""
+"""Texts beside the bodies: title, colour bar or legend, axes and scale bar."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,12 +19,12 @@ from .scales import Scale
 
 _AXES = "#d1495b", "#2f9e60", "#3f74d8"
 _MOST_NAMES = 24
-"""Lines of a legend, at most. Chosen."""
+"""Largest number of lines of a legend. Chosen value."""
 
 
 @dataclass(frozen=True)
 class Ink:
-    """Colours of texts and of the ground."""
+    """Colours of texts and of the background."""
 
     ink: str
     soft: str
@@ -33,12 +33,12 @@ class Ink:
 
 LIGHT, DARK = Ink("#1d2733", "#5a6775", "#ffffff"), Ink("#e6ebf0", "#9aa7b4", "#14191f")
 NEUTRAL = Ink("#7d8894", "#7d8894", "#ffffff")
-"""Read on a light and on a dark ground."""
+"""Colours that are readable on a light and on a dark background."""
 
 
 @cache
 def face(size: int) -> Any:
-    """DejaVu Sans, which comes with matplotlib; where that is not installed what Pillow has itself."""
+    """Returns DejaVu Sans, which matplotlib installs; without matplotlib, the font of Pillow."""
     found = find_spec("matplotlib")
     if found is not None and found.origin is not None:
         path = Path(found.origin).parent / "mpl-data" / "fonts" / "ttf" / "DejaVuSans.ttf"
@@ -48,12 +48,12 @@ def face(size: int) -> Any:
 
 
 def width(text: str, size: int) -> int:
-    """Pixels that a line of text is long."""
+    """Returns the length of a line of text, pixels."""
     return int(face(size).getlength(text) + 1.0)
 
 
 def fitted(text: str, size: int, room: float) -> str:
-    """The text, with dots for what does not fit."""
+    """Returns the text; a text that is too long ends in dots."""
     if width(text, size) <= room:
         return text
     while text and width(f"{text}…", size) > room:
@@ -62,7 +62,7 @@ def fitted(text: str, size: int, room: float) -> str:
 
 
 def folded(text: str, size: int, room: float) -> list[str]:
-    """The text in lines of at most ``room`` pixels, a word at least in each."""
+    """Breaks the text into lines of at most ``room`` pixels. Each line has at least one word."""
     lines: list[str] = []
     for word in text.split():
         if lines and width(f"{lines[-1]} {word}", size) <= room:
@@ -73,7 +73,7 @@ def folded(text: str, size: int, room: float) -> list[str]:
 
 
 class Painter:
-    """Writes on a picture in the inks of its ground."""
+    """Writes texts on a picture in the colours for its background."""
 
     def __init__(self, image: Any, laid: Sheet, ink: Ink) -> None:
         self._draw, self._laid, self._ink = ImageDraw.Draw(image), laid, ink
@@ -86,7 +86,7 @@ class Painter:
         self._draw.text(place, text, fill=colour, font=face(size or self._font), anchor=anchor)
 
     def title(self, title: str, when: str) -> None:
-        """Above all panels: the title at the left, the time at the right."""
+        """Writes the title at the left and the time at the right, above all panels."""
         left, _, across, down = self._laid.head
         margin = self._font
         taken = width(when, self._font) + 2 * margin if when else 0
@@ -95,7 +95,7 @@ class Painter:
             self._text((across - margin, 0.55 * down), when, "rm", soft=True)
 
     def bar(self, field: Field, scale: Scale, extremes: tuple[float, float]) -> None:
-        """The colour bar, its values, and the extremes where they lie beyond."""
+        """Draws the colour bar and its values, and writes the extremes that lie beyond the ends of the bar."""
         left, top, across, down = self._laid.side
         lines = heading(field, across - self._font, self._font)
         step = round(1.35 * self._font)
@@ -138,7 +138,7 @@ class Painter:
             )
 
     def legend(self, entries: Sequence[tuple[str, str]], note: str) -> None:
-        """Names and their colours, as many as there is room for."""
+        """Draws a legend of names and their colours, with as many lines as fit."""
         left, top, _, down = self._laid.side
         step = round(1.6 * self._font)
         room = max(1, min(_MOST_NAMES, int((0.84 * down) / step) - 2 - (1 if note else 0)))
@@ -156,11 +156,11 @@ class Painter:
                 y += round(1.35 * self._font)
 
     def when(self, panel: Box, text: str) -> None:
-        """The time of a panel among several."""
+        """Writes the time of a panel; used if a picture has several panels."""
         self._text((panel[0] + self._font, panel[1] + 0.6 * self._font), text)
 
     def notes(self, panel: Box, lines: Sequence[str]) -> None:
-        """What the picture does not show by itself, below the body."""
+        """Writes a note below the body, for example about pieces outside of the picture."""
         small = max(8, round(0.85 * self._font))
         room = panel[2] - 14 * self._font
         for n, line in enumerate(reversed(lines)):
@@ -168,7 +168,7 @@ class Painter:
             self._text((panel[0] + 7 * self._font, y), fitted(line, small, room), "ls", small, soft=True)
 
     def triad(self, panel: Box) -> None:
-        """The axes, those that point away first."""
+        """Draws the axes. Axes that point away from the camera are drawn first."""
         eye = self._laid.eye
         seen = np.stack([eye.right, -eye.above, eye.towards])
         ends = 2.1 * self._font * seen[:2]
@@ -182,7 +182,7 @@ class Painter:
             self._draw.text(place, "xyz"[axis], fill=_AXES[axis], font=face(self._font), anchor="mm")
 
     def length(self, panel: Box) -> None:
-        """A line of a round length, below the colour bar or at the lower right of the panel."""
+        """Draws the scale bar: a line of a round length, below the colour bar or at the lower right of the panel."""
         room = self._laid.pixel * (self._laid.side[2] - 1.6 * self._font) if self._laid.side[2] else np.inf
         length, text = camera.scale_bar(self._laid.eye, self._laid.aspect, room)
         panel = self._laid.side if self._laid.side[2] else panel
@@ -195,12 +195,12 @@ class Painter:
 
 
 def heading(field: Field, room: float, size: int) -> list[str]:
-    """The label of a field with its unit, folded."""
+    """Returns the label of a field with its unit, broken into lines."""
     return folded(f"{field.label}, {field.unit}" if field.unit else field.label, size, room)
 
 
 def beside_bar(field: Field, scale: Scale, size: int) -> int:
-    """Pixels that a colour bar takes up with what is written on it."""
+    """Returns the width of a colour bar with its texts, pixels."""
     small = max(8, round(0.85 * size))
     uniform = scale.uniform is not None
     texts = exacts([scale.uniform], field.unit, 5) if uniform else exacts(scale.ticks, "", 5)
@@ -210,14 +210,14 @@ def beside_bar(field: Field, scale: Scale, size: int) -> int:
 
 
 def beside_legend(entries: Sequence[tuple[str, str]], note: str, size: int) -> int:
-    """Pixels that a legend takes up."""
+    """Returns the width of a legend, pixels."""
     names = max((width(name, size) for name, _ in entries), default=0)
     words = max((width(word, size) for word in note.split()), default=0)
     return round(max(1.4 * size + names, words) + 1.5 * size)
 
 
 def entries(field: str, present: Sequence[int], parts: Sequence[str]) -> list[tuple[str, str]]:
-    """Names and colours of the parts or ranks that there are."""
+    """Returns names and colours of the parts or ranks in the picture."""
     names = parts if field in ("part", "fragment") else []
     colours = part_colours.of_names(present)
     kind = "part" if field == "fragment" else field

@@ -1,4 +1,4 @@
-"""Puts panels and captions together to the images of a picture."""
+"""Composition of the images of a picture from panels and captions."""
 
 from collections.abc import Sequence
 from typing import Any, Self
@@ -17,14 +17,17 @@ from .scales import Scale, rgb
 from .shot import Shot
 
 _FINE, _FINEST = 2, 4096
-"""Times the size of a picture in which it is drawn, while that is below so many pixels each way. Chosen."""
+"""Factor by which a picture is drawn larger than its size, and the number of pixels each way below which the factor
+is used. Chosen values."""
 _LINE = rgb(captions.LIGHT.ink)
 _GLASS = 0.55
-"""Opacity of walls where the ground is left out."""
+"""Opacity of walls in a picture with a transparent background."""
 
 
 class Printer:
-    """The sheet of a picture of these shots; one of a film at a time, all of them side by side else."""
+    """Composes the images of a picture from shots. Each image of a film has one shot; another picture has all shots
+    side by side.
+    """
 
     def __init__(self, picture: Picture, shots: Sequence[Shot], scale: Scale | None) -> None:
         self._picture, self._shots, self._scale = picture, shots, scale
@@ -38,7 +41,7 @@ class Printer:
         self._clear = picture.look.transparent and not picture.film
         self._longest = arrows.longest(shots) if picture.look.vectors else 0.0
         self.beyond = max(shot.beyond(self._inside) for shot in shots)
-        """Pieces that have flown out of the picture, most of a shot."""
+        """Number of pieces of debris outside of the picture, the largest of all shots."""
 
     def __enter__(self) -> Self:
         return self
@@ -47,7 +50,7 @@ class Printer:
         self._studio.close()
 
     def image(self, shots: Sequence[Shot]) -> Any:
-        """The shots in the panels of one image."""
+        """Composes one image with a panel for each of the shots."""
         look = self._picture.look
         clear = self._clear
         image = Image.new("RGBA" if clear else "RGB", look.size, (0, 0, 0, 0) if clear else self._ground.paper)
@@ -59,7 +62,7 @@ class Printer:
     # The panels ---------------------------------------------------------------------------------------------------
 
     def _panel(self, shot: Shot) -> Any:
-        """One panel: drawn larger, with its lines, and made smaller."""
+        """Draws one panel with its lines at a larger size and reduces the panel to its size."""
         laid, look = self._laid, self._picture.look
         on = arrows.on(shot, laid.eye, laid.aspect, self._longest) if look.vectors else None
         exposure = self._studio.expose(shot.pieces, laid.eye, on)
@@ -72,7 +75,7 @@ class Printer:
         return Image.fromarray(_smaller(layers, self._fine, self._clear))
 
     def _inside(self, places: Any) -> Any:
-        """(n,) which places (n, 3) are in a panel."""
+        """Returns (n,) True for the points of ``places`` (n, 3) that lie in a panel."""
         eye = self._laid.eye
         seen = places - eye.centre
         return (np.abs(seen @ eye.right) < eye.half * self._laid.aspect) & (np.abs(seen @ eye.above) < eye.half)
@@ -119,7 +122,7 @@ class Printer:
             painter.bar(field, self._scale, (min(map(np.min, every)), max(map(np.max, every))))
 
     def _notes(self) -> list[str]:
-        """What the picture does not show by itself."""
+        """Returns the note about debris outside of the picture."""
         notes = []
         if self._longest > 0.0:
             unit = {"velocity": "m/s", "displacement": "m"}[self._picture.look.vectors]
@@ -130,20 +133,22 @@ class Printer:
 
 
 def _present(picture: Picture, shots: Sequence[Shot]) -> list[int]:
-    """Numbers of the parts or ranks that there are."""
+    """Returns the numbers of the parts or ranks in the shots."""
     if picture.field == "rank":
         return sorted({int(n) for shot in shots for n in np.unique(shot.shown)})
     return sorted({piece.part for shot in shots for piece in shot.pieces})
 
 
 def _counted(shots: Sequence[Shot]) -> str:
-    """How many fragments are to be seen, of all shots of an image."""
+    """Returns the number of fragments that are visible in the shots of an image."""
     most = [len(np.unique(shot.shown)) for shot in shots]
     return counted(most[0], "fragment") if len(most) == 1 else f"{most[0]} to {counted(most[-1], 'fragment')}"
 
 
 def _smaller(layers: Any, fine: int, clear: bool) -> Any:
-    """(height, width, 3 or 4) bytes: the mean of ``fine`` by ``fine`` pixels, colours weighted by what is solid."""
+    """Returns (height, width, 3 or 4) bytes: the mean over squares of ``fine`` by ``fine`` pixels. Colours are
+    weighted by opacity.
+    """
     height, width, depth = layers.shape
     blocks = layers.reshape(height // fine, fine, width // fine, fine, depth).mean(axis=(1, 3))
     if clear:

@@ -1,4 +1,4 @@
-"""The fields that pictures can show: where they come from, their unit, their colours."""
+"""Fields that pictures can show, with their arrays in a frame, units and colours."""
 
 from dataclasses import dataclass
 
@@ -9,8 +9,8 @@ from ..errors import LookError
 _VIRIDIS = "#355f8d", "#2a788e", "#21918c", "#22a884", "#44bf70", "#7ad151", "#bddf26", "#fde725"
 _CIVIDIS = "#3b496c", "#575d6d", "#707173", "#8a8779", "#a59c74", "#c3b369", "#e1cc55", "#fee838"
 _PLASMA = "#5302a3", "#8b0aa5", "#b83289", "#db5c68", "#f48849", "#febd2a", "#f0f921"
-"""Perceptual scales (van der Walt and Smith 2015, CC0; cividis: Nunez, Anderton and Renslow 2018) without their darkest
-part: where a value is low, the shape of the body is to be seen."""
+"""Perceptually uniform colour scales (van der Walt and Smith 2015, CC0; cividis: Nunez, Anderton and Renslow 2018)
+without their darkest part: with dark colours the shape of the body would not be visible where values are low."""
 _STRAINED = "#d9dfe6", "#f7d889", "#f49a3d", "#d4432c", "#7c0f34"
 _TWO_SIDED = (
     "#053061", "#2166ac", "#4393c3", "#92c5de", "#d1e5f0", "#f7f7f7", "#fddbc7", "#f4a582", "#d6604d", "#b2182b",
@@ -23,9 +23,8 @@ NAMED = ("classes", "fragments")
 
 @dataclass(frozen=True)
 class Field:
-    """How a field is shown: value times ``factor`` is in ``unit``.
-
-    ``kind`` is linear, centred on 0, classes (names), or fragments: a colour each.
+    """Display of a field: value times ``factor`` is in ``unit``. Kinds: "linear"; "centred" on 0; "classes", whose
+    values are names; "fragments", with one colour for each fragment.
     """
 
     label: str
@@ -34,14 +33,14 @@ class Field:
     colours: tuple[str, ...] = _VIRIDIS
     kind: str = "linear"
     array: str = ""
-    """Where the frame has it; empty: under the name of the field."""
+    """Name of the array in the frame; empty: the name of the field."""
     component: int | None = None
-    """Which one of ``array``; None of a vector: its length."""
+    """Component of ``array``. With None, the length of a vector is shown."""
     floor: float = 0.0
-    """In ``unit``: differences below it are rounding, and a field that has no others is uniform. Chosen."""
+    """Size of rounding errors, in ``unit``. A field whose differences are all smaller is uniform. Chosen value."""
 
     def turns(self, axis: int) -> bool:
-        """Whether it has the other sign in the mirror image across an axis."""
+        """True for a field that has the opposite sign in a mirror image across an axis."""
         shear = {3: (0, 1), 4: (1, 2), 5: (2, 0)}
         along = shear.get(self.component or 0, ()) if self.array == "stress" else (self.component,)
         return self.component is not None and axis in along
@@ -77,10 +76,10 @@ FIELDS = {
     "rank": Field("rank", kind="classes"),
     "fragment": Field("fragment", kind="fragments"),
 }
-"""The fields that ``view`` knows."""
+"""The fields that ``view`` can draw."""
 
 
 def require_field(name: str) -> None:
-    """Raises LookError for a field that nobody knows."""
+    """Raises LookError for an unknown field."""
     if name not in FIELDS:
         raise LookError(f"field = {name!r}: {allowed(name, FIELDS)}")

@@ -1,4 +1,4 @@
-"""Pictures one after the other in one file: GIF by Pillow, MP4 by ffmpeg."""
+"""Films: images one after the other in one file. Pillow writes GIF, ffmpeg writes MP4."""
 
 import shutil
 import subprocess
@@ -13,11 +13,13 @@ from PIL import Image
 from ..errors import ViewError
 
 _LOOKED_AT = 5
-"""Frames by which the 256 colours of a GIF are chosen. Chosen: evenly over the film."""
+"""Number of frames from which the 256 colours of a GIF are taken, evenly over the film. Chosen value."""
 
 
 def save(images: Iterator[Any], n: int, rate: float, out: Path) -> None:
-    """Writes ``n`` images of one size, so many a second. Raises ViewError where there is no ffmpeg for an MP4."""
+    """Writes ``n`` images of one size as a film with ``rate`` images per second. Raises ViewError for an MP4 without
+    ffmpeg.
+    """
     if out.suffix.lower() == ".gif":
         _gif(list(images), rate, out)
     else:
@@ -25,7 +27,7 @@ def save(images: Iterator[Any], n: int, rate: float, out: Path) -> None:
 
 
 def _gif(images: list[Any], rate: float, out: Path) -> None:
-    """All frames have one palette, so that no colour changes by itself."""
+    """Writes a GIF. All frames use the same palette: a colour keeps its meaning over the film."""
     some = [images[k * (len(images) - 1) // max(_LOOKED_AT - 1, 1)] for k in range(_LOOKED_AT)]
     width, height = images[0].size
     strip = Image.new("RGB", (width, height * len(some)))
@@ -37,7 +39,7 @@ def _gif(images: list[Any], rate: float, out: Path) -> None:
 
 
 def _mp4(images: Iterator[Any], rate: float, out: Path) -> None:
-    """H.264 in a form that browsers and presentations play; sides are even numbers of pixels."""
+    """Writes H.264 in a form that browsers and presentations can play. Width and height are even numbers of pixels."""
     first = next(images)
     width, height = (side - side % 2 for side in first.size)
     command = [
@@ -53,7 +55,7 @@ def _mp4(images: Iterator[Any], rate: float, out: Path) -> None:
 
 
 def ffmpeg() -> str:
-    """The program that writes an MP4. Raises ViewError where there is none."""
+    """Returns the path of ffmpeg, which writes an MP4. Raises ViewError if ffmpeg is not installed."""
     if found := shutil.which("ffmpeg"):
         return found
     try:

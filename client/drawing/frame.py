@@ -1,4 +1,6 @@
-"""Whether the file of a frame is whole: VTK reads a damaged one beyond the ends of its arrays, or speaks of its own."""
+"""Check that the file of a frame is complete. VTK reads beyond the ends of the arrays of a damaged file, or prints
+messages of its own.
+"""
 
 from pathlib import Path
 from typing import Any
@@ -12,8 +14,10 @@ _LISTS = ("Points", "Connectivity", "Offsets", "Types")
 
 
 def require_whole(path: str) -> None:
-    """Raises ViewError that names ``path`` where it is no frame or a damaged one, OSError where it cannot be opened."""
-    with Path(path).open("rb"):  # its own words for a file that is not there, or not for this user
+    """Raises ViewError with ``path`` for a damaged file or a file that is not a frame, OSError for a file that
+    cannot be opened.
+    """
+    with Path(path).open("rb"):  # h5py has messages of its own for a file that is missing or not readable
         pass
     try:
         with h5py.File(path, "r") as file:
@@ -25,7 +29,9 @@ def require_whole(path: str) -> None:
 
 
 def _wrong(file: Any) -> str:
-    """What of a VTKHDF file cannot be drawn; empty for nothing. Raises what h5py does for what it cannot read."""
+    """Returns a line about the part of a VTKHDF file that cannot be drawn; empty for a complete file. Raises the
+    errors of h5py for a file that h5py cannot read.
+    """
     root = file.get("VTKHDF")
     if not isinstance(root, h5py.Group):
         return "it has no group VTKHDF"
@@ -45,7 +51,7 @@ def _wrong(file: Any) -> str:
 
 
 def _astray(lists: dict[str, Any], points: Any, cells: Any, ids: Any) -> str:
-    """Which of the pieces of a frame has cells with nodes that it does not have."""
+    """Returns the numbers of the pieces of a frame whose cells refer to missing nodes."""
     if not np.isfinite(lists["Points"]).all():
         return "a coordinate is not finite"
     first = first_cell = 0

@@ -1,4 +1,6 @@
-"""Draws the pieces of a frame off screen: their colours in light, and what is where, by number and by depth."""
+"""Draws the pieces of a frame off screen: colours with light, and for each pixel the number of the nearest part or
+fragment and its depth.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,22 +17,26 @@ from .scales import Scale
 from .surfaces import Piece
 
 FAR = 4.0
-"""How far the camera stands, in reaches of the body. Chosen: beyond walls."""
+"""Distance of the camera from the centre over the radius of the body. Chosen value: the camera stands beyond walls."""
 _SHADE = 0.04
-"""Of the reach of the body, that deep hollows are darker up to this distance. Chosen."""
+"""Radius of the ambient occlusion over that of the body. Hollows that are deeper than this are drawn darker. Chosen
+value."""
 _LIGHTS = ((-0.7, 0.9, 1.6), 0.66), ((1.3, 0.2, 1.0), 0.34)
-"""A key light from the upper left and a weaker one from the right."""
+"""A key light from the upper left and a weaker light from the right."""
 _WALL = "#aab6c3"
 _MATTER = {"ambient": 0.45, "diffuse": 0.85, "specular": 0.10, "specular_power": 20.0}
 _FEATURE = 35.0
-"""Degrees by which faces are bent where the light on them is not smoothed. Chosen: more than a curved face has."""
+"""Angle between two faces above which the shading of their edge is not smoothed, degrees. Chosen value: the faces of
+a curved surface differ by less."""
 
 
 @dataclass(frozen=True)
 class Exposure:
-    """A panel as it was drawn, arrays (height, width): colours, the number of the part and of the fragment that are
-    nearest, from 1 on and 0 for the ground, their depth in m, whether a wall is there; ``glass`` as ``part`` with what
-    can be seen through.
+    """A panel as it was drawn, arrays (height, width).
+
+    ``colour`` is the image. ``part`` and ``fragment`` are the numbers of the nearest part and fragment, from 1 on, 0
+    for the background. ``depth`` is in m. ``wall`` is True where a wall is visible. ``glass`` is as ``part`` and
+    includes the transparent parts.
     """
 
     colour: Any
@@ -42,14 +48,14 @@ class Exposure:
 
 
 class Studio:
-    """A window of one size, in which one frame after the other is drawn."""
+    """A window of one size for frames that are drawn one after the other."""
 
     def __init__(self, size: tuple[int, int], picture: Picture, scale: Scale | None, paper: str) -> None:
         self._picture, self._scale, self._paper = picture, scale, paper
         self._plotter = vtk.window(size, paper)
 
     def expose(self, pieces: Sequence[Piece], eye: Camera, arrows: Any | None) -> Exposure:
-        """Draws the pieces of a frame, and arrows on them."""
+        """Draws the pieces of a frame and arrows on the pieces."""
         plotter = self._plotter
         plotter.clear()
         labels, table = _labels(pieces)
@@ -71,11 +77,11 @@ class Studio:
         return Exposure(colour, parts[number], fragments[number], depth, parts[glass], wall)
 
     def close(self) -> None:
-        """Ends the window."""
+        """Closes the window."""
         self._plotter.close()
 
     def _flat(self, piece: Piece, label: Any) -> Any:
-        """The piece, each cell in the colour of its number."""
+        """Adds a piece whose cells have their number as colour."""
         numbers = np.stack([label & 255, label >> 8 & 255, label >> 16], axis=1).astype(np.uint8)
         copy = piece.surface.copy()
         copy.clear_data()
@@ -84,7 +90,7 @@ class Studio:
                                       reset_camera=False)  # fmt: skip
 
     def _numbers(self, eye: Camera) -> tuple[Any, Any]:
-        """(height, width) the number that is nearest, 0 for the ground, and its depth, m."""
+        """Returns two arrays (height, width): the nearest number, 0 for the background, and its depth, m."""
         plotter = self._plotter
         plotter.set_background("black")
         plotter.renderer.ResetCameraClippingRange()
@@ -96,7 +102,7 @@ class Studio:
         return red + (green << 8) + (blue << 16), depth
 
     def _lit(self, pieces: Sequence[Piece], eye: Camera, arrows: Any | None) -> tuple[Any, Any]:
-        """The colours, and where a wall is drawn."""
+        """Returns the colours, and True where a wall is drawn."""
         plotter, picture = self._plotter, self._picture
         for position, intensity in _LIGHTS:
             plotter.add_light(vtk.light(position, intensity))
@@ -107,7 +113,7 @@ class Studio:
         glassy = bool(picture.opacity)
         if glassy:
             plotter.enable_depth_peeling(number_of_peels=8)
-        elif not picture.film:  # a second a picture
+        elif not picture.film:  # ambient occlusion takes 1 s per picture
             plotter.enable_ssao(radius=_SHADE * eye.deep, bias=0.1 * _SHADE * eye.deep, kernel_size=64, blur=True)
         plotter.renderer.ResetCameraClippingRange()
         colour = self._taken()
@@ -125,7 +131,7 @@ class Studio:
         return np.asarray(self._plotter.screenshot(None, return_img=True))[..., :3]
 
     def _add(self, piece: Piece) -> None:
-        """The piece in its colours."""
+        """Adds a piece with the colours of its field."""
         picture, scale, surface = self._picture, self._scale, piece.surface
         raw, field = picture.look.raw, FIELDS[picture.field]
         look = {
@@ -144,7 +150,9 @@ class Studio:
             self._plotter.add_mesh(surface, scalars="shown", **colours, **look, **smooth)
 
     def _add_wall(self, pieces: Sequence[Piece], wall: Wall) -> None:
-        """A pale disk in the wall, a little larger than the body; it takes no part in the fit of the camera."""
+        """Adds a wall as a pale disk, a little larger than the body. The fit of the camera does not include the
+        disk.
+        """
         normal = np.asarray(wall.normal) / np.linalg.norm(wall.normal)
         points = np.concatenate([np.asarray(piece.surface.points, float) for piece in pieces])
         centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
@@ -156,7 +164,9 @@ class Studio:
         )
 
     def _look(self, eye: Camera) -> None:
-        """Parallel, far enough that everything lies before it, and no farther: depths are of single precision."""
+        """Sets a parallel camera outside of the body. The near and the far plane enclose the body closely: depths
+        have single precision.
+        """
         camera = self._plotter.camera
         camera.focal_point = eye.centre
         camera.position = eye.centre + FAR * eye.deep * eye.towards
@@ -167,7 +177,7 @@ class Studio:
 
 
 def named(field: Field, surface: Any, bodies: int) -> Any:
-    """(cells, 3) the colours of parts, ranks or fragments."""
+    """Returns (cells, 3) colours of parts, ranks or fragments."""
     shown = surface.cell_data["shown"]
     if field.kind == "fragments":
         return part_colours.of_fragments(shown, surface.cell_data["part"], max(bodies, 1))
@@ -175,7 +185,9 @@ def named(field: Field, surface: Any, bodies: int) -> Any:
 
 
 def _labels(pieces: Sequence[Piece]) -> tuple[list[Any], Any]:
-    """Of each piece (cells,) numbers from 1 on for its fragments, and (fragments, 2) part and fragment of each."""
+    """Returns for each piece (cells,) numbers of its fragments, from 1 on, and for all pieces (fragments, 2) the
+    part and the number of each fragment.
+    """
     pairs = [
         np.stack([np.full(piece.surface.n_cells, piece.part), np.asarray(piece.surface.cell_data["fragment"])], axis=1)
         for piece in pieces

@@ -1,4 +1,4 @@
-"""Lines round parts and fragments, and along sharp edges, found in the pixels that were drawn."""
+"""Lines round parts and fragments and along sharp edges. The lines are computed from the pixels of a drawn panel."""
 
 from typing import Any
 
@@ -7,19 +7,23 @@ import numpy as np
 from .offscreen import Exposure
 
 _STRONG, _MIDDLE, _WEAK = 0.85, 0.6, 0.4
-"""How dark a line is: round a part, where one thing is before another, round a fragment and along an edge. Chosen."""
+"""Darkness of the lines round a part, at a jump of the depth, round a fragment and along an edge. Chosen values."""
 _BEND = np.radians(38.0)
-"""Angle between two faces from which on their edge has a line. Chosen: more than curved faces have."""
+"""Angle between two faces above which their edge has a line. Chosen value: the faces of a curved surface differ by
+less."""
 _EVEN = np.radians(12.0)
-"""Angle within which a face has one slope. Chosen: a crack of a pixel's width has not."""
+"""Difference of angles below which the pixels of a face have the same slope. Chosen value: a crack with a width of
+one pixel has a larger difference."""
 _WIDER = 1300
-"""Pixels of a panel for each that a line is wide. Chosen."""
+"""Number of pixels of a panel for each pixel of the width of a line. Chosen value."""
 _JUMP = 5.0
-"""Pixels by which the depth jumps where one thing is before another. Chosen."""
+"""Smallest jump of the depth between two bodies, in sizes of a pixel. Chosen value."""
 
 
 def lines(shown: Exposure, pixel: float, height: int) -> Any:
-    """(height, width) how dark the line at each pixel is, 0 to 1; ``pixel``: its size, m; ``height`` of the panel."""
+    """Returns (height, width) darkness of the lines, 0 to 1; ``pixel``: size of a pixel, m; ``height`` of the panel,
+    pixels.
+    """
     dark = np.zeros(shown.part.shape)
     for axis in (0, 1):
         for value, where in (
@@ -34,18 +38,20 @@ def lines(shown: Exposure, pixel: float, height: int) -> Any:
 
 
 def _ahead(values: Any, axis: int, n: int = 1) -> Any:
-    """The values ``n`` pixels on, those at the border again and again."""
+    """Returns the array shifted by ``n`` pixels along an axis. Values at the border are repeated."""
     places = np.clip(np.arange(values.shape[axis]) + n, 0, values.shape[axis] - 1)
     return np.take(values, places, axis=axis)
 
 
 def _differs(number: Any, axis: int) -> Any:
-    """Pixels beside one of another number."""
+    """Returns the pixels beside a pixel with another number."""
     return (number != _ahead(number, axis)) | (number != _ahead(number, axis, -1))
 
 
 def _jumps(shown: Exposure, pixel: float, axis: int) -> Any:
-    """Pixels of what is nearer, where the depth jumps more than the slopes on both sides explain."""
+    """Returns the pixels of the nearer side of a jump of the depth. A jump is larger than the slopes on both sides
+    explain.
+    """
     steps = [_ahead(shown.depth, axis, n + 1) - _ahead(shown.depth, axis, n) for n in (-2, -1, 0, 1)]
     on = _is_jump(steps[2], steps[1], steps[3], _JUMP * pixel)
     back = _is_jump(-steps[1], -steps[2], -steps[0], _JUMP * pixel)
@@ -53,12 +59,14 @@ def _jumps(shown: Exposure, pixel: float, axis: int) -> Any:
 
 
 def _is_jump(step: Any, before: Any, after: Any, most: float) -> Any:
-    """Where the depth grows by more than ``most`` and than the steps before and after, and stays so deep."""
+    """Returns True where the depth increases by more than ``most`` and by more than in the neighbouring pixels, and
+    does not decrease again.
+    """
     return (step > most) & (step + after > most) & (step - np.abs(before) > most) & (step - np.abs(after) > most)
 
 
 def _bends(shown: Exposure, pixel: float, axis: int) -> Any:
-    """Pixels of a part at which its face turns."""
+    """Returns the pixels of a part at which two faces form an edge."""
     slopes = [_slope(shown, pixel, axis, n) for n in (-2, 1)]
     even = np.ones(shown.part.shape, bool)
     for n, slope in ((-3, slopes[0]), (2, slopes[1])):
@@ -69,10 +77,12 @@ def _bends(shown: Exposure, pixel: float, axis: int) -> Any:
 
 
 def _slope(shown: Exposure, pixel: float, axis: int, n: int) -> Any:
-    """The angle of the face between the pixels ``n`` and ``n + 1`` on."""
+    """Returns the angle of the face between the pixels at the distances ``n`` and ``n + 1``, rad."""
     return np.arctan((_ahead(shown.depth, axis, n + 1) - _ahead(shown.depth, axis, n)) / pixel)
 
 
 def _steep(slopes: Any) -> Any:
-    """Faces that are seen nearly edge on have no slope that could be told from a jump."""
+    """Returns the pixels of faces that are seen nearly edge on. At these faces a slope cannot be distinguished from
+    a jump.
+    """
     return np.maximum(np.abs(slopes[0]), np.abs(slopes[1])) > np.radians(86.0)

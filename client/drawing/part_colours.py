@@ -1,6 +1,5 @@
-"""Colours for names: a hue for each part, and variations of it for the fragments of the part; numpy only.
-
-web/colours.js has the same function: page, report and pictures show the same fragment in the same colour.
+"""Colours for names: a hue for each part, and variations of the hue for the fragments of the part; numpy only.
+web/colours.js has the same function: page, report and pictures show a fragment in the same colour.
 """
 
 from typing import Any, TypeAlias
@@ -11,28 +10,29 @@ Array: TypeAlias = "np.ndarray[Any, np.dtype[np.float64]]"
 Bytes: TypeAlias = "np.ndarray[Any, np.dtype[np.uint8]]"
 
 HUES = np.array([252.0, 70.0, 165.0, 15.0, 305.0, 120.0, 205.0, 345.0])
-"""Degrees in OKLCH of the first parts. Chosen: the first two are kept apart by the colour blind."""
+"""Hues of the first parts in OKLCH, degrees. Chosen values: colour-blind users can distinguish the first two."""
 _STEPS = tuple(np.uint64(step) for step in (0xD1B54A32D192ED03, 0xABC98388FB8FAC03, 0x8CB92BA72F3D8DD7))
-"""2^64 over the powers of 1.2207, the root of g^4 = g + 1: their multiples fill a cube evenly (Roberts 2018, R3)."""
+"""2^64 over the powers of 1.2207, the root of g^4 = g + 1. The multiples of these numbers fill a cube evenly
+(Roberts 2018, R3)."""
 _STRONG, _MUTED = (0.66, 0.12), (0.84, 0.045)
-"""Lightness and chroma of a part by name, and of what is whole: muted, so that what has broken off stands out."""
+"""Lightness and chroma of the colour of a part, and of the colour of its intact body. The second is muted: fragments
+have stronger colours."""
 _DARKER = 0.13
-"""Lightness between a part and the one that has its hue again."""
+"""Difference of lightness between two parts with the same hue. Hues repeat after the first parts."""
 REST = (140, 146, 152)
-"""Of the fragments that have no row of their own, number -1."""
+"""Number of fragments without a row in the table of fragments: -1."""
 
 
 def of_names(numbers: Any) -> Bytes:
-    """(n, 3) the colours of parts or ranks by their numbers from 0 on."""
+    """Returns (n, 3) colours of parts or ranks by their numbers from 0 on."""
     found = np.asarray(numbers).astype(int).reshape(-1)
     light = _STRONG[0] - _DARKER * (found // len(HUES) % 3)
     return rgb(light, np.full(len(found), _STRONG[1]), HUES[found % len(HUES)])
 
 
 def of_fragments(numbers: Any, parts: Any, bodies: int) -> Bytes:
-    """(n, 3) the colours of fragments with these ``numbers`` where they belong to these ``parts``, both (n,).
-
-    The first ``bodies`` numbers are of what was there at the start.
+    """Returns (n, 3) colours of the fragments ``numbers`` (n,) of the parts ``parts`` (n,). The first ``bodies``
+    numbers are the bodies at the start.
     """
     pairs = np.stack([np.asarray(numbers).astype(np.int64).reshape(-1), np.asarray(parts).astype(np.int64).reshape(-1)])
     (number, part), which = np.unique(pairs, axis=1, return_inverse=True)
@@ -46,12 +46,12 @@ def of_fragments(numbers: Any, parts: Any, bodies: int) -> Bytes:
 
 
 def _share(bits: Any) -> Array:
-    """24 bits as a number from 0 to 1."""
+    """Returns 24 bits of a hash as a number from 0 to 1."""
     return np.asarray(bits.astype(np.float64) / 2.0**24)
 
 
 def rgb(light: Any, chroma: Any, hue: Any) -> Bytes:
-    """(n, 3) sRGB of colours in OKLCH (Ottosson 2020), each (n,); the hue in degrees."""
+    """Returns (n, 3) sRGB of colours in OKLCH (Ottosson 2020), each (n,); the hue in degrees."""
     angle = np.asarray(hue) * (np.pi / 180.0)
     a, b = chroma * np.cos(angle), chroma * np.sin(angle)
     long = (light + 0.3963377774 * a + 0.2158037573 * b) ** 3
@@ -67,5 +67,5 @@ def rgb(light: Any, chroma: Any, hue: Any) -> Bytes:
 
 
 def css(colour: Any) -> str:
-    """Three bytes as ``#4c78a8``."""
+    """Returns three bytes as text, such as ``#4c78a8``."""
     return "#" + "".join(f"{int(byte):02x}" for byte in colour)

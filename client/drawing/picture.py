@@ -1,6 +1,5 @@
-"""What ``render`` is asked for, and what it answers.
-
-A ``Picture`` is one drawing of one frame, of several side by side, or of several one after the other (a film).
+"""Input and result of ``render``. A ``Picture`` is a drawing of one frame, of several frames side by side, or of
+several frames one after the other (a film).
 """
 
 import msgspec
@@ -10,7 +9,7 @@ from .view_options import FILMS, Look
 
 
 class Picture(msgspec.Struct, kw_only=True, frozen=True):
-    """Everything that ``render`` needs for one file; all frames have the camera and the colours in common."""
+    """Input of ``render`` for one file. All frames have the same camera and the same colours."""
 
     frames: list[str]
     out: str
@@ -21,27 +20,29 @@ class Picture(msgspec.Struct, kw_only=True, frozen=True):
     mirrors: list[Mirror] = []
     sections: list[Mirror] = []
     cuts: list[Mirror] = []
-    """Planes of symmetry that are not mirrored: the camera looks at them."""
+    """Planes of symmetry that are not mirrored. The camera faces these planes."""
     walls: list[Wall] = []
     parts: list[str] = []
     whole: list[int] = []
     hidden: list[int] = []
     focus: list[int] = []
-    """Numbers of parts: left whole by sections, not drawn, filling the picture."""
+    """Numbers of parts: ``whole`` parts are not cut by sections, ``hidden`` parts are not drawn, ``focus`` parts
+    fill the picture."""
     opacity: dict[int, float] = {}
     range_of: list[str] = []
-    """Frames whose values set the ends of the colour bar; empty: those that are drawn."""
+    """Frames whose values set the ends of the colour bar; empty: the drawn frames."""
     title: str = ""
 
     @property
     def film(self) -> bool:
-        """Whether its frames come one after the other."""
+        """True for a film, False for frames side by side."""
         return self.out.lower().endswith(FILMS)
 
 
 class Drawn(msgspec.Struct, kw_only=True, frozen=True):
-    """What a picture shows: its file, the extremes of the field over the drawn surfaces, the number of faces, the ends
-    of the colour bar (none where colours are names, or the field is uniform), the times of its frames in s.
+    """Result of ``render``: the file, the extremes of the field over the drawn surfaces, the number of faces, the
+    ends of the colour bar and the times of the frames in s. The ends are None if colours are names or the field is
+    uniform.
     """
 
     out: str
@@ -53,4 +54,4 @@ class Drawn(msgspec.Struct, kw_only=True, frozen=True):
     limits: tuple[float, float] | None = None
     times: list[float | None] = []
     beyond: int = 0
-    """Pieces that have flown out of the picture."""
+    """Number of pieces of debris outside of the picture."""

@@ -1,4 +1,4 @@
-"""How a picture is divided: title, panels, and beside them the colour bar or the legend."""
+"""Layout of a picture: title, panels, and the colour bar or legend beside the panels."""
 
 import math
 from collections.abc import Sequence
@@ -12,16 +12,16 @@ from .camera import Camera
 from .picture import Picture
 
 Box = tuple[int, int, int, int]
-"""Left, top, width, height, pixels."""
+"""Left, top, width and height, pixels."""
 _FILL = 0.34
-"""Share of the width that the colour bar or the legend takes up, at most. Chosen."""
+"""Largest width of the colour bar or legend over the width of the picture. Chosen value."""
 LEAST = 200
-"""Pixels of a side, below which a picture has no captions. Chosen."""
+"""Shortest side of a picture that has captions, pixels. Chosen value."""
 
 
 @dataclass(frozen=True)
 class Sheet:
-    """``panels`` are as large as each other, row by row; ``head`` and ``side`` may be empty."""
+    """Rectangles of a picture. ``panels`` have the same size and are in rows; ``head`` and ``side`` may be empty."""
 
     panels: list[Box]
     head: Box
@@ -33,7 +33,7 @@ class Sheet:
 
     @property
     def aspect(self) -> float:
-        """Width over height of a panel."""
+        """Width of a panel over its height."""
         return self.panels[0][2] / self.panels[0][3]
 
     @property
@@ -43,18 +43,18 @@ class Sheet:
 
 
 def captioned(picture: Picture) -> bool:
-    """Whether there is a place for texts."""
+    """True if the picture is large enough for texts."""
     return picture.look.captions and min(picture.look.size) >= LEAST
 
 
 def font(size: tuple[int, int]) -> int:
-    """Pixels of letters in a picture of this size."""
+    """Returns the height of letters in a picture of this size, pixels."""
     return max(8, round(0.0125 * math.sqrt(size[0] * size[1]) + 4.2))
 
 
 def lay(near: Sequence[Any], every: Sequence[Any], n: int, picture: Picture, head: int, side: int) -> Sheet:
-    """A sheet of ``n`` panels, each of which shows all of ``near`` and is before all of ``every``, arrays (., 3), by a
-    camera that is settled; ``head`` and ``side``: pixels of the title and of what is at the right.
+    """Returns a sheet of ``n`` panels. Each panel shows all points of ``near`` by a camera outside of ``every``,
+    arrays (., 3). ``head`` is the height of the title and ``side`` the width of the captions at the right, pixels.
     """
     width, height = picture.look.size
     side = min(side, round(_FILL * width))
@@ -70,5 +70,5 @@ def lay(near: Sequence[Any], every: Sequence[Any], n: int, picture: Picture, hea
 
 
 def when(times: Sequence[float | None]) -> list[str]:
-    """How the times of frames are written; nothing of one that is not known."""
+    """Returns the times of frames as text; empty for an unknown time."""
     return ["" if time is None else f"t = {text}" for time, text in zip(times, exacts(times, "s", 4), strict=True)]

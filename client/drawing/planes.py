@@ -1,4 +1,4 @@
-"""Planes and directions of a picture, as a user writes them: ``x,y=0.002``, ``-x``, ``1,-1.5,0.6``, ``top``."""
+"""Planes and directions of a picture in the notation of users: ``x,y=0.002``, ``-x``, ``1,-1.5,0.6``, ``top``."""
 
 import math
 import re
@@ -13,20 +13,22 @@ Vector = tuple[float, float, float]
 
 
 class Mirror(msgspec.Struct, frozen=True):
-    """The plane ``axis = at``; ``axis`` is 0, 1 or 2, ``at`` in m; of a section None: the middle of the body."""
+    """The plane ``axis = at``; ``axis`` is 0, 1 or 2, ``at`` in m. In a section, ``at`` may be None: the plane
+    passes through the middle of the body.
+    """
 
     axis: int
     at: float | None = 0.0
 
     @property
     def place(self) -> float:
-        """``at`` of a plane that is settled, m."""
+        """Position ``at`` of a plane with a known position, m."""
         assert self.at is not None
         return self.at
 
 
 class Wall(msgspec.Struct, frozen=True):
-    """A rigid wall to draw: a point on it, m, and its normal."""
+    """A rigid wall to draw: a point on the wall, m, and the normal of the wall."""
 
     point: Vector
     normal: Vector
@@ -36,9 +38,9 @@ VIEWS: dict[str, Vector] = {
     "front": (0.0, -1.0, 0.0), "back": (0.0, 1.0, 0.0), "left": (-1.0, 0.0, 0.0), "right": (1.0, 0.0, 0.0),
     "top": (0.0, 0.0, 1.0), "bottom": (0.0, 0.0, -1.0), "iso": (1.0, -1.0, 1.0),
 }  # fmt: skip
-"""Standard views: the direction from the body to the camera."""
+"""Standard views: direction from the body to the camera."""
 _FARTHEST = 1e6
-"""m from the origin that a plane may lie. Chosen: VTK draws in single precision."""
+"""Largest distance of a plane from the origin, m. Chosen value: VTK draws in single precision."""
 _NUMBER = r"[+-]?[0-9]*\.?[0-9]+(?:[eE][+-]?\d+)?"
 _PLANE = re.compile(rf"\s*([xyz])\s*(?:=\s*({_NUMBER}|middle))?\s*")
 _AXIS = re.compile(r"\s*([+-]?)([xyz])\s*")
@@ -46,7 +48,9 @@ _DIRECTION = re.compile(rf"\s*({_NUMBER})\s*,\s*({_NUMBER})\s*,\s*({_NUMBER})\s*
 
 
 def mirrors(text: str, symmetry: tuple[Mirror, ...]) -> tuple[Mirror, ...]:
-    """The planes of ``auto`` (those of ``symmetry``), ``none``, or ``x,y=0.002``, one an axis. Raises LookError."""
+    """Returns the planes of a text: ``auto`` (the planes of ``symmetry``), ``none``, or ``x,y=0.002`` with one plane
+    for each axis. Raises LookError.
+    """
     if text == "auto":
         return symmetry
     found = planes(text, "mirror")
@@ -56,7 +60,7 @@ def mirrors(text: str, symmetry: tuple[Mirror, ...]) -> tuple[Mirror, ...]:
 
 
 def planes(text: str, option: str) -> tuple[Mirror, ...]:
-    """The planes of ``x,y=0.002``, none of ``none`` and of an empty text. Raises LookError."""
+    """Returns the planes of ``x,y=0.002``; no planes for ``none`` and for an empty text. Raises LookError."""
     if text in {"none", ""}:
         return ()
     read = [_PLANE.fullmatch(plane) for plane in text.split(",")]
@@ -75,7 +79,7 @@ def planes(text: str, option: str) -> tuple[Mirror, ...]:
 
 
 def direction(text: str, option: str) -> Vector | None:
-    """``-x``, ``1,-1.5,0.6`` or the name of a view as a vector; None for an empty text. Raises LookError."""
+    """Returns ``-x``, ``1,-1.5,0.6`` or the name of a view as a vector; None for an empty text. Raises LookError."""
     if not text:
         return None
     if option == "camera" and text.strip() in VIEWS:

@@ -1,7 +1,7 @@
 """Draws frames as one file: ``python -m conoid.client.drawing.render`` reads a Picture as JSON and prints a Drawn.
 
-``surfaces`` has what is drawn of a frame (a ``shot``), ``camera`` from where, ``offscreen`` draws it, ``outlines`` adds
-lines; ``composition`` puts the panels on a ``picture_layout`` and has ``captions`` written beside them.
+``surfaces`` makes the surfaces of a frame (a ``shot``), ``camera`` sets the view, ``offscreen`` draws the shot and
+``outlines`` adds lines. ``composition`` puts the panels on a ``picture_layout`` and adds ``captions``.
 """
 
 import sys
@@ -24,7 +24,7 @@ from .shot import Shot
 
 
 def draw(picture: Picture) -> Drawn:
-    """Writes ``picture.out``. Raises ViewError where a frame cannot be drawn."""
+    """Draws and writes ``picture.out``. Raises ViewError for a frame that cannot be drawn."""
     field = FIELDS[picture.field]
     picture, shots = _shots(picture)
     values = [shot.shown for shot in shots]
@@ -42,7 +42,7 @@ def draw(picture: Picture) -> Drawn:
 
 
 def _shots(picture: Picture) -> tuple[Picture, list[Shot]]:
-    """All frames, and the picture with the camera that the first one asks for."""
+    """Reads all frames, and sets the camera of the picture from the first frame."""
     shots, bounds = [], []
     for path in picture.frames:
         mesh, time = vtk.read(path)
@@ -56,19 +56,21 @@ def _shots(picture: Picture) -> tuple[Picture, list[Shot]]:
 
 
 def _in_the_middle(picture: Picture, bulk: Any) -> Picture:
-    """With places for the sections that are to go through the middle of the body, or of the mirrored one."""
+    """Returns the picture with the positions of its sections. A section without a position passes through the middle
+    of the body and its mirror images.
+    """
     middle = dict(enumerate(bulk.mean(axis=1).tolist())) | {one.axis: one.place for one in picture.mirrors}
     sections = [Mirror(one.axis, middle[one.axis]) if one.at is None else one for one in picture.sections]
     return msgspec.structs.replace(picture, sections=sections)
 
 
 def _all_values(picture: Picture) -> list[Any]:
-    """The field of all tets or nodes of the frames by which the range goes."""
+    """Returns the field of all tets or nodes of the frames that set the range of the colour bar."""
     return [surfaces.values(vtk.read(path)[0], picture.field)[0] for path in picture.range_of]
 
 
 def _save(picture: Picture, shots: Sequence[Shot], scale: Scale | None) -> int:
-    """Writes the file, and gives the number of pieces that have flown out of the picture."""
+    """Writes the file and returns the number of pieces of debris outside of the picture."""
     with Printer(picture, shots, scale) as printer:
         if picture.film:
             films.save((printer.image([shot]) for shot in shots), len(shots), picture.look.rate, Path(picture.out))
@@ -78,14 +80,16 @@ def _save(picture: Picture, shots: Sequence[Shot], scale: Scale | None) -> int:
 
 
 def main() -> int:
-    """Reads standard input, draws, prints the result as one line of JSON; a failure is one line on standard error."""
+    """Reads a Picture from standard input, draws, and prints the result as one line of JSON. An error is one line on
+    standard error.
+    """
     code, line = told(sys.stdin.buffer.read())
     print(line, file=sys.stderr if code else sys.stdout)
     return code
 
 
 def told(asked: bytes) -> tuple[int, str]:
-    """The exit code and the line for a Picture as JSON."""
+    """Returns the exit code and the line to print for a Picture as JSON."""
     picture = msgspec.json.decode(asked, type=Picture)
     try:
         return 0, msgspec.json.encode(draw(picture)).decode()

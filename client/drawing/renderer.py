@@ -1,7 +1,6 @@
-"""The program that draws: started for one picture, ended where it hangs, its failures as one clear line.
-
-VTK ends the process with a segmentation fault where it finds no way to draw off screen. In a child that becomes a
-clear message.
+"""Process that draws one picture. A process that hangs is ended, and a failure is reported in one line. VTK ends the
+process with a segmentation fault if it cannot draw off screen. The fault ends the child process only, and the user
+gets an error message.
 """
 
 import os
@@ -20,11 +19,13 @@ from ..local.atomic import whole
 from .picture import Drawn, Picture
 
 _SECONDS = 180.0
-"""s that a frame may take to be drawn. Chosen: without a graphics card a large one takes long."""
+"""Time limit for drawing a frame, s. Chosen value: a large frame takes long without a graphics card."""
 
 
 def render(picture: Picture) -> Drawn:
-    """Draws in a child process; the file is there when all of it is. Raises ViewError that names what is missing."""
+    """Draws in a child process. The file appears when it is complete. Raises ViewError with the reason if the
+    picture cannot be drawn.
+    """
     with whole(Path(picture.out)) as part:
         code, told, errors = child(msgspec.structs.replace(picture, out=str(part)))
         if code:
@@ -33,7 +34,9 @@ def render(picture: Picture) -> Drawn:
 
 
 def child(picture: Picture) -> tuple[int, bytes, str]:
-    """Its exit code, its last line, and what it has complained of. Raises ViewError when it hangs."""
+    """Returns the exit code, the last line of standard output, and standard error. Raises ViewError for a process
+    that hangs.
+    """
     command = [sys.executable, "-m", "conoid.client.drawing.render"]
     seconds = _SECONDS * max(1, len(picture.frames))
     try:
@@ -46,14 +49,14 @@ def child(picture: Picture) -> tuple[int, bytes, str]:
 
 
 def reason(error: Exception, out: str) -> str:
-    """The line that the child tells of a failure; ``out`` is what it was to write."""
+    """Returns the error message of a failed child; ``out`` is the file that it should have written."""
     if isinstance(error, OSError) and error.strerror:
         return f"{error.filename or out}: {error.strerror}"
     return " ".join(str(error).split()) or type(error).__name__
 
 
 def explain(code: int, errors: str) -> ClientError:
-    """Why the child ended with ``code`` and this text on its standard error."""
+    """Returns the reason of a failure, from the exit ``code`` and the text on standard error."""
     if code < 0 or code >= 128:
         return ViewError(
             f"the renderer crashed (signal {-code if code < 0 else code - 128}): VTK found no way to draw off screen; "
@@ -74,7 +77,7 @@ def _package(library: str) -> str:
 
 
 def _environment() -> dict[str, str]:
-    """Says which off-screen window VTK shall use, where that is known."""
+    """Sets the variable that selects the off-screen window of VTK, if the right window is known."""
     environment = dict(os.environ)
     if sys.platform.startswith("linux") and "VTK_DEFAULT_OPENGL_WINDOW" not in environment:
         for library, window in (("EGL", "vtkEGLRenderWindow"), ("OSMesa", "vtkOSOpenGLRenderWindow")):

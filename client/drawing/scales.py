@@ -1,4 +1,4 @@
-"""The scale of a picture: the ends of the colour bar, at round numbers, and its colours; numpy only."""
+"""Scale of a picture: the colours of the colour bar, and its ends at round numbers; numpy only."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,20 +11,21 @@ from .fields import Field
 from .view_options import Look
 
 _PARTS = 6
-"""Parts of a colour bar, at most. Chosen."""
+"""Largest number of intervals of a colour bar. Chosen value."""
 _UNIFORM = "#9fb0c0"
-"""What has one value everywhere: of no scale, so that it cannot be read as low or high. Chosen."""
+"""Colour of a field with the same value everywhere. The colour is in none of the scales: a uniform field cannot be
+mistaken for a low or a high value. Chosen value."""
 _ALIKE = 1e-9
-"""Share of a value by which others differ from it by rounding alone. Chosen."""
+"""Relative difference below which two values differ only by rounding. Chosen value."""
 
 
 def rgb(colour: str) -> tuple[int, int, int]:
-    """``#4c78a8`` as three numbers to 255."""
+    """Returns a colour such as ``#4c78a8`` as three numbers from 0 to 255."""
     return int(colour[1:3], 16), int(colour[3:5], 16), int(colour[5:7], 16)
 
 
 def blend(colours: Sequence[str], n: int = 256) -> list[str]:
-    """So many colours from the first to the last."""
+    """Returns a number of colours between the first and the last colour."""
     corners = np.array([rgb(colour) for colour in colours], float)
     places = np.linspace(0, len(colours) - 1, n)
     channels = np.stack([np.interp(places, range(len(colours)), corners[:, i]) for i in range(3)], axis=1)
@@ -33,8 +34,8 @@ def blend(colours: Sequence[str], n: int = 256) -> list[str]:
 
 @dataclass(frozen=True)
 class Scale:
-    """The colour bar: its ends, in the field's unit, the values that are written beside it, and its colours from low to
-    high. One colour and no ends: the field has the value ``uniform`` everywhere.
+    """The colour bar: its ends in the field's unit, the values that are written beside it, and its colours from low
+    to high. A uniform field has the value ``uniform``, one colour and no ends.
     """
 
     low: float
@@ -45,7 +46,7 @@ class Scale:
 
 
 def of(values: Sequence[Any], field: Field, look: Look) -> Scale:
-    """The scale of all ``values`` together."""
+    """Returns the scale of all ``values`` together."""
     every = np.concatenate([np.asarray(each, float).reshape(-1) for each in values])
     known = every[np.isfinite(every)]
     if not len(known):
@@ -69,21 +70,21 @@ def _ends(known: Any, field: Field, look: Look) -> tuple[float, float]:
 
 
 def rounded(low: float, high: float) -> tuple[float, float]:
-    """Round numbers around ``low`` and ``high``."""
+    """Returns round numbers below ``low`` and above ``high``."""
     step = _step(low, high)
     first, last = np.floor(low / step + 1e-9), np.ceil(high / step - 1e-9)
     return float(first * step), float(max(last, first + 1) * step)
 
 
 def ticks(low: float, high: float) -> list[float]:
-    """Both ends, and the round numbers between them that are not next to an end."""
+    """Returns both ends and the round numbers between them. Numbers next to an end are left out."""
     step = _step(low, high)
     first, last = np.ceil(low / step + 0.4), np.floor(high / step - 0.4)
     return [low, *(float(n * step) for n in np.arange(first, last + 1)), high]
 
 
 def _step(low: float, high: float) -> float:
-    """A round number, of which at most ``_PARTS`` fit between the two."""
+    """Returns a round interval such that at most ``_PARTS`` intervals lie between the two numbers."""
     span = max(high - low, 1e-9 * max(abs(low), abs(high)), 1e-30)
     power = 10.0 ** np.floor(np.log10(span / 4))
     return float(next(f * power for f in (1, 2, 2.5, 5, 10) if span / (f * power) <= _PARTS + 1e-9))

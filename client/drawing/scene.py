@@ -1,4 +1,4 @@
-"""What a picture takes from the case of a run, and a picture of its frames."""
+"""Data of a case for its pictures, and ``draw``, which makes a picture from frame files."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -17,23 +17,24 @@ from .view_options import chosen
 
 @dataclass(frozen=True)
 class Scene:
-    """Nothing of it where there is no case to read."""
+    """Data that a picture takes from the case of a run; all empty without a readable case."""
 
     mirrors: tuple[Mirror, ...] = ()
     walls: tuple[Wall, ...] = ()
     parts: tuple[str, ...] = ()
     title: str = ""
     frames: tuple[Path, ...] = ()
-    """All frames of the run."""
+    """Paths of all frames of the run."""
 
 
 def draw(
     frames: Sequence[Path], scene: Scene, name: str, field: str, out: Path | str | None = None, **options: Any
 ) -> Drawn:
-    """Draws frame files: as a PNG, side by side where there are several, or one after the other as a GIF or MP4.
+    """Draws frame files.
 
-    ``options`` are the fields of ``Look``. ``out`` is by default named after ``name`` and the field, in the present
-    folder. Raises ViewError.
+    One frame is a PNG. Several frames are side by side in a PNG, or one after the other in a GIF or MP4. ``options``
+    are the fields of ``Look``. The default of ``out`` is a file in the current folder, named after ``name`` and the
+    field. Raises ViewError.
     """
     require_field(field)
     target = Path(out or f"{name}-{field}.png").resolve()
@@ -53,7 +54,9 @@ def draw(
 
 
 def numbers(names: Iterable[str], parts: Sequence[str], option: str) -> list[int]:
-    """The numbers of parts by name; where no case is there to name them, as they are in the frame. Raises LookError."""
+    """Returns the numbers of parts by name. Without a case, the names are the numbers in the frame. Raises
+    LookError.
+    """
     found = []
     for name in names:
         if name in parts:

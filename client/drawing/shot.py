@@ -1,4 +1,4 @@
-"""What is drawn of one frame."""
+"""Drawn surfaces of one frame."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from .surfaces import Piece
 
 @dataclass(frozen=True)
 class Shot:
-    """What is drawn of one frame, and its time in s."""
+    """Drawn surfaces of one frame; ``time`` in s."""
 
     pieces: list[Piece]
     time: float | None
@@ -20,22 +20,26 @@ class Shot:
 
     @property
     def shown(self) -> Any:
-        """The field on all surfaces, flat."""
+        """Field values of all surfaces as one array."""
         return np.concatenate([np.asarray(piece.surface["shown"]).reshape(-1) for piece in self.pieces])
 
     @property
     def points(self) -> Any:
-        """(., 3) of all surfaces, m."""
+        """(., 3) points of all surfaces, m."""
         return np.concatenate([np.asarray(piece.surface.points, float) for piece in self.pieces])
 
     def near(self, focus: Sequence[int]) -> Any:
-        """(., 3) of the surfaces without debris, of some parts alone where there are any of them."""
+        """Returns (., 3) points of the surfaces without debris, of the parts in ``focus`` if any of these parts is
+        drawn.
+        """
         some = [piece for piece in self.pieces if piece.part in focus] or self.pieces
         found = [_corners(piece.surface) for piece in some]
         return np.concatenate(found) if any(map(len, found)) else self.points
 
     def beyond(self, inside: Any) -> int:
-        """How many pieces of debris have no face in the picture; ``inside`` tells of places (n, 3) which are (n,)."""
+        """Returns the number of pieces of debris without a face in the picture; ``inside`` returns (n,) True for
+        points (n, 3) in the picture.
+        """
         seen: set[tuple[int, int]] = set()
         debris: set[tuple[int, int]] = set()
         for piece in self.pieces:
@@ -49,6 +53,6 @@ class Shot:
 
 
 def _corners(surface: Any) -> Any:
-    """(., 3) corners of the cells that are no debris."""
+    """Returns (., 3) corners of the cells that are not debris."""
     cells = np.flatnonzero(np.asarray(surface.cell_data["far"]) == 0)
     return np.asarray(surface.extract_cells(cells).points, float) if len(cells) else np.zeros((0, 3))

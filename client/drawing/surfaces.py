@@ -1,6 +1,5 @@
-"""What is drawn of a frame: the surface of each part with the field on it, cut open at sections and mirrored.
-
-A section cuts the tets, so that the field is on the cut as well.
+"""Drawn surfaces of a frame. The surface of each part has the field, is cut at sections and is mirrored. A section
+cuts the tets; the field is interpolated on the cut surface.
 """
 
 import itertools
@@ -22,17 +21,18 @@ from .planes import Mirror
 Array: TypeAlias = "np.ndarray[Any, np.dtype[np.float64]]"
 
 _DEBRIS = 0.003
-"""Share of the volume of a part beyond each end of its bulk, and by how much of its length debris is beyond that."""
+"""Fraction of the volume of a part that lies beyond each end of its bulk."""
 _ASIDE = 0.25
-"""Both chosen: the frame is that of the bulk, and a few pieces that fly far ahead do not shrink it."""
+"""Distance from the bulk at which debris begins, over the length of the bulk. Both are chosen values: the camera frames
+the bulk, and a few fragments far ahead do not make the body small in the picture."""
 _ONE = 1e-6
-"""Of the length of a body, below which two places are one. Chosen."""
+"""Distance below which two points are merged, over the length of a body. Chosen value."""
 
 
 @dataclass(frozen=True)
 class Piece:
-    """A part as drawn. The surface has the field as ``shown``, of cells or points, and of its cells the number of the
-    fragment (0 where the frame has none) and whether it is debris far from the bulk of the part.
+    """A part as drawn. The surface has the field as ``shown``, by cell or by point. Each cell has the number of its
+    fragment (0 for a frame without fragments) and a flag for debris far from the bulk of the part.
     """
 
     part: int
@@ -41,13 +41,13 @@ class Piece:
 
 
 def read_mesh(path: Path) -> Any:
-    """The whole mesh of a frame as a pyvista.UnstructuredGrid."""
+    """Reads the whole mesh of a frame as a pyvista.UnstructuredGrid."""
     return vtk.read(str(path))[0]
 
 
 def pieces(grid: Any, picture: Picture, towards: Sequence[float]) -> list[Piece]:
-    """The parts of a ``prepared`` frame seen by a camera in the direction ``towards``. Raises LookError where sections
-    leave nothing.
+    """Returns the parts of a ``prepared`` frame for a camera in the direction ``towards``. Raises LookError for
+    sections that leave no tets.
     """
     sections = [Section(plane, towards[plane.axis] >= 0.0) for plane in picture.sections]
     found = []
@@ -61,7 +61,7 @@ def pieces(grid: Any, picture: Picture, towards: Sequence[float]) -> list[Piece]
 
 
 def _without_seams(found: list[Piece], picture: Picture) -> list[Piece]:
-    """Without the faces at which opaque parts touch face by face: nothing is to be seen of them."""
+    """Removes the faces that two opaque parts have in common: these faces are not visible."""
     kept = {piece.part: piece for piece in found}
     for whole in (False, True):
         group = [piece for piece in found if piece.opacity == 1.0 and (piece.part in picture.whole) == whole]
@@ -72,7 +72,7 @@ def _without_seams(found: list[Piece], picture: Picture) -> list[Piece]:
 
 
 def _seams(surfaces: Sequence[Any]) -> list[Any]:
-    """Of each surface (cells,) which of its faces are those of another one, too."""
+    """Returns for each surface (cells,) True for the faces that another surface also has."""
     if len(surfaces) < 2:
         return [np.zeros(surface.n_cells, bool) for surface in surfaces]
     sizes = [surface.n_cells for surface in surfaces]
@@ -91,15 +91,15 @@ def _left(surface: Any, seam: Any) -> Any:
 
 
 def bulk(grid: Any, picture: Picture) -> Array:
-    """(3, 2) lowest and highest coordinates, m, of a ``prepared`` frame without debris, as far as it is to be seen."""
+    """Returns (3, 2) lowest and highest coordinates of the visible part of a ``prepared`` frame without debris, m."""
     parts = np.asarray(grid["part"])
     seen = np.isin(parts, picture.focus) if picture.focus else ~np.isin(parts, picture.hidden)
     return extent(grid, seen & (np.asarray(grid["far"]) == 0))
 
 
 def extent(grid: Any, cells: Any) -> Array:
-    """(3, 2) lowest and highest coordinates, m, of the corners of some cells, of all where ``cells`` (n,) has none:
-    nodes that have left the body are points of the frame, too.
+    """Returns (3, 2) lowest and highest coordinates of the corners of the chosen cells, m; of all cells if ``cells``
+    (n,) has no True. Points without cells do not count: a frame also contains nodes that have left the body.
     """
     chosen = np.repeat(cells if cells.any() else np.ones(grid.n_cells, bool), np.diff(grid.offset))
     corners = np.asarray(grid.points, float)[np.asarray(grid.cell_connectivity)[chosen]]
@@ -107,7 +107,7 @@ def extent(grid: Any, cells: Any) -> Array:
 
 
 def require_sections(picture: Picture, bounds: Array) -> None:
-    """Raises LookError for a section off the bodies of all frames, which have the ``bounds`` (frames, 3, 2), m."""
+    """Raises LookError for a section outside of the bodies in all frames; ``bounds`` (frames, 3, 2), m."""
     for plane in picture.sections:
         low, high = bounds[:, plane.axis, 0].min(), bounds[:, plane.axis, 1].max()
         for mirror in picture.mirrors:
@@ -134,7 +134,9 @@ def _beyond(axis: str, at: float, low: float, high: float) -> LookError:
 
 
 def values(mesh: Any, name: str) -> tuple[Array, bool]:
-    """The field in the unit of pictures, and whether it is of points. Raises ViewError where the frame lacks it."""
+    """Returns the field in the unit of pictures, and True for a field of points. Raises ViewError for a frame
+    without the field.
+    """
     field = FIELDS[name]
     array = field.array or name
     of_points = array in mesh.point_data
@@ -148,9 +150,8 @@ def values(mesh: Any, name: str) -> tuple[Array, bool]:
 
 
 def prepared(mesh: Any, picture: Picture) -> Any:
-    """The mesh with ``shown``, ``part``, ``fragment``, ``far`` and, where they are asked for, ``vector`` alone.
-
-    Raises ViewError for a field that it lacks.
+    """Returns the mesh with the arrays ``shown``, ``part``, ``fragment``, ``far`` and, for arrows, ``vector`` only.
+    Raises ViewError for a missing field.
     """
     bare = vtk.bare(mesh)
     found, of_points = values(mesh, picture.field)
@@ -167,7 +168,9 @@ def prepared(mesh: Any, picture: Picture) -> Any:
 
 
 def _part(grid: Any, part: int, picture: Picture) -> Any:
-    """The tets of one part; the field as a mean at its nodes, which it may share with other parts, or of its tets."""
+    """Returns the tets of one part. The field is a mean at the nodes, which other parts may share, or a value by
+    tet.
+    """
     own = grid.extract_cells(np.flatnonzero(grid["part"] == part))
     cells = picture.look.raw or FIELDS[picture.field].kind in NAMED
     if "shown" in own.point_data and cells:
@@ -180,7 +183,7 @@ def _part(grid: Any, part: int, picture: Picture) -> Any:
 
 
 def _far(grid: Any) -> Any:
-    """(cells,) whether a tet is far from the bulk of its part."""
+    """Returns (cells,) True for tets far from the bulk of their part."""
     tets = grid.cells.reshape(-1, 5)[:, 1:] if len(grid.cells) == 5 * grid.n_cells else None
     if tets is None:
         return np.zeros(grid.n_cells, np.uint8)
@@ -208,20 +211,20 @@ def _bulk(places: Array, weights: Array) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class Section:
-    """A cut that leaves what lies below ``plane`` on its axis, or above it."""
+    """A cut that removes the side above ``plane`` on its axis, or the side below."""
 
     plane: Mirror
     below: bool
 
     def reflected(self, mirror: Mirror) -> "Section":
-        """The cut of the body whose image this cuts."""
+        """Returns the cut of the body whose mirror image is this cut."""
         if mirror.axis != self.plane.axis:
             return self
         return replace(self, plane=Mirror(mirror.axis, 2.0 * mirror.place - self.plane.place), below=not self.below)
 
 
 def _surface(part: Any, picture: Picture, sections: Sequence[Section]) -> Any | None:
-    """The outer faces of a part and of its mirror images, each cut open; None where nothing is left."""
+    """Returns the outer faces of a part and of its mirror images after all cuts; None if no faces are left."""
     length, images = float(part.length), []
     made: dict[tuple[Section, ...], Any] = {}
     for mirrors in _chosen(picture.mirrors):
@@ -239,7 +242,7 @@ def _same(one: Mirror, other: Mirror, length: float) -> bool:
 
 
 def _chosen(mirrors: Sequence[Mirror]) -> Iterator[list[Mirror]]:
-    """Every choice of the mirrors in which an image is reflected, the body itself first."""
+    """Returns all combinations of mirrors; the first is the body itself."""
     for flips in itertools.product((False, True), repeat=len(mirrors)):
         yield [mirror for mirror, flip in zip(mirrors, flips, strict=True) if flip]
 
@@ -258,16 +261,16 @@ def _clipped(mesh: Any, sections: Sequence[Section]) -> Any:
         if mesh.n_cells:
             left = mesh.clip(normal=normal, origin=origin)
             thick = np.ptp(np.reshape(left.bounds, (3, 2))[section.plane.axis]) > _ONE * mesh.length
-            mesh = left if thick else left.extract_cells([])  # a plane in the surface leaves flat tets
+            mesh = left if thick else left.extract_cells([])  # a cut along the surface leaves tets without volume
     return mesh
 
 
 def _faces(mesh: Any, mirrors: Sequence[Mirror], length: float) -> Any:
-    """The outer faces, without those in the plane of a mirror."""
+    """Returns the outer faces without the faces in the plane of a mirror."""
     surface = mesh.extract_surface(algorithm="dataset_surface")
     if not mirrors or not surface.n_cells:
         return surface
-    surface = surface.triangulate()  # a section leaves faces of three to six corners
+    surface = surface.triangulate()  # a section leaves faces with three to six corners
     outer = np.ones(surface.n_cells, bool)
     for mirror in mirrors:
         near = np.abs(np.asarray(surface.points)[:, mirror.axis] - mirror.place) < _ONE * length
@@ -276,7 +279,7 @@ def _faces(mesh: Any, mirrors: Sequence[Mirror], length: float) -> Any:
 
 
 def _reflected(surface: Any, mirrors: Sequence[Mirror], field: str) -> Any:
-    """Its image behind all of the mirrors."""
+    """Returns the mirror image of a surface across all given planes."""
     image = surface.copy() if mirrors else surface
     for mirror in mirrors:
         image.points[:, mirror.axis] = 2.0 * mirror.place - image.points[:, mirror.axis]

@@ -1,4 +1,4 @@
-"""What a caller of ``view`` may choose, and what is refused."""
+"""Options of ``view``, and the check of their values."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -12,71 +12,75 @@ from conoid.cases.reading.similar import allowed
 from ..errors import LookError
 
 SMALLEST = 64
-"""Pixels of a picture, each way. Chosen: below it nothing is to be seen."""
+"""Smallest and largest width and height of a picture, pixels. Chosen values: below the smallest the body is not
+recognizable."""
 ENDINGS = (".png", ".gif", ".mp4")
 FILMS = (".gif", ".mp4")
 _MOST_BANDS = 64
 _RANGE = "limits (--range)"
-"""What Python and the command line call the ends of the colour bar."""
+"""Names of the ends of the colour bar in Python and in the command line."""
 VECTORS = ("velocity", "displacement")
 
 
 class Look(msgspec.Struct, kw_only=True, frozen=True):
-    """What a caller of ``view`` may choose."""
+    """Options of ``view``."""
 
     mirror: str = "none"
     """``none``, ``auto`` (the planes of symmetry of the case), or planes such as ``x`` or ``x,y=0.002`` (m)."""
     section: str = ""
-    """Planes, written as in ``mirror``: or ``y=middle``: what lies between one and the camera is cut away; the cut
-    has the field."""
+    """Planes, written as in ``mirror``, or ``y=middle``. The side of a plane that faces the camera is cut away, and
+    the cut surface shows the field."""
     whole: list[str] = []
-    """Parts that sections leave whole."""
+    """Parts that sections do not cut."""
     hide: list[str] = []
     """Parts that are not drawn."""
     opacity: dict[str, float] = {}
-    """Of parts: 0.3 is glassy; those that are not named are opaque."""
+    """Opacity of parts; 0.3 is glassy. Other parts are opaque."""
     focus: list[str] = []
-    """Parts that fill the picture, whatever becomes of the others; empty: all."""
+    """Parts that fill the picture, wherever other parts are; empty: all parts."""
     camera: str = ""
-    """From where the body is seen: ``front``, ``back``, ``left``, ``right``, ``top``, ``bottom``, ``iso``, an axis such
-    as ``-x``, or a direction such as ``1,-1.5,0.6``; empty: from the side where planes of symmetry can be seen, and so
-    that a long body lies along the picture."""
+    """Direction from the body to the camera: ``front``, ``back``, ``left``, ``right``, ``top``, ``bottom``, ``iso``,
+    an axis such as ``-x``, or a vector such as ``1,-1.5,0.6``. The default shows the planes of symmetry; a long body
+    lies horizontally."""
     up: str = ""
-    """What points upwards in the picture: an axis or a direction; empty: z, or y where the camera looks along z; of a
-    body that is long along z the side that is not shown."""
+    """Direction that points upwards in the picture: an axis or a vector. The default is z, or y for a camera along
+    z. For a long body along z, the default is the side that is not shown."""
     zoom: float = 1.0
-    """1: the body fills the picture."""
+    """Magnification; at 1 the body fills the picture."""
     size: tuple[int, int] = (1600, 1200)
     limits: tuple[float, float] | None = None
-    """Ends of the colour bar, in the field's unit; if not given, they come from ``percentiles``."""
+    """Ends of the colour bar, in the field's unit; the default is computed from ``percentiles``."""
     percentiles: tuple[float, float] = (0.5, 99.5)
-    """Which values of the drawn surface are at the ends of the colour bar: a few extreme tets do not set it."""
+    """Percentiles of the drawn values at the ends of the colour bar: the values of a few extreme tets do not set the
+    range."""
     fixed: bool = False
-    """The colour bar is that of all frames of the run, whichever are drawn."""
+    """True: the colour bar has the range of all frames of the run."""
     bands: int = 0
-    """Number of colour bands; 0: a smooth scale."""
+    """Number of colour bands; 0: a continuous scale."""
     vectors: str = ""
-    """``velocity`` or ``displacement`` as arrows on the surface."""
+    """Vector field that is drawn as arrows: ``velocity`` or ``displacement``."""
     raw: bool = False
-    """Values of each tet instead of means at the nodes."""
+    """True: draw the value of each tet. False: draw means at the nodes."""
     edges: bool = False
-    """The edges of the mesh."""
+    """True: draw the edges of the mesh."""
     outlines: bool = True
-    """Lines round parts and fragments, and along sharp edges."""
+    """True: draw lines round parts and fragments, and along sharp edges."""
     scale: bool = True
-    """A bar of a round length beside the body."""
+    """True: draw a scale bar beside the body."""
     captions: bool = True
-    """Title, colour bar or legend; without them the body, its axes and the bar of a length are left."""
+    """True: draw title, colour bar or legend. False: draw only the body, its axes and the scale bar."""
     dark: bool = False
-    """A dark ground."""
+    """True: draw on a dark background."""
     transparent: bool = False
-    """The ground of the picture is left out."""
+    """True: leave the background transparent."""
     rate: float = 8.0
-    """Frames a second of a film."""
+    """Number of frames of a film per second."""
 
 
 def chosen(options: Mapping[str, Any], target: Path) -> Look:
-    """The options as a Look. Raises LookError for one that there is none of, of another kind or out of bounds."""
+    """Returns the options as a Look. Raises LookError for an unknown option, a value of the wrong type or out of
+    bounds.
+    """
     for name in options.keys() - set(Look.__struct_fields__):
         raise LookError(f"{name}: there is no such option; {allowed(name, Look.__struct_fields__)}")
     try:

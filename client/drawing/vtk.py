@@ -1,4 +1,4 @@
-"""The only module that imports pyvista: meshes, lights and the off-screen window in the few words that pictures use."""
+"""The only module that imports pyvista: meshes, lights and the off-screen window."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -11,7 +11,9 @@ from .frame import require_whole
 
 
 def read(path: str) -> tuple[Any, float | None]:
-    """The whole mesh of a frame, its pieces merged, and the frame's time, s. Raises ViewError for a damaged frame."""
+    """Reads the whole mesh of a frame, with its pieces merged, and the time of the frame, s. Raises ViewError for a
+    damaged frame.
+    """
     require_whole(path)
     mesh = pv.read(path)
     data = mesh.field_data
@@ -25,17 +27,17 @@ def read(path: str) -> tuple[Any, float | None]:
 
 
 def bare(mesh: Any) -> Any:
-    """The same points, in double precision, and cells, without fields."""
+    """Returns the mesh with points in double precision and without fields."""
     return pv.UnstructuredGrid(mesh.cells, mesh.celltypes, np.asarray(mesh.points, dtype=float))
 
 
 def joined(surfaces: Sequence[Any]) -> Any:
-    """One surface of several, whose points at the same place are one."""
+    """Merges surfaces; points at the same position become one point."""
     return pv.merge(list(surfaces), merge_points=True).extract_surface(algorithm="dataset_surface")
 
 
 def window(size: tuple[int, int], ground: str) -> Any:
-    """An off-screen window without smoothing of edges: they are drawn larger and made smaller."""
+    """Returns an off-screen window without anti-aliasing: pictures are drawn larger and then reduced."""
     plotter: Any = pv.Plotter(off_screen=True, window_size=list(size), lighting="none", border=False)
     plotter.set_background(ground)
     plotter.render_window.SetMultiSamples(0)
@@ -43,17 +45,17 @@ def window(size: tuple[int, int], ground: str) -> Any:
 
 
 def light(position: Sequence[float], intensity: float) -> Any:
-    """A light that is held to the camera."""
+    """Returns a light that moves with the camera."""
     return pv.Light(position=position, intensity=intensity, light_type="camera light")
 
 
 def disk(centre: Any, normal: Any, radius: float) -> Any:
-    """A flat disk."""
+    """Returns a flat disk."""
     return pv.Disc(center=centre, inner=0.0, outer=radius, normal=normal, r_res=1, c_res=96)
 
 
 def arrows(places: Any, vectors: Any, factor: float) -> Any:
-    """Arrows from ``places`` along ``vectors``, both (n, 3), ``factor`` times as long."""
+    """Returns arrows at ``places`` along ``vectors``, both (n, 3); ``factor`` scales their lengths."""
     cloud = pv.PolyData(places)
     cloud["vector"] = vectors
     shape = pv.Arrow(tip_length=0.26, tip_radius=0.075, shaft_radius=0.022, tip_resolution=12, shaft_resolution=8)
@@ -61,7 +63,9 @@ def arrows(places: Any, vectors: Any, factor: float) -> Any:
 
 
 def depths(plotter: Any) -> Any:
-    """(height, width) of the last drawing, 0 at the near plane to 1 at the far one and at the ground."""
+    """Returns (height, width) the depth of the last drawing: 0 at the near plane, 1 at the far plane and at the
+    background.
+    """
     width, height = plotter.window_size
     flat = pv._vtk.vtkFloatArray()
     plotter.render_window.GetZbufferData(0, 0, width - 1, height - 1, flat)
