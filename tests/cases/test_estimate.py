@@ -172,7 +172,7 @@ def test_what_may_break_may_cost_more() -> None:
     bar = estimate(read_case(shipped_path("glass_steel_bar")))
     assert whole.breaking == 0.0
     assert bar.core_seconds is not None
-    measured = 2 * 184.0  # s of two ranks: docs/performance/bench.md
+    measured = 2 * 184.0  # s of two ranks: docs/performance/history.md
     assert bar.core_seconds < measured < 1.1 * (bar.core_seconds + bar.breaking)
 
 
