@@ -1,4 +1,4 @@
-"""A lock: at most one server for a folder of runs."""
+"""A lock that admits at most one server for a folder of runs."""
 
 import fcntl
 import os
@@ -12,13 +12,14 @@ _LOCK = "server.lock"
 
 
 class AloneError(StartError):
-    """Another server uses the folder; the text is one line."""
+    """Error: another server uses the folder. The text of the error is one line."""
 
 
 @contextmanager
 def only_one(runs: Path) -> Iterator[None]:
-    """Two servers on one folder would start every run twice. Two locks are taken: one on the folder itself, since a
-    file in it could be deleted, and one on a file, for file systems that lock files only."""
+    """Takes the lock of a folder of runs. Two servers on one folder would start every run twice. Two locks are
+    taken: one on the folder itself, because a lock file could be deleted, and one on a lock file, for file systems
+    that lock files only."""
     with ExitStack() as stack:
         folder = os.open(runs, os.O_RDONLY | os.O_DIRECTORY)
         stack.callback(os.close, folder)

@@ -1,4 +1,5 @@
-"""Writing that survives a power cut: data first, then its name, then the folder that holds the name."""
+"""Writing of files that survives a power cut: first the data is flushed to disk, then the name of the file, then the
+folder of the file."""
 
 import os
 import shutil
@@ -7,11 +8,13 @@ from pathlib import Path
 from conoid.cases.reading import whole
 
 _PROBE = 1 << 16
-"""Bytes that are written to find out whether a folder takes any: more than a launch writes. Chosen."""
+"""Number of bytes that are written to test whether a folder can be written (chosen value). A launch writes fewer
+bytes."""
 
 
 def write(path: Path, content: bytes, mode: int = 0o600) -> None:
-    """Puts ``content`` at ``path`` whole or not at all: a temporary name, fsync, rename, fsync of the folder."""
+    """Writes ``content`` to ``path`` completely or not at all, by a temporary name, fsync, rename, and fsync of the
+    folder."""
     beside = path.with_name(f".{path.name}.new")
     with whole.named(path), open(os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, mode), "wb") as file:
         file.write(content)
@@ -22,7 +25,8 @@ def write(path: Path, content: bytes, mode: int = 0o600) -> None:
 
 
 def probe(folder: Path) -> None:
-    """Raises OSError when nothing can be written in ``folder`` now: it is gone, full, or no descriptor is left."""
+    """Raises OSError if nothing can be written in ``folder`` now: the folder is missing, the disk is full, or no
+    file descriptor is free."""
     path = folder / ".probe"
     with whole.named(path), open(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600), "wb") as file:
         file.write(bytes(_PROBE))
@@ -32,7 +36,7 @@ def probe(folder: Path) -> None:
 
 
 def write_new(path: Path, content: bytes) -> None:
-    """A file in a folder that no process reads yet; the caller syncs the folder. Raises FileExistsError."""
+    """Creates a file in a folder that no process reads yet. The caller syncs the folder. Raises FileExistsError."""
     with whole.named(path), open(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as file:
         file.write(content)
         file.flush()
@@ -40,7 +44,7 @@ def write_new(path: Path, content: bytes) -> None:
 
 
 def copy(source: Path, target: Path) -> None:
-    """A new file with the bytes of a regular one; the caller syncs the folder. Raises OSError."""
+    """Creates a file with the bytes of a regular file. The caller syncs the folder. Raises OSError."""
     flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL
     with whole.named(target), whole.opened(source) as file, open(os.open(target, flags, 0o400), "wb") as made:
         shutil.copyfileobj(file, made, 1 << 20)
@@ -49,7 +53,7 @@ def copy(source: Path, target: Path) -> None:
 
 
 def sync_folder(folder: Path) -> None:
-    """Makes the names in ``folder`` durable."""
+    """Flushes the names of the files in ``folder`` to disk."""
     descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
     try:
         with whole.named(folder):

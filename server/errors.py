@@ -31,7 +31,7 @@ _CODES = {400: "bad_request", 401: "unauthorized", 404: "not_found", 405: "metho
 
 
 class ServiceError(Exception):
-    """An answer other than success. ``detail`` is one line for people, ``code`` a constant word for programs."""
+    """An error answer. ``detail`` is one line for people, ``code`` a constant word for programs."""
 
     def __init__(
         self,
@@ -46,8 +46,8 @@ class ServiceError(Exception):
         headers: Mapping[str, str] | None = None,
         outcome: Mapping[str, Any] | None = None,
     ) -> None:
-        """``pointer``: a JSON pointer into the body, or the name of a parameter or header; ``outcome``: the record
-        of a removed run.
+        """Creates the error. ``pointer``: a JSON pointer into the body, or the name of a parameter or header;
+        ``outcome``: the record of a removed run.
         """
         super().__init__(detail)
         self.status, self.headers = status, dict(headers or {})
@@ -96,13 +96,13 @@ def entry(problem: Problem) -> dict[str, str]:
 
 
 def json_pointer(key: str) -> str:
-    """Returns ``parts[0].mesh.radius`` as ``#/parts/0/mesh/radius``; ``#`` for the whole body."""
+    """Returns ``parts[0].mesh.radius`` as the JSON pointer ``#/parts/0/mesh/radius``; ``#`` for the whole body."""
     items = [item for item in re.split(r"[.\[\]]+", key) if item]
     return "#" + "".join(f"/{item}" for item in items)
 
 
 def install(app: FastAPI) -> None:
-    """Makes every error of ``app`` a problem+json."""
+    """Sends every error of ``app`` in the form problem+json."""
     app.add_exception_handler(ServiceError, _service_error)
     app.add_exception_handler(HTTPException, _http_error)
     app.add_exception_handler(RequestValidationError, _parameter_error)
@@ -127,8 +127,8 @@ async def _http_error(request: Request, error: Exception) -> Response:
 
 
 def allowed(app: FastAPI, path: str) -> str:
-    """Returns the methods of all routes for a path, those of the longest pattern if several match; empty without a
-    match.
+    """Returns the methods of all routes for a path. If several patterns match, the longest pattern counts. Empty
+    without a match.
     """
     found: dict[str, set[str]] = {}
     for router in app.state.routers:
@@ -156,8 +156,8 @@ async def _storage(request: Request, error: Exception) -> Response:
 
 
 async def _database(request: Request, error: Exception) -> Response:
-    """Returns the error for a database that is locked by another process, full, or not reachable; the request may
-    succeed later."""
+    """Returns the error for a database that is locked by another process, full, or not reachable. The same request
+    may succeed later."""
     _log.error("%s %s: the database cannot be used: %s", request.method, request.url.path, error)
     return database_away(error).response()
 

@@ -1,4 +1,4 @@
-"""Parts of a running server, as the routes use them; ``app`` creates them."""
+"""Parts of a running server, as the routes use them. ``app`` creates the parts."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -42,15 +42,17 @@ class Service:
     user_limits: UserLimits
     downloads: Downloads
     pool: ThreadPool
-    """Threads for the disk and the database."""
+    """Pool of threads for the disk and the database."""
     readers: ThreadPool
-    """Threads that wait for the reading of cases."""
+    """Pool of threads that wait for the reading of cases."""
     surveyors: ThreadPool
-    """Threads for cases that may name files, whose reading takes seconds, and for restarts, whose case may."""
+    """Pool of threads for cases that may name files, and for restarts, whose case may name files. Reading these
+    cases takes seconds."""
     sweepers: ThreadPool
-    """Threads for sweeps, whose reading takes seconds: submissions of runs do not wait for these."""
+    """Pool of threads for sweeps, whose reading takes seconds. Submissions of single runs do not wait for these
+    threads."""
     reporters: ThreadPool
-    """Threads for reports of runs, which take minutes."""
+    """Pool of threads for reports of runs, which take minutes."""
     sweeps: Sweeps
     searches: Searches
     uploads: Uploads

@@ -35,21 +35,22 @@ from .settings import StartError, loopback
 _log = logging.getLogger("conoid.server")
 _SECRET, _USERS = "server.secret", ".zenoh-users"
 _HANDSHAKE = 3000
-"""Time in ms in which a connection must authenticate. Chosen: it takes two round trips."""
+"""Time in ms in which a new connection must authenticate. The value was chosen because authentication takes two
+round trips."""
 _SECRET_BYTES, _SECRET_MOST = 32, 1 << 16
-"""Length of the secret in bytes: at least, and the part that is read of a longer file."""
+"""Smallest length of the secret in bytes, and largest number of bytes that are read of its file."""
 _HEARS = ["put", "delete", "reply", "declare_queryable", "liveliness_token"]
 _ASKS = ["declare_subscriber", "query", "liveliness_query", "declare_liveliness_subscriber"]
 _ANSWERS = ["query", "declare_subscriber"]
 
 
 class TelemetryError(StartError):
-    """The router cannot be opened; the text is one line."""
+    """Error: the router cannot be opened. The text of the error is one line."""
 
 
 @dataclass(frozen=True)
 class Reader:
-    """Access for a client; ``user`` is empty for a router without access control."""
+    """Access of a client to Zenoh. ``user`` is empty for a router without access control."""
 
     port: int
     prefix: str
@@ -63,9 +64,9 @@ class Telemetry:
     def __init__(
         self, runs: Path, host: str, port: int, tokens: Iterable[Token] | None, nodes: Slurm | None = None
     ) -> None:
-        """``tokens`` is None for a router without access control; ``nodes``: endpoints for the nodes of a cluster.
-        On a full disk there is no router until ``follow`` can open one. Raises TelemetryError, OSError if the secret
-        cannot be made.
+        """Opens the router. ``tokens`` is None for a router without access control; ``nodes``: endpoints for the
+        nodes of a cluster. On a full disk there is no router until ``follow`` can open one. Raises TelemetryError,
+        and OSError if the secret cannot be made.
         """
         self._runs, self._host, self._nodes = runs, host, nodes
         self.port = port or _free_port(host)
@@ -82,7 +83,7 @@ class Telemetry:
 
     @property
     def local_endpoint(self) -> str:
-        """Endpoint for the workers of this machine."""
+        """Endpoint of the router for the workers of this machine."""
         host = self._host if loopback(self._host) else _local(self._host)
         return f"tcp/{_bracketed(host)}:{self.port}"
 
@@ -95,7 +96,7 @@ class Telemetry:
         return Access(self.local_endpoint, prefix, user, self._password(user))
 
     def reader(self, owner: str, token: Token | None) -> Reader:
-        """Returns the credentials of a client, which are valid when this returns. Raises TelemetryError."""
+        """Returns the credentials of a client, which are valid on return. Raises TelemetryError."""
         prefix = keys.owner_prefix(owner)
         if self._tokens is None or token is None:
             return Reader(self.port, prefix, "", "")
@@ -109,7 +110,8 @@ class Telemetry:
             self.admit({(token.id, token.owner) for token in tokens})
 
     def admit(self, tokens: Iterable[tuple[str, str]]) -> None:
-        """Admits exactly these (token id, owner). Raises TelemetryError; the next call tries again."""
+        """Admits exactly the clients with these tokens (token id, owner). Raises TelemetryError; the next call tries
+        again."""
         with self._lock:
             wanted = frozenset(tokens)
             if wanted == self._tokens and self._session is not None:
@@ -122,7 +124,7 @@ class Telemetry:
                 raise TelemetryError(f"the Zenoh router cannot be opened: {error.filename}: {error.strerror}") from None
 
     def publish(self, owner: str, status: Status) -> None:
-        """Publishes a message. The journal has it already, so a lost sample loses no data."""
+        """Publishes a message on Zenoh. The journal already has the message, so a lost sample loses no data."""
         key = keys.message_key(keys.run_prefix(owner, status.run), status.channel)
         with self._lock:
             try:
@@ -186,8 +188,8 @@ class Telemetry:
 
 
 def access_rules(tokens: Iterable[tuple[str, str]]) -> dict[str, Any]:
-    """Returns Zenoh's access control: tokens of an owner may subscribe to the owner's keys, the user of the owner's
-    workers may publish there, nothing else is allowed."""
+    """Returns the access rules of Zenoh. The tokens of an owner may subscribe to the owner's keys, and the user of
+    the owner's workers may publish under these keys. Nothing else is allowed."""
     readers: dict[str, list[str]] = {}
     for token, owner in tokens:
         readers.setdefault(owner, []).append(token)
@@ -226,8 +228,8 @@ def _worker_user(owner: str) -> str:
 
 
 def _read_secret(runs: Path) -> bytes:
-    """Returns the secret from which all passwords follow; it is made at the first start. Raises TelemetryError for a
-    file that others can read or that is too short; OSError if it cannot be made.
+    """Returns the secret from which all passwords are derived; it is made at the first start. Raises TelemetryError
+    for a file that is too short or that others can read, and OSError if the secret cannot be made.
     """
     path = runs / _SECRET
     remedy = "remove it, and the server makes a new one; whoever watches a run asks for a new password by himself"

@@ -1,7 +1,7 @@
 """The card of a run in the table of runs: the values of its case and, after its end, its results.
 
-A case never changes, and results do not change after the end, so a card is made once from the files in the run's
-folder.
+A case never changes, and results do not change after the end of the run, so a card is made once from the files in
+the run's folder.
 """
 
 import zlib
@@ -22,14 +22,15 @@ from ..runs.journal import DAMAGED
 FORM = 1
 """Version of the stored form of a card. A card of another version is made again."""
 _KEYS, _LETTERS = 1000, 200
-"""Largest number of values of a case, and of characters of one value. Chosen: a case of ten parts has 500 values."""
+"""Largest number of values of a case, and of characters of one value. The values were chosen because a case of ten
+parts has 500 values."""
 _RESULTS = 200
-"""Largest number of results of a run. Chosen: a run of twenty probes has 100."""
+"""Largest number of results of a run. The value was chosen because a run of twenty probes has 100 results."""
 _MOST_BYTES = 8 << 20
-"""Largest size in bytes of a case file that is read. Chosen: ten times the largest body of a request, with every
-default."""
+"""Largest size in bytes of a case file that is read: ten times the largest body of a request, because the file has
+every default (chosen value)."""
 _LEFT_OUT = ("digest", ".passed")
-"""Endings of the names of results that are not numbers."""
+"""Last words of the names of results that are not numbers."""
 
 
 class Card(msgspec.Struct, kw_only=True, frozen=True):
@@ -40,7 +41,7 @@ class Card(msgspec.Struct, kw_only=True, frozen=True):
     """Values of the case by key, in SI units."""
     results: dict[str, float | None] | None = None
     units: dict[str, str] = {}
-    """Units of the results that have one, by name."""
+    """Units of the results by name; results without a unit are missing."""
     references: int = 0
     """Number of reference values with which the run was compared."""
     missed: list[str] = []

@@ -1,4 +1,5 @@
-"""Cards of runs in the database. They are an index over the folders of runs, and can be made again from them."""
+"""Cards of runs in the database. The cards are an index over the folders of runs, and can be made again from the
+folders."""
 
 import time
 import zlib
@@ -14,14 +15,15 @@ from . import card
 from .card import Card
 
 _PATIENCE = 0.5
-"""Time in s in which a request makes missing cards; the next request makes more. Chosen: some hundred runs."""
+"""Time in s in which one request makes missing cards; the next request makes more. The value was chosen because some
+hundred cards are made in this time."""
 
 
 class Cards:
     """Reads cards from the database and makes missing ones. Methods may be called from any thread."""
 
     def __init__(self, runs: Path, store: Store) -> None:
-        """``runs`` is the folder of all runs. Nothing is read yet."""
+        """Stores the path of ``runs``, the folder of all runs. No card is read yet."""
         self._runs, self._store = runs, store
 
     def of(self, runs: Sequence[Run]) -> dict[str, Card]:

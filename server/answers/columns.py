@@ -1,8 +1,8 @@
-"""history.csv as columns for charts, reduced so that no peak is lost.
+"""Columns of history.csv for charts, reduced so that no peak is lost.
 
-Lines are gathered in groups of equal size. A group keeps the minimum and the maximum of each column, in the order in
-which they occurred. When there are too many groups, pairs of groups are merged. So memory and answers are bounded,
-and a file of any length is read once.
+Lines are gathered in groups of equal size. For each group the minimum and the maximum of each column are stored, in
+the order in which they occurred. When there are too many groups, pairs of groups are merged. This limits memory and
+the size of answers, and a file of any length is read once.
 """
 
 import csv
@@ -19,25 +19,27 @@ from conoid.cases.reading import whole
 from ..runs.journal import Tail
 
 _GROUPS = 4096
-"""Largest number of groups: more than the pixels of a screen. Chosen."""
+"""Largest number of groups of lines (chosen value). It is larger than the number of pixels across a screen."""
 _NUMBERS = 400_000
-"""Largest product of groups and columns. Chosen: 6 MB."""
+"""Largest product of groups and columns. The value was chosen because so many numbers need 6 MB."""
 _SENT = 200_000
-"""Largest number of values in an answer. Chosen: 4 MB of JSON."""
+"""Largest number of values in an answer. The value was chosen because so many values are 4 MB of JSON."""
 _BLOCK = 1 << 20
-"""Bytes of one read. Chosen."""
+"""Number of bytes of one read (chosen value)."""
 _AT_ONCE = 32
-"""Largest number of blocks that are read for one answer: some 100,000 lines, half a second. Chosen."""
+"""Largest number of blocks that are read for one answer (chosen value). So many blocks have some 100,000 lines and
+take half a second."""
 _MOST_COLUMNS = 4000
-"""Largest number of columns that are read, the first ones. Chosen: a case with a thousand probes has some more."""
+"""Largest number of columns that are read; further columns are ignored. The value was chosen because a case with a
+thousand probes has slightly more than a thousand columns."""
 _TEXT = frozenset({"limiter"})
-"""Columns of text."""
+"""Names of columns of text."""
 csv.field_size_limit(1 << 30)
-"""The csv module refuses longer fields. A field that is not a number becomes NaN."""
+"""Largest length of a field. The csv module refuses a longer field. A field that is not a number becomes NaN."""
 
 
 class Columns:
-    """Content of a history.csv as far as it has been read. The caller holds a lock."""
+    """Content of a history.csv as far as the file has been read. The caller holds a lock."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -55,14 +57,14 @@ class Columns:
         self._places: list[int] = []
         """Positions of the columns of numbers in a line."""
         self._kept: list[array[float]] = []
-        """Two values for each group of ``_every`` lines, by column."""
+        """Minimum and maximum of each group of ``_every`` lines, by column."""
         self._open: list[list[float]] = []
-        """Values of the lines of the last, incomplete group, by column."""
+        """Values of the lines of the last group, which is incomplete, by column."""
         self._extremes: list[tuple[float, float]] = []
         self._last: list[float] = []
 
     def catch_up(self) -> None:
-        """Reads new lines, at most ``_AT_ONCE`` blocks. A file that was replaced is read from its beginning."""
+        """Reads new lines, at most ``_AT_ONCE`` blocks of them. A file that was replaced is read from its beginning."""
         if self._is_another():
             self._begin()
             self._is_another()
@@ -103,7 +105,7 @@ class Columns:
         pairs = [history.split(name) for name in names]
         self._width = len(names)
         places = {name: k for k, (name, _) in reversed([*enumerate(pairs)]) if name not in _TEXT}
-        self._places = sorted(places.values())[:_MOST_COLUMNS]  # the first of several columns with the same name
+        self._places = sorted(places.values())[:_MOST_COLUMNS]  # a repeated name means its first column
         self.units = dict(pairs[k] for k in self._places)
         number = len(self._places)
         self._kept = [array("d") for _ in range(number)]
@@ -138,8 +140,9 @@ class Columns:
         }
 
     def values(self, names: Sequence[str], points: int) -> dict[str, list[float]]:
-        """Returns columns by name, of about ``points`` values at most: all values, or the minimum and the maximum of
-        each group of lines in their order, and the last value.
+        """Returns columns by name, of about ``points`` values at most. A short file gives all values. A longer file
+        gives the minimum and the maximum of each group of lines, in the order of their occurrence, and the last
+        value.
         """
         chosen = frozenset(names)
         places = {name: at for at, name in enumerate(self.units) if name in chosen}

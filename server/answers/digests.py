@@ -1,4 +1,5 @@
-"""SHA-256 of files, computed in slices and kept for each state of a file."""
+"""SHA-256 of files. The hash is computed in slices, and is computed again only when the state of the file has
+changed."""
 
 import asyncio
 import hashlib
@@ -12,10 +13,10 @@ from ..requests.thread_pool import ThreadPool
 State = tuple[int, int, int, int, int]
 """State of a file: device, inode, times of the last change of content and of the inode in ns, size in bytes."""
 _KEPT = 10_000
-"""Largest number of stored digests, 32 bytes each. Chosen."""
+"""Largest number of stored digests, 32 bytes each (chosen value)."""
 _SLICE, _CHUNK = 1 << 25, 1 << 18
-"""Bytes of one task, and bytes of one read. Chosen: a task takes 0.1 s; other requests of the user are served
-between tasks."""
+"""Number of bytes that one task hashes, and number of bytes of one read. The values were chosen because such a task
+takes 0.1 s, and the server handles other requests of the user between two tasks."""
 
 
 def state_of(file: BinaryIO) -> State:
@@ -25,16 +26,16 @@ def state_of(file: BinaryIO) -> State:
 
 
 class Digests:
-    """Digests of files by their state. Used in the thread of the event loop."""
+    """Cache of SHA-256 digests by the state of the file. The class is used in the thread of the event loop."""
 
     def __init__(self, pool: ThreadPool) -> None:
-        """Starts without digests."""
+        """Creates an empty cache of digests."""
         self._pool = pool
         self._known: OrderedDict[State, bytes] = OrderedDict()
         self._locks: WeakValueDictionary[State, asyncio.Lock] = WeakValueDictionary()
 
     async def of(self, file: BinaryIO, state: State) -> bytes:
-        """Returns the SHA-256 of the first ``size`` bytes. Raises OSError, ServiceError 503."""
+        """Returns the SHA-256 of the first ``size`` bytes of a file. Raises OSError, ServiceError 503."""
         lock = self._locks.setdefault(state, asyncio.Lock())
         async with lock:
             if state not in self._known:

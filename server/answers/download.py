@@ -1,4 +1,4 @@
-"""Download of files from a run's folder, whole or in part. Files outside the folder are never sent."""
+"""Download of files from a run's folder, whole or in part. No file outside the folder is ever sent."""
 
 import base64
 import hashlib
@@ -21,9 +21,10 @@ from ..requests.user_limits import place_of
 from .digests import Digests, State, state_of
 
 _CHUNK = 1 << 18
-"""Bytes of one read and one send. Chosen: larger blocks are not faster."""
+"""Number of bytes of one read and one send. The value was chosen because larger blocks are not faster."""
 _SMALL = 1 << 20
-"""Largest size in bytes of a file that is sent and hashed at once. Chosen: 1 ms of a processor."""
+"""Largest size in bytes of a file that is sent and hashed in one step. The value was chosen because such a file
+takes 1 ms of CPU time."""
 _RANGE = re.compile(r"bytes=(\d{0,18})-(\d{0,18})")
 _TYPES = {
     ".json": "application/json", ".jsonl": "application/x-ndjson", ".toml": "application/toml",
@@ -34,7 +35,8 @@ _TYPES = {
 
 @dataclass(frozen=True)
 class Entry:
-    """A file of a run. ``path`` is relative to the run's folder; ``modified`` in Unix s."""
+    """A file of a run. ``path`` is relative to the run's folder; ``modified`` is the time of its last change, Unix
+    s."""
 
     path: str
     size: int
@@ -56,10 +58,11 @@ def listing(folder: Path) -> list[Entry]:
 
 
 def open_inside(folder: Path, relative: str) -> BinaryIO:
-    """Opens a regular file below ``folder``. Raises ServiceError 404 for everything else.
+    """Opens a regular file below ``folder``.
 
-    Each part of the path is opened relative to the folder before it, and links are not followed. So neither ``..``
-    nor a link leads outside, even a link that is created during the call.
+    Raises ServiceError 404 for any other path. Each part of the path is opened relative to the folder before it, and
+    links are not followed. Therefore neither ``..`` nor a link leads outside, even if the link is created during the
+    call.
     """
     parts = relative.split("/")
     if any(part in {"", ".", ".."} or part.startswith(".") or "\0" in part for part in parts):
@@ -86,7 +89,7 @@ def _walk(folder: Path, parts: list[str]) -> int:
 
 
 class Downloads:
-    """Sends files. Used in the thread of the event loop."""
+    """Sends files. The class is used in the thread of the event loop."""
 
     def __init__(self, pool: ThreadPool) -> None:
         """``pool`` has the threads that read files, with limits for each user."""
@@ -128,8 +131,9 @@ class Downloads:
     async def whole(
         self, request: Request, folder: Path, relative: str, size: int, headers: Mapping[str, str], media_type: str
     ) -> Response:
-        """Sends a file that never changes and has ``size`` bytes, with headers of the caller. Raises ServiceError 404,
-        also for a file of another size: it is damaged, and a browser would keep it; 429, 503.
+        """Sends a file that never changes and has ``size`` bytes, with headers of the caller. Raises ServiceError
+        404 for a missing file and for a file of another size, which is damaged and would be cached by the browser;
+        429, 503.
         """
         file, state = await self._pool.run(_opened, folder, relative)
         try:
@@ -149,7 +153,8 @@ def _opened(folder: Path, relative: str) -> tuple[BinaryIO, State]:
 
 
 def is_known(etag: str, text: str) -> bool:
-    """Whether an If-None-Match contains this ETag or ``*``; a weak form, which proxies make, counts as well."""
+    """Whether an If-None-Match header contains this ETag or ``*``. A weak ETag, which proxies make, is equal to the
+    strong one here."""
     known = {tag.strip().removeprefix("W/") for tag in text.split(",")}
     return etag in known or known == {"*"}
 
@@ -179,7 +184,7 @@ def _part(request: Request, size: int, etag: str) -> tuple[int, int, int]:
 
 
 class _FileResponse(StreamingResponse):
-    """Yields a part of an open file; closes the file, also when the client disconnects."""
+    """Yields a part of an open file. Closes the file at the end, also when the client disconnects."""
 
     def __init__(
         self, pool: ThreadPool, file: BinaryIO, begin: int, end: int, status: int, headers: Mapping[str, str]

@@ -19,26 +19,26 @@ _Column = sa.ColumnElement[str]
 
 @dataclass(frozen=True)
 class Chosen:
-    """Filters of a list; a filter without a value excludes nothing. Times are Unix s."""
+    """Filters of a list of runs. A filter without a value excludes nothing. Times are Unix s."""
 
     states: Sequence[State] = ()
     labels: Mapping[str, str] = field(default_factory=dict)
     case: str = ""
     """Name of the case; ``*`` stands for any characters."""
     words: Sequence[str] = ()
-    """Words that must all occur: in the case's name or title, labels, state, cause or message, or at the start of
-    the id."""
+    """Words of a search. Each word must occur in the case's name or title, in a label, state, cause or message, or
+    at the start of the id."""
     since: float | None = None
-    """Submitted at this time or later."""
+    """Earliest time of submission (inclusive), Unix s."""
     until: float | None = None
-    """Submitted before this time."""
+    """Latest time of submission (exclusive), Unix s."""
     runs: Sequence[str] | None = None
     """Runs with these ids; None: no filter."""
     changed: float | None = None
-    """Open runs, and runs that were submitted or ended at this time or later."""
+    """Time, Unix s: the list has open runs, and runs that were submitted or ended at this time or later."""
 
     def where(self, owner: str) -> Iterator[sa.ColumnElement[bool]]:
-        """Yields the conditions, all of which must hold."""
+        """Yields the SQL conditions; all of them must hold."""
         runs = RUNS.c
         yield runs.owner == owner
         if self.states:
@@ -64,7 +64,7 @@ def _literal(text: str) -> str:
 
 
 def _like(column: _Column, pattern: str) -> sa.ColumnElement[bool]:
-    """Compares without case; the default of this differs between databases."""
+    """Compares without case in every database. Without this setting databases differ in how they compare capitals."""
     return sa.func.lower(column).like(pattern.lower(), escape=_ESCAPE)
 
 

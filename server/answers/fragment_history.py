@@ -13,21 +13,23 @@ from . import download
 from .schemas.history import FragmentCourse
 
 MOST = 200
-"""Largest number of snapshots that are read for a history, evenly spaced. Chosen: 0.2 s without cached tables."""
+"""Largest number of snapshots that are read for the history of a fragment; the snapshots are evenly spaced. The
+value was chosen because so many snapshots take 0.2 s without cached tables."""
 _KNOWN = 512
-"""Number of cached tables of fragments, of all runs: 50 MB at most."""
+"""Largest number of cached tables of fragments of all runs. So many tables need at most 50 MB."""
 _HEADER = 16
 """Bytes at the start of a snapshot that contain the length of the header."""
 _LONGEST = 1 << 24
-"""Largest size in bytes of a header. Chosen: a hundred times the longest header of a shipped case."""
+"""Largest size in bytes of the header of a snapshot: a hundred times the longest header of a shipped case (chosen
+value)."""
 _DAMAGE = ValueError, IndexError, TypeError, OverflowError, RecursionError
-"""Errors that a header with wrong numbers or a truncated file causes."""
+"""Errors that are raised while a header with wrong numbers or a truncated file is read."""
 _COLUMNS = "fragment_id", "fragment_mass", "fragment_velocity", "fragment_size", "fragment_tets"
 
 
 def course(folder: Path, snapshots: Sequence[Snapshot], label: int) -> FragmentCourse:
-    """Returns the history of the fragment ``label`` of the run in ``folder``. A snapshot without the fragment, or a
-    damaged one, gives no row."""
+    """Returns the history of the fragment ``label`` of the run in ``folder``. A snapshot that is damaged, or does
+    not contain the fragment, gives no row."""
     most = min(MOST, len(snapshots))
     chosen = sorted({round(k * (len(snapshots) - 1) / max(most - 1, 1)) for k in range(most)})
     rows = [row for k in chosen for row in _found(folder, snapshots[k], label)]
@@ -47,8 +49,8 @@ def _found(folder: Path, message: Snapshot, label: int) -> Iterator[tuple[float,
 
 @lru_cache(maxsize=_KNOWN)
 def _table(folder: Path, path: str, _sha256: str) -> tuple[memoryview, ...]:
-    """Returns the columns of the table of fragments; only these are read from the file. Raises ServiceError,
-    OSError, ValueError.
+    """Returns the requested columns of the table of fragments; no other column is read from the file. Raises
+    ServiceError, OSError, ValueError.
     """
     with download.open_inside(folder, path) as file:
         start = file.read(_HEADER)

@@ -1,7 +1,9 @@
-"""History of a run from its journal, with a limited number of reports: a run of a million events is shown at once.
+"""History of a run from its journal, with a limited number of reports, so that a run of a million events is shown at
+once.
 
-The journal is read once, then only its new lines. For most lines only the type is read. Every n-th report is kept
-unchanged, and n doubles when the limit is reached. All rare events (balance events, snapshots, states) are kept.
+The journal is read once; later calls read only its new lines. For most lines only the message type is decoded. Every
+n-th report is kept unchanged, and n doubles when the limit is reached. All rare events (balance events, snapshots,
+states) are kept.
 """
 
 import re
@@ -21,17 +23,18 @@ from .columns import Columns
 from .log_messages import KINDS, Notes
 
 _SAMPLES = 4096
-"""Largest number of reports that are kept of a run. Chosen: some times the pixels of a chart."""
+"""Largest number of reports that are kept of a run: a few times the number of pixels of a chart (chosen value)."""
 _BYTES = 16 << 20
-"""Largest size of the kept reports of a run, bytes. Chosen: room for all reports of a run of some hundred ranks."""
+"""Largest size of the kept reports of a run, bytes. The value was chosen because all reports of a run of some
+hundred ranks fit in it."""
 _CUTS = 10_000
-"""Number of newest balance events that are kept. Chosen."""
+"""Number of newest balance events that are kept (chosen value)."""
 _RUNS = 16
-"""Number of runs whose history is cached, the most recently requested. Chosen."""
+"""Number of runs whose history is cached, the most recently requested (chosen value)."""
 _BLOCK = 4 << 20
-"""Bytes of one read of the journal. Chosen."""
+"""Number of bytes of one read of the journal (chosen value)."""
 _TYPE = slice(9, 13)
-"""The first letters of a message's type in a line, after ``{"type":"``."""
+"""The bytes of a journal line before the type of its message."""
 
 _SHA256 = re.compile("[0-9a-f]{64}")
 _snapshot = msgspec.json.Decoder(Snapshot)
@@ -49,7 +52,7 @@ class Sample:
 
     @property
     def size(self) -> int:
-        """Size in bytes, without lines that several samples share."""
+        """Size of the report in bytes, without lines that are shared by several reports."""
         return len(self.progress) + len(self.load)
 
 
@@ -63,7 +66,7 @@ class History:
     wall: float = 0.0
     """Unix time of the last status, s."""
     began: float | None = None
-    """Unix time of the start of the worker, s."""
+    """Unix time of the start of the worker process, s."""
     state: State = State.ACCEPTED
     samples: list[Sample] = field(default_factory=list)
     newest: Sample | None = None
@@ -83,7 +86,7 @@ class History:
         self._every, self._reports, self._size = 1, 0, 0
 
     def catch_up(self) -> None:
-        """Reads new lines of the journal. The caller holds the lock."""
+        """Reads new lines of the journal. The caller holds the lock of the history."""
         while block := self._tail.block(_BLOCK):
             lines = block.split(b"\n")
             for line in lines:
@@ -136,15 +139,16 @@ _RARE = frozenset({b"stat", b"snap", b"bala"})
 
 
 class Histories:
-    """Cache of the most recently requested histories, for any thread."""
+    """Cache of the most recently requested histories. It may be used from any thread."""
 
     def __init__(self) -> None:
-        """Starts without histories."""
+        """Creates an empty cache."""
         self._lock = threading.Lock()
         self._known: OrderedDict[Path, History] = OrderedDict()
 
     def of(self, path: Path) -> History:
-        """Returns the history of the journal at ``path``. The caller takes its lock and calls ``catch_up``."""
+        """Returns the history of the journal at ``path``. The caller takes the lock of the history and calls
+        ``catch_up``."""
         with self._lock:
             found = self._known.setdefault(path, History(path))
             self._known.move_to_end(path)

@@ -10,13 +10,14 @@ from conoid.cases.messages import Checkpoint, Log, Status, to_json
 from ..runs.journal import DAMAGED
 
 _FIRST, _NEWEST = 200, 800
-"""Number of lines that are kept from the beginning and from the end. Chosen: enough to read, small to send."""
+"""Number of log lines that are kept from the beginning and from the end of a log (chosen value)."""
 _LONGEST = 2000
-"""Largest number of characters of a message. Chosen: the longest warning of a shipped case has 500."""
+"""Largest number of characters of a message. The value was chosen because the longest warning of a shipped case has
+500 characters."""
 _WARNINGS = 200
-"""Largest number of warnings; later ones are dropped. Chosen."""
+"""Largest number of warnings (chosen value); later ones are dropped."""
 KINDS = frozenset({b'log"', b"stat", b"chec"})
-"""First letters of the types of these messages."""
+"""First letters of the types of the messages that this log shows."""
 
 _decode = msgspec.json.Decoder(Log | Status | Checkpoint).decode
 
@@ -28,7 +29,7 @@ class Notes:
     first: list[bytes] = field(default_factory=list)
     newest: deque[bytes] = field(default_factory=lambda: deque(maxlen=_NEWEST))
     warnings: dict[str, bytes] = field(default_factory=dict)
-    """Lines of warnings and errors by text, so that a repeated text occurs once."""
+    """Lines of warnings and errors by text; a repeated text is stored once."""
     left_out: int = 0
 
     def take(self, line: bytes) -> None:
@@ -54,7 +55,7 @@ class Notes:
 
 
 def _shortened(message: Log | Status | Checkpoint, line: bytes) -> bytes:
-    """Shortens long texts of a line, and drops fields that the message type does not have."""
+    """Shortens long texts of a line, and removes fields that its message type does not have."""
     if len(line) <= _LONGEST:
         return line
     texts = {name: text for name in message.__struct_fields__ if isinstance(text := getattr(message, name), str)}

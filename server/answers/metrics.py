@@ -14,18 +14,20 @@ from conoid.cases.run import State
 from ..service import Service
 
 _BUCKETS = (0.005, 0.01, 0.025, 0.05, 0.1, 0.2, 0.5, 1.0, 5.0, 30.0)
-"""Bounds of the histogram in s. Chosen around 50 and 200 ms, the limits for an answer."""
+"""Bounds of the classes of the histogram of durations, s. The values were chosen around 50 and 200 ms, which are the
+limits for the duration of an answer."""
 
 
 _METHODS = frozenset({"GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS"})
-"""HTTP methods with series of their own. A client may send any method, and each would be kept for ever."""
+"""HTTP methods that are counted separately. All other methods are counted together, because a client may send any
+word as a method and each count is kept for ever."""
 
 
 class Metrics:
     """Metrics of one server."""
 
     def __init__(self, service: Service) -> None:
-        """Starts with all counters at 0."""
+        """Creates all counters with the value 0."""
         self.registry = CollectorRegistry()
         ProcessCollector(registry=self.registry)
         self.registry.register(_Runs(service))
@@ -41,7 +43,7 @@ class Metrics:
         return generate_latest(self.registry)
 
     def answered(self, scope: Scope, status: int, seconds: float) -> None:
-        """Counts an answer by the pattern of its route, so that there are as many series as routes."""
+        """Counts an answer by the pattern of its route, so that the number of series is the number of routes."""
         route = getattr(scope.get("route"), "path", "none")
         method = scope["method"] if scope["method"] in _METHODS else "other"
         self.answers.labels(method, route, str(status)).inc()
@@ -89,7 +91,8 @@ class Timed:
         self._app, self._metrics = app, metrics
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Measures until the answer begins. An exception passes through: it is answered with 500 further out."""
+        """Measures the time until the answer begins. An exception is passed on; an outer middleware answers it with
+        500."""
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return

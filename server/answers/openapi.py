@@ -99,7 +99,7 @@ ANSWERS: dict[tuple[str, str], dict[int, tuple[str, str]]] = {
     ("get", "/readyz"): {200: (_JSON, "Health"), 503: (_JSON, "Health")},
     ("get", "/metrics"): {200: (_TEXT, "")},
 }
-"""Answer of each route on success: status, media type, and schema if it is JSON of this server."""
+"""Answer of each route on success: status, media type, and the schema of a JSON answer."""
 _OPEN = {"/v1/case.schema.json", "/healthz", "/readyz"}
 _REFUSALS = {
     400: "a parameter is wrong", 401: "no valid token", 403: "the token lacks the scope", 404: "there is none",
@@ -137,7 +137,8 @@ def refusals(method: str, path: str) -> set[int]:
 
 
 def install(app: FastAPI) -> None:
-    """Completes the OpenAPI document of ``app``: schema of a case, schema of each answer, each status, the token."""
+    """Completes the OpenAPI document of ``app``: schema of a case, schema of each answer, each status, and the
+    token."""
     own = app.openapi
 
     @cache
@@ -160,7 +161,7 @@ def install(app: FastAPI) -> None:
 
 
 def _mark_null(properties: dict[str, dict[str, Any]]) -> None:
-    """Marks numbers with default NaN as nullable: JSON has no NaN, an unknown number is null."""
+    """Marks numbers with the default NaN as nullable. JSON has no NaN; an unknown number is null."""
     for schema in properties.values():
         default = schema.get("default")
         if isinstance(default, float) and math.isnan(default):

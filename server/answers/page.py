@@ -40,24 +40,25 @@ TESTED = {
 }
 """Path in the address below the version -> path in the package, and its sha256 in the wheel of ``VERSION`` on PyPI."""
 _FOREVER = "public, max-age=31536000, immutable"
-"""Cached for a year, the longest time of RFC 9111: the version is part of the address."""
+"""Caching header of a file whose address contains its version: the file is cached for a year, the longest time that
+RFC 9111 allows."""
 _WORTH = 1 << 10
-"""Smallest size in bytes of a file that is compressed. Chosen: the size of a packet."""
+"""Smallest size in bytes of a file that is compressed: the size of one packet (chosen value)."""
 _TYPES = {
     ".js": "text/javascript", ".css": "text/css", ".html": "text/html", ".json": "application/json",
     ".svg": "image/svg+xml", ".png": "image/png",
 }  # fmt: skip
 _LEVEL = 6
-"""Level of gzip: 1.1 MB become 0.37 MB in 50 ms, once."""
+"""Compression level of gzip. At this level 1.1 MB are compressed to 0.37 MB in 50 ms, once for each file."""
 
 
 class LibraryError(Exception):
-    """The libraries cannot be served; the text is one line."""
+    """Error: the libraries cannot be served. The text of the error is one line."""
 
 
 @dataclass(frozen=True)
 class Library:
-    """A file with its headers."""
+    """A file of the page with its HTTP headers."""
 
     plain: bytes
 
@@ -125,16 +126,16 @@ def _is_shown(path: Path) -> bool:
 
 
 class _Files:
-    """Serves files from memory by address. Browsers revalidate ``fresh`` files at each request, since the server may
-    be a newer version; the other files never change.
+    """Serves files from memory by address. Browsers revalidate the files in ``fresh`` at each request, since the
+    server may have a newer version; files outside ``fresh`` never change.
     """
 
     def __init__(self, fresh: Mapping[str, Library], lasting: Mapping[str, Library]) -> None:
         self._fresh, self._lasting = fresh, lasting
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Raises HTTPException 405 for other methods and 404 for other addresses: every address without a route
-        arrives here.
+        """Raises HTTPException 405 for other methods and 404 for unknown addresses. Every address without a route is
+        handled here.
         """
         address = scope["path"].removeprefix(scope["root_path"]).removeprefix("/")
         file, lasts = self._fresh.get(address) or self._lasting.get(address), address in self._lasting

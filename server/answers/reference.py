@@ -24,7 +24,8 @@ _TITLES = (
     ("Cases", ("/v1/cases", "/v1/case.schema.json")), ("Runs", ("/v1/runs", "/v1/table")), ("Sweeps", ("/v1/sweeps",)),
     ("Files that cases name", ("/v1/files",)), ("The server", ("/",)),
 )  # fmt: skip
-"""Titles with beginnings of paths: a route stands below the first title with a beginning of its path."""
+"""Title of each section and the beginnings of its paths. A route belongs to the first section with a beginning of
+its path."""
 Operation = dict[str, Any]
 
 

@@ -1,4 +1,5 @@
-"""The report of a run that has ended: made once, by a program with limits, and kept in the run's folder."""
+"""The report of a run that has ended. The report is made once, by a program with limits, and stored in the run's
+folder."""
 
 import logging
 import os
@@ -16,21 +17,22 @@ from ..requests.thread_pool import ThreadPool
 
 _log = logging.getLogger("conoid.server")
 _BOUNDS = Bounds(cpu=300, wall=300, memory=8 << 30, file=64 << 20)
-"""Chosen: the report of a run of 600,000 tets takes 40 s and 2 GB, and is 5 MB."""
+"""Limits of the program that makes a report. The values were chosen because the report of a run of 600,000 tets
+takes 40 s and 2 GB, and has a size of 5 MB."""
 _PATIENCE, _WAITING = 900.0, 8
-"""s that a user waits, behind the reports of others, and reports that may wait. Chosen."""
+"""Longest time in s that a user waits for a report, and largest number of waiting reports (chosen values)."""
 _LEFT = ".*report-*"
-"""What is being made, and what a server that was killed has left."""
+"""Pattern of the names of temporary files of reports in progress. A killed server leaves such files."""
 
 
 def reporters() -> ThreadPool:
-    """One report at a time, of all users."""
+    """Makes reports. One report at a time is made for all users."""
     return ThreadPool(each=1, waiting=_WAITING, patience=_PATIENCE, most=1)
 
 
 def made(path: Path) -> int:
-    """The bytes of the report of the run in ``path``, which is made where there is none. Blocks. Raises ServiceError
-    501 without the packages for drawing, 500 where it cannot be made, 507.
+    """Returns the size in bytes of the report of the run in ``path``; a missing report is made first. Blocks. Raises
+    ServiceError 501 without the packages for drawing, 500 for a report that cannot be made, 507 for a full disk.
     """
     target = path / report.NAME
     try:
@@ -55,7 +57,7 @@ def made(path: Path) -> int:
 
 
 def _make(path: Path, out: Path) -> None:
-    """Raises ServiceError 500."""
+    """Raises ServiceError 500 with the reason."""
     with tempfile.TemporaryDirectory(prefix="conoid-report-") as folder:
         ended = bounded.run(
             report.PROGRAM, _BOUNDS, [str(path), str(out)], folder=Path(folder), LP_NUM_THREADS="1",

@@ -1,6 +1,5 @@
-"""Rows of the table of runs as they are sent.
-
-The values of similar cases are sent once for all their runs; a row has only values that differ from these.
+"""Rows of the table of runs as JSON. The values of similar cases are sent once for all their runs; a row has only
+the values that differ from these common values.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -16,12 +15,13 @@ from conoid.cases.reference.key_units import unit_of_key
 from .card import Card
 
 MOST_BYTES = 4 << 20
-"""Largest size in bytes of the rows and cases of an answer. Chosen: 2,000 runs of a case with fifty results."""
+"""Largest size in bytes of the rows and cases of an answer. The value was chosen because 2,000 runs of a case with
+fifty results fit in it."""
 _ALIKE = 0.8
-"""Smallest share of common keys for which two cases are similar. Chosen."""
+"""Smallest share of common keys for which two cases are similar (chosen value)."""
 _GROUPS = 50
-"""Largest number of groups of similar cases in an answer; a case beyond it has no values. Chosen: 50 cases of 300
-values are 0.6 MB."""
+"""Largest number of groups of similar cases in an answer. Runs of further groups have no values. The value was
+chosen because 50 cases of 300 values are 0.6 MB."""
 
 
 @dataclass
@@ -46,10 +46,10 @@ class Group:
 
 
 class Table:
-    """A table that is filled run by run up to ``MOST_BYTES``."""
+    """A table that is filled run by run up to a size of ``MOST_BYTES``."""
 
     def __init__(self) -> None:
-        """Starts without rows."""
+        """Creates a table without rows."""
         self.groups: list[Group] = []
         self.rows: list[msgspec.Raw] = []
         self.pending = 0
@@ -57,7 +57,7 @@ class Table:
         self._bytes = 0
 
     def add(self, line: dict[str, Any], card: Card | None) -> bool:
-        """Adds the row of a run; ``line`` is its line in a list. Returns False if the answer is full."""
+        """Adds the row of a run. ``line``: line of the run in a list. Returns False if the answer is full."""
         groups = len(self.groups)
         row = msgspec.json.encode({**line, **self._of_card(card)})
         size = len(row) + sum(len(msgspec.json.encode(group.values)) for group in self.groups[groups:])

@@ -1,4 +1,4 @@
-"""A history as it is sent: columns over the reports, reduced to the requested number of points."""
+"""History of a run as an answer: columns over the reports, reduced to the requested number of points."""
 
 import time
 from collections.abc import Sequence
@@ -14,9 +14,10 @@ from .history import History, Sample
 
 T = TypeVar("T")
 _NUMBERS = 100_000
-"""Largest product of ranks, phases and times that are sent. Chosen: a megabyte."""
+"""Largest product of ranks, phases and times in an answer. The value was chosen because so many numbers are a
+megabyte of JSON."""
 _ANSWERS = 4
-"""Number of cached answers of a run, with different numbers of points. Chosen."""
+"""Number of cached answers of a run, with different numbers of points (chosen value)."""
 _progress = msgspec.json.Decoder(Progress)
 _load = msgspec.json.Decoder(Load)
 _counts = msgspec.json.Decoder(Counts)
@@ -24,7 +25,8 @@ _snapshot = msgspec.json.Decoder(Snapshot)
 
 
 def body(history: History, points: int) -> bytes:
-    """Returns the whole answer. For a run that has ended it is made once. The caller holds the lock of the history."""
+    """Returns the whole answer. For a run that has ended the answer is made once and cached. The caller holds the
+    lock of the history."""
     last, known = history.answers.get(points, (-1, b""))
     if last == history.last and history.state.final:
         return known
@@ -66,13 +68,13 @@ class _Report(msgspec.Struct, frozen=True):
 
     @property
     def counted(self) -> Counts | Snapshot | None:
-        """Newest message with numbers of fragments."""
+        """Returns the newest message with numbers of fragments."""
         messages = [message for message in (self.counts, self.snapshot) if message is not None]
         return max(messages, key=lambda message: (_counted(message), message.seq)) if messages else None
 
 
 def _read(sample: Sample) -> _Report | None:
-    """Decodes a report; None if the line of the load is damaged. Other damaged lines are left out."""
+    """Decodes a report; None if its line with the load is damaged. Other damaged lines are omitted."""
     load = _sound(_load, sample.load)
     if load is None:
         return None
@@ -90,7 +92,7 @@ def _sound(decoder: msgspec.json.Decoder[T], line: bytes) -> T | None:
 
 
 def _kept(history: History) -> list[Sample]:
-    """Returns the kept reports and the newest one."""
+    """Returns the kept reports and the newest report."""
     newest = history.newest
     if newest is None or (history.samples and history.samples[-1] is newest):
         return history.samples
@@ -98,7 +100,7 @@ def _kept(history: History) -> list[Sample]:
 
 
 def _spread(items: Sequence[Any], most: int) -> list[Any]:
-    """Returns at most ``most`` evenly spaced items, always with the last one."""
+    """Returns at most ``most`` evenly spaced items; the last item is always one of them."""
     n, most = len(items), max(1, most)
     return list(items) if n <= most else [items[(k + 1) * n // most - 1] for k in range(most)]
 
@@ -144,8 +146,8 @@ def _parts(reports: list[_Report]) -> dict[str, dict[str, list[float | None]]]:
 
 
 def _once(reports: list[_Report]) -> list[_Report]:
-    """Removes repeated times: a run that continued from a checkpoint reports some steps twice, and the later report
-    is kept."""
+    """Removes repeated times. A run that continued from a checkpoint reports some steps twice; the later report is
+    kept."""
     kept: list[_Report] = []
     for report in reversed(reports):
         if not kept or report.load.step < kept[-1].load.step:

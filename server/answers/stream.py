@@ -1,8 +1,8 @@
 """Server-sent events of a run, from its journal.
 
-The stream reads the file, not Zenoh: the file has every line, so a client that connects late, reconnects or reads
-slowly gets each event exactly once and in order. The supervisor checks the file every 20 ms and wakes the streams
-when it has grown; each stream then reads on from its position. Native clients use Zenoh.
+The stream reads the file, not Zenoh, because the file has every line: a client that connects late, reconnects or
+reads slowly gets each event exactly once and in order. The supervisor checks the file every 20 ms and wakes the
+streams when the file has grown; each stream then continues from its position in the file. Native clients use Zenoh.
 """
 
 import time
@@ -25,8 +25,8 @@ def event(line: Line) -> bytes:
 
 
 async def events(service: Service, may: Pass, run_id: str, path: Path, after: int) -> AsyncIterator[bytes]:
-    """Yields every event with ``seq`` above ``after``, including future ones; ends with the run or when ``may``
-    expires."""
+    """Yields every event with ``seq`` above ``after``, including future events. Ends with the run or when the time
+    limit ``may`` expires."""
     tail, silent = Tail(path, after), time.monotonic()
     with service.wakeups.listen(run_id) as listener:
         yield b"retry: 1000\n\n"

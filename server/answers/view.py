@@ -1,4 +1,4 @@
-"""A run as JSON. Times are Unix s unless their name has another unit."""
+"""A run as JSON. A time is Unix s unless its name has another unit."""
 
 import base64
 import hashlib
@@ -19,12 +19,12 @@ from ..service import Service
 from .rows import short
 
 _SHORT = 7
-"""Smallest length of a short id, in characters. Chosen: the length in git."""
+"""Smallest length of a short id, in characters: the length that git uses (chosen value)."""
 
 
 @dataclass(frozen=True)
 class Snapshot:
-    """The JSON of a run at one moment."""
+    """The JSON of a run at one moment, with its ETag."""
 
     state: State
     body: bytes
@@ -53,7 +53,7 @@ def snapshot(service: Service, run: Run) -> Snapshot:
 
 
 def _submission(path: Path) -> folder.Submission | None:
-    """Returns None if the file is missing or damaged: the state of the run does not depend on it."""
+    """Returns None if the file is missing or damaged, because the state of the run does not depend on this file."""
     try:
         return folder.submission(path)
     except (OSError, msgspec.MsgspecError):
@@ -69,7 +69,7 @@ def outcome(path: Path) -> Outcome | None:
 
 
 def brief(service: Service, run: Run, labels: Mapping[str, str] | None = None) -> dict[str, Any]:
-    """Returns a run's line in a list; its labels are read from the folder if they are not given."""
+    """Returns the line of a run in a list. Labels that are not given are read from the run's folder."""
     return {
         "id": run.id,
         "owner": run.owner,
@@ -90,7 +90,7 @@ def brief(service: Service, run: Run, labels: Mapping[str, str] | None = None) -
 
 
 def briefs(service: Service, runs: Sequence[Run]) -> list[dict[str, Any]]:
-    """Returns the lines of a list with the present states; labels are from the database, so no file is read."""
+    """Returns the lines of a list with the present states. Labels are read from the database, so no file is opened."""
     labels = service.store.labels([run.id for run in runs])
     shorts = short_ids(service, runs)
     return [

@@ -10,19 +10,20 @@ import sqlalchemy as sa
 from ..settings import StartError
 
 _BUSY = 2000
-"""ms that SQLite waits for a lock of another process. Chosen: longer than any transaction of this server, shorter
-than the time limit of a request."""
+"""Time in ms for which SQLite waits for a lock of another process (chosen value). It is longer than any transaction
+of this server, and shorter than the time limit of a request."""
 _TABLES = 1 << 16
-"""Bytes of free disk below which SQLite cannot open a database: its log and its shared memory. Measured: 32 KiB."""
+"""Bytes of free disk space below which SQLite cannot open a database, because its log and its shared memory need
+space. Measured: 32 KiB."""
 
 
 class StoreError(StartError):
-    """The database cannot be used; the text is one line."""
+    """Error: the database cannot be used. The text of the error is one line."""
 
 
 def failure(url: str | sa.URL, error: Exception, deed: str = "used") -> StoreError:
-    """The message for a database that failed: its file, or its address without the password, and why ``deed``
-    failed."""
+    """Returns the message for a database that failed: its file, or its address without the password, and the error.
+    ``deed``: the operation that failed."""
     try:
         made = sa.make_url(url)
         sqlite = made.get_backend_name() == "sqlite" and made.database
@@ -43,7 +44,7 @@ def _full(folder: Path) -> bool:
 
 
 def engine_of(url: str | sa.URL) -> sa.Engine:
-    """Opens the database. Raises SQLAlchemyError, ImportError where the driver is not installed."""
+    """Opens the database. Raises SQLAlchemyError, and ImportError if the driver is not installed."""
     made = sa.make_url(url)
     engine = sa.create_engine(made, pool_pre_ping=made.get_backend_name() != "sqlite")
     if engine.dialect.name == "sqlite":
@@ -52,7 +53,8 @@ def engine_of(url: str | sa.URL) -> sa.Engine:
 
 
 def _tune(connection: Any, _record: object) -> None:
-    """Switches SQLite to WAL, so that readers do not wait for a writer, and gives it lower() for all letters."""
+    """Switches SQLite to write-ahead logging (WAL), so that readers do not wait for a writer, and replaces its
+    lower() by a function that converts all letters."""
     for pragma in ("journal_mode=wal", f"busy_timeout={_BUSY}"):
         connection.execute(f"pragma {pragma}").close()
     connection.create_function("lower", 1, _lower, deterministic=True)
@@ -64,7 +66,7 @@ def _lower(text: str | None) -> str | None:
 
 
 def identity_of(engine: sa.Engine) -> tuple[int, int] | None:
-    """Device and inode of the file of an SQLite database; None for other databases and where there is no file."""
+    """Returns device and inode of the file of an SQLite database; None for other databases and for a missing file."""
     place = engine.url.database if engine.dialect.name == "sqlite" else None
     try:
         status = os.stat(place) if place else None

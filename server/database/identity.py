@@ -1,8 +1,8 @@
 """Identity of a server: one folder of runs and one database, each with the name of the other.
 
-A second server on the same database would mark the runs of the first one as lost, and a copy of a folder would stop
-the workers of the original: both are refused. ``adopt`` binds a folder and a database that were moved, or restored
-from a backup.
+Two mistakes are refused. A second server on the same database would mark the runs of the first server as lost. A
+server on a copy of a folder would stop the workers of the original. ``adopt`` binds a folder and a database that
+were moved, or restored from a backup.
 """
 
 import secrets
@@ -19,16 +19,18 @@ from .store import Bond, Store
 
 FILE = "server.identity"
 _MOST = 1 << 16
-"""Bytes of the file that are read. Chosen: it has some hundred."""
+"""Largest number of bytes of the identity file that are read. The value was chosen because the file has some hundred
+bytes."""
 
 
 class IdentityError(SettingsError):
-    """Folder and database do not belong together, or not here; the text is one line."""
+    """Error: folder and database do not belong together, or belong to another place. The text of the error is one
+    line."""
 
 
 @dataclass(frozen=True)
 class Pair:
-    """The identities in folder and database; None where there is none yet."""
+    """The identities in folder and database; None for a new folder or database."""
 
     place: str
     folder: Bond | None
@@ -36,8 +38,8 @@ class Pair:
 
 
 def require(runs: Path, store: Store) -> None:
-    """Binds a new folder and a new database. Raises IdentityError where they do not belong together, OSError,
-    SQLAlchemyError.
+    """Binds a new folder and a new database. Raises IdentityError if folder and database do not belong together,
+    OSError, SQLAlchemyError.
     """
     found = _look(runs, store)
     if why := _wrong(found):
@@ -50,8 +52,8 @@ def require(runs: Path, store: Store) -> None:
 
 
 def adopt(runs: Path, store: Store) -> str:
-    """Binds folder and database to each other here; returns the previous identities in one line. Raises OSError,
-    SQLAlchemyError.
+    """Binds folder and database to each other at their present place. Returns the previous identities in one line.
+    Raises OSError, SQLAlchemyError.
     """
     try:
         found = _look(runs, store)
@@ -65,7 +67,7 @@ def adopt(runs: Path, store: Store) -> str:
 
 
 def _look(runs: Path, store: Store) -> Pair:
-    """Reads the file of the folder. Raises IdentityError where it is damaged."""
+    """Reads the identity file of the folder. Raises IdentityError for a damaged file."""
     place = str(runs.resolve())
     try:
         folder = msgspec.json.decode(whole.read(runs / FILE, _MOST), type=Bond)
@@ -79,7 +81,8 @@ def _look(runs: Path, store: Store) -> Pair:
 
 
 def _wrong(found: Pair) -> str:
-    """Returns the reason for which the two do not belong together; empty if they do, or can be bound."""
+    """Returns the reason for which folder and database do not belong together; empty if they belong together or can
+    be bound."""
     if found.folder is not None and found.folder.place != found.place:
         return f"this folder is a copy of {found.folder.place}, or was moved from there"
     if found.database is None:

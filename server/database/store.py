@@ -1,6 +1,7 @@
-"""The server's tables: runs, labels, idempotency keys, tokens. SQLite by default, PostgreSQL by URL.
+"""The server's tables: runs, labels, idempotency keys, tokens.
 
-Runs, labels and keys are an index over the runs' folders and can be rebuilt from them; tokens live here only.
+The database is SQLite by default, or PostgreSQL by URL. Runs, labels and keys are an index over the runs' folders
+and can be made again from the folders; tokens are stored in the database only.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -22,21 +23,21 @@ from .engine import engine_of, failure, identity_of
 from .tables import BONDS, CARDS, KEYS, LABELS, META, RUNS, TOKENS
 
 _ONLY = 1
-"""Key of the single row of the table of bonds."""
+"""Key of the single row in the table that binds the database to a server."""
 _AT_ONCE = 500
-"""Largest number of ids in one statement. Chosen: older versions of SQLite allow 999."""
+"""Largest number of ids in one SQL statement. The value was chosen because older versions of SQLite allow 999."""
 
 
 @dataclass(frozen=True)
 class Token:
-    """A stored token: never the secret, only its hash."""
+    """A stored token. The secret is never stored, only its hash."""
 
     id: str
     owner: str
     sha256: str
     scopes: frozenset[str]
     created: float
-    """Unix s."""
+    """Time at which the token was made, Unix s."""
 
 
 class Bond(msgspec.Struct, frozen=True):
@@ -48,7 +49,7 @@ class Bond(msgspec.Struct, frozen=True):
 
 @dataclass(frozen=True)
 class KeptCard:
-    """A stored card of a run (card.py); ``final``: it was made after the end of the run."""
+    """A stored card of a run (card.py). ``final``: the card was made after the end of the run."""
 
     run: str
     form: int
@@ -57,16 +58,16 @@ class KeptCard:
 
 
 class Store:
-    """The database. Methods may be called from any thread; each is one transaction, and raises SQLAlchemyError on
-    failure."""
+    """The database. Methods may be called from any thread. Each method is one transaction, and raises
+    SQLAlchemyError on failure."""
 
     def __init__(self, url: str | sa.URL) -> None:
         """Opens the database and creates missing tables. Raises StoreError."""
         try:
             self._engine = engine_of(url)
             self.unlabelled = not sa.inspect(self._engine).has_table(LABELS.name)
-            """True if the labels of all runs must be read from their folders: the database is new, or from an older
-            version."""
+            """True if the labels of all runs must be read from their folders, because the database is new or from an
+            older version."""
             META.create_all(self._engine)
             _complete(self._engine)
             self._file = identity_of(self._engine)
@@ -74,11 +75,12 @@ class Store:
             raise failure(url, error, "opened") from None
 
     def close(self) -> None:
-        """Closes every connection."""
+        """Closes every connection to the database."""
         self._engine.dispose()
 
     def probe(self) -> None:
-        """Checks that the database can be written. Raises SQLAlchemyError if it cannot, or if its file was removed."""
+        """Checks that the database can be written. Raises SQLAlchemyError if a write fails, or if the file of the
+        database was removed."""
         if identity_of(self._engine) != self._file:
             raise SQLAlchemyError("the file of the database has been removed or replaced")
         with self._engine.connect() as connection:
@@ -97,12 +99,13 @@ class Store:
         return None if row is None else Bond(row[0], row[1])
 
     def bind(self, bond: "Bond") -> None:
-        """Stores the first bond. If another server has stored one before, that one stays."""
+        """Stores server and folder in a new database. If another server has stored its own before, nothing is
+        changed."""
         with suppress(sa.exc.IntegrityError), self._engine.begin() as connection:
             connection.execute(sa.insert(BONDS).values(number=_ONLY, server=bond.server, place=bond.place))
 
     def rebind(self, bond: "Bond") -> None:
-        """Replaces the bond."""
+        """Replaces the server and folder of the database."""
         with self._engine.begin() as connection:
             connection.execute(sa.delete(BONDS))
             connection.execute(sa.insert(BONDS).values(number=_ONLY, server=bond.server, place=bond.place))
@@ -110,7 +113,7 @@ class Store:
     # Runs -------------------------------------------------------------------------------------------------------------
 
     def add(self, run: Run, key: str | None, labels: Mapping[str, str] | None = None) -> None:
-        """Adds a run, its labels, and its idempotency key; for a known run changes state and labels."""
+        """Adds a run, its labels, and its idempotency key. For a known run, changes state and labels."""
         known = sa.select(KEYS.c.run).where(KEYS.c.owner == run.owner, KEYS.c.key == key)
         with self._engine.begin() as connection:
             self._put(connection, run)
@@ -163,14 +166,14 @@ class Store:
         return None if row is None else _run(row)
 
     def some(self, run_ids: Sequence[str]) -> dict[str, Run]:
-        """Returns the known ones of these runs, of any owner, by id."""
+        """Returns the known runs among these ids, of any owner, by id."""
         with self._engine.connect() as connection:
             rows = (connection.execute(sa.select(RUNS).where(RUNS.c.id.in_(some))) for some in _parts(run_ids))
             return {row["id"]: _run(row) for found in rows for row in found.mappings()}
 
     def page(self, owner: str, chosen: Chosen, before: str | None, limit: int) -> list[Run]:
-        """Returns at most ``limit`` of the ``chosen`` runs of ``owner``, newest first, older than the run
-        ``before``."""
+        """Returns at most ``limit`` runs of ``owner`` that match the filters ``chosen``, newest first, older than
+        the run ``before``."""
         query = sa.select(RUNS).where(*chosen.where(owner)).order_by(RUNS.c.id.desc()).limit(limit)
         if before is not None:
             query = query.where(RUNS.c.id < before)
@@ -178,8 +181,8 @@ class Store:
             return [_run(row) for row in connection.execute(query).mappings()]
 
     def ids_about(self, owner: str, first: str, last: str) -> list[str]:
-        """Returns the sorted ids of all runs of ``owner`` from ``first`` to ``last``, with one neighbour at each
-        end."""
+        """Returns the sorted ids of all runs of ``owner`` from ``first`` to ``last``, and the next id before and
+        after this range."""
         own = sa.select(RUNS.c.id).where(RUNS.c.owner == owner)
         before = own.where(RUNS.c.id < first).order_by(RUNS.c.id.desc()).limit(1)
         after = own.where(RUNS.c.id > last).order_by(RUNS.c.id).limit(1)
@@ -194,7 +197,7 @@ class Store:
             return [KeptCard(*row) for rows in found for row in rows]
 
     def keep_cards(self, cards: Sequence[KeptCard], titles: Mapping[str, str]) -> None:
-        """Stores cards, in place of earlier ones of the same runs. Runs of an older database get their ``titles``."""
+        """Stores cards and replaces earlier cards of the same runs. Runs of an older database get their ``titles``."""
         with self._engine.begin() as connection:
             for card in cards:
                 connection.execute(sa.delete(CARDS).where(CARDS.c.run == card.run))
@@ -269,7 +272,8 @@ class Store:
 
 
 def _complete(engine: sa.Engine) -> None:
-    """Adds the columns that the table of runs of an older server lacks; existing runs get the default."""
+    """Adds the columns that are missing in the table of runs of an older server; existing runs get the default
+    value."""
     there = {column["name"] for column in sa.inspect(engine).get_columns(RUNS.name)}
     with engine.begin() as connection:
         for column in (each for each in RUNS.columns if each.name not in there):
@@ -278,7 +282,7 @@ def _complete(engine: sa.Engine) -> None:
 
 
 def _parts(items: Sequence[str]) -> Iterator[Sequence[str]]:
-    """Yields as many ids at a time as fit into one statement."""
+    """Yields the ids in groups that fit into one SQL statement."""
     return (items[n : n + _AT_ONCE] for n in range(0, len(items), _AT_ONCE))
 
 

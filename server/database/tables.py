@@ -1,4 +1,4 @@
-"""Tables of the server's database for SQLAlchemy; ``store`` reads and writes them."""
+"""Tables of the server's database for SQLAlchemy. ``store`` reads and writes the tables."""
 
 import sqlalchemy as sa
 
@@ -23,7 +23,7 @@ RUNS = sa.Table(
     sa.Index("runs_of_owner", "owner", "id"),
     sa.Index("runs_by_state", "state"),
 )
-"""Runs: every accepted run, as it was last saved."""
+"""Table of runs: every accepted run, as it was last saved."""
 KEYS = sa.Table(
     "idempotency",
     META,
@@ -32,7 +32,7 @@ KEYS = sa.Table(
     sa.Column("run", sa.String(22), nullable=False),
     sa.UniqueConstraint("owner", "key"),
 )
-"""Idempotency keys: the run of each owner and key."""
+"""Table of idempotency keys: the run of each owner and key."""
 LABELS = sa.Table(
     "labels",
     META,
@@ -43,7 +43,7 @@ LABELS = sa.Table(
     sa.PrimaryKeyConstraint("run", "name"),
     sa.Index("runs_of_label", "owner", "name", "value", "run"),
 )
-"""Labels of runs."""
+"""Table of the labels of runs."""
 CARDS = sa.Table(
     "cards",
     META,
@@ -52,7 +52,7 @@ CARDS = sa.Table(
     sa.Column("final", sa.Boolean, nullable=False),
     sa.Column("body", sa.LargeBinary, nullable=False),
 )
-"""Cards of runs (card.py), which can be made again from the folders."""
+"""Table of the cards of runs (card.py), which can be made again from the folders."""
 BONDS = sa.Table(
     "bond",
     META,
@@ -60,7 +60,7 @@ BONDS = sa.Table(
     sa.Column("server", sa.String(64), nullable=False),
     sa.Column("place", sa.Text, nullable=False),
 )
-"""Bond: server and folder of runs of this database, one row."""
+"""Table with one row: the server and the folder of runs to which this database belongs."""
 TOKENS = sa.Table(
     "tokens",
     META,
@@ -71,4 +71,4 @@ TOKENS = sa.Table(
     sa.Column("created", sa.Float(53), nullable=False),
     sa.Column("revoked", sa.Boolean, nullable=False),
 )
-"""Tokens by hash."""
+"""Table of tokens by hash."""

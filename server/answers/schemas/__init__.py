@@ -1,4 +1,5 @@
-"""Schemas of the JSON answers, one module for each subject. OpenAPI has them, and the routes build such answers."""
+"""Schemas of the JSON answers, one module for each subject. The OpenAPI document contains the schemas, and the
+routes build answers with them."""
 
 from conoid.cases.output.search import Search
 
@@ -16,4 +17,4 @@ ALL = (
     FragmentCourse, History, Me, Health, Wish, SweepPage, Sweep, Search, Reported,
     Report,
 )  # fmt: skip
-"""Schemas of whole answers and of requests."""
+"""Schemas of complete answers and of requests."""

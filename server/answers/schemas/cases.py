@@ -1,4 +1,4 @@
-"""Cases: the check of one, and the shipped ones."""
+"""JSON schemas of cases: the check of a case, and the shipped cases."""
 
 from typing import Any
 

@@ -1,10 +1,10 @@
-"""Files of a run, and files that a user has sent."""
+"""JSON schemas of files: files of a run, and files that a user has uploaded."""
 
 import msgspec
 
 
 class FileEntry(msgspec.Struct, kw_only=True):
-    """A file of a run; ``modified`` in Unix s."""
+    """A file of a run; ``modified`` is the time of its last change, Unix s."""
 
     path: str
     size: int
@@ -19,7 +19,8 @@ class Files(msgspec.Struct, kw_only=True):
 
 
 class SentFile(msgspec.Struct, kw_only=True):
-    """A file that a user has sent: ``offset`` of its ``size`` bytes have arrived. ``asked``: last request, Unix s."""
+    """A file that a user has uploaded: ``offset`` bytes of its ``size`` bytes have arrived. ``asked``: time of the
+    last request for the file, Unix s."""
 
     sha256: str
     size: int
@@ -30,7 +31,7 @@ class SentFile(msgspec.Struct, kw_only=True):
 
 
 class SentFiles(msgspec.Struct, kw_only=True):
-    """All files that a user has sent, and the sum of their sizes in bytes."""
+    """All files that a user has uploaded, and the sum of their sizes in bytes."""
 
     files: list[SentFile]
     bytes: int

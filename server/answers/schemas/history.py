@@ -1,4 +1,4 @@
-"""Events, snapshots and the history of a run."""
+"""JSON schemas of events, snapshots and the history of a run."""
 
 from typing import Any
 
@@ -8,7 +8,7 @@ from conoid.cases.messages import Snapshot
 
 
 class EventPage(msgspec.Struct, kw_only=True):
-    """Lines of the journal, the number of the last one, and whether more lines exist now."""
+    """Lines of the journal, the number of the last line, and whether more lines exist now."""
 
     events: list[dict[str, Any]]
     last: int
@@ -16,7 +16,7 @@ class EventPage(msgspec.Struct, kw_only=True):
 
 
 class Snapshots(msgspec.Struct, kw_only=True):
-    """Messages of the journal about snapshots."""
+    """Messages of the journal about snapshots of the fragments."""
 
     snapshots: list[Snapshot]
 
@@ -44,13 +44,14 @@ class History(msgspec.Struct, kw_only=True):
     parts: dict[str, dict[str, list[float | None]]]
     """Energies of each part in J at the times of the series; empty for a case with one part."""
     sizes: dict[str, Any]
-    """Newest size distribution of the fragments, from messages of counts and snapshots."""
+    """Newest size distribution of the fragments, from the messages of counts and snapshots."""
     ranks: dict[str, Any]
     balance: list[dict[str, Any]]
     snapshots: list[dict[str, Any]]
     log: list[dict[str, Any]]
-    """Messages of the log, of states and of checkpoints; the first and the last ones of a long log."""
+    """Messages of the log, of states and of checkpoints. For a long log only the first and the last messages are
+    here."""
     log_left_out: int
     """Number of messages that ``log`` leaves out."""
     warnings: list[dict[str, Any]]
-    """Warnings and errors of the whole log, each text once."""
+    """Warnings and errors of the whole log; each text occurs once."""

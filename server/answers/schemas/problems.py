@@ -1,4 +1,4 @@
-"""Refusals: one line for people, one word for programs."""
+"""JSON schemas of refused requests: each has one line of text for people and one word for programs."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""Runs: the answer to a submission, lists, and one run."""
+"""JSON schemas of runs: the answer to a submission, lists, and one run."""
 
 import msgspec
 
@@ -10,8 +10,8 @@ from .cases import NamedFile
 
 
 class Receipt(msgspec.Struct, kw_only=True):
-    """Answer to a submission. The estimate has elements, nodes, dt, steps, memory_bytes, core_seconds, and seconds of
-    wall-clock time where known.
+    """Answer to a submission. Its estimate has the fields elements, nodes, dt, steps, memory_bytes, core_seconds,
+    and seconds of wall-clock time where known.
     """
 
     id: str
@@ -24,12 +24,12 @@ class Receipt(msgspec.Struct, kw_only=True):
     submitted: float
     estimate: dict[str, float]
     files: list[NamedFile]
-    """Files that the case names. The run has its own copy of each."""
+    """Files that the case names. The run has its own copy of each file."""
     url: str
 
 
 class RunLine(msgspec.Struct, kw_only=True):
-    """A run in a list. Times are Unix s, null before the event."""
+    """A run in a list. Times are Unix s; a time is null before its event."""
 
     id: str
     owner: str
@@ -65,7 +65,7 @@ class RunStatus(RunLine, kw_only=True):
 
 
 class RunPage(msgspec.Struct, kw_only=True):
-    """Runs, newest first, and the cursor of the next page; null on the last page."""
+    """Runs, newest first, and the cursor of the next page; the cursor is null on the last page."""
 
     runs: list[ListedRun]
     next: str | None

@@ -1,4 +1,4 @@
-"""The user, the server and its health."""
+"""JSON schemas of the user, the server and its health."""
 
 import msgspec
 
@@ -13,7 +13,7 @@ class ZenohAccess(msgspec.Struct, kw_only=True):
 
 
 class Slots(msgspec.Struct, kw_only=True):
-    """Cores for runs of this server, and those in use now."""
+    """Number of cores for runs of this server, and number of cores in use now."""
 
     total: int
     used: int
@@ -32,7 +32,7 @@ class Me(msgspec.Struct, kw_only=True):
 
 
 class Health(msgspec.Struct, kw_only=True):
-    """Status of the server, and of each part that it needs."""
+    """Status of the server, and of each service that the server needs."""
 
     status: str
     checks: dict[str, bool] = {}

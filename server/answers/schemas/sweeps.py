@@ -1,4 +1,4 @@
-"""Sweeps: the request, lists, and one sweep."""
+"""JSON schemas of sweeps: the request, lists, and one sweep."""
 
 from typing import Annotated, Any
 
@@ -9,7 +9,8 @@ from conoid.cases.output.search import Search
 from .runs import ListedRun
 
 MOST_POINTS = 1000
-"""Largest number of points of a sweep. Chosen: the cases of that many points are made in a second."""
+"""Largest number of points of a sweep. The value was chosen because the cases of so many points are made in a
+second."""
 
 
 class Wish(msgspec.Struct, kw_only=True, forbid_unknown_fields=True):
@@ -35,9 +36,9 @@ class SweepLine(msgspec.Struct, kw_only=True):
     removed: int
     url: str
     search: Search | None
-    """Last report of an adaptive sweep."""
+    """Last report of an adaptive sweep, as its client sent it."""
     reported: float | None
-    """Time of this report, Unix s."""
+    """Time of the last report of an adaptive sweep, Unix s."""
 
 
 class Reported(msgspec.Struct, kw_only=True):
@@ -56,7 +57,7 @@ class SweepPage(msgspec.Struct, kw_only=True):
 
 
 class SweepPoint(msgspec.Struct, kw_only=True):
-    """Changed values of a point, and its run."""
+    """Changed values of a point, and the run of the point."""
 
     values: dict[str, Any]
     run: ListedRun

@@ -1,4 +1,4 @@
-"""The table of runs: values of the cases and results."""
+"""JSON schemas of the table of runs: values of the cases and results."""
 
 import msgspec
 
@@ -8,7 +8,8 @@ from .runs import ListedRun
 
 
 class TableRow(ListedRun, kw_only=True):
-    """A run in the table: index of its group of similar cases, values that differ from those of the group, results."""
+    """A run in the table: index of its group of similar cases, case values that differ from those of the group, and
+    results."""
 
     progress: Progress | None
     case: int | None
@@ -36,8 +37,8 @@ class AlikeCases(msgspec.Struct, kw_only=True):
 
 
 class Table(msgspec.Struct, kw_only=True):
-    """Runs, newest first, and the cursor of the next page, null on the last page. The values and results of ``pending``
-    of them have not been read yet.
+    """Runs, newest first, and the cursor of the next page, which is null on the last page. ``pending``: number of
+    runs whose case values and results have not been read yet.
     """
 
     runs: list[TableRow]
