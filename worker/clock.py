@@ -1,18 +1,19 @@
-"""Simulated time and the choice of the time step: stability limit, growth limit, landing on output times."""
+"""Simulated time, and the choice of the time step by the stability limit, the growth limit and the output times."""
 
 import math
 
 COLLAPSE = 1e-6
-"""Share of the first stable step below which the run ends with an error: a tet is crushed. Chosen: a run with a
-million times as many steps would never end."""
+"""Smallest stable step over the first stable step; below it the run ends with an error because a tet is crushed.
+Chosen value: a run with a million times as many steps would never end."""
 
 STARVED = 1e-3
-"""Share of the first stable step below which a warning is given: the rest of the run takes a thousand times as many
-steps. Chosen: dust and penetration reduce it to a hundredth."""
+"""Stable step over the first stable step below which a warning is given. The rest of the run would then take a
+thousand times as many steps. Chosen value: dust and penetration reduce the stable step to a hundredth, which needs
+no warning."""
 
 SLOWED = 0.1
-"""Share of the first stable step below which a message that the limit of time or of steps was reached also names the
-stable step as the reason. Chosen: plastic flow and dust reduce it to a third in any run."""
+"""Stable step over the first stable step below which the stable step is named as the reason why a run has reached
+its limit of time or of steps. Chosen value: plastic flow and dust reduce the stable step to a third in any run."""
 
 
 class Clock:
@@ -26,7 +27,7 @@ class Clock:
         self.last_dt = 0.0
         """Time step from n-1 to n, s."""
         self.mean_dt = 0.0
-        """Mean of the two, s: the kick from v(n-1/2) to v(n+1/2) takes this time."""
+        """Mean of ``dt`` and ``last_dt``, s: duration of the kick from v(n-1/2) to v(n+1/2)."""
         self.shorter = 0.0
         """A quarter of ``last_dt - dt``, s."""
         self._first = 0.0
@@ -37,11 +38,11 @@ class Clock:
         self._growth = growth
         self._frames = frames
         self.frame = 0
-        """Index of the next frame on whose time a step ends."""
+        """Index of the next frame; a step ends exactly at the time of a frame."""
         self._of = -1
-        """Index of the frame whose times ``_landing`` and ``_after`` are."""
+        """Index of the frame to which the times ``_landing`` and ``_after`` belong."""
         self._landing = self._after = 0.0
-        """Times of the next frame and of the one after it, s."""
+        """Time of the next frame, and time of the frame after the next one, s."""
 
     def keep(self) -> dict[str, float]:
         """Returns the whole state, for a checkpoint."""
@@ -57,7 +58,7 @@ class Clock:
         return self.t >= self._end
 
     def frame_time(self, index: int) -> float:
-        """Returns the time of frame ``index``, s; that of the last one is the end of the run."""
+        """Returns the time of frame ``index``, s; the time of the last frame is the end of the run."""
         return self._end * (index / self._frames) if self._frames and index < self._frames else self._end
 
     @property
@@ -72,9 +73,9 @@ class Clock:
         all tets, 1/s; zero when no tet is left.
 
         The interval to the next frame is divided into as few equal steps as are stable: a step that changes little
-        costs little energy, and no step is much shorter than the others. ``growth`` bounds the ratio of two
-        successive stable steps. At the end time, ``dt`` is the step that would follow: the last one, if that is
-        stable.
+        costs little energy, and no step is much shorter than the others. ``growth`` bounds the ratio of two successive
+        stable steps. At the end time, ``dt`` is the step that would come next: equal to the last step if the last step
+        is still stable, else the stable step.
         """
         self.last_dt = self.dt
         self._stable = min(self._safety / limit if limit > 0.0 else math.inf, self._growth * self._stable)
@@ -87,7 +88,7 @@ class Clock:
 
     @property
     def longest(self) -> float:
-        """The largest time step that may follow ``dt``, s."""
+        """Largest time step allowed after ``dt``, s."""
         return self._growth * self.dt
 
     def choose_again(self, limit: float) -> float:
@@ -97,17 +98,17 @@ class Clock:
 
     @property
     def collapsed(self) -> bool:
-        """Whether the stable step is so far below the first one that the run would not end."""
+        """Whether the stable step is so far below the first stable step that the run would never end."""
         return self._stable < COLLAPSE * self._first
 
     @property
     def starved(self) -> bool:
-        """Whether the stable step is so far below the first one that the user is warned."""
+        """Whether the stable step is so far below the first stable step that a warning is given."""
         return self._stable < STARVED * self._first
 
     @property
     def share(self) -> float:
-        """The stable step over the first one."""
+        """Ratio of the present stable step to the first stable step."""
         return self._stable / self._first
 
     @property
@@ -117,7 +118,9 @@ class Clock:
 
     @property
     def stable(self) -> float:
-        """The time step that stability and growth allow, s, before it is shortened to land on an output time."""
+        """Largest time step that stability and growth allow, s; ``choose`` shortens it so that a step ends at the
+        output time.
+        """
         return self._stable
 
     def advance(self) -> None:

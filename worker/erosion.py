@@ -1,11 +1,10 @@
 """Erosion: worn tets are removed, the faces behind them become surface, and the energy and momentum removed are booked.
 
-A tet is marked in the pass over the elements (elements/wear.py), when its force of n+1 is already in the nodal sums.
-It is removed before the contact of the next step, so that the faces behind it are in contact in that step. Its last
-force acts in one more kick: the second half of the work of that force is booked one step later, as for a boundary.
-Tets that exceed only a strain or damage limit are collected for some steps, because each removal requires new mean
-normals. So are nodes without tets that contact has pushed, if their part removes them then (``erosion.nodes =
-"strike"``).
+A tet is marked in the pass over the elements (elements/wear.py), when its force of n+1 is already in the nodal sums. It
+is removed before the contact of the next step, so that the faces behind it are in contact in that step. Its last force
+acts in one more kick: the second half of the work of that force is booked one step later, as for a boundary. Tets that
+exceed only a strain or damage limit are collected for some steps, because each removal requires new mean normals. Nodes
+without tets that contact has pushed are collected too, if their part removes such nodes (``erosion.nodes = "strike"``).
 """
 
 import numpy as np
@@ -27,11 +26,12 @@ from .parallel.ownership import Neighbour, complete
 from .parallel.tags import Tag
 
 GATHERED = 10
-"""Number of steps in which worn tets are collected. Chosen: each removal requires new mean normals and tests of all
-candidate pairs."""
+"""Number of steps for which worn tets are collected before they are removed together. Chosen value: it is above 1
+because each removal requires new mean normals and tests of all candidate pairs."""
 UNDECIDED = 0.25
-"""Share of ``erosion.damage`` from which a warning reports that no tet was removed. Chosen: a punch
-(docs/theory/erosion.md, Erosion) leaves damage of 0.42 in a plate, and with smaller tets cuts a plug out of it."""
+"""Largest damage over ``erosion.damage`` from which a warning reports that no tet was removed. Chosen value: in the
+example of a punch (docs/theory/erosion.md, Erosion) the damage of the plate is 0.42 and no tet is removed; with
+smaller tets the punch cuts a plug out of the plate."""
 
 
 class Erosion:
@@ -51,14 +51,14 @@ class Erosion:
             for kind in ("remove", "strike")
         )
         self.removed = np.zeros(model.nodes.n, bool)
-        """(nodes,) which are removed; they stand still where they were."""
+        """(nodes,) True for removed nodes; the velocity of a removed node is zero."""
         self._tets_at = self._completed([block.tets.astype(np.int64) for block in model.blocks])
         self._leaving: tuple[Ints, Floats] = np.zeros(0, np.int64), np.zeros((0, 3))
         """Nodes that are removed in this step, and their v(n-1/2), m/s."""
         self.account = ErosionAccount(clock, extremes)
         self._limit = 0.0
         self.due = False
-        """Whether the next step starts with a removal."""
+        """Whether tets or nodes are removed at the start of the next step."""
 
     def begin(self, limit: float) -> None:
         """Sets the limits of the stable step, as shares of the first one; ``limit``: the largest
@@ -73,8 +73,8 @@ class Erosion:
     def grow(self, split: Split, ids: Ints) -> None:
         """Extends the arrays by the copies of separated nodes.
 
-        Parts that fracture do not erode (cases/checks/checks.py): no tet of these nodes is removed, so that any count
-        of tets but zero will do for a copy.
+        Parts that fracture do not erode (cases/checks/checks.py): no tet of these nodes is removed. The number of tets
+        of a copy is therefore never used; it only must not be zero.
         """
         parents = split.copies.parents
         self.removed = extended(self.removed, self.removed[parents])
@@ -83,7 +83,7 @@ class Erosion:
         self._tets_at = extended(self._tets_at, np.ones(len(parents), np.int64))
 
     def keep(self, parcel: Parcel) -> None:
-        """Adds the state to a parcel."""
+        """Adds the state to a parcel (a checkpoint or migration message)."""
         nodes, ids = self._model.nodes, parcel.nodes["id"]
         account = self.account
         parcel.known["erosion"] = self._limit, self.due, account.work.scale, account.nodal.scale
@@ -94,7 +94,7 @@ class Erosion:
         account.keep(parcel, nodes.x)
 
     def resume(self, parcel: Parcel) -> None:
-        """Restores the state from a parcel."""
+        """Restores the state from a parcel (a checkpoint or migration message)."""
         limit, self.due, self.account.work.scale, self.account.nodal.scale = parcel.known["erosion"]
         self.begin(limit)
         self.removed, self._tets_at = parcel.nodes["erosion.removed"], parcel.nodes["erosion.tets_at"]
@@ -113,8 +113,8 @@ class Erosion:
         return TIRED if (self._leaves & self._loose).any() else SOUND
 
     def decide(self, found: int) -> None:
-        """Decides whether the next step removes tets or nodes; ``found``: the maximum over all ranks of what was
-        found (elements/wear.py).
+        """Decides whether the next step removes tets or nodes; ``found``: the maximum over all ranks of SOUND, TIRED
+        and BROKEN (elements/wear.py).
         """
         self.due = found == BROKEN or (found > SOUND and self._clock.step % GATHERED == 0)
 
@@ -164,7 +164,9 @@ class Erosion:
         state.v[self.removed] = 0.0
 
     def _remove(self, state: Nodes) -> None:
-        """Removes the marked tets and the nodes that leave with them. Collective."""
+        """Removes the marked tets, and the nodes that leave the model because all of their tets are removed.
+        Collective.
+        """
         gone, left, ids = [np.zeros((0, exposure.WORDS), np.int64)], [], [np.zeros(0, np.int64)]
         for block in self._model.blocks:
             worn = np.flatnonzero(block.worn)

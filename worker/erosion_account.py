@@ -26,7 +26,7 @@ from .parallel.fixed_point import Tally
 
 
 class ErosionAccount:
-    """Sums of a rank over what erosion has removed."""
+    """Sums of a rank over the tets and nodes that erosion has removed."""
 
     def __init__(self, clock: Clock, extremes: tuple[float, float, float]) -> None:
         """``extremes``: largest nodal mass, kg, speed, m/s, and distance from the origin, m, of the scene."""
@@ -34,7 +34,8 @@ class ErosionAccount:
         mass, speed, arm = extremes
         energy, momentum, spin = mass * speed * speed, mass * speed, mass * speed * arm
         self.work = Tally(np.full(len(WORKS) + 1, energy))
-        """Sums of WORKS over the removed tets, J, and the heat of those whose equation of state depends on it."""
+        """Sums of WORKS over the removed tets, J, and the sum of their heat, for tets with an equation of state that
+        depends on heat."""
         self.nodal = Tally(np.array([energy, mass, *[momentum] * 3, *[spin] * 3]))
         """Energy, J, mass, kg, momentum, kg m/s, and angular momentum, kg m^2/s, of the removed nodes."""
         self._half = self.nodal.quanta(np.zeros((0, len(self.nodal.scale))))
@@ -75,7 +76,7 @@ class ErosionAccount:
         state.force[leaving] = 0
 
     def keep(self, parcel: Parcel, x: Floats) -> None:
-        """Adds the account to a parcel; ``x`` (nodes, 3): positions."""
+        """Adds the account to a parcel (a checkpoint or migration message); ``x`` (nodes, 3): positions."""
         for key, words in (("work", self.work.words), ("nodal", self.nodal.words), ("half", self._half)):
             parcel.sums[f"erosion.{key}"] = words
         ids = parcel.nodes["id"]
@@ -84,7 +85,7 @@ class ErosionAccount:
         parcel.rows["erosion.last"] = {"at": x[tets].mean(axis=1), "with": ids[tets], "force": forces}
 
     def resume(self, parcel: Parcel) -> None:
-        """Restores the account from a parcel, except the scales of the sums."""
+        """Restores the account from a parcel (a checkpoint or migration message), except the scales of the sums."""
         self.work.words, self.nodal.words, self._half = (
             parcel.sums[f"erosion.{key}"].copy() for key in ("work", "nodal", "half")
         )
@@ -93,7 +94,7 @@ class ErosionAccount:
 
 
 def _rows(block: Block, chosen: Ints, rows: "np.ndarray") -> Floats:
-    """(len(chosen), len(rows)) values of some state rows of some tets."""
+    """Returns the values of the state rows ``rows`` of the tets ``chosen``, (len(chosen), len(rows))."""
     return np.asarray(block.state[(chosen // CHUNK)[:, None], rows, (chosen % CHUNK)[:, None]])
 
 

@@ -20,7 +20,7 @@ from conoid.cases.run import Cause, ExitCode, State
 
 
 class ConoidError(problems.ConoidError):
-    """Base of the tree; a user of Conoid catches problems.ConoidError (client/errors.py)."""
+    """Base class of the errors of the worker; a user of Conoid catches problems.ConoidError (client/errors.py)."""
 
     exit_code: ClassVar[int] = ExitCode.CRASHED
     cause: ClassVar[Cause] = Cause.SERVICE

@@ -1,4 +1,4 @@
-"""Kick and move of the nodes. Velocities and positions are incremented in place, never computed anew."""
+"""Kick and move of the nodes. Velocities and positions are incremented in place."""
 
 from .kernels.jit import njit, types
 from .model.state import Nodes
@@ -45,13 +45,13 @@ class Leapfrog:
 
     def kick(self, nodes: Nodes, impulse_quantum: float, shorter: float) -> None:
         """Computes v*(n+1/2) from v(n-1/2) and f(n). ``impulse_quantum``: mean of the two time steps over the force
-        scale, N s. ``shorter``: (dt(n-1/2) - dt(n+1/2)) / 4 over the force scale; the account ``stepping``, J, takes
-        the work of f(n) by unequal steps, here its first part.
+        scale, N s. ``shorter``: (dt(n-1/2) - dt(n+1/2)) / 4 over the force scale; the account ``stepping``, J, gets the
+        work of f(n) that results from unequal steps; this function adds the first part of that work.
         """
         self._kick.run(nodes.n, nodes.v, nodes.force, nodes.mass, nodes.stepping, impulse_quantum, shorter)
 
     def move(self, nodes: Nodes, dt: float, shorter: float) -> None:
-        """Computes x(n+1) from x(n) with the time step ``dt``, s; adds the second part to ``stepping``, with the
-        same f(n), then sets the forces to zero.
+        """Computes x(n+1) from x(n) with the time step ``dt``, s; adds the second part of the work of f(n) by unequal
+        steps to ``stepping``, then sets the forces to zero.
         """
         self._move.run(nodes.n, nodes.x, nodes.v, nodes.force, nodes.stepping, dt, shorter)

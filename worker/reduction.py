@@ -1,9 +1,9 @@
-"""The reduction of the step (Allreduce): after it all ranks have the same limits and flags, and decide alike.
+"""The reduction of the step (Allreduce): all ranks then have the same limits and flags, and make the same decisions.
 
-A maximum of int64 words over all ranks, one word a field: an integer, a flag (0 or 1), or the bits of a float64 that
-is not negative. Such bits have the order of the floats, and a NaN is larger than any number, so that the maximum of
-words is right for every field. If parts fracture, one word for each rank follows. If there is contact, a sum of six
-words is reduced at the same time. A single rank sends and encodes nothing.
+It is a maximum of int64 words over all ranks. Each field is one word: an integer, a flag (0 or 1), or the bits of a
+float64 that is not negative. Such bits have the order of the floats, and a NaN is larger than any number, so the
+maximum of the words is the maximum of the values for every field. If parts fracture, there is one more word for each
+rank. If there is contact, a sum of six words is reduced at the same time. A run with a single rank sends no message.
 """
 
 import struct
@@ -16,32 +16,34 @@ from .model.state import Ints
 from .parallel.comm import Comm, Pending
 
 _COSTS, _UNSETTLED = 4, 2
-"""Words of the sum: energies that contact took (4), and residuals of its sweeps (2)."""
+"""Number of words in the sum: 4 for the energies that contact took from the bodies, 2 for the residuals of the
+contact sweeps."""
 
 
 class Fields:
     """The fields of the reduction."""
 
     def __init__(self) -> None:
-        """All fields at zero: no limit, no request."""
+        """Sets all fields to zero: no limit and no request."""
         self.limit = 0.0
         """Largest one-over-stable-step of all tets, 1/s; NaN when some tet is inverted or not a number."""
         self.force = 0.0
         """Largest contribution to a nodal force, N."""
         self.stop = 0
-        """Reason to stop, 0 for none (worker/run/stops.py): the largest decides."""
+        """Number of the reason to stop the run, 0 for none (worker/run/stops.py); of several reasons the largest
+        number is used."""
         self.report = False
         """Rank 0 requests the loads of all ranks."""
         self.groups = False
-        """Rank 0 requests the loads of groups as well."""
+        """Rank 0 also requests the loads of groups."""
         self.approach = 0.0
-        """One over the time in which a node passes half of a tet that it hits, 1/s; the largest."""
+        """Largest value of one over the time in which a node passes half of the tet that it hits, 1/s."""
         self.opening = False
         """A crack has opened so wide that its two sides become surface."""
         self.stray = False
-        """A slot of contact will have moved beyond its skin in the next step, and must be registered again."""
+        """A contact node (slot) will leave its skin in the next step, so its candidate pairs must be searched again."""
         self.search = False
-        """The surface of a rank has moved further than the last broad phase allows."""
+        """The surface of a rank has moved further than the last broad phase allows, so a new broad phase is needed."""
         self.worn = 0
         """State of the worn tets of a rank: SOUND, TIRED or BROKEN (elements/wear.py)."""
         self.breaking = 0
@@ -55,8 +57,8 @@ class Fields:
         self.apart = False
         """A bond of a tied node has failed (bonds/stage.py)."""
         self.nodes = 0
-        """Number of nodes of all ranks. A rank without a node of what separated in the last step receives the new
-        number here."""
+        """Number of nodes of all ranks. After node separation, ranks that have none of the separated nodes receive
+        the new number in this field."""
 
     def pack(self, words: Ints) -> None:
         """Encodes the fields in the first ``words``."""
@@ -98,12 +100,12 @@ class StepReduction(Fields):
         self._alone, self._contact = ranks == 1, contact
         self._given, self._agreed = (np.zeros(len(NAMES) + ranks * fractures, np.int64) for _ in range(2))
         self.touched: Ints = self.own.touched if self._alone else self._agreed[len(NAMES) :]
-        """(ranks,) the maximum over the contributions."""
+        """(ranks,) maximum over the contributions of all ranks."""
         self._sums: Ints = np.zeros(_COSTS + _UNSETTLED, np.int64)
         self.costs: Ints = self._sums[:_COSTS]
-        """(4,) sum over all ranks."""
+        """(4,) sum over all ranks of the energies that contact took from the bodies."""
         self.unsettled: Ints = self._sums[_COSTS:]
-        """(2,) sum over all ranks."""
+        """(2,) sum over all ranks of the residuals of the contact sweeps."""
         self._pending: list[Pending] = []
 
     def keep(self) -> Ints:
@@ -131,7 +133,7 @@ class StepReduction(Fields):
         return self
 
     def finish(self) -> None:
-        """Waits until the fields are those of all ranks."""
+        """Waits until the reduction of the fields over all ranks is complete."""
         if self._alone:
             return
         for pending in self._pending:
@@ -139,8 +141,8 @@ class StepReduction(Fields):
         self.unpack(self._agreed)
 
     def begin_again(self) -> None:
-        """Clears the requests that are executed once: a run that resumes from a checkpoint does not stop or report
-        again, and starts with a broad phase.
+        """Clears the requests that were executed before the checkpoint: a resumed run does not repeat a stop or a
+        report. Requests a broad phase, with which a resumed run starts.
         """
         self.stop = 0
         self.report = self.groups = self.stray = self.grown = self.checkpoint = self.snapshot = self.apart = False

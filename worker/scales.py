@@ -1,4 +1,4 @@
-"""Orders of magnitude of a model, which set the quanta of integer sums."""
+"""Orders of magnitude of a model; the quanta of integer sums are computed from these."""
 
 import math
 
@@ -11,7 +11,8 @@ from .model.state import Model
 from .parallel.comm import Comm
 
 _SMALLEST_STRAIN = 1e-12
-"""Strain whose forces the force quantum must still resolve. Chosen: its stress in steel is 0.2 Pa."""
+"""Smallest strain whose nodal forces the force quantum must resolve. Chosen value: in steel, the stress at this
+strain is 0.2 Pa."""
 
 
 def extremes(model: Model, comm: Comm) -> tuple[float, float, float]:
@@ -28,7 +29,8 @@ def extremes(model: Model, comm: Comm) -> tuple[float, float, float]:
 
 
 def force_floor(model: Model, comm: Comm) -> float:
-    """Returns the force, N, down to which the force quantum is refined: that of _SMALLEST_STRAIN on the largest tet.
+    """Returns the force, N, down to which the force quantum is refined: the nodal force of the largest tet at
+    _SMALLEST_STRAIN.
 
     Collective.
     """

@@ -50,13 +50,13 @@ from .scene.assembly import Say, quiet
 
 
 class Stage(Protocol):
-    """A part of the simulation with state by node, by tet or in rows of its own."""
+    """Interface of a stage of the simulation that has state by node, by tet or in its own rows."""
 
     def keep(self, parcel: Parcel) -> None:
-        """Adds its state to a parcel."""
+        """Adds the state of the stage to a parcel (a checkpoint or migration message)."""
 
     def resume(self, parcel: Parcel) -> None:
-        """Restores its state from a parcel."""
+        """Restores the state of the stage from a parcel (a checkpoint or migration message)."""
 
 
 @dataclass
@@ -69,7 +69,7 @@ class Simulation:
     elements: Elements
     leapfrog: Leapfrog
     boundaries: list[Boundary]
-    """In the order in which they act in a step."""
+    """Boundaries, in the order in which they act in a step."""
     contact: Contact | None
     bonds: Bonds | None
     """Tied bonds between non-matching meshes."""
@@ -88,10 +88,10 @@ class Simulation:
     assembled: float
     """CPU time for building the stages on the slowest rank, s."""
     floor: float
-    """Force, N, down to which the force quantum is refined; smaller forces do not refine it."""
+    """Force, N, down to which the force quantum is refined; it is not refined further if all forces are smaller."""
     reduction: StepReduction
     warnings: tuple[str, ...] = ()
-    """Warnings about the meshes, of a run that starts."""
+    """Warnings about the meshes; only in a run that starts, not in one that resumes."""
     _acts: Acts | None = None
 
     @property
@@ -112,7 +112,7 @@ class Simulation:
 
     @property
     def limit(self) -> float:
-        """Largest one-over-stable-step of tets and contact, 1/s."""
+        """Largest inverse of the stable step of tets and contact, 1/s."""
         return max(self.reduction.limit, self.contact.limit) if self.contact is not None else self.reduction.limit
 
     @property
@@ -122,17 +122,17 @@ class Simulation:
 
     @property
     def stages(self) -> list[Stage]:
-        """The stages with state of their own, in the order in which it is restored."""
+        """The stages that have state, in the order in which their state is restored."""
         found = self.erosion, self.contact, self.bonds, self.elements, self.fracture, self.record
         return [each for each in found if each is not None]
 
     def limiting_id(self) -> int:
-        """Returns the id of the tet that limits the time step; of several the smallest. Collective."""
+        """Returns the id of the tet that limits the time step; of several such tets the smallest id. Collective."""
         mine = self.elements.limit_bits == fixed_point.bits_of(self.reduction.limit)
         return -int(self.comm.maximum(np.array([-float(self.elements.limiting) if mine else -np.inf]))[0])
 
     def limiting_tet(self) -> str:
-        """Returns the name of that tet, or "a rigid part". Collective."""
+        """Returns the name of the tet that limits the time step, or "a rigid part". Collective."""
         if self.rigid is not None and self.reduction.limit == self.rigid.limit:
             return "a rigid part"
         first = self.limiting_id()
@@ -164,7 +164,7 @@ class Simulation:
         self.model.nodes_global = int(most[0])
 
     def free(self) -> None:
-        """Frees all persistent messages."""
+        """Frees all persistent MPI messages."""
         for each in (self.elements, self.fracture, self.contact, *self.boundaries, self.bonds):
             if each is not None:
                 each.free()
@@ -200,8 +200,8 @@ def _assemble(
     undeformed: tuple[Rigid | None, Walls], node_volume: Floats, comm: Comm, timers: Timers,
     tied: Pieces,
 ) -> Simulation:  # fmt: skip
-    """Builds the stages that the case needs, for a model and its boundaries. ``node_volume`` (nodes,): at the start,
-    m^3; ``tied``: pieces of the bonds, of a run that starts.
+    """Builds the stages that the case needs, for a model and its boundaries. ``node_volume`` (nodes,): nodal volumes at
+    the start, m^3; ``tied``: pieces of the bonds, only for a run that starts.
     """
     began, run, numerics, (rigid, moving) = worked(comm), case.run, case.numerics, undeformed
     threads = team(run.threads)

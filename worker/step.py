@@ -1,7 +1,8 @@
-"""The time step, in order. A new developer reads this file first.
+"""The time step, in order.
 
 Leapfrog: positions, stresses and forces are known at n, velocities at n-1/2. One pass over the elements computes
-stress(n+1) and from it f(n+1); so f(n) is already known when a step begins:
+stress(n+1) and from it f(n+1), so f(n) is already known when a step begins. Each row of the table is a part of the
+step:
 
 ==  =====================================================  ==========================
  1  choose dt (in the first step again, after 4)           from the limits at n
@@ -21,10 +22,11 @@ stress(n+1) and from it f(n+1); so f(n) is already known when a step begins:
 15  break facets, separate nodes                           topology(n+1), f(n+1)
 ==  =====================================================  ==========================
 
-``first_half`` is 1 to 9, ``second_half`` is 11 to 15; the loop (run/loop.py) writes the output of 10 between them.
-After the last step, 1 to 10 are done once more, and ``end`` sets the velocities to those at n.
+``first_half`` executes rows 1 to 9, ``second_half`` rows 11 to 15; the loop (run/loop.py) writes the output of row 10
+between the halves. After the last step, rows 1 to 10 are executed once more, and ``end`` sets the velocities to those
+at n.
 
-- Rigid bodies (rigid/stage.py) and moving walls act in 2, 6, 8, 9 and 11 only.
+- Rigid bodies (rigid/stage.py) and moving walls act in rows 2, 6, 8, 9 and 11 only.
 - Surface that erosion exposes in 3 is in contact from 4 of the same step on.
 - 12 and 13 are one pass over each chunk of tets; the averaged pressure forms need two, with the exchange of the nodal
   volume sums between them.
@@ -47,7 +49,7 @@ from .simulation import Simulation
 
 
 def prepare(sim: Simulation) -> None:
-    """Computes forces and limits of the initial state: a pass over the elements with dt = 0."""
+    """Computes forces and limits of the initial state by a pass over the elements with dt = 0."""
     sim.model.nodes.force[:] = 0
     _elements(sim, 0.0, None)
     if sim.erosion is not None:
@@ -56,24 +58,26 @@ def prepare(sim: Simulation) -> None:
 
 
 def first_half(sim: Simulation) -> None:
-    """1 to 9: from f(n) to v(n+1/2). Raises PhysicsError where the stable step has collapsed."""
+    """Executes rows 1 to 9 of the table: computes v(n+1/2) from f(n). Raises PhysicsError if the stable step has
+    collapsed.
+    """
     nodes, clock = sim.model.nodes, sim.clock
     sim.timers.switch("nodes")
-    mean_dt = clock.choose(sim.limit)  # 1: dt between n and n+1
+    mean_dt = clock.choose(sim.limit)  # Row 1: choose dt between n and n+1.
     if clock.collapsed:
         raise PhysicsError(
             f"{_when(sim)}: {sim.limiting_tet()} is crushed; the stable step is {clock.stable:.3g} s. Where its "
             "part erodes (parts[].erosion) such a tet is removed"
         )
     acts = sim.acts
-    _before_kick(sim, acts)  # 2 to 4
+    _before_kick(sim, acts)  # Rows 2 to 4: work of the last impulses, erosion, broad phase.
     if sim.contact is not None and clock.step == 0 and sim.contact.look_ahead(nodes):
-        mean_dt = clock.choose_again(sim.limit)  # 1 again: now with the limit of contact
+        mean_dt = clock.choose_again(sim.limit)  # Row 1 again: choose dt with the limit of contact.
     if sim.fracture is not None:
-        sim.fracture.unload()  # 5: unload cohesive facets that would release more than they absorbed
-    # 5: v*(n+1/2) = v(n-1/2) + (dt(n-1/2) + dt(n+1/2)) / 2 f(n) / m
+        sim.fracture.unload()  # Row 5: unload cohesive facets that would release more energy than they absorbed.
+    # Row 5: v*(n+1/2) = v(n-1/2) + (dt(n-1/2) + dt(n+1/2)) / 2 f(n) / m
     sim.leapfrog.kick(nodes, mean_dt / nodes.scale, clock.shorter / nodes.scale)
-    _after_kick(sim, acts)  # 6 to 9: v(n+1/2)
+    _after_kick(sim, acts)  # Rows 6 to 9: compute v(n+1/2).
 
 
 def end(sim: Simulation, before: Floats) -> None:
@@ -97,10 +101,10 @@ def between(sim: Simulation, before: Floats) -> Floats:
 
 
 def _before_kick(sim: Simulation, acts: Acts) -> None:
-    """2 to 4, with v(n-1/2)."""
+    """Executes rows 2 to 4 of the table, with v(n-1/2)."""
     nodes, erosion, contact, bonds = sim.model.nodes, sim.erosion, sim.contact, sim.bonds
     for boundary in acts.noting:
-        boundary.note(nodes)  # 2: half of the last impulse times v(n-1/2)
+        boundary.note(nodes)  # Row 2: book half of the last impulse times v(n-1/2).
     if erosion is not None:
         erosion.note(nodes)
     if contact is not None:
@@ -110,53 +114,53 @@ def _before_kick(sim: Simulation, acts: Acts) -> None:
     sim.walls.note()
     if erosion is not None:
         removes = erosion.due
-        erosion.remove(nodes)  # 3: faces behind the removed tets become surface
+        erosion.remove(nodes)  # Row 3: faces of the neighbours of removed tets become surface.
         if bonds is not None and removes:
             bonds.follow()
     if bonds is not None:
-        bonds.note(nodes)  # 2: after 3, for the nodes that are still tied
+        bonds.note(nodes)  # Row 2 of the tied bonds, after row 3: only for the nodes that are still tied.
     if contact is not None:
-        contact.search_if_due(nodes)  # 4: candidate pairs of the present surface
+        contact.search_if_due(nodes)  # Row 4: update the candidate pairs of the present surface.
 
 
 def _after_kick(sim: Simulation, acts: Acts) -> None:
-    """6 to 9: from v*(n+1/2) to v(n+1/2)."""
+    """Executes rows 6 to 9 of the table: computes v(n+1/2) from v*(n+1/2)."""
     nodes, dt, t = sim.model.nodes, sim.clock.dt, sim.clock.t
     for boundary in acts.before_contact:
-        boundary.apply(nodes, dt, t)  # 6
+        boundary.apply(nodes, dt, t)  # Row 6: gravity, tractions, symmetry, prescribed motion.
     sim.walls.kick(dt, t)
     if sim.rigid is not None:
         sim.rigid.kick(nodes, dt, t)
     if sim.erosion is not None:
-        sim.erosion.stop_removed(nodes)  # 7
+        sim.erosion.stop_removed(nodes)  # Row 7: stop removed nodes.
     if sim.bonds is not None:
-        sim.bonds.predict(nodes)  # 8: bonds first, with the impulses of the last step: warm start for contact
+        sim.bonds.predict(nodes)  # Row 8: last impulses of tied bonds, as a warm start.
     if sim.contact is not None:
-        sim.contact.solve(nodes, dt, t)  # 8
+        sim.contact.solve(nodes, dt, t)  # Row 8: impulses of active contacts.
     if sim.bonds is not None:
-        sim.bonds.solve(nodes, touched=sim.contact is not None)  # 8
+        sim.bonds.solve(nodes, touched=sim.contact is not None)  # Row 8: impulses of tied bonds.
     for boundary in acts.after_contact:
-        boundary.apply(nodes, dt, t)  # 9
+        boundary.apply(nodes, dt, t)  # Row 9: walls and mirror images.
     if sim.rigid is not None:
         sim.rigid.settle(nodes, t)
 
 
 def second_half(sim: Simulation) -> None:
-    """11 to 15: from v(n+1/2) to f(n+1). Raises PhysicsError where a tet has failed."""
+    """Executes rows 11 to 15 of the table: computes f(n+1) from v(n+1/2). Raises PhysicsError if a tet has failed."""
     nodes, clock = sim.model.nodes, sim.clock
-    # 11: x(n+1) = x(n) + dt v(n+1/2)
+    # Row 11: x(n+1) = x(n) + dt v(n+1/2)
     sim.leapfrog.move(nodes, clock.dt, clock.shorter / nodes.scale)
     for boundary in sim.acts.moving:
-        boundary.after_move(nodes)  # 11: debris that passed a symmetry plane is reflected
+        boundary.after_move(nodes)  # Row 11: reflect debris that passed a symmetry plane.
     sim.walls.move(clock.dt)
     if sim.rigid is not None:
         sim.rigid.move(nodes, clock.dt)
     clock.advance()
     _offer_contact(sim)
-    _elements(sim, clock.dt, sim.fracture)  # 12 to 14
+    _elements(sim, clock.dt, sim.fracture)  # Rows 12 to 14: elements, shared nodes, reduction.
     if sim.fracture is not None and sim.reduction.breaking != NOTHING:
         sim.timers.switch("fracture")
-        # 15: facets break, nodes separate; forces f(n+1) of their tets are moved to the new nodes
+        # Row 15: facets break, nodes separate; the forces f(n+1) of tets of a new node are moved to the new node.
         sim.fracture.advance(sim.reduction.breaking, sim.reduction.touched)
         if sim.bonds is not None and sim.reduction.breaking == BREAKS:
             sim.bonds.follow()
@@ -164,16 +168,18 @@ def second_half(sim: Simulation) -> None:
 
 
 def _elements(sim: Simulation, dt: float, fracture: Fracture | None) -> None:
-    """12 to 14. ``fracture``: None in the pass over the initial state, where no facet breaks."""
+    """Executes rows 12 to 14 of the table. ``fracture``: None in the pass over the initial state, where no facet
+    breaks.
+    """
     elements, reduction = sim.elements, sim.reduction
     sim.scale = sim.next_scale()
     sim.timers.switch("elements")
-    elements.advance(dt, sim.scale)  # 12, 13
+    elements.advance(dt, sim.scale)  # Rows 12 and 13: stress, forces, limits.
     if sim.crushing is not None:
         sim.crushing.update()
     sim.timers.switch("exchange")
     _offer(sim, fracture)
-    reduction.begin(sim.comm)  # 14
+    reduction.begin(sim.comm)  # Row 14: start the reduction.
     if fracture is None:
         elements.finish()
     reduction.finish()
@@ -183,7 +189,7 @@ def _elements(sim: Simulation, dt: float, fracture: Fracture | None) -> None:
 
 
 def _offer_contact(sim: Simulation) -> None:
-    """14: what contact contributes on this rank to the reduction, at the positions of n+1."""
+    """Row 14 of the table: sets the contribution of contact on this rank to the reduction, at the positions of n+1."""
     contact, own = sim.contact, sim.reduction.own
     if contact is None:
         return
@@ -193,8 +199,8 @@ def _offer_contact(sim: Simulation) -> None:
 
 
 def _offer(sim: Simulation, fracture: Fracture | None) -> None:
-    """14: what the other stages contribute on this rank to the reduction; with fracture, shared nodes are completed
-    first, and the facets that break are found.
+    """Row 14 of the table: sets the contribution of the other stages on this rank to the reduction. With fracture, the
+    forces of shared nodes are completed first, and the facets that break are found.
     """
     elements, own = sim.elements, sim.reduction.own
     own.breaking = OVERSTRESSED if elements.hot else NOTHING
@@ -213,8 +219,8 @@ def _offer(sim: Simulation, fracture: Fracture | None) -> None:
 
 
 def _follow_reduction(sim: Simulation) -> None:
-    """14: acts on the result of the reduction, alike on all ranks. Raises PhysicsError where a limit or a force is not
-    a finite number.
+    """Row 14 of the table: applies the result of the reduction, equal on all ranks. Raises PhysicsError if a limit or a
+    force is not a finite number.
     """
     reduction = sim.reduction
     sim.model.nodes_global = reduction.nodes
@@ -229,8 +235,8 @@ def _follow_reduction(sim: Simulation) -> None:
 
 
 def _sum_again(sim: Simulation) -> None:
-    """13 and 14: repeats the sum of the forces in a coarser quantum, when the largest force has outgrown the present
-    one.
+    """Rows 13 and 14 of the table: repeats the sum of the forces in a coarser quantum, if the largest force is too
+    large for the present quantum.
     """
     sim.scale = fixed_point.scale_for(sim.reduction.force)
     sim.timers.switch("elements")

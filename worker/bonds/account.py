@@ -1,4 +1,6 @@
-"""Energy account of the tied bonds: halves of the work of each impulse, with the velocities before and after it."""
+"""Energy account of the tied bonds: half of the work of each impulse is booked with the velocity before the impulse,
+half with the velocity after it.
+"""
 
 import numpy as np
 
@@ -16,11 +18,12 @@ class BondAccount:
         self.loss, self.external = np.zeros((2, nodes))
         """(nodes,) energy dissipated by the bonds, and work from outside by prescribed velocities against them, J."""
         self.mobility: Floats = np.zeros((0, 3))
-        """(nodes, 3) 1/kg, as the sweeps use it; 0 where a velocity is prescribed."""
+        """(nodes, 3) inverse mass by component, 1/kg, as the sweeps use it; 0 for a component with prescribed
+        velocity."""
         self._local: Indices = np.zeros(0, np.int32)
-        """(h,) nodes of the last impulses."""
+        """(h,) nodes on which the last impulses act."""
         self._total, self._before = np.zeros((0, 3), np.int64), np.zeros((0, 3))
-        """(h, 3) impulses, quanta, and v(n-1/2), m/s."""
+        """(h, 3) last impulses, quanta, and v(n-1/2) of their nodes, m/s."""
 
     def note(self, v: Floats, local: Indices) -> None:
         """Before the kick: books the second half of the last impulses; stores v(n-1/2) of the nodes ``local``."""
@@ -39,13 +42,13 @@ class BondAccount:
         self.loss, self.external = extended(self.loss, more), extended(self.external, more)
 
     def keep(self, parcel: Parcel) -> None:
-        """Adds the account to a parcel."""
+        """Adds the account to a parcel (a checkpoint or migration message)."""
         impulse = np.zeros((len(self.loss), 3), np.int64)
         impulse[self._local] = self._total
         parcel.nodes |= {"bonds.loss": self.loss, "bonds.external": self.external, "bonds.impulse": impulse}
 
     def resume(self, parcel: Parcel, scale: float) -> None:
-        """Restores the account from a parcel."""
+        """Restores the account from a parcel (a checkpoint or migration message)."""
         self.scale = scale
         self.loss, self.external = (np.array(parcel.nodes[f"bonds.{name}"]) for name in ("loss", "external"))
         impulse = parcel.nodes["bonds.impulse"]

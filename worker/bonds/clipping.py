@@ -22,9 +22,10 @@ import numpy as np
 from ..kernels.jit import njit, types
 
 _MOST = 9
-"""Room for the corners of a triangle cut by three lines, at most six."""
+"""Length of arrays of polygon corners; a triangle cut by three lines has at most six corners."""
 OPPOSED = -0.5
-"""Largest cosine between the normals of two faces that are bonded: 60 degrees from opposed. Chosen."""
+"""Largest cosine between the normals of two faces that may be bonded; the angle to exactly opposed normals is then
+at most 60 degrees. Chosen value."""
 _F1, _F2, _F3, _N2, _I = (
     types.float64[::1], types.float64[:, ::1], types.float64[:, :, ::1], types.int32[:, ::1], types.int64,
 )  # fmt: skip
@@ -126,7 +127,7 @@ def common(area, far, own, both, corner, x, slaves, masters, pairs):  # type: ig
         for i in range(3):
             for j in range(3):
                 own[p, i, j], both[p, i, j], corner[p, i, j] = 0.0, 0.0, -1.0
-        # 1.
+        # 1. Compute the frames of both faces.
         if not (_frame(frame, x, s) and _frame(other, x, m)):
             continue
         facing = 0.0
@@ -134,17 +135,17 @@ def common(area, far, own, both, corner, x, slaves, masters, pairs):  # type: ig
             facing += frame[2, i] * other[2, i]
         if not facing <= OPPOSED:
             continue
-        # 2.
+        # 2. Transform both faces to the frame of the tied face.
         _project(slave, frame, x, s, s[0])
         _project(flat, frame, x, m, s[0])
-        # 3.
+        # 3. Compute the common polygon.
         for k in range(3):
             polygon[k, 0], polygon[k, 1] = slave[k, 0], slave[k, 1]
             _shares(theirs, flat, slave[k, 0], slave[k, 1])
             for j in range(3):
                 corner[p, k, j] = theirs[j]
         n = _cut(polygon, room, 3, flat)
-        # 4.
+        # 4. Integrate over the triangles of the polygon.
         for k in range(1, n - 1):
             e, f = polygon[k, 0] - polygon[0, 0], polygon[k, 1] - polygon[0, 1]
             g, h = polygon[k + 1, 0] - polygon[0, 0], polygon[k + 1, 1] - polygon[0, 1]

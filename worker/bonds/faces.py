@@ -1,4 +1,4 @@
-"""Present corners of the faces of a bonded interface."""
+"""Corner nodes, after all separations so far, of the faces of a bonded interface."""
 
 import numpy as np
 
@@ -15,7 +15,7 @@ class Faces:
         """``names``: ascending, the same on all ranks."""
         self.names, self._model = names, model
         self.corners: Ints = np.full((len(names), 3), -1)
-        """(f, 3) global ids of the corners, -1 for removed faces; of the last ``follow``, on all ranks."""
+        """(f, 3) global ids of the corners at the last ``follow``, equal on all ranks; -1 for removed faces."""
         self._block, self._place = np.full((2, len(names)), -1)
 
     def changed(self) -> bool:
@@ -25,7 +25,7 @@ class Faces:
         return bool(lost.any() or (self._here(here) != self.corners[here]).any())
 
     def follow(self, comm: Comm) -> None:
-        """Updates the corners. Collective."""
+        """Updates ``corners`` on all ranks. Collective."""
         self._locate(~self._stay())
         here = self._block >= 0
         rows = np.column_stack([np.flatnonzero(here), self._here(here)])
@@ -42,7 +42,9 @@ class Faces:
         return self.corners[np.searchsorted(self.names, names)]
 
     def _stay(self) -> Flags:
-        """Returns which faces are still at their last places; False for faces of other ranks."""
+        """Returns a mask of the faces whose tets are still in the same rows of their blocks; False for faces of other
+        ranks.
+        """
         found = np.zeros(len(self.names), bool)
         for b, block in enumerate(self._model.blocks):
             some = np.flatnonzero((self._block == b) & (self._place < block.n))

@@ -29,14 +29,15 @@ from .pieces import Pieces
 from .rows import assembled
 
 _NEAR = 10.0
-"""Multiple of the largest bonded distance up to which nodes that are not tied are counted in a warning."""
+"""A warning counts the nodes that are not tied and whose distance is below this multiple of the largest bonded
+distance."""
 _COVERED = 0.95
-"""Share of a tied face from which on it counts as covered. Chosen: between curved surfaces, whose faces are not
-parallel, gaps and overlaps of 1 or 2 % occur."""
+"""Share of the area of a tied face that the mortar side must cover for the face to count as covered. Chosen value:
+between curved surfaces, whose faces are not parallel, gaps and overlaps of 1 or 2 % of the area occur."""
 _LEAST = 1e-9
-"""Share of the area of a tied face below which a common area is ignored."""
+"""A common area below this share of the area of the tied face is ignored."""
 _ON = 1e-6
-"""Area coordinate by which a node may lie outside a face and still counts as on it."""
+"""Tolerance of the area coordinates: a node that lies outside a face by less counts as on the face."""
 
 
 @dataclass
@@ -56,9 +57,9 @@ class _Faces:
     name: Ints
     """(f,) 4 * tet + local face."""
     nodes: Indices
-    """(f, 3)."""
+    """(f, 3) nodes of each face."""
     size: Floats
-    """(f,) square root of twice the area, m."""
+    """(f,) size of each face, the square root of twice the area, m."""
 
     def take(self, chosen: Flags | Ints) -> "_Faces":
         return _Faces(self.name[chosen], self.nodes[chosen], self.size[chosen])

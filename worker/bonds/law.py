@@ -2,11 +2,11 @@
 
     (<t_n> / s_n)^2 + (|t_s| / s_s)^2 <= (1 - D)^2,   dD = d(delta) / delta_c,   delta_c = 2 G / |T|,
 
-with T the traction on the initial ellipse in the present direction, and G the fracture energy per area, 1 / G = (1 -
-B) / G_n + B / G_s, B the share of shear in the work. So the traction falls linearly with the opening delta, and
-opening in one direction takes the energy G. Below the strength the bond does not open. An open bond closes without
-resistance, transmits pressure when it is closed, and transmits tension again at its widest opening: it stores no
-energy, and releases none. Sliding is permanent.
+with T the traction on the initial ellipse in the present direction, and G the fracture energy per area, 1 / G = (1 - B)
+/ G_n + B / G_s, B the share of shear in the work. The traction therefore decreases linearly with the opening delta, and
+opening in one direction dissipates the energy G. Below the strength the bond does not open. An open bond closes without
+resistance, transmits pressure when it is closed, and transmits tension again at its widest opening: the open bond
+stores no energy. Sliding is permanent.
 """
 
 import numpy as np
@@ -31,7 +31,7 @@ from .records import (
 from .records import NODES as _NODES
 
 _FULL = 1.0 - 1e-6
-"""Share of the ellipse above which a traction opens the bond."""
+"""A traction above this share of the size of the ellipse opens the bond."""
 _F, _I = types.float64, types.int64
 _VECTOR = types.UniTuple(_F, 3)  # type: ignore[no-untyped-call]
 
@@ -85,7 +85,7 @@ def open_bonds(rows, nodes, mean_dt, dt, first, stop):  # type: ignore[no-untype
     for r in range(first, stop):
         if state[r, DAMAGE] >= 1.0:
             continue
-        # 1.
+        # 1. Compute the relative velocity at the end of the step.
         for i in range(3):
             speed = v[rows.node[r], i]
             for e in range(rows.begin[r], rows.begin[r + 1]):
@@ -95,7 +95,7 @@ def open_bonds(rows, nodes, mean_dt, dt, first, stop):  # type: ignore[no-untype
         b = rows.bond[r]
         if laws[b, BREAKS] == 0.0:
             continue
-        # 2.
+        # 2. Compute tension and shear, opening velocity and power.
         along, opening, work, shear = 0.0, 0.0, 0.0, 0.0
         for i in range(3):
             along += state[r, PUSH + i] * state[r, NORMAL + i]
@@ -106,7 +106,7 @@ def open_bonds(rows, nodes, mean_dt, dt, first, stop):  # type: ignore[no-untype
             work -= slide * state[r, SPEED + i]
         across = max(along, 0.0)
         work += across * opening
-        # 3.
+        # 3. Update the damage, if the impulse is at the ellipse.
         force, tension = mean_dt * rows.area[r], across * across
         size = np.sqrt(tension / (force * laws[b, STRENGTH]) ** 2 + shear / (force * laws[b, SHEAR_STRENGTH]) ** 2)
         full = size > 0.0 and size >= _FULL * (1.0 - state[r, DAMAGE])
@@ -118,11 +118,11 @@ def open_bonds(rows, nodes, mean_dt, dt, first, stop):  # type: ignore[no-untype
             length = np.sqrt(tension + shear)
             critical = 2.0 * energy * size * force / length
             state[r, DAMAGE] = min(state[r, DAMAGE] + max(dt * work / length, 0.0) / critical, 1.0)
-        # 4.
+        # 4. Update the present and the largest opening.
         if state[r, DAMAGE] > 0.0:
             state[r, OPENING] = max(state[r, OPENING] + dt * opening, 0.0)
             state[r, WIDEST] = max(state[r, WIDEST], state[r, OPENING])
-        # 5.
+        # 5. Set the impulse of a failed row to zero.
         if state[r, DAMAGE] >= 1.0:
             apart += 1
             for i in range(3):

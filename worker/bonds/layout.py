@@ -1,9 +1,10 @@
-"""Rows of tied nodes on one rank: those of the nodes that it owns, and the nodes that they push.
+"""Rows of tied nodes on one rank: each rank has the rows of the tied nodes that it owns, and a table of the nodes to
+which these rows apply impulses.
 
-The table of nodes of a rank contains the nodes of its rows, and the tied and mortar nodes that it has: these may be
-pushed by rows of other ranks. Positions and velocities of nodes that it does not have are copied from their owners;
-sums of impulses are sent to all ranks with the node in their table. Every rank has the list of all rows (rows.py);
-the messages are planned once, when the rows change.
+The table contains the nodes of the rows, and all tied and mortar nodes on this rank, because rows of other ranks may
+apply impulses to them. Positions and velocities of nodes of other ranks are copied from their owners; sums of impulses
+are sent to all ranks with the node in their table. Every rank has the list of all rows (rows.py); the messages are
+planned once, when the rows change.
 """
 
 import math
@@ -18,13 +19,13 @@ from .records import BREAKS, KEPT, NORMAL, STATE, TiedNodes, TiedRows
 from .rows import Rows
 
 _SETTLED = 1e-7
-"""Share of the change of the impulses in a step that its sweeps leave unsolved. Chosen: the energy dissipated by the
-bond is then below 1e-9 of the energy that passes through it (docs/theory/bonds.md)."""
+"""Residual of the sweeps of a step over the change of the impulses in the step. Chosen value: the energy dissipated
+by the bond is then below 1e-9 of the energy transmitted through the bond (docs/theory/bonds.md)."""
 _SLOWEST = 0.02
-"""Least bound of the smallest eigenvalue of the rows over the largest one: 60 sweeps. Chosen: tied nodes with
-prescribed motion have no bound above zero."""
+"""Smallest value used for the bound of the smallest over the largest eigenvalue of the rows; it gives 60 sweeps.
+Chosen value: it is needed because the bound is zero for tied nodes with prescribed motion."""
 _WORDS = 6
-"""Words of a node: position and velocity."""
+"""Number of words of a node in a message: position and velocity."""
 
 
 @dataclass
@@ -36,9 +37,9 @@ class Layout:
     number: Ints
     """(r,) number of each row among all rows."""
     held: Indices
-    """(h,) places in the table of the nodes that this rank has."""
+    """(h,) places in the table of the nodes on this rank."""
     local: Indices
-    """(h,) their local indices."""
+    """(h,) local indices of the nodes of the table that are on this rank."""
     sweeps: int
     """Number of sweeps in a step."""
     momentum: float
@@ -148,13 +149,14 @@ class Messages:
     sums: Exchange
     copies: Exchange
     sends: Indices
-    """Places in the table of the sums that are sent, rank by rank; ``receives``: of those received."""
+    """``sends``: places in the table of the sums that are sent, rank by rank; ``receives``: places of the received
+    sums."""
     receives: Indices
     gives: Indices
-    """Places of the copies of nodes that are sent; ``takes``: of those received."""
+    """``gives``: places of the copies of nodes that are sent; ``takes``: places of the received copies."""
     takes: Indices
     buffers: tuple[Ints, Ints, Ints, Ints]
-    """Buffers of the sums, sent and received, and of the copies."""
+    """Buffers of the sent sums, the received sums, the sent copies and the received copies."""
 
     @classmethod
     def of(cls, ids: Ints, pushed: Flags, local: Indices, nodes: Nodes, comm: Comm) -> "Messages":
@@ -204,7 +206,7 @@ class Messages:
         np.add.at(words, self.receives, self.buffers[1])
 
     def free(self) -> None:
-        """Frees the persistent messages."""
+        """Frees the persistent MPI messages."""
         self.sums.free()
         self.copies.free()
 

@@ -20,7 +20,7 @@ class Pieces:
     slave: Ints
     """(p,) tied face."""
     master: Ints
-    """(p,) mortar face that it is tied to."""
+    """(p,) mortar face to which the tied face is tied."""
     weights: Floats
     """(p, 9) weight of each corner of the tied face with each of the mortar face, row by row, m^2."""
     of_face: Ints
@@ -42,7 +42,7 @@ class Pieces:
         )
 
     def table(self) -> Table:
-        """Returns the columns, for a parcel."""
+        """Returns the columns of the pieces for a parcel (a checkpoint or migration message)."""
         return {
             "bond": self.bond, "slave": self.slave, "master": self.master, "weights": self.weights,
             "of_face": self.of_face,

@@ -10,9 +10,9 @@ PUSH, LAST, SPEED, DAMAGE, OPENING, WIDEST, NORMAL = 0, 3, 6, 9, 10, 11, 12
 extrapolation (3); relative velocity after the last step (3), m/s; damage, 0 intact, 1 failed; present opening across
 the interface, and the largest so far, m; unit normal out of the tied side (3)."""
 STATE = 15
-"""Number of places."""
+"""Number of places in a row of ``TiedRows.state``."""
 KEPT = 12
-"""Number of places, from the first on, that a checkpoint contains."""
+"""Number of places in a row of ``TiedRows.state`` that a checkpoint contains, from the first place on."""
 STRENGTH, SHEAR_STRENGTH, ENERGY, SHEAR_ENERGY, BREAKS = range(5)
 """Columns of ``TiedRows.laws``: strengths, Pa, fracture energies, J/m^2, and 1 for a bond that may break, else 0."""
 
@@ -27,12 +27,12 @@ class TiedRows(NamedTuple):
     master: Indices
     """(e,) mortar nodes of each row."""
     weight: Floats
-    """(e,) their weights."""
+    """(e,) weights of the mortar nodes."""
     area: Floats
     """(r,) area of the interface that belongs to the row, m^2."""
     inverse: Floats
-    """(r, 3) one over the bound of the l1 norm of the row, by axis, kg; 0 along an axis that the row does not
-    constrain. Equal for all other axes of a row that may break."""
+    """(r, 3) one over the bound of the l1 norm of the row, by axis, kg. It is 0 along an axis that the row does not
+    constrain; in a row that may break, the values of all other axes are equal."""
     bond: Indices
     """(r,) row of ``laws``."""
     laws: Floats
@@ -40,13 +40,13 @@ class TiedRows(NamedTuple):
     side: Ints
     """(r + 1,) start of the tied faces at each tied node."""
     face: Indices
-    """(s, 3) their corners."""
+    """(s, 3) corners of the tied faces at the tied nodes."""
     state: Floats
     """(r, STATE) state of each row."""
     change: Floats
     """(r, 3) change of the impulse in this sweep, N s."""
     own: Ints
-    """(r, 3) the same on the tied node, quanta."""
+    """(r, 3) change of the impulse on the tied node in this sweep, quanta."""
 
 
 class TiedNodes(NamedTuple):

@@ -103,20 +103,20 @@ class Bonds:
     # Checkpoint and migration --------------------------------------------------------------------------------------
 
     def keep(self, parcel: Parcel) -> None:
-        """Adds the state to a parcel."""
+        """Adds the state to a parcel (a checkpoint or migration message)."""
         self.account.keep(parcel)
         parcel.known["bonds"] = self.account.scale, self._mean_dt
         self.ties.keep(parcel, self._layout)
 
     def resume(self, parcel: Parcel) -> None:
-        """Restores the state from a parcel. Collective."""
+        """Restores the state from a parcel (a checkpoint or migration message). Collective."""
         scale, self._mean_dt = parcel.known["bonds"]
         self.account.resume(parcel, scale)
         self.ties.resume(parcel)
         self._lay_out()
 
     def free(self) -> None:
-        """Frees the persistent messages."""
+        """Frees the persistent MPI messages."""
         if self._layout is not None:
             self._layout.messages.free()
 

@@ -48,7 +48,7 @@ class Ties:
 
     def rebuild(self, layout: Layout | None, known: list[Known] | None = None) -> None:
         """Makes the rows from the pieces and present corners; ``layout``: present rows of this rank; ``known``: states
-        of rows from a parcel. Collective.
+        of rows from a parcel (a checkpoint or migration message). Collective.
         """
         pieces, old, states = self._pieces, self.faces.of(self._pieces.slave), self._joined_states(layout)
         self.faces.follow(self._comm)
@@ -77,7 +77,7 @@ class Ties:
         self.version += 1
 
     def keep(self, parcel: Parcel, layout: Layout | None) -> None:
-        """Adds the pieces and rows of this rank to a parcel."""
+        """Adds the pieces and rows of this rank to a parcel (a checkpoint or migration message)."""
         nodes, rows = self._model.nodes, self.rows
         pieces = self._pieces.take(self.faces.here(self._pieces.slave))
         parcel.rows["bonds.pieces"] = {"tet": pieces.slave // 4, **pieces.table()}
@@ -87,7 +87,7 @@ class Ties:
         parcel.rows["bonds.rows"] = {"node": rows.node[mine], "bond": rows.bond[mine], "state": states[mine]}
 
     def resume(self, parcel: Parcel) -> None:
-        """Restores the pieces and rows from a parcel. Collective."""
+        """Restores the pieces and rows from a parcel (a checkpoint or migration message). Collective."""
         self._set(Pieces.of(self._comm.share(parcel.rows["bonds.pieces"])))
         tables = [table for table in self._comm.share(parcel.rows["bonds.rows"]) if table]
         none = np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros((0, KEPT))

@@ -116,7 +116,7 @@ class Boundary(ABC):
         """Removes the loads on faces of the tets with these global ids, which erosion has removed on any rank."""
 
     def keep(self, parcel: Parcel, name: str) -> None:
-        """Adds the state of the boundary to a parcel, under its ``name``."""
+        """Adds the state of the boundary to a parcel (a checkpoint or migration message), under its ``name``."""
         for key in self._kept:
             values = getattr(self, key)
             column = np.zeros((length(parcel.nodes), *values.shape[1:]))
@@ -124,13 +124,13 @@ class Boundary(ABC):
             parcel.nodes[f"{name}.{key}"] = column
 
     def resume(self, parcel: Parcel, name: str, dt: float) -> None:
-        """Restores the state from a parcel; ``dt``: of the last step, s."""
+        """Restores the state from a parcel (a checkpoint or migration message); ``dt``: of the last step, s."""
         for key in self._kept:
             setattr(self, key, parcel.nodes[f"{name}.{key}"][self.nodes])
         self._before = np.zeros((len(self.nodes), 3))
 
     def free(self) -> None:  # noqa: B027 (most boundaries send no messages)
-        """Frees all persistent messages."""
+        """Frees all persistent MPI messages."""
 
     def _inherit(self, at: Ints) -> None:  # noqa: B027 (a boundary of its own may keep more by node)
         """Extends own columns by copies of the nodes at the places ``at``, after all other nodes."""

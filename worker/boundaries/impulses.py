@@ -10,16 +10,18 @@ from ..parallel.team import TASK
 
 _F, _F1, _F2, _N1 = types.float64, types.float64[::1], types.float64[:, ::1], types.int32[::1]
 NOTE = _F2, _N1, _F2, _F2, _F1, _F
-"""Types of: v (nodes, 3), nodes (n,); by place: v(n-1/2) and impulses (n, 3), N s, account of their work (n,), J;
-1/2 with the sign of the work in the account."""
+"""Types of the arguments v (nodes, 3) and nodes (n,); of v(n-1/2) and the impulses (n, 3), N s, and the account of
+their work (n,), J, one row for each node of the boundary; and of 1/2 with the sign of the work in the account."""
 _ACT = _F2, _F1, _N1, _F2, _F2, _F1
-"""Types of: v, mass (nodes,), nodes; v(n-1/2), impulses and account as above. The work is from outside."""
+"""Types of the arguments v, mass (nodes,) and nodes; and of v(n-1/2), impulses and account as in the previous
+constant. The work is work from outside."""
 PRESCRIBE = (*_ACT, _F2, _F)
-"""Further types: velocities (n, 3), m/s, NaN for a free component, and their factor."""
+"""Types of the further arguments: velocities (n, 3), m/s, NaN for a free component, and the factor of the
+velocities."""
 ACCELERATE = (*_ACT, _F1)
-"""Further type: velocity increment (3,), m/s."""
+"""Type of the further argument: velocity increment (3,), m/s."""
 PUSH = (*_ACT, _F2, _F)
-"""Further types: forces (n, 3), N, and their duration, s."""
+"""Types of the further arguments: forces (n, 3), N, and the duration of the forces, s."""
 _note, _prescribe, _accelerate, _push = reader(*NOTE), reader(*PRESCRIBE), reader(*ACCELERATE), reader(*PUSH)
 
 

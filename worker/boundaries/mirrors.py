@@ -1,8 +1,8 @@
 """Planes of symmetry for the nodes beside them: a node that reaches the plane hits its mirror image there.
 
-A node with tets and its image exert equal forces on each other, so that neither passes the plane: the plane is a
-wall for each side. Nodes without tets do not interact: such a node passes its image, and is replaced by it, with
-mirrored position and velocity. So debris is reflected at a plane without a loss.
+A node with tets and its image exert equal forces on each other, so that neither passes the plane: the plane is a wall
+for each side. Nodes without tets do not interact: such a node passes its image, and is replaced by it, with mirrored
+position and velocity. Debris is therefore reflected at a plane without loss of energy.
 """
 
 from typing import Self
@@ -20,10 +20,11 @@ from ..scene.conditions import AXES, part_sides, sides
 from .boundaries import Boundary, driven, free
 
 _TOGETHER = 64
-"""Number of nodes that are tested in one loop with vector instructions; only if one of them would be beyond the
-plane are they tested one by one."""
+"""Number of nodes that are tested together in one loop with vector instructions. The nodes are tested one by one
+only if one of them would end beyond the plane."""
 _TURNS = 1000
-"""Most planes that a node without tets may pass in a step; it ends the loop for a velocity that is not finite."""
+"""Largest number of planes that a node without tets may pass in a step. The limit ends the loop if the velocity is
+not finite."""
 
 
 class Mirrors(Boundary):
@@ -45,7 +46,8 @@ class Mirrors(Boundary):
         self._axes, self._at, self._sides, self._restitution = axes, at, sides, restitution
         self._loose_sides = sides.copy() if loose_sides is None else loose_sides
         self._stopped: Ints = np.zeros(0, np.int64)
-        """Places of the nodes that were stopped or reflected in the last step."""
+        """Places (indices in the arrays of the boundary) of the nodes that were stopped or reflected in the last
+        step."""
         self._loose: Ints = np.zeros(0, np.int64)
         """Places of the nodes without tets."""
         self._reflected: Ints = np.zeros(0, np.int64)

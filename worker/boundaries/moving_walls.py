@@ -32,13 +32,13 @@ from .wall_shapes import SHAPES, Walls, gap
 from .walls import ACROSS
 
 _NEWTON, _ENOUGH = 20, 1e-9
-"""Most iterations, and the relative change of V that ends them. The sum is piecewise linear in V without sliding:
-two or three are enough."""
+"""Largest number of iterations, and the relative change of V that ends the iteration. Without sliding the sum is
+piecewise linear in V, so that two or three iterations are enough."""
 _SWEEPS = 4
-"""Passes over the walls, if there are several (walls.py)."""
+"""Number of passes over the walls, if there are several walls (walls.py)."""
 _LINE = 16
-"""Words of a thread's sums: impulse (3), its derivative xx, yy, zz, yz, zx, xy; padded, so that no two threads write
-to one cache line."""
+"""Number of words of the sums of a thread: impulse (3), and its derivative xx, yy, zz, yz, zx, xy. The words are
+padded so that two threads do not write to the same cache line."""
 
 
 class MovingWalls(Stopping):
@@ -53,10 +53,10 @@ class MovingWalls(Stopping):
         super().__init__(nodes, walls.n, reports=reports)
         self.walls, self._owned, self._held, self._mirrored, self._comm = walls, owned, held, planes, comm
         self.scale = self._weight = 1.0
-        """Quanta per N s, and per kg."""
+        """Quanta per N s of impulses, and quanta per kg of the derivative."""
         n, w = len(nodes), walls.n
         self._step, self._rubbed = np.zeros((2, n, 3 * w))
-        """(n, 3 walls) impulses of the last step, and the part of them by friction, N s."""
+        """(n, 3 walls) impulses of the last step, N s, and the part of these impulses that is friction."""
         self.friction_loss = np.zeros(n)
         self._kept = (*self._kept, "friction_loss", "_step", "_rubbed")
         self._pushed = False
@@ -207,7 +207,7 @@ def _push_out(table, begin, end, thread):  # type: ignore[no-untyped-def]
     for j in range(begin, end):
         if not held[j, k]:
             continue
-        # 1.
+        # 1. Skip nodes with no negative gap at the end of the step.
         a = nodes[j]
         far = gap(normal, shapes, k, x[a, 0], x[a, 1], x[a, 2])
         speed, along = 0.0, 0.0
@@ -217,12 +217,12 @@ def _push_out(table, begin, end, thread):  # type: ignore[no-untyped-def]
                 along += normal[i] * normal[i]
         if far + dt * speed >= 0.0 or along <= ACROSS:
             continue
-        # 2.
+        # 2. Compute the normal impulse.
         push = -(far / dt + speed) / along
         size, share = 0.0, 0.0
         for i in range(3):
             impulse[i] = 0.0 if mirrored[j, i] else push * normal[i]
-        # 3.
+        # 3. Compute sliding velocity and friction.
         if mu > 0.0:
             speed = speed + push * along
             for i in range(3):
@@ -230,7 +230,7 @@ def _push_out(table, begin, end, thread):  # type: ignore[no-untyped-def]
                 size += slide[i] * slide[i]
             most = mu * push
             share = most / np.sqrt(size) if size > most * most else 1.0
-        # 4.
+        # 4. Round the impulse to quanta; apply it, add it to the sum.
         for i in range(3):
             rub = -share * slide[i] if mu > 0.0 else 0.0
             words[i] = np.int64(np.rint(mass[a] * (impulse[i] + rub) * scale))
@@ -241,7 +241,7 @@ def _push_out(table, begin, end, thread):  # type: ignore[no-untyped-def]
                 rubbed[j, 3 * k + i] += mass[a] * rub
             if owned[j]:
                 sums[thread, i] += words[i]
-        # 5.
+        # 5. Add the derivative of the impulse.
         if owned[j] and not gives:
             sticks = mu > 0.0 and share == 1.0
             for m in range(6):

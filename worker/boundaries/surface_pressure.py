@@ -30,10 +30,11 @@ from .boundaries import KEPT, free
 from .drivers import Course, Driver
 
 _BITS = 42
-"""Quanta of the largest force on a node of a face at the start, as a power of two. Chosen: rounding is 1e-13 of the
-force of a face, and the area may grow by a factor 2^(_MOST - _BITS)."""
+"""Binary logarithm of the number of quanta in the largest force on a node of a face at the start. Chosen value:
+rounding is 1e-13 of the force of a face, and the area may increase by a factor 2^(_MOST - _BITS)."""
 _MOST = 56
-"""Most quanta on a node of a face, as a power of two: 64 faces fit into the sum of a node."""
+"""Binary logarithm of the largest number of quanta on a node of a face. With this limit the sum of a node holds 64
+faces without overflow."""
 
 
 def scale(spec: Traction, outward: Floats) -> float:

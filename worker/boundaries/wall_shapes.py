@@ -15,7 +15,7 @@ KINDS = ("plane", "cylinder", "sphere")
 
 
 class Shapes(NamedTuple):
-    """Shapes of walls, one row each."""
+    """Shapes of walls; each wall is one row of the arrays."""
 
     kind: Ints
     """(w,) PLANE, CYLINDER or SPHERE."""

@@ -11,11 +11,12 @@ from .boundaries import KEPT, Boundary, Stopping, free, mirrored
 from .impulses import book
 
 _SWEEPS = 4
-"""Passes over the walls for each node. Chosen: two walls at right angles take one; the rest at a sharper corner is
-corrected in the next step."""
+"""Largest number of passes over the walls for each node. Chosen value: two walls at right angles need one pass; the
+remaining error at a sharper corner is corrected in the next step."""
 ACROSS = 1e-12
-"""Least square of the part of a wall's unit normal that the planes of symmetry at a node leave free: with less, the
-wall is parallel to a plane and cannot push the node. Chosen far above rounding (1e-32) and below any intended angle."""
+"""Smallest squared length of the unit normal of a wall after the components held by planes of symmetry are set to
+zero. Below this value the wall is parallel to a plane of symmetry and cannot push the node. Chosen value: far above
+rounding (1e-32) and below any intended angle."""
 
 
 class RigidWalls(Stopping):
@@ -128,7 +129,7 @@ def _push_out(table, begin, end, thread):  # type: ignore[no-untyped-def]
         for _ in range(_SWEEPS):
             moved = False
             for k in range(len(points)):
-                # 1.
+                # 1. Compute gap, velocity and free part of the normal.
                 gap, speed, along = 0.0, 0.0, 1.0
                 for i in range(3):
                     gap += (x[a, i] - points[k, i]) * normals[k, i]
@@ -136,7 +137,7 @@ def _push_out(table, begin, end, thread):  # type: ignore[no-untyped-def]
                     if mirrored[j, i]:
                         along -= normals[k, i] * normals[k, i]
                 if held[j, k] and gap + dt * speed < 0.0 and along > ACROSS:
-                    # 2.
+                    # 2. Compute the impulse that makes the gap zero.
                     push = -(gap / dt + speed) / along
                     for i in range(3):
                         if mirrored[j, i]:
@@ -148,7 +149,7 @@ def _push_out(table, begin, end, thread):  # type: ignore[no-untyped-def]
                     moved = any_moved = True
                     if friction[k] == 0.0:
                         continue
-                    # 3.
+                    # 3. Compute the friction.
                     speed, size = 0.0, 0.0
                     for i in range(3):
                         speed += v[a, i] * normals[k, i]
@@ -162,7 +163,7 @@ def _push_out(table, begin, end, thread):  # type: ignore[no-untyped-def]
                         impulse[j, i] -= mass[a] * share * slide[i]
                         rubbed[j, i] -= mass[a] * share * slide[i]
                         given[j, 3 * k + i] -= mass[a] * share * slide[i]
-            # 4.
+            # 4. Decide whether another pass is needed.
             if not moved or len(points) == 1:
                 break
         if any_moved:

@@ -45,10 +45,10 @@ class Account:
         return taken >= _AHEAD * self._most
 
     def known(self) -> tuple[float, float, float, float]:
-        """Values besides the words, for a parcel; equal on all ranks."""
+        """Values besides the words, for a parcel (a checkpoint or migration message); equal on all ranks."""
         return self.scale, self._taken, self._early, self._most
 
     def resume(self, words: Ints, known: tuple[float, float, float, float]) -> None:
-        """Restores the state of ``keep`` from a parcel."""
+        """Restores the state of ``keep`` from a parcel (a checkpoint or migration message)."""
         scale, self._taken, self._early, self._most = known
         self._tally.words, self._tally.scale = words, np.full(2, scale)

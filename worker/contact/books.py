@@ -42,11 +42,13 @@ class Books:
         self.pressed = np.zeros((nodes if "contact_pressure" in case.run.fields else 0, 3), np.int64)
         """(nodes, 3) impulses since the last frame, quanta; (0, 3) if the field ``contact_pressure`` is not written."""
         self.open: Ints = np.zeros((0, 3), np.int64)
-        """(nodes, 3) impulses of the last step before a restart or a cut, quanta; (0, 3) once they are booked."""
+        """(nodes, 3) impulses of the last step before a restart or a repartition, quanta; (0, 3) once they are
+        booked."""
 
     def keep(self, parcel: Parcel, scene: Scene | None) -> None:
-        """Adds all sums to the ``parcel``; the impulses of the last step are read from the ``scene``, if there is
-        one."""
+        """Adds all sums to the ``parcel`` (a checkpoint or migration message); the impulses of the last step are read
+        from the ``scene``, if there is one.
+        """
         parcel.nodes["contact.contact_loss"] = self.contact_loss
         parcel.nodes["contact.external_work"] = self.external_work
         parcel.sums["contact.parts"], parcel.sums["contact.friction"] = self.parts, self.friction.words
@@ -59,7 +61,7 @@ class Books:
         parcel.nodes["contact.total"] = total
 
     def resume(self, parcel: Parcel, known: tuple[float, float, float, float]) -> None:
-        """Restores the sums from the ``parcel``; ``known``: values of the account."""
+        """Restores the sums from the ``parcel`` (checkpoint or migration message); ``known``: values of the account."""
         self.contact_loss = np.array(parcel.nodes["contact.contact_loss"])
         self.external_work = np.array(parcel.nodes["contact.external_work"])
         self.account.resume(parcel.sums["contact.account"], known)
@@ -107,8 +109,9 @@ class Books:
         )  # fmt: skip
 
     def book_resumed(self, nodes: Nodes, mobility: Floats) -> None:
-        """Books the second half of the work of impulses from before a restart or a cut; ``mobility`` (nodes, 3),
-        1/kg."""
+        """Books the second half of the work of impulses from before a restart or a repartition; ``mobility`` (nodes,
+        3), 1/kg.
+        """
         if len(self.open):
             some = np.flatnonzero(self.open.any(axis=1)).astype(np.int32)
             every = np.arange(len(self.open), dtype=np.int32)

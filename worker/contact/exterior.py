@@ -41,7 +41,9 @@ class Exterior:
         """Whether facets of any rank have broken, so that cracks may open."""
 
     def keep(self, parcel: Parcel) -> None:
-        """Adds cracks, edges that became sharp, surface nodes and moments of normals to the ``parcel``."""
+        """Adds cracks, edges that became sharp, surface nodes and moments of normals to the ``parcel`` (a checkpoint or
+        migration message).
+        """
         parcel.rows["contact.cracks"] = self.cracks.keep(parcel.nodes["id"])
         parcel.nodes["family"] = self.cracks.families.root
         parcel.rows["contact.turned"] = {"tet": self.surface.turned >> 34, "name": self.surface.turned}

@@ -85,7 +85,9 @@ class Contact:
         """Mean step at the last step with a scene, s."""
 
     def keep(self, parcel: Parcel) -> None:
-        """Adds everything except the candidate pairs to the ``parcel``: a search finds these again."""
+        """Adds everything except the candidate pairs to the ``parcel`` (a checkpoint or migration message): a search
+        finds these again.
+        """
         books = self.books
         parcel.known["contact"] = (
             books.scale, books.friction.scale, self.limit, self.searches.many, self._mean_dt, self.exterior.size,

@@ -106,7 +106,9 @@ class Averages:
         return {name: column[rows] for name, column in columns.items()}
 
     def keep(self, columns: dict[str, "np.ndarray"]) -> Table:
-        """Returns the table of a parcel for the means of nodes of several materials; ``columns`` (rows, ...)."""
+        """Returns the table of a parcel (a checkpoint or migration message) for the means of nodes of several
+        materials; ``columns`` (rows, ...).
+        """
         nodes = self._model.nodes
         node, part = nodes.of_parts()
         several = np.isin(node, nodes.shares.node)
@@ -116,7 +118,9 @@ class Averages:
         return {"of": of, "key": of * MOST_PARTS + pairs[:, 1], "kind": pairs[:, 1], **table}
 
     def resume(self, table: Table, columns: dict[str, "np.ndarray"]) -> dict[str, "np.ndarray"]:
-        """Returns ``columns`` (nodes, ...) of a parcel, extended by the rows of ``table``."""
+        """Returns ``columns`` (nodes, ...) of a parcel (a checkpoint or migration message), extended by the rows of
+        ``table``.
+        """
         rows, found = self.at(self._model.nodes.places(table["of"]), table["kind"]), {}
         for name, values in columns.items():
             found[name] = np.concatenate([values, np.zeros((self.n - len(values), *values.shape[1:]), values.dtype)])

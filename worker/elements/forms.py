@@ -147,13 +147,15 @@ class Elements:
             self._connect()
 
     def keep(self, parcel: Parcel) -> None:
-        """Adds the state of the form, except that of the tets, to a parcel. Collective."""
+        """Adds the state of the form, except that of the tets, to a parcel (a checkpoint or migration message).
+        Collective.
+        """
         limit = fixed_point.bits_of(float(self._comm.maximum(np.array([self.limit]))[0]))
         mine = -float(self.limiting) if self.limit_bits == limit else -np.inf
         parcel.known["peaks"] = limit, -int(self._comm.maximum(np.array([mine]))[0])
 
     def resume(self, parcel: Parcel) -> None:
-        """Restores the state from a parcel."""
+        """Restores the state from a parcel (a checkpoint or migration message)."""
         self.peaks[[records.LARGEST_LIMIT, records.LIMITING_TET]] = parcel.known["peaks"]
 
     def attach(self, flags: FlagExchange) -> None:
@@ -169,7 +171,7 @@ class Elements:
             self._flags.receive(self.shared_forces.received)
 
     def free(self) -> None:
-        """Frees the persistent messages."""
+        """Frees the persistent MPI messages."""
         for shared in self._exchanges():
             shared.free()
 

@@ -88,14 +88,14 @@ class Cohesion:
         law.foresee(self.facets, nodes.v, nodes.force, nodes.mass, mean_dt / nodes.scale)
 
     def keep(self, parcel: Parcel) -> None:
-        """Adds the facets to a parcel."""
+        """Adds the facets to a parcel (a checkpoint or migration message)."""
         columns, ids = self.facets.columns(), parcel.nodes["id"]
         nodes, first = columns.pop("nodes"), columns["tets"][:, 0]
         parcel.rows["cohesive"] = {"tet": first, "with": ids[nodes], **columns}
         parcel.sums["cohesive.gone"], parcel.known["cohesive"] = self.gone.words, self.gone.scale
 
     def resume(self, parcel: Parcel, nodes: Nodes) -> None:
-        """Restores the facets from a parcel."""
+        """Restores the facets from a parcel (a checkpoint or migration message)."""
         table = parcel.rows["cohesive"]
         self.facets = Facets.of({**table, "nodes": nodes.places(table["with"])})
         self.gone.words, self.gone.scale = parcel.sums["cohesive.gone"], parcel.known["cohesive"]

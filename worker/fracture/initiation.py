@@ -98,19 +98,19 @@ class Initiation:
             body.follow(split, self._model.nodes.x0)
 
     def keep(self, parcel: Parcel) -> None:
-        """Adds the clocks to a parcel."""
+        """Adds the clocks to a parcel (a checkpoint or migration message)."""
         tables = [facets.clocks(body, self._step) for body in self.bodies if body.own]
         none = {"tet": np.zeros(0, np.int64), "key": np.zeros(0, np.int64), "since": np.zeros(0)}
         every = {name: np.concatenate([column, *(table[name] for table in tables)]) for name, column in none.items()}
         parcel.rows["fracture.since"] = every
 
     def resume(self, parcel: Parcel) -> None:
-        """Restores the clocks from a parcel."""
+        """Restores the clocks from a parcel (a checkpoint or migration message)."""
         for body in (body for body in self.bodies if body.own):
             facets.set_clocks(body, parcel.rows["fracture.since"], self._step)
 
     def free(self) -> None:
-        """Frees the persistent messages."""
+        """Frees the persistent MPI messages."""
         self.interface.free()
 
     def _candidates(self, k: int, body: Body) -> Candidates:

@@ -100,7 +100,7 @@ class Interface:
             exchange.finish()
 
     def free(self) -> None:
-        """Frees the persistent messages."""
+        """Frees the persistent MPI messages."""
         for exchange in self._exchanges.values():
             exchange.free()
 

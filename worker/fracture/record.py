@@ -35,14 +35,14 @@ class Record:
         """Number of fragments at the start, which have the first numbers, and the next free number."""
 
     def keep(self, parcel: Parcel) -> None:
-        """Adds the numbers of the last frame to a parcel."""
+        """Adds the numbers of the last frame to a parcel (a checkpoint or migration message)."""
         parcel.known["record"] = self.count, self.initial, self.next
         if self.next:
             for table in parcel.tets.values():
                 table["fragment"] = self._last(table["id"])
 
     def resume(self, parcel: Parcel) -> None:
-        """Restores them from a parcel."""
+        """Restores them from a parcel (a checkpoint or migration message)."""
         self.count, self.initial, self.next = parcel.known["record"]
         if self.next:
             tables = [table for table in parcel.tets.values() if length(table)]

@@ -116,21 +116,21 @@ class Fracture:
         self.separation.survey([b.facets.sides for b in found], count, touched)
 
     def keep(self, parcel: Parcel) -> None:
-        """Adds the state of fracture to a parcel."""
+        """Adds the state of fracture to a parcel (a checkpoint or migration message)."""
         parcel.known["fracture"] = self.broken, self._insertion.longest
         self.initiation.keep(parcel)
         if self.cohesion is not None:
             self.cohesion.keep(parcel)
 
     def resume(self, parcel: Parcel) -> None:
-        """Restores the state from a parcel."""
+        """Restores the state from a parcel (a checkpoint or migration message)."""
         self.separation.broken, self._insertion.longest = parcel.known["fracture"]
         self.initiation.resume(parcel)
         if self.cohesion is not None:
             self.cohesion.resume(parcel, self._model.nodes)
 
     def free(self) -> None:
-        """Frees the persistent messages."""
+        """Frees the persistent MPI messages."""
         self.initiation.free()
         if self.cohesion is not None:
             self._unloading.free()

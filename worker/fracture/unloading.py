@@ -36,7 +36,7 @@ class Unloading:
         self._cohesion.foresee(nodes, clock.mean_dt)
 
     def free(self) -> None:
-        """Frees the persistent messages."""
+        """Frees the persistent MPI messages."""
         if self._shared is not None:
             self._shared.free()
             self._shared = None

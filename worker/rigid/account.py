@@ -12,11 +12,13 @@ _KEPT = {
     "contact_loss": "contact_loss", "external_work": "external_work", "friction_loss": "friction_loss",
     "_later": "later", "_before": "before",
 }  # fmt: skip
-"""Names in a checkpoint, and attributes."""
+"""Names of the sums in a checkpoint, and names of the attributes that hold the sums."""
 
 
 class BodyAccount:
-    """Work on the rigid bodies of a case, in halves before and after each impulse; equal on all ranks."""
+    """Work on the rigid bodies of a case: half of the work of an impulse is computed with the velocity before the
+    impulse, half with the velocity after it. Equal on all ranks.
+    """
 
     def __init__(self, bodies: Bodies) -> None:
         self._bodies = bodies
@@ -24,7 +26,7 @@ class BodyAccount:
         """(b,) energy lost by impact and friction, work from outside, and the part of the loss by friction on walls,
         J."""
         self.later = np.zeros((3, bodies.n))
-        """(3, b) second halves of these for the last step, J."""
+        """(3, b) second halves of the loss, the work from outside and the wall friction of the last step, J."""
         self.before = np.stack([bodies.speed, bodies.momentum])
         """(2, b, 3) v(n-1/2), m/s, and angular momentum at n-1/2, kg m^2/s."""
 

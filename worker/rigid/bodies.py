@@ -14,7 +14,7 @@ from . import rotation
 from .motion import Held
 
 STATE = ("centre", "q", "speed", "momentum")
-"""Quantities that change from step to step."""
+"""Names of the quantities that change from step to step."""
 
 
 @dataclass
@@ -30,8 +30,8 @@ class Bodies:
     inertia: Floats
     """(b, 3, 3) inertia about the centre, along the axes of the case, at the start, kg m^2."""
     reach: Floats
-    """(b,) a power of two above the distance of any node from the centre, m: the quantum of moments is that of
-    impulses times it."""
+    """(b,) reach: a power of two above the largest distance of a node from the centre, m. The quantum of moments is
+    the quantum of impulses times the reach."""
     held: list[Held]
 
     def __post_init__(self) -> None:
@@ -47,7 +47,8 @@ class Bodies:
         about one."""
         self.free = np.array([each.free for each in self.held]).reshape(n, 3)
         self.turns = np.array([each.turns for each in self.held]).reshape(n, 3)
-        """(b, 3) 1 for axes along which impulses move the body, and about which they turn it; else 0."""
+        """(b, 3) 1 for an axis along which impulses may move the body, else 0; and the same for axes about which
+        impulses may rotate the body."""
         self.loose = np.flatnonzero(self.turns.all(axis=1))
         """Bodies that turn freely."""
         self.lightness = self.free / self.mass[:, None]
@@ -68,7 +69,7 @@ class Bodies:
                 self.compliance[b] = 0.0
                 self.compliance[b, axis, axis] = 1.0 / self.about(b)[axis, axis]
         self.yielding = self.compliance * self.turns[:, :, None]
-        """(b, 3, 3) the same, 0 where the rotation is held."""
+        """(b, 3, 3) inverse of the inertia in space, 0 where the rotation is held."""
 
     def about(self, b: int) -> Floats:
         """Returns the inertia of a body in space, (3, 3), kg m^2."""

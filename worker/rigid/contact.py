@@ -1,4 +1,6 @@
-"""Rigid bodies in the contact of a step: their slots, and the impulses that these receive."""
+"""Rigid bodies in the contact of a step: the slots (contact nodes) of the bodies, and the contact impulses on the
+slots.
+"""
 
 from typing import NamedTuple, Self
 
@@ -13,18 +15,18 @@ from .bodies import Bodies, times
 from .stops import BodyStops
 
 _SMALL = 16
-"""Bits of an impulse that are ignored in the residual of the sweeps (contact/solver/slot_numbers.py)."""
+"""Number of low bits of an impulse that the residual of the sweeps ignores (contact/solver/slot_numbers.py)."""
 
 
 class _Slots(NamedTuple):
-    """Slots of the step that are nodes of rigid bodies."""
+    """Slots (contact nodes of the step) that are nodes of rigid bodies."""
 
     slot: Indices
     """(k,) place among all slots of the step."""
     body: Indices
-    """(k,) body."""
+    """(k,) body of each slot."""
     arm: Floats
-    """(k, 3) from its centre, m."""
+    """(k, 3) vector from the centre of the body to each slot, m."""
     owned: Flags
     """(k,) True if this rank owns the node."""
     node: Indices
@@ -58,7 +60,7 @@ class BodyContacts:
         self._total, self._scale = np.zeros((bodies.n, rows.WORDS), np.int64), 1.0
         """(b, WORDS) impulses of contact in the step, quanta, and quanta per N s."""
         self._changed: Ints = np.zeros((bodies.n, rows.WORDS), np.int64)
-        """(b, WORDS) those of the last sweep."""
+        """(b, WORDS) impulses of contact in the last sweep, quanta."""
         self.active = False
         """True if a contact of this step, on any rank, has a node of a rigid body."""
 

@@ -19,15 +19,15 @@ class Held:
     """Loads and constraints of one body."""
 
     free: Floats = field(default_factory=lambda: np.ones(3))
-    """(3,) 1 for axes along which impulses move it, else 0."""
+    """(3,) 1 for axes along which impulses may move the body, else 0."""
     turns: Floats = field(default_factory=lambda: np.ones(3))
-    """(3,) 1 for axes about which impulses turn it, else 0: all of them, one, or none."""
+    """(3,) 1 for axes about which impulses may rotate the body, else 0; either all axes, one axis or none."""
     driven: dict[int, tuple[float, Course]] = field(default_factory=dict)
-    """Prescribed velocity, m/s, and its factor over time, by axis."""
+    """Prescribed velocity along each axis, m/s, and the factor over time of that velocity."""
     spin: tuple[Floats, Floats] | None = None
     """Point on the axis of a prescribed rotation, m, and the rotation vector, rad/s."""
     pulls: list[tuple[Floats, Course]] = field(default_factory=list)
-    """Accelerations, m/s^2."""
+    """Accelerations of gravity, m/s^2, with their factors over time."""
     prescribed: bool = False
     """True if any motion is prescribed: walls do not stop the body then."""
 

@@ -17,9 +17,10 @@ import numpy as np
 from ..kernels.jit import njit
 
 _ENOUGH = 1e-16
-"""Relative change of the mean that ends the iteration."""
+"""Relative change of the mean angular momentum at which the iteration ends."""
 _MOST = 60
-"""Most fixed-point iterations: each reduces the error by dt times the rate of precession, below a tenth (stage.py)."""
+"""Largest number of fixed-point iterations. Each iteration multiplies the error by dt times the rate of precession,
+which is below a tenth (stage.py)."""
 
 
 @njit("void(float64[:, :, ::1], float64[:, ::1])", cache=True)
@@ -56,8 +57,8 @@ def spatial(out, rotation, tensor):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[:, ::1], float64[:, ::1], float64[:, :, ::1], float64[:, :, ::1], int64[::1], float64)", cache=True)
 def turn(q, momentum, rotation, inverse, which, dt):  # type: ignore[no-untyped-def]
-    """Turns the bodies ``which`` (k,), free ones, by a step ``dt``, s: their ``q`` (b, 4), for the angular ``momentum``
-    (b, 3), kg m^2/s, the ``rotation`` of q, and the inverse of the inertia in the body, 1/(kg m^2).
+    """Rotates the bodies ``which`` (k,), which turn freely, by a step ``dt``, s: their ``q`` (b, 4), for the angular
+    ``momentum`` (b, 3), kg m^2/s, the ``rotation`` of q, and the inverse of the inertia in the body, 1/(kg m^2).
     """
     p, mean, rate = np.empty(3), np.empty(3), np.empty(3)
     for b in which:

@@ -2,9 +2,9 @@
 
 Contacts give integer impulses to slots (contact/solver/sweeps.py), and shared slots are completed as for other nodes.
 On the rank that owns the node of a slot, the impulses and their moments about the centre of the body are summed as
-integers, then over the ranks; the body moves, and its slots with it. So all rows of a body are coupled through its mass
-and inertia, and the sweeps are Jacobi sweeps, as for shared nodes: the norm of a row is bounded by the l1 norm over all
-rows of the body (``norms``), and the result is independent of the order of contacts and ranks.
+integers, then over the ranks; the body moves, and its slots with it. All rows of a body are therefore coupled through
+its mass and inertia, and the sweeps are Jacobi sweeps, as for shared nodes: the norm of a row is bounded by the l1 norm
+over all rows of the body (``norms``), and the result is independent of the order of contacts and ranks.
 """
 
 import numpy as np
@@ -14,10 +14,10 @@ from ..contact.solver.loading import SHARES
 from ..kernels.jit import njit, types
 
 WEIGHTS = 8
-"""Words of the weights of a body: sums over its slots of |w| |n_i|, of |arm x (|w| |n|)|_i over the reach, of |w|,
-of |arm| |w|."""
+"""Number of words of the weights of a body: sums over its slots of |w| |n_i|, of |arm x (|w| |n|)|_i over the reach,
+of |w|, of |arm| |w|."""
 WORDS = 6
-"""Words of an impulse (3), quanta, and a moment (3), quanta times the reach of the body."""
+"""Number of words of an impulse (3), quanta, and a moment (3), quanta times the reach of the body."""
 _F, _F1, _F2, _F3 = types.float64, types.float64[::1], types.float64[:, ::1], types.float64[:, :, ::1]
 _N1, _I2, _B1 = types.int32[::1], types.int64[:, ::1], types.boolean[::1]
 

@@ -27,8 +27,8 @@ from .stopped import stopped
 from .stops import BodyStops
 
 _TURN = 0.1
-"""Largest rotation of a body in a step, rad. Chosen: the phase of a tumbling body is then wrong by a thousandth of a
-turn in each turn, and the path of a node differs from its chord by a thousandth of the arm."""
+"""Largest rotation of a body in a step, rad. Chosen value: the error of the rotation of a tumbling body is then a
+thousandth of a turn in each turn, and the path of a node differs from the chord by a thousandth of the arm."""
 
 
 class Rigid:
@@ -46,7 +46,7 @@ class Rigid:
         """(k,) local nodes of the bodies."""
         self._body: Indices = of[self.nodes]
         self._arms = np.ascontiguousarray(nodes.x0[self.nodes] - bodies.origin[self._body])
-        """(k, 3) arms at the start, m."""
+        """(k, 3) arms (vectors from the centre of the body to the nodes) at the start, m."""
         self.of_part: Indices = np.full(len(case.parts), -1, np.int32)
         """(parts,) body of each part, -1 for none."""
         self.of_part[case.rigid] = np.arange(len(case.rigid), dtype=np.int32)
@@ -57,7 +57,8 @@ class Rigid:
         self._start, self._rate = np.zeros((2, bodies.n, 3)), np.zeros((bodies.n, 3))
         """Velocities and rotation vectors before the impulses of the step; present rotation vectors, rad/s."""
         self.share = 1.0
-        """Share of the last change of the motion in the velocities of the nodes: less than 1 at the end of a run."""
+        """Share of the last change of the motion that the velocities of the nodes contain; less than 1 at the end of
+        a run, when velocities are interpolated to n."""
         self.stops = BodyStops(
             walls, bodies, *stopped(case, nodes, bodies, beside, comm), _restitution(case, walls), _names(case)
         )

@@ -34,6 +34,8 @@ def _by_walls(case: Case, bodies: Bodies) -> Flags:
 
 
 def _by_planes(case: Case, bodies: Bodies, beside: Ints) -> Flags:
-    """Returns the side above each plane, then that below."""
+    """Returns flags (2 planes, b): for each plane of symmetry, which bodies start above the plane, then which start
+    below.
+    """
     side = beside[:, bodies.part]
     return np.stack([side > 0, side < 0], axis=1).reshape(2 * len(case.boundaries_of(Symmetry)), bodies.n)

@@ -11,8 +11,8 @@ r"""Walls that stop rigid bodies: impulses at the nodes of their surfaces.
               wall    V
 
 Bodies, walls and the nodes here are equal on all ranks: every rank computes all impulses, one after the other
-(Gauss-Seidel), without messages. Impulses are kept during a step, within the sweeps of contact and after them, so that
-a body between a wall and another body penetrates neither.
+(Gauss-Seidel), without messages. The impulses are accumulated during a step, within the sweeps of contact and after the
+sweeps, so that a body between a wall and another body penetrates neither of the two.
 """
 
 from typing import NamedTuple
@@ -26,12 +26,12 @@ from ..model.state import Flags, Floats, Indices, Ints
 from .bodies import Bodies, dot
 
 _NEAR = 2.0
-"""Multiple of the motion of a body in a step within which walls are checked."""
+"""Walls are checked for a body within this multiple of the motion of the body in a step."""
 _CLOSE = 1e-3
-"""Share of the reach of a body: added to the distance within which walls are checked, and the depth behind a wall
-that ends the run."""
+"""Length over the reach of a body. It is added to the distance within which walls are checked; a node that ends
+deeper than this behind a wall ends the run."""
 _MOST, _ENOUGH = 200, 1e-12
-"""Most passes over the rows, and the relative change of an impulse that ends them."""
+"""Largest number of passes over the rows, and the relative change of an impulse at which the passes end."""
 
 
 class Rows(NamedTuple):
@@ -52,7 +52,7 @@ class Rows(NamedTuple):
 
     @classmethod
     def room(cls, n: int) -> "Rows":
-        """Returns room for ``n`` rows."""
+        """Allocates arrays for ``n`` rows."""
         return cls(
             np.empty(n, np.int64), np.empty(n, np.int64), np.empty((n, 3)), np.empty((n, 3)), np.empty(n), np.zeros(n),
             np.zeros((n, 3)),
@@ -81,9 +81,11 @@ class BodyStops:
         self.given = np.zeros((walls.n, bodies.n, 3))
         """(walls, b, 3) sum of the impulses of each wall on each body so far, N s."""
         self.impulse, self.rubbed = np.zeros((2, bodies.n, 6))
-        """(b, 6) impulse, N s, and moment, N m s, of the step; and the part of them by friction."""
+        """(b, 6) impulse, N s, and moment, N m s, of the walls on each body in the step, and the part of both that
+        is friction."""
         self.of_walls, self.rubbed_by = np.zeros((2, walls.n, bodies.n, 3))
-        """(walls, b, 3) impulses of the step; and the part of them by friction, N s."""
+        """(walls, b, 3) impulses of each wall on each body in the step, N s, and the part of these impulses that is
+        friction."""
 
     def begin(self, dt: float) -> None:
         """Finds the rows of a step ``dt``, s, at the positions of n, with the velocities before impulses."""
@@ -199,13 +201,13 @@ def press(  # type: ignore[no-untyped-def]
     for _ in range(_MOST):
         largest, moved = 0.0, 0.0
         for r in range(many):
-            # 1.
+            # 1. Compute the velocity of the node relative to the wall.
             b, w = rows.body[r], rows.wall[r]
             x, y, z = rows.arm[r, 0], rows.arm[r, 1], rows.arm[r, 2]
             slip[0] = speed[b, 0] + (rate[b, 1] * z - rate[b, 2] * y) - wall_speed[w, 0]
             slip[1] = speed[b, 1] + (rate[b, 2] * x - rate[b, 0] * z) - wall_speed[w, 1]
             slip[2] = speed[b, 2] + (rate[b, 0] * y - rate[b, 1] * x) - wall_speed[w, 2]
-            # 2.
+            # 2. Compute the compliance along n of body and wall.
             p, q, s = rows.normal[r, 0], rows.normal[r, 1], rows.normal[r, 2]
             turn[0], turn[1], turn[2] = y * s - z * q, z * p - x * s, x * q - y * p
             gives, along = wall_lightness[w], 0.0
@@ -216,7 +218,7 @@ def press(  # type: ignore[no-untyped-def]
                     gives += turn[i] * yielding[b, i, j] * turn[j]
             if not gives > 0.0:
                 continue
-            # 3.
+            # 3. Compute the normal impulse.
             push = max(0.0, rows.push[r] + (rows.least[r] - along) / gives)
             more = push - rows.push[r]
             rows.push[r] = push
@@ -226,7 +228,7 @@ def press(  # type: ignore[no-untyped-def]
             _give(b, w, x, y, z, change, speed, rate, lightness, yielding, wall_speed, wall_lightness, impulse, given)
             if friction[w] == 0.0 or (push == 0.0 and more == 0.0):
                 continue
-            # 4.
+            # 4. Compute the friction.
             slip[0] = speed[b, 0] + (rate[b, 1] * z - rate[b, 2] * y) - wall_speed[w, 0]
             slip[1] = speed[b, 1] + (rate[b, 2] * x - rate[b, 0] * z) - wall_speed[w, 1]
             slip[2] = speed[b, 2] + (rate[b, 0] * y - rate[b, 1] * x) - wall_speed[w, 2]

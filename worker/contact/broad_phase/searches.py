@@ -61,7 +61,7 @@ class Searches:
         self._last = -math.inf
         """Step of the last search from nothing."""
         self._kept: tuple[Ints, Floats] = np.zeros((0, 2), np.int64), np.zeros((0, 4))
-        """Pairs and their stored impulses, from before a cut or a restart, for the next search."""
+        """Pairs and their stored impulses, from before a repartition or a restart, for the next search."""
 
     @cached_property
     def rubs(self) -> bool:
@@ -83,7 +83,9 @@ class Searches:
         )
 
     def keep(self, parcel: Parcel) -> None:
-        """Adds the stored impulses of pairs to the ``parcel``; the candidates are found again by a search."""
+        """Adds the stored impulses of pairs to the ``parcel`` (a checkpoint or migration message); the candidates are
+        found again by a search.
+        """
         keys, kept = self._kept if self.scene is None else self.scene.kept
         parcel.rows["contact.kept"] = {"node": keys[:, 0], "face": keys[:, 1], "kept": kept}
 

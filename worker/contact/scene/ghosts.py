@@ -114,7 +114,9 @@ def _company(node: Ints, holder: Ints, group: Ints, member: int) -> Ints:
 
 
 class Copies:
-    """Persistent messages of the ghosts' state: positions and velocities, before and after the kick, in every step."""
+    """Persistent MPI messages of the state of ghosts: positions and velocities before and after the kick, in every
+    step.
+    """
 
     def __init__(self, sends: list[Neighbour], receives: list[Neighbour], comm: Comm, tag: Tag) -> None:
         """``sends``: local nodes; ``receives``: slots of the ghosts."""

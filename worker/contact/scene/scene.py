@@ -28,7 +28,7 @@ from .near_surface import Rules
 
 @dataclass
 class Messages:
-    """Persistent messages between ranks, in every step."""
+    """Persistent MPI messages between ranks, in every step."""
 
     company: SharedSums
     """Sums over the nodes with impulses of several ranks."""

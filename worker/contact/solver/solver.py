@@ -67,7 +67,7 @@ class ActiveSet:
         """Number of the sweep, and of all sweeps of the step."""
 
     def go_on(self, scale: float, sides: Floats) -> None:
-        """Sets the scale, and the ``sides`` of the stops, after a restart or a cut."""
+        """Sets the scale, and the ``sides`` of the stops, after a restart or a repartition."""
         self.scale, self.stops = scale, self.stops._replace(sides=sides.reshape(self.stops.sides.shape))
 
     def begin(
