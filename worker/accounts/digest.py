@@ -10,11 +10,11 @@ from ..parallel.comm import Comm
 
 
 def digest(model: Model, comm: Comm, nodal: list[Floats], more: bytes = b"") -> str | None:
-    """Return the hex digest on rank 0, None on the others. Collective.
+    """Return the hex digest on rank 0, None on the others.
 
-    It covers positions, velocities, the other ``nodal`` arrays, every row of the tets' state except VOLUME_FLUX,
-    which is scratch or a volume that follows from the positions, and the bytes ``more``, which are equal on all
-    ranks.
+    Collective. The digest covers positions, velocities, the other ``nodal`` arrays, every row of the state of the
+    tets except VOLUME_FLUX, and the bytes ``more``, which are equal on all ranks. VOLUME_FLUX is omitted, because it
+    is scratch or a volume that follows from the positions.
     """
     nodes, h = model.nodes, hashlib.sha256()
     owned = nodes.owned

@@ -22,53 +22,56 @@ from .sums import Sums, Totals
 
 
 class Ledger:
-    """The lines of all ranks; equal on all ranks. Construction sets the initial energy. Collective."""
+    """The energies (lines) of the ledger, summed over all ranks; equal on all ranks.
+
+    Construction sets the initial energy. Collective.
+    """
 
     def __init__(self, sums: Sums, parts: list[str]) -> None:
-        """``parts``: their names."""
+        """``parts``: names of the parts."""
         self._sums, self._names = sums, parts
         self.initial = sums.kinetic()
         self.worst = 0.0
         """Largest residual so far."""
         self.making = Making(sums.rounding())
-        """Energy that single lines have made."""
+        """Energy that single lines of the ledger have made."""
         self.lost = 0.0
-        """Share of the initial energy lost to contact, with friction, at the last call."""
+        """Energy lost to contact, with friction, at the last call, as a share of the initial energy."""
         self.residual = 0.0
-        """Difference of the lines over the largest energy, at the last call: of the energy received so far, the work of
-        the stress and the kinetic energy."""
+        """Residual at the last call: difference of the lines, divided by the largest energy. The largest energy is
+        the maximum of the energy received so far, the work of the stress and the kinetic energy."""
         self.beyond = 0.0
-        """Kinetic energy above all that was received, over the same, at the last call: the sum of the other lines is
-        negative."""
+        """Kinetic energy in excess of all received energy at the last call, divided by the same largest energy. The
+        sum of the other lines is then negative."""
         self.unpaid = 0.0
-        """Largest decrease of the energy lost to fracture so far, over the energy that all broken facets absorb:
-        facets released more than they had absorbed."""
+        """Largest decrease of the energy lost to fracture so far, divided by the energy that all broken facets
+        absorb. A decrease means that facets released more energy than they had absorbed."""
         self._taken = 0.0
         """Largest energy lost to fracture so far, J."""
         self.came = self.initial
         """Largest energy received so far, J."""
         self.momentum = np.zeros(3)
-        """Linear momentum at the last call, kg m/s, with that of removed nodes."""
+        """Linear momentum at the last call, kg m/s, including removed nodes."""
         self.angular_momentum = np.zeros(3)
-        """Angular momentum about the origin, kg m^2/s, likewise."""
+        """Angular momentum about the origin at the last call, kg m^2/s, including removed nodes."""
         self.eroded_mass = 0.0
         """Mass of removed nodes at the last call, kg."""
         self.parts: dict[str, PartEnergy] = {}
         """Energies of each part at the last call; empty if there is one part."""
 
     def keep(self) -> tuple[Any, ...]:
-        """Return the state for a checkpoint, equal on all ranks."""
+        """Return the state of the ledger for a checkpoint, equal on all ranks."""
         largest = self.initial, self.came, self.worst, self.lost, self._taken, self.unpaid
         return largest, self.momentum, self.angular_momentum, self.eroded_mass, self.making.keep()
 
     def resume(self, known: tuple[Any, ...]) -> None:
-        """Set the state of ``keep``."""
+        """Set the state of the ledger to ``keep``."""
         largest, self.momentum, self.angular_momentum, self.eroded_mass, made = known
         self.making.resume(made)
         self.initial, self.came, self.worst, self.lost, self._taken, self.unpaid = largest
 
     def close(self, before: Floats) -> Energy:
-        """Return the ledger at time n. Collective. ``before`` is v(n-1/2) (nodes, 3), the model holds v(n+1/2)."""
+        """Return the ledger at time n. Collective. ``before`` is v(n-1/2) (nodes, 3); the model has v(n+1/2)."""
         sums = self._sums.take(before)
         self._set(sums)
         kinetic, loss, external, stepping = (float(sums.nodal[k]) for k in (0, 1, 2, 6))
@@ -102,7 +105,10 @@ class Ledger:
         self.unpaid = max(self.unpaid, (self._taken - lost) / whole if whole > 0.0 else 0.0)
 
     def _judge(self, total: float, kinetic: float, external: float, work: float) -> float:
-        """Set the residual; return the largest energy, J. ``total``: sum of the lines; ``work``: of the stress."""
+        """Set the residual and return the largest energy, J.
+
+        ``total``: sum of the lines; ``work``: work of the stress.
+        """
         self.came = max(self.came, abs(external))
         scale = max(self.came, work, kinetic)
         left = abs(total - self.initial - external)
@@ -123,8 +129,10 @@ class Ledger:
         return residuals + self.making.warnings(safety)
 
     def require(self, run: Run, safety: float, when: str) -> None:
-        """Raise EnergyError if a limit of ``run`` is exceeded: run.residual_limit by the last call, run.made_limit by
-        any; ``safety``: numerics.dt_safety.
+        """Raise EnergyError if a limit of ``run`` is exceeded.
+
+        The residual of the last call is compared with run.residual_limit, the energy made in any call with
+        run.made_limit. ``safety``: numerics.dt_safety.
         """
         limit = run.residual_limit
         for what, share in (
@@ -137,6 +145,6 @@ class Ledger:
 
 
 def _named(parts: list[str], kinetic: Floats, internal: Floats) -> dict[str, PartEnergy]:
-    """Return the energies by part; none if there is one part."""
+    """Return the energies of each part; an empty result if there is one part."""
     rows = zip(parts, kinetic.tolist(), internal.tolist(), strict=True)
     return {part: PartEnergy(kinetic=k, internal=i) for part, k, i in rows} if len(parts) > 1 else {}

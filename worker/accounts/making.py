@@ -27,47 +27,48 @@ LASTING = ("plastic", "viscous", "friction", "fracture")
 RETURNED = ("contact", "averaging", "eroded", "cohesive")
 STEPPING = "stepping"
 WARNED = 0.01
-"""Share of the largest energy that a line may make without a warning. Chosen: the usual accuracy of reference
-values."""
+"""Energy that a line may make without a warning, as a share of the largest energy. The value was chosen: it is the
+usual accuracy of reference values."""
 STRAIN = 1e-10
-"""Volume strain of the whole model below whose energy everything is round-off: positions are rounded to some 1e-16
-of a coordinate, so strains to 1e-15, and the energy of this strain is accurate to 1e-5 of itself."""
+"""Volume strain of the whole model. Energies below the energy of this strain are round-off: positions are rounded to
+some 1e-16 of a coordinate, so strains are rounded to 1e-15, and the energy of this strain is accurate to 1e-5 of
+itself."""
 
 
 class Made(NamedTuple):
     """The largest energy that a line has made."""
 
     share: float
-    """Share of the largest energy until then."""
+    """Energy made by the line, divided by the largest energy until then."""
     t: float
-    """Time, s."""
+    """Time at which the share was largest, s."""
 
 
 class Making:
-    """Energy that each line has made so far; equal on all ranks."""
+    """Energy that each line of the ledger has made so far; equal on all ranks."""
 
     def __init__(self, rounding: float) -> None:
-        """``rounding``: energy below which no line is judged, J."""
+        """``rounding``: largest energy, J, at which no line is judged."""
         self._rounding = rounding
         self._largest = dict.fromkeys(LASTING, 0.0)
         self._energy = 0.0
         self.worst: dict[str, Made] = {}
-        """By the name of the line, for lines that have made any energy."""
+        """Energy made, by the name of the line; only lines that have made energy."""
 
     def keep(self) -> tuple[dict[str, float], float, dict[str, tuple[float, float]]]:
-        """Return the state for a checkpoint."""
+        """Return the state of the object for a checkpoint."""
         return self._largest, self._energy, {name: (made.share, made.t) for name, made in self.worst.items()}
 
     def resume(self, known: tuple[dict[str, float], float, dict[str, tuple[float, float]]]) -> None:
-        """Set the state of ``keep``."""
+        """Set the state of the object to ``keep``."""
         self._largest, self._energy, worst = known
         self.worst = {name: Made(*made) for name, made in worst.items()}
 
     def look(self, energy: Energy, largest: float, t: float, heat: float = 0.0) -> None:
-        """Add the lines of time ``t``, s.
+        """Add the lines of the ledger at time ``t``, s.
 
-        ``largest``: the largest of received energy, work of the stress and kinetic energy, J; ``heat``: heat of
-        eroded matter whose pressure depends on it, J.
+        ``largest``: maximum of received energy, work of the stress and kinetic energy, J; ``heat``: heat of eroded
+        matter with a pressure that depends on heat, J.
         """
         self._energy = max(self._energy, largest)
         found = {name: -getattr(energy, name) for name in RETURNED}
@@ -85,7 +86,7 @@ class Making:
                 self.worst[name] = Made(share, t)
 
     def ranked(self) -> list[tuple[str, Made]]:
-        """Return the lines that have made energy, the worst first."""
+        """Return the lines that have made energy, in descending order of this energy."""
         return sorted(self.worst.items(), key=lambda item: (-item[1].share, item[0]))
 
     def require(self, limit: float, safety: float, when: str) -> None:
@@ -106,7 +107,7 @@ class Making:
 
 
 def _cure(name: str, share: float, safety: float) -> str:
-    """Return the remedy, as far as it is derived and measured (docs/theory/energy.md, Energy that a line makes)."""
+    """Return the remedy, if one is derived and measured in docs/theory/energy.md, "Energy that a line makes"."""
     if name == STEPPING:
         wanted = safety * math.sqrt(0.5 * WARNED / share)
         return f"; it falls with the square of the step: numerics.dt_safety = {wanted:.2g} would leave half a per cent"

@@ -5,7 +5,7 @@ from ..parallel.arguments import reader
 from ..parallel.team import TASK
 
 NODAL = 10
-"""Rows of ``of_nodes``."""
+"""Number of rows of ``of_nodes``."""
 _F, _F1, _F2 = types.float64, types.float64[::1], types.float64[:, ::1]
 OF_NODES = _F2, _F2, _F2, _F2, types.int64[:, ::1], _F, _F1, _F1, _F1, _F1, types.boolean[::1]
 """Types of the arguments of ``of_nodes``."""
@@ -40,8 +40,8 @@ def of_nodes(table, first, stop, thread):  # type: ignore[no-untyped-def]
         half, x, y, z = 0.5 * mass[a], before[a, 0], before[a, 1], before[a, 2]
         power = x * force[a, 0] + y * force[a, 1] + z * force[a, 2]
         squares = x * v[a, 0] + y * v[a, 1] + z * v[a, 2]
-        # 1/2 m v(n-1/2) . v(n+1/2) + 1/4 (dt- - dt+) v(n-1/2) . f(n); the kick has booked the second term as a loss
-        # already, so the loss is less by it until n
+        # 1/2 m v(n-1/2) . v(n+1/2) + 1/4 (dt- - dt+) v(n-1/2) . f(n); the kick has already booked the second term
+        # as a loss, so the loss is reduced by this term until time n
         out[0, a], out[1, a], out[2, a] = half * squares + shorter * power, loss[a], external[a]
         # p(n) = m (v(n-1/2) + v(n+1/2)) / 2
         p, q, r = half * (x + v[a, 0]), half * (y + v[a, 1]), half * (z + v[a, 2])

@@ -1,7 +1,8 @@
 """Sums of the energy ledger at time n, over the nodes, tets, boundaries, facets and bonds of all ranks.
 
-All are made in one reduction and part by part, in the quanta of the whole model: the sums of the whole are sums of the
-same integers, so that their bits do not depend on the parts, and the sums of parts cost no further pass.
+One reduction makes all sums, for each part and for the whole model, in the quanta of the whole model. The sums of
+the whole model add the same integers as the sums of the parts, so their bits do not depend on the parts. The sums of
+parts need no further pass.
 """
 
 from dataclasses import dataclass, field
@@ -34,7 +35,7 @@ class Eroded:
     """Accounts of removed tets and nodes."""
 
     works: Floats
-    """(5,) WORKS of the tets, and the heat in their pressure, J."""
+    """(5,) WORKS of the tets, and the part of their heat on which their pressure depends, J."""
     kinetic: float = 0.0
     """Kinetic energy of the nodes, J."""
     mass: float = 0.0
@@ -48,18 +49,18 @@ class Totals:
     """The sums at time n."""
 
     t: float
-    """Time n, s."""
+    """Time at step n, s."""
     nodal: Floats
-    """(NODAL,) rows of ``nodal.of_nodes`` over all nodes, rigid bodies and walls."""
+    """(NODAL,) sums of the rows of ``nodal.of_nodes`` over all nodes, rigid bodies and walls."""
     works: Floats
-    """(4,) WORKS over all tets, J."""
+    """(4,) sums of WORKS over all tets, J."""
     kinetic: Floats
-    """(parts,) kinetic energy, J."""
+    """(parts,) kinetic energy of each part, J."""
     internal: Floats
-    """(parts,) work of the stress and of the bulk viscosity, J."""
+    """(parts,) work of the stress and of the bulk viscosity in each part, J."""
     eroded: Eroded
     facets: tuple[float, float, float]
-    """Cohesive facets, J: energy lost, stored, and lost in all once they have failed."""
+    """Energies of cohesive facets, J: dissipated, recoverable, and the fracture energy of all facets ever inserted."""
     bonds: list[float]
     """Energy lost by bonds of meshes that do not match, J."""
     friction: float
@@ -67,21 +68,21 @@ class Totals:
 
 
 class Sums:
-    """Makes the sums. Every public method is collective."""
+    """Makes the sums of the ledger. Every public method is collective."""
 
     def __init__(
         self, model: Model, boundaries: list[Boundary], contact: Contact | None, bonds: Bonds | None,
         erosion: Erosion | None, fracture: Fracture | None, undeformed: tuple[Rigid | None, Walls], comm: Comm,
         clock: Clock, team: Team,
     ) -> None:  # fmt: skip
-        """``undeformed``: rigid parts and walls; ``team``: threads of the pass over the nodes."""
+        """``undeformed``: rigid parts and walls; ``team``: threads for the pass over the nodes."""
         self._pass, self._columns = Pass(team, of_nodes, *OF_NODES), np.empty(0)
         self._model, self._boundaries, self._contact, self._bonds = model, boundaries, contact, bonds
         self._erosion, self._undeformed, self._comm, self._clock = erosion, undeformed, comm, clock
         self._cohesion = fracture.cohesion if fracture is not None else None
 
     def kinetic(self) -> float:
-        """Return the kinetic energy of the velocities of the model, J."""
+        """Return the kinetic energy of the present velocities of the model, J."""
         nodes = self._model.nodes
         energy = 0.5 * nodes.mass * (nodes.v * nodes.v).sum(axis=1)
         return self._node_sum(energy, self._counted()) + energy_of(*self._undeformed)
@@ -95,7 +96,7 @@ class Sums:
         return self._node_sum(0.5 * STRAIN * STRAIN * nodes.mass * bulk[nodes.part], nodes.owned)
 
     def take(self, before: Floats) -> Totals:
-        """Return the sums at time n; ``before`` is v(n-1/2) (nodes, 3), the model holds v(n+1/2)."""
+        """Return the sums at time n. ``before`` is v(n-1/2) (nodes, 3); the model has v(n+1/2)."""
         tables, tallies = self._tables(before), self._tallies()
         words = np.concatenate([np.zeros(0, np.int64), *(tally.words.reshape(-1) for tally in tallies.values())])
         sums, of_parts, words = totals_and_words(self._comm, [each for some in tables.values() for each in some], words)
@@ -115,8 +116,8 @@ class Sums:
         )  # fmt: skip
 
     def _tables(self, before: Floats) -> dict[str, list[Columns]]:
-        """Return the columns that are summed, in the order of the sums: NODAL, WORKS, one for each boundary with
-        friction, one for bonds, and those of cohesive facets.
+        """Return the columns to be summed, in the order of the sums: NODAL, WORKS, one for each boundary with
+        friction, one for bonds, and the columns of cohesive facets.
         """
         nodes, parts = self._model.nodes, len(self._model.parts)
         tables: dict[str, list[Columns]] = {
@@ -159,7 +160,7 @@ class Sums:
         return loss, external
 
     def _tallies(self) -> dict[str, Tally]:
-        """Return the sums that are accumulated over the run."""
+        """Return the sums that are accumulated over the whole run."""
         found = {}
         if self._contact is not None:
             found["friction"] = self._contact.books.friction
@@ -186,14 +187,14 @@ class Sums:
         return float(exact_sums(self._comm, values[counted][:, None])[0])
 
     def _counted(self) -> Flags:
-        """Return (nodes,) the nodes that this rank counts: nodes that it owns, without those of rigid parts."""
+        """Return (nodes,) which nodes this rank counts: nodes that it owns, except nodes of rigid parts."""
         nodes, rigid = self._model.nodes, self._undeformed[0]
         return nodes.owned if rigid is None else nodes.owned & (rigid.of_part[nodes.part] < 0)
 
 
 def _by_part(columns: Floats, nodes: Nodes) -> tuple[Floats, Indices]:
-    """Return (n, NODAL) rows of ``columns`` (NODAL, nodes), and their parts (n,): a node of several parts has a row for
-    each, by mass.
+    """Return (n, NODAL) rows of ``columns`` (NODAL, nodes), and their parts (n,). A node of several parts has a row
+    for each of its parts; its values are divided by mass.
     """
     shares = nodes.shares
     if not len(shares.node):

@@ -15,7 +15,7 @@ from ..parallel.comm import Comm
 from ..parallel.team import Team
 
 PHASES = ("elements", "exchange", "nodes", "contact", "fracture", "output", "balance", "rest")
-"""``rest`` is the time between the others."""
+"""Phases of the step. ``rest`` is the time between the other phases."""
 
 
 def worked(comm: Comm) -> float:
@@ -24,7 +24,7 @@ def worked(comm: Comm) -> float:
 
 
 def by_phase(seconds: Sequence[dict[str, float]]) -> dict[str, list[float]]:
-    """Return for each phase one number a rank, from the ``seconds`` by phase of each; {} for no ranks."""
+    """Return for each phase a list with one number per rank; {} for no ranks. ``seconds``: of each rank, by phase."""
     return {name: [each[name] for each in seconds] for name in PHASES} if seconds else {}
 
 
@@ -38,23 +38,24 @@ def _less(now: dict[str, float], before: dict[str, float]) -> dict[str, float]:
 
 @dataclass
 class Spent:
-    """Seconds by phase, and of all phases the waiting."""
+    """Seconds by phase, and the waiting time of all phases together."""
 
     cpu: dict[str, float] = field(default_factory=_none)
-    """CPU time of this thread."""
+    """CPU time of this thread by phase."""
     serial: dict[str, float] = field(default_factory=_none)
-    """Wall time outside of regions, without the waiting. It includes the time of other programs on the same core."""
+    """Wall time outside of regions by phase, without the waiting. It includes the time of other programs on the same
+    core."""
     parallel: dict[str, float] = field(default_factory=_none)
-    """Wall time in regions."""
+    """Wall time in regions by phase."""
     waiting: float = 0.0
-    """CPU time in calls that wait for other ranks; it is part of ``exchange`` of ``cpu``, too."""
+    """CPU time in calls that wait for other ranks. It is also part of ``exchange`` of ``cpu``."""
     helped: float = 0.0
-    """Time of the other threads in tasks, all together."""
+    """Time of the other threads of the rank in tasks, summed over these threads."""
     projected: dict[int, dict[str, float]] = field(default_factory=dict)
-    """By number of threads: ``cpu`` without the waiting, as estimated for so many threads (parallel/projecting.py)."""
+    """Estimate of ``cpu`` without the waiting, by number of threads (parallel/projecting.py)."""
 
     def since(self, before: "Spent") -> "Spent":
-        """Return the difference from an earlier state."""
+        """Return the difference between this state and an earlier state."""
         return Spent(
             _less(self.cpu, before.cpu), _less(self.serial, before.serial), _less(self.parallel, before.parallel),
             self.waiting - before.waiting, self.helped - before.helped,
@@ -69,7 +70,7 @@ class Spent:
         }  # fmt: skip
 
     def copy(self) -> "Spent":
-        """Return a copy."""
+        """Return a copy of the times."""
         projected = {crew: dict(seconds) for crew, seconds in self.projected.items()}
         return Spent(dict(self.cpu), dict(self.serial), dict(self.parallel), self.waiting, self.helped, projected)
 
@@ -102,12 +103,14 @@ class Timers:
         self._reported, self._helped = self.spent.copy(), self._team.helped
 
     def phase(self, name: str) -> "_Phase":
-        """Return a context whose time is added to a phase; a phase within it subtracts its own time."""
+        """Return a context whose time is added to a phase. The time of a phase inside of it is subtracted."""
         return self._blocks[name]
 
     def switch(self, name: str) -> str:
-        """End the present phase, which is returned, and begin another. Each change reads the clock of the thread, a
-        system call of up to 1 us: a step makes as few as possible.
+        """End the present phase, begin another one, and return the phase that ended.
+
+        Each change of phase reads the clock of the thread, a system call of up to 1 us. Therefore a step has as few
+        changes of phase as possible.
         """
         cpu, wall, waited, within = cpu_time(), wall_time(), self._comm.waited, self._team.within
         ended, spent = self._phase, self.spent
@@ -125,7 +128,7 @@ class Timers:
         return ended
 
     def _project(self, phase: str, serial: float) -> None:
-        """Add to a phase the CPU time outside of regions, and the estimated time of each crew in them."""
+        """Add to a phase the CPU time outside of regions, and the estimated time of each crew in regions."""
         assert self._team.projecting is not None
         spans = self._team.projecting.spans
         for seconds, now, before in zip(self.spent.projected.values(), spans, self._spans, strict=True):
@@ -133,7 +136,7 @@ class Timers:
         self._spans = spans
 
     def since_last(self) -> Spent:
-        """Return the time since the last call; called between phases."""
+        """Return the time since the last call of this method; called between phases."""
         self.switch(self._phase)
         self.spent.helped = self._team.helped - self._helped
         added = self.spent.since(self._reported)
@@ -142,7 +145,7 @@ class Timers:
 
 
 class _Phase:
-    """Context of a phase; a class, since two dozen run in every step and generators take longer."""
+    """Context of a phase. It is a class, since a step opens two dozen contexts and generators take longer."""
 
     __slots__ = ("_name", "_outer", "_timers")
 

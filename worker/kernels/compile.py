@@ -25,29 +25,31 @@ from ..run.signals import REQUESTS
 from . import store
 
 Tell = Callable[[int, int], None]
-"""Callback for the progress, every few seconds: number of compiled kernels, and of all."""
+"""Callback for the progress, called every few seconds: number of compiled kernels, and number of all kernels."""
 
 COMPLETE = "complete"
 """File in the cache folder that marks all kernels as compiled."""
 WORD_EVERY = 3.0
-"""s between two reports of the progress. Chosen."""
+"""Interval between two reports of the progress, s. Chosen value."""
 _MOST = 4
-"""Largest number of children: the longest chain of modules holds 27 % of the machine code."""
+"""Largest number of child processes: the longest chain of modules holds 27 % of the machine code."""
 _MOST_WORDS = 500
-"""Characters of numba's report that are kept: the error comes first."""
+"""Number of characters of a numba error report that are kept: the error is at its beginning."""
 _PATIENCE = 900.0
-"""Time limit of a module, s: the largest takes ten on an idle core."""
+"""Time limit for the compilation of a module, s: the largest module takes ten seconds on an idle core."""
 _HASH = "hash"
-"""File in a module's folder that marks all its kernels as compiled, and contains the hash of their sources."""
+"""File in the folder of a module. It marks all kernels of the module as compiled, and contains the hash of their
+sources."""
 _LOCK, _LOOK = "lock", 0.3
-"""Lock file of the program that compiles, and s between two tests of it: a tenth of WORD_EVERY."""
+"""Lock file of the program that compiles, and interval between two tests of the lock, s: a tenth of WORD_EVERY."""
 
 
 def compile_all(folder: Path, tell: Tell, root: Path = store.ROOT, package: str = "conoid.worker") -> bool:
     """Compiles every kernel below ``root`` that ``folder`` lacks; returns False if none is missing. Raises
     CompileError.
 
-    One program compiles at a time: another one waits for it, and continues if it is killed.
+    Only one program compiles at a time. Another program waits, and continues the compilation if the first one is
+    killed.
     """
     if (folder / COMPLETE).exists():
         return False
@@ -98,12 +100,12 @@ def _alone(folder: Path, said: _Saying) -> Iterator[None]:
 
 @dataclass(frozen=True)
 class _Module:
-    """A file with kernels."""
+    """A source file with kernels."""
 
     name: str
-    """Name for Python's import, and of its folder."""
+    """Name of the module for Python's import, and name of its cache folder."""
     hash: str
-    """Hash of all sources that its kernels depend on."""
+    """Hash of all sources on which the kernels of the module depend."""
 
     @classmethod
     def of(cls, path: Path, root: Path, package: str) -> "_Module":
@@ -111,8 +113,8 @@ class _Module:
         return cls(name, store.module_hash(path, root))
 
     def take_over(self, folder: Path) -> bool:
-        """Links its kernels from another folder beside ``folder``, unless they are in it; returns whether they are
-        complete.
+        """Links the kernels of the module from another folder beside ``folder``, unless ``folder`` has them; returns
+        whether all kernels are present.
         """
         own = folder / self.name
         if self._whole(own):
@@ -123,7 +125,7 @@ class _Module:
         return False
 
     def done(self, folder: Path) -> None:
-        """Marks its kernels in the folder as complete."""
+        """Marks the kernels of the module in the folder as complete."""
         own = folder / self.name
         own.mkdir(exist_ok=True)
         (own / _HASH).write_text(self.hash)
@@ -135,7 +137,7 @@ class _Module:
             return False
 
     def _link(self, other: Path, own: Path) -> bool:
-        """Returns False if files cannot be linked: the kernels are compiled then."""
+        """Links files; returns False if links are impossible. The kernels are compiled in that case."""
         try:
             own.mkdir(exist_ok=True)
             for path in other.glob("*.nb[ci]"):
@@ -147,12 +149,12 @@ class _Module:
         return True
 
 
-# The order --------------------------------------------------------------------------------------------------------
+# Order of the modules ---------------------------------------------------------------------------------------------
 
 
 def _order(files: set[Path]) -> dict[Path, set[Path]]:
-    """Returns for each file those that must come before it; files that begin the longest chains of source come
-    first.
+    """Returns for each file the files that must be compiled before it. Files that begin the longest chains of source
+    come first.
     """
     needs = {path: _needed(path, files) for path in files}
     length = {path: len(path.read_text(encoding="utf-8")) for path in files}
@@ -168,7 +170,7 @@ def _needed(path: Path, files: set[Path]) -> set[Path]:
 
 
 def _in_parallel(needs: dict[Path, set[Path]], folder: Path, said: _Saying, modules: dict[Path, _Module]) -> None:
-    """Compiles the files of ``needs``, each after those that it needs, with as many children as there are cores."""
+    """Compiles the files of ``needs``, each after the files that it needs, with as many children as there are cores."""
     children: queue.SimpleQueue[_Child] = queue.SimpleQueue()
     number = min(_MOST, len(os.sched_getaffinity(0)), len(needs))
     done: set[Path] = set()
@@ -200,7 +202,7 @@ def _by_one(children: "queue.SimpleQueue[_Child]", module: str) -> None:
     children.put(child)
 
 
-# The children -----------------------------------------------------------------------------------------------------
+# Child processes --------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -234,7 +236,7 @@ class _Child:
 
 @contextmanager
 def _child(folder: Path) -> Iterator[_Child]:
-    """Starts a child that compiles into ``folder``; it ends with the block, and when this process dies."""
+    """Starts a child that compiles into ``folder``. The child ends with the block, and when this process dies."""
     command = [sys.executable, "-m", "conoid.worker.kernels.compile", "--child"]
     environment = os.environ | {store.VARIABLE: str(folder), "NUMBA_NUM_THREADS": "1"}
     pipe = subprocess.PIPE
@@ -249,8 +251,8 @@ def _child(folder: Path) -> Iterator[_Child]:
 
 
 def _serve() -> int:
-    """Runs the child: imports the modules named on standard input, compiles their kernels, and names each module when
-    it is done. Returns the exit code.
+    """Runs the child: imports the modules named on standard input, compiles their kernels, and writes the name of each
+    finished module. Returns the exit code.
 
     Only the answers go to standard output; all other output goes to standard error.
     """

@@ -31,27 +31,28 @@ __all__ = ["DECLARED", "Kernel", "intrinsic", "njit", "packed", "prefetch", "rec
 
 _BLAS = "scipy.linalg"
 _TO_READ, _TO_SECOND, _DATA = 0, 2, 1
-"""Arguments of LLVM's prefetch: for reading, into the second-level cache, of data."""
+"""Arguments of LLVM's prefetch instruction: prefetch for reading, into the second-level cache, of data."""
 FunctionIdentity._unique_ids = iter(lambda: int.from_bytes(os.urandom(8), "big"), None)  # type: ignore[assignment]
-"""Random numbers by which numba distinguishes functions of one name; by default it counts them in each process. If
-two kernels from different processes have functions of one name and number, the first that is loaded serves both:
-kernels could call each other's sorting, and crash (numba issue 10486)."""
+"""Random numbers by which numba distinguishes functions of one name. By default numba counts the functions of each
+process. Two kernels from different processes may then have functions with the same name and number, and the function
+that is loaded first serves both kernels: kernels could call each other's sorting, and crash (numba issue 10486)."""
 _MAKERS = {
     "arange", "argsort", "array", "concatenate", "copy", "cumsum", "empty", "full", "ones", "sort", "unique", "zeros",
 }  # fmt: skip
-"""Names of functions and methods that make arrays. numba refuses to compile a kernel that makes arrays by others, or
-by assigning whole rows, without reference counts: such a kernel is declared with ``_nrt=True``."""
+"""Names of functions and methods that make arrays; kernels that call them need reference counts. numba refuses to
+compile a kernel without reference counts that makes arrays in another way, or assigns whole rows: such a kernel is
+declared with ``_nrt=True``."""
 DECLARED: list["Kernel"] = []
 """All kernels of the imported modules."""
 
 
 def _folder() -> str:
-    """Returns the folder of all kernels, "" if it is not set."""
+    """Returns the folder of all kernels; "" if no folder is set."""
     return str(config.CACHE_DIR)  # type: ignore[attr-defined]
 
 
 class _ModuleFolder(_CacheLocator):
-    """Locator for numba: folder of the kernels of a module, below the folder named by the sources
+    """Locator of cache files for numba: the folder of the kernels of a module, below the folder named by the sources
     (kernels/store.py).
     """
 
@@ -61,22 +62,23 @@ class _ModuleFolder(_CacheLocator):
         os.makedirs(self._path, exist_ok=True)
 
     def get_cache_path(self) -> str:
-        """Returns the folder."""
+        """Returns the cache folder of the module."""
         return self._path
 
     def get_source_stamp(self) -> str:
-        """Returns a constant: other sources have another folder."""
+        """Returns a constant instead of a stamp of the sources: other sources have another folder."""
         return ""
 
     def get_disambiguator(self) -> str:
-        """Returns the part of a file name that numba's default sets to the line of the kernel: empty, since
-        docstrings move lines. Kernels of one name share an index, in which numba finds them by their byte code.
+        """Returns the part of a file name that by default contains the line of the kernel: empty here, since
+        docstrings move lines. Kernels of one name share an index file. numba finds a kernel in this index by its
+        byte code.
         """
         return ""
 
     @classmethod
     def from_function(cls, function: Callable[..., Any], file: str) -> "_ModuleFolder | None":
-        """Returns None if the folder is not set or cannot be made: numba uses its own default then."""
+        """Returns None if the folder is not set or cannot be made: numba uses its default folder in that case."""
         try:
             return cls(function, file) if _folder() else None
         except OSError:
@@ -95,20 +97,22 @@ class Kernel(CPUDispatcher):
     """A compiled function with one signature."""
 
     signature: Any = ""
-    """Signature as declared: in numba's notation, or made of its ``types``."""
+    """Signature as declared, in numba's notation, or a signature made from ``types``."""
     _address: int | None = None
 
     @property
     def result(self) -> Any:
-        """Type of the result."""
+        """Type of the result of the kernel."""
         return normalize_signature(self.signature)[1]  # type: ignore[no-untyped-call]
 
     def enable_caching(self) -> None:
-        """Sets the folder of the module as cache of the kernel."""
+        """Sets the cache folder of the kernel to the folder of its module."""
         self._cache = _Cache(self.py_func)  # type: ignore[no-untyped-call]
 
     def load(self) -> None:
-        """Compiles the kernel and the kernels that it calls, or loads them from the cache; once, from any thread."""
+        """Compiles the kernel and the kernels that it calls, or loads them from the cache. This happens once, in any
+        thread.
+        """
         with global_compiler_lock:
             if self.overloads:
                 return
@@ -119,7 +123,7 @@ class Kernel(CPUDispatcher):
 
     @property
     def address(self) -> int:
-        """Address of its machine code, for calls with the calling convention of C."""
+        """Address of the machine code of the kernel, for calls with the calling convention of C."""
         if self._address is None:
             self.load()
             compiled: Any = next(iter(self.overloads.values()))
@@ -127,16 +131,16 @@ class Kernel(CPUDispatcher):
         return self._address
 
     def compile(self, sig: Any) -> Any:
-        """Returns the entry point for numba when another kernel calls this one: for the declared signature, whatever
-        ``sig`` is.
+        """Returns the entry point of this kernel when numba compiles a call of it from another kernel. The entry
+        point is for the declared signature, whatever ``sig`` is.
         """
         self.load()
         (compiled,) = self.overloads.values()
         return compiled.entry_point  # type: ignore[attr-defined]
 
     def _compile_for_args(self, *args: Any, **kws: Any) -> "Kernel":
-        """Loads the kernel when numba asks for it at the first call from Python; numba then calls it again and
-        checks the arguments.
+        """Loads the kernel. numba calls this method at the first call of the kernel from Python. After that numba
+        calls the kernel again and checks the types of the arguments.
         """
         self.load()
         return self
@@ -158,7 +162,7 @@ def _holds_arrays(kind: Any) -> bool:
 
 
 def njit(signature: Any, *, cache: bool = True, **options: Any) -> Callable[[Callable[..., Any]], Kernel]:
-    """Declares a kernel with that signature; ``options`` are numba's own."""
+    """Declares a kernel with the given signature; ``options`` are options of numba's njit."""
 
     def declare(function: Callable[..., Any]) -> Kernel:
         kernel = Kernel(function, targetoptions={"nopython": True, "boundscheck": None, **options})
@@ -172,12 +176,12 @@ def njit(signature: Any, *, cache: bool = True, **options: Any) -> Callable[[Cal
 
 
 def several(*kinds: Any) -> Any:
-    """Returns the type of a tuple."""
+    """Returns the numba type of a tuple."""
     return types.Tuple(kinds)  # type: ignore[no-untyped-call]
 
 
 def record(name: type, *kinds: Any) -> Any:
-    """Returns the type of a named tuple."""
+    """Returns the numba type of a named tuple."""
     if len(set(kinds)) == 1:
         return types.NamedUniTuple(kinds[0], len(kinds), name)  # type: ignore[no-untyped-call]
     return types.NamedTuple(kinds, name)  # type: ignore[no-untyped-call]
@@ -202,12 +206,12 @@ def _prefetch(_: Any, array: Any, index: Any) -> Any:
 
 
 prefetch: Any = intrinsic(_prefetch)
-"""In a kernel: load the cache line of an element of a one-dimensional array; an index beyond its end is harmless. It
-changes no value."""
+"""Loads the cache line of an element of a one-dimensional array, in a kernel. The call changes no value. An index
+beyond the end of the array is harmless."""
 
 
 class _Loading:
-    """CPU and wall time of this thread for loading kernels, s; nested loads count once."""
+    """CPU and wall time of this thread for loading kernels, s. The time of nested loads is counted once."""
 
     def __init__(self) -> None:
         self.spent = self.passed = 0.0
@@ -232,7 +236,7 @@ def _begin() -> None:
     """Loads numba's own implementations, which the first kernel needs, without the BLAS of scipy, which no kernel
     needs.
 
-    If scipy is installed numba would import all of its linear algebra.
+    Without this function numba would import the whole linear algebra of scipy, if scipy is installed.
     """
     absent = _BLAS not in sys.modules
     if absent:
@@ -254,5 +258,5 @@ def cpu_time() -> float:
 
 
 def wall_time() -> float:
-    """Returns the s of a clock of this process that stops while kernels are loaded."""
+    """Returns the time of a clock of this process, s. The clock stops while kernels are loaded."""
     return time.monotonic() - _loading.passed

@@ -36,7 +36,9 @@ def preload(case: Case) -> None:
 
 
 def called(module: ModuleType) -> Iterator[Kernel]:
-    """Yields the kernels that functions and methods of a module name, as its own or as those of another module."""
+    """Yields the kernels that the functions and methods of a module refer to by name, in this module or in another
+    module.
+    """
     loader = module.__loader__
     assert isinstance(loader, InspectLoader)
     whole = loader.get_code(module.__name__)

@@ -23,20 +23,20 @@ VARIABLE = "NUMBA_CACHE_DIR"
 DECLARATION = "\n@njit("
 """Text with which the declaration of a kernel begins in its source."""
 _PROSE = re.compile(rb'"""[\s\S]*?"""|#[^\n]*')
-"""Docstrings and comments of a source."""
+"""Pattern of docstrings and comments in a source."""
 
 
 @cache
 def source_hash(root: Path = ROOT) -> str:
-    """Returns a hash of the sources of all kernels below ``root``, and of the versions. 0.08 CPU seconds on an idle
-    core.
+    """Returns a hash of the sources of all kernels below ``root``, and of the versions. The call takes 0.08 CPU
+    seconds on an idle core.
     """
     return _hashed(kernel_sources(root), root)
 
 
 def module_hash(path: Path, root: Path) -> str:
-    """Returns a hash of all that the kernels of a file depend on: its source, its imports, the versions and the
-    processor.
+    """Returns a hash of everything on which the kernels of a file depend: its source, its imports, the versions and
+    the processor.
     """
     return _named(f"{path.relative_to(root)} {_hashed(reached([path]), root)}")
 
@@ -51,7 +51,9 @@ def _hashed(sources: set[Path], root: Path) -> str:
 
 
 def _code(source: bytes) -> bytes:
-    """Returns the lines of a source without docstrings, comments and empty lines, on which kernels do not depend."""
+    """Returns the lines of a source without docstrings, comments and empty lines, since kernels do not depend on
+    these.
+    """
     return b"\n".join(line.rstrip() for line in _PROSE.sub(b"", source).splitlines() if line.strip())
 
 
@@ -60,20 +62,21 @@ def _named(sources: str) -> str:
 
 
 def cache_folder(sources: str | None = None) -> Path:
-    """Returns the folder of this source tree's kernels on this machine; ``sources``: ``source_hash()`` if it is
-    known.
+    """Returns the cache folder for the kernels of this source tree on this machine.
+
+    ``sources``: result of ``source_hash()`` if it is already computed.
     """
     base = os.environ.get("CONOID_CACHE_DIR") or Path.home() / ".cache" / "conoid"
     return Path(base) / "kernels" / _named(sources or source_hash())
 
 
 def kernel_sources(root: Path) -> set[Path]:
-    """Returns the files below ``root`` with kernels, and the files whose names they import, to any depth."""
+    """Returns the files below ``root`` with kernels, and the files from which they import names, to any depth."""
     return reached(kernel_files(root))
 
 
 def reached(paths: list[Path]) -> set[Path]:
-    """Returns the files ``paths``, and those that they import relatively, to any depth."""
+    """Returns the files ``paths``, and the files that they import relatively, to any depth."""
     found: set[Path] = set()
     waiting = list(paths)
     while waiting:
@@ -90,7 +93,9 @@ def kernel_files(root: Path) -> list[Path]:
 
 
 def imported(path: Path) -> list[Path]:
-    """Returns the files that ``path`` imports relatively at its top level: all names that a kernel can use."""
+    """Returns the files that ``path`` imports relatively at its top level. A kernel can use names from these files
+    only.
+    """
     files = []
     for level, module, names in _imports(path.read_text(encoding="utf-8")):
         base = path.parents[level - 1].joinpath(*module.split("."))
@@ -117,8 +122,10 @@ def _processor() -> str:
 
 
 def use_cache(sources: str | None = None) -> Path:
-    """Sets numba's cache folder and returns it. Raises RuntimeError if numba was imported before: it would keep
-    kernels beside their sources, and not detect an edited callee.
+    """Sets numba's cache folder and returns it.
+
+    Raises RuntimeError if numba was imported before: numba would then keep kernels beside their sources, and not
+    detect an edited callee.
     """
     folder = cache_folder(sources)
     if "numba" in sys.modules and os.environ.get(VARIABLE) != str(folder):

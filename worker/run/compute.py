@@ -39,7 +39,7 @@ from .signals import Signals
 from .summary import Times, sum_up
 
 CHOSEN, ALL, PROJECT = "chosen", "all", "project"
-"""Use of the threads of a rank; see ``compute``."""
+"""Use of the threads of a rank; ``compute`` describes the values."""
 
 log = logging.getLogger("conoid.worker")
 
@@ -55,7 +55,7 @@ def compute(
     estimated time with more. Raises ConoidError.
     """
     say = journal.starting if journal is not None else quiet
-    threads = team(case.run.threads)  # the team may have the settings of an earlier run of this process
+    threads = team(case.run.threads)  # the team of threads may have the settings of an earlier run of this process
     threads.most = threads.threads
     threads.projecting = Projecting(threads.threads) if use == PROJECT else None
     if comm.size > 1:
@@ -96,8 +96,10 @@ def compute(
 
 
 def _resumed(case: Case, folder: Path, comm: Comm, journal: Journal | None) -> tuple[Simulation, Start]:
-    """Returns the simulation of the latest complete checkpoint in ``folder``. Collective. The journal gets a warning
-    of each later checkpoint, which is damaged. Raises InputError on all ranks.
+    """Returns the simulation of the latest complete checkpoint in ``folder``.
+
+    Collective. The journal gets a warning for each later checkpoint, which is damaged. Raises InputError on all
+    ranks.
     """
     found: tuple[Path, Manifest] | None = None
     failure: InputError | None = None

@@ -17,26 +17,28 @@ class Frames:
     """Writes the frames of a run. Every method is collective except ``report_losses``."""
 
     def __init__(self, folder: Path, notices: Notices, counter: Counter) -> None:
-        """``folder``: of the run; ``counter``: finds the fragments that a frame shows."""
+        """``folder``: folder of the run; ``counter``: finds the fragments that a frame shows."""
         self._folder, self._notices, self._counter = folder, notices, counter
         self._losses = Losses(folder) if notices.journal is not None else None
         self.lost: list[str] = []
         """Warnings of output files that were removed during the run; on rank 0."""
 
     def write(self, sim: Simulation) -> None:
-        """Write the frame of the present time, and its message if the journal has none of this frame."""
+        """Write the frame of the present time, and its message if the journal has no message of this frame."""
         clock, index, journal = sim.clock, sim.clock.frame, self._notices.journal
         sim.count_nodes()
         self.report_losses(sim)
         path = self._written(sim, index)
-        self.report_losses(sim)  # adds the new file to those that are watched
+        self.report_losses(sim)  # adds the new file to the files that are watched
         clock.frame += 1
         if path is not None and journal is not None and index not in journal.frames:
             journal.frames.add(index)
             self._notices.write(clock, messages.Frame, index=index, path=path)
 
     def _written(self, sim: Simulation, index: int) -> str | None:
-        """Write the file, and the record of the fragments; return its path in the run's folder on rank 0."""
+        """Write the frame file and the record of the fragments. Return the path of the file in the run's folder on
+        rank 0.
+        """
         t, record = sim.clock.t, sim.record
         cohesion = sim.fracture.cohesion if sim.fracture is not None else None
         damaged = damage(sim.case, sim.model, cohesion, sim.comm)

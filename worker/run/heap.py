@@ -4,14 +4,15 @@ import ctypes
 import sys
 
 _TRIM_THRESHOLD, _MMAP_THRESHOLD = -1, -3
-"""Parameters of mallopt(3), of glibc."""
+"""Parameters of mallopt(3) of glibc."""
 LARGE = 1 << 20
-"""Bytes of an array that goes back to the system at once. By default glibc raises this bound, up to 32 MB, to the
-largest array that was freed: arrays that grow while a body breaks then leave holes, and the case of
-docs/tutorial/first_case.md took 540 MB instead of 380 MB. CPU time is unchanged, also for a bar with 62,000 tets."""
+"""Size in bytes from which a freed array goes back to the system at once. By default glibc raises this bound, up to
+32 MB, to the size of the largest array that was freed. Arrays that grow while a body breaks then leave holes in the
+heap, and the case of docs/tutorial/first_case.md took 540 MB instead of 380 MB with this setting. CPU time is
+unchanged, also for a bar with 62,000 tets."""
 _SPARE = 32 << 20
-"""Free bytes at the end of the heap that stay allocated: without them each step of that bar returns large arrays and
-requests them again, 2 s of 28."""
+"""Number of free bytes at the end of the heap that stay allocated. With 0, each step of a bar with 62,000 tets
+returns large arrays and requests them again, which takes 2 s of 28 s."""
 
 
 def tidy() -> bool:

@@ -31,15 +31,17 @@ from .lock import hold
 
 _ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 _ASK_FOR = 20.0
-"""s for which the controller is asked for the cause of a signal. Chosen: KillWait, 30 s by default, ends this
-process."""
+"""Time for which the controller is asked for the cause of a signal, s. Chosen value: KillWait, 30 s by default, ends
+this process."""
 _EARLY = 90.0
-"""s by which Slurm may send the signal early (60, sbatch(1)), and a margin for the checkpoint."""
+"""Time by which Slurm may send the signal early (60 s, sbatch(1)), plus a margin for the checkpoint, s."""
 
 
 @dataclass
 class Relay:
-    """Passes the TERM of the batch system on to the ranks, as USR1: srun takes a TERM as its own end."""
+    """Passes the TERM of the batch system on to the ranks as USR1, because srun takes a TERM as a request to end
+    itself.
+    """
 
     child: "subprocess.Popen[bytes] | None" = None
     raised: bool = False
@@ -60,7 +62,9 @@ class Relay:
 
 
 def main(arguments: list[str]) -> int:
-    """Runs the ranks and returns their exit code; 0 if another job runs this case or this job is queued again."""
+    """Runs the ranks and returns their exit code. Returns 0 if another job runs this case or this job is queued
+    again.
+    """
     relay = Relay()
     relay.listen()
     folder, number, name = *_place(Path(arguments[0]), os.environ), arguments[1]
@@ -84,8 +88,10 @@ def main(arguments: list[str]) -> int:
 
 
 def _place(given: Path, env: Mapping[str, str]) -> tuple[Path, str]:
-    """Returns the run's folder, and the number of the job as the queue shows it. A task of an array finds its folder
-    by its index, and writes into that folder's log from then on. Raises OSError.
+    """Returns the run's folder, and the number of the job as the queue shows it.
+
+    A task of an array finds its folder by its index, and from then on it writes into the log of this folder. Raises
+    OSError.
     """
     task = env.get("SLURM_ARRAY_TASK_ID", "")
     if not task or not (given / layout.ARRAY).exists():
@@ -115,12 +121,12 @@ def claim(folder: Path, job: Job, number: str) -> bool:
 
 
 def latest(folder: Path) -> int:
-    """Returns the step of the newest checkpoint; -1 if there is none."""
+    """Returns the step of the newest checkpoint; -1 if there is no checkpoint."""
     return next((int(place.name) for place in checkpoints.found(folder)), -1)
 
 
 def _run(folder: Path, job: Job, number: str, relay: Relay) -> int:
-    """Starts the ranks and waits for their end, without a limit after a signal. Returns their exit code."""
+    """Starts the ranks and waits for their end, without a time limit after a signal. Returns their exit code."""
     (folder / layout.INTERRUPTED).unlink(missing_ok=True)
     again = int(os.environ.get("SLURM_RESTART_COUNT", "0"))
     attempt = f"attempt {job.attempt + again}" if job.attempt + again > 1 else figures.crew(job.ranks, job.threads)
@@ -148,8 +154,9 @@ def environment(base: Mapping[str, str], job: Job, access: batch.Access | None) 
 
 
 def _interrupted(folder: Path, job: Job, number: str, further: bool) -> int | None:
-    """Acts on the cause of the signal; None if the exit code of the ranks stands. ``further``: there is a newer
-    checkpoint.
+    """Acts on the cause of the signal; returns None if the exit code of the ranks is valid.
+
+    ``further``: whether the ranks have written a newer checkpoint.
     """
     if (folder / layout.STOP_REQUEST).exists():
         return _cancelled(folder, job, "stopped on request")
@@ -193,7 +200,7 @@ def judge(found: Mapping[str, str], restarts: int, notice: float, now: float) ->
 
 
 def _seconds(text: str) -> float | None:
-    """Returns ``1-02:03:04`` in s; None for no limit."""
+    """Returns a duration ``1-02:03:04`` in s; None for no limit."""
     days, _, clock = text.rpartition("-")
     parts = clock.split(":")
     if not all(part.isdigit() for part in (*parts, days or "0")):
@@ -226,7 +233,7 @@ def _cancelled(folder: Path, job: Job, message: str) -> int:
 
 
 def _so_far(folder: Path, state: State, cause: Cause, message: str) -> Outcome:
-    """Returns the outcome of the interrupted ranks, with its true cause."""
+    """Returns the outcome of the interrupted ranks, with the true cause of the interruption."""
     try:
         found = outcome.from_json(whole.read(folder / layout.INTERRUPTED))
     except (OSError, msgspec.MsgspecError):

@@ -9,14 +9,16 @@ from typing import IO
 from conoid.cases.output import layout
 
 _PATIENCE = 20.0
-"""s to wait for the former holder. Chosen: a killed run is gone within seconds, a lock on a network within ten."""
+"""Time to wait for the former holder of the lock, s. Chosen value: a killed run ends within seconds, and a lock on a
+network file system is released within ten."""
 _PAUSE = 0.2
-"""s between two tries. Chosen."""
+"""Interval between two attempts to take the lock, s. Chosen value."""
 
 
 def hold(folder: Path, patience: float = _PATIENCE) -> IO[str] | None:
-    """Returns the open file, which holds the lock until it is closed or the process ends; None if another process
-    holds it."""
+    """Returns the open file that holds the lock; None if another process holds it.
+
+    The lock is held until the file is closed or the process ends."""
     file = (folder / layout.LOCK).open("a")
     deadline = time.monotonic() + patience
     while True:

@@ -31,19 +31,19 @@ from .signals import Signals
 
 @dataclass(frozen=True)
 class Start:
-    """Sizes, counters and warnings at the first step of this process; a checkpoint keeps them for a resumed run."""
+    """Sizes, counters and warnings at the first step of this process. A checkpoint stores them for a resumed run."""
 
     elements: int
     nodes: int
     thick: list[list[list[float]]]
-    """See reference.thicknesses."""
+    """Result of reference.thicknesses at the start."""
     sample: int = 0
-    """Samples scheduled so far."""
+    """Number of samples scheduled so far."""
     updates: int = 0
-    """Tets times steps so far."""
+    """Sum over the steps so far of the number of tets."""
     resumed: bool = False
     warnings: tuple[str, ...] = ()
-    """See Simulation."""
+    """Warnings of the set-up (Simulation)."""
 
 
 class Loop:
@@ -56,11 +56,11 @@ class Loop:
         """``journal`` and ``history``: None on all ranks except 0."""
         self.sim, self.balance = sim, balance
         self.stopped = 0
-        """Reason for an early stop (stops.py), 0 for none."""
+        """Reason for an early stop (stops.py); 0 if there is no reason."""
         self.warnings: list[str] = []
         """Warnings of the steps, equal on all ranks."""
         self.updates = start.updates
-        """Tets times steps so far."""
+        """Sum over the steps so far of the number of tets."""
         self.choice: Choice | None = None
         """Chooses the number of threads of this rank; None: all threads are used."""
         self._folder, self._start = folder, start
@@ -75,7 +75,7 @@ class Loop:
     def run(self) -> None:
         """Take steps until the end time or a reason to stop. Raises PhysicsError."""
         gc.collect()
-        gc.freeze()  # else a collection scans all objects of numba, 0.1 s, in a step of one rank while others wait
+        gc.freeze()  # else a garbage collection scans all objects of numba, 0.1 s of one rank
         self.sim.timers.begin()
         self.sim.comm.sent.since_last()
         if not self._start.resumed:
@@ -94,14 +94,14 @@ class Loop:
                 self._notices.write(self.sim.clock, messages.Log, level="info", text=text)
 
     def _number_fragments(self) -> None:
-        """Number the fragments of the initial state if no frame does so."""
+        """Number the fragments of the initial state, if no frame numbers them."""
         record, run = self.sim.record, self.sim.case.run
         if record is not None and not run.frames:
             record.update()
             record.number()
 
     def _attend(self) -> None:
-        """Carry out the requests of the last reduction and fill this rank's part of the next one."""
+        """Carry out the requests of the last reduction and fill this rank's part of the next reduction."""
         sim = self.sim
         if sim.reduction.report:
             self._reports.write(sim, self.samples, self.updates)
@@ -113,7 +113,7 @@ class Loop:
             self._requests.propose(self.sim, self.balance, self.snapshots, now)
 
     def _first_half(self) -> None:
-        """Take 1 to 9 of the step (step.py), then run the outputs of time n."""
+        """Take stages 1 to 9 of the step (step.py), then run the outputs of time n."""
         sim, clock = self.sim, self.sim.clock
         ending = clock.done or bool(sim.reduction.stop)
         before = sim.model.nodes.v.copy() if ending or self.samples.due(clock) else None
@@ -126,7 +126,10 @@ class Loop:
         self.snapshots.tell()
 
     def _put_out(self, before: Floats | None, *, ending: bool) -> None:
-        """Run the scheduled outputs of time n; ``before``: (nodes, 3) v(n-1/2) if a sample is one of them."""
+        """Run the scheduled outputs of time n.
+
+        ``before``: (nodes, 3) v(n-1/2) if a sample is scheduled.
+        """
         sim, clock = self.sim, self.sim.clock
         with sim.timers.phase("output"):
             if before is not None:
@@ -146,7 +149,7 @@ class Loop:
         self.frames.report_losses(sim)
 
     def _rebalance(self) -> None:
-        """Move tets to other ranks if the balance calls for it and another step follows."""
+        """Move tets to other ranks if the load balance requires it and another step follows."""
         cause = None if self.sim.clock.done else self.balance.cause(self.sim)
         if cause is not None:
             with self.sim.timers.phase("balance"):

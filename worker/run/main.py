@@ -61,7 +61,7 @@ def main(arguments: list[str]) -> int:
     try:
         return _run(options, comm, signals, began)
     except BaseException as error:
-        if log.hasHandlers():  # it writes into the run's folder, which exists
+        if log.hasHandlers():  # the log is written into the run's folder, which exists
             log.error("rank %d stops the job\n%s", comm.rank, traceback.format_exc())
         if storage.failed(error) or storage.gone(error, options.out):
             named = "" if isinstance(error, OSError) and error.filename else f" (in {options.out})"
@@ -86,7 +86,7 @@ def _run(options: argparse.Namespace, comm: Comm, signals: Signals, began: float
 
 
 def _succeeded(folder: Path) -> bool:
-    """Returns whether the run in a folder has succeeded: its outcome must not be replaced."""
+    """Returns whether the run in a folder has succeeded. The outcome of a successful run must not be replaced."""
     try:
         return State(outcomes.from_json((folder / layout.OUTCOME).read_bytes()).state) is State.SUCCEEDED
     except (OSError, ValueError):
@@ -170,8 +170,9 @@ def _parse(arguments: list[str]) -> argparse.Namespace:
 
 
 def _case(options: argparse.Namespace, comm: Comm) -> tuple[Case, list[str]]:
-    """Returns the case with its overrides, for as many ranks as MPI has started, and warnings of how it is written.
-    Rank 0 reads it; all ranks get it, or raise its error.
+    """Returns the case with its overrides, for as many ranks as MPI has started, and warnings about its text.
+
+    Rank 0 reads the case; all ranks get it, or raise its error.
     """
     found: tuple[Case, list[str]] | None = None
     failure: Exception | None = None
@@ -188,7 +189,7 @@ def _case(options: argparse.Namespace, comm: Comm) -> tuple[Case, list[str]]:
 
 
 def _file(name: str) -> Path:
-    """Returns the file of a case, which may be a shipped one. Raises CaseError."""
+    """Returns the file of a case; the name may be that of a shipped case. Raises CaseError."""
     path = Path(name)
     return load.shipped_path(name) if not path.exists() and not path.suffix else path
 
@@ -200,13 +201,14 @@ def _read(options: argparse.Namespace, ranks: int) -> tuple[Case, list[str]]:
 
 
 def _prepare_folder(folder: Path, comm: Comm) -> AbstractContextManager[Any] | None:
-    """Returns the holder of the folder's lock on rank 0, an empty holder on the others; None on every rank if
-    another worker has the lock."""
+    """Returns the open lock file of the folder on rank 0, and an empty context on the other ranks.
+
+    Returns None on every rank if another worker has the lock."""
     held: AbstractContextManager[Any] | None = nullcontext()
     if comm.rank == 0:
         (folder / layout.LOGS).mkdir(parents=True, exist_ok=True)
         held = hold(folder)
-        if held is not None and (folder / layout.OUTCOME).exists():  # the request belonged to the earlier attempt
+        if held is not None and (folder / layout.OUTCOME).exists():  # the request to stop was for an earlier attempt
             (folder / layout.STOP_REQUEST).unlink(missing_ok=True)
     if not comm.broadcast(held is not None):
         return None
@@ -224,7 +226,7 @@ def _compute(
     ready_kernels(comm, journal)
     from . import compute
 
-    meshes = _file(options.case).resolve().parent  # relative paths of mesh files start here
+    meshes = _file(options.case).resolve().parent  # relative paths of mesh files start at this folder
     return compute.compute(case, meshes, options.out, comm, journal, signals, began, options.restart, options.use)
 
 
@@ -256,7 +258,7 @@ def _report(journal: Journal | None, what: str) -> None:
 def _close(outcome: Outcome, options: argparse.Namespace, journal: Journal, telemetry: "Telemetry | None") -> None:
     """Writes the outcome, then the last message: a reader of the last message finds the outcome on disk.
 
-    An interrupted run has not ended: worker/run/job.py finds the cause of the interruption.
+    An interrupted run has no last message here: worker/run/job.py finds the cause of the interruption.
     """
     interrupted = options.interruptible and outcome.state == State.CANCELLED
     if interrupted and not (options.out / layout.STOP_REQUEST).exists():

@@ -1,4 +1,4 @@
-"""Messages of the time loop for the journal, with the step and the time at which they are written."""
+"""Messages of the time loop for the journal. Each message has the step and the time at which it is written."""
 
 from typing import Any
 

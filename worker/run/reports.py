@@ -18,7 +18,7 @@ from .requests import Requests
 from .samples import Samples
 
 _LOG_EVERY = 10.0
-"""s of wall time between two lines of the log. Chosen."""
+"""Wall time between two lines of the log, s. Chosen value."""
 
 log = logging.getLogger("conoid.worker")
 
@@ -27,13 +27,13 @@ class _Load(NamedTuple):
     """Load of a rank since the last report."""
 
     work: dict[str, float]
-    """CPU seconds by phase."""
+    """CPU seconds of this rank by phase."""
     others: dict[str, float]
     """Waiting, messages and outside nodes, by the names of messages.Load."""
     counting: bool
-    """Whether fragments are to be found; the value of rank 0 decides."""
+    """Whether fragments are to be found. The value of rank 0 decides."""
     projected: dict[int, dict[str, float]]
-    """CPU seconds by phase as they would be, by number of threads."""
+    """Estimated CPU seconds by phase, for each number of threads."""
 
 
 class Reports:
@@ -43,17 +43,20 @@ class Reports:
         self, sim: Simulation, balance: Balance, groups: Groups, notices: Notices, counter: Counter, requests: Requests,
         updates: int,
     ) -> None:  # fmt: skip
-        """``updates``: tets times steps so far."""
+        """``updates``: sum over the steps so far of the number of tets."""
         self._balance, self._groups, self._notices, self._counter = balance, groups, notices, counter
         self._requests = requests
         self._step, self._updates = sim.clock.step, updates
-        """Step, and tets times steps, at the last report."""
+        """Step at the last report, and the sum over the steps until then of the number of tets."""
         self._logged = -math.inf
         """Wall time of the last line of the log, s."""
         self._pace = Pace(sim.clock.t, requests.reported)
 
     def write(self, sim: Simulation, samples: Samples, updates: int) -> None:
-        """Write the progress and the loads since the last report; ``updates``: tets times steps so far."""
+        """Write the progress and the loads since the last report.
+
+        ``updates``: sum over the steps so far of the number of tets.
+        """
         spent, clock = sim.timers.since_last(), sim.clock
         ending = clock.done or bool(sim.reduction.stop)
         with sim.timers.phase("output"):
@@ -92,7 +95,7 @@ class Reports:
         return sim.comm.share(_Load(spent.cpu, sent, counting, spent.projected))
 
     def _count(self, sim: Simulation, *, find: bool) -> None:
-        """Write the counts of tets, nodes and fragments if they have changed; ``find``: find the fragments first."""
+        """Write the numbers of tets, nodes and fragments if they have changed. ``find``: find the fragments first."""
         if find:
             self._counter.find(sim)
         sim.count_nodes()

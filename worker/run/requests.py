@@ -1,4 +1,4 @@
-"""This rank's requests in the reduction of the step: a stop, a report, a checkpoint, a snapshot, a new cut."""
+"""Requests of this rank in the reduction of the step: a stop, a report, a checkpoint, a snapshot, a new cut."""
 
 import math
 from pathlib import Path
@@ -15,7 +15,7 @@ from .signals import Signals
 from .stops import CANCELLED, MAX_STEPS, WALL_TIME
 
 _REPORT_EVERY = 0.25
-"""s of wall time between two reports. Chosen: a display that is updated four times a second moves smoothly."""
+"""Wall time between two reports, s. Chosen value: a display that is updated four times a second moves smoothly."""
 
 
 class Requests:
@@ -29,11 +29,12 @@ class Requests:
         self._stop_file = False
         """Whether a file has requested a stop."""
         self._active = True
-        """Whether the last part that this rank filled had a request in it."""
+        """Whether the last part of a reduction that this rank filled contained a request."""
         self._every_step = case.balance.policy == "outside"
-        """Whether the part is filled in every step, because the outside nodes are compared with their limit in each."""
+        """Whether the part is filled in every step. This is so if the number of outside nodes is compared with its
+        limit in every step."""
         self._wall = self._time = 0.0
-        """Wall time and simulated time, s, before which no request can begin."""
+        """Wall time and simulated time before which no request can begin, s."""
 
     def due(self, clock: Clock, now: float) -> bool:
         """Return whether the requests may have changed at the wall time ``now``, s."""
@@ -68,7 +69,10 @@ class Requests:
         )
 
     def _stop(self, clock: Clock, now: float, *, read_files: bool) -> int:
-        """Return the reason to stop, 0 for none; ``read_files``: whether to test for the file that requests it."""
+        """Return the reason to stop; 0 for no reason.
+
+        ``read_files``: whether to test for the file that requests a stop.
+        """
         self._stop_file |= read_files and (self._folder / layout.STOP_REQUEST).exists()
         if clock.step + 1 >= self._run.max_steps:
             return MAX_STEPS

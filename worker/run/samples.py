@@ -1,4 +1,4 @@
-"""Samples of a run: the lines of history.csv, and the time at which the next one is scheduled."""
+"""Samples of a run: the lines of history.csv, and the time of the next sample."""
 
 import math
 
@@ -17,13 +17,13 @@ class Samples:
     """Takes samples and keeps the latest one."""
 
     def __init__(self, sim: Simulation, history: History | None, number: int) -> None:
-        """``history``: the file, None on all ranks except 0; ``number``: samples scheduled so far."""
+        """``history``: the file, None on all ranks except 0; ``number``: number of samples scheduled so far."""
         run = sim.case.run
         self._history = history
         self._names = [probe.name for probe in sim.case.probes]
         self._every = run.end_time, run.samples
         self.number = number
-        """Samples scheduled so far."""
+        """Number of samples scheduled so far."""
         self._next = number * run.end_time / run.samples
         """Time of the next sample, s."""
         self.time: float | None = None
@@ -31,20 +31,22 @@ class Samples:
         self.energy: Energy | None = None
         self.parts: dict[str, PartEnergy] = {}
         self.measured: list[float] = []
-        """Values of the probes."""
+        """Values of the probes at the latest sample."""
 
     def due(self, clock: Clock) -> bool:
         """Return whether the time of the next sample is reached."""
         return clock.t >= self._next
 
     def probes(self) -> dict[str, float | None]:
-        """Return the latest value of each probe by name; None for NaN, which JSON has not."""
+        """Return the latest value of each probe by name; None for NaN, since JSON has no NaN."""
         named = zip(self._names, self.measured, strict=True)
         return {name: None if math.isnan(value) else value for name, value in named}
 
     def take(self, sim: Simulation, before: Floats, *, ending: bool) -> None:
         """Write energies, momenta and probes at time n to the history. Raises PhysicsError if the energy is out of
-        balance. Collective. ``before``: (nodes, 3) v(n-1/2); ``ending``: the step after the last one.
+        balance.
+
+        Collective. ``before``: (nodes, 3) v(n-1/2); ``ending``: whether this is the sample after the last step.
         """
         clock, (end, samples) = sim.clock, self._every
         self.energy, self.parts, self.time = sim.ledger.close(before), sim.ledger.parts, clock.t

@@ -1,4 +1,6 @@
-"""Requests to stop by SIGTERM, SIGUSR1 or SIGINT: a flag, which the reduction of the next step carries to all ranks."""
+"""Requests to stop by SIGTERM, SIGUSR1 or SIGINT. A signal sets a flag. The reduction of the next step sends the
+flag to all ranks.
+"""
 
 import signal
 
@@ -6,7 +8,7 @@ REQUESTS = (signal.SIGTERM, signal.SIGUSR1, signal.SIGINT)
 
 
 class Signals:
-    """Handlers of the signals, installed at construction; the flag is first read after the set-up of a run."""
+    """Handlers of the signals, installed at construction. The flag is first read after the set-up of a run."""
 
     def __init__(self) -> None:
         self.raised = False

@@ -6,7 +6,7 @@ from ..clock import SLOWED
 from ..simulation import Simulation
 
 CANCELLED, WALL_TIME, MAX_STEPS = 1, 2, 3
-"""Reasons to stop early, in the reduction of the step: the largest decides."""
+"""Reasons to stop early, in the reduction of the step. If several ranks have a reason, the largest number decides."""
 
 STOPS = {
     CANCELLED: (State.CANCELLED, Cause.CANCELLED, "stopped on request"),
@@ -17,7 +17,8 @@ STOPS = {
 
 
 def reason(sim: Simulation, stop: int) -> str:
-    """Return the message for an early stop: the reason, the time reached and, if it fell far, the stable step.
+    """Return the message for an early stop: the reason, the time reached, and the stable step if it has decreased much.
+
     Collective.
     """
     clock, text = sim.clock, STOPS[stop][2]
@@ -35,7 +36,9 @@ def starved(sim: Simulation) -> str:
 
 
 def _fallen(sim: Simulation, extent: str) -> str:
-    """Return how far the stable step has fallen, which tet limits it, and the key that helps. Collective."""
+    """Return the decrease of the stable step, the tet that limits the step, and the key of the case that helps.
+    Collective.
+    """
     clock = sim.clock
     return (
         f"the stable step has fallen to {clock.stable:.2g} s, {extent} ({sim.limiter()}): about "

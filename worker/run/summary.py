@@ -36,15 +36,18 @@ class Times:
     """Times of a run on this rank, s."""
 
     cpu: float
-    """CPU time of the time loop, with that of the other threads of the rank."""
+    """CPU time of the time loop, including the other threads of the rank, s."""
     setup: float
-    """Wall time before the time loop."""
+    """Wall time before the time loop, s."""
     elapsed: float
-    """Wall time of the whole run."""
+    """Wall time of the whole run, s."""
 
 
 def sum_up(loop: Loop, folder: Path, failure: PhysicsError | None, start: Start, times: Times) -> Outcome:
-    """Return the outcome of a run in ``folder`` that has ended, by ``failure`` if it is given. Collective."""
+    """Return the outcome of a run in ``folder`` that has ended. ``failure``: the error that ended the run, or None.
+
+    Collective.
+    """
     sim, complete = loop.sim, failure is None and not loop.stopped
     sim.timers.since_last()
     costs = _costs(loop, start, times)
@@ -70,7 +73,7 @@ def sum_up(loop: Loop, folder: Path, failure: PhysicsError | None, start: Start,
 
 
 def _end(loop: Loop, failure: PhysicsError | None) -> dict[str, Any]:
-    """Return state, cause and message."""
+    """Return state, cause and message of the end of the run."""
     state: State = State.SUCCEEDED
     cause: Cause | None = None
     message = ""
@@ -82,7 +85,9 @@ def _end(loop: Loop, failure: PhysicsError | None) -> dict[str, Any]:
 
 
 def _costs(loop: Loop, start: Start, times: Times) -> dict[str, Any]:
-    """Return what the run has taken of time and memory, with one number a rank where it differs between ranks."""
+    """Return the time and the memory that the run has taken. A quantity that differs between ranks has one number
+    per rank.
+    """
     sim = loop.sim
     spent: list[Spent] = sim.comm.gather(sim.timers.spent) or []
     cpu = sum(sim.comm.gather(times.cpu) or [])
@@ -101,7 +106,7 @@ def _costs(loop: Loop, start: Start, times: Times) -> dict[str, Any]:
 
 
 def _sharing(sim: Simulation) -> Sharing | None:
-    """Return the regions and tasks of this rank if their costs were measured."""
+    """Return the numbers of regions and tasks of this rank if their costs were measured."""
     made = team(sim.case.run.threads).projecting
     if not isinstance(made, Projecting):
         return None
@@ -113,7 +118,9 @@ def _sharing(sim: Simulation) -> Sharing | None:
 
 
 def _fragments(sim: Simulation) -> tuple[int, list[Ints]]:
-    """Return the number of fragments and, for each block, (n,) the fragment of each tet; of bodies if none breaks."""
+    """Return the number of fragments and, for each block, (n,) the fragment of each tet. Without fracture the bodies
+    are counted.
+    """
     if sim.record is not None:
         sim.record.update()
         return sim.record.count, sim.record.labels
@@ -122,7 +129,7 @@ def _fragments(sim: Simulation) -> tuple[int, list[Ints]]:
 
 
 def _penetration(sim: Simulation, labels: list[Ints]) -> tuple[dict[str, Any], list[str]]:
-    """Return the nodes inside of other bodies and the volume in common, and the warnings of both."""
+    """Return the number of nodes inside of other bodies, the volume in common, and the warnings about both."""
     if sim.contact is None:
         return {}, []
     nodes = inside.look(sim.contact, sim.model, labels, sim.comm)
@@ -145,7 +152,7 @@ def _probes(loop: Loop, folder: Path) -> list[Measured]:
 
 
 def _warnings(loop: Loop, eroded: int) -> list[str]:
-    """Return the warnings of the steps; ``eroded``: number of tets that were removed."""
+    """Return the warnings of the steps; ``eroded``: number of removed tets."""
     sim = loop.sim
     return [
         *loop.warnings, *loop.frames.lost, *sim.ledger.warnings(sim.case.numerics.dt_safety),
