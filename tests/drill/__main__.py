@@ -1,9 +1,10 @@
-"""``python -m tests.drill``: every fault, one after the other; a table in build/drill.
+"""``python -m tests.drill``: tries all faults in sequence, and writes a table into build/drill.
 
-A drill that was interrupted goes on where it was: what was true in build/drill/faults.jsonl is not tried again unless
-``--fresh`` says so; the table names what has not been tried yet. ``--shard 2/4`` tries every fourth group from the
-second on, ``--only WORDS`` those whose names have the words, or whose kind of stand is of that name (``slurm``), of
-several ``--only`` those that fit one, ``--list`` names them. The exit code is 0 when every state became true in time.
+A later call continues an interrupted drill: faults that build/drill/faults.jsonl lists as true are tried again only
+with ``--fresh``. The table names the groups that have not been tried. ``--shard 2/4`` tries every fourth group, from
+the second on. ``--only WORDS`` tries the groups whose name contains WORDS or whose kind of stand is WORDS, for
+example ``slurm``; the option can be repeated. ``--list`` prints the names of the groups. The exit code is 0 if every
+state became true in time.
 """
 
 import argparse
@@ -24,11 +25,11 @@ from .table import write
 
 PLACE = Path("build/drill")
 Group = tuple[str, Callable[[Grounds], Iterator[Row]]]
-"""A kind of stand, and what is tried on it."""
+"""Kind of stand, and function that tries the faults of the group on such a stand."""
 
 
 def groups() -> dict[str, Group]:
-    """What is tried together, by name."""
+    """Returns the groups of faults by name; the faults of a group share one stand."""
     found: dict[str, Group] = {}
     for one in [*strikes.everything(), *odd.everything(), *cluster.everything(), *operator.strikes()]:
         found[one.name] = (one.stand, partial(_struck, one))
@@ -73,7 +74,7 @@ def main() -> int:
 
 
 def _try(name: str, group: Group, made: Grounds, book: Path) -> None:
-    """One group; what goes wrong with the drill itself is a line of the table as well."""
+    """Tries one group. An error of the drill itself becomes a row of the table, too."""
     began = time.monotonic()
     if why := made.lacks(group[0]):
         print(f"{name}: not tried: {why}", flush=True)

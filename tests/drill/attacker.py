@@ -1,7 +1,8 @@
-"""``python -m tests.drill.attacker KIND URL TOKEN RUN LONG MANY SWEEP SECONDS``: one who takes all that he gets.
+"""``python -m tests.drill.attacker KIND URL TOKEN RUN LONG MANY SWEEP SECONDS``: a user who loads a server as much as
+the server allows.
 
-A process of its own, for so many seconds, bounded in connections. Prints as JSON how often each status was answered; 0
-where a connection was closed without an answer.
+The attack is a process, lasts SECONDS, and has a limited number of connections. It prints as JSON how often each
+status was answered; status 0 counts connections that were closed without an answer.
 """
 
 import itertools
@@ -23,31 +24,32 @@ from ..server.running import case_text
 from ..server.sweep_bodies import wish as sweep_wish
 
 NICE = 10
-"""Steps of priority below the server: an attacker has a processor of his own elsewhere."""
+"""Increase of the nice value: the attacker has lower priority than the server, since a real attacker uses another
+machine."""
 MOST = 400
-"""Connections at a time."""
+"""Largest number of simultaneous connections."""
 
 
 @dataclass
 class Attack:
-    """What is sent on each connection, and how often."""
+    """Requests of an attack on each connection, and their rate."""
 
     requests: Callable[["Target"], Iterator[bytes]]
-    """One after the other on one connection; the next one when the answer is there."""
+    """Generator of the requests on one connection. The next request is sent after the answer to the previous one."""
     crowd: int
-    """Connections at a time."""
+    """Number of simultaneous connections."""
     reads: bool = True
-    """Whether the answers are read."""
+    """Whether the attacker reads the answers."""
     drip: float = 0.0
-    """s after each byte, where what is sent comes a byte at a time; else 0."""
+    """Pause in s after each byte of a request; 0: a request is sent as a whole."""
     pause: float = 0.1
-    """s after which he connects again when he was sent away."""
+    """Pause in s before the attacker connects again after its connection was closed."""
 
 
 @dataclass
 class Target:
-    """A server, somebody's token there, a run of his that goes on, one with a long journal, many with longer ones, and
-    a sweep.
+    """Target of an attack: a server, the token of the attacker, and runs of the attacker: one that is running, one
+    with a long journal, several with longer journals, and a sweep.
     """
 
     url: str
@@ -60,19 +62,19 @@ class Target:
     answers: Counter[int] = field(default_factory=Counter)
 
     def get(self, path: str, method: str = "GET", more: str = "", token: bool = True) -> bytes:
-        """A request."""
+        """Returns a request without a body."""
         shown = f"Authorization: Bearer {self.token}\r\n" if token else ""
         return f"{method} {path} HTTP/1.1\r\nHost: 127.0.0.1\r\n{shown}{more}\r\n".encode()
 
     def post(self, path: str, body: bytes, kind: str = "application/toml", length: int | None = None) -> bytes:
-        """A request with a body, which has ``length`` bytes as is said."""
+        """Returns a request with a body; ``length`` is the value of its header Content-Length."""
         size = len(body) if length is None else length
         return self.get(path, "POST", f"Content-Type: {kind}\r\nContent-Length: {size}\r\n") + body
 
 
 def again(*paths: str, method: str = "GET", more: str = "", token: bool = True) -> Callable[[Target], Iterator[bytes]]:
-    """The same requests without end; RUN and LONG stand for the two runs, MANY for one of many,
-    SWEEP for the sweep, {n} for a number that is always another.
+    """Returns the same requests in an endless sequence. In a path, RUN and LONG are replaced by the two runs, MANY
+    by one of the many runs, SWEEP by the sweep, and {n} by a number that changes.
     """
 
     def requests(target: Target) -> Iterator[bytes]:
@@ -85,12 +87,12 @@ def again(*paths: str, method: str = "GET", more: str = "", token: bool = True) 
 
 
 def once(*words: str, token: bool = True) -> Callable[[Target], Iterator[bytes]]:
-    """One request, and no more."""
+    """Returns a single request."""
     return lambda target: itertools.islice(again(*words, token=token)(target), 1)
 
 
 def nothing(target: Target) -> Iterator[bytes]:
-    """Silence."""
+    """Sends no byte."""
     yield b""
 
 
@@ -104,12 +106,12 @@ def no_http(target: Target) -> Iterator[bytes]:
 
 
 def half_a_body(target: Target) -> Iterator[bytes]:
-    """All of a mebibyte but its end."""
+    """Sends a body of 1 MiB without its last byte."""
     yield target.post("/v1/cases:validate", b"#" * ((1 << 20) - 1), length=1 << 20)
 
 
 def endless_chunks(target: Target) -> Iterator[bytes]:
-    """Of a body whose length is not said, half a mebibyte."""
+    """Sends half a mebibyte of a chunked body, and never its end."""
     head = target.get("/v1/cases:validate", "POST", "Content-Type: application/toml\r\nTransfer-Encoding: chunked\r\n")
     yield head + b"8000\r\n%s\r\n" % (b"#" * 0x8000) * 16
 
@@ -132,13 +134,13 @@ def guesses(target: Target) -> Iterator[bytes]:
 
 
 def many_at_once(target: Target) -> Iterator[bytes]:
-    """On one connection, before any answer."""
+    """Sends many requests on one connection before the first answer."""
     while True:
         yield target.get("/v1/cases") * 200
 
 
 def adaptive(target: Target) -> Iterator[bytes]:
-    """Reports of ever other adaptive sweeps, as long as they may be."""
+    """Sends reports of many adaptive sweeps, each of the largest allowed size."""
     points = [{"x": float(n), "changed": {"run.end_time": f"{n} us" * 8}, "run": target.run} for n in range(500)]
     report = {"name": "bar", "began": 1.0, "result": "time", "threshold": 0.0, "key": "run.end_time", "low": 0.0}
     body = json.dumps({**report, "high": 1.0, "tolerance": 0.1, "points": points}).encode()
@@ -148,7 +150,7 @@ def adaptive(target: Target) -> Iterator[bytes]:
 
 
 def swept_again(target: Target) -> Iterator[bytes]:
-    """A sweep whose points have all failed."""
+    """Starts again a sweep of which all points have failed."""
     while True:
         yield target.post(f"/v1/sweeps/{target.sweep}:again", sweep_wish(), "application/json")
 
@@ -207,7 +209,7 @@ KINDS: dict[str, Attack] = {
 
 
 def attack(kind: str, target: Target) -> None:
-    """Until the time is over; then all connections are closed."""
+    """Runs the attack until its time is over; then all connections are closed."""
     chosen = KINDS[kind]
     crowd = [threading.Thread(target=one, args=(chosen, target), daemon=True) for _ in range(min(MOST, chosen.crowd))]
     for each in crowd:
@@ -216,7 +218,7 @@ def attack(kind: str, target: Target) -> None:
 
 
 def one(chosen: Attack, target: Target) -> None:
-    """Connects again when it was sent away."""
+    """Opens a connection, and a new one each time the server closes it."""
     while time.monotonic() < target.until:
         with suppress(OSError):
             place = urlsplit(target.url)
@@ -244,7 +246,7 @@ def talk(chosen: Attack, target: Target, connection: socket.socket) -> None:
 
 
 def answered(target: Target, connection: socket.socket) -> bool:
-    """Reads an answer; False where the connection is closed, or the answer has no end that is known."""
+    """Reads an answer. Returns False if the connection was closed."""
     with connection.makefile("rb") as answer:
         words = answer.readline().split()
         target.answers[int(words[1]) if len(words) > 1 and words[1].isdigit() else 0] += 1

@@ -1,4 +1,5 @@
-"""Servers and disks that fail the client: every command ends in time, with one line and its code, and no half file."""
+"""Faults of servers and disks that a client sees: every command must end in time, with one line, its exit code, and
+no incomplete file."""
 
 import gzip
 import os
@@ -17,12 +18,13 @@ from .strikes import emptied, filled
 
 RUN = "0123456789abcdefghjkmn"
 PATIENCE = 60.0
-"""s after its first question in which a command has given up: 40 for the head of an answer, some on a busy machine."""
+"""Time in s from its first request within which a command must give up. The client allows 40 s for the head of an
+answer; the rest is a margin for a busy machine."""
 Deed = Callable[[Stand], Iterator[Row]]
 
 
 def groups() -> dict[str, tuple[str, Deed]]:
-    """What is tried together, by name."""
+    """Returns the groups of faults by name."""
     found: dict[str, tuple[str, Deed]] = {
         f"clients, {name}": ("plain", partial(answered, name, answer)) for name, answer in ANSWERS.items()
     }
@@ -32,32 +34,32 @@ def groups() -> dict[str, tuple[str, Deed]]:
 
 
 def hangs() -> Iterator[bytes]:
-    """Nothing, for longer than anybody waits."""
+    """Sends no byte for longer than any client waits."""
     time.sleep(2 * PATIENCE)
     yield b""
 
 
 @cache
 def bomb() -> bytes:
-    """Half a gibibyte of blanks."""
+    """Returns 512 MiB of blanks, compressed."""
     return gzip.compress(b" " * (1 << 29), 1)
 
 
 def endless(first: bytes, piece: bytes) -> Iterator[bytes]:
-    """A beginning, and the same again and again."""
+    """Sends a first piece, then another piece again and again."""
     yield first
     yield from repeat(piece)
 
 
 def drips() -> Iterator[bytes]:
-    """A letter of the head a second."""
+    """Sends the head of an answer at one character per second."""
     for letter in head(200, 10).decode():
         yield letter.encode()
         time.sleep(1.0)
 
 
 def slow() -> Iterator[bytes]:
-    """A byte of the body a second."""
+    """Sends the body of an answer at one byte per second."""
     yield head(200, 1 << 20)
     for _ in range(round(2 * PATIENCE)):
         yield b" "
@@ -84,7 +86,7 @@ ANSWERS: dict[str, Answer] = {
 
 
 def answered(name: str, answer: Answer, stand: Stand) -> Iterator[Row]:
-    """The same answer to whatever is asked."""
+    """Gives the same answer to every request."""
     asked = list[float]()
 
     def noted() -> Iterable[bytes]:
@@ -100,7 +102,8 @@ def answered(name: str, answer: Answer, stand: Stand) -> Iterator[Row]:
 
 
 def files(stand: Stand) -> Iterator[Row]:
-    """A list that says another size, a body that breaks off, a sum that is another one, a name that leads out."""
+    """Tries lists of files with a wrong size, an incomplete body, a wrong checksum, and a name outside of the
+    folder."""
     told = {"longer than it is": 9, "shorter than it is": 1}
     wrong: dict[str, tuple[dict[str, object], Answer]] = {
         name: ({"path": "a.csv", "size": size}, said(b"12345")) for name, size in told.items()
@@ -120,7 +123,7 @@ def files(stand: Stand) -> Iterator[Row]:
 
 
 def full(stand: Stand) -> Iterator[Row]:
-    """Every command that writes, to a disk on which nothing is left; a file that is there stays as it was."""
+    """Runs every command that writes, on a full disk. An existing file must not change."""
     run = stand.submit()
     stand.reached(run)
     assert stand.http is not None
@@ -147,7 +150,8 @@ def _row(
     name: str, url: str, words: list[str], copy: Path, token: str = "", stdout: Path | None = None,
     place: Path | None = None, asked: Sequence[float] = (),
 ) -> Row:  # fmt: skip
-    """One command, in the folder ``place``; ``asked``: when the server has been asked, from which its time counts."""
+    """Runs one command in the folder ``place``; ``asked``: times of the requests to the server; the time of the
+    command counts from the first one."""
     began = time.monotonic()
     environment = {**os.environ, "CONOID_URL": url, "CONOID_TOKEN": token, "NO_COLOR": "1"}
     out = stdout.open("w") if stdout else subprocess.PIPE

@@ -1,7 +1,7 @@
-"""Faults of a batch system: its controller, its node, the jobs, and commands that answer anything but the truth.
+"""Faults of a batch system: of its controller, node, jobs and commands.
 
-The Slurm is real (``tests.server.real_slurm``). The server and its jobs reach it through commands of the stand, which
-do what an order says as long as there is one.
+The Slurm is real (``tests.server.real_slurm``). The server and its jobs call wrapper scripts of the stand in place
+of the commands of Slurm. A wrapper fails as its order file describes; without such a file it calls the command.
 """
 
 import shutil
@@ -49,16 +49,19 @@ ANSWERS = {
     "unheard": "does its work and fails",
 }  # fmt: skip
 ALL_BUT_KILLED = tuple(life for life in situations.ALL if life is not situations.is_killed_meanwhile)
-"""Where Slurm puts jobs back or knows of none any more, one whose rank is killed goes on like any other."""
+"""Situations for faults after which Slurm requeues jobs or has lost them: a run with a killed rank then continues
+like all other runs, so its situation is left out."""
 ROUND = 3.0
-"""s between two looks of the operator."""
+"""Time in s between two actions of the operator."""
 AGAIN = 6
-"""Starts of a run whose job is put back: by the fault, by its end, and when it gets its place again."""
+"""Largest number of starts of a run whose job is requeued: after the fault, after its end, and when the job is
+scheduled again."""
 
 
 @dataclass
 class ClusterStand(Stand):
-    """A server that hands its runs to a Slurm of this machine; ``root`` has the commands and their orders besides."""
+    """A server that submits its runs to a Slurm on this machine; ``root`` also contains the wrapper scripts and
+    their order files."""
 
     slots: int = 1000
     large: int = real_slurm.CORES - 3
@@ -66,31 +69,31 @@ class ClusterStand(Stand):
     profile: str = PROFILE
     cluster: Cluster | None = None
     mended: bool = False
-    """Whether the fault is over and an operator looks round."""
+    """Whether the fault has ended and the operator acts."""
     rounds: float = 0.0
-    """When he looks round again."""
+    """Time of the next action of the operator."""
 
     def jobs(self, *states: str) -> list[str]:
-        """The numbers of the jobs in one of these states."""
+        """Returns the numbers of the jobs in one of these states."""
         assert self.cluster is not None
         return [number for number, state in self.cluster.jobs("conoid-") if state in states]
 
     def told(self, *words: str) -> None:
-        """A command of the operator; what Slurm will not do is left undone."""
+        """Runs a command of the operator; a refusal by Slurm is ignored."""
         assert self.cluster is not None
         with suppress(AssertionError):
             self.cluster.command(*words)
 
     def state(self, run: str) -> str:
-        """Also what an operator does about jobs that wait for him."""
+        """Returns the state of a run; before that, the operator treats the jobs that need an action."""
         if self.mended and time.monotonic() > self.rounds:
             self.rounds = time.monotonic() + ROUND
             self.operate()
         return super().state(run)
 
     def operate(self) -> None:
-        """Slurm drains a node that it takes for faulty, holds what it cannot start, and lets a job that it has put back
-        wait for two minutes. The last of these is not waited for here.
+        """Acts as an operator of Slurm: resumes a drained node, releases held jobs, and starts requeued jobs at
+        once. Slurm itself would delay a requeued job by two minutes.
         """
         assert self.cluster is not None
         with suppress(AssertionError):
@@ -100,14 +103,14 @@ class ClusterStand(Stand):
             self.told("scontrol", "update", f"jobid={job}", "StartTime=now", "TimeLimit=UNLIMITED")
 
     def close(self) -> None:
-        """The jobs as well."""
+        """Ends the server and all jobs."""
         super().close()
         self.told("scancel", "--full", "--signal=KILL", "--user=root")
         self.told("scancel", "--user=root")
 
 
 def stand(root: Path, cluster: Cluster) -> ClusterStand:
-    """With commands of its own, which work until an order comes."""
+    """Returns a stand whose wrapper scripts call the commands of Slurm until they get an order."""
     (root / "bin").mkdir()
     (root / "orders").mkdir()
     for name in COMMANDS:
@@ -119,7 +122,7 @@ def stand(root: Path, cluster: Cluster) -> ClusterStand:
 
 
 def mended(deed: Callable[[ClusterStand, Cluster], None]) -> Deed:
-    """The end of a fault, after which an operator looks round."""
+    """Returns a function that ends a fault; after that the operator acts."""
 
     def done(stand: Stand) -> None:
         on(deed)(stand)
@@ -130,7 +133,7 @@ def mended(deed: Callable[[ClusterStand, Cluster], None]) -> Deed:
 
 
 def on(deed: Callable[[ClusterStand, Cluster], None]) -> Deed:
-    """A deed of a stand that has a cluster."""
+    """Returns a function of a stand for a function that needs the stand and its cluster."""
 
     def done(stand: Stand) -> None:
         assert isinstance(stand, ClusterStand)
@@ -153,7 +156,7 @@ def back(_: ClusterStand, cluster: Cluster) -> None:
 
 
 def killed_often(stand: ClusterStand, cluster: Cluster) -> None:
-    """It comes back twice, for as long as a look at the queue takes, and not at all in the end."""
+    """Restarts the controller twice, each time for about the time of one query of the queue, and leaves it killed."""
     for pause in (0.3, 1.5):
         cluster.kill()
         time.sleep(0.2)
@@ -171,7 +174,7 @@ def goes_on(_: ClusterStand, cluster: Cluster) -> None:
 
 
 def controllers() -> Iterator[Strike]:
-    """Killed, killed several times, hung; with the server killed meanwhile."""
+    """Yields the faults of the controller: killed, killed several times, hung; some also with the server killed."""
     away, here = on(killed), mended(back)
     still, moves = on(hung), mended(goes_on)
     yield _again("the controller killed", away, here, hold=4.0)
@@ -185,7 +188,7 @@ def controllers() -> Iterator[Strike]:
 
 
 def node(state: str) -> Callable[[ClusterStand, Cluster], None]:
-    """What happens to the node."""
+    """Returns a function that sets the state of the node."""
     return lambda stand, cluster: stand.told(
         "scontrol", "update", f"nodename={cluster.host}", f"state={state}", "reason=drill"
     )
@@ -205,18 +208,18 @@ def daemon_back(stand: ClusterStand, cluster: Cluster) -> None:
 
 
 def looked_after(_: ClusterStand, __: Cluster) -> None:
-    """The operator does the rest."""
+    """Does nothing: the operator ends the fault."""
 
 
 def preempted(stand: ClusterStand, _: Cluster) -> None:
-    """Somebody with more rights wants every core."""
+    """Submits a job of higher priority that needs every core."""
     wants = ("-p", "high", "-n", str(real_slurm.CORES), "-o", "/dev/null", "--wrap", "sleep 4")
     stand.told("sbatch", *wants)
     time.sleep(3.0)
 
 
 def each(state: str, *words: str) -> Callable[[ClusterStand, Cluster], None]:
-    """A command of the operator for each job in a state."""
+    """Returns a function that runs a command of the operator for each job in a state."""
 
     def done(stand: ClusterStand, _: Cluster) -> None:
         for job in stand.jobs(state):
@@ -226,13 +229,14 @@ def each(state: str, *words: str) -> Callable[[ClusterStand, Cluster], None]:
 
 
 def limited(stand: ClusterStand, _: Cluster) -> None:
-    """The time of all that run is nearly over."""
+    """Sets the time limit of all running jobs to one minute."""
     for job in stand.jobs("RUNNING"):
         stand.told("scontrol", "update", f"jobid={job}", "TimeLimit=1")
 
 
 def nodes() -> Iterator[Strike]:
-    """The node drained, down, without its daemon; jobs preempted, put back, held, at their time limit."""
+    """Yields the faults of node and jobs: node drained, down, without its daemon; jobs preempted, requeued, held, at
+    their time limit."""
     yield _strike("the node drained", on(node("drain")), mended(resumed), hold=4.0)
     yield _strike("the node's daemon killed", on(daemon_killed), mended(daemon_back), hold=4.0)
     again = mended(looked_after)
@@ -248,7 +252,7 @@ def nodes() -> Iterator[Strike]:
 
 
 def ordered(what: str, *names: str) -> Deed:
-    """These commands do so from now on."""
+    """Returns a function that gives these wrapper scripts an order."""
 
     def deed(stand: Stand) -> None:
         for name in names:
@@ -258,13 +262,13 @@ def ordered(what: str, *names: str) -> Deed:
 
 
 def obeyed(stand: Stand) -> None:
-    """They tell the truth again."""
+    """Removes all orders, so that the wrapper scripts call the commands of Slurm again."""
     for path in (stand.root / "orders").iterdir():
         path.unlink()
 
 
 def commands() -> Iterator[Strike]:
-    """Lists that are none, jobs that are made without an answer, ends that nobody is told of."""
+    """Yields the faults of commands: wrong lists of jobs, and commands that work but do not answer."""
     answers: dict[str, tuple[str, ...]] = {
         "squeue": ("garbage", "half", "fails", "hangs"), "sbatch": ("garbage", "nothing", "mute", "unheard", "fails"),
         "scancel": ("fails", "nothing", "unheard"), "scontrol": ("garbage", "nothing", "fails"),
@@ -286,5 +290,5 @@ def _again(name: str, deed: Deed, lift: Deed, hold: float = 2.5) -> Strike:
 
 
 def everything() -> list[Strike]:
-    """All of them, in the order in which they are tried."""
+    """Returns all faults of the batch system, in the order in which they are tried."""
     return [*controllers(), *nodes(), *commands()]

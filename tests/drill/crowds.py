@@ -1,8 +1,9 @@
-"""What one user takes from two others who are beside him: an attacker of his own process, two who ask as people do.
+"""Effect of one attacker on two other users of the same server. The attacker is a process; the two others send requests
+as people do.
 
-True is an attack during which 99 of 100 GETs of the other two are answered within 0.2 s and none later than 1 s, by a
-server that gives no wrong answer and does not grow. A machine that has much else to do makes a GET late by itself: how
-late a thread is that only sleeps is told, and a slow attack beside much other work is tried again.
+The verdict is true if 99 % of the GET requests of the two others are answered within 0.2 s and all within 1 s, no
+answer is wrong, and the memory of the server does not grow. Other load on the machine delays GET requests, too. A
+thread that only sleeps measures this delay; a slow attack on a busy machine is tried again.
 """
 
 import json
@@ -38,30 +39,32 @@ from .judge import TRUE, Row
 from .stand import Stand
 
 SECONDS = 6.0
-"""Of each attack."""
+"""Duration of each attack, s."""
 P99, WORST = 0.2, 1.0
-"""s that a GET of somebody else may take."""
+"""Largest time of a GET request of the two others at p99, and of the slowest one, s."""
 BUSY, TRIES = 0.02, 3
-"""s by which a thread that only sleeps is late, at p99, on a machine with much else to do; tries there. Chosen: a GET
-is handed from thread to thread some ten times.
+"""Delay of a sleeping thread at p99 from which the machine counts as busy, s; largest number of tries on a busy
+machine. Chosen: a GET request changes threads about ten times.
 """
 REST = 2.0
-"""s after an attack, in which what is left of it ends."""
+"""Pause after an attack, in which its remaining requests end, s."""
 GROWTH = 200 << 20
-"""Bytes by which the server may grow meanwhile."""
+"""Largest growth of the memory of the server during an attack, bytes."""
 PAUSE = 0.02
-"""s between two GETs of a person."""
+"""Pause between two GET requests of a person, s."""
 RUNS, EVENTS, REPORTS, FILES = 3000, 2500, 20_000, 2000
-"""Of the attacker: runs with labels; events of 20 kB, and reports, of his long run; files of another one."""
+"""Data of the attacker: number of runs with labels; number of events of 20 kB and of reports in the journal of the
+long run; number of files of another run."""
 MANY, LINES = 20, 1_000_000
-"""Of the attacker: runs with a journal of so many lines, more runs than the server keeps histories of."""
+"""Data of the attacker: number of runs with long journals, and number of lines of such a journal. The server caches
+the histories of fewer runs."""
 SAID = {-1, 200, 202, 204, 206, 304, 400, 401, 404, 405, 408, 409, 410, 413, 415, 416, 422, 429, 500, 503}
-"""What the attacker may be answered; -1: he does not read it."""
+"""Statuses that an attacker may get as an answer; -1: the attacker does not read the answer."""
 
 
 @dataclass
 class Person:
-    """Who asks for a run of his own now and then; how long each answer took, s."""
+    """A user with regular GET requests for a run; ``took``: time of each answer, s."""
 
     http: httpx2.Client
     paths: tuple[str, ...]
@@ -69,7 +72,7 @@ class Person:
     wrong: list[str] = field(default_factory=list)
 
     def asks(self, until: float) -> None:
-        """One GET after the other."""
+        """Sends GET requests one after the other."""
         n = 0
         while time.monotonic() < until:
             began, n = time.monotonic(), n + 1
@@ -85,7 +88,7 @@ class Person:
 
 @dataclass(frozen=True)
 class Scene:
-    """Who is there: the attacker's token and runs, the two others."""
+    """Token and runs of the attacker, and the two other users."""
 
     token: str
     run: str
@@ -96,16 +99,16 @@ class Scene:
 
 
 _scenes: dict[int, Scene] = {}
-"""By server process."""
+"""Scenes by process id of the server."""
 
 
 def groups() -> dict[str, tuple[str, Callable[[Stand], Iterator[Row]]]]:
-    """Each attack is a group of its own."""
+    """Returns the groups: one for each attack."""
     return {f"beside others: {kind}": ("plain", partial(rows, kind=kind)) for kind in KINDS}
 
 
 def rows(stand: Stand, kind: str) -> Iterator[Row]:
-    """One attack, tried again while it is slow and the machine busy."""
+    """Tries one attack; tries again while the attack is slow and the machine busy."""
     for n in range(1, TRIES + 1):
         row, late = _tried(stand, kind)
         row.happened += f"; try {n}" if n > 1 else ""
@@ -115,7 +118,7 @@ def rows(stand: Stand, kind: str) -> Iterator[Row]:
 
 
 def _tried(stand: Stand, kind: str) -> tuple[Row, float]:
-    """And by how much a thread that only sleeps was late, s at p99."""
+    """Returns the row of one try, and the delay of a sleeping thread at p99, s."""
     assert stand.http is not None
     assert stand.child is not None
     scene = _scenes.get(stand.child.pid) or _scenes.setdefault(stand.child.pid, _made(stand))
@@ -139,7 +142,7 @@ def _tried(stand: Stand, kind: str) -> tuple[Row, float]:
 
 
 def p99(times: Sequence[float]) -> float:
-    """Of the shortest first."""
+    """Returns the time at p99 of sorted times."""
     return times[int(0.99 * (len(times) - 1))]
 
 
@@ -155,7 +158,7 @@ def _verdict(during: Person, said: dict[int, int], grown: int) -> str:
 
 
 def _asked(people: tuple[Person, Person], seconds: float) -> Person:
-    """What both found, the shortest answer first."""
+    """Returns the requests of both persons together, with ascending times."""
     for person in people:
         person.took, person.wrong = [], []
     until = time.monotonic() + seconds
@@ -169,7 +172,7 @@ def _asked(people: tuple[Person, Person], seconds: float) -> Person:
 
 
 class _Machine:
-    """How late a thread is that only sleeps."""
+    """Measures the delay of a thread that only sleeps."""
 
     def __init__(self) -> None:
         self._late: list[float] = []
@@ -184,14 +187,14 @@ class _Machine:
             self._late.append(time.monotonic() - began - PAUSE)
 
     def end(self) -> float:
-        """s at p99."""
+        """Ends the measurement; returns the delay at p99, s."""
         self._over.set()
         self._thread.join()
         return p99(sorted(self._late))
 
 
 class _Growth:
-    """The memory of the server, looked at while an attack goes on."""
+    """Measures the memory of the server during an attack."""
 
     def __init__(self, stand: Stand, before: int) -> None:
         self._stand, self._before, self.most = stand, before, 0
@@ -204,14 +207,14 @@ class _Growth:
             self.most = max(self.most, _memory(self._stand) - self._before)
 
     def end(self) -> int:
-        """The most by which it has grown, bytes."""
+        """Ends the measurement; returns the largest growth, bytes."""
         self._over.set()
         self._thread.join()
         return self.most
 
 
 def _memory(stand: Stand) -> int:
-    """Bytes of the server in memory."""
+    """Returns the resident memory of the server, bytes."""
     assert stand.child is not None
     with suppress(OSError):
         return int(Path(f"/proc/{stand.child.pid}/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
@@ -222,7 +225,8 @@ def _memory(stand: Stand) -> int:
 
 
 def _made(stand: Stand) -> Scene:
-    """The attacker has 3,000 runs, one with a long journal, one with many files that goes on."""
+    """Creates the data of the attacker: 3,000 runs, one of them with a long journal, and a running one with many
+    files."""
     assert stand.http is not None
     store = Store(Settings(runs=stand.runs).database_url)
     token = create_token(store, "mallory", frozenset({"read", "submit", "metrics"}))
@@ -272,7 +276,7 @@ def _person(stand: Stand, store: Store, name: str) -> Person:
 
 
 def _laid(runs: Path, run: str, n: int) -> None:
-    """The folder of a run that has ended, of a case whose values are like those of a few others."""
+    """Creates the folder of a finished run; the values of its case are shared with few other runs."""
     (runs / run).mkdir()
     values = {f"key{n % 60}": {f"value{k}": f"{n} {'x' * 40}" for k in range(200)}, "run": {"end_time": n}}
     (runs / run / layout.RESOLVED_CASE).write_text(json.dumps(values))
@@ -289,7 +293,7 @@ def _record(run: str) -> Submission:
 
 
 def _long_journal(path: Path) -> None:
-    """20,000 reports, and 2,500 lines of 20 kB."""
+    """Writes a journal of 20,000 reports and 2,500 lines of 20 kB."""
     last = write(path, (message for message in told(REPORTS) if not isinstance(message, Status)), 100)
     with (path / layout.JOURNAL).open("ab") as file:
         for n in range(EVENTS):

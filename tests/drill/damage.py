@@ -1,4 +1,5 @@
-"""Faults that hit the files of one run: deleted, emptied, cut, garbled, replaced, locked away."""
+"""Faults of the files of one run: deleted, emptied, truncated, overwritten with garbage, replaced, without
+permission."""
 
 import os
 import shutil
@@ -20,7 +21,8 @@ from .stand import Stand
 CASE = "case.toml"
 GONE = frozenset({"410"})
 IN_A_ROW = 4
-"""Runs that wait at a time: they run one after the other, and the time that each is given is not for the queue."""
+"""Number of runs that wait at the same time. The runs of a group start one after the other, and the time limit of a
+run should not count its time in the queue."""
 LOST = frozenset({"lost/service", "lost/storage", "failed/storage", "failed/service"})
 ANY_FAILURE = STORAGE | {"failed/input"}
 
@@ -30,7 +32,7 @@ def deleted(path: Path) -> None:
 
 
 def emptied(path: Path) -> None:
-    """A folder: of what it has."""
+    """Empties a file, or removes the content of a folder."""
     if path.is_dir():
         for inner in path.iterdir():
             deleted(inner)
@@ -71,7 +73,8 @@ def endless(path: Path) -> None:
 
 
 def listening(path: Path) -> None:
-    """A socket that nobody answers at; its path is longer than such a name may be."""
+    """Replaces a file by a socket that no process listens to. The path is longer than the limit for sockets, so the
+    socket is bound through the folder's descriptor."""
     path.unlink()
     folder = os.open(path.parent, os.O_RDONLY)
     with socket.socket(socket.AF_UNIX) as made:
@@ -86,14 +89,15 @@ WAYS: dict[str, Callable[[Path], None]] = {
 IRREGULAR: dict[str, Callable[[Path], None]] = {
     "a pipe in its place": pipe, "a link to an endless device": endless, "a socket in its place": listening,
 }  # fmt: skip
-"""What is no file, and would keep a reader waiting."""
+"""Replacements that are no regular files; a program that reads such a path would block."""
 OF_FILES = ("deleted", "emptied", "cut to half", "garbled", "a folder in its place", "not permitted")
 OF_FOLDERS = ("deleted", "emptied", "a file in its place", "not permitted")
 
 
 @dataclass(frozen=True)
 class Damage:
-    """``name`` in the folder of a run that is ``doing`` something; ``down``: while no server is there."""
+    """Damage of the file ``name`` in the folder of a run; ``doing``: state of the run; ``down``: True if the server
+    is stopped meanwhile."""
 
     name: str
     way: str
@@ -102,27 +106,28 @@ class Damage:
 
     @property
     def title(self) -> str:
-        """In the table."""
+        """Name of the fault in the table."""
         when = "while no server was there" if self.down else "beneath the server"
         return f"{self.name or 'the folder of the run'}: {self.way}, {when}: {self.doing}"
 
     @property
     def beyond_use(self) -> bool:
-        """Whether nobody can write there any more."""
+        """Whether the path can no longer be written."""
         return self.way in {"a folder in its place", "a file in its place", "not permitted", *IRREGULAR}
 
     def states(self) -> frozenset[str]:
-        """What is true of the run afterwards."""
+        """Returns the states of the run that are correct after the damage."""
         return {"runs": self._runs, "waits": self._waits, "has ended": self._ended}[self.doing]()
 
     def _runs(self) -> frozenset[str]:
-        """A worker that can write goes on: what it has read is in its memory."""
+        """Returns the correct states of a running run. A worker that can write continues, because it has its input
+        in memory."""
         if not self.name:
             return {"not permitted": STORAGE, "emptied": STORAGE | SUCCEEDED}.get(self.way, GONE | STORAGE)
         return STORAGE if self.name == layout.JOURNAL and self.beyond_use else SUCCEEDED
 
     def _waits(self) -> frozenset[str]:
-        """A run whose case or submission is not what was accepted is not run."""
+        """Returns the correct states of a waiting run. A run whose case or submission has changed is not started."""
         if not self.name:
             return STORAGE if self.way == "not permitted" else GONE | STORAGE
         if self.name in {CASE, layout.SUBMISSION}:
@@ -130,17 +135,17 @@ class Damage:
         return STORAGE if self.beyond_use and self.name in {layout.JOURNAL, layout.LOGS} else SUCCEEDED
 
     def _ended(self) -> frozenset[str]:
-        """What has ended stays as it was told."""
+        """Returns the correct states of a finished run: its state does not change."""
         return GONE | SUCCEEDED if not self.name and self.way != "not permitted" else SUCCEEDED
 
     @property
     def whole(self) -> bool:
-        """Whether journal and outcome can still tell the same."""
+        """Whether journal and outcome can still agree."""
         return bool(self.name) and self.name not in {layout.JOURNAL, layout.OUTCOME} and not self.beyond_use
 
 
 def damages() -> Iterator[Damage]:
-    """All of them: file by way by what the run is doing, with and without a server."""
+    """Yields all damages: each file, in each way, for each state of the run, with a running and a stopped server."""
     files = {
         "runs": (layout.SUBMISSION, layout.JOURNAL, layout.WORKER, CASE),
         "waits": (layout.SUBMISSION, layout.JOURNAL, CASE),
@@ -155,7 +160,7 @@ def damages() -> Iterator[Damage]:
 
 
 def rows(stand: Stand, some: Sequence[Damage]) -> Iterator[Row]:
-    """Damages to as many runs at once; all of them with a server there, or all without."""
+    """Damages several runs at the same time; the server is running for all of them, or stopped for all."""
     blockers = [stand.running(ranks=stand.slots - 1)] if some[0].doing == "waits" else []
     made = [_made(stand, one) for one in some]
     lives = blockers + [run for one, run in zip(some, made, strict=True) if one.doing == "runs"]
@@ -206,7 +211,8 @@ def _judged(stand: Stand, some: Sequence[Damage], truths: Sequence[Truth]) -> It
 
 
 def batches(some: Iterable[Damage], size: int) -> Iterator[list[Damage]]:
-    """Of one kind each: what the runs do, and whether a server is there."""
+    """Yields batches of damages; in a batch the state of the runs is the same, and so is whether the server is
+    stopped."""
     kinds: dict[tuple[str, bool], list[Damage]] = {}
     for one in some:
         kinds.setdefault((one.doing, one.down), []).append(one)
@@ -216,7 +222,7 @@ def batches(some: Iterable[Damage], size: int) -> Iterator[list[Damage]]:
 
 
 def groups(size: int = 12) -> dict[str, tuple[str, Callable[[Stand], Iterator[Row]]]]:
-    """What is tried at once, by name, and on which kind of stand."""
+    """Returns the groups of damages by name, each with its kind of stand."""
     made: dict[str, tuple[str, Callable[[Stand], Iterator[Row]]]] = {}
     for n, batch in enumerate(batches(damages(), size)):
         kind = "narrow" if batch[0].doing == "waits" else "wide"

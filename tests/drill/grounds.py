@@ -1,4 +1,4 @@
-"""The stands of the drill by kind, each made when it is first needed, all closed at the end."""
+"""Stands of the drill by kind. A stand is made at its first use; all stands are closed at the end."""
 
 import os
 import shutil
@@ -12,7 +12,8 @@ from . import cluster
 from .stand import UNPRIVILEGED, Stand, can_drop
 
 DISK = "size=1100m,nr_inodes=4000"
-"""Of the file system of its own, in memory, that one of the stands has: little more than what a server keeps free."""
+"""Options of the file system in memory of one stand: its size is little more than the space that a server keeps
+free."""
 FAKETIME = ("/usr/lib/*/faketime/libfaketimeMT.so.1", "/usr/local/lib/faketime/libfaketimeMT.so.1")
 
 
@@ -34,7 +35,7 @@ class Grounds:
         }  # fmt: skip
 
     def lacks(self, kind: str) -> str:
-        """Why there can be no such stand here; empty when there can."""
+        """Returns the reason why this machine cannot have such a stand; an empty string if it can."""
         if kind in {"unprivileged", "wide", "narrow"} and not can_drop():
             return "root without setpriv: permissions do not hold"
         if kind == "disk" and os.geteuid() != 0:
@@ -44,7 +45,7 @@ class Grounds:
         return real_slurm.missing() if kind == "slurm" else ""
 
     def stand(self, kind: str) -> Stand:
-        """With a server that answers."""
+        """Returns the stand of a kind, with a running server."""
         if kind not in self._stands:
             root = self._place / kind
             root.mkdir(parents=True)
@@ -55,7 +56,7 @@ class Grounds:
         return found
 
     def renew(self, kind: str, log: Path | None = None) -> None:
-        """The next one starts from nothing; ``log``: where the log of the one before is kept."""
+        """Closes the stand of a kind, so that the next one of that kind is new; ``log``: copy of its server's log."""
         if kind in self._stands:
             found = self._stands.pop(kind)
             if log is not None:
@@ -79,7 +80,7 @@ class Grounds:
         shutil.rmtree(stand.root, ignore_errors=True)
 
     def _slurm(self) -> real_slurm.Cluster:
-        """One for all stands; it takes a while to start."""
+        """Returns the cluster that all stands share, because its start takes long."""
         if self._cluster is None:
             self._cluster = self._ends.enter_context(real_slurm.running(self._place / "cluster"))
         return self._cluster
@@ -93,7 +94,7 @@ class Grounds:
 
 
 def _odd(root: Path) -> Path:
-    """A folder in it whose name has all that a pattern, an address or a shell takes for something else."""
+    """Creates a folder whose name contains characters that are special in patterns, addresses and shells."""
     made = root / "100%s a\\b #1?x=%20;[y] '\u00e4'"
     made.mkdir()
     return made
@@ -114,7 +115,7 @@ def _libfaketime() -> str:
 
 @contextmanager
 def grounds(place: Path) -> Iterator[Grounds]:
-    """Closed at the end, whatever happens."""
+    """Yields the stands, and closes them at the end, also after an error."""
     made = Grounds(place)
     try:
         yield made

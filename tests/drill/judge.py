@@ -1,4 +1,5 @@
-"""Whether what the server says of a run is true: by the book of the workers, the processes, and the run's folder."""
+"""Checks whether the state that the server reports of a run is true, from the record of the workers, the processes,
+and the folder of the run."""
 
 import time
 from collections.abc import Sequence
@@ -16,7 +17,7 @@ TRUE = "true"
 
 @dataclass
 class Row:
-    """A line of the table."""
+    """A row of the table."""
 
     fault: str
     family: str
@@ -26,7 +27,7 @@ class Row:
 
 
 def settled(stand: Stand, truths: Sequence[Truth], since: float) -> list[tuple[str, float]]:
-    """The state at which each run comes to rest, and how long after ``since`` that was seen."""
+    """Returns the final or expected state of each run, and the time from ``since`` at which it was seen, s."""
     found: dict[str, tuple[str, float]] = {}
     while True:
         late = time.monotonic() > since + stand.patience
@@ -41,12 +42,12 @@ def settled(stand: Stand, truths: Sequence[Truth], since: float) -> list[tuple[s
 
 
 def settle(stand: Stand, truth: Truth, since: float) -> tuple[str, float]:
-    """The same of one run."""
+    """Returns the same for one run."""
     return settled(stand, [truth], since)[0]
 
 
 def verdict(stand: Stand, truth: Truth, seen: str, seconds: float) -> str:
-    """What is wrong, most severe first; ``TRUE`` for nothing."""
+    """Returns the most severe error; ``TRUE`` if there is none."""
     if truth.run == "none":
         return "never accepted"
     if "two runs" in truth.happened:
@@ -75,7 +76,7 @@ def _doubles(stand: Stand, truth: Truth) -> str:
 
 
 def _orphans(stand: Stand, truth: Truth, seen: str) -> str:
-    """Ranks end within a moment of their launcher."""
+    """Returns an error if processes of a finished run still exist. Ranks end a moment after their launcher."""
     deadline = time.monotonic() + 2.0
     while seen.partition("/")[0] in FINAL and processes.of_run(truth.run):
         if time.monotonic() > deadline:
@@ -85,7 +86,8 @@ def _orphans(stand: Stand, truth: Truth, seen: str) -> str:
 
 
 def _success(stand: Stand, truth: Truth, seen: str) -> str:
-    """By the book, or by the outcome that only a worker writes so: one may hang after it."""
+    """Checks that a worker has succeeded: by the record, or by an outcome that only a worker writes. A worker may
+    hang after its outcome."""
     done = any(entry["what"] == "end" and entry["code"] == 0 for entry in stand.entries(truth.run))
     if not done and (ended := folder.outcome(stand.runs / truth.run)) is not None:
         done = ended.state == "succeeded" and bool(ended.digest)
@@ -93,7 +95,7 @@ def _success(stand: Stand, truth: Truth, seen: str) -> str:
 
 
 def _folder(stand: Stand, truth: Truth, seen: str) -> str:
-    """Journal, outcome and list say the same as the answer."""
+    """Checks that journal, outcome and list agree with the answer."""
     path, state = stand.runs / truth.run, seen.partition("/")[0]
     told, ended = journal.statuses(path / layout.JOURNAL), folder.outcome(path)
     if not told or told[-1].state != state:
@@ -105,13 +107,13 @@ def _folder(stand: Stand, truth: Truth, seen: str) -> str:
 
 
 def reads(stand: Stand, run: str) -> None:
-    """Everything that may be asked of a run; answers that are none are kept by the stand."""
+    """Sends every GET request of a run; the stand stores server errors."""
     for path in ("", "/events", "/history", "/files", "/logs/0", "/snapshots"):
         stand.ask("GET", f"/v1/runs/{run}{path}")
 
 
 def stranded(stand: Stand) -> str:
-    """By the server's own account."""
+    """Returns an error if the metric ``conoid_stranded`` of the server is not 0."""
     told = str(stand.ask("GET", "/metrics")[1])
     found = [line for line in told.splitlines() if line.startswith("conoid_stranded ")]
     return "" if found and float(found[0].split()[1]) == 0.0 else f"stranded by its own account: {found}"

@@ -1,4 +1,4 @@
-"""Names of files and addresses that nobody thinks of: each is answered, and leads where it says."""
+"""Files and addresses with unusual names: each request is answered, and a link leads to the file that it names."""
 
 import os
 import time
@@ -26,18 +26,18 @@ Deed = Callable[[Stand], Iterator[Row]]
 
 
 def groups() -> dict[str, tuple[str, Deed]]:
-    """What is tried together, by name."""
+    """Returns the groups of faults by name."""
     found: dict[str, Deed] = {"files of odd names": files, "odd addresses": addresses, "odd heads": heads}
     return {name: ("plain", deed) for name, deed in found.items()}
 
 
 def everything() -> list[Strike]:
-    """Runs in a folder of an odd name."""
+    """Yields faults of a server whose folder of runs has an unusual name."""
     return [Strike("the server killed, its folder of an odd name", "names", killed, started, "odd")]
 
 
 def files(stand: Stand) -> Iterator[Row]:
-    """One of each name, in a folder of that name, too."""
+    """Creates a file of each name, also in a folder of that name, and reads them through the server."""
     run = stand.submit()
     stand.reached(run)
     folder = os.fsencode(stand.runs / run)
@@ -59,7 +59,7 @@ def files(stand: Stand) -> Iterator[Row]:
 
 
 def addresses(stand: Stand) -> Iterator[Row]:
-    """Each is not there, or wrong, for GET and for HEAD."""
+    """Checks that GET and HEAD of each address are answered with an error of the client."""
     run = stand.submit()
     stand.reached(run)
     for address in ADDRESSES:
@@ -70,7 +70,7 @@ def addresses(stand: Stand) -> Iterator[Row]:
 
 
 def heads(stand: Stand) -> Iterator[Row]:
-    """Of what has no end: at once, and with the headers of GET."""
+    """Sends HEAD requests for a running run, some of them for endless answers. Each answer must come at once."""
     run = stand.running()
     stand.reached(run, "running")
     for path in ("/logs/0?follow=true", "/logs/launcher?follow=true", "/stream", "/stream?after=1", "", "/history"):

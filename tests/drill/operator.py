@@ -1,4 +1,5 @@
-"""Faults that an operator makes: files that are none, a second server on the same runs, a server killed in a sweep."""
+"""Faults of an operator: irregular files, a second server on the same runs, a server killed while it accepts a
+sweep."""
 
 import json
 import os
@@ -24,13 +25,13 @@ from .strikes import nothing
 
 POINTS = 30
 REFUSED = 2
-"""The exit code of a server that is asked for something wrong."""
+"""Exit code of a server with wrong arguments."""
 ASKS = """
 import json, sys, httpx2
 url, headers, body = sys.argv[1:]
 httpx2.post(url.rstrip("/") + "/v1/sweeps", content=body, headers=json.loads(headers), timeout=60)
 """
-"""One who hands in a sweep, in a process of his own."""
+"""Program of a client that submits a sweep, run in a separate process."""
 Rows = Callable[[Stand], Iterator[Row]]
 
 
@@ -38,7 +39,7 @@ Rows = Callable[[Stand], Iterator[Row]]
 
 
 def irregular() -> Iterator[Damage]:
-    """File by way by what the run is doing, with and without a server."""
+    """Yields irregular files in place of each file, for each state of the run, with a running and a stopped server."""
     files = {
         "runs": (layout.SUBMISSION, layout.JOURNAL, layout.WORKER, CASE),
         "waits": (layout.SUBMISSION, layout.JOURNAL, CASE),
@@ -53,7 +54,7 @@ def irregular() -> Iterator[Damage]:
 
 
 def refused(stand: Stand, runs: Path, database: str = "") -> None:
-    """A server on ``runs`` ends at once, with one line."""
+    """Starts a server on ``runs``: the server must end at once, with one line."""
     command = [sys.executable, "-m", "conoid.server", "--runs", str(runs), "--port", "0", "--no-zenoh"]
     environment = {**os.environ, "CONOID_DATABASE": database}
     done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=START, check=False)
@@ -62,7 +63,7 @@ def refused(stand: Stand, runs: Path, database: str = "") -> None:
 
 
 def copied(stand: Stand) -> None:
-    """A copy of the folder is served beside it."""
+    """Starts a second server on a copy of the folder."""
     copy = stand.root / "copy"
     shutil.copytree(stand.runs, copy, ignore_dangling_symlinks=True)
     refused(stand, copy)
@@ -70,7 +71,7 @@ def copied(stand: Stand) -> None:
 
 
 def shared(stand: Stand) -> None:
-    """Another folder is served with the same database."""
+    """Starts a second server on another folder, with the same database."""
     other = stand.root / "other"
     other.mkdir()
     refused(stand, other, f"sqlite:///{stand.runs / 'server.sqlite'}")
@@ -78,7 +79,7 @@ def shared(stand: Stand) -> None:
 
 
 def strikes() -> Iterator[Strike]:
-    """Second servers: nobody is worse off."""
+    """Yields the faults with a second server: the first server is not affected."""
     yield Strike("a copy of the folder served beside it", "operator", copied, nothing, waits=START)
     yield Strike("another folder served with the same database", "operator", shared, nothing, waits=START)
 
@@ -87,7 +88,7 @@ def strikes() -> Iterator[Strike]:
 
 
 def sweeps(stand: Stand) -> Iterator[Row]:
-    """The server is killed while a sweep is handed in, later and later, with a key and without."""
+    """Kills the server while it accepts a sweep, after increasing times, with and without an idempotency key."""
     for key, pause in product(("key", ""), (0.02, 0.1, 0.2, 0.4, 0.7)):
         yield _swept(stand, f"{key}{time.monotonic_ns()}" if key else "", pause)
 
@@ -125,7 +126,8 @@ def _runs(stand: Stand) -> list[dict[str, str]]:
 
 
 def _settled(stand: Stand, before: set[str]) -> list[dict[str, str]]:
-    """The runs of the sweep once none of them is open, or none has ended for long: they run one after the other."""
+    """Returns the runs of the sweep when all of them have ended, or when no further run has ended within the
+    patience of the stand. The runs start one after the other."""
     ended, deadline = -1, 0.0
     while True:
         made = [run for run in _runs(stand) if run["id"] not in before]
@@ -138,7 +140,7 @@ def _settled(stand: Stand, before: set[str]) -> list[dict[str, str]]:
 
 
 def groups(size: int = 12) -> dict[str, tuple[str, Rows]]:
-    """What is tried at once, by name, and on which kind of stand."""
+    """Returns the groups of faults by name, each with its kind of stand."""
     made: dict[str, tuple[str, Rows]] = {"the server killed in a sweep": ("plain", sweeps)}
     for n, batch in enumerate(damage.batches(irregular(), size)):
         kind = "narrow" if batch[0].doing == "waits" else "wide"

@@ -1,9 +1,10 @@
-"""A server whose disk fails on demand: ``python -m tests.drill.server ORDER ...`` runs ``conoid.server`` with the rest.
+"""A server whose disk fails on demand: ``python -m tests.drill.server ORDER ...`` runs ``conoid.server`` with the other
+arguments.
 
-While the file ORDER is there, what the server writes below its folder of runs fails as the file says, in JSON:
-``errno``, 0 for what hangs until the file is gone; ``what``: "write" (files that are opened for writing, renamed, made,
-removed, written, flushed), "open" (all files, as without descriptors), "fsync" or "rename"; ``every``: one in so many
-fails.
+While the file ORDER exists, file operations of the server below its folder of runs fail as that file describes, in
+JSON. ``errno``: number of the error; 0: the operation hangs until the file is removed. ``what``: "write" (open for
+writing, rename, create, remove, write, flush), "open" (open any file, as without descriptors), "fsync" or "rename".
+``every``: n, if one of n operations fails.
 """
 
 import errno
@@ -18,19 +19,19 @@ from typing import Any
 WRITES = os.O_WRONLY | os.O_RDWR | os.O_CREAT
 CHANGES = {"os.rename", "os.mkdir", "os.remove", "os.truncate"}
 LOOK = 0.02
-"""s for which an order is kept in mind."""
+"""Time in s for which the content of the order file is cached."""
 fsync, write = os.fsync, os.write
 
 
 class Order:
-    """What is to fail now."""
+    """The operations that fail at present."""
 
     def __init__(self, path: Path, root: str) -> None:
         self.path, self.root, self.looked, self.words = path, root, 0.0, {}  # type: tuple[Path, str, float, dict[str, Any]]
         self.calls, self.busy = count(), False
 
     def fail(self, kinds: set[str], path: object = None) -> None:
-        """Raises what is ordered for one of these kinds of work on ``path``."""
+        """Raises the ordered error for one of these kinds of operation on ``path``."""
         if self.busy or (path is not None and not self._mine(path)):
             return
         words = self._read()
@@ -57,7 +58,8 @@ class Order:
 
 
 def install(order: Order) -> None:
-    """Python tells its audit hooks of files before they are touched, and passes on what a hook raises."""
+    """Installs the faults: Python calls audit hooks before file operations, and an exception of a hook stops the
+    operation."""
 
     def audit(event: str, arguments: tuple[object, ...]) -> None:
         if event == "open" and isinstance(arguments[2], int):
@@ -79,7 +81,7 @@ def install(order: Order) -> None:
 
 
 def order(number: int, what: str = "write", every: int = 1) -> str:
-    """The text of an order."""
+    """Returns the text of an order file."""
     assert number in {0, *errno.errorcode}
     return json.dumps({"errno": number, "what": what, "every": every})
 

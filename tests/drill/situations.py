@@ -1,4 +1,5 @@
-"""What a run may be doing when a fault strikes: each is a life in three parts, before, meanwhile and after."""
+"""Situations of a run at the time of a fault. A situation is a generator of three parts: before, during and after
+the fault."""
 
 import os
 import signal
@@ -12,16 +13,16 @@ from .stand import Stand
 
 @dataclass(frozen=True)
 class Truth:
-    """What must come out of a run; ``states`` as ``Stand.state`` tells them."""
+    """Expected result of a run; ``states``: correct states, in the form of ``Stand.state``."""
 
     run: str
     states: frozenset[str]
     happened: str = ""
-    """What was answered meanwhile."""
+    """Answers of the server during the fault."""
     launches: int = 1
-    """How often it may have been started at most."""
+    """Largest number of starts of the run."""
     whole: bool = True
-    """Whether its folder must tell the same."""
+    """Whether the files in the folder must agree with the answer."""
 
 
 Life = Generator[None, None, Truth]
@@ -31,7 +32,7 @@ STORAGE = frozenset({"failed/storage", "lost/storage"})
 
 
 def is_running(stand: Stand, unsaid: frozenset[str]) -> Life:
-    """It goes on after the fault."""
+    """The run continues after the fault."""
     run = stand.running()
     yield
     yield
@@ -40,7 +41,7 @@ def is_running(stand: Stand, unsaid: frozenset[str]) -> Life:
 
 
 def ends_meanwhile(stand: Stand, unsaid: frozenset[str]) -> Life:
-    """Its worker has done its work. ``unsaid``: what is true when it could not write so."""
+    """The worker ends during the fault. ``unsaid``: further correct states if the worker could not write its end."""
     run = stand.running()
     yield
     stand.go(run)
@@ -49,7 +50,7 @@ def ends_meanwhile(stand: Stand, unsaid: frozenset[str]) -> Life:
 
 
 def is_cancelled_meanwhile(stand: Stand, unsaid: frozenset[str]) -> Life:
-    """By its owner, who asks again when that could not be recorded."""
+    """The owner cancels the run during the fault, and tries again after it if the cancellation could not be stored."""
     run = stand.running()
     yield
     answer = stand.cancel(run)
@@ -59,7 +60,7 @@ def is_cancelled_meanwhile(stand: Stand, unsaid: frozenset[str]) -> Life:
 
 
 def is_killed_meanwhile(stand: Stand, unsaid: frozenset[str]) -> Life:
-    """A rank, from outside."""
+    """All processes of rank 0 are killed during the fault."""
     run = stand.running()
     yield
     for pid in stand.ranks(run):
@@ -70,7 +71,8 @@ def is_killed_meanwhile(stand: Stand, unsaid: frozenset[str]) -> Life:
 
 
 def waits(stand: Stand, unsaid: frozenset[str]) -> Life:
-    """In the queue, and gets its turn when others have ended. A launch that cannot be recorded is made again."""
+    """The run waits in the queue and starts when other runs have ended. A start that could not be stored is tried
+    again."""
     run = stand.submit(ranks=stand.large)
     yield
     yield
@@ -78,7 +80,7 @@ def waits(stand: Stand, unsaid: frozenset[str]) -> Life:
 
 
 def waits_and_is_cancelled(stand: Stand, unsaid: frozenset[str]) -> Life:
-    """In the queue, or just come out of it; it would not end by itself."""
+    """The run is cancelled in the queue or just after its start; without the cancellation it would not end."""
     run = stand.submit(ranks=stand.large, steps=100_000, pace=0.02)
     yield
     answer = stand.cancel(run)
@@ -88,7 +90,8 @@ def waits_and_is_cancelled(stand: Stand, unsaid: frozenset[str]) -> Life:
 
 
 def is_submitted_meanwhile(stand: Stand, unsaid: frozenset[str]) -> Life:
-    """With a key, and again afterwards as a client does: one run, whatever was answered."""
+    """The run is submitted during the fault with an idempotency key, and again after it, as a client does: the
+    result must be one run."""
     key = f"k{time.monotonic_ns()}"
     yield
     answer, told = stand.hand_in(key)
@@ -104,7 +107,7 @@ def is_submitted_meanwhile(stand: Stand, unsaid: frozenset[str]) -> Life:
 
 
 def has_ended(stand: Stand, unsaid: frozenset[str]) -> Life:
-    """It had succeeded before and stays so."""
+    """The run succeeded before the fault, and its state does not change."""
     run = stand.submit()
     stand.reached(run)
     yield
@@ -113,7 +116,7 @@ def has_ended(stand: Stand, unsaid: frozenset[str]) -> Life:
 
 
 def cancel_until(stand: Stand, run: str) -> int:
-    """The answer to the last of the requests: as a person does who is told to try again."""
+    """Cancels a run until the request is accepted, as a person would; returns the last status."""
     deadline = time.monotonic() + stand.patience
     while (answer := stand.cancel(run)) != 202 and time.monotonic() < deadline:
         time.sleep(0.2)
@@ -124,4 +127,4 @@ ALL: tuple[Situation, ...] = (
     has_ended, is_running, ends_meanwhile, is_cancelled_meanwhile, is_killed_meanwhile, waits, waits_and_is_cancelled,
     is_submitted_meanwhile,
 )  # fmt: skip
-"""In the order in which they begin: those that run before those that find no room."""
+"""Order in which the situations begin: running runs come before runs that must wait for slots."""

@@ -1,4 +1,4 @@
-"""Where a fault is tried: a server of its own on a folder of its own, its user, a book of what its workers did."""
+"""Stand of a fault: a server with a folder of runs, a user, and a record of the work of the workers."""
 
 import json
 import os
@@ -26,55 +26,56 @@ from ..server.running import TOML, case_text
 
 HERE = Path(__file__).parent
 START = 180.0
-"""s in which a server must be up, or have said why not."""
+"""Time in s within which a server must have started, or have printed why not."""
 PATIENCE = 60.0
-"""s for which a user waits for an answer."""
+"""Time in s for which a user waits for an answer."""
 UNPRIVILEGED = ("setpriv", "--bounding-set=-dac_override,-dac_read_search")
-"""Before a command: root obeys the permissions of files as everybody does."""
+"""Prefix of a command that makes root obey the permissions of files like other users."""
 FINAL = {state.value for state in State if state.final}
 TOLERATED = {503, 507}
-"""Server errors that say what is wrong and that it passes."""
+"""Statuses of server errors that name a temporary cause."""
 
 
 @dataclass
 class Stand:
-    """A server with workers that compute nothing; ``root`` has its book, its orders and the folder of its runs."""
+    """A server with workers that compute no physics; ``root`` contains their record, the order files and the folder
+    of runs."""
 
     root: Path
     options: Sequence[str] = ()
     before: Sequence[str] = ()
-    """What stands before the server's command."""
+    """Prefix of the server's command."""
     environment: Mapping[str, str] = field(default_factory=dict)
     slots: int = 5
     large: int = 2
-    """Ranks of a run that finds no room beside four others."""
+    """Number of ranks of a run that must wait while four other runs are running."""
     patience: float = 30.0
-    """s in which the state must be true again."""
+    """Time in s within which the state must be true after the fault."""
     profile: str = ""
     child: subprocess.Popen[bytes] | None = None
     http: httpx2.Client | None = None
     errors: list[str] = field(default_factory=list)
-    """Answers that are none: 500 and the like, by run."""
+    """Answers with unexpected server errors such as 500; each text contains the run."""
 
     @property
     def runs(self) -> Path:
-        """The server's folder."""
+        """Folder of the runs of the server."""
         return self.root / "runs"
 
     @property
     def order(self) -> Path:
-        """What is to fail in the server, see ``tests.drill.server``."""
+        """Order file that makes operations of the server fail (``tests.drill.server``)."""
         return self.root / "order.json"
 
     @property
     def book(self) -> Path:
-        """What the workers did."""
+        """Record of the starts and ends of the workers."""
         return self.root / "book.jsonl"
 
     # The server -------------------------------------------------------------------------------------------------------
 
     def start(self, patience: float = START) -> bool:
-        """Starts the server; False when it refuses, in so many words."""
+        """Starts the server. Returns False if the server ends with a message, or does not answer in time."""
         self.runs.mkdir(0o700, parents=True, exist_ok=True)
         address = self.runs / "server.json"
         with suppress(OSError):
@@ -115,39 +116,39 @@ class Stand:
         self.http = httpx2.Client(base_url=url, headers={"Authorization": token}, timeout=PATIENCE)
 
     def token(self) -> str:
-        """Of a user, made by the operator."""
+        """Creates a token of the user."""
         store = Store(Settings(runs=self.runs).database_url)
         made = create_token(store, "ann", frozenset({"read", "submit", "metrics"}))
         store.close()
         return made
 
     def new_token(self) -> None:
-        """After a database was lost, which is the only place that has them."""
+        """Creates a new token after the loss of the database, which alone contains the tokens."""
         assert self.http is not None
         self.http.headers["Authorization"] = f"Bearer {self.token()}"
 
     def signal(self, number: signal.Signals) -> None:
-        """To the server."""
+        """Sends a signal to the server."""
         assert self.child is not None
         os.kill(self.child.pid, number)
 
     def kill(self) -> None:
-        """As a crash does."""
+        """Kills the server, as a crash would."""
         if self.child is not None and self.child.poll() is None:
             self.child.kill()
             self.child.wait(20)
 
     def again(self) -> None:
-        """Kills the server and starts the next one. Raises AssertionError when it does not start."""
+        """Kills the server and starts a new one. Raises AssertionError if it does not start."""
         self.kill()
         assert self.start(), f"the server does not start: {self.said()}"
 
     def said(self) -> str:
-        """The last line of the server."""
+        """Returns the last line of the server's log."""
         return (self.root / "server.log").read_text(errors="replace").strip().rpartition("\n")[2][:200]
 
     def close(self) -> None:
-        """Ends everything."""
+        """Ends the server and all processes of the stand."""
         self.order.unlink(missing_ok=True)
         self.kill()
         if self.http is not None:
@@ -160,7 +161,7 @@ class Stand:
     # Its users --------------------------------------------------------------------------------------------------------
 
     def ask(self, method: str, path: str, **words: Any) -> tuple[int, Any]:
-        """Status and body; status 0 when there was no answer."""
+        """Sends a request; returns status and body, status 0 without an answer."""
         assert self.http is not None
         try:
             answer = self.http.request(method, path, **words)
@@ -175,48 +176,50 @@ class Stand:
 
     @contextmanager
     def giving_up(self, seconds: float) -> Iterator[None]:
-        """Users wait no longer than so for an answer."""
+        """Sets the time for which users wait for an answer within the block."""
         assert self.http is not None
         self.http.timeout = seconds
         yield
         self.http.timeout = PATIENCE
 
     def hand_in(self, key: str = "", **plan: Any) -> tuple[int, Any]:
-        """One try to submit a run."""
+        """Tries once to submit a run."""
         query = {"profile": self.profile} if self.profile else {}
         headers = {**TOML, **({"Idempotency-Key": key} if key else {})}
         return self.ask("POST", "/v1/runs", content=case_text(**plan), headers=headers, params=query)
 
     def submit(self, **plan: Any) -> str:
-        """The id of a new run."""
+        """Submits a run; returns its id."""
         status, told = self.hand_in(**plan)
         assert status == 202, told
         return str(told["id"])
 
     def running(self, **plan: Any) -> str:
-        """The id of a run that waits for its sign; it may not run yet when this returns."""
+        """Submits a run that waits for the signal of ``go``; returns its id. The run may still be in the queue."""
         name = f"go-{time.monotonic_ns()}"
         run = self.submit(wait=str(self.root / name), **plan)
         (self.root / f"sign-{run}").write_text(name)
         return run
 
     def go(self, run: str) -> None:
-        """The sign."""
+        """Creates the file for which the run waits."""
         (self.root / (self.root / f"sign-{run}").read_text()).touch()
 
     def cancel(self, run: str) -> int:
-        """One try."""
+        """Tries once to cancel a run; returns the status."""
         return self.ask("POST", f"/v1/runs/{run}:cancel")[0]
 
     def state(self, run: str) -> str:
-        """``succeeded``, ``lost/node``, or what was answered instead."""
+        """Returns state and cause of a run, such as ``succeeded`` or ``lost/node``; otherwise the status of the
+        answer."""
         status, told = self.ask("GET", f"/v1/runs/{run}")
         if status != 200:
             return str(status)
         return f"{told['state']}/{told['cause']}" if told["cause"] else str(told["state"])
 
     def reached(self, run: str, *states: str) -> str:
-        """The state once it is one of these (any final one when none is named), or whatever it is too late."""
+        """Waits until the run has one of these states, by default any final state; returns its last state, also
+        after the time limit."""
         deadline = time.monotonic() + self.patience
         while (seen := self.state(run)).partition("/")[0] not in (states or FINAL):
             if time.monotonic() > deadline:
@@ -225,22 +228,23 @@ class Stand:
         return seen
 
     def entries(self, run: str) -> list[dict[str, Any]]:
-        """What the book says of a run."""
+        """Returns the entries of a run in the record of the workers."""
         lines = self.book.read_text().splitlines() if self.book.exists() else []
         return [entry for entry in map(json.loads, lines) if entry["run"] == run]
 
     def ranks(self, run: str) -> list[int]:
-        """The processes of rank 0 that live."""
+        """Returns the process ids of rank 0 that still exist."""
         started = [entry["pid"] for entry in self.entries(run) if entry["what"] == "start"]
         return [pid for pid in started if processes.start_time(pid) is not None]
 
 
 def _children(pid: int) -> Iterator[int]:
-    """setpriv replaces itself, faketime as well; a wrapper that stays has children."""
+    """Yields the children of a process. setpriv and faketime replace themselves by their command; a wrapper that
+    stays has children."""
     with suppress(OSError):
         yield from map(int, Path(f"/proc/{pid}/task/{pid}/children").read_text().split())
 
 
 def can_drop() -> bool:
-    """Whether permissions hold for what a stand starts."""
+    """Whether file permissions limit the processes that a stand starts."""
     return os.geteuid() != 0 or shutil.which(UNPRIVILEGED[0]) is not None

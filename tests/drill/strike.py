@@ -1,4 +1,4 @@
-"""A fault that hits a whole server, while runs are in every situation."""
+"""A fault of a whole server, tried with runs in every situation."""
 
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -14,27 +14,27 @@ Deed = Callable[[Stand], None]
 
 @dataclass(frozen=True)
 class Strike:
-    """``deed`` makes the fault, ``lift`` ends it ``hold`` s later."""
+    """``deed`` starts the fault, ``lift`` ends it ``hold`` s later."""
 
     name: str
     family: str
     deed: Deed
     lift: Deed
     stand: str = "plain"
-    """The kind of stand that it needs."""
+    """Kind of stand that the fault needs."""
     unsaid: frozenset[str] = frozenset()
-    """What is true of a worker that could not write how it ended, where the fault hits what workers write as well."""
+    """Further correct states of a worker that could not write its end, if the fault also affects files of workers."""
     hold: float = 2.5
     lives: Sequence[Situation] = situations.ALL
     launches: int = 1
-    """How often any run may be started at most."""
+    """Largest number of starts of a run."""
     waits: float = PATIENCE
-    """s after which whoever asks something meanwhile gives up: a fault ends at its time, whoever waits for it."""
+    """Time in s after which requests during the fault give up: the fault must end on time even if the server hangs."""
 
 
 def rows(stand: Stand, strike: Strike) -> Iterator[Row]:
-    """Brings runs into every situation, strikes, lifts, and says of each run whether its state became true; and
-    whether a server that is started then says the same.
+    """Brings runs into every situation, starts and ends the fault, and yields for each run whether its state became
+    true, and whether a newly started server reports the same state.
     """
     lives = [life(stand, strike.unsaid) for life in strike.lives]
     _begin(stand, lives)
@@ -66,14 +66,15 @@ def rows(stand: Stand, strike: Strike) -> Iterator[Row]:
 
 
 def _concerns(error: str, truth: Truth, name: str) -> bool:
-    """An answer that failed belongs to its run; one to a submission to the run that was submitted; others to all."""
+    """Whether a server error concerns a run: an error of a submission concerns the submitted run, an error with the
+    id of a run that run, all other errors every run."""
     if error.startswith("POST /v1/runs:"):
         return "submitted" in name
     return truth.run in error or "/v1/runs/" not in error
 
 
 def _begin(stand: Stand, lives: Sequence[Life]) -> None:
-    """Those that run are given the time to do so, before others want their places."""
+    """Begins the situations one by one: runs that should be running start before other runs need their slots."""
     for life in lives:
         next(life)
         if stand.slots < 100 or stand.profile:

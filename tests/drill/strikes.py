@@ -1,4 +1,4 @@
-"""The faults that hit a whole server: disks, clocks, descriptors, the database, the server's own processes."""
+"""Faults of a whole server: disks, clocks, descriptors, the database, and the processes of the server."""
 
 import errno
 import os
@@ -23,28 +23,29 @@ DATABASE = "server.sqlite"
 
 
 def nothing(stand: Stand) -> None:
-    """It passes by itself."""
+    """Does nothing: the fault ends without an action."""
 
 
 # Disks ----------------------------------------------------------------------------------------------------------------
 
 
 def fails(number: int, what: str = "write", every: int = 1) -> Deed:
-    """What the server writes fails; what its workers write does not."""
+    """Returns a function that makes file operations of the server fail; those of its workers do not fail."""
     return lambda stand: void(stand.order.write_text(server.order(number, what, every)))
 
 
 def void(_: object) -> None:
-    """For deeds."""
+    """Returns None, so that a lambda with an expression can be a deed."""
 
 
 def mend(stand: Stand) -> None:
-    """The server's disk is well again."""
+    """Ends the fault of the server's disk."""
     stand.order.unlink(missing_ok=True)
 
 
 def and_killed(deed: Deed) -> Deed:
-    """The server is killed under the fault; one that is started meanwhile may refuse."""
+    """Returns a function that starts a fault, kills the server and tries to start it; the start may fail during the
+    fault."""
 
     def both(stand: Stand) -> None:
         deed(stand)
@@ -55,7 +56,7 @@ def and_killed(deed: Deed) -> Deed:
 
 
 def and_started(lift: Deed) -> Deed:
-    """When the fault is over, whoever looks after the server starts it, if it is not there."""
+    """Returns a function that ends a fault and, as an operator would, starts the server if it is not running."""
 
     def both(stand: Stand) -> None:
         lift(stand)
@@ -66,7 +67,7 @@ def and_started(lift: Deed) -> Deed:
 
 
 def filled(stand: Stand) -> None:
-    """Every byte of the disk is taken."""
+    """Fills the disk completely."""
     with (stand.runs / "filler").open("wb", buffering=0) as file:
         size = 0
         for chunk in (1 << 24, 1 << 12):
@@ -82,7 +83,7 @@ def emptied(stand: Stand) -> None:
 
 
 def crowded(stand: Stand) -> None:
-    """No further file can be made."""
+    """Creates files until the file system has no free inode."""
     place = stand.runs / "filler-many"
     place.mkdir()
     with suppress(OSError):
@@ -95,12 +96,13 @@ def thinned(stand: Stand) -> None:
 
 
 def mode(number: int) -> Deed:
-    """Of the folder of all runs."""
+    """Returns a function that sets the permissions of the folder of runs."""
     return lambda stand: stand.runs.chmod(number)
 
 
 def disks() -> Iterator[Strike]:
-    """Errors that the server alone has, then real disks, each with the server going on and killed."""
+    """Yields the faults of the disk: errors of the server's file operations, then real disks; each also with the
+    server killed."""
     codes = ("ENOSPC", "EIO", "EROFS", "EDQUOT", "ESTALE", "EACCES", "ENOMEM")
     for code in codes:
         yield Strike(f"{code} at every write of the server", "storage", fails(getattr(errno, code)), mend)
@@ -130,7 +132,7 @@ def disks() -> Iterator[Strike]:
 
 
 def few(left: int) -> Deed:
-    """The server may open so many files more."""
+    """Returns a function that limits the descriptors of the server to ``left`` more than it has open."""
 
     def deed(stand: Stand) -> None:
         assert stand.child is not None
@@ -148,7 +150,7 @@ def many(stand: Stand) -> None:
 
 
 def descriptors() -> Iterator[Strike]:
-    """None left, one left, and errors at every opening."""
+    """Yields the faults of descriptors: no free descriptor, one, and errors when files are opened."""
     yield Strike("no descriptor left", "descriptors", few(0), many)
     yield Strike("one descriptor left", "descriptors", few(1), many)
     yield Strike("EMFILE at every opening", "descriptors", fails(errno.EMFILE, "open"), mend)
@@ -159,12 +161,14 @@ def descriptors() -> Iterator[Strike]:
 
 
 def clock(words: str) -> Deed:
-    """The real-time clock of the server, in the words of libfaketime. Workers have their own: there ``sleep`` fails."""
+    """Returns a function that changes the real-time clock of the server; ``words``: syntax of libfaketime. Workers
+    keep the true clock, because ``sleep`` fails under libfaketime."""
     return lambda stand: void((stand.root / "clock").write_text(words))
 
 
 def clocks() -> Iterator[Strike]:
-    """Set forward and back, fast and slow; the clock that nobody sets goes on. A rate lasts until the next."""
+    """Yields the faults of the real-time clock: set forward, set back, too fast, too slow. The monotonic clock is
+    not changed. libfaketime keeps a rate until another one is set."""
     right = clock("+0 x1")
     for name, words in (
         ("set forward by a day", "+1d"), ("set back by a day", "-1d"), ("set forward by 10 s", "+10"),
@@ -182,7 +186,7 @@ def clocks() -> Iterator[Strike]:
 
 
 def locked(stand: Stand) -> None:
-    """By another process that does not let go."""
+    """Locks the database by another connection that stays open."""
     other = sqlite3.connect(stand.runs / DATABASE, isolation_level=None, check_same_thread=False)
     other.execute("begin immediate")
     _locks[stand.root] = other
@@ -198,19 +202,19 @@ _locks: dict[Path, sqlite3.Connection] = {}
 
 
 def files(stand: Stand, suffix: str = "*") -> list[Path]:
-    """The database's."""
+    """Returns the files of the database."""
     return list(stand.runs.glob(f"{DATABASE}{suffix}"))
 
 
 def stopped(stand: Stand) -> None:
-    """The server ends cleanly, so that its database is one file."""
+    """Stops the server normally, so that its database is a single file."""
     stand.signal(signal.SIGTERM)
     assert stand.child is not None
     stand.child.wait(30)
 
 
 def down(deed: Callable[[Stand], None]) -> Deed:
-    """Done while no server is there."""
+    """Returns a function that acts while the server is stopped."""
 
     def both(stand: Stand) -> None:
         stopped(stand)
@@ -226,7 +230,7 @@ def deleted(stand: Stand) -> None:
 
 
 def saved(stand: Stand) -> None:
-    """A backup, from which an operator restores."""
+    """Copies the database, as a backup for the operator."""
     for path in files(stand):
         shutil.copy2(path, stand.root / path.name)
 
@@ -271,7 +275,8 @@ def writable(stand: Stand) -> None:
 
 
 def restored(stand: Stand) -> None:
-    """What an operator does about a server that does not start, or cannot use its database: the backup; else none."""
+    """Restores the database as an operator does if the server does not start or cannot use it: from the backup, or
+    an empty one."""
     stand.kill()
     path = stand.runs / DATABASE
     if path.is_dir():
@@ -284,7 +289,7 @@ def restored(stand: Stand) -> None:
 
 
 def renewed(stand: Stand) -> None:
-    """Tokens that were lost are made again."""
+    """Starts the server if necessary, and creates a new token if the old one was lost."""
     if stand.child is None or stand.child.poll() is not None:
         assert stand.start(), stand.said()
     if stand.ask("GET", "/v1/me")[0] == 401:
@@ -292,13 +297,13 @@ def renewed(stand: Stand) -> None:
 
 
 def restarted(stand: Stand) -> None:
-    """Whoever deletes a database starts the server anew."""
+    """Restarts the server after its database was deleted."""
     stand.again()
     renewed(stand)
 
 
 def databases() -> Iterator[Strike]:
-    """Locked, gone, damaged, read-only."""
+    """Yields the faults of the database: locked, deleted, damaged, read-only."""
     yield Strike("the database locked for 8 s", "database", locked, unlocked, hold=8.0)
     yield Strike("the database deleted beneath the server", "database", deleted, restarted)
     yield Strike("the database deleted while no server was there", "database", down(deleted), renewed)
@@ -325,7 +330,7 @@ def started(stand: Stand) -> None:
 
 
 def killed_often(stand: Stand) -> None:
-    """Before each has looked round."""
+    """Kills the server three times, before it has found its runs again."""
     for pause in (0.0, 0.05, 0.3):
         stand.kill()
         stand.start()
@@ -341,7 +346,7 @@ def goes_on(stand: Stand) -> None:
 
 
 def reader_gets(stand: Stand, number: signal.Signals) -> None:
-    """The program that reads cases."""
+    """Sends a signal to the process that reads cases for the server."""
     assert stand.child is not None
     for entry in Path("/proc").iterdir():
         with suppress(OSError):
@@ -351,7 +356,7 @@ def reader_gets(stand: Stand, number: signal.Signals) -> None:
 
 
 def kills() -> Iterator[Strike]:
-    """Of the server and its helper."""
+    """Yields the faults of processes: of the server and of its reader of cases."""
     yield Strike("the server killed", "kill", killed, started)
     yield Strike("the server killed three times", "kill", killed_often, started)
     yield Strike("the server told to stop", "kill", stopped, started)
@@ -363,5 +368,5 @@ def kills() -> Iterator[Strike]:
 
 
 def everything() -> list[Strike]:
-    """All of them, in the order in which they are tried."""
+    """Returns all faults of a whole server, in the order in which they are tried."""
     return [*disks(), *descriptors(), *clocks(), *databases(), *kills()]

@@ -1,4 +1,4 @@
-"""The table of the drill."""
+"""Table of the results of the drill."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -7,14 +7,15 @@ from pathlib import Path
 from .judge import TRUE, Row
 
 WORDS = ("stranded", "lie", "orphan", "double", "acknowledged and lost", "late")
-"""With which the verdict of a fault that went wrong begins; anything else is counted by itself."""
+"""First words of wrong verdicts, in the order of the summary. Other wrong verdicts are counted after them."""
 
 NAMED = 12
-"""Groups that were not tried and are named."""
+"""Number of untried groups that are named."""
 
 
 def write(path: Path, rows: Sequence[Row], untried: Sequence[str] = ()) -> int:
-    """Writes and prints; 0 when all are true. ``untried``: groups of faults of which nothing is known."""
+    """Writes and prints the table; returns 0 if all verdicts are true. ``untried``: names of groups without a
+    result."""
     told = [*summary(rows), *missing(untried)]
     lines = [*told, "", "| fault | what happened | s to the truth | verdict |", "|---|---|---|---|"]
     lines += [f"| {row.fault} | {row.happened} | {row.seconds:.1f} | {row.verdict} |" for row in rows]
@@ -24,13 +25,13 @@ def write(path: Path, rows: Sequence[Row], untried: Sequence[str] = ()) -> int:
 
 
 def missing(untried: Sequence[str]) -> list[str]:
-    """What the counts leave out."""
+    """Returns a line about groups without a result."""
     more = f"; and {len(untried) - NAMED} more" if len(untried) > NAMED else ""
     return [f"groups not tried, {len(untried)}: {'; '.join(untried[:NAMED])}{more}"] if untried else []
 
 
 def summary(rows: Sequence[Row]) -> list[str]:
-    """Counts by family and by verdict."""
+    """Returns the number of faults by family and by verdict."""
     families = Counter(row.family for row in rows)
     true = sum(row.verdict == TRUE for row in rows)
     kinds = Counter(row.verdict.partition(":")[0] for row in rows if row.verdict != TRUE)

@@ -1,4 +1,4 @@
-"""Twenty faults of the drill on one server: the tests of every day. All of them: ``python -m tests.drill``."""
+"""Test of twenty faults of the drill on one server. ``python -m tests.drill`` tries all faults."""
 
 import errno
 import socket
@@ -31,7 +31,8 @@ FILES = (
     Damage(layout.OUTCOME, "a folder in its place", "has ended", False),
     Damage(layout.LOGS, "a file in its place", "has ended", False), Damage("", "deleted", "has ended", False),
 )  # fmt: skip
-"""On the server that the strike has left; four of them run, which leaves one slot for the others."""
+"""Damages that are tried on the server after the strike. Four of the runs are running, which leaves one slot for the
+others."""
 
 
 @pytest.fixture
@@ -51,7 +52,7 @@ def test_twenty_faults_leave_every_state_true(stand: Stand) -> None:
 
 
 def test_nobody_waits_longer_than_told_for_a_server_that_hangs(tmp_path: Path) -> None:
-    """A fault of three seconds would last for minutes."""
+    """A request to a hung server must give up, else a fault of three seconds would take minutes."""
     with socket.create_server(("127.0.0.1", 0)) as silent:
         stand = Stand(tmp_path, http=httpx2.Client(base_url=f"http://127.0.0.1:{silent.getsockname()[1]}"))
         began = time.monotonic()

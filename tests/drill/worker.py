@@ -1,7 +1,8 @@
-"""The fake worker of the server's tests, with a book beside the runs in which each start and each end stands.
+"""Fake worker of the tests of the server, with a record of each start and each end: ``worker.py BOOK CASE --out DIR
+...``.
 
-``worker.py BOOK CASE --out DIR ...``: whatever happens to the run's folder, the book knows how often it was started,
-whether two were alive at a time, and how it ended.
+The file BOOK is outside of the folder of the run. After any damage of that folder it still contains how often the
+run was started, whether two workers ran at the same time, and how the run ended.
 """
 
 import json

@@ -1,4 +1,4 @@
-"""Faults of one worker, which the server that started it sees, or the next one."""
+"""Faults of one worker, detected by the server that started it or by the next server."""
 
 import os
 import signal
@@ -17,12 +17,12 @@ from .stand import Stand
 NODE, PREEMPTED = frozenset({"lost/node"}), frozenset({"failed/preempted"})
 FAILED = frozenset({"failed/service", "failed/launch"})
 Upload = tuple[str, signal.Signals]
-"""To whom, and what."""
+"""Receiver of a signal, and the signal."""
 
 
 @dataclass(frozen=True)
 class Blow:
-    """What happens to a worker; ``states``: what is true then; ``plan``: of the fake worker."""
+    """A fault of a worker; ``states``: correct states after it; ``plan``: arguments of the fake worker."""
 
     name: str
     states: frozenset[str]
@@ -30,11 +30,11 @@ class Blow:
     plan: tuple[tuple[str, object], ...] = ()
     cancels: bool = False
     goes: bool = False
-    """Whether it gets its sign afterwards: what is left of it can come to its end."""
+    """Whether the worker gets its start signal after the fault, so that the remaining processes can end."""
 
 
 def blows() -> Iterator[Blow]:
-    """Signals to ranks, launcher and what stands between; workers that end in odd ways."""
+    """Yields the faults: signals to ranks, launcher and proxy, and workers with unusual ends."""
     for number in (signal.SIGKILL, signal.SIGSEGV, signal.SIGABRT, signal.SIGTERM):
         states = {signal.SIGKILL: NODE, signal.SIGTERM: PREEMPTED}.get(number, FAILED)
         yield Blow(f"{number.name} to rank 0", states, ("rank", number))
@@ -55,7 +55,8 @@ def blows() -> Iterator[Blow]:
 
 
 def rows(stand: Stand, adopted: bool) -> Iterator[Row]:
-    """All blows at once, each to a run of its own; ``adopted``: to workers that an earlier server has started."""
+    """Applies all faults at once, each to another run; ``adopted``: True if an earlier server has started the
+    workers."""
     all_ = list(blows())
     runs = [stand.running(ranks=1, **dict(blow.plan)) for blow in all_]
     for run in runs:
@@ -78,7 +79,8 @@ def rows(stand: Stand, adopted: bool) -> Iterator[Row]:
 
 
 def _states(blow: Blow, adopted: bool) -> frozenset[str]:
-    """Of a worker that is not the server's child nobody may know the exit code: when its launcher is gone as well."""
+    """Returns the correct states. A server does not get the exit code of an adopted worker if the launcher is gone,
+    too."""
     silent = blow.states is FAILED or (blow.sends is not None and blow.sends[0] in {"launcher", "all"})
     return blow.states | {"lost/service"} if adopted and silent else blow.states
 
