@@ -1,4 +1,6 @@
-"""``python -m conoid.client.reports FOLDER OUT``: the report of the run in a folder, as a server has it made."""
+"""``python -m conoid.client.reports FOLDER OUT`` writes the report of the run in a folder. The server makes reports
+by this command.
+"""
 
 import sys
 from pathlib import Path
@@ -9,7 +11,7 @@ from .report import write
 
 
 def main(folder: str, out: str) -> int:
-    """0, or 1 with one line of what is wrong."""
+    """Writes a report; returns the exit code: 0, or 1 after one line with the error."""
     try:
         write(Result.open(folder), Path(out))
     except ClientError as error:

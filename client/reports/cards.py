@@ -1,4 +1,4 @@
-"""What a report says in words and tables, card by card; pictures and charts are in ``pictures``."""
+"""Texts and tables of a report, card by card; ``pictures`` has pictures and charts."""
 
 import json
 from collections.abc import Sequence
@@ -16,12 +16,14 @@ from . import html
 from .compare import summary
 
 _CUTS = 50
-"""Cuts that are listed. Chosen."""
+"""Largest number of balance events in the table. Chosen value."""
 _PARAMETERS = {"rayleigh": "mode", "exponential": "mean", "power": "exponent"}
 
 
 def strip(ended: Outcome | None, noun: str, number: int | None) -> str:
-    """The five numbers that matter most; of pieces (``Live.pieces``) the noun, and the number where it is known."""
+    """Returns the five main numbers of a run. ``noun`` and ``number`` describe its pieces (``Live.pieces``);
+    ``number`` is None if unknown.
+    """
     if ended is None:
         return ""
     many = ended.fragments if noun == "fragment" or number is None else number
@@ -140,7 +142,7 @@ def fragments(result: Result) -> str:
 
 
 def _laws(what: str, fits: Sequence[Fit], unit: str) -> list[list[str]]:
-    """The likeliest law first; the exponent of a power law has no unit."""
+    """Returns the rows of the laws, the likeliest law first. The exponent of a power law has no unit."""
     return [
         [what, fit.law, _PARAMETERS[fit.law], exact(fit.parameter, "" if fit.law == "power" else unit, 4),
          exact(fit.log_likelihood, "", 5)]
@@ -169,13 +171,13 @@ def balance(result: Result, ended: Outcome | None) -> str:
 
 
 def messages(result: Result) -> str:
-    """All lines of the log."""
+    """Returns all lines of the log."""
     lines = [f"{message.level}: {message.text}" for message in result.messages if isinstance(message, Log)]
     return f"<pre class=log tabindex=0>{escape(chr(10).join(lines))}</pre>" if lines else ""
 
 
 def keys(told: dict[str, object]) -> str:
-    """The case with every default filled in, in SI."""
+    """Returns the case with all defaults, in SI units."""
     text = escape(json.dumps(told, indent=2, ensure_ascii=False))
     shown = f"<pre class=log tabindex=0>{text}</pre>"
     return f"<details><summary>with every default filled in, in SI</summary>{shown}</details>"

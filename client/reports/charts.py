@@ -1,4 +1,4 @@
-"""Charts from a run's journal. Nothing imports matplotlib early: this module and ``curves`` alone."""
+"""Charts of a run's journal. Only this module and ``curves`` import matplotlib, which loads slowly."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -18,18 +18,19 @@ _COLOURS = {
     "elements": "#4c78a8", "nodes": "#72b7b2", "contact": "#f58518", "fracture": "#e45756", "output": "#54a24b",
     "exchange": "#b5bcc4",
 }  # fmt: skip
-"""By phase, from the foot of a bar upwards."""
+"""Colours of the phases, in the order of a bar from bottom to top."""
 _RANKS = ["#4c78a8", "#f58518", "#54a24b", "#e45756", "#72b7b2", "#b279a2", "#eeca3b", "#9d755d"]
 _INK, _FAINT = "#1d2733", "#b5bcc4"
 _NAMED = len(_RANKS)
-"""Ranks that all have a colour of their own; of more, only those with the most and the fewest nodes in the end have."""
+"""Largest number of ranks with a colour each. With more ranks, only the ranks with the most and the fewest nodes at
+the end have a colour."""
 PAPER = {
     "glass_steel_bar": (
         "Moon, Kim and Lee, fig. 17: 18 cuts on 16 processors, domain 4, by the impact, grows most; "
         "fig. 18: contact and its communication take most of the time"
     ),
 }
-"""What the paper says of the same, by case."""
+"""Result of the paper for comparison, by case."""
 
 
 @dataclass
@@ -37,19 +38,20 @@ class Course:
     """Loads of the ranks over time."""
 
     times: list[float] = field(default_factory=list)
-    """s."""
-    outside: list[list[int]] = field(default_factory=list)
-    """Of each rank at these times."""
-    cuts: list[float] = field(default_factory=list)
     """Times, s."""
+    outside: list[list[int]] = field(default_factory=list)
+    """Number of surface nodes of each rank at these times."""
+    cuts: list[float] = field(default_factory=list)
+    """Times of the balance events, s."""
     seconds: dict[str, list[float]] = field(default_factory=dict)
-    """CPU time by phase, one number a rank."""
+    """CPU time of each rank by phase, s."""
 
 
 def course(messages: Sequence[AnyMessage]) -> Course:
-    """The course of the ranks. Raises ClientError where the journal knows none.
+    """Returns the loads of the ranks over time. Raises ClientError for a journal without loads.
 
-    What a run that went on from a checkpoint had told of the times beyond is dropped; its CPU time is not.
+    A run that continued from a checkpoint computes some times twice. The first loads of these times are dropped;
+    their CPU time is counted.
     """
     told = Course()
     for message in messages:
@@ -70,7 +72,7 @@ def course(messages: Sequence[AnyMessage]) -> Course:
 
 
 def balance(told: Course, title: str, case: str, out: Path) -> None:
-    """Draws surface nodes of each rank with the balance events, and CPU time by phase and rank, as a PNG."""
+    """Writes a PNG of the surface nodes of each rank with the balance events, and of the CPU time by phase and rank."""
     figure = balance_figure(told)
     figure.suptitle(title, fontsize=11, color=_INK)
     figure.supxlabel(PAPER.get(case, ""), fontsize=8, color=_INK)

@@ -1,4 +1,4 @@
-"""Comparison of two runs: keys that differ, outcomes, fragments."""
+"""Comparison of two runs: keys that differ, results at the end, fragments."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -27,12 +27,12 @@ _DRAWN = (
     "kinetic", "elastic", "plastic", "contact", "friction", "eroded", "fracture", "cohesive", "stepping", "averaging",
 )  # fmt: skip
 AT_THE_END = ", at the end"
-"""Behind the name of a column of the history: its last value."""
+"""Suffix for the name of a column of the history, for its last value."""
 _UNITS = {"time": "s", "elapsed": "s", "cpu": "s", "eroded_mass": "kg", "element_updates_per_second": "1/s"}
 
 
 class Key(msgspec.Struct, frozen=True):
-    """A key of the case that differs; None where a case has none."""
+    """A key whose values differ between two cases; the value is None if a case does not have the key."""
 
     key: str
     a: Any
@@ -40,7 +40,7 @@ class Key(msgspec.Struct, frozen=True):
 
 
 class Value(msgspec.Struct, frozen=True):
-    """A number of both runs, NaN where it is not known; ``difference`` is b - a, ``relative`` that over |a|."""
+    """A number of two runs; NaN if it is unknown. ``difference`` is b - a, ``relative`` is (b - a) / abs(a)."""
 
     name: str
     unit: str
@@ -49,12 +49,12 @@ class Value(msgspec.Struct, frozen=True):
 
     @property
     def difference(self) -> float:
-        """b - a."""
+        """Difference b - a."""
         return self.b - self.a
 
     @property
     def relative(self) -> float:
-        """Of the magnitude of a; 0 where both are the same, NaN where one is not known, or a is 0."""
+        """Difference over the magnitude of a; 0 for equal values, NaN for an unknown value or for a = 0."""
         if self.difference == 0.0:
             return 0.0
         return self.difference / abs(self.a) if self.a else math.nan
@@ -66,7 +66,7 @@ class Comparison:
 
     names: tuple[str, str]
     same_answer: bool
-    """Their digests are equal."""
+    """True if the digests of both runs are equal."""
     keys: list[Key]
     ends: list[Value]
     sizes: list[Value]
@@ -83,21 +83,23 @@ def compare(a: Result, b: Result) -> Comparison:
 
 
 def differing(a: Any, b: Any) -> list[Key]:
-    """The keys whose values differ, such as ``parts.glass.mesh.element_size``."""
+    """Returns the keys whose values differ, such as ``parts.glass.mesh.element_size``."""
     first, second = dict(_flat(a)), dict(_flat(b))
     every = [*first, *(key for key in second if key not in first)]
     return [Key(key, first.get(key), second.get(key)) for key in every if first.get(key) != second.get(key)]
 
 
 def changes(before: Any, now: Any) -> str:
-    """The first keys that differ, each with both values; empty if there are none."""
+    """Returns the first keys that differ, each with both values; empty if all are equal."""
     found = differing(before, now)
     keys = ", ".join(f"{one.key} was {shown(one.a)} and is {shown(one.b)}" for one in found[:_TOLD])
     return keys + (f", and {counted(len(found) - _TOLD, 'more key')}" if len(found) > _TOLD else "")
 
 
 def _flat(data: Any, path: str = "") -> Iterator[tuple[str, Any]]:
-    """Keys and values of the leaves; entries of lists are called by their name where they have one."""
+    """Yields keys and values of the leaves. An entry of a list is identified by its name, or by its index if it has
+    no name.
+    """
     if isinstance(data, dict):
         for key, value in data.items():
             yield from _flat(value, f"{path}.{key}" if path else str(key))
@@ -110,7 +112,9 @@ def _flat(data: Any, path: str = "") -> Iterator[tuple[str, Any]]:
 
 
 def _outcomes(a: Result, b: Result) -> list[Value]:
-    """NaN where one run does not know it; what neither knows is left out."""
+    """Returns the numbers of both outcomes, NaN for a number that one run lacks. A number that both runs lack is
+    left out.
+    """
     pairs = ((name, _known(a.outcome, name), _known(b.outcome, name)) for name in _OUTCOME)
     return [Value(n, _UNITS.get(n, ""), *both) for n, *both in pairs if not all(map(math.isnan, both))]
 
@@ -146,13 +150,13 @@ def _last(a: Result, b: Result) -> list[Value]:
 
 
 def common(a: Columns, b: Columns) -> list[str]:
-    """Returns the columns of numbers that both have."""
+    """Returns the numeric columns that both histories have."""
     return [name for name, values in a.items() if name in b and not isinstance(values, list)]
 
 
 @dataclass(frozen=True)
 class Material:
-    """What a picture of two runs is drawn from, by their names."""
+    """Data for a figure of two runs, by the names of the runs."""
 
     histories: dict[str, Columns]
     fragments: dict[str, Columns]
@@ -160,7 +164,9 @@ class Material:
 
 
 def material(a: Result, b: Result, names: Sequence[str] = ()) -> Material:
-    """The histories and last fragment tables; without ``names``, energies that are not all 0 and shared probes."""
+    """Returns the histories and the last fragment tables. The default of ``names`` is the energies that are not all
+    0 and the probes that both runs have.
+    """
     runs = {a.folder.name: a, b.folder.name: b} if a.folder.name != b.folder.name else {"A": a, "B": b}
     told = {name: run.history for name, run in runs.items()}
     both = common(a.history, b.history)
@@ -188,7 +194,7 @@ def _sizes(a: Result, b: Result) -> list[Value]:
 
 
 def summary(result: Result) -> Summary | None:
-    """Returns the totals of the last table of fragments; None without one."""
+    """Returns the totals of the last table of fragments; None for a run without tables."""
     if not result.fragment_tables:
         return None
     table = result.fragments_of()

@@ -1,4 +1,6 @@
-"""Curves of a run: energy, fragments, time step, columns of its history; two runs in one picture. With matplotlib."""
+"""Curves of a run: energy, fragments, time step and columns of its history; also two runs in one figure. With
+matplotlib.
+"""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -26,13 +28,15 @@ _LEDGER = (
 )  # fmt: skip
 _DASHES = ("-", "--", ":")
 _LIMITERS = 6
-"""Limiters of the step that have a colour of their own. Chosen."""
+"""Largest number of limiters of the time step with a colour each. Chosen value."""
 _PROBES = 8
-"""Curves of a panel, at most. Chosen."""
+"""Largest number of curves in a panel. Chosen value."""
 
 
 def save(figure: Figure, out: Path) -> Path:
-    """Writes a figure, as PNG or what the name ends in. Raises ClientError, UsageError for an ending nobody knows."""
+    """Writes a figure as PNG, or in the format of the file's ending. Raises ClientError, UsageError for an unknown
+    ending.
+    """
     try:
         with whole(out) as part:
             figure.savefig(part, dpi=100)
@@ -42,8 +46,8 @@ def save(figure: Figure, out: Path) -> Path:
 
 
 def energy(told: Columns) -> Figure:
-    """The whole ledger; its terms without the kinetic one and what came in; the residual; and of several parts the
-    kinetic and the internal energy of each.
+    """Draws the whole ledger; its terms without the kinetic energy; the residual; and, for several parts, the
+    kinetic and the internal energy of each part.
     """
     parts = {name: _largest(some) for name, some in by_part(told).items()}
     figure, (left, middle, right, *others) = _panels(3 + len(parts))
@@ -70,7 +74,7 @@ def energy(told: Columns) -> Figure:
 
 
 def _largest(curves: dict[str, Sequence[float]]) -> dict[str, Sequence[float]]:
-    """As many as a panel has room for, those that rise highest."""
+    """Returns the curves with the largest maxima, as many as fit in a panel."""
     chosen = sorted(curves, key=lambda name: -max(curves[name], default=0.0))[:_PROBES]
     return {name: curves[name] for name in curves if name in chosen}
 
@@ -91,14 +95,15 @@ def steps(told: Columns) -> Figure:
 
 
 def _limiter(text: str) -> str:
-    """``stability: glass`` of ``stability: tet 12 of glass``."""
+    """Returns the kind of limiter and its part: ``stability: glass`` for ``stability: tet 12 of glass``."""
     what, _, where = text.partition(":")
     return f"{what}: {where.rpartition(' of ')[2].strip()}" if where else what
 
 
 def fragments(tables: Sequence[Columns]) -> Figure:
     """Draws the number of fragments in each frame, the share of the largest one, and N(m) of the last frame with its
-    laws."""
+    laws.
+    """
     if not tables or not any(table.rows for table in tables):
         raise ClientError("this run has no tables of fragments: nothing in it can break")
     figure, (left, right) = _panels(2)
@@ -114,7 +119,7 @@ def fragments(tables: Sequence[Columns]) -> Figure:
 
 
 def distribution(axes: Axes, tables: Mapping[str, Columns]) -> None:
-    """N(m), the number of fragments of mass m or more, on two logarithmic axes."""
+    """Draws N(m), the number of fragments of mass m or more, on two logarithmic axes."""
     for (name, table), colour in zip(tables.items(), _COLOURS, strict=False):
         masses = sorted((1e3 * mass for mass in table.numbers("mass") if mass > 0.0), reverse=True)
         when = exact(table.numbers("t")[0], "s", 4) if table.rows else ""
@@ -126,19 +131,20 @@ def distribution(axes: Axes, tables: Mapping[str, Columns]) -> None:
 
 
 def columns(told: Columns, names: Sequence[str] = ()) -> Figure:
-    """Columns of a history, those of one unit in one panel; without names, those of the probes. Raises ClientError."""
+    """Draws columns of a history, with one panel for each unit. The default is the columns of the probes. Raises
+    ClientError.
+    """
     return overlaid({"": told}, names or probes(told) or ["momentum_x", "momentum_y", "momentum_z"])
 
 
 def probes(told: Columns) -> list[str]:
-    """The columns that belong to the probes of the case."""
+    """Returns the columns of the case's probes."""
     return [name for name in told if name not in history.COLUMNS and history.part_of(name) is None]
 
 
 def overlaid(runs: Mapping[str, Columns], names: Sequence[str], spare: int = 0) -> Figure:
-    """Columns of several runs: a panel a unit, a colour a column, a dash a run; the last ``spare`` panels stay empty.
-
-    Raises ClientError.
+    """Draws columns of several runs: a panel for each unit, a colour for each column, a dash pattern for each run.
+    The last ``spare`` panels stay empty. Raises ClientError.
     """
     groups = _by_unit(runs, names)
     figure, panels = _panels(len(groups) + spare)
@@ -154,12 +160,12 @@ def overlaid(runs: Mapping[str, Columns], names: Sequence[str], spare: int = 0) 
 
 
 def _dashed(runs: Mapping[str, Columns]) -> str:
-    """Draws the legend of dashes and runs."""
+    """Returns the legend that assigns dash patterns to runs."""
     return ", ".join(f"{run} {mark}" for run, mark in zip(runs, ("——", "– –", "· ·"), strict=False))
 
 
 def comparison(material: Material) -> Figure:
-    """Two runs: the columns of their histories over each other, and the masses of their fragments."""
+    """Draws two runs: the columns of both histories in the same panels, and the masses of their fragments."""
     figure = overlaid(material.histories, material.columns, 1 if material.fragments else 0)
     if material.fragments:
         distribution(figure.axes[-1], material.fragments)
@@ -167,7 +173,7 @@ def comparison(material: Material) -> Figure:
 
 
 def _by_unit(runs: Mapping[str, Columns], names: Sequence[str]) -> dict[str, list[str]]:
-    """Names by their unit, in their order, so many a panel."""
+    """Returns the names by unit, in their order. A unit has at most as many names as a panel has curves."""
     groups: dict[str, list[str]] = {}
     for name in names:
         told = next((told for told in runs.values() if name in told), next(iter(runs.values())))

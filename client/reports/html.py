@@ -1,4 +1,4 @@
-"""Pieces of HTML that reports and notebooks show."""
+"""HTML elements of reports and notebooks."""
 
 import base64
 from collections.abc import Sequence
@@ -10,7 +10,7 @@ from conoid.cases.outcome import Outcome
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]], numbers: Sequence[int] = ()) -> str:
-    """A table of text, which is escaped; ``numbers`` are the columns that stand right."""
+    """Returns a table of escaped text; ``numbers`` are the columns that are aligned right."""
 
     def cells(row: Sequence[str], tag: str) -> str:
         return "".join(f"<{tag}{' class=n' * (i in numbers)}>{escape(each)}</{tag}>" for i, each in enumerate(row))
@@ -21,12 +21,12 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]], numbers: Sequence[
 
 
 def image(data: bytes, kind: str, alt: str) -> str:
-    """A picture in the page itself."""
+    """Returns an image whose data are embedded in the page."""
     return f'<img alt="{escape(alt)}" src="data:image/{kind};base64,{base64.b64encode(data).decode()}">'
 
 
 def head(name: str, title: str, ended: Outcome | None) -> str:
-    """Title, state and numbers of a run; ``ended`` is None before its end."""
+    """Returns title, state and numbers of a run; ``ended`` is None before the run's end."""
     release = f"Conoid {metadata.version('conoid')}"
     if ended is None:
         state, rows = "<span class=bad>not ended</span>", [["run", name], ["written by", release]]
@@ -46,7 +46,7 @@ def head(name: str, title: str, ended: Outcome | None) -> str:
 
 
 def references(ended: Outcome | None) -> str:
-    """The references of a run with pass or fail; nothing where there are none."""
+    """Returns the references of a run with pass or fail; empty for a run without references."""
     if ended is None or not ended.reference:
         return ""
     rows = []

@@ -1,4 +1,4 @@
-"""Pictures and charts of a report, each in the page itself."""
+"""Pictures and charts of a report, embedded in the page."""
 
 import io
 import re
@@ -18,14 +18,17 @@ from ..result import Result
 from . import html
 
 _SHOTS = 3
-"""Times of a picture, evenly over the frames. Chosen: they fit beside each other."""
+"""Number of times at which a field is drawn, evenly over the frames. Chosen value: three pictures fit side by side."""
 _SIZE = (1500, 860)
 _INK, _FAINT = "#1d2733", "#b5bcc4"
-"""Colours of charts that are those of the text in a report, so that they are read on a light and on a dark ground."""
+"""Colours of charts. A report replaces these two by the colours of its text: a chart is readable on a light and on a
+dark background."""
 
 
 def pictures(result: Result, fields: Sequence[str], at: Callable[[str], None]) -> str:
-    """Draws each field at some times, and the last one on a section; a failure is one line."""
+    """Draws each field at some times, and the last state of one field on a section. A picture that fails is replaced
+    by a line with the error.
+    """
     frames = [frame.index for frame in result.frames]
     if not frames or not fields:
         return ""
@@ -42,7 +45,9 @@ def pictures(result: Result, fields: Sequence[str], at: Callable[[str], None]) -
 
 
 def _cut(result: Result) -> dict[str, str]:
-    """A model with a plane of symmetry shows its inside there; others are cut through the middle."""
+    """Returns the options for a view of the inside. A model with planes of symmetry shows its inside without
+    mirrors; another model is cut through the middle.
+    """
     return {} if result.scene().mirrors else {"section": "y=middle", "camera": "0.35,-1,0.3"}
 
 
@@ -60,8 +65,8 @@ def _picture(result: Result, field: str, how: str, **options: Any) -> str:
 
 
 def _webp(path: Path) -> bytes:
-    """The picture in a tenth of the bytes."""
-    from PIL import Image  # comes with what has drawn it
+    """Returns the picture as WebP, a tenth of the bytes."""
+    from PIL import Image  # a dependency of the package that has drawn the picture
 
     packed = io.BytesIO()
     with Image.open(path) as image:
@@ -70,7 +75,7 @@ def _webp(path: Path) -> bytes:
 
 
 def _key(drawn: Drawn) -> str:
-    """The colour bar of a picture as text and a stripe."""
+    """Returns the colour bar of a picture as text and a stripe."""
     field = FIELDS[drawn.field]
     if field.kind == "fragments":
         return "<span class=hint>a hue for each part, fragments vary it; unbroken parts are pale</span>"
@@ -90,18 +95,18 @@ def _key(drawn: Drawn) -> str:
 
 
 def curve(result: Result, name: str) -> list[str]:
-    """The charts of a history; a line where there is no package to draw with."""
+    """Returns the charts of a history; a line with the error if matplotlib is not installed."""
     return charts(lambda: _curves().__dict__[name](result.history))
 
 
 def fragments(result: Result) -> list[str]:
-    """Numbers of fragments over time, and their masses."""
+    """Returns charts of the number of fragments over time and of their masses."""
     tables = (result.fragments_of(index) for index in result.fragment_tables)
     return charts(lambda: _curves().fragments(list(tables)))
 
 
 def balance(result: Result) -> list[str]:
-    """Outside nodes and CPU time by rank."""
+    """Returns charts of surface nodes and CPU time by rank."""
     messages = result.messages
     if not any(isinstance(message, Load) for message in messages):
         return []
@@ -121,7 +126,7 @@ def _curves() -> Any:
 
 
 def charts(draw: Callable[[], Any]) -> list[str]:
-    """Each panel of a figure as SVG of its own, in the colours of the text; nothing where the run lacks it."""
+    """Returns each panel of a figure as an SVG in the colours of the text; nothing for a run without these data."""
     try:
         figure = draw()
     except UnfinishedError:

@@ -1,8 +1,8 @@
-"""The replay in 3-D inside a report: the page's own modules, three.js and the snapshots of a run, all in one file.
+"""Replay in 3-D inside a report: the page's modules, three.js and the snapshots of a run in one file.
 
-The modules import each other by relative addresses, which a page without an address cannot resolve: here they are
-entries of an import map, called ``conoid/NAME``. Those that ask the server have small ones in their place. Modules and
-snapshots are packed by gzip, which browsers unpack.
+The modules import each other by relative addresses, which a page without an address cannot resolve. In a report an
+import map has an entry ``conoid/NAME`` for each module. Modules that send requests to the server are replaced by
+small ones. Modules and snapshots are compressed by gzip, which browsers can decompress.
 """
 
 import base64
@@ -23,17 +23,19 @@ from ..errors import ClientError
 from ..result import Result
 
 FIRST = "body.js"
-"""The module that shows the body; what it imports comes along."""
+"""Module that shows the body. A report embeds this module and all modules that it imports."""
 PACKAGE, VERSION = "nicegui", "3.18.0"
 THREE = (
     "nicegui/elements/scene/dist/index.js",
     "f55227d12dac0eb037cae13b1992091746fc017a275748e4a1bebd0f6244e7e5",
 )
-"""three.js as the live page has it: the file in the package, and its sha256 in the wheel of ``VERSION`` on PyPI."""
+"""three.js, the same file as in the live page: its path in the package, and its sha256 in the wheel of ``VERSION``
+on PyPI."""
 MOST = 24
-"""Snapshots that are embedded, evenly over the run, unless they are too large. Chosen."""
+"""Largest number of embedded snapshots, evenly over the run; fewer if they are too large. Chosen value."""
 BUDGET = 2_200_000
-"""Packed bytes of all snapshots in a report, where they are a third more. Chosen: all of it stays below 5 MB."""
+"""Largest number of compressed bytes of all snapshots in a report. Base64 makes them a third larger. Chosen value:
+the whole report stays below 5 MB."""
 _WEB = Path(__file__).parent.parent / "web"
 _IMPORT = re.compile(r"""(?:import|export)\s*(?:\{([^}]*)\}|\*)?[^;'"]*["']\./([\w-]+\.js)["']""")
 _RELATIVE = re.compile(r"""(from\s*|import\s*\(\s*|import\s+)(["'])\./""")
@@ -50,7 +52,7 @@ _OF_SERVER = {
     },
     "libraries.js": {"three": '() => import("conoid/three")'},
 }
-"""What stands in for modules that ask the server."""
+"""Exports of the modules that replace those with requests to the server."""
 _ABSENT = '() => { throw new Error("a report has no server"); }'
 _START = """
 import { Body } from "conoid/body.js";
@@ -78,7 +80,9 @@ _BOOT = """
 
 
 def html(result: Result) -> str:
-    """The replay of a run's snapshots; a line where three.js is not installed; nothing where there is no snapshot."""
+    """Returns the replay of a run's snapshots; a line with the reason without three.js; empty for a run without
+    snapshots.
+    """
     names = [name for name in result.folder.names() if re.fullmatch(rf"{layout.SNAPSHOTS}/\d+\.snap", name)]
     if not names or not (_WEB / FIRST).is_file():
         return ""
@@ -98,7 +102,9 @@ def html(result: Result) -> str:
 
 
 def _snapshots(result: Result, names: Sequence[str]) -> tuple[list[dict[str, Any]], list[str]]:
-    """What the body is told of the snapshots that fit, and their bytes; those of all tets while there is room."""
+    """Returns the entries of the snapshots for the body, and scripts with their bytes. Snapshots of all tets are
+    added while the total size stays below the limit.
+    """
     told = {message.n: message for message in _messages(result) if isinstance(message, Snapshot)}
     packed = _packed(result, names)
     room = BUDGET - sum(map(len, packed.values()))
@@ -117,7 +123,7 @@ def _snapshots(result: Result, names: Sequence[str]) -> tuple[list[dict[str, Any
 
 
 def _packed(result: Result, names: Sequence[str]) -> dict[str, bytes]:
-    """As many snapshots as there is room for, the first and the last one at least."""
+    """Returns as many compressed snapshots as the size limit allows, at least the first and the last one."""
     packed = {name: gzip.compress(result.folder.path(name).read_bytes(), mtime=0) for name in spread(names, MOST)}
     while len(packed) > 2 and sum(map(len, packed.values())) > BUDGET:
         kept = spread(list(packed), max(2, len(packed) * 4 // 5))
@@ -133,12 +139,12 @@ def _messages(result: Result) -> list[Any]:
 
 
 def spread(names: Sequence[str], most: int) -> list[str]:
-    """At most so many of the names, evenly, with the first and the last."""
+    """Returns at most a given number of the names, evenly, with the first and the last name."""
     return sorted({names[round(k * (len(names) - 1) / max(most - 1, 1))] for k in range(most)})
 
 
 def modules(library: str) -> dict[str, str]:
-    """All modules of the replay by their names in the import map; ``library``: three.js."""
+    """Returns all modules of the replay by their names in the import map; ``library``: code of three.js."""
     found, asked, waiting = {"conoid/three": library}, {name: set(known) for name, known in _OF_SERVER.items()}, [FIRST]
     while waiting:
         name = waiting.pop()
@@ -158,7 +164,9 @@ def _stand_in(module: str, wanted: set[str]) -> str:
 
 
 def three() -> bytes:
-    """three.js out of the installed package, which is not imported. Raises ClientError for any but the tested one."""
+    """Reads three.js from the installed package without importing the package. Raises ClientError for another
+    version than the tested one.
+    """
     cure = f"pip install --no-deps {PACKAGE}=={VERSION}"
     try:
         installed = metadata.distribution(PACKAGE)

@@ -1,7 +1,5 @@
-"""``conoid report``: a run as one HTML file that needs no server, no network and nothing beside it.
-
-It has the style sheets of the live page, so that it looks like one: the body at the left, what matters beside it, and
-charts below.
+"""``conoid report``: a run as one HTML file that needs no server, no network and no other file. The report has the
+style sheets of the live page: the body is at the left, the main numbers are beside it, and charts are below.
 """
 
 from collections.abc import Callable, Sequence
@@ -54,10 +52,10 @@ _MARK = (
 def write(
     result: Result, out: Path, fields: Sequence[str] | None = None, at: Callable[[str], None] = lambda _: None
 ) -> Path:
-    """Writes the report of a run; ``fields`` are drawn, none for no pictures, by default what tells most. ``at`` is
-    called with what it is at.
+    """Writes the report of a run. ``fields`` are drawn; the default is the most informative fields, and an empty list
+    draws no pictures. ``at`` is called with a description of each step.
 
-    Raises ClientError, UnfinishedError where not even the case is there.
+    Raises ClientError, UnfinishedError for a run without a case.
     """
     case, ended = result.case, _outcome(result)
     title = str(case.get("title") or case.get("name"))
@@ -171,7 +169,7 @@ def _has_journal(result: Result) -> bool:
 
 
 def telling(result: Result) -> list[str]:
-    """The fields that say most of a run: its fragments, its plastic strain or its stress; and the speed."""
+    """Returns the most informative fields of a run: fragments, plastic strain or stress; and speed."""
     ended = _outcome(result)
     if result.fragment_tables:
         return ["fragment", "speed"]

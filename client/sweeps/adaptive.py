@@ -1,4 +1,4 @@
-"""An adaptive sweep: runs of a case at points that close in on where a result passes a threshold."""
+"""Adaptive sweep: runs of a case at points that narrow the bracket in which a result passes a threshold."""
 
 import hashlib
 import json
@@ -26,17 +26,17 @@ from .goal import Goal, Span, changes, goal_of, tolerance_of
 from .reporting import Reported, Reporter, in_si
 
 MOST = 40
-"""Runs, at most, where no other number is given. Chosen: a bisection takes 20 to a millionth."""
+"""Default of the largest number of runs. Chosen value: 20 bisections narrow a bracket to a millionth."""
 _AT_ONCE = 8
-"""Points of a round, at most, where no other number is given. Chosen: more win little, a round divides by one more than
-it has points."""
+"""Largest number of points that run at the same time by default. Chosen value: n points divide the bracket by n + 1,
+and more points bring little."""
 _ATTEMPTS = 100
-"""Times that a point is run again, at most."""
+"""Largest number of attempts to run a point."""
 Say = Callable[[str], None]
 
 
 class Server(Protocol):
-    """Who runs the points: a Session."""
+    """Session that runs the points: the methods of ``Session`` that an adaptive sweep calls."""
 
     outbox: Outbox
 
@@ -44,38 +44,39 @@ class Server(Protocol):
         self, case: Any, overrides: Any = (), key: str | None = None, labels: Mapping[str, str] | None = None,
         profile: str = "", priority: int = 0, folder: Path | str | None = None,
     ) -> Run:  # fmt: skip
-        """As of a Session."""
+        """See ``Session.submit``."""
 
     def me(self) -> Me:
-        """As of a Session."""
+        """See ``Session.me``."""
 
     def runs(self, states: Sequence[str] = (), limit: int = 50) -> Sequence[RunInfo]:
-        """As of a Session."""
+        """See ``Session.runs``."""
 
     def put(self, kind: type[Reported], path: str, body: bytes, headers: Mapping[str, str]) -> Reported:
-        """As of a Session."""
+        """See ``Session.put``."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Search:
-    """What is looked for, where, and how far it goes."""
+    """Input of an adaptive sweep: case, goal, spans, tolerance and limits."""
 
     case: Mapping[str, Any]
-    """Plain data, with the constants of the sweep and the hashes of its files."""
+    """The case as plain data, with the constant overrides of the sweep and the hashes of the case's files."""
     folder: Path
     goal: Goal
     spans: Sequence[Span]
-    """All vary together; the first is x."""
+    """Spans of the keys that vary together; x is the value of the first key."""
     tolerance: float
-    """The bracket is no wider at the end, in the unit of the first span."""
+    """Largest width of the bracket at the end, in the unit of the first span."""
     at_once: int | None = None
     most: int = MOST
     since: str = ""
-    """The newest run of before: ids are in the order of time, and a later run is one of this search."""
+    """Id of the newest run before this search. Ids increase with time: a run with a greater id belongs to this
+    search."""
 
     @property
     def ends(self) -> tuple[float, float]:
-        """The lower and the upper one."""
+        """Returns the smaller and the larger end of the first span."""
         span = self.spans[0]
         return min(span.low, span.high), max(span.low, span.high)
 
@@ -84,7 +85,7 @@ def found_by(
     session: Server, data: Mapping[str, Any], folder: Path, goal: str, spans: Sequence[Span], tolerance: Any,
     at_once: int | None, most: int, out: Path | None, say: Say, at: Say = lambda text: None,
 ) -> Found:  # fmt: skip
-    """As ``Session.adaptive_sweep``, of plain data whose files lie below ``folder``."""
+    """Runs ``Session.adaptive_sweep`` for a case as plain data; the case's files lie below ``folder``."""
     if not spans:
         raise UsageError("spans: name at least one key that varies, with both of its ends")
     first = apply_overrides(data, changes(spans, spans[0].low))
@@ -106,11 +107,12 @@ def _reporter(session: Server, wanted: Search) -> Reporter:
 
 
 def search(session: Server, wanted: Search, book: Book, told: Reporter, say: Say, at: Say) -> Found:
-    """Runs points until the bracket is as narrow as the tolerance, or no point is left that would help. ``say`` hears
-    of each run that has ended, ``at`` what goes on; ``told`` reports to the server.
+    """Runs points until the bracket is as narrow as the tolerance, or until no further point can narrow the bracket.
+    ``say`` receives a line for each run that has ended, ``at`` a line about the present round. ``told`` sends reports
+    to the server.
 
-    Points of the ``book`` that have succeeded are not run again; what is new is written into it at once. Raises
-    CaseError for ends that make no valid case, ClientError.
+    Points of the ``book`` that have succeeded are not run again. Each new point is written to the book at once.
+    Raises CaseError for ends with which the case is not valid, ClientError.
     """
     for x in wanted.ends:
         parse_case(apply_overrides(wanted.case, changes(wanted.spans, x)))
@@ -133,7 +135,7 @@ def search(session: Server, wanted: Search, book: Book, told: Reporter, say: Say
 
 
 def _counted(wanted: Search, book: Book, fresh: Sequence[Tried]) -> list[Tried]:
-    """The points within the range, of earlier commands and of this one."""
+    """Returns the points of earlier commands and of this command within the range."""
     return [each for each in (*book.good(), *fresh) if wanted.ends[0] <= each.x <= wanted.ends[1]]
 
 
@@ -145,7 +147,7 @@ def _report(wanted: Search, told: Reporter, tried: Sequence[Tried], *, over: boo
 
 
 def _next(wanted: Search, tried: Sequence[Tried], spent: int, many: int) -> tuple[list[float], str]:
-    """The points of the following round; none, and why, at the end."""
+    """Returns the points of the next round. At the end of the search, returns no points and the reason."""
     low, high = wanted.ends
     left = wanted.most - spent
     taken = [each.x for each in tried]
@@ -179,7 +181,9 @@ def _samples(tried: Sequence[Tried]) -> list[Sample]:
 def _round(
     session: Server, wanted: Search, told: Reporter, tried: Sequence[Tried], at: Sequence[float]
 ) -> Iterator[tuple[Tried, list[Tried]]]:
-    """Runs points at the same time; each in their order when it has ended, with those that are still open."""
+    """Runs points at the same time. Yields each point in its order when its run has ended, with the points whose
+    runs have not ended.
+    """
     runs = [(x, _submitted(session, wanted, told, x)) for x in at]
     started = [Tried(x=x, values=changes(wanted.spans, x), run=run.id, state="") for x, run in runs]
     _report(wanted, told, [*tried, *started])
@@ -188,7 +192,9 @@ def _round(
 
 
 def _submitted(session: Server, wanted: Search, told: Reporter, x: float) -> Run:
-    """The run of a point. One of an earlier search is taken where it has succeeded or goes on, else it is repeated."""
+    """Returns the run of a point. A run of an earlier search is used if it has succeeded or has not ended, else a
+    new run is submitted.
+    """
     case = apply_overrides(wanted.case, changes(wanted.spans, x))
     name = f"adaptive-{_hash(wanted.goal.result, [span.key for span in wanted.spans], case, told.id)[:12]}"
     labels = {"sweep": told.id or f"adaptive {wanted.goal.result}"[:200], "point": _at(wanted, x)[:200]}
@@ -197,7 +203,7 @@ def _submitted(session: Server, wanted: Search, told: Reporter, x: float) -> Run
         try:
             run = session.submit(case, key=key, labels=labels, folder=wanted.folder)
             info = run.status()
-        except MissingError:  # its folder has been removed
+        except MissingError:  # the folder of the run was removed
             continue
         if run.id > wanted.since or info.state is State.SUCCEEDED or not info.state.final:
             return run
@@ -228,7 +234,7 @@ def _cpu(ended: Outcome | None) -> float:
 
 
 def _free(session: Server, case: Mapping[str, Any]) -> int:
-    """How many runs of the case may run now, at least one."""
+    """Returns how many runs of the case the free slots can hold, from 1 to ``_AT_ONCE``."""
     slots = session.me().slots
     cores = parse_case(case).run.cores
     free = (slots.get("total", cores) - slots.get("used", 0)) // cores
@@ -253,7 +259,9 @@ def _found(wanted: Search, tried: Sequence[Tried], why: str, fresh: int) -> Foun
 
 
 def _fit(wanted: Search, tried: Sequence[Tried], made: Bracket) -> ballistic.Fit | None:
-    """Of residual velocity over velocity, or a line where the result goes through the threshold."""
+    """Fits the law of residual velocity over impact velocity, or a line near the point at which the result passes
+    the threshold.
+    """
     samples = _samples(tried)
     speeds = wanted.spans[0].unit.endswith("/s") and wanted.goal.unit == "m/s"
     if speeds and ballistic.stops(samples, made, wanted.goal.threshold):

@@ -1,4 +1,6 @@
-"""What an adaptive sweep has found, and the plain file that keeps it: the same command goes on from it."""
+"""Result of an adaptive sweep, and the file that stores the result. A later command with the same file continues the
+sweep.
+"""
 
 from collections.abc import Mapping, Sequence
 from importlib import metadata
@@ -19,8 +21,8 @@ from .goal import Goal
 
 
 class Tried(msgspec.Struct, kw_only=True, frozen=True):
-    """A point: the value of the first key, what was changed, the run, what came out; ``f`` is ``value`` less the
-    threshold, ``cpu`` in s. Without a result ``problem`` says why.
+    """A point of an adaptive sweep. ``x`` is the value of the first key, ``values`` are the changed keys, ``f`` is
+    ``value`` minus the threshold, ``cpu`` is in s. A point without a result has the reason in ``problem``.
     """
 
     x: float
@@ -32,16 +34,17 @@ class Tried(msgspec.Struct, kw_only=True, frozen=True):
     cpu: float = 0.0
     problem: str = ""
     results: dict[str, int | float | str | None] = {}
-    """Columns of the table of a sweep."""
+    """Results of the run, by column of the table of a sweep."""
 
     def but(self, **changes: Any) -> "Tried":
-        """The same with other values."""
+        """Returns a copy with some fields changed."""
         return msgspec.structs.replace(self, **changes)
 
 
 class Found(msgspec.Struct, kw_only=True, frozen=True):
-    """Where the result passes its threshold: at ``limit``, give or take ``uncertainty``, half of the bracket, of which
-    ``ends`` has the values of the key and of the result. Without a limit ``ends`` are those of the range.
+    """Value of the key at which the result passes the threshold: ``limit`` +- ``uncertainty``, half the width of the
+    bracket. ``ends`` are key and result at the ends of the bracket, or at the ends of the range if ``limit`` is
+    None.
     """
 
     key: str
@@ -53,35 +56,35 @@ class Found(msgspec.Struct, kw_only=True, frozen=True):
     uncertainty: float | None = None
     fit: Fit | None = None
     changes: int = 0
-    """How often the threshold is passed."""
+    """Number of times that the result passes the threshold."""
     mixed: tuple[float, float] | None = None
-    """Between which values it is passed again and again."""
+    """Interval of the key in which the result passes the threshold several times."""
     why: str = ""
-    """Why it ended before the tolerance was reached."""
+    """Reason for an end before the tolerance was reached."""
     points: int
-    """Runs that count, of earlier commands, too; ``failed`` of them have no result."""
+    """Number of runs in the result, with those of earlier commands; ``failed`` runs have no result."""
     fresh: int
-    """Runs of this command."""
+    """Number of runs of this command."""
     failed: int
     cpu: float
-    """s, of all runs."""
+    """CPU time of all runs, s."""
 
     def but(self, **changes: Any) -> "Found":
-        """The same with other values."""
+        """Returns a copy with some fields changed."""
         return msgspec.structs.replace(self, **changes)
 
     @property
     def reached(self) -> bool:
-        """Whether the bracket is as narrow as was asked for."""
+        """True if the bracket is as narrow as the tolerance."""
         return self.limit is not None and not self.why
 
     @property
     def unsettled(self) -> str:
-        """Why it is not as close as was asked for; empty where it is."""
+        """Reason for a bracket wider than the tolerance; empty if the tolerance is reached."""
         return self.why or ("" if self.limit is not None else "the threshold is not passed in the range")
 
     def lines(self) -> list[str]:
-        """For people."""
+        """Returns the result as lines for the terminal."""
         told = [self._first(), *self._passes()]
         if self.fit is not None:
             told.append(_curve(self.fit, self.unit))
@@ -110,7 +113,7 @@ class Found(msgspec.Struct, kw_only=True, frozen=True):
         return [f"not monotonic, or it scatters: the threshold is {again}; the first of them is given"]
 
     def _within(self, limit: float) -> bool:
-        """Whether the limit of a curve lies in the bracket; a curve of velocities has magnitudes."""
+        """True if the limit of a curve lies in the bracket. The limit of a law of velocities is a magnitude."""
         low, high = sorted(abs(x) for x, _ in self.ends)
         return low <= abs(limit) <= high
 
@@ -129,7 +132,7 @@ def _curve(fit: Fit, unit: str) -> str:
 
 
 class Kept(msgspec.Struct, kw_only=True):
-    """The file: what is looked for, in which case, all points, and what was found."""
+    """Content of the file of an adaptive sweep: version, case, goal, keys, all points and the result."""
 
     version: str
     case: dict[str, Any]
@@ -140,10 +143,12 @@ class Kept(msgspec.Struct, kw_only=True):
 
 
 class Book:
-    """The points of an adaptive sweep in a file, which is written after each of them; without a file in memory."""
+    """Points of an adaptive sweep, in a file that is written after each point; without a path, in memory only."""
 
     def __init__(self, path: Path | None, case: Mapping[str, Any], goal: Goal, keys: Sequence[str]) -> None:
-        """Reads what is there. Raises UsageError for a file of another case or goal, or of something else."""
+        """Reads the file if it exists. Raises UsageError for a file with another goal or version, or of another
+        kind; ClientError for a changed case.
+        """
         self.path = path
         fresh = Kept(version=metadata.version("conoid"), case=_plain(case), goal=goal, keys=list(keys))
         self.kept = fresh
@@ -152,16 +157,16 @@ class Book:
             _require_same(path, self.kept, fresh)
 
     def good(self) -> list[Tried]:
-        """The points that have a result."""
+        """Returns the points with a result."""
         return [each for each in self.kept.points if each.f is not None]
 
     def add(self, tried: Tried) -> None:
-        """Takes a point in, in the place of an earlier one at the same x."""
+        """Adds a point; an earlier point with the same x is replaced."""
         self.kept.points = [*(each for each in self.kept.points if each.x != tried.x), tried]
         self._write()
 
     def close(self, found: Found) -> Found:
-        """Keeps what was found."""
+        """Stores the result."""
         self.kept.found = found
         self._write()
         return found
@@ -172,7 +177,7 @@ class Book:
 
 
 def read(path: Path) -> Kept:
-    """The file of an adaptive sweep. Raises UsageError."""
+    """Reads the file of an adaptive sweep. Raises UsageError."""
     try:
         return msgspec.json.decode(whole.read(path), type=Kept)
     except OSError as error:
@@ -193,13 +198,13 @@ def _require_same(path: Path, kept: Kept, fresh: Kept) -> None:
 
 
 def _plain(case: Mapping[str, Any]) -> dict[str, Any]:
-    """As it is read back."""
+    """Returns the case as it is after it was written as JSON and read again."""
     data: dict[str, Any] = msgspec.json.decode(msgspec.json.encode(case))
     return data
 
 
 def table(kept: Kept) -> list[points.Column]:
-    """The table of its points, in the order of x."""
+    """Returns the table of the points, in the order of x."""
     return points.table([
         points.Point(
             values=each.values, run=each.run, state=each.state, cause=each.problem,

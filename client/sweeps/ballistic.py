@@ -1,4 +1,4 @@
-"""The curve through the points of an adaptive sweep: residual over impact velocity, or a line; with scipy."""
+"""Curve through the points of an adaptive sweep: residual velocity over impact velocity, or a line; with scipy."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -9,48 +9,54 @@ import msgspec
 from .bracket import Bracket, Sample
 
 _FREE, _FIXED = 4, 3
-"""Points from which on the exponent is fitted, too, and from which on the other two constants are: one more than these,
-for an error."""
+"""Smallest number of points for a fit with the exponent, and for a fit without it. Each number is one more than the
+number of constants, for an estimate of the error."""
 _NEAREST = 4
-"""Points through which a line is drawn. Chosen: so near to the root that the curve between them is one."""
+"""Number of points for the fit of a line. Chosen value: the curve between the points nearest to the root is nearly
+straight."""
 _EXPONENT = 1.0, 6.0
-"""Bounds of p. Chosen: energies that add up make 2, long rods at high speed have up to 5 (Lambert and Jonas 1976)."""
+"""Bounds of p. Chosen values: an energy balance has p = 2, long rods at high speed up to 5 (Lambert and Jonas 1976)."""
 _COURSE = 60
-"""Places along a curve that is drawn. Chosen: a chart has some hundred pixels."""
+"""Number of points of a curve in a chart. Chosen value: a chart is some hundred pixels wide."""
 _STOPPED = 0.2
-"""Of the largest residual velocity: what is left before the limit is less. Chosen: a rebound has a few per cent."""
+"""Largest residual velocity below the limit over the largest residual velocity. Chosen value: a rebound has a few
+per cent."""
 
 
 class Fit(msgspec.Struct, kw_only=True, frozen=True):
-    """A curve and where it begins, or passes the threshold: ``limit`` with its standard ``error``, in the unit of x."""
+    """A fitted curve. ``limit`` is the velocity at which the curve begins, or the x at which a line passes the
+    threshold; ``error`` is its standard error. Both have the unit of x.
+    """
 
     law: str
     limit: float
     error: float | None
-    """None where there are no more points than constants."""
+    """Standard error of ``limit``; None if the number of points does not exceed the number of constants."""
     points: int
     factor: float
-    """a of the law, or the slope of the line."""
+    """Constant a of the law, or the slope of the line."""
     exponent: float | None = None
-    """p of the law."""
+    """Exponent p of the law."""
     scale: float = 1.0
-    """The unit of x in that of the result, for a law of velocities."""
+    """The unit of x in the unit of the result, for a law of velocities."""
     covariance: tuple[tuple[float, ...], ...] = ()
-    """Of ``limit``, ``factor`` and, where it is fitted, ``exponent``; empty without an ``error``."""
+    """Covariance of ``limit``, ``factor`` and, if fitted, ``exponent``; empty if ``error`` is None."""
 
 
 def stops(samples: Sequence[Sample], found: Bracket, threshold: float) -> bool:
-    """Whether the result is a residual velocity: next to nothing on the side of the smaller velocities."""
+    """True for a result that is a residual velocity: it is nearly zero at impact velocities below the bracket."""
     before, beyond = _sides(samples, found, threshold)
     return found.changes == 1 and max(y for _, y in before) <= _STOPPED * max(y for _, y in beyond)
 
 
 def residual_velocity(samples: Sequence[Sample], found: Bracket, threshold: float, scale: float = 1.0) -> Fit | None:
-    """v_r = a (v^p - v_bl^p)^(1/p) through the points beyond the limit (Lambert and Jonas, BRL R-1828, 1976; with
-    p = 2 Recht and Ipson, J. Appl. Mech. 30, 1963, where a is the share of the masses).
+    """Fits v_r = a (v^p - v_bl^p)^(1/p) to the points above the limit (Lambert and Jonas, BRL R-1828, 1976; with p = 2
+    Recht and Ipson, J. Appl. Mech. 30, 1963, where a is the mass of the projectile over the sum of the masses of
+    projectile and plug).
 
-    Velocities may count below zero: magnitudes are fitted. ``scale`` is the unit of x in that of the result. None for
-    too few points, or without scipy.
+    v is the impact velocity, v_r the residual velocity, v_bl the ballistic limit. Velocities may be negative:
+    magnitudes are fitted. ``scale`` is the unit of x in the unit of the result. Returns None for too few points or
+    without scipy.
     """
     x, y = zip(*_sides(samples, found, threshold)[1], strict=True)
     if len(x) < _FIXED:
@@ -60,7 +66,7 @@ def residual_velocity(samples: Sequence[Sample], found: Bracket, threshold: floa
 
 
 def _in_unit(fit: Fit, scale: float) -> Fit:
-    """With the limit in the unit of x; a has none."""
+    """Returns the fit with ``limit``, ``error`` and covariance in the unit of x. The factor a has no unit."""
     worth = [1.0 / scale, 1.0, 1.0]
     spread = tuple(tuple(v * worth[n] * worth[k] for k, v in enumerate(row)) for n, row in enumerate(fit.covariance))
     return msgspec.structs.replace(
@@ -71,7 +77,9 @@ def _in_unit(fit: Fit, scale: float) -> Fit:
 def _sides(
     samples: Sequence[Sample], found: Bracket, threshold: float
 ) -> tuple[list[tuple[float, float]], list[tuple[float, float]]]:
-    """Magnitudes of key and result at the points before the bracket and beyond it, its ends among them."""
+    """Returns magnitudes of key and result: first of the points up to the lower end of the bracket, then from its
+    upper end on.
+    """
     known = sorted((abs(s.x), abs(s.f + threshold)) for s in samples if s.f is not None)
     low, high = sorted((abs(found.low.x), abs(found.high.x)))
     return [each for each in known if each[0] <= low], [each for each in known if each[0] >= high]
@@ -95,7 +103,7 @@ def _straight(v: Any, root: float, a: float) -> Any:
 
 
 def line(samples: Sequence[Sample], found: Bracket) -> Fit | None:
-    """The line through the points nearest to where the threshold is passed; None without scipy, or two points."""
+    """Fits a line to the points nearest to the bracket. Returns None if the fit fails or scipy is not installed."""
     centre = 0.5 * (found.low.x + found.high.x)
     known = sorted((s for s in samples if s.f is not None), key=lambda s: abs(s.x - centre))[:_NEAREST]
     x, y = zip(*sorted((s.x, s.f) for s in known), strict=True)
@@ -106,9 +114,11 @@ def line(samples: Sequence[Sample], found: Bracket) -> Fit | None:
 
 
 def course(fit: Fit, low: float, high: float) -> list[tuple[float, float, float | None]]:
-    """x, value and its standard error along the curve, from ``low`` to ``high``: magnitudes for velocities, distances
-    from the threshold for a line. The error follows from the covariance by the derivatives at the constants; None
-    next to the limit, where a law of velocities is so steep that the error is larger than the value.
+    """Returns x, value and standard error of the value along the curve from ``low`` to ``high``.
+
+    Values are magnitudes for a law of velocities, distances from the threshold for a line. The error is computed
+    from the covariance and the derivatives by the constants. Near the limit a law of velocities is steep; if the
+    error exceeds the value there, the error is None.
     """
     import numpy as np
 
@@ -126,7 +136,7 @@ def course(fit: Fit, low: float, high: float) -> list[tuple[float, float, float 
 
 
 def _slope(curve: Callable[..., Any], x: Any, constants: Sequence[float], n: int) -> Any:
-    """The derivative of a curve by its constant ``n``."""
+    """Returns the derivative of a curve with respect to constant ``n``, by central differences."""
     step = 1e-6 * (abs(constants[n]) or 1.0)
     up, down = ([c + (k == n) * way * step for k, c in enumerate(constants)] for way in (1, -1))
     return (curve(x, *up) - curve(x, *down)) / (2.0 * step)
@@ -136,7 +146,9 @@ def _fitted(
     law: str, curve: Callable[..., Any], x: Sequence[float], y: Sequence[float], start: Sequence[float],
     bounds: tuple[Sequence[float], Sequence[float]] | None = None, exponent: float | None = None,
 ) -> Fit | None:  # fmt: skip
-    """The constants by least squares, ``exponent`` where it is not one of them; None where that does not converge."""
+    """Fits the constants by least squares; ``exponent`` is the exponent of a law in which it is fixed. Returns None
+    if the fit does not converge.
+    """
     try:
         import numpy as np
         from scipy.optimize import OptimizeWarning, curve_fit

@@ -1,4 +1,4 @@
-"""Bracketing: between which two points a result passes a threshold, and which points to look at next."""
+"""Bracketing: the interval in which a result passes a threshold, and the points to run next."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ from itertools import pairwise
 
 @dataclass(frozen=True)
 class Sample:
-    """A result less its threshold, ``f``, at ``x``; None where the run has not given one."""
+    """A result at ``x``: ``f`` is the result minus the threshold, None for a run without a result."""
 
     x: float
     f: float | None
@@ -15,26 +15,28 @@ class Sample:
 
 @dataclass(frozen=True)
 class Bracket:
-    """The threshold is passed between the points ``low`` and ``high``, in the order of x."""
+    """Interval between two neighbouring points, in the order of x, in which the result passes the threshold."""
 
     low: Sample
     high: Sample
     changes: int = 1
-    """How often it is passed between all points: more than once where the result is not monotonic, or scatters."""
+    """Number of passages of the threshold between all points; more than 1 if the result is not monotonic, or
+    scatters."""
     mixed: tuple[float, float] | None = None
-    """From the first point beyond the threshold to the last one before it, where it is passed more than once."""
+    """Interval of x with all passages, if there are several: from the first point beyond the threshold to the last one
+    before the threshold."""
 
     @property
     def width(self) -> float:
-        """Of x."""
+        """Width of the bracket in x."""
         return self.high.x - self.low.x
 
 
 def bracket(samples: Sequence[Sample]) -> Bracket | None:
-    """The first passage, from the lowest x on; None where all points are on one side.
+    """Returns the bracket of the passage with the smallest x; None if all points are on the same side of the threshold.
 
-    A result that is exactly at the threshold at the low end belongs to the side before it: what is left of a projectile
-    that was stopped is 0, and what bounces back is below.
+    If the result at the low end equals the threshold, that point counts as before the threshold: the residual
+    velocity of a stopped projectile is 0, and that of a rebounding projectile is negative.
     """
     known = sorted((sample for sample in samples if sample.f is not None), key=lambda sample: sample.x)
     beyond = _beyond(known)
@@ -48,7 +50,7 @@ def bracket(samples: Sequence[Sample]) -> Bracket | None:
 
 
 def _beyond(known: Sequence[Sample]) -> list[bool]:
-    """Whether each point is on another side than the first one."""
+    """Returns for each point True if it is on the other side of the threshold than the first point."""
     signs = [_sign(sample.f) for sample in known]
     first = signs[0] if signs else 0
     if first:
@@ -62,7 +64,9 @@ def _sign(value: float | None) -> int:
 
 
 def between(low: float, high: float, taken: Sequence[float], many: int) -> list[float]:
-    """So many points between two others that divide what the ``taken`` ones there leave as evenly as can be."""
+    """Returns ``many`` new points between ``low`` and ``high``. With the points ``taken``, the new points divide the
+    interval as evenly as possible.
+    """
     ends = sorted({low, high, *(x for x in taken if low < x < high)})
     gaps = list(pairwise(ends))
     counts = [0] * len(gaps)
@@ -73,5 +77,5 @@ def between(low: float, high: float, taken: Sequence[float], many: int) -> list[
 
 
 def widest(low: float, high: float, taken: Sequence[float]) -> float:
-    """The widest gap between two points, or between one and those ``taken`` there."""
+    """Returns the widest gap between neighbouring points of ``low``, ``high`` and ``taken``."""
     return max(b - a for a, b in pairwise(sorted({low, high, *(x for x in taken if low < x < high)})))

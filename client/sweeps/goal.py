@@ -1,4 +1,4 @@
-"""What an adaptive sweep looks for, from words: a result and its threshold, and the spans of the keys that vary."""
+"""Goal of an adaptive sweep, parsed from text: a result and its threshold, and the spans of the keys that vary."""
 
 import math
 from collections.abc import Sequence
@@ -15,13 +15,13 @@ from conoid.cases.units import parse_quantity, written
 
 _ADAPTIVE, _SET, _TOLERANCE = "--adaptive", "--set", "--tolerance"
 _SHARE = 0.01
-"""Of the larger end, the tolerance where none is given. Chosen: finer than tests of a ballistic limit scatter."""
+"""Default tolerance over the magnitude of the larger end. Chosen value: smaller than the scatter of ballistic tests."""
 _DIGITS = 9
-"""Of a value that is tried: more than any case is sensitive to, and short to read."""
+"""Number of digits of a value that is run. Chosen value: more than any case is sensitive to."""
 
 
 class Goal(msgspec.Struct, kw_only=True, frozen=True):
-    """Where a result passes ``threshold``; both in ``unit``."""
+    """A result and the threshold that the result shall pass; both in ``unit``."""
 
     result: str
     threshold: float
@@ -29,7 +29,7 @@ class Goal(msgspec.Struct, kw_only=True, frozen=True):
 
 
 class Span(msgspec.Struct, kw_only=True, frozen=True):
-    """A key and its values at both ends, in ``unit``, which is empty for plain numbers."""
+    """A key and its values at both ends of the range, in ``unit``; ``unit`` is empty for plain numbers."""
 
     key: str
     low: float
@@ -37,17 +37,17 @@ class Span(msgspec.Struct, kw_only=True, frozen=True):
     unit: str = ""
 
     def value(self, x: float) -> str | float:
-        """As it is written into the case."""
+        """Returns the value in the form in which it is written into the case."""
         rounded = float(f"{x:.{_DIGITS}g}")
         return f"{rounded!r} {self.unit}" if self.unit else rounded
 
     def along(self, other: "Span", x: float) -> str | float:
-        """The value at the place of ``x`` of ``other``."""
+        """Returns the value of this key that corresponds to ``x`` of the span ``other`` by linear interpolation."""
         return self.value(self.low + (self.high - self.low) * (x - other.low) / (other.high - other.low))
 
 
 def goal_of(words: str, case: Case) -> Goal:
-    """Of ``probe.NAME = 0``; the result is a column of the table of a sweep, without its unit. Raises CaseError."""
+    """Parses ``probe.NAME = 0``: the name of a result without its unit, and a threshold. Raises CaseError."""
     name, equals, text = (part.strip() for part in words.rpartition("="))
     known = points.names(case)
     if not equals or not name or not text:
@@ -58,7 +58,7 @@ def goal_of(words: str, case: Case) -> Goal:
 
 
 def spans_of(words: Sequence[str]) -> tuple[list[Span], dict[str, Any]]:
-    """The spans of ``KEY=LOW:HIGH`` and the values of ``KEY=VALUE``. Raises CaseError."""
+    """Returns the spans of ``KEY=LOW:HIGH`` and the values of ``KEY=VALUE``. Raises CaseError."""
     from .sweep import axes_of
 
     spans, constants = list[Span](), dict[str, Any]()
@@ -77,7 +77,7 @@ def spans_of(words: Sequence[str]) -> tuple[list[Span], dict[str, Any]]:
 
 
 def span_of(key: str, ends: Any) -> Span:
-    """Of two values of a key. Raises CaseError."""
+    """Returns the span between two values of a key. Raises CaseError."""
     if not isinstance(ends, Sequence) or isinstance(ends, str) or len(ends) != 2:
         raise _wrong("spans", ends, f"{key} varies between two values, such as ('-200 m/s', '-800 m/s')")
     unit, (low, high) = points.in_one_unit(key, list(ends))
@@ -89,7 +89,7 @@ def span_of(key: str, ends: Any) -> Span:
 
 
 def _span(key: str, text: str) -> Span | None:
-    """None of a text that is no span. A unit behind the second end is that of the first one, too."""
+    """Returns the span of ``LOW:HIGH``, None for another text. A unit after HIGH also applies to LOW."""
     low, _, high = (part.strip() for part in text.partition(":"))
     first, second = written(low), written(high)
     if first is None or second is None:
@@ -98,7 +98,7 @@ def _span(key: str, text: str) -> Span | None:
 
 
 def tolerance_of(given: Any, span: Span) -> float:
-    """In the unit of the span; a bare number is in it. Raises CaseError."""
+    """Returns the tolerance in the unit of the span; a number without a unit has that unit. Raises CaseError."""
     if given is None:
         return _SHARE * max(abs(span.low), abs(span.high))
     pair = written(given)
@@ -123,5 +123,7 @@ def _wrong(option: str, value: Any, message: str) -> CaseError:
 
 
 def changes(spans: Sequence[Span], x: float) -> dict[str, Any]:
-    """What is changed at a point, by key: all spans at the place of ``x`` of the first one."""
+    """Returns the changed keys at a point. ``x`` is the value of the first span; the other keys are interpolated at
+    the same relative position.
+    """
     return {span.key: span.along(spans[0], x) for span in spans}

@@ -1,4 +1,4 @@
-"""Reports of an adaptive sweep to the server, which the page shows: where it stands, and what was found."""
+"""Reports of an adaptive sweep to the server, which the page shows: the points so far, the bracket and the result."""
 
 import math
 import time
@@ -19,30 +19,32 @@ from .bracket import Bracket
 from .goal import Goal, Span
 
 _PROBLEM, _WHY = 200, 1000
-"""Characters that a report may have (cases/output/search.py)."""
+"""Largest numbers of characters of texts in a report (cases/output/search.py)."""
 
 
 class Reported(msgspec.Struct, kw_only=True, frozen=True):
-    """What the server says to a report: the id of the sweep, and whether it was cancelled there."""
+    """Answer of the server to a report: the id of the sweep; ``stop`` is True after a cancel on the server."""
 
     id: str
     stop: bool = False
 
 
 class Put(Protocol):
-    """``Http.put``."""
+    """Type of ``Http.put``."""
 
     def __call__(self, kind: type[Reported], path: str, body: bytes, headers: Mapping[str, str]) -> Reported:
-        """The answer to a PUT."""
+        """Sends a PUT request and returns the answer."""
 
 
 class Reporter:
-    """Tells a server of an adaptive sweep. What is not told, for whatever reason, is told with the next report: the
-    runs and the file of the sweep do not depend on it.
+    """Sends reports of an adaptive sweep to a server. A report contains all points: if sending fails, the next
+    report has the missing data. The runs and the file of the sweep do not depend on reports.
     """
 
     def __init__(self, put: Put, name: str, case: str, goal: Goal, spans: Sequence[Span], tolerance: float) -> None:
-        """``name`` is the same for the same sweep, ``case`` the case's. Nothing is sent yet."""
+        """Prepares reports; nothing is sent yet. ``name`` identifies the sweep and is the same in each command of a
+        sweep; ``case`` is the name of the case.
+        """
         self._put, self._path, self._goal = put, f"/v1/sweeps/adaptive/{quoted(name)}", goal
         span = spans[0]
         self._scale, unit = in_si(span)
@@ -53,15 +55,17 @@ class Reporter:
             tolerance=self._scale * tolerance,
         )  # fmt: skip
         self.id = ""
-        """Of the sweep on the server; empty where it keeps none."""
+        """Id of the sweep on the server; empty if the server stores no adaptive sweeps."""
         self.stop = False
-        """Whether the sweep was cancelled there."""
+        """True after the sweep was cancelled on the server."""
 
     def tell(
         self, tried: Sequence[Tried], made: Bracket | None, fit: Fit | None = None, *, over: bool = False,
         why: str = "",
     ) -> None:  # fmt: skip
-        """Sends a report: all points with those whose runs go on, the bracket, and at the end the curve."""
+        """Sends a report: all points, also those whose runs have not ended, the bracket, and the fitted curve if
+        there is one.
+        """
         points = sorted((self._point(each) for each in tried), key=lambda point: point.x)[:MOST_RUNS]
         search = msgspec.structs.replace(
             self._plain, points=points, over=over, why=why[:_WHY],
@@ -71,7 +75,7 @@ class Reporter:
         )  # fmt: skip
         try:
             told = self._put(Reported, self._path, msgspec.json.encode(search), {"Content-Type": "application/json"})
-        except ClientError:  # an older server, or one that is away
+        except ClientError:  # the server is not reachable, or is older than these reports
             return
         self.id, self.stop = told.id, told.stop
 
@@ -88,7 +92,7 @@ class Reporter:
         )  # fmt: skip
 
     def _curve(self, fit: Fit, made: Bracket, tried: Sequence[Tried]) -> Curve:
-        """With the signs of key and result, of which a law of velocities has the magnitudes."""
+        """Returns the curve with the signs of key and result. A law of velocities is fitted to magnitudes."""
         values = [each for each in tried if each.value is not None]
         law = fit.law != "line"
         way = math.copysign(1.0, made.low.x + made.high.x) if law else 1.0
@@ -104,7 +108,7 @@ class Reporter:
 
 
 def in_si(span: Span) -> tuple[float, str]:
-    """What the unit of a span is worth in the SI unit of its key, and that unit."""
+    """Returns the unit of a span in the SI unit of its key, and the SI unit."""
     unit = unit_of_key(span.key)
     if not span.unit or not unit:
         return 1.0, span.unit or unit

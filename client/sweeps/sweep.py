@@ -1,4 +1,4 @@
-"""Sweeps: one case at many points, on a server. The points from words, the handle, the table."""
+"""Sweeps: one case at many points, on a server. Points parsed from text, the handle of a sweep, and its table."""
 
 import csv
 import io
@@ -26,23 +26,23 @@ from ..remote.run_info import ID, RunInfo
 from ..run import Run
 
 _LOOK = 2.0
-"""s after which is looked which runs have ended. Chosen."""
+"""Time between two checks for ended runs, s. Chosen value."""
 _COLUMNS = {"run", "state"}
-"""That the table of every sweep has."""
+"""Columns that the table of each sweep has."""
 Point = dict[str, Any]
-"""What is changed at a point, by key: ``{"parts[0].velocity[2]": "-200 m/s"}``."""
+"""Changed keys of a point with their values: ``{"parts[0].velocity[2]": "-200 m/s"}``."""
 
 
 class SweepPoint(msgspec.Struct, kw_only=True, frozen=True):
-    """What was changed at a point, and its run."""
+    """Changed keys of a point, and the run of the point."""
 
     values: Point
     run: RunInfo
 
 
 class SweepInfo(msgspec.Struct, kw_only=True, frozen=True):
-    """What the server tells of a sweep; ``submitted`` in Unix s, ``states`` counts its runs, ``removed`` those whose
-    folder is gone.
+    """State of a sweep on the server. ``submitted`` is in Unix s, ``states`` has the number of runs in each state,
+    ``removed`` is the number of runs whose folder was removed.
     """
 
     id: Annotated[str, msgspec.Meta(pattern=ID)]
@@ -56,18 +56,18 @@ class SweepInfo(msgspec.Struct, kw_only=True, frozen=True):
 
     @property
     def failed(self) -> int:
-        """Runs that have ended without success, or were removed."""
+        """Number of runs that have ended without success or were removed."""
         bad = (n for state, n in self.states.items() if State(state).final and state != State.SUCCEEDED)
         return sum(bad) + self.removed
 
     @property
     def over(self) -> bool:
-        """True when every run has ended, or has been removed after that."""
+        """True if every run has ended or was removed after its end."""
         return sum(n for state, n in self.states.items() if State(state).final) + self.removed == self.total
 
 
 class SweepPage(msgspec.Struct, kw_only=True, frozen=True):
-    """Sweeps, newest first; ``next`` asks for those that are older, None where there are none."""
+    """Sweeps, newest first; ``next`` requests the page of older sweeps, None on the last page."""
 
     sweeps: list[SweepInfo]
     next: str | None = None
@@ -75,29 +75,29 @@ class SweepPage(msgspec.Struct, kw_only=True, frozen=True):
 
 @dataclass
 class Sweep:
-    """A sweep on a server. Nothing is asked before a method is called."""
+    """Handle of a sweep on a server. A request is sent only when a method is called."""
 
     session: Http
     id: str
 
     @property
     def path(self) -> str:
-        """Its place in the REST interface."""
+        """Path of the sweep in the REST interface."""
         return f"/v1/sweeps/{quoted(self.id)}"
 
     def status(self) -> SweepInfo:
-        """What the server knows of it now."""
+        """Returns the present state of the sweep on the server."""
         return self.session.get(SweepInfo, self.path)
 
     def runs(self) -> list[Run]:
-        """A handle of each of its runs, in the order of the points."""
+        """Returns a handle of each run of the sweep, in the order of the points."""
         return [Run(self.session, point.run.id) for point in self.status().points]
 
     def wait(
         self, timeout: float | None = None, say: Callable[[SweepInfo, SweepPoint], None] = lambda info, point: None
     ) -> SweepInfo:
-        """Returns when all runs have ended. Raises TimeoutError after ``timeout`` s. ``say`` hears of each point whose
-        run has ended, with what is known of all then.
+        """Returns when all runs have ended. Raises TimeoutError after ``timeout`` s. ``say`` receives the state of
+        the sweep and each point whose run has ended.
         """
         deadline = math.inf if timeout is None else time.monotonic() + timeout
         told = set[str]()
@@ -117,11 +117,13 @@ class Sweep:
                 raise TimeoutError(f"sweep {self.id}: {len(left)} of {info.total} runs have not ended")
 
     def cancel(self) -> SweepInfo:
-        """Asks every run to stop; to ask twice does no harm."""
+        """Cancels all runs. A second call has no further effect."""
         return self.session.post(SweepInfo, f"{self.path}:cancel")
 
     def csv(self) -> str:
-        """A line a point: what was changed, the state of the run, its results. Raises AnswerError for another text."""
+        """Returns the table as CSV with a line for each point: changed keys, state of the run, results. Raises
+        AnswerError for another text.
+        """
         text = self.session.fetch(f"{self.path}/table").decode(errors="replace")
         if not set(next(csv.reader(io.StringIO(text)), [])) >= _COLUMNS:
             raise AnswerError(
@@ -130,15 +132,15 @@ class Sweep:
         return text
 
     def keys(self) -> list[str]:
-        """The keys that it changes."""
+        """Returns the keys that the sweep changes."""
         return list(dict.fromkeys(key for point in self.status().points for key in point.values))
 
     def table(self) -> list[dict[str, str]]:
-        """The lines of the table by column, as text."""
+        """Returns the lines of the table by column, as text."""
         return text_rows(self.csv())
 
     def frame(self) -> Any:
-        """The table as a pandas.DataFrame. Raises ClientError without pandas."""
+        """Returns the table as a pandas.DataFrame. Raises ClientError without pandas."""
         try:
             import pandas
         except ImportError:
@@ -146,10 +148,11 @@ class Sweep:
         return pandas.read_csv(io.StringIO(self.csv()))
 
     def plot(self, out: Path | str, columns: Sequence[str] = (), x: str | None = None) -> Path:
-        """Results over what was changed, as a picture: those ``columns``, or the telling ones of those that differ.
+        """Draws results over the changed keys. ``columns`` are the drawn results; the default is the most informative
+        columns whose values differ.
 
-        ``x`` is the key on the axis, the first that varies when it is None; the other keys make a curve each. Raises
-        ClientError.
+        ``x`` is the key on the axis; the default is the first key that varies. Each combination of the other keys
+        has a curve. Raises ClientError.
         """
         from ..reports import curves
         from . import sweep_plot
@@ -158,20 +161,19 @@ class Sweep:
 
 
 def text_rows(text: str) -> list[dict[str, str]]:
-    """The lines of a table in CSV by column."""
+    """Returns the lines of a table in CSV by column."""
     return list(csv.DictReader(io.StringIO(text)))
 
 
 def points_of(words: Iterable[str], *, grid: bool = False) -> list[Point]:
-    """The points of ``key=a,b,c``: one after the other with all keys at once, or each with each for a ``grid``.
-
-    A key with one value has it at every point. Raises CaseError.
+    """Returns the points of ``key=a,b,c``. All keys change together from point to point; with ``grid``, each value
+    is combined with each. A key with one value has this value at every point. Raises CaseError.
     """
     return points_along(axes_of(words), grid=grid, named="--set")
 
 
 def axes_of(words: Iterable[str]) -> dict[str, list[Any]]:
-    """The values of each key of ``key=a,b,c``. Raises CaseError."""
+    """Returns the values of each key of ``key=a,b,c``. Raises CaseError."""
     axes = [_axis(word) for word in words]
     if not axes:
         raise CaseError([Problem("--set", "", "write at least one key with its values, such as run.ranks=1,2")])
@@ -180,8 +182,9 @@ def axes_of(words: Iterable[str]) -> dict[str, list[Any]]:
 
 
 def points_along(axes: Mapping[str, Iterable[Any]], *, grid: bool = False, named: str = "points") -> list[Point]:
-    """The points of the values of each key: one after the other with all keys at once, or each with each for a
-    ``grid``; a list of one value holds at every point. ``named``: what errors call them. Raises CaseError.
+    """Returns the points for lists of values by key. All keys change together from point to point; with ``grid``,
+    each value is combined with each. A list of one value applies to every point. ``named``: name of the input in
+    error messages. Raises CaseError.
     """
     lists = {key: _values(key, values, named) for key, values in axes.items()}
     if grid:
@@ -198,7 +201,9 @@ def points_along(axes: Mapping[str, Iterable[Any]], *, grid: bool = False, named
 
 
 def _values(key: str, values: Any, named: str) -> list[Any]:
-    """The values of a key as a list; arrays are sequences, too. Raises CaseError for one value, a text among them."""
+    """Returns the values of a key as a list; arrays count as sequences. Raises CaseError for a single value or a
+    text.
+    """
     if isinstance(values, Iterable) and not isinstance(values, str | bytes | Mapping):
         return list(values.tolist() if hasattr(values, "tolist") else values)
     message = f"{key} has one value; write a list of values, such as [{values!r}]"
@@ -206,7 +211,7 @@ def _values(key: str, values: Any, named: str) -> list[Any]:
 
 
 def listed(points: Any) -> list[Point]:
-    """The points as they are sent, each a mapping of keys to values. Raises CaseError."""
+    """Returns the points in the form in which they are sent, each a mapping of keys to values. Raises CaseError."""
     found: list[Any] = [points] if isinstance(points, str) or not isinstance(points, Iterable) else list(points)
     told = "a point is a mapping of keys to values, such as {'run.ranks': 2}"
     wrong = [
@@ -218,7 +223,7 @@ def listed(points: Any) -> list[Point]:
 
 
 def points_in(path: Path) -> list[Point]:
-    """The points in a CSV file: its first line has the keys. Raises CaseError."""
+    """Returns the points in a CSV file whose first line has the keys. Raises CaseError."""
     named = repr(str(path))
     try:
         text = whole.read_text(path).removeprefix("\ufeff")
@@ -240,14 +245,14 @@ def points_in(path: Path) -> list[Point]:
 
 
 def _once(named: str, keys: Iterable[str], allowed: str) -> None:
-    """Raises CaseError for a key that is given twice: which of its values was meant, nobody knows."""
+    """Raises CaseError for a key that is given twice: the intended value is not known."""
     twice = [key for key, times in Counter(keys).items() if times > 1]
     if twice:
         raise CaseError(Problem(named, repr(key), f"is given more than once; {allowed}") for key in twice)
 
 
 def value_of(text: str) -> Any:
-    """A value as TOML has it, or as text."""
+    """Returns a TOML value, or the text itself if it is not TOML."""
     return apply_overrides({}, [f"value={text.strip()}"])["value"]
 
 
@@ -260,7 +265,7 @@ def _axis(word: str) -> tuple[str, list[Any]]:
 
 
 def _parts(text: str) -> list[str]:
-    """What stands between the commas that are in no list and no quotes."""
+    """Returns the texts between commas. Commas in lists and in quotes do not separate."""
     parts, depth, quote = [""], 0, ""
     for letter in text:
         if quote or letter in "\"'":

@@ -1,4 +1,6 @@
-"""The table of a sweep from its file: one in a folder of runs of a server, or an adaptive one. No server is asked."""
+"""Table of a sweep from a file, without a server: the file of a sweep in the folder of a server, or that of an
+adaptive sweep.
+"""
 
 from pathlib import Path
 from typing import Any
@@ -16,20 +18,20 @@ from . import adaptive_result
 
 
 class _Plan(msgspec.Struct):
-    """What server/intake/sweeps.py keeps."""
+    """File of a sweep that server/intake/sweeps.py writes."""
 
     points: list[dict[str, Any]]
     runs: list[str]
 
 
 def file_named(text: str) -> Path | None:
-    """The file that is meant, None for an id."""
+    """Returns the path of a file, None for a text that is the id of a sweep."""
     path = Path(text)
     return path if path.suffix == ".json" and path.is_file() else None
 
 
 def columns_of(path: Path) -> list[Column]:
-    """The table. Raises UsageError for a file of something else."""
+    """Returns the table. Raises UsageError for a file of another kind."""
     try:
         plan = msgspec.json.decode(whole.read(path), type=_Plan)
     except OSError as error:
@@ -50,7 +52,7 @@ def _point(folder: Path, values: dict[str, Any]) -> Point:
 
 
 def _outcome(path: Path) -> Outcome | None:
-    """None before the end, and where it was removed or damaged."""
+    """Returns the outcome of a run; None before its end, and for a removed or damaged file."""
     try:
         return outcome.from_json(whole.read(path))
     except (OSError, ValueError):

@@ -1,4 +1,4 @@
-"""The table of a sweep as a picture: results over what was changed, a panel a result. With matplotlib."""
+"""Table of a sweep as a picture: a panel for each result over the changed keys; with matplotlib."""
 
 from collections.abc import Mapping, Sequence
 
@@ -12,13 +12,14 @@ from ..errors import ClientError, UsageError
 
 _COLOURS = ("#4c78a8", "#f58518", "#54a24b", "#e45756", "#72b7b2", "#b279a2", "#eeca3b", "#9d755d", "#ff9da6")
 _PANELS = 6
-"""Results that are drawn when nobody names any. Chosen: as many as are read on one page."""
+"""Largest number of results that are drawn by default. Chosen value: that many panels are readable on one page."""
 
 
 def figure(rows: Sequence[Row], keys: Sequence[str], x: str | None, columns: Sequence[str]) -> Figure:
-    """``rows`` of a table, of which ``keys`` were changed; over the key ``x``, the first that varies when it is None.
+    """Draws the ``rows`` of a table over the key ``x``; the default is the first key that varies. ``keys`` are the
+    changed keys.
 
-    One curve for each combination of the other keys; keys that go together are one of them. Raises ClientError.
+    Each combination of the other keys has a curve; keys that change together count as one. Raises ClientError.
     """
     titles = {split(title)[0]: title for title in rows[0]} if rows else {}
     changed = {key: titles[key] for key in keys if key in titles}
@@ -42,7 +43,9 @@ def figure(rows: Sequence[Row], keys: Sequence[str], x: str | None, columns: Seq
 
 
 def _together(rows: Sequence[Row], titles: Sequence[str]) -> list[list[str]]:
-    """The columns that vary, in groups: each value of one belongs to one value of each of the others in its group."""
+    """Returns the columns that vary, in groups of columns that change together: a value of one column determines the
+    values of the others.
+    """
     groups: dict[tuple[int, ...], list[str]] = {}
     for title in titles:
         order = list(dict.fromkeys(row[title] for row in rows))
@@ -52,7 +55,7 @@ def _together(rows: Sequence[Row], titles: Sequence[str]) -> list[list[str]]:
 
 
 def _axis(rows: Sequence[Row], changed: Mapping[str, str], x: str | None) -> str:
-    """The title of the column on the axis."""
+    """Returns the title of the column on the axis."""
     if x is not None and x not in changed:
         raise UsageError(f"x = {x!r}: the sweep changes {', '.join(changed)}")
     varies = [title for title in changed.values() if len({row[title] for row in rows}) > 1]
@@ -78,19 +81,19 @@ def _panel(axes: Axes, rows: Sequence[Row], over: str, others: Sequence[str], na
 
 
 def _labelled(column: str) -> str:
-    """As an axis has it."""
+    """Returns the label of an axis."""
     name, unit = split(column.removeprefix("reference.").removeprefix("probe."))
     return f"{name}, {unit}" if unit else name
 
 
 def _valued(row: Row, title: str) -> str:
-    """``run.ranks 2``, ``speed 200 m/s``."""
+    """Returns a name with a value and a unit, such as ``speed 200 m/s``."""
     name, unit = split(title)
     return f"{name} {row[title]} {unit}".strip()
 
 
 def _places(rows: Sequence[Row], over: str) -> tuple[bool, dict[str, float]]:
-    """Whether the values are words, and where each of them lies."""
+    """Returns True if the values are words, and the position of each value on the axis."""
     texts = list(dict.fromkeys(row[over] for row in rows))
     numbers = {text: value for text in texts if (value := number_of(text)) is not None}
     return (False, numbers) if len(numbers) == len(texts) else (True, {text: float(n) for n, text in enumerate(texts)})
