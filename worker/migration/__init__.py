@@ -1,1 +1,3 @@
-"""The complete state of a run by global ids: moved between ranks, written to disk, read on any number of ranks."""
+"""The complete state of a run by global ids. It is moved between ranks, written to disk, and read on any number of
+ranks.
+"""

@@ -1,8 +1,8 @@
 """Load balance: costs of tets, the decision to cut again, and the time that cuts have saved.
 
-Costs are CPU seconds of this run: of the tets of each part by the passes over them, of nodes, and of contact by the
-candidates of a node. Every rank receives the work of all ranks, so that all decide alike. The answer of the run does
-not depend on it.
+Costs are CPU seconds of this run. The cost of the tets of each part is measured in the passes over these tets. The
+cost of nodes and the cost of contact, by the candidates of a node, are measured as well. Every rank receives the
+work of all ranks, so that all ranks make the same decision. The answer of the run does not depend on this decision.
 """
 
 import time
@@ -26,8 +26,8 @@ from .parcel import Parcel
 from .route import route
 
 _LEAST = 1e-9
-"""Least cost of a tet, s: so that every rank gets tets before any cost is measured. Chosen far below the cost of any
-tet."""
+"""Smallest cost of a tet, s. With this value every rank gets tets before any cost is measured. Chosen value, far
+below the measured cost of any tet."""
 
 
 @dataclass
@@ -36,28 +36,28 @@ class Window:
 
     steps: int
     work: dict[str, list[float]]
-    """By phase, one number a rank."""
+    """CPU seconds by phase, one number per rank."""
 
     def loads(self, phases: tuple[str, ...]) -> list[float]:
-        """Return (ranks,) the load of each rank in some phases, s a step."""
+        """Return (ranks,) the load of each rank in some phases, s per step."""
         return [float(load) / max(self.steps, 1) for load in np.sum([self.work[name] for name in phases], axis=0)]
 
     @property
     def imbalance(self) -> float:
-        """Largest load over the mean."""
+        """Largest load of a rank divided by the mean load."""
         return balancing.imbalance(self.loads(WORK))
 
 
 @dataclass
 class Balance:
-    """Measures the loads of a run and moves tets when that saves time."""
+    """Measures the loads of a run and moves tets when a cut saves time."""
 
     case: Case
     comm: Comm
     trigger: Trigger
     _meter: Meter
-    """Measures costs since the last cut, and again since half of the loss that triggers the next cut: costs change
-    as fronts move."""
+    """Measures costs since the last cut. The measurement is restarted at half of the loss that triggers the next
+    cut, since costs change as fronts move."""
     spent: float = 0.0
     """Wall time of all cuts, s."""
     events: int = 0
@@ -68,7 +68,7 @@ class Balance:
     _before: float | None = None
     """Imbalance of the steps just before the last cut."""
     _saved: float = 0.0
-    """Time saved by the cuts before the last one, s."""
+    """Time saved by all cuts except the last one, s."""
 
     @classmethod
     def of(cls, sim: Simulation) -> Self:
@@ -83,8 +83,10 @@ class Balance:
 
     @property
     def saved(self) -> float:
-        """Time saved by all cuts so far, s: the difference of the work with the imbalance just before each cut and
-        just after it. Imbalance that has grown since then is not counted.
+        """Time saved by all cuts so far, s.
+
+        For each cut the work is compared with the imbalance just before and just after the cut. Imbalance that
+        arises later is not counted.
         """
         stretch = self.trigger.stretch
         if self._before is None or not stretch.steps:
@@ -108,7 +110,10 @@ class Balance:
         return cause
 
     def move(self, sim: Simulation) -> tuple[Simulation, dict[str, Any]]:
-        """Cut by the costs and move tets; return the new simulation and the fields of the message. Collective."""
+        """Cut by the costs and move tets. Return the new simulation and the fields of the message.
+
+        Collective.
+        """
         began, before, cpu = time.monotonic(), self._latest, worked(self.comm)
         parcel = simulation.keep(sim)
         self.weigh(sim, parcel)
@@ -136,8 +141,10 @@ class Balance:
         self._guard = Guard(self.case.balance.alpha, sim.contact.outside if sim.contact is not None else 0)
 
     def weigh(self, sim: Simulation, parcel: Parcel) -> None:
-        """Set the ``weight`` of every tet of a parcel, s a step, by phases between which ranks wait: its own, and
-        for its nodes the search and the rest of contact. Collective.
+        """Set the ``weight`` of every tet of a parcel, s per step.
+
+        The weight has a column for each phase after which ranks wait: the cost of the tet itself, and for its nodes
+        the cost of the search and of the rest of contact. Collective.
         """
         if self.case.balance.weights == "tets":
             return
@@ -155,8 +162,8 @@ class Balance:
 
 
 def _with_their_first_tets(parcel: Parcel, effort: "np.ndarray") -> dict[int, Floats]:
-    """Return by part (n, k) the ``effort`` (nodes, k) of the nodes whose tet of smallest id on this rank each tet
-    is.
+    """Return by part (n, k) the ``effort`` (nodes, k) of nodes. Each node counts for one tet: the tet of smallest id
+    on this rank.
     """
     ids, first = parcel.nodes["id"], np.full(len(effort), np.iinfo(np.int64).max)
     corners = {part: located(ids, t["corners"]) for part, t in parcel.tets.items()}

@@ -41,7 +41,7 @@ from ..parallel.comm import Comm
 from .parcel import Parcel, Table, take
 
 _KEPT = 2
-"""Number of checkpoints that are kept. Chosen: one more than the latest, which may be damaged."""
+"""Number of checkpoints that are kept. Chosen value: one more than the latest, which may be damaged."""
 _FREE = {
     "run": {
         "ranks", "threads", "profile", "cut_scale", "max_steps", "max_wall_time", "checkpoint_every", "residual_limit",
@@ -49,11 +49,14 @@ _FREE = {
     },
     "contact": {"skin", "domain"},
 }  # fmt: skip
-"""Keys that may change when a run is resumed: the answer does not depend on them."""
+"""Keys that may change when a run is resumed: the answer does not depend on these keys."""
 
 
 def write(parcel: Parcel, case: Case, folder: Path, step: int, t: float, comm: Comm) -> tuple[Path, int]:
-    """Write a checkpoint of the run in ``folder``; return its folder and its bytes. Collective."""
+    """Write a checkpoint of the run in ``folder``; return its folder and its number of bytes.
+
+    Collective.
+    """
     place = layout.checkpoint(folder, step)
     beside = place.with_suffix(".part")
     if comm.rank == 0:
@@ -86,7 +89,9 @@ def _describe(beside: Path, manifest: Manifest) -> None:
 
 
 def forget(folder: Path, step: int = -1) -> None:
-    """Remove the checkpoints of ``folder`` after a step, and unfinished ones; all of them if no step is given."""
+    """Remove the checkpoints of ``folder`` after a step, and unfinished checkpoints. Without a step all checkpoints
+    are removed.
+    """
     if step < 0:
         shutil.rmtree(folder / layout.CHECKPOINTS, ignore_errors=True)
     kept = {place.name for place in found(folder) if int(place.name) <= step}
@@ -114,7 +119,7 @@ def latest(folder: Path) -> tuple[Path, Manifest, list[str]]:
 
 
 def require_same(case: Case, manifest: Manifest) -> None:
-    """Raise InputError if the case differs from that of the checkpoint in a key on which the answer depends."""
+    """Raise InputError if the case differs from the case of the checkpoint in a key on which the answer depends."""
     now, then = (_answering(data) for data in (json.loads(resolved_json(case)), manifest.case))
     for key in sorted({*now, *then}):
         if now.get(key) != then.get(key):
@@ -122,7 +127,9 @@ def require_same(case: Case, manifest: Manifest) -> None:
 
 
 def _answering(case: dict[str, Any]) -> dict[str, Any]:
-    """Return the keys of a case on which its answer depends, those of ``run`` and ``contact`` one by one."""
+    """Return the keys of a case on which its answer depends. The keys of ``run`` and ``contact`` are returned one by
+    one.
+    """
     found = {key: value for key, value in case.items() if key not in ("balance", "title", "description")}
     for table, free in _FREE.items():
         if isinstance(keys := found.get(table), dict):
@@ -189,7 +196,7 @@ def _plain(value: Any) -> Any:
 
 
 def _rich(value: Any) -> Any:
-    """Return the value that ``_plain`` was given, with tuples as lists."""
+    """Return the value that was the argument of ``_plain``, with tuples as lists."""
     if isinstance(value, dict):
         if value.keys() == {"dtype", "values"}:
             return np.array(value["values"], value["dtype"])

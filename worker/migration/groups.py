@@ -15,9 +15,9 @@ from ..simulation import Simulation
 from .meter import Meter
 
 _TIMES = 200
-"""Largest number of records of a run, unless it is slow: then one each ``_PATIENCE``."""
+"""Largest number of records of a run. A slow run has more: one for each interval ``_PATIENCE``."""
 _PATIENCE = 10.0
-"""s of wall time. Chosen."""
+"""Largest wall time between two records, s. Chosen value."""
 _SHARE = 1.0 / 400.0
 """Share of the time of a run that records may take."""
 
@@ -36,7 +36,7 @@ class Groups:
         self._first = True
 
     def moved(self, sim: Simulation) -> None:
-        """Reset the meter: tets have moved, and blocks count from zero."""
+        """Reset the meter, since tets have moved and blocks count from zero."""
         self._meter = Meter.of(sim)
 
     def due(self, t: float, now: float) -> bool:
@@ -45,7 +45,7 @@ class Groups:
         return since * _SHARE > self._took and (t >= self._t or since > _PATIENCE)
 
     def record(self, sim: Simulation) -> dict[str, Any]:
-        """Return the fields of the message. Collective."""
+        """Return the fields of the message of a record. Collective."""
         began, model = worked(sim.comm), sim.model
         n, end = len(model.groups), sim.case.run.end_time
         counts = np.zeros((n, len(model.parts) + 2), np.int64)

@@ -1,4 +1,4 @@
-"""Costs of tets, candidates and ranks: CPU seconds of this run."""
+"""Costs of tets, contact candidates and ranks: CPU seconds of this run."""
 
 from dataclasses import dataclass
 from typing import Self
@@ -11,33 +11,34 @@ from ..model.state import Floats
 from ..simulation import Simulation
 
 _FARTHEST = 4.0
-"""Largest ratio of the cost of a candidate on one rank to the mean, and of the mean to it. Chosen: with few
-candidates the measurement is mostly noise."""
+"""Bound of the ratio between the cost of a candidate on one rank and the mean cost, in both directions. Chosen
+value: with few candidates the measurement is mostly noise."""
 
 
 @dataclass(frozen=True)
 class Costs:
-    """CPU seconds a step."""
+    """Costs in CPU seconds per step."""
 
     tet: Floats
-    """(parts,) cost of a tet."""
+    """(parts,) cost of a tet of each part."""
     candidate: float
-    """Cost of a candidate on this rank: candidates differ, and the measured cost is the best estimate there."""
+    """Cost of a contact candidate on this rank. Candidates differ between ranks, and the cost measured on a rank is
+    the best estimate for this rank."""
     fracture: float
-    """Cost of all fracture on this rank."""
+    """Cost of the whole fracture stage on this rank."""
     rank: float
-    """Remaining cost of each rank."""
+    """Cost of contact that is not proportional to the candidates, for each rank."""
 
 
 @dataclass
 class Meter:
-    """Measures costs since it was made."""
+    """Measures costs since its construction."""
 
     step: int
     seconds: dict[str, float]
-    """Timers when it was made, s."""
+    """Timers at construction, s."""
     on_parts: Floats
-    """(parts,) CPU time of the passes over the tets until then, s."""
+    """(parts,) CPU time at construction of the passes over the tets of each part, s."""
 
     @classmethod
     def of(cls, sim: Simulation) -> Self:
@@ -45,7 +46,7 @@ class Meter:
         return cls(sim.clock.step, dict(sim.timers.seconds), on_parts(sim))
 
     def costs(self, sim: Simulation, effort: float) -> Costs:
-        """Return the costs, if this rank has ``effort`` candidates. Collective."""
+        """Return the costs; ``effort``: number of candidates of this rank. Collective."""
         tets, steps = np.zeros(len(self.on_parts)), max(sim.clock.step - self.step, 1)
         for block in sim.model.blocks:
             tets[block.part] = block.n
@@ -62,14 +63,16 @@ class Meter:
 
 
 def _candidates(had: Floats, took: Floats) -> Floats:
-    """Return (ranks,) the cost of a candidate on each rank, from their numbers ``had`` and times ``took``, (ranks,)."""
+    """Return (ranks,) the cost of a candidate on each rank, from the numbers of candidates ``had`` and the times
+    ``took``, (ranks,).
+    """
     mean = took.sum() / max(had.sum(), 1.0)
     return np.asarray(np.clip(took / np.maximum(had, 1.0), mean / _FARTHEST, mean * _FARTHEST))
 
 
 def on_parts(sim: Simulation) -> Floats:
-    """Return (parts,) the CPU time of the passes over the tets of each part so far, s; with one block, that of the
-    phase.
+    """Return (parts,) the CPU time of the passes over the tets of each part so far, s. With one block it is the time
+    of the phase.
     """
     seconds, blocks = np.zeros(len(sim.model.parts)), sim.model.blocks
     for block in blocks:

@@ -17,7 +17,7 @@ from .route import Arrived
 
 _NODAL = ("id", "part", "x0", "x", "v", "mass", "force", "stepping", "group")
 _OF_TETS = ("across", "bond", "weakest", "worn")
-"""Columns that a block has if the scene needs them."""
+"""Columns of a block that exist if the scene needs them."""
 
 
 def keep(model: Model, case: Case) -> Parcel:
@@ -56,7 +56,7 @@ def _keep_block(block: Block, ids: Ints) -> Table:
 
 
 def resume(case: Case, arrived: Arrived, comm: Comm) -> Model:
-    """Return the model of the tables that have arrived, which are sorted in the order of its tets and nodes."""
+    """Return the model from tables in a parcel that are sorted in the order of its tets and nodes."""
     parcel, known = arrived.parcel, arrived.parcel.known
     values: dict[str, Any] = {
         name: np.ascontiguousarray(parcel.nodes[name]) for name in (*_NODAL, "marks") if name in parcel.nodes

@@ -19,12 +19,12 @@ Table = dict[str, "np.ndarray"]
 
 
 def length(table: Table) -> int:
-    """Return the number of rows."""
+    """Return the number of rows of a table."""
     return len(next(iter(table.values()))) if table else 0
 
 
 def take(table: Table, chosen: "np.ndarray") -> Table:
-    """Return the chosen rows."""
+    """Return the chosen rows of a table."""
     return {name: column[chosen] for name, column in table.items()}
 
 
@@ -41,21 +41,24 @@ def once(table: Table, key: "np.ndarray") -> Table:
 
 @dataclass
 class Parcel:
-    """State of tets and nodes, see the module. ``known`` and the names of all columns are equal on all ranks."""
+    """Parcel: state of tets and nodes in a message or a checkpoint. ``known`` and the names of all columns are equal
+    on all ranks.
+    """
 
     known: dict[str, Any] = field(default_factory=dict)
     """Numbers and small arrays that are equal on all ranks."""
     sums: dict[str, Ints] = field(default_factory=dict)
-    """Words whose sums over the ranks count."""
+    """Integers of this rank; only their sums over the ranks have a meaning."""
     nodes: Table = field(default_factory=dict)
-    """A row a node, with a column ``id`` (n,), ascending after routing. If there is a column ``family`` (n,), all
-    nodes of the families of a tet's corners go with the tet."""
+    """Table with a row for each node, and a column ``id`` (n,), ascending after routing. If there is a column
+    ``family`` (n,), a tet is sent with all nodes of the families of its corners."""
     tets: dict[int, Table] = field(default_factory=dict)
-    """By part, a row a tet: ``id`` (n,), ``corners`` (n, 4) global ids of nodes, and its state."""
+    """Tables by part, with a row for each tet: ``id`` (n,), ``corners`` (n, 4) global ids of nodes, and the state of
+    the tet."""
     rows: dict[str, Table] = field(default_factory=dict)
-    """Tables of other things. Their target is that of a tet, ``tet`` (k,), or the owner of a node, ``node`` (k,), or
-    the rank at a position, ``at`` (k, 3). Nodes ``with`` them (k, m), -1 for none, go along; rows of one ``key``
-    (k,) are copies of each other."""
+    """Tables of other data. A row is sent to the rank of a tet, ``tet`` (k,), to the owner of a node, ``node`` (k,),
+    or to the rank at a position, ``at`` (k, 3). The nodes in its column ``with`` (k, m), -1 for none, are sent with
+    it. Rows with equal ``key`` (k,) are copies of each other."""
 
     def packed(self) -> Ints:
         """Return the parcel as one flat message."""
@@ -67,12 +70,12 @@ class Parcel:
 
     @classmethod
     def unpacked(cls, words: Ints) -> "Parcel":
-        """Return the parcel of a message of ``packed``."""
+        """Return the parcel from a message made by ``packed``."""
         return cls(*pickle.loads(words[1:].view(np.uint8)[: int(words[0])].data))
 
     @classmethod
     def of(cls, parcels: Sequence["Parcel"]) -> "Parcel":
-        """Return the union of at least one parcel; nodes in several parcels are in it once."""
+        """Return the union of at least one parcel. A node in several parcels is in the union once."""
         nodes = joined([p.nodes for p in parcels])
         parts = sorted({part for p in parcels for part in p.tets})
         names = sorted({name for p in parcels for name in p.rows})

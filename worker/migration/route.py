@@ -1,8 +1,9 @@
-"""Redistribution: a cut of all tets, parcels from rank to rank, and the holders and owners of nodes afterwards.
+"""Redistribution of the state: a cut of all tets, parcels from rank to rank, and the holders and owners of nodes
+afterwards.
 
-A box of the cut goes to the rank that has most of its tets already. Tets take their nodes along. A distributed
-directory finds the ranks that share a node: the rank number id % ranks receives the holders of a node and sends each
-of them the others.
+A box of the cut goes to the rank that already has most of its tets. The nodes of a tet are sent with the tet. A
+distributed directory finds the ranks that share a node: the rank with the number id % ranks receives the holders of
+a node and sends to each of them the other holders.
 """
 
 from dataclasses import dataclass
@@ -18,21 +19,21 @@ from ..parallel.ownership import Neighbour
 from .parcel import Parcel, Table, joined, length, once, take
 
 _NO_TET = np.iinfo(np.int64).max
-"""Stands for the smallest tet of a rank that has no tet at a node."""
+"""Id of the smallest tet at a node on a rank that has no tet at this node."""
 
 
 @dataclass
 class Directory:
-    """This rank's share of the directory of all nodes: those with id % ranks equal to its number."""
+    """This rank's share of the directory of all nodes: the nodes with id % ranks equal to the number of this rank."""
 
     comm: Comm
     id: Ints
-    """(n,) node ids, ascending."""
+    """(n,) ids of the nodes, ascending."""
     owner: Indices
-    """(n,) owner of each node: the rank of its tet of smallest id."""
+    """(n,) owner of each node: the rank that has the tet of smallest id at this node."""
 
     def owners(self, ids: Ints) -> Indices:
-        """Return (k,) the owners of any nodes. Collective."""
+        """Return (k,) the owners of nodes with these ids. Collective."""
         home = ids % self.comm.size
         asked = self.comm.swap({rank: ids[home == rank] for rank in range(self.comm.size)})
         answers = self.comm.swap({
@@ -52,16 +53,16 @@ class Arrived:
     owner: Indices
     """(nodes,) rank that owns each of the parcel's nodes."""
     border: Flags
-    """(nodes,) which nodes other ranks hold, too."""
+    """(nodes,) whether other ranks hold the node, too."""
     neighbours: list[Neighbour]
     moved: tuple[int, int]
-    """Numbers of tets and nodes that came from other ranks."""
+    """Numbers of tets and nodes that this rank received from other ranks."""
 
 
 def route(parcel: Parcel, scale: tuple[float, float, float], comm: Comm) -> Arrived:
-    """Cut all tets by their ``weight`` (n, 3), see Balance.weigh, and send all data to its target. Collective.
+    """Cut all tets by their ``weight`` (n, 3) (Balance.weigh), and send all data to its target rank.
 
-    ``scale`` multiplies positions before the cut.
+    Collective. ``scale`` multiplies positions before the cut.
     """
     places, cuts = _cut(parcel, np.array(scale), comm)
     home = _homes(places, comm)
@@ -83,8 +84,9 @@ def route(parcel: Parcel, scale: tuple[float, float, float], comm: Comm) -> Arri
 
 
 def _one_of_each(name: str, rows: Table) -> Table:
-    """Return the rows by ascending key, once each. Raises ConoidError if the copies of a row are not equal: the
-    answer would depend on the choice.
+    """Return the rows by ascending key, each key once.
+
+    Raises ConoidError if two rows with equal key differ: the answer would depend on the choice between them.
     """
     found = once(rows, rows["key"])
     at = np.searchsorted(found["key"], rows["key"])
@@ -108,7 +110,10 @@ def _cut(parcel: Parcel, scale: Floats, comm: Comm) -> tuple[dict[int, Indices],
 
 
 def _homes(places: dict[int, Indices], comm: Comm) -> Indices:
-    """Return (boxes,) the rank of each box: the one that has most of its tets, if it has no box yet. Collective."""
+    """Return (boxes,) the rank of each box: the rank that has most of the tets of the box, if this rank has no box yet.
+
+    Collective.
+    """
     here = np.bincount(np.concatenate([np.zeros(0, np.int32), *places.values()]), minlength=comm.size)
     held = np.array(comm.share(here))
     home, free = np.full(comm.size, -1, np.int32), np.ones(comm.size, bool)

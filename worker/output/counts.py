@@ -1,9 +1,9 @@
 """Counts of a run for its reports: sizes of the model and fragments, sent when they have changed.
 
-To find the fragments all ranks go through all their tets (docs/reference/snapshots.md, "Between two snapshots"). So
-it is done when a facet has broken or a tet was removed since the last time, and as often as a share of the wall time
-allows: in every report of a small model, every few seconds for a large one. Rank 0 decides, and its decision goes
-round with the loads.
+To find the fragments, all ranks read the state of all their tets (docs/reference/snapshots.md, "Between two
+snapshots"). Fragments are therefore searched only when a facet has broken or a tet was removed since the last
+search. A share of the wall time limits the number of searches: every report of a small model, every few seconds for
+a large model. Rank 0 decides, and its decision is sent with the loads.
 """
 
 import math
@@ -22,30 +22,35 @@ from ..simulation import Simulation
 from ..snapshots.table import by_size
 
 SHARE = 1.0 / 50.0
-"""Share of the wall time for finding fragments between frames. Chosen: a run of a minute takes a second longer."""
+"""Share of the wall time for finding fragments between frames. Chosen value: a run of a minute takes one second
+longer."""
 
 
 class Counter:
     """The counts of a run. Every method is collective except ``due``."""
 
     def __init__(self) -> None:
-        """No count is made yet."""
+        """Start without any count."""
         self._sent: tuple[object, ...] = ()
         self._found: tuple[int, int] = (-1, -1)
         """Numbers of broken facets and of tets when fragments were last found."""
         self._step = -1
-        """Step in which they were last found."""
+        """Step in which the fragments were last found."""
         self._again = -math.inf
-        """Wall time from which they may be found again, as time.monotonic(), s."""
+        """Wall time from which fragments may be found again, as time.monotonic(), s."""
         self._smallest, self._sizes = 0, list[int]()
 
     def due(self, sim: Simulation, now: float, *, ending: bool) -> bool:
-        """Return whether fragments are to be found; called on rank 0. ``ending``: this is the last report."""
+        """Return whether fragments are to be found. Called on rank 0.
+
+        ``ending``: whether this is the last report.
+        """
         return sim.record is not None and _state(sim) != self._found and (ending or now >= self._again)
 
     def find(self, sim: Simulation) -> None:
-        """Find the fragments and their sizes. The first time loads a kernel, so its duration is not used for the
-        interval.
+        """Find the fragments and their sizes.
+
+        The first search loads a kernel, so its duration does not count for the interval between two searches.
         """
         if sim.record is None:
             return
@@ -56,7 +61,9 @@ class Counter:
         self._again = ended if first else ended + (ended - began) / SHARE
 
     def changed(self, sim: Simulation, cuts: int) -> dict[str, Any] | None:
-        """Return the fields of a message (messages.Counts) if they have changed; ``cuts``: number of cuts so far."""
+        """Return the fields of a message (messages.Counts) if the counts have changed; ``cuts``: number of cuts so
+        far.
+        """
         model, record = sim.model, sim.record
         fragments = record.count if record is not None and record.count else len(set(bodies(sim.case)))
         now = model.elements_global, model.nodes_global, cuts, fragments, self._found
@@ -92,7 +99,9 @@ def sizes(model: Model, labels: list[Ints], comm: Comm) -> tuple[int, list[int]]
 
 
 def _extents(pieces: list[tuple[Ints, Floats]]) -> Floats:
-    """Return (g,) the longest side of the bounding box of each fragment, m, from its pieces on all ranks."""
+    """Return (g,) the longest side of the bounding box of each fragment, m. A fragment may have pieces on several
+    ranks.
+    """
     label, of = np.unique(np.concatenate([labels for labels, _ in pieces]), return_inverse=True)
     whole = np.full((len(label), 6), -np.inf)
     np.maximum.at(whole, of, np.concatenate([reach for _, reach in pieces]))
@@ -101,7 +110,8 @@ def _extents(pieces: list[tuple[Ints, Floats]]) -> Floats:
 
 @njit("void(float64[:, ::1], int32[::1], int32[::1], uint32[:, ::1], float64[:, ::1])", cache=True)
 def _reach(reach, last, of, tets, x):  # type: ignore[no-untyped-def]
-    """Raise ``reach`` (g, 6), upper corners and negative lower corners, to the nodes of tets of group ``of`` (n,);
+    """Raise ``reach`` (g, 6), upper corners and negative lower corners, to the nodes of tets of group ``of`` (n,).
+
     ``last`` (nodes,): the group for which each node was last used.
     """
     for tet in range(len(tets)):

@@ -1,7 +1,8 @@
 """Damage of tets for frames: 0 intact, 1 failed.
 
-It is the largest of three values: the damage of its law; the spent share of the fracture energy of its most damaged
-cohesive facet (1 for a facet that has failed); its plastic strain over that at which it erodes.
+Damage is the largest of three values: the damage of the material law; the dissipated share of the fracture energy in
+the most damaged cohesive facet of the tet (1 for a facet that has failed); the plastic strain of the tet divided by
+its erosion strain.
 """
 
 import numpy as np
@@ -36,8 +37,8 @@ def spent_energy(f: Facets) -> Floats:
     """Return (m,) the share of the fracture energy that each facet has dissipated: 1 - (remaining area below the law) /
     energy.
 
-    The remaining area of a pair is strength share^2 critical / 2, with the remaining ``share`` of the traction
-    (fracture/cohesive.py); a facet has three pairs.
+    The remaining area of a pair of nodes is strength share^2 critical / 2, with the remaining ``share`` of the
+    traction (fracture/cohesive.py). A facet has three pairs of nodes.
     """
     law, beyond = f.softening, np.maximum(f.state.top - f.softening.knee, 0.0)
     fallen = np.divide(beyond, law.critical, out=(beyond > 0.0).astype(float), where=law.critical > 0.0)
@@ -46,7 +47,9 @@ def spent_energy(f: Facets) -> Floats:
 
 
 def _facets(cohesion: Cohesion, comm: Comm) -> tuple[Ints, Floats]:
-    """Return the tets on either side (m, 2) of the cohesive facets of all ranks, and their spent shares (m,).
+    """Return the tets on either side (m, 2) of the cohesive facets of all ranks, and the dissipated shares (m,) of
+    these facets.
+
     Collective.
     """
     shares = comm.share((cohesion.facets.tets, spent_energy(cohesion.facets)))

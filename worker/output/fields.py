@@ -1,7 +1,7 @@
 """Fields of frames that a case requests (``run.fields``): density, strain, strain rate, contact pressure.
 
-They are computed from positions and velocities, and the contact pressure from the impulses of contact since the
-frame before. Each value depends on its tet or node only, not on ranks or on the order of tets.
+The first three fields are computed from positions and velocities. The contact pressure is computed from the impulses
+of contact since the frame before. Each value depends on its tet or node only, not on ranks or on the order of tets.
 """
 
 from typing import NamedTuple
@@ -13,28 +13,28 @@ from ..model.rows import MASS
 from ..model.state import Block, Floats, Ints, Nodes
 
 _ORDER = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))
-"""Indices of the components in VTK's order."""
+"""Indices of the tensor components in VTK's order."""
 
 
 _FACING = 0.5
-"""Smallest cosine of the angle between an impulse and the inward normal of a face on which it acts. Chosen: above it
-are impulses with friction up to a coefficient of 1.7 on a flat face, below it the sides of an edge of 90 degrees up
-to 0.6."""
+"""Smallest cosine of the angle between an impulse and the inward normal of a face on which the impulse acts. The
+value was chosen between two cases: impulses with friction up to a coefficient of 1.7 on a flat face have a larger
+cosine, and the sides of an edge of 90 degrees have a smaller cosine up to a coefficient of 0.6."""
 
 
 class Wanted(NamedTuple):
     """Requested fields of a frame, and their data."""
 
     names: tuple[str, ...] = ()
-    """Names of ``cases.schema.FrameField``."""
+    """Names of the fields (``cases.schema.FrameField``)."""
     impulses: Floats | None = None
     """(nodes, 3) impulses of contact and walls on each node since the frame before, N s."""
     passed: float = 0.0
-    """Time since the frame before, s; 0 for the first one."""
+    """Time since the frame before, s; 0 for the first frame."""
 
 
 def of_tets(names: tuple[str, ...], block: Block, nodes: Nodes) -> dict[str, Floats]:
-    """Return the fields of the tets of a block."""
+    """Return the requested fields of the tets of a block."""
     found: dict[str, Floats] = {}
     edges = _edges(nodes.x, block)
     if "density" in names:
@@ -60,7 +60,7 @@ def logarithmic(F: Floats) -> Floats:
 
 
 def effective(strain: Floats) -> Floats:
-    """Return (n,) sqrt(2/3 e' : e') of the deviators e' of strains or their rates (n, 3, 3)."""
+    """Return (n,) sqrt(2/3 e' : e') of the deviators e' of strains or of strain rates (n, 3, 3)."""
     mean = (strain[:, 0, 0] + strain[:, 1, 1] + strain[:, 2, 2]) / 3.0
     deviator = strain - mean[:, None, None] * np.eye(3)
     return np.asarray(np.sqrt(2.0 / 3.0 * (deviator * deviator).sum(axis=(1, 2))))
@@ -70,9 +70,9 @@ def contact_pressure(x: Floats, tets: Ints, impulses: Floats, passed: float) -> 
     """Return (nodes,) the mean contact pressure on the nodes of the surface, Pa; 0 inside of bodies and on nodes
     without a loaded face.
 
-    It is the component of the ``impulses`` (nodes, 3), N s, along the normal of the loaded area of a node, over that
-    area and the time ``passed``, s. The loaded area is a third of each face whose inward normal is within 60 degrees
-    of the impulse, so that the sides of an edge do not count.
+    The pressure is the component of the ``impulses`` (nodes, 3), N s, along the normal of the loaded area of a node,
+    divided by this area and the time ``passed``, s. The loaded area is a third of each face whose inward normal is
+    within 60 degrees of the impulse. The side faces of an edge are therefore omitted.
     """
     faces, share = boundary_faces(tets.astype(np.int32)), np.zeros((len(x), 3))
     outward = normals(x, faces) / 6.0
@@ -99,7 +99,7 @@ def _determinant(rows: Floats) -> Floats:
 
 
 def _inverse_transposed(rows: Floats) -> Floats:
-    """Return (n, 3, 3) transposed inverses, by cofactors."""
+    """Return (n, 3, 3) transposed inverses of matrices, by cofactors."""
     a, b, c = rows[:, 0], rows[:, 1], rows[:, 2]
     cofactors = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=1)
     return np.asarray(cofactors / _determinant(rows)[:, None, None])

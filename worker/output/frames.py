@@ -1,4 +1,4 @@
-"""Frames: one VTKHDF file each (version 2.3, UnstructuredGrid), readable during the run.
+"""Frames: one VTKHDF file per frame (version 2.3, UnstructuredGrid), readable during the run.
 
 A file is written under another name, flushed to disk and renamed: a visible file is complete.
 """
@@ -35,10 +35,11 @@ UNITS = {
     "temperature": "K", "plastic_strain": "1", "damage": "1", "density": "kg/m^3", "strain": "1",
     "effective_strain": "1", "strain_rate": "1/s", "contact_pressure": "Pa",
 }  # fmt: skip
-"""Unit of each field, an attribute ``unit`` of its data set; names and numbers have none."""
+"""Unit of each field, the attribute ``unit`` of its data set. Names and numbers have no unit."""
 _NOTHING = fields.Wanted()
 _ORDER = [0, 1, 2, 5, 3, 4]
-"""Indices of the components in VTK's order, xx, yy, zz, xy, yz, zx, among those of the state (CONVENTIONS.md)."""
+"""Indices of the components in VTK's order, xx, yy, zz, xy, yz, zx, among the components of the state
+(CONVENTIONS.md)."""
 
 
 def principal(stress: Floats) -> Floats:
@@ -94,8 +95,8 @@ def _share(
 def _by_block(
     model: Model, labels: list[Ints] | None, damage: list[Floats] | None
 ) -> Iterator[tuple[Block, Ints, Floats]]:  # fmt: skip
-    """Yield each block with the fragments and the damage of its tets; an empty block on a rank without tets, so that
-    every rank has all columns.
+    """Yield each block with the fragments and the damage of its tets. A rank without tets yields an empty block, so
+    that every rank has all columns.
     """
     none: tuple[Ints, Floats] = np.zeros(0, np.int64), np.zeros(0)
     if not model.blocks:
@@ -111,8 +112,8 @@ def write(
 ) -> str | None:  # fmt: skip
     """Write frame ``index``; return its path relative to the run's folder on rank 0, None on the others. Collective.
 
-    ``labels``: for each block the fragment of each tet, or None; ``damage``: its damage, or None; ``wanted``:
-    further fields.
+    ``labels``: for each block the fragment of each tet, or None; ``damage``: for each block the damage of each tet,
+    or None; ``wanted``: further fields.
     """
     pieces = comm.gather(_share(model, comm.rank, labels, damage, wanted))
     if pieces is None:

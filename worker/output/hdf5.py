@@ -1,9 +1,8 @@
 """HDF5 files that are safe on a full disk.
 
-After a failed write HDF5 continues with the data that it could not write: it fails again at each object that is
-freed, which Python can only print, and
-ends in a segmentation fault; or a file opens as complete although a part is missing. So failures are recorded here and
-not passed to HDF5.
+After a failed write HDF5 continues with the data that it could not write. HDF5 then fails again at each object that
+is freed, which Python can only print, and ends in a segmentation fault. In other cases a file opens as complete
+although a part is missing. Therefore this module records the failures and does not pass them to HDF5.
 """
 
 import errno
@@ -19,8 +18,10 @@ import h5py
 
 @contextmanager
 def created(path: Path) -> Iterator["h5py.File"]:
-    """Open a new HDF5 file and flush it to disk at the end. Raises OSError with the name of the file if it is
-    incomplete: the first failure of the disk, whatever HDF5 did after it.
+    """Open a new HDF5 file and flush it to disk at the end.
+
+    Raises OSError with the name of the file if the file is incomplete. The error is the first failure of the disk,
+    whatever HDF5 did after it.
     """
     with open(path, "w+b", buffering=0, opener=_at_once) as raw:
         disk = _Disk(raw)
@@ -34,8 +35,10 @@ def created(path: Path) -> Iterator["h5py.File"]:
 
 
 def _at_once(path: str, flags: int) -> int:
-    """Open a file without waiting. Raises OSError for a path that is not a regular file: a pipe would block the
-    rank, a device would not keep the data.
+    """Open a file without waiting.
+
+    Raises OSError for a path that is not a regular file: a pipe would block the rank, and a device would not keep
+    the data.
     """
     handle = os.open(path, flags | os.O_NONBLOCK, 0o666)
     if not stat.S_ISREG(os.fstat(handle).st_mode):
@@ -45,12 +48,12 @@ def _at_once(path: str, flags: int) -> int:
 
 
 class _Disk:
-    """A file object for HDF5. After a failure it discards what is written, and reports success."""
+    """A file object for HDF5. After a failure it discards the written data, and reports success."""
 
     def __init__(self, raw: Any) -> None:
         self._raw = raw
         self.failure: OSError | None = None
-        """The first failure."""
+        """The first failure of the disk; None without a failure."""
 
     def write(self, data: Any) -> int:
         """Write all data, or discard it after a failure; return its size."""
@@ -64,7 +67,7 @@ class _Disk:
         return size
 
     def readinto(self, room: Any) -> int:
-        """Read into ``room``; zeros where nothing was written."""
+        """Read into ``room``; zeros where the file has no data."""
         left = memoryview(room).cast("B")
         size = len(left)
         while left and (found := self._raw.readinto(left)):

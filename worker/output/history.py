@@ -1,5 +1,5 @@
-"""history.csv: one line a sample with clock, ledger, momenta, parts and probes; at the end the same as
-history.parquet, if pyarrow is installed.
+"""history.csv: one line per sample with clock, ledger, momenta, parts and probes. At the end of the run
+history.parquet gets the same data, if pyarrow is installed.
 """
 
 import csv
@@ -16,7 +16,7 @@ from . import storage
 
 
 class History:
-    """Appends lines to the file and flushes each."""
+    """Appends lines to the file and flushes each line."""
 
     def __init__(self, folder: Path, further: Mapping[str, str]) -> None:
         """``further``: names of the columns of parts and probes, with their units. A file of an earlier attempt
@@ -32,8 +32,10 @@ class History:
             self._writer.writerow(head)
 
     def write(self, step: int, t: float, dt: float, limiter: str, energy: Energy, extra: list[float]) -> None:
-        """Write one line; ``extra``: momenta, parts and probes. Numbers are written so that they are read back to
-        the same bits. Raises OSError, also if the file was removed.
+        """Write one line; ``extra``: momenta, parts and probes.
+
+        Numbers are written so that reading them back gives the same bits. Raises OSError, also if the file was
+        removed.
         """
         storage.require(self._file, self._path)
         values = [*msgspec.structs.astuple(energy), *extra]

@@ -1,4 +1,6 @@
-"""journal.jsonl, the complete record of a run: every message is numbered, written and flushed before it is sent on."""
+"""journal.jsonl, the complete record of a run. Every message is numbered, written and flushed before it is sent to
+readers.
+"""
 
 import contextlib
 import time
@@ -17,7 +19,7 @@ from . import storage
 
 M = TypeVar("M", bound=messages.Message)
 _MOST = 1 << 40
-"""Largest size of a journal that is read, bytes: practically unlimited."""
+"""Largest size of a journal that is read, bytes. It is practically unlimited."""
 
 
 class _Head(msgspec.Struct):
@@ -38,7 +40,7 @@ class Listener(Protocol):
 
 
 class Journal:
-    """Appends to the journal of a run folder, with numbers that continue those in it."""
+    """Appends to the journal of a run folder. The numbers of the messages continue the numbers in the journal."""
 
     def __init__(self, folder: Path, run: str, listener: Listener | None = None) -> None:
         self._path = path = folder / layout.JOURNAL
@@ -46,7 +48,7 @@ class Journal:
         self.frames: set[int] = set()
         """Indices of the frames in the journal."""
         self.snapshots = 0
-        """Number of the next snapshot, after those in the journal."""
+        """Number of the next snapshot. It continues the numbers of the snapshots in the journal."""
         self._file = whole.appended(path)
         self._seq, content = 0, whole.read(path, _MOST)
         for line in content.splitlines():
@@ -61,8 +63,9 @@ class Journal:
         self._listener = listener
 
     def write(self, kind: type[M], step: int = 0, t: float = 0.0, blob: bytes = b"", **fields: Any) -> M:
-        """Write one message and send it on, with the ``blob`` of a snapshot. Raises OSError, also if the file was
-        removed: the message would be lost.
+        """Write one message and send it to readers, with the ``blob`` of a snapshot.
+
+        Raises OSError, also if the file was removed: the message would be lost.
         """
         storage.require(self._file, self._path)
         self._seq += 1
@@ -84,7 +87,7 @@ class Journal:
 
 
 def _number(line: bytes) -> int:
-    """Return the number of a message, also of another version; 0 for a line that is no message."""
+    """Return the number of a message, also of a message of another version; 0 for a line that is no message."""
     try:
         return _head.decode(line).seq
     except (msgspec.DecodeError, UnicodeDecodeError):

@@ -1,4 +1,4 @@
-"""Output files of a run that are removed while it goes on: each gives a warning, and the run continues."""
+"""Output files that are removed during a run. Each removed file gives a warning, and the run continues."""
 
 from pathlib import Path
 

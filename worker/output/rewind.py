@@ -1,4 +1,4 @@
-"""Removal of output after the step of a checkpoint: a resumed run writes the same output again."""
+"""Removal of output after the step of a checkpoint. A resumed run writes this output again."""
 
 import csv
 import os
@@ -8,8 +8,10 @@ from conoid.cases.output import fragments, layout
 
 
 def rewind(folder: Path, step: int, frame: int) -> None:
-    """Remove lines of the history from ``step`` on and of the genealogy from ``frame`` on, in a run's folder; all
-    lines at step 0.
+    """Remove lines from the history and the genealogy in a run's folder.
+
+    Removed are lines of the history from ``step`` on and lines of the genealogy from ``frame`` on; all lines at step
+    0.
     """
     _keep_below(folder / layout.HISTORY, step)
     _keep_below(fragments.genealogy(folder), frame)
@@ -18,7 +20,7 @@ def rewind(folder: Path, step: int, frame: int) -> None:
 
 
 def _keep_below(path: Path, limit: int) -> None:
-    """Keep the head of a table and its complete lines whose first column is below ``limit``."""
+    """Keep the header of a table and its complete lines with a first column below ``limit``."""
     if not path.exists():
         return
     if limit == 0:

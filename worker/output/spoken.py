@@ -1,4 +1,4 @@
-"""Standard output of a worker that runs without a server: start, a line each percent, warnings, end."""
+"""Standard output of a worker that runs without a server: the start, a line for each percent, warnings, and the end."""
 
 import contextlib
 import sys
@@ -15,7 +15,7 @@ class Speaker:
     """Prints the messages of a run's journal on rank 0."""
 
     def __init__(self, folder: Path) -> None:
-        """``folder``: of the run."""
+        """``folder``: folder of the run."""
         self._folder = folder
         self._percent = -1
         self._warned = set[str]()

@@ -23,7 +23,9 @@ def require(file: IO[Any], path: Path) -> None:
 
 
 def failed(error: BaseException) -> bool:
-    """Return whether the cause of ``error`` is a disk, also if HDF5 gives the error number in its text."""
+    """Return whether the cause of ``error`` is a disk, also if the error number is only in the text of an HDF5
+    error.
+    """
     if isinstance(error, OSError) and error.errno in _STORAGE:
         return True
     if any(f"errno = {number}," in str(error) for number in _STORAGE):

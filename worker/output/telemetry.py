@@ -1,10 +1,9 @@
 """Messages on Zenoh, sent by a thread with a bounded queue: the solver never waits for the network.
 
-A snapshot is sent with its bytes; if several wait, the older ones are sent without, and readers fetch them over HTTP.
-
-``put`` reports no loss and may block, so it runs in the thread; when the queue is full the oldest message is
-dropped, and a reader that finds a gap in ``seq`` reads the journal. Without a router the thread tries to connect at
-intervals; the run is not affected.
+A snapshot is sent with its bytes. If several snapshots wait, the older ones are sent without their bytes, and
+readers fetch the bytes over HTTP. ``put`` reports no loss and may block, so it is called in the thread. When the
+queue is full, the oldest message is dropped. A reader that finds a gap in ``seq`` reads the journal. Without a
+router the thread tries to connect at intervals; the run is not affected.
 """
 
 import json
@@ -19,19 +18,22 @@ from conoid.cases import messages
 from conoid.cases.output import keys
 
 _RING = 1024
-"""Messages that wait for the network. Chosen: more than a minute of a run, which sends some ten a second."""
+"""Largest number of messages that wait for the network. Chosen value: more than a minute of a run, which sends some
+ten messages a second."""
 _BLOBS = 2
-"""Snapshots that wait for the network with their bytes, a megabyte each. Chosen: one that is sent, and the newest."""
+"""Largest number of snapshots that wait for the network with their bytes, a megabyte each. Chosen value: the
+snapshot that is being sent, and the newest one."""
 _RETRY = 2.0
-"""s between two attempts to reach a router. Chosen."""
+"""Interval between two attempts to reach a router, s. Chosen value."""
 _LINGER = 1.0
-"""s for sending the last messages at the end. Chosen: the journal has them."""
+"""Time for sending the last messages at the end, s. Chosen value: messages that are not sent are still in the
+journal."""
 
 log = logging.getLogger("conoid.worker")
 
 
 class Telemetry:
-    """Publishes messages."""
+    """Publishes messages on Zenoh."""
 
     def __init__(self, endpoint: str, prefix: str) -> None:
         self._endpoint = endpoint
@@ -45,7 +47,7 @@ class Telemetry:
         self._thread.start()
 
     def tell(self, message: messages.AnyMessage, blob: bytes = b"") -> None:
-        """Queue a message, a snapshot with its bytes; never waits for the network."""
+        """Queue a message; a snapshot is queued with its bytes. The call never waits for the network."""
         whole = isinstance(message, messages.Snapshot) and blob
         with self._wake:
             if len(self._ring) == _RING:

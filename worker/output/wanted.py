@@ -1,4 +1,4 @@
-"""Data of the further fields that a case requests for frames."""
+"""Data of the additional fields that a case requests for frames."""
 
 import numpy as np
 

@@ -1,1 +1,3 @@
-"""Snapshots of the fragments: what ranks give away between two steps, and what a process of its own makes of it."""
+"""Snapshots of the fragments: copies that the ranks make between two steps, and a separate process that makes
+snapshots from the copies.
+"""

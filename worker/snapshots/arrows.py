@@ -1,4 +1,4 @@
-"""Arrows of velocity in a snapshot: at a few triangles that are spread evenly over the outline."""
+"""Arrows of velocity in a snapshot. The arrows are at a few triangles that are spread evenly over the outline."""
 
 import numpy as np
 
@@ -6,17 +6,18 @@ from ..model.state import Floats, Ints
 from .outline import Outline
 
 _MOST = 1000
-"""Largest number of arrows. Chosen: more would hide the body."""
+"""Largest number of arrows in a snapshot. Chosen value: more arrows would hide the body."""
 MOST_BYTES = _MOST * (4 + 3 * 4)
 _LEVELS = 6
-"""Grids of cells that are tried, from 2^6 cells along the longest side down to one."""
+"""Level of the finest grid that is tried: it has 2^6 cells along the longest side. The coarsest grid has one cell."""
 
 
 def chosen(drawn: Outline, velocity: Floats) -> dict[str, "np.ndarray"]:
     """Return the arrays of a snapshot: triangles with an arrow, and their velocities; ``velocity`` (m, 3): of each
     triangle, m/s.
 
-    They are the first triangles in the cells of the finest grid with at most ``_MOST`` occupied cells.
+    The arrows are at the first triangle in each cell of a grid. The grid is the finest one with at most ``_MOST``
+    occupied cells.
     """
     rows = np.zeros(0, np.int64)
     if len(drawn.tet):

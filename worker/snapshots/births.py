@@ -1,4 +1,4 @@
-"""Times at which fragments were formed, from the genealogy that the frames of a run record."""
+"""Times at which fragments were formed, read from the genealogy. The frames of a run record the genealogy."""
 
 from pathlib import Path
 
@@ -10,18 +10,20 @@ from ..model.state import Floats, Ints
 
 
 class Births:
-    """Reads the genealogy of a run as it grows."""
+    """Reads the genealogy of a run while the run writes it."""
 
     def __init__(self, folder: Path, end: float, frames: int) -> None:
-        """``folder``: of the run; ``frames``: their number up to the time ``end``, s."""
+        """``folder``: folder of the run; ``frames``: number of frames up to the time ``end``, s."""
         self._folder, self._end, self._frames = folder, end, frames
         self._known: dict[int, float] = {}
         self._read = 0
 
     def at(self, t: float, numbers: Ints, initial: int, *, kept: bool = True) -> Floats:
-        """Return (g,) the times, s, at which fragments ``numbers`` were formed: the first frame up to time ``t``
-        that has them, or ``t``; 0 for the ``initial`` ones. NaN for the others if no record of fragments is
-        ``kept``.
+        """Return (g,) the times, s, at which fragments ``numbers`` were formed.
+
+        The time is that of the first frame up to time ``t`` with this fragment, or ``t`` if there is no such frame;
+        0 for the ``initial`` fragments. Without a record of fragments (``kept``) the time of the other fragments is
+        NaN.
         """
         if not kept:
             return np.where(numbers < initial, 0.0, np.nan)
@@ -44,5 +46,5 @@ class Births:
                 self._known.setdefault(int(child), self._time(int(frame)))
 
     def _time(self, frame: int) -> float:
-        """Return the time of a frame, as Clock.frame_time."""
+        """Return the time of a frame, equal to Clock.frame_time."""
         return self._end * (frame / self._frames) if frame < self._frames else self._end

@@ -1,5 +1,5 @@
-"""Conversion of a whole model into the bytes of a snapshot (cases/output/snapshot.py), and of all its tets into
-theirs.
+"""Conversion of a whole model into the bytes of a snapshot (cases/output/snapshot.py), and of all its tets into the
+bytes for sections.
 """
 
 from collections.abc import Callable
@@ -20,9 +20,9 @@ from .outline import Outline
 from .share import Whole
 
 _VERTEX, _TRIANGLE = 6 + 4, 12 + 2 + 1
-"""Bytes of a vertex, and of a triangle without its fields."""
+"""Number of bytes of a vertex, and number of bytes of a triangle without its fields."""
 _HEADER = 200
-"""Largest number of bytes of an array in the header and in padding."""
+"""Largest number of bytes that an array takes in the header and in padding."""
 UNITS = {
     "speed": "m/s", "broken_faces": "", "plastic_strain": "", "temperature": "K", "damage": "", "mises": "Pa",
     "pressure": "Pa", "principal_stress": "Pa",
@@ -31,12 +31,12 @@ UNITS = {
 
 
 _PERCENTILES = 0.0, 0.5, 99.5, 100.0
-"""Percentiles of the values of a field. Chosen: 0.5 % at each end are extremes."""
+"""Percentiles of the values of a field. Chosen values: 0.5 % of the values at each end count as extremes."""
 
 
 @dataclass(frozen=True)
 class Budget:
-    """Limits of a snapshot: triangles, and bytes."""
+    """Limits of a snapshot: number of triangles, and number of bytes."""
 
     triangles: int = 50_000
     bytes: int = 1_000_000
@@ -44,22 +44,22 @@ class Budget:
 
 @dataclass(frozen=True)
 class Made:
-    """A snapshot, and further fields of its journal line."""
+    """A snapshot, and the further fields of its line in the journal."""
 
     data: bytes
     tets: bytes
-    """All tets for sections, packed; empty if there are none, or more than ``volume.MOST_TETS``."""
+    """All tets for sections, packed; empty if there are no tets or more than ``volume.MOST_TETS``."""
     triangles: int
     fragments: int
     smallest: int
-    """First size, see ``table.by_size``."""
+    """First size of the histogram of fragments (``table.by_size``)."""
     sizes: list[int]
     fields: dict[str, list[float]]
-    """Of each field the smallest value, the 0.5 and the 99.5 percentile, and the largest value."""
+    """Statistics of each field: smallest value, 0.5 and 99.5 percentile, and largest value."""
 
 
 Births = Callable[[Ints], Floats]
-"""Callback that returns (g,) times of birth, s, of fragments with these numbers."""
+"""Callback that returns (g,) times of birth, s, of the fragments with these numbers."""
 
 
 def made(whole: Whole, told: dict[str, Any], births: Births, budget: Budget) -> Made:
@@ -94,8 +94,9 @@ def made(whole: Whole, told: dict[str, Any], births: Births, budget: Budget) -> 
 def _numbers(whole: Whole, labels: Ints) -> Ints:
     """Return (tets,) the number of the fragment of each tet.
 
-    If only erosion separates bodies there is no record of fragments: the largest piece of each part has the number
-    of the part, and every other piece that of its first tet, above those of the parts.
+    If bodies are separated by erosion only, there is no record of fragments. In that case the largest piece of each
+    part has the number of the part. Every other piece has the number of its first tet, counted above the numbers of
+    the parts.
     """
     if whole.initial:
         return numbered(whole.numbers, labels, whole.next, SerialComm())[0]
@@ -109,8 +110,9 @@ def _numbers(whole: Whole, labels: Ints) -> Ints:
 
 
 def _tets(whole: Whole, header: Header, corners: Ints, values: dict[str, Floats], row: Ints) -> bytes:
-    """Return all tets, packed; ``corners`` (tets, 4): indices of their nodes; ``row`` (tets,): of the fragment of
-    each.
+    """Return all tets, packed.
+
+    ``corners`` (tets, 4): indices of their nodes; ``row`` (tets,): row of the fragment of each tet.
     """
     places = _in_box(whole.model.nodes.x, header.box)
     nodes, over, order = volume.ordered(places, corners)
@@ -137,13 +139,13 @@ def _levels(of: dict[str, Floats]) -> tuple[dict[str, Field], dict[str, "np.ndar
 
 
 def _ranges(of: dict[str, Floats]) -> dict[str, list[float]]:
-    """Return ``Made.fields``."""
+    """Return the statistics ``Made.fields``."""
     known = {name: values[np.isfinite(values)] for name, values in of.items()}
     return {name: np.percentile(values, _PERCENTILES).tolist() for name, values in known.items() if len(values)}
 
 
 def _drawn(whole: Whole, drawn: Outline, row: Ints, box: Any) -> dict[str, "np.ndarray"]:
-    """Return the arrays of vertices and triangles without the fields; ``row`` (g,): of each fragment."""
+    """Return the arrays of vertices and triangles, without the fields; ``row`` (g,): row of each fragment."""
     return {
         "positions": _in_box(drawn.points, box), "triangles": drawn.triangles.astype(np.uint32),
         "vertex_fragment": row[drawn.fragment].astype(np.uint32), "triangle_rank": whole.rank[drawn.tet],
@@ -152,7 +154,7 @@ def _drawn(whole: Whole, drawn: Outline, row: Ints, box: Any) -> dict[str, "np.n
 
 
 def _fields(whole: Whole) -> dict[str, Floats]:
-    """Return (tets,) each field except the speed."""
+    """Return (tets,) for each field except the speed."""
     values = dict(whole.rows)
     if any(len(block.bond) for block in whole.model.blocks):
         shares = [(b.bond > 0).mean(axis=1) if len(b.bond) else np.zeros(b.n) for b in whole.model.blocks]
@@ -190,7 +192,7 @@ def _in_box(points: Floats, box: Any) -> "np.ndarray":
 
 
 def _in_bits(values: Floats) -> tuple[float, float, "np.ndarray"]:
-    """Return the lowest and highest of values (m,), and uint8 levels between them."""
+    """Return the lowest and the highest of values (m,), and uint8 levels between these two."""
     low, high = float(values.min(initial=np.inf)), float(values.max(initial=-np.inf))
     if not low < high:
         return (low, low, np.zeros(len(values), np.uint8)) if len(values) else (0.0, 0.0, np.zeros(0, np.uint8))

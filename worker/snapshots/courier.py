@@ -1,4 +1,6 @@
-"""Side thread of a rank: writes its shares to disk, and on rank 0 has the packer make snapshots of them."""
+"""Side thread of a rank. It writes the shares of the rank to disk. On rank 0 it also sends tasks to the packer,
+which makes snapshots from the shares.
+"""
 
 import contextlib
 import json
@@ -20,14 +22,15 @@ from . import share
 from .share import Share
 
 _FAREWELL = 30.0
-"""s for the last snapshots after the last step. Chosen: a hundred times what one of 150,000 tets takes."""
+"""Time for the last snapshots after the last step, s. Chosen value: a hundred times the duration of one snapshot of
+150,000 tets."""
 _SECRETS = ("CONOID_ZENOH_USER", "CONOID_ZENOH_PASSWORD")
 
 log = logging.getLogger("conoid.worker")
 
 
 class Courier:
-    """Queue and thread for the shares of a rank; the solver never waits for it."""
+    """Queue and thread for the shares of a rank. The solver never waits for the thread."""
 
     def __init__(self, folder: Path, rank: int) -> None:
         self._folder, self._rank = folder, rank
@@ -35,8 +38,7 @@ class Courier:
         self._packer: subprocess.Popen[str] | None = None
         self._thread: threading.Thread | None = None
         self.answers: deque[tuple[dict[str, Any], bytes]] = deque()
-        """On rank 0: for each task the answer with the fields of the task, and the snapshot; or the answer with an
-        ``error``."""
+        """Answers on rank 0, one for each task: the fields of the task with the snapshot, or an ``error``."""
         self.under_way = 0
         """Number of tasks without an answer."""
 
@@ -72,13 +74,14 @@ class Courier:
     def _work(self) -> None:
         """Work on the tasks of the queue.
 
-        Launchers send the requests to stop to all processes of a rank, and the packer must make the last snapshot:
-        it inherits the blocked signals of this thread from its start, and ends with its standard input.
+        Launchers send the requests to stop to all processes of a rank, and the packer must make the last snapshot.
+        Therefore the packer inherits the blocked signals of this thread from its start, and ends with its standard
+        input.
         """
         signal.pthread_sigmask(signal.SIG_BLOCK, REQUESTS)
         while (task := self._tasks.get()) is not None:
             try:
-                (self._folder / layout.SNAPSHOTS).mkdir(exist_ok=True)  # somebody may have removed it
+                (self._folder / layout.SNAPSHOTS).mkdir(exist_ok=True)  # the folder may have been removed
                 share.write(layout.share(self._folder, task[0]["n"], self._rank), task[1])
                 if self._rank == 0:
                     self._ask(task[0])

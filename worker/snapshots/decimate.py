@@ -1,8 +1,9 @@
 """Decimation of the outline: vertices in one cell of a grid are merged (Rossignac and Borrel 1993).
 
 Each fragment has cells of its own size, at most half its extent, so that a small fragment keeps a shape while a
-large one becomes coarser; fragments with few triangles are unchanged. If there are more fragments than triangles for
-them, the smallest are omitted. All decisions depend on the whole model only, not on the number of ranks.
+large one becomes coarser. Fragments with few triangles are unchanged. If there are more fragments than the budget of
+triangles allows, the smallest fragments are omitted. All decisions depend on the whole model only, not on the number
+of ranks.
 """
 
 from collections.abc import Callable
@@ -14,20 +15,21 @@ from ..model.state import Floats, Ints
 from .outline import Outline
 
 _FINENESS = 2.0**0.25
-"""Ratio of successive cell sizes. Chosen: at most a third of the budget is unused."""
+"""Ratio of successive cell sizes. Chosen value: at most a third of the budget of triangles is unused."""
 _LEAST = 8
-"""Smallest number of triangles in the budget for each fragment: those of two tets. Chosen."""
+"""Smallest number of triangles in the budget for each fragment. Chosen value: the number of triangles of two tets."""
 _SIMPLE = 8
-"""Number of triangles up to which a fragment is unchanged. Chosen."""
+"""Largest number of triangles of a fragment that stays unchanged. Chosen value."""
 _SIZES = 128
-"""Number of cell sizes, from the whole box down: the last is 2^-32 of it."""
+"""Number of cell sizes. They decrease from the whole box to 2^-32 of the box."""
 Fits = Callable[[Outline], bool]
 """Callback: whether an outline is within the budget."""
 
 
 def to_budget(outline: Outline, mass: Floats, most: int, fits: Fits) -> Outline:
-    """Return the finest outline within the budget. ``mass`` (fragments,): at most ``most`` / 8 fragments, the
-    heaviest, are drawn.
+    """Return the finest outline within the budget.
+
+    ``mass`` (fragments,): mass of each fragment. At most ``most`` / 8 fragments are drawn, the heaviest ones.
     """
     if fits(outline):
         return outline
@@ -59,14 +61,14 @@ def _fewest(outline: Outline, mass: Floats, fits: Fits) -> Outline:
 
 
 def _heaviest(mass: Floats, most: int) -> "np.ndarray":
-    """Return (fragments,) which are among the heaviest; of equal ones the first."""
+    """Return (fragments,) which fragments are among the heaviest. Of fragments of equal mass the first is chosen."""
     chosen = np.zeros(len(mass), bool)
     chosen[np.argsort(-mass, kind="stable")[:most]] = True
     return chosen
 
 
 def _extents(outline: Outline, fragments: int) -> Floats:
-    """Return (fragments,) the longest side of the bounding box of the vertices of each, m."""
+    """Return (fragments,) the longest side of the bounding box of the vertices of each fragment, m."""
     low, high = np.full((fragments, 3), np.inf), np.full((fragments, 3), -np.inf)
     np.minimum.at(low, outline.fragment, outline.points)
     np.maximum.at(high, outline.fragment, outline.points)

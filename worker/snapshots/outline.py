@@ -1,4 +1,4 @@
-"""Outline of fragments: the triangles of their surface that are visible, also when fragments are drawn apart."""
+"""Outline of fragments: the triangles of their surfaces that are visible, also when the fragments are drawn apart."""
 
 from dataclasses import dataclass
 
@@ -11,10 +11,10 @@ from ..model.state import WIDE, Block, Floats, Ints, Model
 
 @dataclass
 class Outline:
-    """Triangles; each vertex belongs to one fragment."""
+    """Triangles of the outline. Each vertex belongs to one fragment."""
 
     points: Floats
-    """(v, 3) m."""
+    """(v, 3) positions of the vertices, m."""
     fragment: Ints
     """(v,) number of the fragment of each vertex."""
     triangles: Ints
@@ -49,7 +49,10 @@ def find(model: Model, fragment: Ints) -> Outline:
 
 
 def _seen(block: Block, known: Ints, fragments: Ints, own: Ints) -> "np.ndarray":
-    """Return (n, 4) which faces of a block are part of the outline; ``fragments``: those of the ``known`` tets."""
+    """Return (n, 4) which faces of a block are part of the outline.
+
+    ``fragments``: fragments of the tets with ``known`` ids.
+    """
     if not len(block.across):
         return np.asarray(across(block.tets.astype(np.int32)) < 0)
     seen = block.across < 0

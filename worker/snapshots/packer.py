@@ -22,15 +22,16 @@ from . import blob, share
 from .births import Births
 
 _NICE, _LOWEST = 10, 19
-"""Decrease of the priority: ranks get nine times the share of a core. Chosen: the remainder is enough. And the
-lowest priority."""
+"""Decrease of the priority of this process, and the lowest priority. With the decrease of 10 a rank gets nine times
+the share of a core. Chosen value: the remaining share is sufficient."""
 _TETS = 256_000_000
-"""Approximate limit of the bytes of all tets of all snapshots of a run; early ones leave room for later ones.
-Chosen: a hundred times 150,000 tets in 2,900 fragments."""
+"""Approximate limit of the bytes of all tets in all snapshots of a run. Early snapshots leave room for later ones.
+Chosen value: a hundred snapshots of 150,000 tets in 2,900 fragments."""
 _PATIENCE = 60.0
-"""s for the share of a rank to appear. Chosen: many times what a slow disk takes."""
+"""Time within which the share of a rank must appear, s. Chosen value: many times the duration of writing on a slow
+disk."""
 _LOOK = 0.005
-"""s between two tests for a share. Chosen."""
+"""Interval between two tests for a share, s. Chosen value."""
 
 
 def main(folder: Path) -> None:
@@ -45,7 +46,7 @@ def main(folder: Path) -> None:
                     answer = _made(folder, task, births)
                 else:
                     answer = behind.submit(_made, folder, task, births).result()
-            except Exception as error:  # of one snapshot; the next may be made
+            except Exception as error:  # an error of one snapshot; the next one may be made
                 answer = {"error": f"{type(error).__name__}: {error}"}
             print(json.dumps({"n": task["n"], "cpu": time.process_time() - began, **answer}), flush=True)
 
@@ -80,7 +81,10 @@ def _made(folder: Path, task: dict[str, Any], births: Births) -> dict[str, Any]:
 
 
 def _with_tets(folder: Path, task: dict[str, Any], tets: bytes) -> int:
-    """Write the tets of a snapshot if there is room for them; return their bytes. Without them it has no sections."""
+    """Write the tets of a snapshot if the limit leaves room for them; return the number of bytes.
+
+    A snapshot without tets has no sections.
+    """
     if not tets or not _may_keep(folder, task, len(tets)):
         return 0
     try:
@@ -91,7 +95,7 @@ def _with_tets(folder: Path, task: dict[str, Any], tets: bytes) -> int:
 
 
 def _may_keep(folder: Path, task: dict[str, Any], size: int) -> bool:
-    """Return whether ``size`` bytes of tets leave room for those of later snapshots; True for the last one."""
+    """Return whether ``size`` bytes of tets leave room for the tets of later snapshots; True for the last snapshot."""
     if task["cause"] == "end":
         return True
     kept = sum(path.stat().st_size for path in (folder / layout.SNAPSHOTS).glob(f"*{layout.TETS_SUFFIX}"))

@@ -20,22 +20,22 @@ from ..model.state import Block, Floats, Ints, Model, Nodes
 from . import invariants
 
 ROWS = {"plastic_strain": PLASTIC_STRAIN, "temperature": TEMPERATURE, "damage": DAMAGE}
-"""Rows of the state of tets that become fields, if a block has them."""
+"""Rows of the state of tets that become fields, if a block has these rows."""
 _STRESSES = PRESSURE + 1 - S_XX
 _STRESS = slice(S_XX, PRESSURE + 1)
-"""Rows of the deviatoric stress and the pressure."""
+"""Rows of the deviatoric stress and of the pressure."""
 Share = dict[str, "np.ndarray"]
-"""Arrays by name; the names of block k begin with ``k.``."""
+"""Arrays by name. The names of arrays of block k begin with ``k.``."""
 
 
 def copied(
     model: Model, held: Ints, counting: set[int], numbers: Sequence[Ints] = (), known: Sequence[int] = (0, 0)
 ) -> Share:
-    """Return a rank's share.
+    """Return the share of a rank.
 
-    ``held`` (m, 2): ids of tets that a cohesive facet connects; ``counting``: parts whose law has damage;
-    ``numbers``: for each block those of the fragments of its tets in the last frame; ``known``: number of fragments
-    at the start, and the next number.
+    ``held`` (m, 2): ids of tets that a cohesive facet connects; ``counting``: parts with a law that has damage;
+    ``numbers``: for each block the fragments of its tets in the last frame; ``known``: number of fragments at the
+    start, and the next number.
     """
     nodes = model.nodes
     share = {"nodes": nodes.id.copy(), "x": nodes.x.copy(), "v": nodes.v.copy(), "held": held.copy()}
@@ -53,7 +53,7 @@ def copied(
 
 
 def write(path: Path, share: Share) -> None:
-    """Write a share under another name and rename it. Raises OSError that names it."""
+    """Write a share under another name and rename it. Raises OSError with the name of the file."""
     beside = path.with_name(path.name + ".part")
     try:
         with named(path), beside.open("wb") as file:
@@ -78,25 +78,28 @@ class Whole:
     """The model of all ranks, in the order of global ids, equal for any number of ranks."""
 
     model: Model
-    """Blocks by part, with ids, tets, faces and bonds only."""
+    """Blocks by part. They have ids, tets, faces and bonds only."""
     held: Ints
-    """(m, 2) pairs of tets, see ``copied``."""
+    """(m, 2) pairs of tets that a cohesive facet connects (``copied``)."""
     mass: Floats
-    """(tets,) mass, kg, in the order of the blocks."""
+    """(tets,) mass of each tet, kg, in the order of the blocks."""
     rank: "np.ndarray"
-    """(tets,) uint16 rank."""
+    """(tets,) uint16 rank of each tet."""
     rows: dict[str, Floats]
-    """(tets,) each of ``ROWS`` that some block has, 0 in other blocks, and the invariants of the stress."""
+    """(tets,) arrays by name: each row of ``ROWS`` that some block has, with 0 in other blocks, and the invariants
+    of the stress."""
     numbers: Ints
-    """(tets,) numbers of the fragments in the last frame."""
+    """(tets,) number of the fragment of each tet in the last frame."""
     initial: int
-    """Number of fragments at the start, which have the first numbers; 0 if nothing fractures."""
+    """Number of fragments at the start. These have the first numbers. 0 if no part fractures."""
     next: int
-    """Next number of a fragment."""
+    """Number of the next new fragment."""
 
 
 def joined(shares: Sequence[Share], parts: list[str]) -> Whole:
-    """Return the model of the shares of all ranks, rank 0 first. A node is taken from the first rank that has it."""
+    """Return the model of the shares of all ranks; the share of rank 0 is the first. The state of a node on several
+    ranks is read from the first of these ranks.
+    """
     ids, first = np.unique(np.concatenate([share["nodes"] for share in shares]), return_index=True)
     x, v = (np.concatenate([share[name] for share in shares])[first] for name in ("x", "v"))
     n = len(ids)
@@ -122,7 +125,7 @@ def joined(shares: Sequence[Share], parts: list[str]) -> Whole:
 
 
 def _block(shares: Sequence[Share], part: int, ids: Ints) -> tuple[Block, dict[str, "np.ndarray"]]:
-    """Return the tets of a part, by id, and their columns."""
+    """Return the tets of a part, ordered by id, and their columns."""
     found = [
         (rank, {name.partition(".")[2]: share[name] for name in share if name.startswith(f"{k}.")}, share["nodes"])
         for rank, share in enumerate(shares)
@@ -154,7 +157,7 @@ def _block(shares: Sequence[Share], part: int, ids: Ints) -> tuple[Block, dict[s
 
 
 def _by_tet(stress: "np.ndarray", n: int) -> "np.ndarray":
-    """Return (n, 7) from (chunks, 7, CHUNK)."""
+    """Return (n, 7) rows from an array (chunks, 7, CHUNK)."""
     return stress.transpose(0, 2, 1).reshape(-1, _STRESSES)[:n]
 
 

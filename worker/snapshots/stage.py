@@ -1,7 +1,8 @@
-"""Schedule of the snapshots. Their cost for the solver is a copy (``share``), which a side thread takes (``courier``).
+"""Schedule of the snapshots.
 
-All ranks copy between the same two halves of a step, at the place where frames are written: rank 0 requests it in
-the reduction of the step before.
+The cost of a snapshot for the solver is a copy (``share``), which a side thread writes (``courier``). All ranks copy
+between the same two halves of a step, at the place where frames are written. Rank 0 requests the copy in the
+reduction of the step before.
 """
 
 import math
@@ -22,27 +23,29 @@ from .courier import Courier
 from .share import copied
 
 _APART = 1.0
-"""s of wall time between two that are scheduled by simulated time. Chosen: people do not watch more often."""
+"""Smallest wall time between two scheduled snapshots, s. Chosen value: people do not watch more often."""
 _SHARE = 1.0 / 200.0
 """Share of the time of a run that copies may take."""
 _CROWDED = 1.0 / 20.0
-"""Share of a core for the process that makes snapshots, if ranks use all cores: all ranks wait for the one on its
-core. Chosen: a run takes at most a twentieth longer, and a body of 150,000 tets still has a snapshot every 6 s."""
+"""Share of a core for the process that makes snapshots, if ranks use all cores. All ranks wait for the rank on the
+core of this process. Chosen value: a run takes at most a twentieth longer, and a body of 150,000 tets still has a
+snapshot every 6 s."""
 
 _EARLY = 1e-6
-"""Share of the time between two snapshots: much more than round-off."""
+"""Time by which a snapshot may be early, as a share of the time between two snapshots. The value is much larger than
+round-off."""
 
 
 class Snapshots:
     """The snapshots of a run; ``journal``: None on all ranks except 0."""
 
     def __init__(self, sim: Simulation, folder: Path, journal: Journal | None) -> None:
-        """Collective; numbers continue those in the journal."""
+        """Start with the number after the last snapshot in the journal. Collective."""
         self._folder, self._journal, self._case, self._comm = folder, journal, sim.case, sim.comm
         self._n: int = sim.comm.broadcast(journal.snapshots if journal is not None else 0)
         self._courier = Courier(folder, sim.comm.rank)
         self.next_time = math.inf
-        """Simulated time, s, before which none is scheduled; requests are not limited by it."""
+        """Simulated time before which no snapshot is scheduled, s. This time does not limit requested snapshots."""
         self._wait(self._place(sim.clock) + 1)
         self._taken = self._took = self._packed = 0.0
         self._crowded = len(os.sched_getaffinity(0)) <= sim.comm.size
@@ -54,7 +57,10 @@ class Snapshots:
         sim.comm.barrier()
 
     def due(self, clock: Clock, now: float, *, look: bool) -> bool:
-        """Return whether to make one of the next state; called on rank 0. ``look``: test for a request."""
+        """Return whether to make a snapshot of the next state. Called on rank 0.
+
+        ``look``: whether to test for a request.
+        """
         self._asked_for = self._asked_for or (look and (self._folder / layout.SNAPSHOT_REQUEST).exists())
         if self._courier.under_way:
             return False
@@ -63,11 +69,11 @@ class Snapshots:
 
     @property
     def asked_for(self) -> bool:
-        """Whether one is requested that is not made yet."""
+        """Whether a snapshot is requested and not made yet."""
         return self._asked_for
 
     def look(self, sim: Simulation, *, due: bool, ending: bool) -> None:
-        """Copy the present state if it is ``due``, or the first or the last."""
+        """Copy the present state if a snapshot is ``due``, or if the state is the first or the last one."""
         wanted = self._case.run.snapshots > 0
         first = wanted and sim.clock.step == 0
         if not (due or first or (wanted and ending)):
@@ -101,13 +107,16 @@ class Snapshots:
             self._journal.write(messages.Snapshot, **told)
 
     def close(self) -> None:
-        """Wait for the last snapshot and write its message. Collective; ranks leave their cores to the packer."""
+        """Wait for the last snapshot and write its message.
+
+        Collective. The waiting ranks leave their cores to the packer.
+        """
         self._courier.close()
         self.tell()
         self._comm.await_all()
 
     def _wait(self, place: int) -> None:
-        """Set the number of the next evenly spaced time, and a time a little earlier for the test."""
+        """Set the number of the next evenly spaced time, and the time of the test, which is slightly earlier."""
         self._next = place
         run = self._case.run
         if run.snapshots:
@@ -137,14 +146,14 @@ class Snapshots:
 def pause(copying: float, packing: float, *, crowded: bool) -> float:
     """Return the wall time between two snapshots, s.
 
-    ``copying``: s of wall time that the last one took the solver; ``packing``: s of CPU time of the process that
-    makes them; ``crowded``: no core is free for it.
+    ``copying``: wall time of the last copy in the solver, s; ``packing``: CPU time of the process that makes the
+    snapshots, s; ``crowded``: whether no core is free for this process.
     """
     return max(_APART, copying / _SHARE, packing / _CROWDED if crowded else 0.0)
 
 
 def _clear(folder: Path, n: int) -> None:
-    """Remove remains of a killed worker, and snapshots from ``n`` on, which are not in the journal."""
+    """Remove files of a killed worker, and snapshots from ``n`` on, which are not in the journal."""
     place = folder / layout.SNAPSHOTS
     place.mkdir(exist_ok=True)
     for path in place.iterdir():

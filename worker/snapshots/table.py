@@ -1,4 +1,4 @@
-"""Table of the fragments in a snapshot: the heaviest first, and the rest in one row."""
+"""Table of the fragments in a snapshot: the heaviest fragments first, and the other fragments in one row."""
 
 from dataclasses import dataclass
 
@@ -12,27 +12,28 @@ from ..parallel.comm import SerialComm
 from .share import Whole
 
 MOST_ROWS = 2048
-"""Fragments with a row of their own. Chosen: a tenth of the bytes of a snapshot, and more than a user selects."""
+"""Largest number of fragments with a row of their own. Chosen value: their rows take a tenth of the bytes of a
+snapshot, and a user selects fewer fragments."""
 
 
 @dataclass
 class Table:
-    """All fragments of a model, by ascending label; equal to ``fragments.table`` to the bit."""
+    """All fragments of a model, by ascending label. The values are bit-identical to ``fragments.table``."""
 
     label: Ints
-    """(g,) label."""
+    """(g,) label of each fragment."""
     of: Ints
     """(tets,) index of the fragment of each tet."""
     tets: Ints
-    """(g,) number of tets."""
+    """(g,) number of tets of each fragment."""
     mass: Floats
-    """(g,) mass, kg."""
+    """(g,) mass of each fragment, kg."""
     centre: Floats
-    """(g, 3) centre of mass, m."""
+    """(g, 3) centre of mass of each fragment, m."""
     velocity: Floats
-    """(g, 3) velocity, m/s."""
+    """(g, 3) velocity of each fragment, m/s."""
     size: Floats
-    """(g,) longest side of the bounding box, m."""
+    """(g,) longest side of the bounding box of each fragment, m."""
 
 
 def measured(whole: Whole, labels: Ints) -> Table:
@@ -75,7 +76,7 @@ def columns(table: Table, birth: Floats) -> tuple[dict[str, "np.ndarray"], Ints]
 
 
 def _rest(table: Table, rest: Ints) -> dict[str, "np.ndarray"]:
-    """Return one row for the fragments ``rest``: sums and means, no size and no birth."""
+    """Return one row for the fragments ``rest``: sums and means, without a size and a time of birth."""
     mass = table.mass[rest]
     total = mass.sum()
     return {
@@ -87,8 +88,10 @@ def _rest(table: Table, rest: Ints) -> dict[str, "np.ndarray"]:
 
 
 def by_size(size: Floats) -> tuple[int, list[int]]:
-    """Return the histogram of the ``size`` (g,), m, of fragments: a first number k and counts; count i is for sizes
-    from 2^((k+i)/2) m up to the next. Fragments without extent are omitted.
+    """Return the histogram of the ``size`` (g,), m, of fragments: a first number k, and counts.
+
+    Count i is the number of fragments with sizes from 2^((k+i)/2) m up to the next bound. Fragments without extent
+    are omitted.
     """
     steps = np.floor(2.0 * np.log2(size[size > 0.0])).astype(np.int64)
     if not len(steps):

@@ -1,7 +1,8 @@
 """All tets of a model in few bytes, for sections; in the layout of a snapshot (cases/output/snapshot.py).
 
-Nodes are in the order of a Z-curve through the box (Morton 1966), tets have their nodes ascending and are sorted by
-them: differences of successive values are small, and gzip compresses the zeros of their high bytes.
+Nodes are in the order of a Z-curve through the box (Morton 1966). The four nodes of a tet are ascending, and the
+tets are sorted by their nodes. Differences of successive values are therefore small, and gzip compresses the zeros
+of their high bytes.
 """
 
 import gzip
@@ -11,16 +12,18 @@ import numpy as np
 from ..model.state import Floats, Ints
 
 MOST_TETS = 400_000
-"""Largest number of tets of a model with such a file. Chosen: a page cuts them in 20 ms."""
+"""Largest number of tets of a model for which the file is written. Chosen value: a page cuts this number of tets in
+20 ms."""
 _BITS = 10
-"""Bits of a coordinate on the Z-curve. Chosen: finer than meshes of ``MOST_TETS``."""
+"""Number of bits of a coordinate on the Z-curve. Chosen value: finer than meshes of ``MOST_TETS`` tets."""
 _LEVEL = 1
-"""Level of gzip. Chosen: level 6 takes three times as long for 5 % less."""
+"""Level of gzip. Chosen value: level 6 takes three times as long for 5 % fewer bytes."""
 
 
 def ordered(places: "np.ndarray", tets: Ints) -> tuple["np.ndarray", Ints, Ints]:
-    """Return the nodes in their order (k,), the tets over them (n, 4), and the original row of each tet (n,);
-    ``places``: (v, 3) uint16; ``tets``: (n, 4) nodes.
+    """Return the nodes in their order (k,), the tets over them (n, 4), and the original row of each tet (n,).
+
+    ``places``: (v, 3) uint16 positions; ``tets``: (n, 4) nodes.
     """
     used = np.unique(tets)
     nodes = used[np.argsort(_along(places[used]), kind="stable")]
@@ -42,8 +45,11 @@ def _along(places: "np.ndarray") -> Ints:
 
 
 def steps(corners: Ints) -> "np.ndarray":
-    """Return (4, 4, n) uint8: for each byte of 32 bits, lowest first, and each corner the difference of the first
-    node from that of the tet before, and of the others from the corner before; modulo 2^32.
+    """Return (4, 4, n) uint8 bytes of differences modulo 2^32: for each byte of 32 bits, lowest first, and for each
+    corner.
+
+    The first node of a tet is subtracted from the first node of the tet before, each other node from the node of the
+    corner before.
     """
     change = np.concatenate([np.diff(corners[:, :1], axis=0, prepend=0), np.diff(corners, axis=1)], axis=1)
     words = np.ascontiguousarray(change.T).astype("<u4")
@@ -51,11 +57,11 @@ def steps(corners: Ints) -> "np.ndarray":
 
 
 def speed(v: Floats, tets: Ints) -> Floats:
-    """Return (n,) the size of the mean velocity of the nodes of each tet, m/s."""
+    """Return (n,) the magnitude of the mean velocity of the nodes of each tet, m/s."""
     mean = (v[tets[:, 0]] + v[tets[:, 1]] + v[tets[:, 2]] + v[tets[:, 3]]) / 4.0
     return np.asarray(np.sqrt(mean[:, 0] ** 2 + mean[:, 1] ** 2 + mean[:, 2] ** 2))
 
 
 def packed(data: bytes) -> bytes:
-    """Return the data compressed by gzip, without a time."""
+    """Return the data compressed by gzip, without a time stamp."""
     return gzip.compress(data, _LEVEL, mtime=0)
