@@ -1,5 +1,6 @@
-"""Account of the energy that contact took from the bodies: the limit of the energy that it may give back when it
-corrects penetrations."""
+"""Account of the energy that contact has taken from the bodies. This energy is the limit of the energy that contact may
+return when it corrects penetrations.
+"""
 
 import numpy as np
 
@@ -7,11 +8,14 @@ from ..model.state import Ints
 from ..parallel.fixed_point import Tally
 
 _AHEAD = 2.0
-"""Safety factor: the balance must exceed this many times the largest energy given back in one step so far."""
+"""Safety factor: penetrations are corrected only while the balance exceeds this factor times the largest energy that
+contact has returned in one step so far."""
 
 
 class Account:
-    """Sums over all contacts, steps and ranks, as integers: independent of the order and of the cut."""
+    """Sums over all contacts, steps and ranks, as integers: independent of the order of summation and of the
+    partition.
+    """
 
     def __init__(self, energy: float) -> None:
         """``energy``: order of magnitude of the energy that one contact takes in a step, J."""
@@ -20,7 +24,7 @@ class Account:
 
     @property
     def words(self) -> Ints:
-        """(2, 2) limbs of the sums of this rank; see impulse_work.cost."""
+        """(2, 2) limbs (low and high words) of the sums of this rank; see impulse_work.cost."""
         return self._tally.words
 
     @property
@@ -29,15 +33,15 @@ class Account:
         return float(self._tally.scale[0])
 
     def carry(self) -> None:
-        """Keeps the low limbs from wrapping; see Tally."""
+        """Carries the low limbs into the high limbs, so that the low limbs do not overflow; see Tally."""
         self._tally.carry()
 
     def settle(self, words: Ints) -> bool:
         """Returns whether contact may correct penetrations in the step ahead; ``words`` (2, 2): sum of the words of all
         ranks.
 
-        It may while the energy taken from the bodies is at least ``_AHEAD`` times the largest energy given back in
-        one step.
+        Correction is allowed while the energy taken from the bodies is at least ``_AHEAD`` times the largest energy
+        returned in one step.
         """
         taken, early = (float(v) for v in self._tally.valued(words))
         self._most = max(self._most, self._taken - taken, early - self._early)
@@ -45,7 +49,9 @@ class Account:
         return taken >= _AHEAD * self._most
 
     def known(self) -> tuple[float, float, float, float]:
-        """Values besides the words, for a parcel (a checkpoint or migration message); equal on all ranks."""
+        """Returns the values of the account other than the words, for a parcel (a checkpoint or migration message);
+        equal on all ranks.
+        """
         return self.scale, self._taken, self._early, self._most
 
     def resume(self, words: Ints, known: tuple[float, float, float, float]) -> None:

@@ -16,8 +16,9 @@ from .scene.scene import Scene
 
 
 class Books:
-    """Sums of the energies and impulses. One half of the work of an impulse, with v(n-1/2), is booked in the step
-    that applies it, the other half, with v(n+1/2), in the next one."""
+    """Sums of the energies and impulses of contact. One half of the work of an impulse, with v(n-1/2), is booked in the
+    step that applies it, the other half, with v(n+1/2), in the next step.
+    """
 
     def __init__(self, nodes: int, case: Case, impulse: float, energy: float, team: Team) -> None:
         """``impulse``, N s, and ``energy``, J: upper bounds at one node in one step."""
@@ -27,9 +28,9 @@ class Books:
         self.external_work = np.zeros(nodes)
         """(nodes,) work of the supports of held nodes against contact, J."""
         self.scale = fixed_point.scale_for(impulse)
-        """Quanta per N s."""
+        """Quanta per N s of impulse."""
         self.friction = fixed_point.Tally(np.full(2, energy))
-        """Work of friction so far, J, and the part of the last step that is not yet in the ledger."""
+        """Work of friction so far, J, and the part of the work of the last step that is not yet in the ledger."""
         self.account = Account(energy)
         self.agreed = self.account.words
         """Sum over all ranks of the words of the account, from the last reduction (account.py)."""
@@ -37,8 +38,8 @@ class Books:
         self.parts = np.zeros((parts, 3), np.int64)
         """(parts, 3) impulses on each part so far, quanta."""
         self.pairs = np.zeros((parts, parts, 3) if asked else (0, 0, 3), np.int64)
-        """(parts, parts, 3) impulses so far on each part (first index) from each other part, quanta; (0, 0, 3) if no
-        probe has the key ``by``."""
+        """(parts, parts, 3) impulses so far on each part (first index) from each other part, quanta; it is (0, 0, 3)
+        if no probe of the case has the key ``by``."""
         self.pressed = np.zeros((nodes if "contact_pressure" in case.run.fields else 0, 3), np.int64)
         """(nodes, 3) impulses since the last frame, quanta; (0, 3) if the field ``contact_pressure`` is not written."""
         self.open: Ints = np.zeros((0, 3), np.int64)
@@ -71,7 +72,7 @@ class Books:
         self.pairs, self.open = parcel.sums["contact.pairs"], parcel.nodes["contact.total"]
 
     def grow(self, copies: int) -> None:
-        """Extends the arrays by ``copies`` nodes; booked energies stay with the parents."""
+        """Extends the arrays by ``copies`` nodes; booked energies remain at the parent nodes."""
         self.contact_loss = extended(self.contact_loss, np.zeros(copies))
         self.external_work = extended(self.external_work, np.zeros(copies))
         if len(self.pressed):
@@ -94,7 +95,7 @@ class Books:
         return np.asarray(comm.sum(self.pairs) / self.scale)
 
     def due(self) -> None:
-        """Clears the outstanding half of the work of friction: the next booking includes it."""
+        """Sets the outstanding half of the work of friction to zero, because the next booking includes that half."""
         self.friction.words[:, 1] = 0
 
     def book(self, scene: Scene, places: Indices, *, fresh: bool = False) -> None:

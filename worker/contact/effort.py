@@ -1,4 +1,4 @@
-"""Cost of contact by node, for the balance of the ranks."""
+"""Cost of contact by node, for the load balance between ranks."""
 
 import numpy as np
 
@@ -6,9 +6,9 @@ from ..model.state import Flags, Floats
 from .scene.scene import Scene
 
 _SURFACE, _LISTED, _TESTED, _ACTIVE = 9.0, 0.1, 3.0, 4.0
-"""Cost of a step for a surface node (searches and registrations, averaged), a listed pair, a tested pair or crack,
-and an active contact: 450, 3, 150 and 200 ns, from the profile of the shattering bar to 40 us on one rank, in units
-of 50 ns."""
+"""Costs per step in units of 50 ns: of a surface node (searches and registrations, averaged), a listed pair, a
+tested pair or crack, and an active contact: 450, 3, 150 and 200 ns, measured in the profile of the shattering bar to
+40 us on one rank."""
 
 
 def effort(now: Scene | None, on_surface: Flags) -> Floats:

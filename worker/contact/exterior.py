@@ -17,7 +17,7 @@ from .surface import exposure, normals, surface
 from .surface.families import Corners
 
 _WORDS = 9 + 2 * normals.SHARE
-"""Width of the row of a crack that opens (Exterior.widened)."""
+"""Number of columns of a row of ``Exterior.widened``, which describes a crack that opens."""
 
 
 class Exterior:
@@ -38,7 +38,7 @@ class Exterior:
         self.motion = SurfaceMotion(self.surface, model.nodes, mobilities(model.nodes, bounds), self.size, comm)
         self._moments = np.zeros((model.nodes.n, normals.COLUMNS), np.int64)
         self._broken = False
-        """Whether facets of any rank have broken, so that cracks may open."""
+        """True if facets of any rank have broken, so that cracks may open."""
 
     def keep(self, parcel: Parcel) -> None:
         """Adds cracks, edges that became sharp, surface nodes and moments of normals to the ``parcel`` (a checkpoint or
@@ -97,7 +97,9 @@ class Exterior:
         return found
 
     def sharpen(self, scene: Scene, least: Floats) -> None:
-        """Marks the edges whose faces' normals have a cosine below ``least`` (parts,) as sharp, for good."""
+        """Marks the edges as sharp whose two faces have normals with a cosine below ``least`` (parts,). Edges remain
+        sharp.
+        """
         turned = scene.sharpen(least)[: self.surface.edges.n]
         if turned.any():
             self.surface.sharpen(np.union1d(self.surface.turned, self.surface.edges.names[turned]))
@@ -130,7 +132,9 @@ class Exterior:
         return False
 
     def _loosen(self, loose: Flags) -> None:
-        """Updates the mobility of nodes that have lost their last tet: only their own boundaries hold them."""
+        """Updates the mobility of nodes that have lost their last tet: the components of such nodes are held only by
+        boundaries that act on the nodes themselves.
+        """
         if (loose & ~self.motion.loose).any():
             self.motion.loose, self.motion.mobility = loose, mobilities(self._model.nodes, self._bounds)
 
@@ -139,7 +143,7 @@ class Exterior:
         self.cracks.add(tets, nodes, sides, self._model.blocks)
 
     def take_up(self) -> None:
-        """Builds the surface with everything that may become surface before the next search. Collective."""
+        """Builds the surface, with all faces that may become surface before the next search. Collective."""
         if self._near_erosion is not None:
             self._near_erosion = exposure.near_erosion(self._model.blocks)
         if self._broken or self._near_erosion is not None:
@@ -193,8 +197,9 @@ class Exterior:
         return np.column_stack([cracks.foreseen[rows], cracks.faces[rows], nodes.id[sides], shares])
 
     def open(self, received: Ints, scene: Scene | None) -> bool:
-        """Makes surface of the cracks of all ranks, rows of ``widened``; returns whether the scene lacks any of
-        them."""
+        """Adds the sides of the wide cracks of all ranks, the rows of ``widened``, to the surface; returns True if the
+        scene lacks any of these sides.
+        """
         received = received.reshape(-1, _WORDS)
         nodes, sides = self._model.nodes, received[:, 3:9].reshape(-1, 3)
         local = nodes.places(sides)
@@ -215,7 +220,7 @@ class Exterior:
         return [(block, self.cracks.corners(b)) for b, block in some if len(block.bond)]
 
     def separate(self, split: Split) -> None:
-        """Follows the separation of nodes on any rank."""
+        """Updates the surface after nodes have separated on any rank."""
         self._broken |= bool(split.touched.any())
         if split.copies.n:
             parents = split.copies.parents

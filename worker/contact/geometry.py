@@ -1,5 +1,5 @@
-"""Points, faces and edges in kernels. A vector is a tuple of three floats, which stays in registers; no kernel
-allocates an array for one.
+"""Geometry of points, faces and edges for kernels. A vector is a tuple of three floats, so that it is kept in registers
+and no array is allocated.
 """
 
 import numpy as np
@@ -7,7 +7,8 @@ import numpy as np
 from ..kernels.jit import njit
 
 MARGIN = 1e-3
-"""Tolerance of the area coordinates: how far outside of a face the foot of a node may lie."""
+"""Tolerance of the area coordinates: largest distance outside of a face at which the foot of a node still counts as
+on the face."""
 VECTOR = "UniTuple(float64, 3)"
 """Type of a vector in numba's notation."""
 

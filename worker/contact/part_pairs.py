@@ -1,4 +1,4 @@
-"""Pairs of parts: whether they may be in contact, their friction, and the mass that bounds their impulses."""
+"""Pairs of parts: permission of contact, coefficient of friction, and the mass that bounds the contact impulses."""
 
 import numpy as np
 
@@ -40,7 +40,7 @@ def self_contact(case: Case, mu: Floats) -> Flags:
 
 def lighter(mu: Floats, nodes: Nodes, mobility: Floats, comm: Comm, rigid: Rigid | None = None) -> float:
     """Returns the mass, kg, of the heaviest node of the lighter of two parts, maximum over all pairs in contact; for
-    ``rigid`` bodies the whole mass; 0 without pairs. Collective.
+    ``rigid`` bodies the mass of the whole body; 0 if there is no pair. Collective.
 
     No impulse exceeds this mass times a speed, because the lighter part has no more momentum. A part with a held
     direction, ``mobility`` (nodes, 3) 0, can transmit any impulse, so the other part of the pair counts.

@@ -16,15 +16,16 @@ from ...model.state import Floats, Indices, Ints
 _MOST = 2.0**20
 """Largest number of cells along an axis: codes of three axes stay far below 2^63."""
 _WIDE = 512
-"""Largest number of cells of a box with entries; larger boxes are tested against all others."""
+"""Largest number of cells of a box that is entered in the buckets; a box with more cells is tested against all other
+boxes."""
 _CURVE_BITS = 12
-"""Bits of a coordinate on the curve."""
+"""Number of bits of each coordinate in the code of the space-filling curve."""
 _LEAST_BITS = 6
-"""Least number of bits of the hash."""
+"""Smallest number of bits of the hash."""
 
 
 class Table(NamedTuple):
-    """Boxes by the cells that they touch."""
+    """Hash table of bounding boxes, by the cells that each box touches."""
 
     origin: Floats
     inverse: float
@@ -32,9 +33,9 @@ class Table(NamedTuple):
     shape: Ints
     """(3,) cells along each axis."""
     bits: int
-    """Bits of the hash."""
+    """Number of bits of the hash."""
     start: Ints
-    """(2^bits + 1,) offset of the entries of each hash, and the end."""
+    """(2^bits + 1,) offset of the first entry of each hash value; the last value is the number of entries."""
     thing: Indices
     """(m,) box of each entry."""
     code: Ints

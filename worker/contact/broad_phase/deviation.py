@@ -11,7 +11,8 @@ from ...parallel.team import TASK, Team
 from .reference_motion import ReferenceMotion, farthest, largest, leave
 
 _SLOTS, _ROWS = 4096, 8192
-"""Slots of a task, and faces or edges. Chosen: 20 us of work each, against 2 us for a region of threads."""
+"""Number of slots in a task, and number of faces or edges in a task. Chosen values: each task takes 20 us, compared
+with 2 us to start a parallel region."""
 _F, _I, _F1, _F2, _N2 = types.float64, types.int64, types.float64[::1], types.float64[:, ::1], types.int32[:, ::1]
 _LINE = _F1, _F2, _F2
 _LEAVE = *_LINE, *_LINE, _F2, _F2, _F, _F, types.boolean[::1], _F1
@@ -21,7 +22,9 @@ _leave, _largest = reader(*_LEAVE), reader(*_LARGEST)
 
 @njit(TASK, cache=True)
 def _slots(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``reference_motion.leave`` of both kinds of lines, and ``farthest`` of the searched ones."""
+    """Task: ``reference_motion.leave`` for the search lines and the short lines, and ``farthest`` for the search
+    lines.
+    """
     left, line, course, near, short, mean, x, v, t, dt, tracked, most = _leave(table)
     leave(left, line, course, x, v, t, dt, first, stop)
     leave(near, short, mean, x, v, t, dt, first, stop)
@@ -30,7 +33,7 @@ def _slots(table, first, stop, thread):  # type: ignore[no-untyped-def]
 
 @njit(TASK, cache=True)
 def _corners(table, first, stop, thread):  # type: ignore[no-untyped-def]
-    """``reference_motion.largest``."""
+    """Task: ``reference_motion.largest``."""
     out, corners, many, left = _largest(table)
     largest(out, corners, many, left, first, stop)
 
@@ -46,9 +49,9 @@ class Deviation:
     def measure(
         self, motion: ReferenceMotion, x: Floats, v: Floats, faces: Indices, edges: Indices, tracked: Flags
     ) -> float:  # fmt: skip
-        """Sets the distances of the slots at ``x`` (slots, 3), with velocities before contact ``v`` (slots, 3), and
-        of the faces and edges at them, from their lines in the step and ``motion.beyond``. Returns the largest
-        distance of ``tracked`` (slots,) ones from their lines of the search, m.
+        """Sets the distances of the slots at ``x`` (slots, 3), with velocities before contact ``v`` (slots, 3), and of
+        the faces and edges at them, from their lines in the step and ``motion.beyond``. Returns the largest distance of
+        the ``tracked`` (slots,) slots from their search lines, m.
         """
         n, dt, searched, short = len(x), motion.end - motion.t + motion.beyond, motion.searched, motion.short
         most = self._scratch.of("most", self._slots.many(n), np.float64)

@@ -1,9 +1,9 @@
 """Contact domain: the faces and edges of this rank that other ranks need as ghosts.
 
 ``box`` compares bounding boxes (Paik et al.): a face or edge is sent to every rank whose box of nodes and edges it
-touches. ``arbitrary`` adds a second exchange (the paper's eqs 5 to 16, in three dimensions): the other rank sends
-the cells of its nodes and edges, and gets only what touches one of them. Since only surface nodes are entered, every
-occupied cell is an outside cell, and the paper's test of a cell's neighbours is not needed.
+touches. ``arbitrary`` adds a second exchange (the paper's eqs 5 to 16, in three dimensions): the other rank sends the
+cells of its nodes and edges, and receives only the faces and edges that touch one of these cells. Since only surface
+nodes are entered, every occupied cell is an outside cell, and the paper's test of a cell's neighbours is not needed.
 """
 
 import numpy as np
@@ -62,15 +62,15 @@ def _cell(x, edge):  # type: ignore[no-untyped-def]
 
 @njit("int64(int64, int64, int64)", cache=True)
 def _code(ix, iy, iz):  # type: ignore[no-untyped-def]
-    """Cell as one number. Two cells have the same only if they are 2^20 cells apart; then a ghost is sent that is
-    not needed.
+    """Returns the code of a cell. Two cells have the same code only if they are 2^20 cells apart; the only effect is
+    that an unneeded ghost is sent.
     """
     return (ix << 42) + (iy << 21) + iz
 
 
 @njit("int64[::1](float64[:, ::1], float64[:, ::1], boolean[::1], float64)", cache=True)
 def _cells(low, high, some, edge):  # type: ignore[no-untyped-def]
-    """Codes of all cells that ``some`` of the boxes touch, each once."""
+    """Returns the codes of all cells that the boxes ``some`` touch, each code once."""
     bits, n = 6, 0
     codes, used, found = np.empty(1 << bits, np.int64), np.zeros(1 << bits, np.bool_), np.empty(1 << bits, np.int64)
     for j in range(len(low)):
@@ -97,8 +97,9 @@ def _cells(low, high, some, edge):  # type: ignore[no-untyped-def]
 
 @njit("int64(int64[::1], boolean[::1], int64, int64)", cache=True)
 def _place(codes, used, code, bits):  # type: ignore[no-untyped-def]
-    """Position of a code in a table of 2^bits entries, or of the free entry for it: at its hash, or the next one
-    behind."""
+    """Position of a code in a table of 2^bits entries, or of the free entry for it: at the entry of its hash, or at the
+    next entry after that one which is free or has the code.
+    """
     at = bucket_at(code, bits)
     while used[at] and codes[at] != code:
         at = (at + 1) % len(codes)

@@ -1,9 +1,9 @@
 """Velocities with which a search extrapolates the nodes.
 
-A node of a metal is extrapolated with its own velocity. Nodes of a body that breaks vibrate: a free tet has a period
-of some ten steps, and the release of 1 GPa in glass makes it vibrate with sigma / (rho c) = 75 m/s. Extrapolated to
-the next search, this velocity would lead away from where the node stays. So such a node gets the velocity of a rigid
-body with the momentum and the angular momentum of its tets.
+A node of a metal is extrapolated with its own velocity. Nodes of a body that breaks vibrate: a free tet has a period of
+some ten steps, and the release of 1 GPa in glass makes it vibrate with sigma / (rho c) = 75 m/s. Extrapolation to the
+next search with this velocity would be wrong by more than the motion of the node. Such a node therefore gets the
+velocity of a rigid body with the momentum and the angular momentum of its tets.
 """
 
 import numpy as np
@@ -15,9 +15,10 @@ from ...parallel.ownership import Neighbour, complete
 from ...parallel.tags import Tag
 
 _QUANTA = 2.0**16
-"""Quanta per m/s: sums up to 1e14 m/s do not overflow."""
+"""Quanta per m/s; with this value sums up to 1e14 m/s do not overflow."""
 _THIN = 1e-9
-"""Smallest determinant of the inertia of a tet, over the cube of its trace, for which its rotation is computed."""
+"""Smallest value, over the cube of its trace, of the determinant of the inertia of a tet for which the rotation of
+the tet is computed."""
 
 
 def courses(blocks: list[Block], nodes: Nodes, neighbours: list[Neighbour], comm: Comm) -> Floats:

@@ -8,8 +8,8 @@ contact is not tested again as long as
     slack > U t + left_1 + left_2 (now) + left_1 + left_2 (when it was tested),
 
 with U the relative speed of the two reference motions and t the time since the test; for a face or an edge, ``left`` is
-that of its farthest corner. So a pair stores one number and U. The condition is exact: a skipped pair could not be
-active. No bit of the answer depends on it, and it may differ between ranks.
+that of its farthest corner. A pair therefore stores one number and U. The condition is exact: a pair that is not tested
+cannot be active. No bit of the answer depends on it, and it may differ between ranks.
 
 A pair whose face is turned away from the node is not tested until the face may have turned towards it
 (node_face.py).
@@ -26,7 +26,7 @@ from ..narrow_phase.node_face import chain
 from ..narrow_phase.tables import Pairs
 
 _FRESH = {"until": -np.inf, "speed": np.nan, "turned": False, "kept": 0.0, "next": -1}
-"""Initial values of a pair: tested in the next step."""
+"""Initial values of a pair, with which the pair is tested in the next step."""
 
 
 @dataclass
@@ -89,8 +89,8 @@ class PairTable:
         _recall(self.kept, first, self.next, self.rows, rows, kept)
 
     def carried(self, one: Indices, two: Indices) -> "PairTable":
-        """Returns the pairs with new numbers ``one`` and ``two`` of their members, -1 for those that are gone,
-        ordered by the first member, so that successive pairs of a kernel share data.
+        """Returns the pairs with new numbers ``one`` and ``two`` of their members, -1 for removed members, ordered by
+        the first member, so that successive pairs of a kernel share data.
         """
         some, rows = _renumbered(self.rows, one, two, int(one.max(initial=-1)) + 1)
         return PairTable(
@@ -122,8 +122,8 @@ def _recall(kept, first, following, pairs, rows, values):  # type: ignore[no-unt
 
 @njit("Tuple((int64[::1], int32[:, ::1]))(int32[:, ::1], int32[::1], int32[::1], int64)", cache=True)
 def _renumbered(pairs, one, two, n):  # type: ignore[no-untyped-def]
-    """Rows of ``pairs`` (p, 2) with numbers in both ``one`` and ``two``, by ascending number of the first member,
-    which is below ``n``; and their numbers.
+    """Returns the rows of ``pairs`` (p, 2) whose members both have new numbers in ``one`` and ``two``, in the order of
+    the new number of the first member, which is below ``n``; and the new numbers.
     """
     begin = np.zeros(n + 1, np.int64)
     for p in range(len(pairs)):

@@ -1,8 +1,8 @@
 """Reference motions: the straight lines along which slots are extrapolated, and the distances of the slots from them.
 
 A search extrapolates every slot along a straight line. Pairs that it excludes can be active only if slots depart from
-their lines by half the skin. A slot that does so gets a new line from its position on, with its mean velocity since the
-last line, and is registered again (registration.py).
+their lines by half the skin. A slot that departs so far gets a new line, which begins at the present position of the
+slot, with its mean velocity since the last line, and is registered again (registration.py).
 
 The time for which a pair is not tested is measured from other, short lines, renewed every few steps for all slots:
 with the mean velocities of these steps they are much closer to the slots, and need no registration (pairs.py).
@@ -18,7 +18,7 @@ _V1, _V2, _N2 = "float64[::1]", "float64[:, ::1]", "int32[:, ::1]"
 
 
 class Lines:
-    """Straight line of every slot."""
+    """Straight line along which each slot is extrapolated."""
 
     def __init__(self, x: Floats, course: Floats) -> None:
         """``x``, ``course`` (slots, 3): positions, m, and velocities, m/s, at time 0."""
@@ -26,7 +26,8 @@ class Lines:
         self.since = np.zeros(len(x))
         """(slots,) time at which each line began, s."""
         self.left = np.zeros(len(x))
-        """(slots,) distance of each slot from its line in the step ahead, the larger of beginning and end, m."""
+        """(slots,) distance of each slot from its line in the present step, m: the larger of the distances at the
+        beginning and at the end of the step."""
         self._rooms = Rooms("x", "course", "since", "left")
 
     def add(self, x: Floats, course: Floats, t: float) -> None:
@@ -39,8 +40,9 @@ class Lines:
             column[heirs] = column[parents]
 
     def take_over(self, slots: Indices, old: "Lines", t: float) -> None:
-        """Copies the lines of ``old`` at time ``t``; ``slots``: new number of each of its slots, -1 for those that
-        are gone."""
+        """Copies the lines of ``old`` at time ``t``; ``slots``: new number of each of its slots, -1 for removed
+        slots.
+        """
         self.x -= t * self.course
         self.since[:] = t
         there, here = np.flatnonzero(slots >= 0), slots[slots >= 0]
@@ -58,17 +60,17 @@ class ReferenceMotion:
     def __init__(self, x: Floats, course: Floats, faces: int, edges: int, drift: Floats, until: float) -> None:
         """``x``, ``course`` (slots, 3): positions, m, and velocities, m/s, at the time of the search."""
         self.drift = drift
-        """(3,) mean velocity, m/s."""
+        """(3,) mean velocity of all surface nodes at the search, m/s."""
         self.until = until
         """Time up to which the candidates are complete, s after the search."""
         self.searched, self.short = Lines(x, course), Lines(x, course)
-        """Lines of the search, and short lines from which the distances of pairs are measured."""
+        """Search lines, and short lines; the distances of pairs are measured from the short lines."""
         self.faces, self.edges = np.zeros(faces), np.zeros(edges)
         """(f,) and (e,) largest distance of a corner from its short line, m."""
         self.t = 0.0
-        """Beginning of the step, s after the search."""
+        """Time at the beginning of the step, s after the search."""
         self.end = 0.0
-        """End of the step, s after the search."""
+        """Time at the end of the step, s after the search."""
         self.beyond = 0.0
         """Time beyond the end of the step for which distances are measured too, s."""
         self.strayed = 0.0
@@ -85,7 +87,7 @@ class ReferenceMotion:
         self.short.inherit(heirs, parents)
 
     def take_over(self, slots: Indices, old: "ReferenceMotion") -> None:
-        """Copies the lines of ``old``; ``slots``: new number of each of its slots, -1 for those that are gone."""
+        """Copies the lines of ``old``; ``slots``: new number of each of its slots, -1 for removed slots."""
         self.t = self.end = old.end
         self.searched.take_over(slots, old.searched, self.t)
         self.short.take_over(slots, old.short, self.t)

@@ -1,8 +1,9 @@
-"""Registration: candidate pairs of changed nodes, faces and edges, each once, without other ranks.
+"""Registration: the search for the candidate pairs of changed nodes, faces and edges on one rank, without
+communication. Each pair is found once.
 
-The pairs of a changed node, face or edge are removed and searched again among everything in the broad phase. Changed
-are those that have departed from their lines (reference_motion.py) and those that are new on the surface. A search
-from nothing is the same with everything changed. No bit of the answer depends on candidates that do not become
+The pairs of a changed node, face or edge are removed and searched again among everything in the broad phase. A node,
+face or edge is changed if it has departed from its line (reference_motion.py) or is new on the surface. A complete
+search is a registration in which everything is changed. No bit of the answer depends on candidates that do not become
 active.
 """
 
@@ -19,7 +20,8 @@ from .deviation import Deviation
 from .search import Primitives
 
 _PARTLY = 0.5
-"""Share of half the skin: slots beyond it get new lines together with a slot that has departed by half the skin."""
+"""Share of half the skin. When a slot has departed from its line by half the skin, all slots that have departed by
+more than this share of half the skin get new lines too."""
 
 
 @dataclass
@@ -36,18 +38,19 @@ class _Flight:
     """Time to the end of the candidate list, s."""
 
     def find(self, small: Primitives, large: Primitives, allowed: Flags, rank: Ints | None) -> Indices:
-        """search.find on these lines."""
+        """Calls search.find on the lines of the scene."""
         return search.find(small, large, self.x, self.course, self.part, allowed, self.horizon, rank)
 
 
 def register_new(scene: Scene) -> None:
-    """Registers everything new, before a step begins."""
+    """Registers all new nodes, faces and edges, before a step begins."""
     scene.reference.begin_anew(scene.settle_live(), scene.surface_nodes.x)
     _register(scene)
 
 
 def renew(scene: Scene, x: Floats, v: Floats, strayed: bool, deviation: Deviation) -> None:
-    """Registers everything new and, with ``strayed``, begins new lines for the slots that have departed from theirs.
+    """Registers all new nodes, faces and edges and, with ``strayed``, begins new lines for the slots that have departed
+    from their lines.
 
     ``x``, ``v`` (slots, 3): at the beginning of the step, v before contact; ``deviation``: measures the distances.
     """
@@ -68,9 +71,9 @@ def renew(scene: Scene, x: Floats, v: Floats, strayed: bool, deviation: Deviatio
 
 
 def carry(now: Scene, old: Scene) -> None:
-    """Copies the state of the scene ``old`` to ``now``, which is not connected yet: lines, broad-phase flags, and
-    the pairs that still exist. The pairs of a copied node were on the rank of its parent, and are on the rank of its
-    own owner from now on.
+    """Copies the state of the scene ``old`` to ``now``, which is not connected yet: lines, broad-phase flags, and the
+    pairs that still exist. The pairs of a copied node were on the rank of its parent, and are from now on on the rank
+    that owns the copy.
     """
     slots, faces = _numbers(now.surface_nodes.id, old.surface_nodes.id), _numbers(now.faces.id, old.faces.id)
     edges = _numbers(now.edges.names, old.edges.names)
@@ -94,7 +97,7 @@ def carry(now: Scene, old: Scene) -> None:
 
 
 def _numbers(now: Ints, old: Ints) -> Indices:
-    """Rows of the names ``old`` in ``now``, -1 for those that are missing."""
+    """Returns the row of each name of ``old`` in ``now``, -1 for a name that is missing."""
     order = np.argsort(now, kind="stable")
     at = places(now[order], old)
     return np.where(at >= 0, order[at], -1).astype(np.int32) if len(order) else at
@@ -140,7 +143,9 @@ def _node_face(scene: Scene, nodes: Flags, faces: Flags, flight: _Flight) -> Ind
 
 
 def _edge_edge(scene: Scene, edges: Flags, flight: _Flight) -> Indices:
-    """(p, 2) edges of which one has changed, that of lower rank first; its rank has the pair."""
+    """Returns pairs of edges (p, 2) of which at least one has changed. The edge of lower rank is first, and the pair is
+    computed on the rank that has this edge.
+    """
     of = np.ascontiguousarray(scene.edges.corners[:, :2]), 0.5 * (scene.rules.skin + scene.edges.deep)
     allowed, rank = scene.rules.allowed, scene.edges.rank
     changed, others = (Primitives(*of, _rows(some)) for some in (edges, scene.edges.live & ~edges))

@@ -1,8 +1,8 @@
 """Candidate pairs: nodes and faces, edges and edges, that may be in contact before the next search.
 
-All nodes are extrapolated over a time, the horizon, and two primitives are candidates when their paths come closer
-than their reach. A candidate list is valid until the horizon has passed or a node has departed from its path by half
-the skin; so a body in free flight uses no skin, for any speed. The list may contain pairs that are not needed, but
+All nodes are extrapolated over a time, the horizon, and two primitives are candidates when their paths come closer than
+their reach. A candidate list is valid until the horizon has passed or a node has departed from its path by half the
+skin; so free flight at a constant velocity uses none of the skin. The list may contain pairs that are not needed, but
 misses none.
 """
 
@@ -17,8 +17,8 @@ from . import buckets
 from .buckets import TABLE, bucket_at, bucket_of
 
 _FEW, _SAMPLE = 8, 256
-"""Ratio of the numbers of large and small primitives from which on larger cells are faster; number of boxes of which
-the size of cells is computed."""
+"""Ratio of the numbers of large and small primitives above which larger cells are faster; and size of the sample of
+boxes from which the size of the cells is computed."""
 
 
 @dataclass
@@ -28,13 +28,13 @@ class Primitives:
     corners: Indices
     """(n, k) rows of their nodes."""
     reach: Floats
-    """(n,) distance from the hull of the corners within which others are found, m."""
+    """(n,) reach, m: distance from the hull of the corners within which other primitives are candidates."""
     some: Indices | None = None
-    """(m,) rows to be searched; None for all."""
+    """(m,) rows of the primitives to be searched; None for all."""
 
     @property
     def searched(self) -> Indices:
-        """(m,) rows to be searched."""
+        """(m,) rows of the primitives to be searched."""
         return np.arange(len(self.corners), dtype=np.int32) if self.some is None else self.some
 
 
@@ -47,7 +47,9 @@ class Boxes:
 
     @property
     def hull(self) -> Floats:
-        """(6,) lowest corner and minus the highest of them all; infinities without boxes."""
+        """(6,) lowest corner of all boxes, and minus the highest corner of all boxes; infinities if there are no
+        boxes.
+        """
         return np.asarray(_hull(self.low, self.high))
 
     def touching(self, hull: Floats) -> Flags:
@@ -189,7 +191,7 @@ class Sought(NamedTuple):
     corners: Indices
     """(n, k) slots of all primitives."""
     some: Indices
-    """(m,) rows of the searched ones."""
+    """(m,) rows of the searched primitives."""
     rank: Ints
     """(n,) rank: in a pair the small primitive has the lower rank; (0,) for any order."""
 
@@ -235,7 +237,7 @@ def _ask(out, n, asked, table, small, large, part, allowed):  # type: ignore[no-
     every, others = small.some, large.some
     first, last = np.empty(3, np.int64), np.empty(3, np.int64)
     for at in range(asked, len(others)):
-        before, cells = n, 1  # the cells of its box
+        before, cells = n, 1  # loop over the cells of the box of the large primitive
         for i in range(3):
             first[i] = bucket_of(box_low[at, i], origin[i], inverse, shape[i])
             last[i] = bucket_of(box_high[at, i], origin[i], inverse, shape[i])
@@ -252,22 +254,22 @@ def _ask(out, n, asked, table, small, large, part, allowed):  # type: ignore[no-
                         bucket = bucket_at(code, bits)
                         begin, end = np.int64(start[bucket]), np.int64(start[bucket + 1])
                     apart = end - begin
-                    if x == first[0] and y == first[1] and z == first[2]:  # once: boxes without entries
+                    if x == first[0] and y == first[1] and z == first[2]:  # first cell: add the unentered boxes
                         end += len(every) if alone else len(wide)
                     for p in range(begin, end):
                         if p - begin < apart:
-                            if codes[p] != code:  # 1
+                            if codes[p] != code:  # condition 1, listed above
                                 continue
                             b = things[p]
                         else:
                             b = p - begin if alone else wide[p - begin - apart]
-                        if few_low[b, 0] > box_high[at, 0] or few_low[b, 1] > box_high[at, 1]:  # 2
+                        if few_low[b, 0] > box_high[at, 0] or few_low[b, 1] > box_high[at, 1]:  # condition 2
                             continue
                         if few_low[b, 2] > box_high[at, 2] or few_high[b, 0] < box_low[at, 0]:
                             continue
                         if few_high[b, 1] < box_low[at, 1] or few_high[b, 2] < box_low[at, 2]:
                             continue
-                        if p - begin < apart:  # 3
+                        if p - begin < apart:  # condition 3, listed above
                             if bucket_of(max(few_low[b, 0], box_low[at, 0]), origin[0], inverse, shape[0]) != x:
                                 continue
                             if bucket_of(max(few_low[b, 1], box_low[at, 1]), origin[1], inverse, shape[1]) != y:
@@ -275,9 +277,9 @@ def _ask(out, n, asked, table, small, large, part, allowed):  # type: ignore[no-
                             if bucket_of(max(few_low[b, 2], box_low[at, 2]), origin[2], inverse, shape[2]) != z:
                                 continue
                         i, j = every[b], others[at]
-                        if len(rank) > 0 and rank[i] >= order[j]:  # 4
+                        if len(rank) > 0 and rank[i] >= order[j]:  # condition 4, listed above
                             continue
-                        if not allowed[part[few[i, 0]], part[many[j, 0]]] or _meet(few, many, i, j):  # 5
+                        if not allowed[part[few[i, 0]], part[many[j, 0]]] or _meet(few, many, i, j):  # condition 5
                             continue
                         if n == len(out):
                             return before, at

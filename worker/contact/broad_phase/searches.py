@@ -1,4 +1,4 @@
-"""Searches of all ranks: their schedule, their horizon, and the scene that they make."""
+"""Searches of all ranks: schedule, horizon, and the scene that results from a search."""
 
 import math
 from functools import cached_property
@@ -27,41 +27,41 @@ from . import registration
 from .extrapolation import courses
 
 _SHORTEST = 10.0
-"""Least horizon of a search, in steps; at most twice the steps since the last search."""
+"""Smallest horizon of a search, in steps. The horizon is also at most twice the number of steps since the last
+search."""
 _LONGEST = 80.0
-"""Largest horizon where bodies break, in steps: with 300 steps the pairs between fragments cost a quarter more than
-the searches that they save (docs/performance/bench.md, the bar to 40 us).
-"""
+"""Largest horizon of a search, in steps, if bodies break. With 300 steps the additional pairs between fragments
+would cost a quarter more than the searches that are saved (docs/performance/bench.md, the bar to 40 us)."""
 _AHEAD = 2.0
-"""Steps before the end of the horizon at which the next search is scheduled: the second is the one for which the
-narrow phase detects contacts ahead.
-"""
+"""Number of steps before the end of the horizon at which the next search is scheduled. The second of these steps is
+needed because the narrow phase also detects the contacts of the step after the present one."""
 _LEAST = 3.0 + _AHEAD
-"""Least remaining horizon, in steps, with which a search keeps the candidates of the last one: with less the next
-search would follow at once. Chosen: one more than that, and one for a step that grows.
-"""
+"""Smallest remaining horizon, in steps, for which the candidates of the last search are kept; with a shorter one the
+next search would follow immediately. Chosen value: three steps more than _AHEAD; one of the three allows for a time
+step that increases."""
 
 
 class Searches:
-    """Scene of a rank, and the searches that renew it."""
+    """Scene of a rank, and the searches that replace the scene."""
 
     def __init__(
         self, case: Case, model: Model, neighbours: list[Neighbour], exterior: Exterior, comm: Comm, clock: Clock
     ) -> None:
-        """Begins without a scene."""
+        """Creates the searches without a scene."""
         self._case, self._model, self._neighbours, self._exterior = case, model, neighbours, exterior
         self._comm, self._clock = comm, clock
         self.mu = part_pairs.friction(case)
         """(parts, parts) Coulomb's coefficient, NaN where two parts may not be in contact."""
         self.scene: Scene | None = None
         self.due = True
-        """Whether the next step begins with a search."""
+        """True if the next step begins with a search."""
         self.many = 0
         """Number of searches so far."""
         self._last = -math.inf
-        """Step of the last search from nothing."""
+        """Number of the step of the last complete search."""
         self._kept: tuple[Ints, Floats] = np.zeros((0, 2), np.int64), np.zeros((0, 4))
-        """Pairs and their stored impulses, from before a repartition or a restart, for the next search."""
+        """Pairs with their stored impulses, from before a repartition or a restart; the next search assigns the
+        impulses to the new pairs."""
 
     @cached_property
     def rubs(self) -> bool:
@@ -131,8 +131,8 @@ class Searches:
         self.many += 1
 
     def _laid_out(self, nodes: Nodes, goes_on: bool) -> Scene:
-        """Lays out the present surface, without pairs; with ``goes_on`` for the remaining horizon of the last search
-        from nothing, else for a new one. Collective.
+        """Lays out the present surface, without pairs; with ``goes_on`` for the remaining horizon of the last complete
+        search, else for a new horizon. Collective.
         """
         clock, motion = self._clock, self._exterior.motion
         self._exterior.refresh(self._courses(nodes), clock.t)
@@ -157,8 +157,8 @@ class Searches:
         follower.settle(self._neighbours, self._comm)
 
     def foresee(self, *, anew: bool = False) -> None:
-        """Adds the faces of cracks that may open soon to the broad phase of all ranks that have them. ``anew``: also
-        those already in it, after a search. Collective.
+        """Adds the faces of cracks that may open soon to the broad phase of all ranks that have them. ``anew``: True
+        after a search, when the faces that were already in the broad phase are added again. Collective.
         """
         now, cracks = self.scene, self._exterior.cracks
         if now is None or not self._case.fractures:
@@ -192,6 +192,6 @@ class Searches:
         return np.asarray((places >= 0) & now.slots.total[places].any(axis=1))
 
     def free(self) -> None:
-        """Releases the messages of MPI."""
+        """Frees the persistent MPI messages."""
         if self.scene is not None:
             self.scene.free()

@@ -1,11 +1,11 @@
 """Swept filter: removes candidate pairs whose boxes touch but which stay apart over the horizon.
 
-A box round a face or an edge is much larger than the primitive. A pair of edges is removed when one direction
-separates them all the time. For a node and a face, the height over the face and the distances from its sides are
-computed at the beginning, middle and end of the horizon. Each is nearly a parabola in time: between two of these
-moments it deviates by an eighth of its second difference, of which twice is allowed for. A pair is removed only when
-one and the same measure excludes it all the time, by the skin and the depth of contacts; so a pair that no measure
-excludes at the beginning stays.
+A box round a face or an edge is much larger than the primitive. A pair of edges is removed if a single direction
+separates the two edges over the whole horizon. For a node and a face, the height over the face and the distances from
+its sides are computed at the beginning, middle and end of the horizon. Each is nearly a parabola in time: between two
+of these moments it deviates from the straight line by an eighth of its second difference; the filter allows for twice
+that deviation. A pair is removed only if a single measure excludes contact over the whole horizon, with the skin and
+the depth of contacts as margin. A pair that no measure excludes at the beginning is therefore kept.
 """
 
 import numpy as np
@@ -37,7 +37,9 @@ def edges(
 
 @njit("float64(float64, float64, float64)", cache=True)
 def _least(f, g, h):  # type: ignore[no-untyped-def]
-    """Lower bound of a function with the values f, g and h at beginning, middle and end."""
+    """Returns a lower bound of a function with the values f, g and h at the beginning, middle and end of the
+    horizon.
+    """
     return min(f, g, h) - 0.25 * abs(f - 2.0 * g + h)
 
 
@@ -87,7 +89,7 @@ def _near_faces(pairs, faces, size, x, v, part, skin, horizon):  # type: ignore[
 
 @njit(f"boolean({VECTOR}, {VECTOR}, {VECTOR}, {VECTOR}, {VECTOR}, float64)", cache=True)
 def _beyond(axis, a, b, c, d, far):  # type: ignore[no-untyped-def]
-    """Whether the segment cd lies further beyond ab than ``far``, along ``axis``."""
+    """Returns True if the segment cd lies further from ab than ``far`` in the direction of ``axis``."""
     one, two = max(dot(axis, a), dot(axis, b)), min(dot(axis, c), dot(axis, d))
     return two - one > far * np.sqrt(dot(axis, axis))
 

@@ -2,7 +2,7 @@
 
 Bodies may overlap without a node of one inside of the other (``inside``): by their edges, or face on face. Every tet
 with a corner on the surface, or with a separated corner, is cut by all tets of parts that may be in contact with its
-own and that have no node in common with it; in a part that breaks, except those of the same fragment. The common
+own and that have no node in common with it; in a part that breaks, tets of the same fragment are excluded. The common
 volume of two tets is their intersection, exact except for rounding. Tets of other ranks are exchanged by bounding
 boxes, so that no cut of the domain changes the result.
 """
@@ -23,35 +23,37 @@ from ..stage import Contact
 from .inside import outermost
 
 LARGE = 0.1
-"""Share of the volume of a tet: tets with more of it in others are counted. Chosen: curved bodies of flat facets
-that touch have a hundredth in common."""
+"""A tet is counted if a larger share of its volume lies in other tets. Chosen value: where curved bodies of flat
+facets touch, their tets have about a hundredth of the volume in common."""
 _SHARED, _MOST = 0.01, 0.5
-"""Limits of the warning: common volume over the volume of all these tets, like the lines of the ledger, and over
-that of one of them. Chosen."""
+"""Limits of the warning: common volume over the volume of all tets that were cut, and the largest common volume of
+one tet over the volume of that tet. Chosen values; the first is equal to the limit of the lines of the ledger."""
 _WORDS = 19
-"""Words of a tet in a message: its id, its fragment, its part, its nodes' ids and the words of their positions."""
+"""Number of words of a tet in a message: its id, its fragment, its part, its nodes' ids and the words of their
+positions."""
 _QUANTUM = 2.0**-40
-"""Quantum of the shares of a tet, of its volume: their sum does not depend on their order."""
+"""Quantum of the common volumes of a tet, as a share of its volume. Sums of quanta do not depend on the order of
+summation."""
 _PIECES = 81
 """Largest number of pieces of a tet after four cuts by planes, each into at most three."""
 
 
 @dataclass(frozen=True)
 class CommonVolume:
-    """Result, equal on all ranks."""
+    """Result of the check, equal on all ranks."""
 
     tets: int
     """Number of tets that were cut."""
     large: int
-    """Number of those with more than LARGE of their volume in others."""
+    """Number of tets with more than the share LARGE of their volume in other tets."""
     largest: float
-    """Largest share of the volume of one tet in others."""
+    """Largest share of the volume of one tet that lies in other tets."""
     share: float
-    """Share of the volume of all of them in others."""
+    """Share of the volume of all tets that were cut that lies in other tets."""
 
     @property
     def warnings(self) -> list[str]:
-        """One line if the common volume is above the limits."""
+        """Returns a warning of one line if the common volume is above the limits."""
         if self.share <= _SHARED and self.largest <= _MOST:
             return []
         return [
@@ -130,13 +132,15 @@ def _corners(received: Ints) -> Floats:
 
 
 def _volumes(corners: Floats) -> Floats:
-    """(n,) volumes of tets (n, 4, 3), m^3; 0 for inverted ones."""
+    """(n,) volumes of tets (n, 4, 3), m^3; 0 for inverted tets."""
     return np.asarray(np.maximum(np.linalg.det(corners[:, 1:] - corners[:, :1]) / 6.0, 0.0))
 
 
 @njit("float64(float64[:, :], int64, int64, int64, float64[:, :], int64)", cache=True)
 def _triple(tet, a, b, c, other, k):  # type: ignore[no-untyped-def]
-    """Six times the volume, m^3, of the tet of three corners of one and corner ``k`` of another."""
+    """Six times the volume, m^3, of the tet whose corners are three corners of one tet and corner ``k`` of another
+    tet.
+    """
     start = at(tet, a)
     return dot(cross(minus(at(tet, b), start), minus(at(tet, c), start)), minus(at(other, k), start))
 
@@ -154,7 +158,7 @@ def _height(tet, face, other, k):  # type: ignore[no-untyped-def]
 
 @njit("boolean(float64[:, ::1], float64[:, ::1])", cache=True)
 def _apart(one, other):  # type: ignore[no-untyped-def]
-    """Whether a tet lies entirely behind a face of another."""
+    """Returns True if a tet lies entirely on the outer side of a face of another tet."""
     for face in range(4):
         behind = True
         for k in range(4):
@@ -200,7 +204,7 @@ def _in_front(out, n, tet, height, wedge, order):  # type: ignore[no-untyped-def
     if before == 0:
         return n
     for k in range(before):
-        if before == 2:  # an edge of the tet joins the ends of the wedge
+        if before == 2:  # an edge of the tet joins the two end triangles of the wedge
             wedge[3 * k] = tet[order[k]]
             _meet(wedge[3 * k + 1], tet, height, order[k], order[2])
             _meet(wedge[3 * k + 2], tet, height, order[k], order[3])

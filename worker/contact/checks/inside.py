@@ -3,11 +3,11 @@ from, whether that part is in contact with itself or not.
 
 A node in a tet of another fragment has passed through that body's surface. Its depth is computed from the tet alone:
 below the nearest exposed face of the tet; in a tet without exposed face but with a corner on the surface, below the
-nearest of all its faces; and at most the distance from such a corner. In a tet without a corner on the surface the
-node is deeper than the outermost layer, unless that layer has been compressed to nearly nothing: then the nearest
-exposed faces of the body decide. A node on an edge between two corners on the surface counts as touching, because a
-tet with an edge on the surface may have no exposed face there; this includes edges that run through a plate of one
-tet. Nodes of the surface and separated nodes are tested against the tets of all ranks, so that no cut changes the
+nearest of all its faces; and at most the distance from such a corner. In a tet without a corner on the surface the node
+is deeper than the outermost layer, unless that layer has been compressed to nearly nothing: then the nearest exposed
+faces of the body decide. A node on an edge between two corners on the surface counts as touching, because a tet with an
+edge on the surface may have no exposed face there; this includes edges that run through a plate of one tet. Nodes of
+the surface and separated nodes are tested against the tets of all ranks, so that the partition does not change the
 result.
 """
 
@@ -26,13 +26,14 @@ from ..stage import Contact
 from .overlap import to_borders
 
 SLIGHT = 0.05
-"""Share of the typical size of a face: smaller depths count as 0. Chosen: above the residual of the sweeps."""
+"""Depth over the typical size of a face; smaller depths count as 0. Chosen value: it is above the residual of the
+contact sweeps."""
 _WORDS = 5
-"""Words of a node in a message."""
+"""Number of words of a node in a message."""
 _ROUNDING = 1e-9
-"""Tolerance of the volume coordinates: a node on a face between two tets is in both."""
+"""Tolerance of the volume coordinates. With it a node on the face between two tets is in both tets."""
 DEEP = 0.25
-"""Share of the typical size of a face: depth from which on there is a warning. Chosen: about half of the altitude of
+"""Depth over the typical size of a face above which there is a warning. Chosen value: about half of the altitude of
 a regular tet."""
 
 
@@ -43,19 +44,20 @@ class Inside:
     tested: int
     """Number of nodes tested."""
     nodes: int
-    """Number of those inside of another body or fragment, or without tets and inside of their own part, deeper than
-    SLIGHT."""
+    """Number of nodes deeper than SLIGHT inside of another body or fragment; for nodes without tets, also inside of
+    their own part."""
     own: int
-    """Number of these without tets that are inside of their own part only."""
+    """Number of penetrated nodes without tets that are inside of their own part only."""
     buried: int
-    """Number of these in tets without a corner on the surface, further than SLIGHT from any exposed face of their
-    body."""
+    """Number of penetrated nodes that lie in a tet without a corner on the surface, further than SLIGHT from any
+    exposed face of the body of that tet."""
     deepest: float
-    """Largest depth of the others, in typical sizes of a face; 0 if no node is deeper than SLIGHT."""
+    """Largest depth of the penetrated nodes that lie in a tet with a corner on the surface, in typical sizes of a
+    face; 0 if no node is deeper than SLIGHT."""
 
     @property
     def warnings(self) -> list[str]:
-        """One line if a node is deeper than DEEP."""
+        """Returns a warning of one line if a node is deeper than DEEP."""
         if not self.buried and self.deepest <= DEEP:
             return []
         how = [f"{self.own} of them, without tets, into the part that they come from"] if self.own else []
@@ -116,11 +118,11 @@ class _Seen(NamedTuple):
     """Tested nodes; equal on all ranks."""
 
     part: Indices
-    """(k,)."""
+    """(k,) part of each node."""
     fragment: Ints
-    """(k,) fragment, -1 for a node without tets."""
+    """(k,) fragment of each node, -1 for a node without tets."""
     x: Floats
-    """(k, 3) position, m."""
+    """(k, 3) position of each node, m."""
 
 
 def _seen(outer: Flags, model: Model, fragments: list[Ints], comm: Comm) -> _Seen:
@@ -128,7 +130,7 @@ def _seen(outer: Flags, model: Model, fragments: list[Ints], comm: Comm) -> _See
     nodes = model.nodes
     some = nodes.owned & outer
     received = comm.join(np.column_stack([nodes.id, nodes.part, nodes.x.view(np.int64)])[some]).reshape(-1, _WORDS)
-    here = np.full(nodes.n + 1, -1, np.int64)  # the last entry is for nodes that this rank does not hold
+    here = np.full(nodes.n + 1, -1, np.int64)  # the last entry is for nodes that are not on this rank
     for block, fragment in zip(model.blocks, fragments, strict=True):
         here[block.tets] = fragment[:, None]
     known = here[nodes.places(received[:, 0])].astype(np.float64)

@@ -1,5 +1,6 @@
-"""Overlap of bodies before the first step: its place and depth, its removal by moving nodes, and the failure of
-that."""
+"""Overlap of bodies before the first step: finds place and depth of an overlap, removes the overlap by moving nodes,
+and reports an error if an overlap remains.
+"""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -15,17 +16,19 @@ from ..narrow_phase.facing import FACING
 _INSIDE = 1e-9
 """Tolerance of the volume coordinates of a node inside of a tet."""
 _ROUNDING = 1e-6
-"""Share of the size of a face: smaller depths count as 0."""
+"""Depth over the size of a face; smaller depths count as 0."""
 _TRIES = 30
-"""Largest number of passes in which overlapping bodies are moved apart. Chosen."""
+"""Largest number of passes in which overlapping bodies are moved apart. Chosen value."""
 
 
 _THROUGH = 0.1
-"""Share of the size of a face: an edge passes through a face if its ends are further in front of it and behind it
-than this, and the crossing point is further from the sides than this share of their heights. Rims, and facets of two
-round bodies that fit, overlap by less. Chosen."""
+"""Tolerance of the crossing of an edge and a face. An edge passes through a face if its two ends are further than
+this share of the size of the face from the plane of the face, on opposite sides, and the crossing point is further
+from each side of the face than this share of the altitude on that side. Rims, and facets of two round bodies that
+fit, overlap by less. Chosen value."""
 _CRUSHED = 0.1
-"""Share of its volume: a tet that keeps less was compressed too much. Chosen."""
+"""Smallest volume of a tet after the move over its volume before; a tet with less has been compressed too much.
+Chosen value."""
 
 
 @dataclass(frozen=True)
@@ -33,11 +36,11 @@ class Surface:
     """Exposed faces of all parts."""
 
     faces: Indices
-    """(f, 3) nodes of the mesh."""
+    """(f, 3) nodes of each face in the mesh."""
     part: Indices
-    """(f,)."""
+    """(f,) part of each face."""
     exposed: Flags
-    """(tets, 4) which faces of the tets these are."""
+    """(tets, 4) True for the faces of tets that are exposed."""
 
 
 @dataclass(frozen=True)
@@ -95,7 +98,7 @@ def move_apart(
 
 
 def crushed(before: Floats, after: Floats, tets: Indices) -> Indices:
-    """Tets that have less than a tenth of their volume after the move, or are inverted."""
+    """Returns the tets that have less than a tenth of their volume after the move, or are inverted."""
     had = _volumes(before[tets])
     return np.flatnonzero((had > 0.0) & (_volumes(after[tets]) < _CRUSHED * had)).astype(np.int32)
 

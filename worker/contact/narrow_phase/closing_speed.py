@@ -1,4 +1,6 @@
-"""Closing speed of active contacts: the bound of the next step, so that no node passes too much of a tet in it."""
+"""Closing speed of active contacts, which bounds the next time step: no node may pass more than a fixed share of a tet
+in one step.
+"""
 
 import numpy as np
 

@@ -1,14 +1,14 @@
 """Contact of separated nodes with the faces at their former corner.
 
 When a node separates into three or more pieces, a copy has a twin across a facet only if their two pieces have that
-facet in common. With the other pieces it has an edge or the node alone in common, and at the moment of separation it
-lies on all their sides (faces of broken facets that are not surface yet), with a gap of zero. The position at the end
-of the step decides which side it would enter: the nearest one above it with its foot on the side
-(docs/theory/fracture.md, "Contact").
+facet in common. With the other pieces the copy has only an edge or the node in common. At the moment of separation the
+copy lies on all sides of these pieces (faces of broken facets that are not surface yet), with a gap of zero. The
+position of the copy at the end of the step decides which side the copy would enter: the nearest side above the copy
+that contains the foot of the copy (docs/theory/fracture.md, "Contact").
 
-The corners of such narrow sides are processed by family. The positions of each member relative to all corners of its
-family are computed in loops over rows of a few kilobytes, which the compiler vectorizes; few corners pass and are
-tested on their own.
+The corners of such narrow sides are processed by family (all copies of one original node). The positions of each member
+relative to all corners of its family are computed in loops over rows of a few kilobytes, which the compiler vectorizes;
+the few corners that pass are then tested one by one.
 """
 
 from typing import NamedTuple
@@ -41,7 +41,7 @@ from .corner_rows import (
 from .tables import CONTACT_ROWS, DEEP_SELF, STEP, needed
 
 _SOON, _NEXT = 16, 8
-"""Distances of the prefetches, in corners: of the numbers of the nodes of a side, and of their positions."""
+"""Prefetch distances, in corners: for the numbers of the nodes of a side, and for the positions of these nodes."""
 _LATER = np.array([0, 1, 2, 0, 1])
 """Corners of a side in cyclic order."""
 _I, _F, _F1, _F2 = types.int64, types.float64, types.float64[::1], types.float64[:, ::1]
@@ -49,7 +49,7 @@ _N1, _N2, _N3 = types.int32[::1], types.int32[:, ::1], types.int32[:, :, ::1]
 
 
 class NarrowSides(NamedTuple):
-    """Cracks, and the block of tets at their sides."""
+    """Cracks, and the block of tets whose faces are the sides of the cracks."""
 
     cracks: Indices
     """(m, 6) local nodes of all cracks."""
@@ -147,7 +147,7 @@ def _pushed_out(out, step, first, stop):  # type: ignore[no-untyped-def]
             continue
         every = out.weights[r, 0] + out.weights[r, 1] + out.weights[r, 2]
         w, w_f, w_g = -out.weights[r, 0] / every, -out.weights[r, 1] / every, -out.weights[r, 2] / every
-        if w_f == 0.0:  # two equal slots in the middle are a row of two nodes
+        if w_f == 0.0:  # two equal slots in the middle mark a contact of two nodes
             f, w_f, g, w_g = g, w_g, f, w_f
         if w_f == 0.0:
             f, w = a, -1.0
@@ -221,7 +221,7 @@ def entering(out, base, each, narrow, of, step, first, stop):  # type: ignore[no
     words, rest = flags.view(np.uint64), np.empty((MANY, 3), np.int32)
     for family in range(first, stop):
         kind = part[place[members[begin[family]]]]
-        if not mu[kind, kind] >= 0.0:  # 1
+        if not mu[kind, kind] >= 0.0:  # condition 1, listed above
             continue
         for head in range(start[family], start[family + 1], MANY):
             many = min(start[family + 1] - head, MANY)
@@ -233,7 +233,7 @@ def entering(out, base, each, narrow, of, step, first, stop):  # type: ignore[no
             for member in range(begin[family], begin[family + 1]):
                 d = place[members[member]]
                 x, y, z = at(ahead, d)
-                under(flags, w, full * WORD, member, x, y, z)  # 2
+                under(flags, w, full * WORD, member, x, y, z)  # condition 2, listed above
                 for word in range(full):
                     if words[word] == 0:
                         continue
@@ -250,7 +250,7 @@ def entering(out, base, each, narrow, of, step, first, stop):  # type: ignore[no
                         opened = _opened(tets, across, bond, e, f, g)
                         if opened:
                             to_top = minus(at(ahead, place[tets[e, sides[c, h, 2]]]), o)
-                            if _beside(r, vector(w, INWARD, i), to_top, to_f, to_g, opened):  # 3
+                            if _beside(r, vector(w, INWARD, i), to_top, to_f, to_g, opened):  # condition 3
                                 continue
                         along_f, along_g = dot(to_f, r), dot(to_g, r)
                         w_f = max(w[GG + i] * along_f - w[FG + i] * along_g, 0.0) / w[SQUARE + i]
@@ -263,4 +263,4 @@ def entering(out, base, each, narrow, of, step, first, stop):  # type: ignore[no
                         n += 1
     if n > end:
         return n - begins
-    return _pushed_out(out, step, begins, n)  # 4
+    return _pushed_out(out, step, begins, n)  # condition 4, listed above

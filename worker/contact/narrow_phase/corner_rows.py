@@ -5,18 +5,20 @@ from ..geometry import VECTOR, cross, dot
 from ..surface.sharp import SHARP
 
 _BENT = 1.0 - SHARP * SHARP
-"""Square of the sine of the angle between two faces of a smooth surface: the limit of sharp edges."""
+"""Square of the sine of the largest angle between two neighbouring faces of a smooth surface, equal to the limit for
+sharp edges."""
 MANY = 64
-"""Number of corners in one block of rows: 10 kB, which stay in the first-level cache."""
+"""Number of corners in one block of rows. A block has 10 kB, which fit into the first-level cache."""
 WORD = 8
-"""Flags in a word, and numbers in the longest vector register."""
+"""Number of flags in a word, and number of float64 in the longest vector register."""
 CORNER, TO_F, TO_G, INWARD = (MANY * row for row in (0, 3, 6, 9))
-"""Rows of three components: the corner; from it to the ends of the other two edges of the side, clockwise seen from
-outside; the inward normal of the side."""
+"""First rows of vectors of three components: the position of the corner; the vectors from the corner to the other
+two nodes of the side, clockwise seen from outside; the inward normal of the side."""
 SQUARE, FF, GG, FG, TWIN = (MANY * row for row in (12, 13, 14, 15, 16))
-"""Rows: square of the normal, dot products of the two edges, and the number of the corner's twin among the members."""
+"""Rows of the square of the normal, of the dot products of the two edges, and of the number of the corner's twin
+among the members of the family."""
 ROWS = 17
-"""Number of rows."""
+"""Number of rows of a block."""
 _I, _F, _F1 = types.int64, types.float64, types.float64[::1]
 
 
@@ -54,8 +56,8 @@ def measure(w, n):  # type: ignore[no-untyped-def]
 def under(flags, w, n, member, x, y, z):  # type: ignore[no-untyped-def]
     """Flags those of the first ``n`` corners whose side is above the ``member`` at x, y, z, with its foot on the side.
 
-    A foot beyond an edge counts while a neighbouring face, bent by less than the angle of a sharp edge, would still
-    be above it; one behind the corner does not.
+    A foot beyond an edge still counts if a neighbouring face, at less than the angle of a sharp edge, could contain the
+    foot. A foot on the far side of the corner does not count.
     """
     for i in range(n):
         r = x - w[CORNER + i], y - w[CORNER + MANY + i], z - w[CORNER + 2 * MANY + i]

@@ -8,21 +8,20 @@ from ..geometry import at, cross, dot, half, minus, plus
 from .tables import CONTACT_ROWS, CRACK, DEEP_SELF, NEAR, STEP, needed
 
 _WIDE = 0.2
-"""Share of the typical size of a face: width from which on the sides of a crack are surface. At 0.1, 33 of 38
-searches in the first 500 steps of the glass bar are caused by cracks that open without having been included in a
-search; at 0.2, 2 of 32.
-"""
+"""Width of a crack over the typical size of a face from which on the sides of the crack are surface. With 0.1, 33 of
+the 38 searches in the first 500 steps of the glass bar are caused by cracks that open without having been included
+in a search; with 0.2, 2 of 32 searches."""
 _FORESEEN = 0.5
-"""Share of that width from which on the faces of a crack are in the broad phase, so that they have their pairs when
-it opens."""
+"""Share of the width _WIDE from which on the faces of a crack are in the broad phase, so that their candidate pairs
+exist when the crack opens."""
 _AHEAD = 8
-"""Distance of the prefetch of the nodes, in cracks."""
+"""Prefetch distance of the nodes, in cracks."""
 
 
 @njit("int64[::1](int32[:, ::1], float64[:, ::1], float64)", cache=True)
 def widening(cracks, x, typical):  # type: ignore[no-untyped-def]
-    """Rows of the ``cracks`` (m, 6), slots, that are so wide at the positions ``x`` (slots, 3) that their faces must
-    enter the broad phase; ``typical``: size of a face, m.
+    """Returns the rows of the ``cracks`` (m, 6), given by slots, that are so wide at the positions ``x`` (slots, 3)
+    that their faces must enter the broad phase; ``typical``: size of a face, m.
     """
     rows, n = np.empty(len(cracks), np.int64), 0
     for c in range(len(cracks)):
@@ -86,13 +85,13 @@ def across(out, base, opening, cracks, typical, step, first, stop):  # type: ign
         most = 0.0
         for k in range(3):
             p, q = cracks[c, k], cracks[c, 3 + k]
-            if p == q:  # 1
+            if p == q:  # condition 1, listed above
                 continue
             width = minus(at(x, q), at(x, p))
             most = max(most, dot(width, width))
             gap0, speed = dot(m, width), dot(m, minus(at(v, q), at(v, p)))
             gap1 = gap0 + dt * speed
-            if not (gap1 <= NEAR * size and gap0 >= -DEEP_SELF * size and mu[part[p], part[q]] >= 0.0):  # 2, 3
+            if not (gap1 <= NEAR * size and gap0 >= -DEEP_SELF * size and mu[part[p], part[q]] >= 0.0):  # items 2, 3
                 continue
             out.nodes[n, 0], out.nodes[n, 1], out.nodes[n, 2], out.nodes[n, 3] = q, p, p, p
             out.weights[n, 0], out.weights[n, 1], out.weights[n, 2], out.weights[n, 3] = 1.0, -1.0, 0.0, 0.0
@@ -100,7 +99,7 @@ def across(out, base, opening, cracks, typical, step, first, stop):  # type: ign
             out.wanted[n] = speed + needed(gap0, gap1, speed, step.give, dt)
             out.friction[n], out.pair[n] = mu[part[p], part[q]], CRACK - (3 * c + k)
             n += 1
-        if most >= (_WIDE * typical) ** 2:  # opens
+        if most >= (_WIDE * typical) ** 2:  # the crack opens
             opening[wide] = c
             wide += 1
     return n - base - 3 * first, wide - first

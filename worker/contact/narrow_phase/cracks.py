@@ -1,11 +1,11 @@
 """Contact across cracks.
 
-The two sides of a broken facet lie on each other, so no search is needed to find their contacts: from the moment of
-separation the nodes across, copies of one node, are in contact along the normal of the facet, from a gap of exactly
-zero. Anything else could reach the faces of a crack only by entering it, so they are not on the surface until they
-are a share of a facet's size apart. In the step in which they are, they open: faces, nodes and edges are on the
-surface from the next step on. The last search has included them, so that opening needs no search. However finely a
-body shatters, unmoved cracks cost no search.
+The two sides of a broken facet coincide, so no search is needed to find the contacts of the two sides. From the moment
+of separation, the two copies of a node on opposite sides are in contact along the normal of the facet, with an initial
+gap of exactly zero. Another body could reach the faces of a crack only by entering the crack. The faces are therefore
+not on the surface until the width of the crack is a fixed share of the size of a facet. In the step in which the width
+reaches this share, the crack opens: faces, nodes and edges are on the surface from the next step on. The last search
+has included these faces, so that opening needs no search. Cracks that do not widen never cause a search.
 """
 
 from dataclasses import dataclass, field
@@ -21,15 +21,15 @@ from ..surface.families import Corners, Families, by_family
 from ..surface.records import CrackSides
 
 AGE, _YOUNG = 16, 0.3
-"""Steps between two checks whether cracks become aged, and the share of young cracks from which on all do
-(docs/theory/contact.md, "Edges at cracks")."""
+"""Number of steps between two checks whether cracks become aged, and the share of young cracks above which all
+cracks become aged (docs/theory/contact.md, "Edges at cracks")."""
 _KEPT = 12
 """Columns of the stored impulses of a crack."""
 
 
 @dataclass
 class Cracks:
-    """Broken facets that are not surface yet, with a side on this rank."""
+    """Cracks: broken facets with a side on this rank whose sides are not surface yet."""
 
     faces: Ints
     """(m, 2) global ids of the sides, that of the smaller tet id first."""
@@ -45,12 +45,13 @@ class Cracks:
     """(m, 6) slots of the nodes; all -1 for a crack without separated nodes, and for one that another rank computes,
     that of the first side."""
     kept: Floats
-    """(m, 12) stored impulse of each of the three pairs of nodes across, times its row norm, zero where it was not
-    active: along the normal (1) and across (3), m/s; undefined for a crack that another rank computes."""
+    """(m, 12) stored impulse of each of the three pairs of nodes across, times the row norm of the pair, m/s: along
+    the normal (1) and across (3). Zero for a pair that was not active; undefined for a crack that another rank
+    computes."""
     families: Families
-    """Families of all local nodes."""
+    """Families (all copies of one original node) of all local nodes."""
     _corners: dict[int, Corners] = field(default_factory=dict)
-    """Corners by block, for reuse; empty after a change."""
+    """Corners of the narrow sides by block, kept until cracks or families change."""
 
     @classmethod
     def none(cls, ids: Ints) -> "Cracks":
@@ -99,9 +100,9 @@ class Cracks:
 
     @classmethod
     def resume(cls, table: Table, root: Ints, blocks: list[Block], nodes: Nodes) -> "Cracks":
-        """Builds cracks from a table by ascending key. The row of the first side is used if present: a rank that had
-        only the second side may have begun with another node, on which the last bit of a normal depends; and it has
-        not computed the crack, so it has no stored impulses.
+        """Builds cracks from the rows of a table, sorted by key. The row of the first side is used if present: a rank
+        that had only the second side may have the nodes in another order, which changes the last bit of a normal. Such
+        a rank has not computed the crack, so it has no stored impulses.
         """
         table = once(table, table["faces"][:, 0])
         faces = np.array(table["faces"])
@@ -130,8 +131,8 @@ class Cracks:
         return np.array([int((mine & ~self.aged).sum()), int(mine.sum())])
 
     def age(self, ages: Ints) -> bool:
-        """Makes all cracks aged if enough are young, by the ``ages`` of all ranks; returns whether it does. The
-        steps of searches have no influence: no answer depends on them.
+        """Makes all cracks aged if enough are young, by the ``ages`` of all ranks; returns True if the cracks became
+        aged. The steps of searches have no influence: no answer depends on them.
         """
         if due := bool(ages[0] > _YOUNG * ages[1]):
             self.aged[:] = True
@@ -158,8 +159,8 @@ class Cracks:
         self._corners = {}
 
     def open(self, faces: Ints, blocks: list[Block]) -> None:
-        """Makes surface of the cracks whose first sides are among ``faces``, ascending, and removes them from the
-        table: the last rows move into the gaps.
+        """Removes the cracks whose first sides are among ``faces``, ascending, from the table, because their sides are
+        now surface. The last rows are moved to the free rows.
         """
         rows = named(self.faces[:, 0], faces)
         sides = self.sides[rows].reshape(-1, 3)
@@ -182,7 +183,7 @@ class Cracks:
 
 @njit("int64[::1](int64[:], int64[::1])", cache=True)
 def named(ids, wanted):  # type: ignore[no-untyped-def]
-    """Rows of ``ids`` that are among the ascending ``wanted``."""
+    """Returns the rows of the ``ids`` that are among the ascending ``wanted``."""
     rows, n = np.empty(len(ids), np.int64), 0
     for i in range(len(ids)):
         at = np.searchsorted(wanted, ids[i])
@@ -194,8 +195,8 @@ def named(ids, wanted):  # type: ignore[no-untyped-def]
 
 @njit("int64[::1](int64[::1], int32[:, ::1], int32[:, :, ::1])", cache=True)
 def computed(rows, nodes, sides):  # type: ignore[no-untyped-def]
-    """Those of the cracks ``rows`` that this rank computes: with separated nodes, and with the first side on this
-    rank.
+    """Returns those cracks among ``rows`` that this rank computes: cracks with separated nodes whose first side is on
+    this rank.
     """
     some, n = np.empty(len(rows), np.int64), 0
     for c in rows:

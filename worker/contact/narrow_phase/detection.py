@@ -23,12 +23,14 @@ from .tables import FAST, Step, StepRoom
 from .tied import Tied
 
 _KINEMATIC = 2.0
-"""Inverse of the share of a tet's altitude that a node may pass in a step."""
+"""Inverse of the largest share of the altitude of a tet that a node may pass in a step."""
 _FACES, _EDGES, _CRACKS = 0, 1, 2
-"""Kinds of contacts (rows.py): node-face, edge-edge, across cracks; corner contacts have the kinds after these."""
+"""Numbers of the kinds of contacts (rows.py): node-face, edge-edge, across cracks. Corner contacts have the next
+numbers, one for each block."""
 _JOIN = 0.6
-"""Share of the distance at which a slot must be registered again: a rank registers slots beyond it when another rank
-has to register, so that ranks do not wait for each other in turn. No bit of the answer depends on it."""
+"""Share of the distance from its line at which a slot must be registered again. In a step in which one rank has to
+register slots, all other ranks register their slots beyond this share too, so that the ranks register in the same
+step and wait for each other only once. No bit of the answer depends on it."""
 
 
 @dataclass
@@ -37,12 +39,12 @@ class Detected:
 
     approach: float
     """Inverse of the step in which no node passes more than half of a tet with which it is in contact, or will be in
-    the next step, 1/s."""
+    contact in the next step, 1/s."""
     opening: Ints
     """Rows of the cracks that have become wide enough to open."""
     stray: bool
-    """Whether a slot will depart so far in the next step that it must be registered again; of any rank, after the
-    reduction of the step."""
+    """True if a slot will depart so far from its line in the next step that the slot must be registered again. After
+    the reduction of the step: true if this holds on any rank."""
 
     @classmethod
     def nothing(cls) -> "Detected":
@@ -52,21 +54,21 @@ class Detected:
 
 @dataclass(frozen=True)
 class Ahead:
-    """Time for which contacts are detected ahead."""
+    """Look-ahead time of the detection of contacts."""
 
     dt: float
-    """Length of the step, s."""
+    """Length of the time step, s."""
     most: float
-    """Longest step that may follow, s."""
+    """Largest length of the next time step, s."""
     size: float
     """Typical size of a face, m."""
     rebound: float
-    """See tables.Step."""
+    """Record of the step for kernels, see tables.Step."""
 
     def beyond(self, fastest: float) -> float:
-        """Returns the longest step that may follow if velocities that differ by up to ``fastest``, m/s, may close a
-        distance of FAST of a face in it; else 0. No slower pair bounds a step, so that ranks with slow nodes only need
-        no data of others.
+        """Returns the largest length of the next step, s, if velocities that differ by up to ``fastest``, m/s, may
+        close a distance of FAST of a face in it; else 0. Slower pairs cannot limit a step, so ranks that have only slow
+        nodes need no data of other ranks.
         """
         return self.most if fastest * self.most > FAST * self.size else 0.0
 
@@ -76,7 +78,7 @@ class Detection:
 
     def __init__(self, team: Team) -> None:
         self.tied: Tied | None = None
-        """Bonds of the scene."""
+        """Tied bonds of the slots of the scene."""
         self.found = Detected.nothing()
         """Results of the last step on this rank."""
         pairs, some = PAIRS_OF_A_TASK, CONTACTS_OF_A_TASK
@@ -92,7 +94,7 @@ class Detection:
         self._deviation = Deviation(team)
         self._scratch = StepRoom()
         self._rows_of_corner = 1
-        """Rows for each corner of a narrow side, in the mean of a task."""
+        """Number of rows reserved for each corner of a narrow side, on average over a task."""
 
     def take(self, now: Scene, nodes: Nodes) -> None:
         """Copies positions and velocities of local nodes to the scene."""
@@ -112,9 +114,9 @@ class Detection:
     ) -> Detected:  # fmt: skip
         """Detects the active contacts of the step from positions and velocities of the scene's nodes.
 
-        ``surface``: of this rank; ``mu`` (parts, parts): friction, NaN where two parts may not be in contact;
-        ``give``: see tables.PUSH_OUT; ``redraw``: whether short lines begin anew (reference_motion.py);
-        ``together``: whether any rank registers slots that have departed.
+        ``surface``: of this rank; ``mu`` (parts, parts): friction, NaN where two parts may not be in contact; ``give``:
+        see tables.PUSH_OUT; ``redraw``: True if new short lines begin in this step (reference_motion.py); ``together``:
+        True if any rank registers departed slots in this step.
         """
         surface_nodes, reference = now.surface_nodes, now.reference
         beyond = ahead.beyond(self._spread(surface_nodes.v))
@@ -145,8 +147,8 @@ class Detection:
         return spread(boxes)
 
     def _renewed(self, now: Scene, together: bool) -> bool:
-        """Registers what has to be; returns whether a slot will depart too far in the next step, by linear
-        extrapolation.
+        """Registers the slots that must be registered; returns True if a slot will depart too far in the next step, by
+        linear extrapolation.
         """
         of, reference = now.surface_nodes, now.reference
         most, before = 0.5 * now.rules.skin, reference.strayed

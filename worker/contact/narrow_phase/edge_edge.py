@@ -1,7 +1,7 @@
 """Narrow phase of sharp edges: contacts of the step ahead, and deactivation of distant pairs.
 
-Edges are in contact where they cross, except at their ends: these are nodes, in contact with faces. The end of an
-edge that lies on another edge slides along a surface.
+Two edges are in contact where they cross, except near their ends: an end is a node, and nodes are in contact with
+faces.
 """
 
 import numpy as np
@@ -12,29 +12,32 @@ from ..geometry import VECTOR, at, beyond, cross, distance, dot, lowest_height, 
 from .tables import CONTACT_ROWS, DEEP, DEEP_SELF, EDGES, NEAR, PAIRS, STEP, bonded, needed
 
 _PARALLEL = 1e-3
-"""Sine of the angle below which a pair of edges is left to nodes and faces. Ridges could pass each other through a
-gap as wide as this share of an edge; the crossing point of edges is accurate to 1e-10 of them at this angle."""
+"""Sine of the smallest angle between two edges in edge-edge contact; at smaller angles only nodes and faces are in
+contact. Nearly parallel ridges could penetrate by this share of the length of an edge. At this angle the crossing
+point is accurate to 1e-10 of the length of an edge."""
 _END = 1e-4
-"""Share of the length of an edge at its ends without edge-edge contact: a node there is in contact with faces.
-Chosen: a tenth of MARGIN, by which the foot of a node may lie outside of a face, so that the edge holds what slides
-over a rim until the node does."""
+"""Share of the length of an edge, at each end, in which the edge has no edge-edge contact, because the node at the
+end is in contact with faces. Chosen value: a tenth of MARGIN, the distance by which the foot of a node may lie
+outside of a face. When an edge slides over a rim, edge-edge contact therefore ends only after the contact of the
+node has begun."""
 _FLUSH = 0.05
-"""Sine of the angle by which the normal of a contact may lie outside of the sector of the faces' normals: edges of
-faces that lie on each other cross there, a little to either side. Chosen with fragments that are pressed together
-(docs/theory/contact.md, "Face on face")."""
+"""Sine of the largest angle by which the normal of a contact may lie outside of the sector between the normals of
+the two faces. Where faces lie on each other, their edges cross with normals slightly outside of this sector. Chosen
+value, by tests of fragments that are pressed together (docs/theory/contact.md, "Face on face")."""
 _ROUND = 0.01
-"""Share of the length of an edge, added to the distance of contact for rounding."""
+"""Tolerance for rounding, as a share of the length of an edge; it is added to the distance of contact."""
 _WORTH = 0.02
-"""Share of the length of an edge: a pair with less slack is tested in every step, which is cheaper than to compute
-the slack."""
+"""Smallest slack, as a share of the length of an edge, for which a pair is deactivated. Pairs with less slack are
+tested in every step, which takes less time than the computation of the slack."""
 _STRETCH = 0.1
 """Largest motion of ends relative to each other, over the lengths of two edges, for which the bounds of
 ``beyond_ends`` hold."""
 _SPARE = 0.006
-"""Like _WORTH, for pairs that cross beyond an end. Chosen: ends of edges in shattering glass depart from their short
-lines by a fifth of that."""
+"""Smallest slack, as a share of the length of an edge, for which a pair of edges that cross beyond an end is
+deactivated (see _WORTH). Chosen value: in shattering glass the ends of edges depart from their short lines by a
+fifth of this value."""
 _SOON, _NEXT = 16, 8
-"""Distances of the prefetches, in pairs: of the numbers of the ends, and of their positions."""
+"""Prefetch distances, in pairs of edges: for the numbers of the ends of edges, and for the positions of the ends."""
 _X2, _V2, _N2 = "float64[:, :]", "float64[:, ::1]", "int32[:, ::1]"
 _SECTOR = f"Tuple((float64, {VECTOR}, {VECTOR}))"
 _I, _F, _N1 = types.int64, types.float64, types.int32[::1]
@@ -132,7 +135,9 @@ def _deep(x, edges, e):  # type: ignore[no-untyped-def]
 
 @njit(f"boolean({_N2}, int64, int64)", cache=True)
 def _opposite(edges, one, two):  # type: ignore[no-untyped-def]
-    """Whether an edge joins the third nodes of the other's faces: then both are opposite edges of one tet."""
+    """Returns True if an edge joins the third nodes of the two faces of another edge: the two are then opposite edges
+    of one tet.
+    """
     a, b, c, d = edges[one, 2], edges[one, 3], edges[two, 0], edges[two, 1]
     return (a == c and b == d) or (a == d and b == c)
 
@@ -225,15 +230,15 @@ def edge_edge(out, base, pairs, edges, step, course, end, first, stop):  # type:
         if fresh[one] or fresh[two]:
             until[p], speed[p] = -np.inf, np.nan
         a, b, c, d = corners[one, 0], corners[one, 1], corners[two, 0], corners[two, 1]
-        if not (meets[one] and meets[two]) or a == b or c == d or _opposite(corners, one, two):  # 1
+        if not (meets[one] and meets[two]) or a == b or c == d or _opposite(corners, one, two):  # condition 1
             until[p], speed[p] = np.inf, 0.0
             continue
         active[tested] = first + p
         tested += 1
-        if len(step.tied) > 0 and bonded(step, a, b, c, d):  # 2
+        if len(step.tied) > 0 and bonded(step, a, b, c, d):  # condition 2, listed above
             continue
         known = not np.isnan(until[p])
-        if known:  # deactivated while it cannot be in contact: slack > left_1 + left_2 + U t (pairs.py)
+        if known:  # deactivate the pair while it cannot be in contact: slack > left_1 + left_2 + U t (pairs.py)
             if np.isnan(speed[p]):
                 speed[p] = _fastest(course, a, b, c, d)
             slack = segments(at(ahead, a), at(ahead, b), at(ahead, c), at(ahead, d))
@@ -242,10 +247,10 @@ def edge_edge(out, base, pairs, edges, step, course, end, first, stop):  # type:
         share, u, w, r = _crossing(x, ahead, a, b, c, d)
         uu, uw, ww, ur, wr = dot(u, u), dot(u, w), dot(w, w), dot(u, r), dot(w, r)
         area = uu * ww - uw * uw
-        if not area > _PARALLEL * _PARALLEL * uu * ww:  # 3
+        if not area > _PARALLEL * _PARALLEL * uu * ww:  # condition 3, listed above
             continue
         s, t = (ww * ur - uw * wr) / area, (uw * ur - uu * wr) / area
-        if not (min(s, t) >= _END and max(s, t) <= 1.0 - _END):  # 4
+        if not (min(s, t) >= _END and max(s, t) <= 1.0 - _END):  # condition 4, listed above
             if known and share == 1.0 and np.isnan(until[p]):
                 slack = beyond_ends(u, w, r, s, t)
                 if slack > _SPARE * size[one]:
@@ -255,18 +260,18 @@ def edge_edge(out, base, pairs, edges, step, course, end, first, stop):  # type:
         m = m[0] / length, m[1] / length, m[2] / length
         gap0, gap1 = _apart(m, x, v, a, b, c, d, s, t, 0.0), _apart(m, x, v, a, b, c, d, s, t, dt)
         near, deep = NEAR * min(size[one], size[two]), min(edges.deep[one], edges.deep[two])
-        if (gap1 > near or gap0 < -deep) and (-gap1 > near or -gap0 < -deep):  # 5, either sign
+        if (gap1 > near or gap0 < -deep) and (-gap1 > near or -gap0 < -deep):  # condition 5, either sign, listed above
             continue
         sector = _sector(u, x, v, corners, one, h)
         sign = 1.0 if _points_out(sector, m, 1.0) else -1.0
-        if sign < 0.0 and not _points_out(sector, m, -1.0):  # 6, first body
+        if sign < 0.0 and not _points_out(sector, m, -1.0):  # condition 6, first body, listed above
             continue
         gap0, gap1 = sign * gap0, sign * gap1
-        if gap1 > near or gap0 < -deep:  # 5, this sign
+        if gap1 > near or gap0 < -deep:  # condition 5, this sign, listed above
             continue
-        if not _points_out(_sector(w, x, v, corners, two, h), m, -sign):  # 6, second body
+        if not _points_out(_sector(w, x, v, corners, two, h), m, -sign):  # condition 6, second body, listed above
             continue
-        if gap0 < 0.0 and gap0 < -min(_deep(x, edges, one), _deep(x, edges, two)):  # 7
+        if gap0 < 0.0 and gap0 < -min(_deep(x, edges, one), _deep(x, edges, two)):  # condition 7, listed above
             continue
         nodes[n, 0], nodes[n, 1], nodes[n, 2], nodes[n, 3] = c, d, a, b
         weights[n, 0], weights[n, 1], weights[n, 2], weights[n, 3] = 1.0 - t, t, s - 1.0, -s

@@ -1,5 +1,6 @@
-"""Side of a body on which a node is: orientation of nodes to faces, and nodes beside a convex edge or in front of
-another face there (docs/theory/contact.md, "Which point" and "Beside a free edge")."""
+"""Tests on which side of a body a node is: by the orientation of nodes to faces, and for nodes beside a convex edge or
+in front of another face at the edge (docs/theory/contact.md, "Which point" and "Beside a free edge").
+"""
 
 import numpy as np
 
@@ -8,38 +9,42 @@ from ..geometry import MARGIN, VECTOR, at, dot, foot, height, minus, off
 from .tables import DEEP, DEEP_SELF, FACES, NEAR, PAIRS, STEP
 
 TOUCHING = 1e-3
-"""Share of the size of a face: a node deeper than this has contact with the nearest face of that part only."""
+"""Depth over the size of a face: a node that is deeper inside of a part has contact only with the nearest face of
+that part."""
 FACING = 0.1
 """A node faces a face when the cosines between the face's normal and those of the node's own faces have a mean minus
 deviation below -FACING, and either a mean below FACING, or the node's own faces rise from the face by a mean slope
-whose sine exceeds FACING. So a corner of a flake that is the lowest of its tet faces the plane below, for any mean
-of its three normals."""
+whose sine exceeds FACING. With this definition, the lowest corner of the tet of a flake faces the plane below it for
+any mean of its three normals."""
 _SOME = 0.25
 """A node of another part that passes a face from outside has contact with it when the mean minus deviation is below
--_SOME: then one of its faces certainly faces it. Without a negative cosine this is at least (1 - sqrt(2)) / 2 =
--0.207."""
+-_SOME: then one of its faces certainly faces it. If no cosine is negative, mean minus deviation is at least (1 -
+sqrt(2)) / 2 = -0.207."""
 RIM = 0.01
-"""Share of the size of a face: a node that faces both faces of a convex edge and slides along one, no deeper below
-it than this, is beside the edge. Chosen: twice the depth to which a sharp edge that slides along another sinks when
-its end comes there, 1e-3 to 4e-3, because edges have no contact at their ends."""
+"""Share of the size of a face: a node that faces both faces of a convex edge slides along one of the two, and is not
+deeper below that face than this share, is beside the edge. Chosen value: twice the penetration of a sharp edge that
+slides along another edge, 1e-3 to 4e-3, at the moment when the end of the edge reaches the other edge. This
+penetration occurs because edges have no contact at their ends."""
 _SLIDES = 2e-3
-"""Share of the size of a face: a node that slides along a face approaches it by less in a step. A faster one cuts
-the corner: it is beside the edge only up to TOUCHING, else a shot is found a step late (test_hard_contact). Chosen:
-twice the fastest observed in sliding."""
+"""Share of the size of a face: a node that slides along a face approaches the face by less in a step. A faster node
+counts as beside the edge only up to the depth TOUCHING; otherwise the contact of a fast projectile would be detected
+one step late (test_hard_contact). Chosen value: twice the fastest approach observed in sliding."""
 _BEHIND = 0.1
-"""Share of the size of a face: sum of the depths of its corners behind another face, from which on the edge between
-them is convex. Chosen: below the value of a bend of 25 degrees, above rounding."""
+"""Share of the size of a face: sum of the depths of the corners of the face behind a neighbouring face. If the sum
+is larger, the common edge is convex. Chosen value: below the sum for an angle of 25 degrees between the faces, above
+rounding."""
 _OVER = 0.1
-"""Least component along a face of the mean direction from a node to its faces' midpoints, for faces that reach over
-that face: those of a blunt edge have less. Chosen: a third of the value for the corner of a cube."""
+"""Least component along a face of the mean direction from a node to its faces' midpoints, above which the faces of
+the node reach over that face. The faces of a blunt edge have a smaller component. Chosen value: a third of the
+component for the corner of a cube."""
 _F, _VECTOR = types.float64, types.UniTuple(types.float64, 3)  # type: ignore[no-untyped-call]
 
 
 @njit(f"UniTuple(float64, 2)(float64[:, ::1], int64, {VECTOR})", cache=True)
 def facing(normals, s, m):  # type: ignore[no-untyped-def]
     """Returns the angle measures, as differences of cosines, by which m must turn until node s faces a face of this
-    normal (FACING), and until it does or one of its own faces does (_SOME); at most 0 if it does already, and -1 for
-    a node without faces, which faces any face.
+    normal (FACING), and until it does or one of its own faces does (_SOME); at most 0 if the condition is fulfilled
+    already, and -1 for a node without faces, because such a node faces any face.
     """
     mean, square, length, rise = 0.0, 0.0, 0.0, 0.0
     for a in range(3):
@@ -60,9 +65,8 @@ def reaches_over(normals, s, b, e, f, size):  # type: ignore[no-untyped-def]
     """Whether the faces of node s reach over a face, by their mean direction, from the node's foot on its border;
     ``b``: area coordinates of the foot on the face of edges ``e`` and ``f``.
 
-    Then the body of the node comes onto the face and not beside it: if two bodies collide with equal faces, all
-    nodes have their feet on the border, and none is ever inside of the other body if their tets become narrower
-    behind it.
+    In that case the body of the node moves onto the face, not beside it. Example: if two bodies collide with equal
+    faces, all nodes have their feet on the border of a face, and no node is ever inside of the other body.
     """
     way = normals[s, 9], normals[s, 10], normals[s, 11]
     ee, ff, ef, er, fr = dot(e, e), dot(f, f), dot(e, f), dot(e, way), dot(f, way)
@@ -85,7 +89,9 @@ def plane(faces, ahead, f):  # type: ignore[no-untyped-def]
 
 @njit(types.boolean(PAIRS, FACES, types.int32[::1], types.int64, types.int64, _F, _F), cache=True, forceinline=True)
 def _asked(pairs, faces, part, q, body, strayed, end):  # type: ignore[no-untyped-def]
-    """Whether the face of pair ``q`` is exposed, of the part ``body``, and near enough for a test; see outside."""
+    """Returns True if the face of pair ``q`` is exposed, belongs to the part ``body`` and is near enough for a test;
+    see outside.
+    """
     f = pairs.rows[q, 1]
     far = pairs.until[q] > strayed + faces.left[f] + pairs.speed[q] * end and not pairs.turned[q]
     return (faces.fresh[f] or not far) and faces.exposed[f] and part[faces.corners[f, 0]] == body
@@ -101,10 +107,10 @@ def outside(pairs, first, faces, x, part, p, depth, strayed, end):  # type: igno
     """Whether the node of pair ``p``, ``depth`` below its face, is nearer to the front of another face of that part.
 
     Then it is beside an acute edge and not inside the body: the nearest face decides on which side a node is. Only
-    faces within the share of their size that every candidate list covers are tested, and of these none whose pair is
-    deactivated: it is further away. ``strayed``: distance of the node from its line, infinite if the pairs have no
-    valid bounds; ``end``: of the step plus one more step, because another thread may have just measured a pair at
-    its end.
+    faces within the share of their size that every candidate list covers are tested. A face whose pair is deactivated
+    is further away and is not tested. ``strayed``: distance of the node from its line, infinite if the pairs have no
+    valid bounds; ``end``: of the step plus one more step, because another thread may have just measured a pair at its
+    end.
     """
     rows, corners, size = pairs.rows, faces.corners, faces.size
     s, body = rows[p, 0], part[corners[rows[p, 1], 0]]
@@ -161,21 +167,21 @@ def in_front(pairs, first, faces, step, normals, p, gap0, gap1, strayed, end):  
             continue
         f = rows[q, 1]
         i, j, k = corners[f, 0], corners[f, 1], corners[f, 2]
-        if a not in (i, j, k) and b not in (i, j, k) and c not in (i, j, k):  # 1
+        if a not in (i, j, k) and b not in (i, j, k) and c not in (i, j, k):  # condition 1, listed above
             continue
         o, e, h = at(ahead, i), at(ahead, j), at(ahead, k)
         m = plane(faces, ahead, f)
         behind = dot(m, minus(at(ahead, a), o)) + dot(m, minus(at(ahead, b), o)) + dot(m, minus(at(ahead, c), o))
-        if not behind < -_BEHIND * size[g]:  # 2
+        if not behind < -_BEHIND * size[g]:  # condition 2, listed above
             continue
         above, _ = height(point, o, e, h)
         before, _ = height(at(step.x, s), at(step.x, i), at(step.x, j), at(step.x, k))
         least, along = min(before, above), abs(above - before)
         slides = along < abs(gap1 - gap0) and along <= _SLIDES * size[f] and least > -RIM * size[f]
-        if not ((slides or (above > gap1 and least > -TOUCHING * size[f])) and above <= NEAR * size[f]):  # 3
+        if not ((slides or (above > gap1 and least > -TOUCHING * size[f])) and above <= NEAR * size[f]):  # condition 3
             continue
         every, some = facing(normals, s, m)
-        if not (every if part[s] == body else some) <= 0.0:  # 4
+        if not (every if part[s] == body else some) <= 0.0:  # condition 4, listed above
             continue
         on, _ = foot(minus(point, o), minus(e, o), minus(h, o))
         if on:

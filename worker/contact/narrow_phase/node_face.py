@@ -1,7 +1,7 @@
 """Narrow phase of nodes and faces: contacts of the step ahead, and deactivation of distant pairs.
 
-The contact point on the face is the one where the node passes its plane, so that a node that slides from facet to
-facet changes its face at the edge.
+The contact point is the point at which the node passes the plane of the face. A node that slides over several faces
+therefore changes from one face to the next at their common edge.
 """
 
 import numpy as np
@@ -14,16 +14,16 @@ from .facing import RIM, TOUCHING, facing, in_front, outside, plane, reaches_ove
 from .tables import CONTACT_ROWS, DEEP, DEEP_SELF, FACES, NEAR, PAIRS, SLOTS, STEP, bonded, needed
 
 _ROUND = 0.01
-"""Share of the size of a face, added to the distance of contact for rounding."""
+"""Tolerance for rounding, as a share of the size of a face; it is added to the distance of contact."""
 _WORTH = 0.02
-"""Share of the size of a face: a pair with less slack is tested in every step, which is cheaper than to compute the
-slack."""
+"""Smallest slack, as a share of the size of a face, for which a pair is deactivated. Pairs with less slack are
+tested in every step, which takes less time than the computation of the slack."""
 _BEND = 0.1
-"""Largest motion of two corners of a face relative to each other, over its two edges, for which the bound of
+"""Largest relative motion of two corners of a face, over the lengths of its two edges, for which the bound of
 ``_bent`` holds."""
 
 _SOON, _NEXT = 8, 4
-"""Distances of the prefetches, in pairs: of a node and a face, and of the corners of a face."""
+"""Prefetch distances, in pairs: for a node and a face, and for the corners of a face."""
 _X2, _V2, _N2 = "float64[:, :]", "float64[:, ::1]", "int32[:, ::1]"
 _F, _I, _N1 = types.float64, types.int64, types.int32[::1]
 _VECTOR = types.UniTuple(types.float64, 3)  # type: ignore[no-untyped-call]
@@ -122,9 +122,9 @@ def due(pairs, slots, faces, end, first, stop):  # type: ignore[no-untyped-def]
     """Selects the pairs from ``first`` to ``stop`` to be tested: ``pairs.active`` from ``first`` on; returns their
     number. ``end``: end of the step and of the time tested ahead, s after the search.
 
-    The bounds of a selected pair become invalid, except that it is too close to be deactivated: a thread that reads
-    it (facing.py) while another thread tests it treats it as near. Pairs without exposed face or surface node are
-    deactivated until that changes.
+    The bound of a selected pair is set to "too close to be deactivated" during the test, so that a thread that reads
+    the bound (facing.py) while another thread tests the pair treats the pair as near. Pairs without exposed face or
+    surface node are deactivated until that changes.
     """
     rows, until, speed, turned = pairs.rows[first:], pairs.until[first:], pairs.speed[first:], pairs.turned[first:]
     active, exposed, on_surface = pairs.active[first:], faces.exposed, slots.on_surface
@@ -167,7 +167,7 @@ def due(pairs, slots, faces, end, first, stop):  # type: ignore[no-untyped-def]
 # 5. Its foot at tau is on the face, and it is no deeper than ``reach`` of the face and half the altitude of its tet.
 # 6. It is not beside a convex edge, in front of another face there (facing.in_front).
 # 7. If it is inside by more than TOUCHING, it is not nearer to the front of another face (facing.outside).
-# A node inside of several faces of a part keeps its contact with the nearest one (``nearest``).
+# A node behind several faces of a part keeps its contact with the nearest one (``nearest``).
 
 
 @njit(f"void({_N2}, {_N2}, {_V2}, {_X2}, int32[::1], int64, int64)", cache=True, forceinline=True)
@@ -192,8 +192,9 @@ def node_face(out, depth, base, pairs, slots, faces, step, end, first, stop):  #
     from ``base + first`` on; returns their number, and the largest square of a speed over the altitude of a tet, 1/s^2,
     of the pairs that will be in contact in the next step (``_coming``).
 
-    ``depth`` (room,): depth of a node that is inside, m, else 0; of the faces of a part the nearest one keeps it
-    (``nearest``). ``end``: of the step, s after the search. Numbers at the ends of lines: conditions listed above.
+    ``depth`` (room,): depth of a node that is inside, m, else 0; of the faces of a part the nearest face keeps the
+    contact (``nearest``). ``end``: of the step, s after the search. Numbers at the ends of lines: conditions listed
+    above.
     """
     rows, until, speed, turned, active = pairs.rows, pairs.until, pairs.speed, pairs.turned, pairs.active
     corners, size, left = faces.corners, faces.size, faces.left
@@ -206,14 +207,14 @@ def node_face(out, depth, base, pairs, slots, faces, step, end, first, stop):  #
         _bring(rows, corners, normals, x, active, q, stop - 1)
         s, f = rows[p, 0], rows[p, 1]
         i, j, k = corners[f, 0], corners[f, 1], corners[f, 2]
-        if len(step.tied) > 0 and bonded(step, s, i, j, k):  # 1
+        if len(step.tied) > 0 and bonded(step, s, i, j, k):  # condition 1, listed above
             continue
         m = plane(faces, ahead, f)
         gap1 = dot(m, minus(at(ahead, s), at(ahead, i)))
         reach = DEEP_SELF if part[s] == part[i] else DEEP
         if not np.isnan(
             until[p]
-        ):  # deactivated while it cannot be in contact: slack > left_1 + left_2 + U t (pairs.py)
+        ):  # deactivate the pair while it cannot be in contact: slack > left_1 + left_2 + U t (pairs.py)
             a, b, c = at(course, i), at(course, j), at(course, k)
             rate = max(distance(at(course, s), a), distance(at(course, s), b), distance(at(course, s), c))
             slack = _distance(ahead, s, i, j, k) - (_ROUND + max(reach, NEAR)) * size[f]
@@ -224,27 +225,27 @@ def node_face(out, depth, base, pairs, slots, faces, step, end, first, stop):  #
                 rate = max(distance(a, b), distance(a, c))
             speed[p], turned[p] = rate, bends
             until[p] = slack - strayed[s] - left[f] + rate * end if slack > _WORTH * size[f] else np.nan
-        if not gap1 <= NEAR * size[f]:  # 2
+        if not gap1 <= NEAR * size[f]:  # condition 2, listed above
             if step.beyond > 0.0:
                 most = max(most, _coming(step, normals, faces, s, f, m, gap1))
             continue
         every, some = facing(normals, s, m)
-        if not (every if part[s] == part[i] else some) <= 0.0:  # 3
+        if not (every if part[s] == part[i] else some) <= 0.0:  # condition 3, listed above
             continue
         gap0, now = height(at(x, s), at(x, i), at(x, j), at(x, k))
-        if not (every <= 0.0 or gap0 >= -NEAR * size[f]):  # 4
+        if not (every <= 0.0 or gap0 >= -NEAR * size[f]):  # condition 4, listed above
             continue
         passes, b = _passes(x, ahead, corners, s, f, now, gap0, gap1, reach * size[f])
-        if not passes:  # 5
+        if not passes:  # condition 5, listed above
             continue
         leaves, until_end = np.inf if other[s] else strayed[s], end + step.dt
         sides = minus(at(x, j), at(x, i)), minus(at(x, k), at(x, i))
         beside = min(b[0], b[1], b[2]) <= RIM and not reaches_over(normals, s, b, sides[0], sides[1], size[f])
-        if beside and in_front(pairs, chains, faces, step, normals, p, gap0, gap1, leaves, until_end):  # 6
+        if beside and in_front(pairs, chains, faces, step, normals, p, gap0, gap1, leaves, until_end):  # condition 6
             continue
         depth[n] = 0.0
         if gap0 < -TOUCHING * size[f]:
-            if outside(pairs, chains, faces, x, part, p, -gap0, leaves, until_end):  # 7
+            if outside(pairs, chains, faces, x, part, p, -gap0, leaves, until_end):  # condition 7, listed above
                 continue
             depth[n] = -gap0
         nodes[n, 0], nodes[n, 1], nodes[n, 2], nodes[n, 3] = s, i, j, k
@@ -261,9 +262,9 @@ def node_face(out, depth, base, pairs, slots, faces, step, end, first, stop):  #
 
 @njit(_I(_N1, CONTACT_ROWS, types.float64[::1], PAIRS, FACES, _N1, _N1), cache=True)
 def nearest(found, out, depth, pairs, faces, part, holder):  # type: ignore[no-untyped-def]
-    """Keeps those of the contacts ``found``, rows of ``out``, that count: a node inside of several faces of a part has
-    contact with the nearest one, of two at the same depth with that of the lower id. Returns their number; ``holder``
-    (slots,): working array, -1 before and after.
+    """Removes contacts from ``found``, rows of ``out``: a node that is behind several faces of a part keeps only its
+    contact with the nearest face; of two faces at the same depth, with the face of lower id. Returns their number;
+    ``holder`` (slots,): working array, -1 before and after.
     """
     earlier, m = np.empty(len(found), np.int32), 0
     for q in range(len(found)):

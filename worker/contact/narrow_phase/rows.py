@@ -9,30 +9,31 @@ from ..tasks import collected
 from .tables import ContactRows
 
 _SPARE = 2
-"""Factor of the room over the needed rows."""
+"""Ratio of allocated rows to needed rows."""
 
 
 @dataclass
 class ActiveRows:
-    """Rows of active contacts: every kind has a range of the ``room``, and every task a part of that. Rows are not
-    moved; the first ``n`` entries of ``found`` are the numbers of the active ones.
+    """Rows of active contacts. Every kind of contact has a range of the ``room`` allocated rows, and every task has a
+    part of that range. Rows are not moved; the first ``n`` entries of ``found`` are the numbers of the rows with active
+    contacts.
     """
 
     room: ContactRows = field(default_factory=lambda: ContactRows.room(0))
     found: Indices = field(default_factory=lambda: np.zeros(0, np.int32))
     depth: Floats = field(default_factory=lambda: np.zeros(0))
-    """(room,) depth of a node inside of a face, m; see node_face."""
+    """(room,) depth of a node behind a face, m; see node_face."""
     n: int = 0
     _ends: list[int] = field(default_factory=lambda: [0], init=False)
     _holder: Indices = field(default_factory=lambda: np.zeros(0, np.int32), init=False)
 
     def begin(self, *many: int) -> None:
-        """Begins a step, without contacts, with room for ``many`` rows of each kind."""
+        """Begins a step without contacts; reserves ``many`` rows for each kind."""
         self._ends, self.n = [0, *np.cumsum(many).tolist()], 0
         self._reserve(self._ends[-1])
 
     def more(self, many: int) -> int:
-        """Reserves ``many`` rows for one more kind; returns its number."""
+        """Reserves ``many`` rows for one more kind of contacts; returns the number of the kind."""
         self._ends.append(self._ends[-1] + many)
         self._reserve(self._ends[-1])
         return len(self._ends) - 2
@@ -51,7 +52,9 @@ class ActiveRows:
         return np.asarray(self.room.nodes[self.found[: self.n]])
 
     def holder(self, slots: int) -> Indices:
-        """(slots,) working array of a number for each slot, all -1; its user restores that."""
+        """(slots,) working array of a number for each slot, all -1. Each function that uses the array must reset it to
+        -1.
+        """
         if len(self._holder) < slots:
             self._holder = np.full(_SPARE * slots, -1, np.int32)
         return self._holder[:slots]

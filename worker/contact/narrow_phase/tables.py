@@ -18,23 +18,25 @@ from ..geometry import at, cross, dot, minus
 from .tied import NOTHING
 
 NEAR = 0.02
-"""Share of the size of a face: largest gap at the end of the step with an active contact."""
+"""Largest gap at the end of the step at which a contact is active, as a share of the size of a face."""
 DEEP = 0.25
-"""Share of the size of a face, and of the length of an edge and the height of its tets: largest depth of a
-penetration; anything deeper is the back of a thin body."""
+"""Largest depth of a penetration, as a share of the size of a face, or of the length of an edge and the height of
+its tets. A node or edge that is deeper is on the other side of a thin body."""
 DEEP_SELF = 0.05
-"""The same for faces of the same part, whose nodes lie behind its own faces; also the least depth to which edges
-have contact, for tets of any height."""
+"""Largest depth of a penetration, as a share of the size of a face, for a node and a face of the same part, because
+all nodes of a part lie behind its own faces. It is also the smallest value used for the largest depth of a contact
+of edges, for tets of any height."""
 FAST = 0.1
-"""Share of the typical size of a face: pairs that close less distance in a step do not bound it before they are
-active. The altitude of a tet of that size is several times larger."""
+"""Pairs whose distance decreases in a step by less than this share of the typical size of a face limit the time step
+only when they are active. The altitude of a tet of that size is several times larger."""
 PUSH_OUT = 0.1
-"""Largest share of a penetration that is corrected in a step, and of the closing speed that is returned for it; 0
-while contact has no energy to give back (``account.Account``)."""
+"""Largest share of a penetration that is corrected in a step, and largest share of the closing speed that is
+returned for the correction. Both are 0 while contact has no energy to return (``account.Account``)."""
 CRACK = -2
-"""First number of a pair of nodes across a crack; others are below."""
+"""First number of pairs of nodes across a crack; these pairs have negative numbers from here downwards."""
 _FEWEST = 2
-"""Least rows of a table of cache lines: numba treats a slice of a single row as contiguous, another type."""
+"""Smallest number of rows of a table of cache lines; a slice of a single row would be contiguous, which is a
+different type in numba."""
 
 
 _NONE = np.empty(0)
@@ -65,8 +67,8 @@ class ContactRows(NamedTuple):
 
 
 class StepRoom(Scratch):
-    """Working arrays of a step. They are kept for many steps, because the system clears new pages of memory; tables
-    of arguments stay valid while the number of slots does not change.
+    """Working arrays of a step. The arrays are reused for many steps, because the operating system must clear new pages
+    of memory. Tables of arguments stay valid while the number of slots does not change.
     """
 
     def __init__(self) -> None:
@@ -74,7 +76,9 @@ class StepRoom(Scratch):
         self._room = self._places = cache_lines(0)
 
     def lines(self, slots: int) -> tuple[Floats, Floats, Floats]:
-        """Cache lines of the slots, and views of them for positions at the beginning of the step and at its end."""
+        """Cache lines of the slots, and views of these for the positions at the beginning and at the end of the
+        step.
+        """
         n = max(slots, _FEWEST)
         if n != len(self._places):
             if n > len(self._room):
@@ -100,7 +104,7 @@ class Step(NamedTuple):
     ahead: Floats
     """(slots, 3) positions at its end without contact, m."""
     part: Indices
-    """(slots,)."""
+    """(slots,) part of each slot."""
     mu: Floats
     """(parts, parts) Coulomb's coefficient, NaN where two parts may not be in contact."""
     give: float
@@ -108,9 +112,9 @@ class Step(NamedTuple):
     dt: float
     """s."""
     beyond: float
-    """Longest step that may follow, s, for which closing pairs are detected; 0 if nothing is fast enough."""
+    """Largest length of the next step, s, for which closing pairs are detected; 0 if no pair is fast enough."""
     fast: float
-    """Distance, m; pairs that close less in that step are ignored."""
+    """Distance, m; pairs whose distance decreases by less in the next step are ignored."""
     rebound: float
     """Largest velocity change by contact over the closing speed: 1 + restitution."""
     least: Floats
@@ -157,25 +161,25 @@ class Pairs(NamedTuple):
 
 
 class SlotTable(NamedTuple):
-    """Slots, as nodes in contact with faces."""
+    """Slots (nodes of the scene) with the data for node-face contact."""
 
     normals: Floats
     """(slots, 12) means over a node's faces of their normal n, of n n (xx, yy, zz, yz, zx, xy) and of the unit
     vector to the midpoint of the opposite edge; zero without faces."""
     on_surface: Flags
-    """(slots,) nodes on the surface; no others are in contact with faces."""
+    """(slots,) True for nodes on the surface; only these are in contact with faces."""
     first: Indices
     """(slots,) first pair with a face, -1 for none."""
     left: Floats
-    """(slots,) distance of each from its reference motion, m."""
+    """(slots,) distance of each slot from its reference motion, m."""
     course: Floats
     """(slots, 3) velocities of the reference motions, m/s."""
     fresh: Flags
-    """(slots,) whether its mean normals changed."""
+    """(slots,) True if the mean normals of the slot have changed."""
 
 
 class FaceTable(NamedTuple):
-    """Faces."""
+    """Faces of the scene."""
 
     corners: Indices
     """(f, 4) slots, counter-clockwise seen from outside, the opposite node last."""
@@ -183,7 +187,7 @@ class FaceTable(NamedTuple):
     """(f,) square root of twice the initial area, m."""
     id: Ints
     exposed: Flags
-    """(f,) exposed faces; no others have contacts."""
+    """(f,) True for exposed faces; only these have contacts."""
     left: Floats
     """(f,) largest distance of a corner from its reference motion, m."""
     fresh: Flags
@@ -191,7 +195,7 @@ class FaceTable(NamedTuple):
 
 
 class EdgeTable(NamedTuple):
-    """Edges; pairs are of sharp ones."""
+    """Edges of the scene; only sharp edges have candidate pairs."""
 
     corners: Indices
     """(e, 6) slots: records.Edges."""
@@ -221,8 +225,9 @@ EDGES = record(EdgeTable, _N2, _F1, _F1, _B1, _F1, _B1)
 
 @njit("float64(float64, float64, float64, float64, float64)", cache=True, error_model="numpy")
 def needed(gap0, gap1, speed, give, dt):  # type: ignore[no-untyped-def]
-    """Least change of the normal speed, m/s, so that the node does not pass, or, inside already, goes no deeper:
-    (min(gap0, 0) - gap1) / dt, plus the correction of a share ``give`` of the penetration (PUSH_OUT).
+    """Returns the smallest change of the normal speed, m/s, with which the node does not pass the face, or, if it is
+    behind the face already, does not move deeper: (min(gap0, 0) - gap1) / dt, plus the correction of a share ``give``
+    of the penetration (PUSH_OUT).
     """
     back = give * min(max(-gap0, 0.0) / dt, max(-speed, 0.0))
     return (min(gap0, 0.0) - gap1) / dt + back
@@ -230,7 +235,7 @@ def needed(gap0, gap1, speed, give, dt):  # type: ignore[no-untyped-def]
 
 @njit(types.boolean(STEP, _I, _I, _I, _I), cache=True)
 def bonded(step, a, b, c, d):  # type: ignore[no-untyped-def]
-    """Whether one bond ties four slots, of two parts."""
+    """Returns True if one bond ties all four slots, which belong to two parts."""
     tied, part = step.tied, step.part
     return tied[a] & tied[b] & tied[c] & tied[d] != 0 and not part[a] == part[b] == part[c] == part[d]
 

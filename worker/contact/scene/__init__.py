@@ -1,1 +1,3 @@
-"""The surface near one rank: own rows, ghosts of other ranks, candidate pairs; updates between two searches."""
+"""The surface near one rank: the faces, edges and nodes of the rank, ghosts of other ranks, candidate pairs; and
+updates of these between two searches.
+"""

@@ -15,23 +15,23 @@ _FRESH = {
     **dict.fromkeys(("owned", "pushes", "live", "new", "fresh", "tracked", "on_surface"), False),
     "first": -1, "root": -1, "normals": 0.0, "total": 0,
 }  # fmt: skip
-"""Initial values of a slot."""
+"""Initial values of the columns of a slot."""
 
 
 @dataclass
 class OwnSlots:
-    """Slots of the nodes that this rank holds, and of others."""
+    """Slots of the nodes on this rank, and of nodes of other ranks."""
 
     slots: Indices
     """(h,) slots of local nodes."""
     local: Indices
-    """(h,) local indices of these nodes."""
+    """(h,) local indices of the nodes of these slots."""
     place: Indices
     """(nodes,) slot of each local node, -1 for a node without slot."""
     far: Indices
-    """(k,) slots of nodes that this rank does not hold."""
+    """(k,) slots of nodes that are not on this rank."""
     far_ids: Ints
-    """(k,) their global ids, ascending."""
+    """(k,) global ids of the nodes that are not on this rank, ascending."""
     _rooms: Rooms = field(default_factory=lambda: Rooms("slots", "local"), init=False, repr=False)
     _by_node: Rooms = field(default_factory=lambda: Rooms("place"), init=False, repr=False)
 
@@ -67,34 +67,35 @@ class SceneSlots:
     """Columns of the slots."""
 
     owned: Flags
-    """(slots,) owned surface nodes: this rank computes their contacts with faces."""
+    """(slots,) True for owned surface nodes; this rank computes the contacts of such nodes with faces."""
     pushes: Flags
-    """(slots,) nodes to which a contact of this rank may apply an impulse."""
+    """(slots,) True for nodes to which a contact of this rank may apply an impulse."""
     live: Flags
-    """(slots,) owned nodes that are in the broad phase."""
+    """(slots,) True for owned nodes in the broad phase."""
     new: Flags
-    """(slots,) nodes to be registered."""
+    """(slots,) True for nodes whose candidate pairs must be searched again (registration)."""
     fresh: Flags
-    """(slots,) nodes whose pairs must be tested because their mean normals changed."""
+    """(slots,) True for nodes whose pairs must be tested because the mean normals of the node have changed."""
     tracked: Flags
-    """(slots,) nodes of anything in the broad phase, whose motion is measured."""
+    """(slots,) True for all nodes of faces and edges in the broad phase, and nodes in it; their motion is measured."""
     on_surface: Flags
     """(slots,) local nodes on the surface: only these are in contact with faces."""
     first: Indices
     """(slots,) first pair with a face, -1 for none."""
     root: Indices
-    """(slots,) slot of the search of which each is a copy, or which it is; -1 for one that came later."""
+    """(slots,) for each slot, the slot at the last search of which it is a copy or which it is itself; -1 for a slot
+    that was added after the search."""
     normals: Floats
     """(slots, COLUMNS) mean normals; see tables.SlotTable."""
     total: Ints
     """(slots, 3) impulses of the last step, quanta."""
     before: Floats
-    """(slots, 3) v(n-1/2)."""
+    """(slots, 3) v(n-1/2), m/s."""
     _rooms: Rooms = field(default_factory=lambda: Rooms("before", *_FRESH), init=False, repr=False)
 
     @classmethod
     def at_rest(cls, owned: Flags, pushes: Flags) -> "SceneSlots":
-        """Returns the columns with nothing in the broad phase yet."""
+        """Returns the columns; no row is in the broad phase yet."""
         n = len(owned)
         live, new, fresh, tracked, on_surface = np.zeros((5, n), bool)
         first, root = np.full(n, -1, np.int32), np.arange(n, dtype=np.int32)
@@ -123,22 +124,24 @@ class SceneFaces:
     """(f,) global ids, ascending."""
     size: Floats
     exposed: Flags
-    """(f,) exposed faces; no others have contacts."""
+    """(f,) True for exposed faces; only these have contacts."""
     live: Flags
-    """(f,) faces in the broad phase: exposed ones, and those that may be exposed soon."""
+    """(f,) True for faces in the broad phase: exposed faces, and faces that may be exposed soon."""
     new: Flags
-    """(f,) faces to be registered."""
+    """(f,) True for faces whose candidate pairs must be searched again (registration)."""
     fresh: Flags
-    """(f,) faces whose pairs must be tested: new corners, or newly exposed."""
+    """(f,) True for faces whose pairs must be tested because a corner is new or the face is newly exposed."""
 
     @classmethod
     def at_rest(cls, corners: Indices, ids: Ints, size: Floats, exposed: Flags) -> "SceneFaces":
-        """Returns the columns with nothing in the broad phase yet."""
+        """Returns the columns; no row is in the broad phase yet."""
         return cls(corners, ids, size, exposed, *np.zeros((3, len(corners)), bool))
 
     @cached_property
     def incidence(self) -> Incidence:
-        """Rows at each slot of the search; asked for first before any corner has become a copy."""
+        """Rows of the table at each slot of the last search. The first call must come before any corner has become a
+        copy.
+        """
         return Incidence(self.corners)
 
 
@@ -149,34 +152,34 @@ class SceneEdges:
     corners: Indices
     """(e, 6) slots: see records.Edges."""
     sides: Ints
-    """(e, 2) ids of their faces."""
+    """(e, 2) ids of the two faces of each edge."""
     faces: Indices
-    """(e, 2) rows of their faces, -1 for a face that this rank does not have."""
+    """(e, 2) rows of the two faces of each edge, -1 for a face that this rank does not have."""
     lengths: Floats
     """(2, e) ``size`` and ``deep`` of records.Edges, m."""
     opened: Bits
-    """(e, 2) states of their faces: see records.Edges."""
+    """(e, 2) states of the two faces of each edge: see records.Edges."""
     meets: Flags
     """(e,) whether the states of both faces admit edge-edge contact: see records.Edges."""
     sharp: Flags
-    """(e,) edges that are or have been sharp (sharp.py)."""
+    """(e,) True for edges that are or have been sharp (sharp.py)."""
     own: Flags
-    """(e,) edges whose face of smaller id is this rank's."""
+    """(e,) True for edges whose face of smaller id is on this rank."""
     rank: Ints
     """(e,) order of the edges: a pair belongs to the edge of lower rank."""
     live: Flags
-    """(e,) edges in the broad phase."""
+    """(e,) True for edges in the broad phase."""
     new: Flags
-    """(e,) edges to be registered."""
+    """(e,) True for edges whose candidate pairs must be searched again (registration)."""
     fresh: Flags
-    """(e,) edges whose pairs must be tested."""
+    """(e,) True for edges whose pairs must be tested."""
 
     @classmethod
     def at_rest(
         cls, corners: Indices, sides: Ints, faces: Indices, lengths: Floats, opened: Bits, sharp: Flags, own: Flags,
         rank: Ints,
     ) -> "SceneEdges":  # fmt: skip
-        """Returns the columns with nothing in the broad phase yet."""
+        """Returns the columns; no row is in the broad phase yet."""
         one, two = opened.T
         meets = np.asarray((np.minimum(one, two) >= AGED) & (np.maximum(one, two) == OPEN))
         return cls(
@@ -200,7 +203,9 @@ class SceneEdges:
 
     @cached_property
     def incidence(self) -> Incidence:
-        """Rows at each slot of the search; asked for first before any corner has become a copy."""
+        """Rows of the table at each slot of the last search. The first call must come before any corner has become a
+        copy.
+        """
         return Incidence(self.corners)
 
     @property

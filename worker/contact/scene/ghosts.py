@@ -13,9 +13,10 @@ from ...parallel.tags import Tag
 from ..surface.records import Edges, Faces, SurfaceNodes
 
 _CROWD_WORDS = 15
-"""Words of a node in a message (``pack``)."""
+"""Number of words of a node in a message (``pack``)."""
 _ROOM = 32
-"""Rows by which the message of a rank grows, so that separated nodes seldom need new messages. Chosen: 2 kB."""
+"""Number of rows by which the message of a rank is enlarged, so that separated nodes seldom need a new message.
+Chosen value: 2 kB."""
 
 
 def pack(faces: Faces, edges: Edges, surface_nodes: SurfaceNodes) -> Ints:
@@ -59,7 +60,9 @@ def unpack_nodes(words: Ints) -> SurfaceNodes:
 
 
 def fetch(ids: Ints, owners: Indices, held: SurfaceNodes, comm: Comm) -> SurfaceNodes:
-    """Fetches nodes, by their ids and owners, that this rank does not hold; ``held``: all local nodes. Collective."""
+    """Receives the data of nodes that are not on this rank, given by ids and owners, from their owners; ``held``: all
+    local nodes. Collective.
+    """
     asked = comm.swap({rank: ids[owners == rank] for rank in ranks(owners)})
     answers = comm.swap({rank: pack_nodes(held.take(held.places(want))) for rank, want in asked.items()})
     return unpack_nodes(np.concatenate([np.zeros(0, np.int64), *answers.values()]))
@@ -94,7 +97,7 @@ def members(used: Ints, owners: Indices, holders: list[Neighbour], nodes: Nodes,
 
 
 def _begins(values: Ints) -> Flags:
-    """(n,) first occurrence of each of the ascending values."""
+    """(n,) True for the first occurrence of each of the ascending values."""
     return np.concatenate([np.ones(min(len(values), 1), bool), values[1:] != values[:-1]])
 
 
@@ -104,8 +107,8 @@ def _rows(ids: Ints, rank: int, comm: Comm) -> Ints:
 
 
 def _company(node: Ints, holder: Ints, group: Ints, member: int) -> Ints:
-    """Rows (node, holder) of the nodes of ``member``, without its own; ``group`` (n,): number of the node of each
-    row.
+    """Returns the rows (node, holder) of the nodes of the rank ``member``, without the rows of that rank itself;
+    ``group`` (n,): number of the node of each row.
     """
     held = np.zeros(group[-1] + 1, bool)
     held[group[holder == member]] = True
@@ -119,7 +122,9 @@ class Copies:
     """
 
     def __init__(self, sends: list[Neighbour], receives: list[Neighbour], comm: Comm, tag: Tag) -> None:
-        """``sends``: local nodes; ``receives``: slots of the ghosts."""
+        """``sends``: local nodes that are sent to each rank; ``receives``: slots of the ghosts that are received from
+        each rank.
+        """
         self._comm, self._tag = comm, tag
         self._rows: tuple[list[int], list[int]] | None = None
         self.take(sends, receives)
@@ -139,7 +144,7 @@ class Copies:
         self._exchange = self._comm.exchange(_slices(self._out, sends, rows[0]), into, self._tag)
 
     def note(self, nodes: Nodes) -> None:
-        """Stores v(n-1/2) for the next message."""
+        """Stores v(n-1/2), which the next message contains."""
         _pack(self._out, 6, nodes.v, self._from)
 
     def begin(self, nodes: Nodes) -> None:
@@ -154,7 +159,7 @@ class Copies:
         _unpack(x, v, before, self._to, self._in)
 
     def free(self) -> None:
-        """Releases the messages of MPI."""
+        """Frees the persistent MPI messages."""
         self._exchange.free()
 
 
@@ -175,12 +180,14 @@ def _unpack(x, v, before, rows, got):  # type: ignore[no-untyped-def]
 
 
 def _rooms(others: list[Neighbour]) -> list[int]:
-    """Number of rows of each rank's message."""
+    """Returns the number of rows of the message of each rank."""
     return [_ROOM * (1 + len(other.nodes) // _ROOM) for other in others]
 
 
 def _padded(others: list[Neighbour], rooms: list[int]) -> Indices:
-    """Nodes of each rank in turn, filled with -1 up to its number of rows, ``rooms``."""
+    """Returns the nodes of all ranks, rank after rank; the nodes of a rank are filled with -1 up to the number of rows
+    of its message, ``rooms``.
+    """
     rows, begin = np.full(sum(rooms), -1, np.int32), 0
     for other, room in zip(others, rooms, strict=True):
         rows[begin : begin + len(other.nodes)] = other.nodes
@@ -189,7 +196,7 @@ def _padded(others: list[Neighbour], rooms: list[int]) -> Indices:
 
 
 def _slices(buffer: Floats, others: list[Neighbour], rooms: list[int]) -> list[tuple[int, Ints]]:
-    """Slices of the buffer by rank."""
+    """Returns the range of each rank in the buffer."""
     words, ends = buffer.view(np.int64), np.cumsum(rooms).tolist()
     return [(other.rank, words[end - room : end]) for other, room, end in zip(others, rooms, ends, strict=True)]
 

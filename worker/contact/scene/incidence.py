@@ -1,7 +1,8 @@
-"""Faces and edges by their corners: the rows of a scene that a split can change, without a pass over the whole scene.
+"""Faces and edges by their corners. The table gives the rows of a scene that a split (node separation) can change,
+without a pass over the whole scene.
 
-A scene keeps its faces and edges from one search to the next. When nodes separate, corners become copies, so the rows
-of a copy are among those of the slot that it was at the search.
+A scene keeps its faces and edges from one search to the next. When nodes separate, corners are replaced by copies. The
+rows of a copy are therefore among the rows of the slot that was its original at the search.
 """
 
 import numpy as np
@@ -13,7 +14,7 @@ _I, _I1, _N1, _N2 = types.int64, types.int64[::1], types.int32[::1], types.int32
 
 
 class Incidence:
-    """The rows of faces or edges at each slot, as it was at the search."""
+    """The rows of faces or edges at each slot, with the corners at the last search."""
 
     def __init__(self, corners: Indices) -> None:
         """``corners`` (n, k): slots, before any of them has separated."""

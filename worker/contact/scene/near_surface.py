@@ -1,4 +1,4 @@
-"""Surface near one rank: its own, and ghosts of other ranks' surfaces."""
+"""Surface near one rank: the surface of the rank, and ghosts of the surfaces of other ranks."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -14,8 +14,9 @@ from ..surface.records import Edges, Faces, SurfaceNodes, merged
 from . import ghosts
 
 HALO = 1.0
-"""Width of the halo over the typical size of a face: slots of different ranks are guaranteed to be candidates only
-while each departs from its reference motion by less than half of it; a search of all ranks comes before."""
+"""Width of the halo over the typical size of a face. Candidate pairs of slots of different ranks are complete only
+while each slot has departed from its reference motion by less than half of the width. All ranks search again before
+a slot departs further."""
 
 
 @dataclass(frozen=True)
@@ -24,7 +25,7 @@ class Rules:
 
     domain: str
     allowed: Flags
-    """(parts, parts) pairs of parts that may be in contact."""
+    """(parts, parts) True for pairs of parts that may be in contact."""
     cell: float
     """Edge of a cell of the contact domain, m."""
     skin: float
@@ -44,7 +45,7 @@ class NearSurface:
     """Faces by ascending id."""
     edges: Edges
     surface_nodes: SurfaceNodes
-    """All nodes of the faces and edges, and all local surface nodes."""
+    """Nodes of all faces and edges, and all local surface nodes."""
     owned: Ints
     """Ids of the owned nodes of the surface, and of cracks that may open."""
 

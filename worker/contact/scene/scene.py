@@ -31,19 +31,19 @@ class Messages:
     """Persistent MPI messages between ranks, in every step."""
 
     company: SharedSums
-    """Sums over the nodes with impulses of several ranks."""
+    """Sums of impulses at nodes to which contacts of several ranks apply impulses."""
     copies: Copies
     """Positions and velocities of the ghosts."""
 
     def free(self) -> None:
-        """Releases the messages of MPI."""
+        """Frees the persistent MPI messages."""
         self.company.free()
         self.copies.free()
 
 
 @dataclass
 class Scene:
-    """Result of the last search of all ranks, with the updates since."""
+    """Scene: result of the last search of all ranks, with the updates after the search."""
 
     surface_nodes: SurfaceNodes
     own: OwnSlots
@@ -57,7 +57,7 @@ class Scene:
     (narrow_phase/cracks.py).
     """
     node_face: PairTable = field(default_factory=PairTable)
-    """Node-face pairs: slot and face."""
+    """Candidate node-face pairs: slot and face."""
     edge_edge: PairTable = field(default_factory=PairTable)
     active: ActiveRows = field(default_factory=ActiveRows)
     """Active contacts of the last step."""
@@ -82,8 +82,9 @@ class Scene:
         self.messages.copies.note(nodes)
 
     def stored(self, cracks: Floats) -> Kept:
-        """Stored impulses of the pairs and of the ``cracks`` (m, 12); the same object while these are the same
-        memory."""
+        """Stored impulses of the pairs and of the ``cracks`` (m, 12); it is the same object while the arrays use the
+        same memory.
+        """
         before, pairs, rows = self._stored, self.node_face.kept, cracks.reshape(-1, 4)
         if before is None or before.pairs is not pairs or not same_memory(before.cracks, rows):
             self._stored = before = Kept(pairs, rows)
@@ -100,7 +101,7 @@ class Scene:
     def remember(self, keys: Ints, kept: Floats, nodes: Nodes, comm: Comm) -> None:
         """Copies the stored impulses ``kept`` of the pairs ``keys`` from the scene of the last search. Collective.
 
-        The pairs of a copied node were on the rank of its parent, and are on its own rank from now on.
+        The pairs of a copied node were on the rank of its parent, and are from now on on the rank that owns the copy.
         """
         rows = np.column_stack([keys, kept.view(np.int64)])
         if comm.size > 1:
@@ -114,7 +115,7 @@ class Scene:
         self.node_face.recall(self.slots.first, pairs, np.ascontiguousarray(rows[here, 2:]).view(np.float64))
 
     def rows_of(self, faces: Ints) -> Indices:
-        """(k,) rows of those of the ``faces``, ids, that this rank has."""
+        """(k,) rows of the ``faces`` (ids) that this rank has."""
         rows = places(self.faces.id, faces)
         return rows[rows >= 0]
 
@@ -165,7 +166,7 @@ class Scene:
 
     @property
     def pending(self) -> bool:
-        """Whether anything has to be registered."""
+        """True if any node, face or edge must be registered."""
         return bool(self.faces.new.any() or self.slots.new.any() or self.edges.new.any())
 
     def sharpen(self, least: Floats) -> Flags:
@@ -199,14 +200,15 @@ class Scene:
         return EdgeTable(edges.corners, edges.size, edges.deep, edges.meets, self.reference.edges, edges.fresh)
 
     def free(self) -> None:
-        """Releases the messages of MPI."""
+        """Frees the persistent MPI messages."""
         self.messages.free()
 
 
 @njit("void(uint8[:, ::1], boolean[::1], boolean[::1], int32[:, ::1], boolean[::1])", cache=True)
 def _expose(opened, meets, fresh, faces, shown):  # type: ignore[no-untyped-def]
-    """Opens the edges whose ``faces`` (e, 2) are exposed, ``shown`` (f,), and updates whether they are in edge-edge
-    contact, ``meets``; see SceneEdges."""
+    """Sets the state OPEN of edges whose ``faces`` (e, 2) are exposed, ``shown`` (f,), and updates ``meets``, True for
+    edges in edge-edge contact; see SceneEdges.
+    """
     for e in range(len(opened)):
         for k in range(2):
             if faces[e, k] >= 0 and shown[faces[e, k]] and opened[e, k] < OPEN:

@@ -1,5 +1,5 @@
-"""Faces, edges and candidate pairs after a split: copies by parent, new corners, and new pairs: those that a copy
-inherits from its parent, and those that shared a node before.
+"""Faces, edges and candidate pairs after a split (node separation): copies by parent, new corners, and new pairs. New
+pairs are the pairs that a copy gets from its parent, and pairs whose members had a common node before the split.
 """
 
 from typing import NamedTuple
@@ -16,7 +16,7 @@ _I, _I1, _I2, _N1, _N2, _B1 = (
 
 
 class Family(NamedTuple):
-    """Separated nodes and their copies."""
+    """Family: separated nodes and the copies of each."""
 
     first: Indices
     """(surface_nodes,) row of ``member`` of the first copy of a node, -1 for a node without copies."""
@@ -64,7 +64,9 @@ def _become(ids, key, became, node, tet):  # type: ignore[no-untyped-def]
 
 @njit(_I1(_N2, _N1, _I1), cache=True)
 def _torn(corners, first, near):  # type: ignore[no-untyped-def]
-    """Those of the rows ``near`` of ``corners`` (n, 4 or 6) with a node that has copies; ``first``: see Family."""
+    """Returns the rows among ``near`` of ``corners`` (n, 4 or 6) that contain a node with copies; ``first``: see
+    Family.
+    """
     rows, n = np.empty(len(near), np.int64), 0
     for row in near:
         for k in range(corners.shape[1]):
@@ -95,8 +97,8 @@ def follow_faces(near, corners, fresh, faces, first, ids, key, became):  # type:
 
 @njit(several(_I1, _N2, _B1)(_I1, _N2, _B1, _I2, _N1, _I1, _I1, _N1), cache=True)
 def follow_edges(near, corners, fresh, sides, first, ids, key, became):  # type: ignore[no-untyped-def]
-    """Does the same for edges between ``sides`` (e, 2), ids of faces; also returns which edges vanish because their
-    faces have separated there.
+    """Replaces the nodes of edges between ``sides`` (e, 2), ids of faces, by their copies, as for faces; also returns
+    which edges are removed because their two faces have separated there.
     """
     rows = _torn(corners, first, near)
     old, gone = np.empty((len(rows), 6), np.int32), np.zeros(len(rows), np.bool_)
@@ -120,8 +122,8 @@ def follow_edges(near, corners, fresh, sides, first, ids, key, became):  # type:
 
 @njit("int32[:, ::1](int32[:, ::1], int32[::1], int32[::1], int32[:, ::1])", cache=True)
 def inherited(family, first, following, pairs):  # type: ignore[no-untyped-def]
-    """(p, 2) candidate pairs, node and face, of the copies of a ``family`` (c, 2), slots of parents and copies:
-    those of their parents. ``first`` (nodes,), ``following`` and ``pairs``: see node_face.chain.
+    """(p, 2) candidate pairs, node and face, of the copies of a ``family`` (c, 2), slots of parents and copies. Each
+    copy gets the pairs of its parent. ``first`` (nodes,), ``following`` and ``pairs``: see node_face.chain.
     """
     n = 0
     for write in range(2):
@@ -211,7 +213,7 @@ def apart_from_edges(old, now, first, own):  # type: ignore[no-untyped-def]
 
 @njit("int64[::1](int32[:, ::1], boolean[::1])", cache=True)
 def touching(table, flags):  # type: ignore[no-untyped-def]
-    """Rows of ``table`` (n, k) with a flagged entry."""
+    """Returns the rows of ``table`` (n, k) that contain a flagged entry."""
     rows = np.empty(len(table), np.int64)
     n = 0
     for i in range(len(table)):

@@ -28,7 +28,7 @@ class SplitUpdate:
         scene.own.grow(nodes.n)
 
     def places(self, ids: Ints) -> Indices:
-        """Slots of global ids, in their shape, -1 for a node without slot."""
+        """Returns the slots of global ids, in the shape of ``ids``; -1 for a node without slot."""
         own = self._scene.own
         found = _located(ids.ravel(), self._nodes.id, own.place, own.far_ids, own.far)
         return np.asarray(found.reshape(ids.shape))
@@ -92,8 +92,8 @@ class SplitUpdate:
 
     def share(self, update: TopologyUpdate, neighbours: list[Neighbour]) -> None:
         """Updates the lists of shared nodes without a message. A copy is shared by the ranks that share its parent,
-        since the same ranks hold it, send it and have contacts of it; and a separated node is shared by all ranks
-        that hold it, since it may get impulses across the crack.
+        because the same ranks hold, send and use the copy and its parent. A separated node is shared by all ranks that
+        hold it, because the contacts across the crack may apply impulses to it.
         """
         messages, surface_nodes, nodes = self._scene.messages, self._scene.surface_nodes, self._nodes
         family = update.family[np.argsort(update.family[:, 1])]
@@ -127,7 +127,9 @@ class SplitUpdate:
         scene.own.add(first, rows)
 
     def _faces(self, update: TopologyUpdate, became: Indices, family: Family) -> None:
-        """Replaces the corners of faces by their copies, and adds pairs with the nodes that left a face."""
+        """Replaces the corners of faces by their copies, and adds pairs of a face with nodes that were its corners
+        before.
+        """
         faces, slots, surface_nodes = self._scene.faces, self._scene.slots, self._scene.surface_nodes
         near = faces.incidence.at(slots.root[family.pairs[:, 0]])
         rows, old = split_pairs.follow_faces(
@@ -143,7 +145,7 @@ class SplitUpdate:
         self._add_pairs(pairs[:n])
 
     def _edges(self, update: TopologyUpdate, became: Indices, family: Family) -> None:
-        """Removes edges whose faces have separated, and adds pairs with the edges that left their ends."""
+        """Removes edges whose faces have separated, and adds pairs of edges that had a common end before."""
         edges, surface_nodes = self._scene.edges, self._scene.surface_nodes
         near = edges.incidence.at(self._scene.slots.root[family.pairs[:, 0]])
         rows, old, gone = split_pairs.follow_edges(
@@ -179,8 +181,8 @@ class SplitUpdate:
 
 
 def _heirs(some: Neighbour, family: Indices, flags: Flags) -> Neighbour:
-    """Appends the copies of the nodes shared with a rank to them; ``family`` (c, 2): parents and copies, -1 for a
-    node that is not present; ``flags``: working array, all false.
+    """Appends the copies of the nodes shared with a rank to the list of these nodes; ``family`` (c, 2): parents and
+    copies, -1 for a node that is not present; ``flags``: working array, all false.
     """
     heirs = family[meets(flags, some.nodes, family), 1]
     return Neighbour(some.rank, extended(some.nodes, heirs)) if len(heirs) else some
@@ -199,7 +201,7 @@ def _flagged(ids, wanted):  # type: ignore[no-untyped-def]
 
 @njit("void(boolean[::1], int32[::1], int32[::1])", cache=True)
 def _mark(flags, some, others):  # type: ignore[no-untyped-def]
-    """Flags those of ``some`` that are among the ascending ``others``."""
+    """Sets the flag of each of ``some`` that is among the ascending ``others``."""
     for i in range(len(some)):
         at = np.searchsorted(others, some[i])
         if at < len(others) and others[at] == some[i]:
@@ -208,7 +210,9 @@ def _mark(flags, some, others):  # type: ignore[no-untyped-def]
 
 @njit("int64[::1](int64[::1], int32[::1], int64[:, ::1], boolean[::1])", cache=True)
 def _joining(ids, places, family, have):  # type: ignore[no-untyped-def]
-    """Rows of ``ids`` without a slot that belong to a ``family`` (c, 2) that the scene shall ``have``."""
+    """Returns the rows of ``ids`` without a slot that belong to a ``family`` (c, 2) which must be in the scene,
+    ``have``.
+    """
     wanted = np.sort(family[have].reshape(-1))
     rows, n = np.empty(len(ids), np.int64), 0
     for i in range(len(ids)):
@@ -278,7 +282,9 @@ def _newly_shared(ids, local, places, holds, shares, flags):  # type: ignore[no-
 
 @njit("int32[::1](int64[::1], int64[::1], int32[::1], int64[::1], int32[::1])", cache=True)
 def _located(wanted, ids, place, far_ids, far):  # type: ignore[no-untyped-def]
-    """(n,) the ``place`` of those that are among the ``ids`` of this rank, ``far`` of the others, -1 for no slot."""
+    """(n,) slot of each node: from ``place`` for nodes among the ``ids`` of this rank, from ``far`` for other nodes, -1
+    for a node without slot.
+    """
     found = np.empty(len(wanted), np.int32)
     for i in range(len(wanted)):
         found[i] = -1

@@ -13,11 +13,12 @@ from . import ghosts
 from .near_surface import HALO, NearSurface
 
 _HORIZONS = np.array([10.0, 20.0, 40.0, 80.0, 160.0, 300.0])
-"""Horizons of a search, in steps."""
+"""Smallest and largest horizon of a search, in steps."""
 _SWEPT = 8.0
-"""Largest mean number of cells that a node may sweep: two along each axis."""
+"""Largest mean number of cells that a node may sweep in a horizon: two cells along each axis."""
 _SPENT = 0.4
-"""Share of the halo: a node that departs further from its extrapolated position needs a search of all ranks."""
+"""Share of the width of the halo. A node that departs further from its extrapolated position makes a search of all
+ranks necessary."""
 
 
 class SurfaceMotion:
@@ -37,10 +38,10 @@ class SurfaceMotion:
     def follow(self, found: Surface, nodes: Nodes) -> None:
         """Replaces the surface. Collective."""
         self.found = found
-        """Surface of this rank."""
+        """Returns the surface of this rank."""
         self._watched = found.flags | found.waiting
         self.sides = self._whole(nodes, located(nodes.id, found.faces.nodes))
-        """Faces, edges and nodes of it."""
+        """Returns faces, edges and nodes of the surface."""
 
     def forget(self, removed: Flags) -> None:
         """Ignores ``removed`` (nodes,) nodes from now on."""
@@ -51,8 +52,8 @@ class SurfaceMotion:
         self._x, self._course, self._t = nodes.x.copy(), course.copy(), t
 
     def spent(self, nodes: Nodes, t: float, dt: float) -> bool:
-        """Returns whether the candidate list will be invalid a step ``dt`` after ``t``: its time is over, or a node
-        departs so far that another rank may lack its ghost.
+        """Returns whether the candidate list will be invalid a step ``dt`` after ``t``: the horizon has passed, or a
+        node departs so far that another rank may lack its ghost.
         """
         if t + dt > self.until:
             return True
@@ -75,8 +76,8 @@ class SurfaceMotion:
         return SurfaceNodes(nodes.id, every, nodes.owner, nodes.part, self.mobility, nodes.x, nodes.v, self._course)
 
     def _whole(self, nodes: Nodes, local: Indices) -> NearSurface:
-        """Returns the faces, edges and nodes of the surface; ``local`` (f, 4): nodes of the faces. The tet of an
-        edge may be another rank's, and its opposite node a local one.
+        """Returns the faces, edges and nodes of the surface; ``local`` (f, 4): nodes of the faces. The tet of an edge
+        may be on another rank although the opposite node of the tet is on this rank.
         """
         found, here = self.found, self.here(nodes)
         used, opposite = self._watched.copy(), nodes.places(found.edges.nodes[:, 4:])
@@ -102,8 +103,8 @@ class SurfaceMotion:
     def foresight(self, dt: float) -> tuple[float, Floats]:
         """Returns the horizon of a search in steps ``dt``, and the mean velocity (3,), m/s. Collective.
 
-        The largest horizon with which the mean volume swept by a node is below ``_SWEPT`` cells of a face's size:
-        about a face's length if all nodes move, much more if few are fast.
+        The largest horizon with which the mean volume swept by a node is below ``_SWEPT`` cells of a face's size: The
+        swept length is about the length of a face if all nodes move, and much more if only few nodes are fast.
         """
         surface_nodes, owned = self.sides.surface_nodes, self.sides.owned
         v = surface_nodes.course[surface_nodes.places(owned)]
@@ -122,7 +123,9 @@ class SurfaceMotion:
     cache=True,
 )
 def _strayed(x, v, x_then, v_then, flags, dt, ahead):  # type: ignore[no-untyped-def]
-    """Largest squared distance, m^2, of a flagged node from its extrapolated position, one step ahead."""
+    """Returns the largest squared distance, m^2, of a flagged node from its extrapolated position at the end of the
+    step.
+    """
     most = 0.0
     for a in range(len(x)):
         if flags[a]:

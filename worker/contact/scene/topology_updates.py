@@ -1,4 +1,6 @@
-"""Topology changes of a split near one rank: those of its own nodes, and those of ghosts, received from other ranks."""
+"""Topology changes of a split (node separation) near one rank: changes of the nodes of the rank, and changes of ghosts,
+which are received from other ranks.
+"""
 
 from dataclasses import dataclass
 
@@ -24,12 +26,12 @@ class TopologyUpdate:
     family: Ints
     """(c, 2) ids of parents, ascending, and of their copies."""
     rows: SurfaceNodes
-    """Parents and copies."""
+    """Parents and copies that belong to one message."""
 
 
 def gather(split: Split, scene: Scene, here: SurfaceNodes, comm: Comm) -> TopologyUpdate | None:
-    """Returns None if no node split. ``here``: all nodes of this rank, by local index. Splits of ghosts arrive from
-    the rank that sends their state; only ranks with such messages take part.
+    """Returns None if no node split. ``here``: all nodes of this rank, by local index. Splits of ghosts are received
+    from the rank that sends the state of the ghosts; only ranks with such messages take part.
     """
     sources = [other.rank for other in scene.messages.copies.receives if split.touched[other.rank]]
     if not (sources or split.touched[comm.rank]):
@@ -74,7 +76,9 @@ def _messages(split: Split, scene: Scene, here: SurfaceNodes, table: Ints, local
 
 @njit("int64[::1](boolean[::1], int32[::1], int32[:, ::1])", cache=True)
 def meets(flags, nodes, family):  # type: ignore[no-untyped-def]
-    """Rows of a ``family`` (c, 2) whose parents are among the ``nodes``; ``flags``: working array, all false."""
+    """Returns the rows of a ``family`` (c, 2) whose parents are among the ``nodes``; ``flags``: working array, all
+    false.
+    """
     rows, n = np.empty(len(family), np.int64), 0
     for a in nodes:
         flags[a] = True
