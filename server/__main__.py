@@ -22,7 +22,8 @@ from .settings import Caps, Settings, SettingsError, StartError, capped, command
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Returns the exit code: 0; 2 for a wrong command line, 1 for any other failure, with one line for people."""
+    """Runs the command line and returns the exit code: 0 for success, 2 for a wrong command line, 1 for any other
+    failure. A failure is explained in one line for people."""
     options = _parser().parse_args(arguments)
     logging.basicConfig(format="%(asctime)s %(levelname)s %(message)s", level=logging.INFO)
     try:
@@ -160,8 +161,8 @@ def _untouched(settings: Settings) -> bool:
 
 
 def _store(options: argparse.Namespace) -> Store:
-    """Returns the database with the tokens. Raises SettingsError if it does not exist: ``--runs`` may name another
-    folder."""
+    """Returns the database with the tokens. Raises SettingsError if the database does not exist: ``--runs`` may name
+    another folder."""
     settings = _settings(options)
     if _untouched(settings):
         raise SettingsError(f"--runs {settings.runs}: no server has used this folder, and it has no tokens")
@@ -170,7 +171,7 @@ def _store(options: argparse.Namespace) -> Store:
 
 
 def _add(options: argparse.Namespace) -> None:
-    """Adds a token. Creates the folder and its database like the server if they do not exist, and reports a new
+    """Adds a token. If the folder and its database do not exist, creates them like the server and reports the new
     database."""
     settings = _settings(options)
     new = _untouched(settings)

@@ -71,8 +71,8 @@ _SAFE_HEADERS = {
 
 @contextmanager
 def opened(settings: Settings) -> Iterator[Service]:
-    """Opens the parts of a server in order of dependence, the supervisor last, and closes them in reverse order;
-    workers continue. Raises StoreError, IdentityError, TelemetryError, OSError.
+    """Opens the parts of a server in order of dependence, the supervisor last, and closes them in reverse order.
+    Workers continue after the close. Raises StoreError, IdentityError, TelemetryError, OSError.
     """
     settings.runs.mkdir(0o700, parents=True, exist_ok=True)
     with ExitStack() as stack:
@@ -140,7 +140,7 @@ def launcher_of(settings: Settings) -> Launcher:
 
 
 def build_app(service: Service) -> FastAPI:
-    """Returns the FastAPI application over open parts."""
+    """Returns the FastAPI application that uses open parts."""
 
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:

@@ -1,22 +1,23 @@
-"""Settings of the C library's heap, so that freed memory returns to the system."""
+"""Settings of the heap of the C library, so that freed memory returns to the operating system."""
 
 import ctypes
 import sys
 
 _ARENA_MAX, _MMAP_THRESHOLD = -8, -3
-"""Parameters of mallopt(3), of glibc."""
+"""Parameters of mallopt(3) of glibc."""
 _HEAPS = 2
-"""Number of heaps for all threads. Chosen: Python runs one thread at a time, and the CPU time did not change."""
+"""Number of heaps for all threads. The value was chosen because Python runs one thread at a time, and the CPU time
+did not change."""
 _LARGE = 256 << 10
-"""Size in bytes from which a freed block returns to the system at once. Chosen: answers that grow with a run are
-larger. glibc would raise the limit to the largest block so far.
+"""Size in bytes from which a freed block returns to the system at once. The value was chosen because answers that
+grow with a run are larger. Without this setting glibc would raise the limit to the largest block so far.
 """
 
 
 def share() -> bool:
-    """Limits the number of heaps; call it before the first thread. False where the C library has no such setting.
-    Without it each thread has a heap of its own, which stays as large as the largest answer that the thread has
-    made.
+    """Limits the number of heaps; must be called before the first thread starts. Returns False if the C library has
+    no such setting. Without the limit each thread has a heap of its own, which stays as large as the largest answer
+    that the thread has made.
     """
     if not sys.platform.startswith("linux"):
         return False

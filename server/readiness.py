@@ -14,16 +14,17 @@ from .requests.thread_pool import ThreadPool
 from .settings import Settings
 
 _FRESH = 1.0
-"""s for which a result is used: /readyz needs no token, and each check writes to the disk. Chosen."""
+"""Time in s for which the result of a check is used again (chosen value). Reason: /readyz needs no token, and each
+check writes to the disk."""
 _LIMIT = 2.0
-"""s after which a check has failed. Chosen: a disk that works answers within 0.1 s."""
+"""Time in s after which a check has failed. The value was chosen because a disk that works answers within 0.1 s."""
 
 
 class Readiness:
-    """Used in the thread of the event loop."""
+    """Checks of the disk and the database. The class is used in the thread of the event loop."""
 
     def __init__(self, settings: Settings, store: Store) -> None:
-        """Checks nothing yet."""
+        """Creates the object; no check is made yet."""
         self._settings, self._store = settings, store
         self._checks = {
             name: _Check(look)
@@ -58,7 +59,7 @@ class Readiness:
 
 
 class _Check:
-    """One check: in a thread of its own, once for all requests at the same time."""
+    """Makes one check in a separate thread; all requests at the same time share its result."""
 
     def __init__(self, look: Callable[[], bool]) -> None:
         self._look, self._thread = look, ThreadPool(each=1, waiting=1, patience=_LIMIT, most=1)
@@ -66,7 +67,7 @@ class _Check:
         self._asked: asyncio.Task[None] | None = None
 
     async def passes(self) -> bool:
-        """The result, at most ``_FRESH`` s old; False where the check takes longer than ``_LIMIT``."""
+        """Returns the result of a check, at most ``_FRESH`` s old; False if the check takes longer than ``_LIMIT``."""
         if time.monotonic() >= self._until:
             if self._asked is None or self._asked.done():
                 self._asked = asyncio.create_task(self._ask())

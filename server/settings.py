@@ -1,4 +1,4 @@
-"""Settings of a site: folder of runs, cores, start of workers, caps."""
+"""Settings of a site: folder of runs, cores, start of workers, limits of a run."""
 
 import ipaddress
 import os
@@ -13,42 +13,42 @@ from conoid.cases.estimates.cores import usable_cores
 from conoid.cases.site.batch import Site, SiteError, read_site
 
 WORKER = (sys.executable, "-m", "mpi4py", "-m", "conoid.worker")
-"""Command of the worker after ``mpiexec -n N``; with ``-m mpi4py`` an exception of one rank ends all ranks."""
+"""Command of the worker after ``mpiexec -n N``. With ``-m mpi4py`` an exception of one rank ends all ranks."""
 
 
 class StartError(Exception):
-    """The server or a command cannot do its work; the text is one line for people."""
+    """Error: the server or a command cannot do its work. The text of the error is one line for people."""
 
     exit_code = 1
-    """Exit code of the command: 2 for a wrong request, 1 for everything else, as for the client."""
+    """Exit code of the command: 2 for a wrong request, 1 for any other failure, as for the client."""
 
 
 class SettingsError(StartError):
-    """A setting cannot be used; the text names it, its value and what is allowed."""
+    """Error: a setting cannot be used. The text names the setting, its value and the allowed values."""
 
     exit_code = 2
 
 
 def memory_bytes() -> int:
-    """Physical memory of this machine, bytes."""
+    """Returns the physical memory of this machine, bytes."""
     return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
 
 
 @dataclass(frozen=True)
 class Caps:
-    """Largest case that is accepted, by its estimate; None: no cap."""
+    """Limits of an accepted case, by its estimate; None: no limit."""
 
     elements: int | None = 100_000_000
     steps: int | None = 100_000_000
     memory: int | None = field(default_factory=memory_bytes)
-    """Memory of all ranks together, bytes."""
+    """Memory limit of all ranks together, bytes."""
     core_seconds: float | None = None
     wall_time: float | None = None
-    """Wall time of a run in s. A case with a smaller ``run.max_wall_time`` is stopped at that time."""
+    """Limit of the wall time of a run, s. A case with a smaller ``run.max_wall_time`` is stopped at that time."""
     queued: int = 1000
-    """Number of open runs of one owner."""
+    """Largest number of open runs of one owner."""
     output_bytes: int | None = None
-    """Bytes of a run's folder; a larger run is stopped."""
+    """Largest size in bytes of a run's folder; a larger run is stopped."""
     free_disk: int = 1 << 30
     """Bytes that must be free on the disk of the runs' folder before a run is accepted."""
 
@@ -71,12 +71,13 @@ class Settings:
     database: str = ""
     """SQLAlchemy URL; empty: SQLite in the runs' folder."""
     mpiexec: str = ""
-    """Launcher of the site; empty: the one beside this Python, else the one in PATH."""
+    """Launcher of the site; empty: the launcher beside this Python, else the launcher in PATH."""
     worker: tuple[str, ...] = WORKER
     grace: float = 30.0
-    """Time in s between the request to stop and the kill."""
+    """Time in s between the request to stop a worker and the kill."""
     end_runs: bool = False
-    """Cancel all runs when the server stops; otherwise workers go on, and the next server adopts them."""
+    """Whether all runs are cancelled when the server stops. Otherwise the workers continue, and the next server
+    adopts them."""
     caps: Caps = field(default_factory=Caps)
     site: Site = field(default_factory=Site)
     """Site settings: launcher, and profiles of batch systems."""
@@ -98,7 +99,8 @@ class Settings:
 
     @property
     def database_url(self) -> str | URL:
-        """Returns the URL in use. As text, a path with ``%``, ``?`` or ``#`` would be misread."""
+        """Returns the database URL in use. The URL is built from parts, because a file name with ``%``, ``?`` or
+        ``#`` would be misread in a text."""
         return self.database or URL.create("sqlite", database=str(self.database_file))
 
     @property
@@ -118,13 +120,13 @@ def loopback(host: str) -> bool:
 
 
 def capped(site: Site) -> dict[str, float]:
-    """The caps that a site's settings file names."""
+    """Returns the limits of a run from a site's settings file."""
     named = {name: getattr(site.caps, name) for name in site.caps.__struct_fields__}
     return {name: cap for name, cap in {**named, "queued": site.quota.queued}.items() if cap is not None}
 
 
 def site_of(path: Path | None) -> Site:
-    """The settings file of a site; without one, runs are started on this machine. Raises SettingsError."""
+    """Returns the site settings in a file; without a file, runs are started on this machine. Raises SettingsError."""
     try:
         return Site() if path is None else read_site(path)
     except SiteError as error:
@@ -132,7 +134,7 @@ def site_of(path: Path | None) -> Site:
 
 
 def command(text: str, option: str = "--worker") -> tuple[str, ...]:
-    """A command line as a list of arguments; no shell is involved. Raises SettingsError."""
+    """Returns a command line as a list of arguments; no shell is used. Raises SettingsError."""
     try:
         words = tuple(shlex.split(text))
     except ValueError as error:

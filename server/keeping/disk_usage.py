@@ -1,6 +1,6 @@
 """Disk usage of runs and uploaded files.
 
-A file that a case names is one file on disk for all runs that use it; it counts once for each user.
+A file that several cases name is one file on disk; it counts once for each user.
 """
 
 import os
@@ -13,12 +13,12 @@ from pathlib import Path
 from conoid.cases.output import layout
 
 Copies = dict[tuple[int, int], int]
-"""Bytes of files, by device and inode."""
+"""Size of files in bytes, by device and inode."""
 
 
 def size(folder: Path) -> int:
-    """Returns the bytes of all files except the copies of files that the case names. A file that disappears
-    meanwhile counts 0."""
+    """Returns the bytes of all files except the copies of files that the case names. A file that disappears during
+    the call counts 0."""
     total = 0
     for place, folders, names in os.walk(folder):
         if place == os.fspath(folder) and layout.FILES in folders:
@@ -42,16 +42,16 @@ def copies(folder: Path) -> Copies:
 
 @dataclass
 class DiskUsage:
-    """Sizes at the last pass. Not safe between threads."""
+    """Sizes of folders and files at the last pass. The class is not thread-safe."""
 
     sizes: dict[str, int] = field(default_factory=dict)
-    """Bytes of the folder of each run, without the files that its case names."""
+    """Size in bytes of the folder of each run, without the files that its case names."""
     files: dict[str, Copies] = field(default_factory=dict)
     """Files that the case of each run names."""
     owners: dict[str, str] = field(default_factory=dict)
     """Owner of each run."""
     sent: dict[str, Copies] = field(default_factory=dict)
-    """Uploaded files of each user."""
+    """Uploaded files of each user, by device and inode."""
 
     def note(self, run: str, owner: str, its: int, copies: Copies) -> None:
         """Records the size of a run's folder and the files that its case names."""
@@ -70,7 +70,7 @@ class DiskUsage:
         self.owners.pop(run, None)
 
     def by_owner(self) -> Counter[str]:
-        """Returns the bytes of each user: folders of runs, and files, each counted once."""
+        """Returns the bytes of each user: folders of runs, and files; each file counts once."""
         found, files = Counter[str](), {owner: dict(copies) for owner, copies in self.sent.items()}
         for run, owner in self.owners.items():
             found[owner] += self.sizes[run]
@@ -79,10 +79,10 @@ class DiskUsage:
 
 
 class Left:
-    """The bytes that remain if runs are removed one after the other."""
+    """Number of bytes that remain if runs are removed one after the other."""
 
     def __init__(self, weights: DiskUsage) -> None:
-        """Starts with everything: ``total`` in bytes."""
+        """Begins with the bytes of all runs: ``total``."""
         self._sizes, self._files = dict(weights.sizes), dict(weights.files)
         held = [*self._files.values(), *weights.sent.values()]
         self._names = Counter(inode for copies in held for inode in copies)
@@ -90,7 +90,7 @@ class Left:
         self.total = sum(self._sizes.values()) + sum(files.values())
 
     def drop(self, run: str) -> None:
-        """Subtracts a run, and the files that no other run and no user has."""
+        """Subtracts a run, and those of its files that no other run and no user has."""
         self.total -= self._sizes.pop(run, 0)
         for inode, size in self._files.pop(run, {}).items():
             self._names[inode] -= 1

@@ -24,24 +24,24 @@ from .removed_runs import RemovedRuns
 
 _log = logging.getLogger("conoid.server")
 _PATIENCE = 5.0
-"""s from the start of the server to the first pass over the folders; also the shortest time between two passes that
-requests cause. Chosen."""
+"""Time in s from the start of the server to the first pass over the folders (chosen value). It is also the shortest
+time between two passes that requests cause."""
 
 
 class Removal:
-    """Measures and removes folders in a thread of its own; methods may be called from any thread. Folders are
-    measured if the site has [retention] or quota.output_bytes."""
+    """Measures and removes folders in a separate thread. Methods may be called from any thread. Folders are measured
+    if the site has [retention] or quota.output_bytes."""
 
     def __init__(
         self, settings: Settings, store: Store, lines: RemovedRuns, is_open: Callable[[str], bool], sent: Uploads
     ) -> None:
-        """``is_open``: whether a run may still change."""
+        """Creates the object without starting its thread. ``is_open``: whether a run may still change."""
         self._settings, self._store, self._lines, self._is_open, self._sent = settings, store, lines, is_open, sent
         self._rules = settings.site.retention
         asked = self._rules.oldest is not None or self._rules.bytes is not None
         self._weighs = asked or settings.site.quota.output_bytes is not None
         self.needed: Callable[[], Set[str]] = frozenset
-        """Hashes of files that must not be removed now."""
+        """Function that returns the hashes of files that must not be removed now."""
         self._lock, self._asking = threading.Lock(), threading.Lock()
         self._asked_again = 0.0
         self._usage = DiskUsage()
@@ -66,8 +66,8 @@ class Removal:
         return self._kept[owner]
 
     def kept_now(self, owner: str) -> int:
-        """Returns the bytes of an owner's runs and files. Without the thread they are measured, at most every
-        ``_PATIENCE`` s. Raises SQLAlchemyError."""
+        """Returns the bytes of an owner's runs and files. If the site has no limit of size, the thread measures
+        nothing, and the folders are measured here, at most every ``_PATIENCE`` s. Raises SQLAlchemyError."""
         with self._asking:
             if not self._weighs and time.monotonic() >= self._asked_again:
                 with suppress(OSError):
@@ -76,7 +76,8 @@ class Removal:
         return self._kept[owner]
 
     def remove(self, run: Run, why: str) -> None:
-        """Removes the folder of a run that has ended; its record is on disk first. Raises OSError."""
+        """Removes the folder of a run that has ended; the record of the run is written to disk first. Raises
+        OSError."""
         path = self._settings.runs / run.id
         if not path.is_dir():
             raise FileNotFoundError(path)
@@ -95,7 +96,7 @@ class Removal:
         paths, known = self._all()
         self._weigh(paths, known)
         for run, why in self._due([known[path.name] for path in paths], time.time()):
-            with suppress(FileNotFoundError):  # the owner may have removed it at the same time
+            with suppress(FileNotFoundError):  # the owner may have removed the run at the same time
                 self.remove(run, why)
                 _log.info("run %s of %s is removed: %s", run.id, run.owner, why)
 
@@ -121,7 +122,7 @@ class Removal:
             self._kept = self._usage.by_owner()
 
     def _due(self, runs: list[Run], now: float) -> Iterator[tuple[Run, str]]:
-        """Yields the runs to remove, oldest first, with the rule."""
+        """Yields the runs to remove, oldest first, each with the rule that removes it."""
         left, most, oldest = Left(self._usage), self._rules.bytes, self._rules.oldest
         for run in sorted(runs, key=lambda run: run.finished):
             old = oldest is not None and now - run.finished > oldest
@@ -146,7 +147,7 @@ class Removal:
 
 
 def restore(store: Store, lines: RemovedRuns) -> None:
-    """Marks removed runs in a database that was lost. Raises SQLAlchemyError, OSError."""
+    """Marks removed runs as removed in a new database that replaces a lost one. Raises SQLAlchemyError, OSError."""
     ended = store.ended()
     for run_id in lines:
         line = lines.get(run_id)

@@ -24,7 +24,7 @@ FILE = "purged.jsonl"
 
 
 class RemovedRun(msgspec.Struct, kw_only=True, frozen=True):
-    """The kept record of a removed run; times are Unix s."""
+    """The stored record of a removed run. Times are Unix s."""
 
     id: str
     owner: str
@@ -38,9 +38,9 @@ class RemovedRun(msgspec.Struct, kw_only=True, frozen=True):
     message: str
     removed: float
     why: str
-    """Removed by this user or rule."""
+    """User or rule that has removed the run."""
     steps: int | None = None
-    """This number and the simulated time reached, s, are None where they are unknown."""
+    """Number of the last step, and simulated time reached, s; None if unknown."""
     time: float | None = None
     digest: str = ""
     bytes: int = 0
@@ -48,7 +48,7 @@ class RemovedRun(msgspec.Struct, kw_only=True, frozen=True):
 
     @property
     def run(self) -> Run:
-        """The record as a row of the database."""
+        """Returns the record as a row of the table of runs."""
         cause = Cause(self.cause) if self.cause else None
         return Run(
             self.id, self.owner, self.name, self.ranks, self.submitted, State(self.state), cause, self.message,
@@ -60,7 +60,7 @@ _record = msgspec.json.Decoder(RemovedRun)
 
 
 def of(run: Run, path: Path, why: str) -> RemovedRun:
-    """The record of a run that has ended, made while its folder exists."""
+    """Returns the record of a run that has ended. It is made while the folder of the run exists."""
     ended = folder.outcome(path)
     results: dict[str, Any] = (
         {} if ended is None else {"steps": ended.steps, "time": known(ended.time), "digest": ended.digest}
@@ -74,7 +74,8 @@ def of(run: Run, path: Path, why: str) -> RemovedRun:
 
 
 class RemovedRuns:
-    """The records of all removed runs, for any thread. Only the offset of each line is in memory."""
+    """The records of all removed runs. Methods may be called from any thread. Only the offset of each line is in
+    memory."""
 
     def __init__(self, runs: Path) -> None:
         """Reads the file once; an incomplete last line is ignored. Raises OSError."""
@@ -96,7 +97,8 @@ class RemovedRuns:
         return iter(tuple(self._at))
 
     def add(self, line: RemovedRun) -> None:
-        """Appends a record; it is on disk on return. A second record of a run replaces the first. Raises OSError."""
+        """Appends a record; the record is on disk on return. A second record of a run replaces the first. Raises
+        OSError."""
         with self._lock, whole.appended(self._path, 0o600) as file:
             end = os.fstat(file.fileno()).st_size
             begin = b"" if not end or _last(self._path, end) == b"\n" else b"\n"
@@ -110,7 +112,7 @@ class RemovedRuns:
         durable.sync_folder(self._path.parent)
 
     def get(self, run_id: str) -> RemovedRun | None:
-        """The record of a run; None without one. Raises OSError."""
+        """Returns the record of a run; None without a record. Raises OSError."""
         place = self._at.get(run_id)
         if place is None:
             return None

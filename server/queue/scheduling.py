@@ -19,12 +19,13 @@ from conoid.cases.site.policy import Share
 from ..runs.events import Run
 
 _LEAST = 1.0
-"""Least core-seconds of a run in the order of the queue, for a smaller or missing estimate. Chosen."""
+"""Smallest number of core-seconds of a run in the order of the queue (chosen value). It replaces a smaller or
+missing estimate."""
 
 
 @dataclass(frozen=True)
 class Need:
-    """Request of a waiting run."""
+    """Cores, memory and time that a waiting run requests."""
 
     run: str
     owner: str
@@ -32,9 +33,9 @@ class Need:
     memory: float = 0.0
     """Memory of all ranks by the estimate, bytes; 0: unknown."""
     seconds: float = 0.0
-    """Expected duration, s; 0: unknown."""
+    """Expected duration of the run, s; 0: unknown."""
     limit: float = math.inf
-    """Duration after which the run is certainly stopped, s."""
+    """Duration after which the run is stopped in any case, s."""
     priority: int = 0
     """Priority among the runs of its owner."""
     sweep: str = ""
@@ -42,8 +43,8 @@ class Need:
 
 @dataclass(frozen=True)
 class Busy:
-    """Cores and memory of a running run, and the Unix time of its expected end; 0: unknown, it may end at any
-    moment."""
+    """Cores and memory of a running run, and the Unix time of its expected end. Time 0: the end is unknown, and the
+    run may end at any moment."""
 
     cores: int
     memory: float = 0.0
@@ -52,23 +53,23 @@ class Busy:
 
 @dataclass(frozen=True)
 class Room:
-    """Cores, and memory in bytes."""
+    """Numbers of free cores and free bytes of memory."""
 
     cores: int
     memory: float = math.inf
 
     def fits(self, need: Need) -> bool:
-        """True if the request fits."""
+        """True if the requested cores and memory are free."""
         return need.cores <= self.cores and need.memory <= self.memory
 
     def less(self, *taken: Need | Busy) -> "Room":
-        """Returns what is left besides these runs."""
+        """Returns the free cores and memory besides these runs."""
         return Room(self.cores - sum(one.cores for one in taken), self.memory - sum(one.memory for one in taken))
 
 
 @dataclass
 class Plan:
-    """Runs that start now, in order, and for each of the others the reason for which it waits."""
+    """Runs that start now, in order, and the reason for which each of the other runs waits."""
 
     start: list[str] = field(default_factory=list)
     why: dict[str, str] = field(default_factory=dict)
@@ -86,8 +87,8 @@ def stranded(runs: Iterable[Run], looked_after: Set[str]) -> list[str]:
 
 
 def ordered(needs: Iterable[Need], taken: Mapping[str, float], users: Mapping[str, Share]) -> list[Need]:
-    """Returns the queue in the order of starting. ``taken``: core-seconds of each owner so far, with those of
-    running runs."""
+    """Returns the queue in the order of starting. ``taken``: core-seconds of each owner so far, including running
+    runs."""
     of_owner: dict[str, list[Need]] = {}
     for need in sorted(needs, key=lambda need: (-need.priority, need.run)):
         of_owner.setdefault(need.owner, []).append(need)
@@ -139,7 +140,7 @@ def plan(
 
 
 def _beyond(need: Need, room: Room) -> str:
-    """Returns why a run can never start; a server may have been restarted with fewer cores."""
+    """Returns why a run can never start, for example after a restart of the server with fewer cores."""
     if need.cores > room.cores:
         return f"it needs {counted(need.cores, 'slot')}, and this server has {room.cores}: it cannot start here"
     if need.memory > room.memory:
@@ -156,7 +157,7 @@ def _reason(need: Need, room: Room, free: Room, waits: int) -> str:
 
 
 def _passes(need: Need, first: Need, busy: Sequence[Busy], free: Room, now: float) -> bool:
-    """Whether ``need`` can start without a delay of ``first``, which does not fit into ``free``."""
+    """Whether ``need`` can start without a delay of ``first``, the run that does not fit into ``free``."""
     return now + need.limit <= _earliest(first, busy, free, now) or _beside(need, first, busy, free)
 
 

@@ -1,4 +1,4 @@
-"""Core-seconds that each owner has used. Past use decays: half of it is forgotten after each half-life."""
+"""Core-seconds that each owner has used. Past use decays by half in each half-life."""
 
 from collections.abc import Iterable
 from typing import NamedTuple
@@ -14,10 +14,10 @@ class Took(NamedTuple):
 
 
 class Usage:
-    """Core-seconds by owner. Used in the supervisor's thread; ``of`` may be called from any thread."""
+    """Core-seconds by owner. The class is used in the supervisor's thread; ``of`` may be called from any thread."""
 
     def __init__(self, half_life: float) -> None:
-        """Starts without use. ``half_life`` in s."""
+        """Creates the object with no use of any owner. ``half_life`` in s."""
         self._half_life = half_life
         self._taken: dict[str, tuple[float, float]] = {}
 
@@ -32,10 +32,10 @@ class Usage:
         self._taken[took.owner] = (self.of(took.owner, took.finished) + seconds, took.finished)
 
     def of(self, owner: str, now: float) -> float:
-        """Returns the core-seconds that count at the Unix time ``now``."""
+        """Returns the decayed core-seconds of an owner at the Unix time ``now``."""
         taken, at = self._taken.get(owner, (0.0, now))
         return float(taken * 0.5 ** (max(0.0, now - at) / self._half_life))
 
     def all(self, now: float) -> dict[str, float]:
-        """Returns the core-seconds of every owner."""
+        """Returns the decayed core-seconds of every owner."""
         return {owner: self.of(owner, now) for owner in tuple(self._taken)}

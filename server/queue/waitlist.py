@@ -1,4 +1,5 @@
-"""The queue of the supervisor: the needs of each run, the use of each owner, and the runs that start now."""
+"""The queue of the supervisor: cores and memory that each run needs, use of each owner, and selection of the runs
+that start now."""
 
 import math
 import time
@@ -20,24 +21,27 @@ from .scheduling import Busy, Need, Room
 from .usage import Took, Usage
 
 _REST = 1.0
-"""Longest time in s between two schedulings: past use decays with time, and failed starts are tried again. Chosen."""
+"""Longest time in s between two schedulings (chosen value). Scheduling is repeated because past use decays with
+time, and failed starts are tried again."""
 
 
 @dataclass(frozen=True)
 class Held:
-    """Conditions of other parts under which a run waits."""
+    """Conditions outside the queue under which a run waits."""
 
     now: Callable[[str], bool]
-    """Whether the next try of the run is later."""
+    """Whether the start of the run was delayed and its next try is later."""
     sweep: Callable[[Need, Iterable[Need]], str]
-    """Reason for which a run waits for others of its sweep, given the runs with cores; empty if it does not."""
+    """Returns the reason for which a run waits for other runs of its sweep; empty if it does not wait. Its argument
+    is the list of the runs with cores."""
 
 
 class Waitlist:
-    """The queue. Used in the supervisor's thread; ``why`` and ``used`` may be called from any thread."""
+    """The queue. The class is used in the supervisor's thread; ``why`` and ``used`` may be called from any thread."""
 
     def __init__(self, settings: Settings, queues: bool) -> None:
-        """``queues``: the launcher is a batch system with a queue of its own, which also allocates memory."""
+        """Creates an empty queue. ``queues``: the launcher is a batch system with a queue of its own, which also
+        allocates memory."""
         self._settings, self._queues = settings, queues
         self._rules, self._quota = settings.site.queue, settings.site.quota
         self.usage = Usage(self._rules.forgets)
@@ -46,11 +50,11 @@ class Waitlist:
         self._due = 0.0
 
     def changed(self) -> None:
-        """Schedules again at the next call of ``turn``."""
+        """Requests a scheduling at the next call of ``turn``."""
         self._due = 0.0
 
     def settled(self, before: Run | None, after: Run) -> None:
-        """Notes the step of a run. Its use of cores is added when it releases them."""
+        """Records the step of a run. Its use of cores is added when the run releases the cores."""
         self._due = 0.0
         if before is not None and before.started and (after.state.final or not after.started):
             self.usage.add(Took(before.owner, before.cores, before.started, after.finished or time.time()))
@@ -63,7 +67,7 @@ class Waitlist:
         return self._why.get(run_id, "")
 
     def used(self, owner: str, runs: Iterable[Run]) -> float:
-        """Returns the core-seconds of an owner that count now, with those of the running ones among ``runs``."""
+        """Returns the decayed core-seconds of an owner, with the use of the running runs among ``runs``."""
         now = time.time()
         own = (run.cores * (now - run.started) for run in runs if run.owner == owner and run.started)
         return self.usage.of(owner, now) + sum(own)
@@ -89,7 +93,8 @@ class Waitlist:
         return Room(self._settings.slots) if memory is None else Room(self._settings.slots, float(memory))
 
     def _taken(self, working: Iterable[tuple[Run, Need]], now: float) -> dict[str, float]:
-        """Returns core-seconds by owner. A running run counts with its estimate, or with its use if that is larger."""
+        """Returns core-seconds by owner. A running run counts with its estimated use, or with its use so far if that
+        is larger."""
         taken = defaultdict(float, self.usage.all(now))
         for run, need in working:
             taken[run.owner] += run.cores * max(need.seconds, now - run.started if run.started else 0.0, 1.0)
@@ -114,8 +119,8 @@ class Waitlist:
         return blocked
 
     def _need(self, run: Run) -> Need:
-        """Returns the needs by the run's folder, which is read once. If the folder is damaged, only the number of
-        cores is known."""
+        """Returns the cores and memory that a run needs, from the run's folder, which is read once. If the folder is
+        damaged, only the number of cores is known."""
         if run.id not in self._needs:
             try:
                 made = folder.submission(self._settings.runs / run.id)
@@ -126,10 +131,10 @@ class Waitlist:
 
 
 def need_of(made: Submission, grace: float, room: float = math.inf) -> Need:
-    """Returns the needs of a submission. ``grace``: time in s between its limit and the forced end.
+    """Returns the cores, memory and time that a submission needs.
 
-    For bodies that may break, the memory is that of all tets as separate fragments, unless the run would then not
-    fit into ``room`` bytes.
+    ``grace``: time in s between its time limit and the forced end. For bodies that may break, the memory is that of
+    all tets as separate fragments, unless this exceeds ``room`` bytes.
     """
     seconds = made.estimate.get("seconds", made.estimate.get("core_seconds", 0.0) / made.cores)
     limit = math.inf if made.wall_time is None else made.wall_time + 2.0 * grace
@@ -141,5 +146,5 @@ def need_of(made: Submission, grace: float, room: float = math.inf) -> Need:
 
 
 def _busy(run: Run, need: Need) -> Busy:
-    """A running run with its expected end."""
+    """Returns a running run with its expected end."""
     return Busy(run.cores, need.memory, run.started + need.seconds if run.started and need.seconds else 0.0)

@@ -1,4 +1,5 @@
-"""Middleware: finds the token of a request and waits for its turn (``request_order``); limits: ``user_limits``."""
+"""Middleware that finds the token of a request and delays the request until it may begin (``request_order``). Limits
+are in ``user_limits``."""
 
 import hashlib
 import time
@@ -17,23 +18,26 @@ from .thread_pool import asking
 from .tokens import check_token
 
 ALIVE = "/healthz"
-"""Address of /healthz: it waits for its turn, and for nothing else."""
+"""Address of /healthz. A request to this address waits for its turn (``request_order``) only, and not for a token or
+a limit."""
 LOCAL_OWNER = "local"
 """Owner of all runs on a server without access control."""
 _SEEN = 1000
-"""Number of recently valid tokens that are kept. Chosen."""
+"""Number of recently valid tokens that are kept (chosen value)."""
 _FRESH = 1.0
-"""s for which a valid token is not looked up again. Chosen: a revoked token is refused after that time."""
+"""Time in s for which a valid token is not looked up again. The value was chosen because a revoked token is refused
+after this time."""
 
 
 class Admission:
-    """Middleware of all requests. The app reads the token and the place of the request from the state of the scope."""
+    """Middleware of all requests. The app reads the token and the entry of the request (``user_limits``) from the
+    state of the scope."""
 
     def __init__(self, app: ASGIApp, service: Service) -> None:
         self._app, self._service = app, service
         self._seen: OrderedDict[bytes, tuple[float, Token]] = OrderedDict()
-        """By hash of a token: the time until which it counts as valid, and the token. After that the database is
-        read again, in a thread of its owner."""
+        """Valid tokens, by hash: time until which the token counts as valid, and the token. After that time the
+        database is read again, in a thread of the owner."""
         self._turns = RequestOrder()
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -75,7 +79,7 @@ class Admission:
         return token.owner if token is not None else _address(scope)
 
     async def _token(self, scope: Scope) -> Token | None:
-        """The token of the request; None where it has no valid one. Raises ServiceError 429, 503, 507."""
+        """Returns the token of the request; None without a valid token. Raises ServiceError 429, 503, 507."""
         scheme, _, text = Headers(scope=scope).get("authorization", "").partition(" ")
         if not self._service.settings.auth:
             await self._turns.wait(LOCAL_OWNER)
@@ -106,6 +110,6 @@ class Admission:
 
 
 def _address(scope: Scope) -> str:
-    """Returns a name that no user can have: user names have no blank."""
+    """Returns a name for an address that differs from all user names: user names have no blank."""
     client = scope.get("client")
     return f"address {client[0]}" if client else "address"

@@ -17,17 +17,17 @@ from .admission import LOCAL_OWNER
 from .tokens import SCOPES
 
 RECHECK = 2.0
-"""s between two checks of the token of a long answer, so that a stream ends at most 5 s after its token is revoked.
-Chosen."""
+"""Time in s between two checks of the token of a long answer (chosen value). A stream ends at most 5 s after its
+token is revoked."""
 
 
 @dataclass(frozen=True)
 class Identity:
-    """The caller: owner and token."""
+    """The caller: the owner of runs, and the token of the request."""
 
     owner: str
     token: Token | None
-    """None on a server without access control."""
+    """Token of the caller; None on a server without access control."""
 
     def allows(self, scope: str) -> bool:
         """True when the token carries ``scope``."""
@@ -35,7 +35,8 @@ class Identity:
 
 
 async def identify(request: Request, service: ServiceOf) -> Identity:
-    """The identity of a request; the middleware ``admission`` has looked up its token. Raises ServiceError 401."""
+    """Returns the identity of a request; the middleware ``admission`` has looked up the token. Raises ServiceError
+    401."""
     if not service.settings.auth:
         _same_machine_page(request)
         return Identity(LOCAL_OWNER, None)
@@ -46,7 +47,7 @@ async def identify(request: Request, service: ServiceOf) -> Identity:
 
 
 def unauthorized() -> ServiceError:
-    """The error for a request without a valid token."""
+    """Returns the error for a request without a valid token."""
     return ServiceError(
         401, "unauthorized", "this needs a valid token", headers={"WWW-Authenticate": "Bearer"},
         hint="send the header 'Authorization: Bearer <token>'; the server's operator makes tokens",
@@ -54,8 +55,7 @@ def unauthorized() -> ServiceError:
 
 
 def _same_machine_page(request: Request) -> None:
-    """Refuses requests of other web pages on a server without tokens: a page of another site could send them through
-    the user's browser."""
+    """Refuses requests that another web site sends through the user's browser to a server without tokens."""
     host = request.url.hostname or ""
     if not loopback(host):
         raise ServiceError(403, "forbidden", f"Host {host!r}: a server without tokens answers on loopback names only")
@@ -65,7 +65,8 @@ def _same_machine_page(request: Request) -> None:
 
 
 def requires(scope: str) -> Callable[[Identity], Awaitable[Identity]]:
-    """A dependency that returns the identity. Raises ServiceError 401, or 403 when the token lacks ``scope``."""
+    """Returns a dependency that gives the identity of the caller. Raises ServiceError 401, or 403 when the token
+    lacks ``scope``."""
 
     async def check(identity: Annotated[Identity, Depends(identify)]) -> Identity:
         if not identity.allows(scope):
@@ -90,11 +91,11 @@ class Pass:
 
     @property
     def left(self) -> float:
-        """s until the next check of the token."""
+        """Time until the next check of the token, s."""
         return max(0.0, min(RECHECK, self._ends - time.monotonic()))
 
     async def holds(self) -> bool:
-        """False once the token is revoked or the time is over."""
+        """False once the token is revoked or the time limit is over."""
         now = time.monotonic()
         if now >= self._ends:
             return False
@@ -104,7 +105,7 @@ class Pass:
         return await self._service.pool.run(self._valid)
 
     def _valid(self) -> bool:
-        """Reads the token; if the database does not answer, the stream goes on."""
+        """Reads the token again. If the database does not answer, the stream continues."""
         token = self._identity.token
         try:
             return token is None or self._service.store.token(token.id) is not None

@@ -1,4 +1,5 @@
-"""Protection against slow clients: a time limit for headers and unread answers, and a limit of connections."""
+"""Protection against slow clients: a time limit for headers and for unread answers, and a limit of the number of
+connections."""
 
 import asyncio
 import resource
@@ -11,25 +12,29 @@ import h11
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 BODY = 1 << 20
-"""Bytes of the largest body (``limits``)."""
+"""Largest size of a request body, bytes (``limits``)."""
 HEADER = 10.0
-"""s within which the header of a request must arrive, from its first byte or from the start of the connection.
-Chosen."""
+"""Time in s within which the header of a request must arrive (chosen value). The time begins at the first byte of
+the header or at the start of the connection."""
 _PIECES, _PAUSE = 4, 0.5
-"""Pieces of a header that are parsed as they arrive, and s between two later parses. Chosen: a normal client sends
-its header in one piece, and a parse takes 0.1 ms of the event loop.
+"""Number of pieces of a header that are parsed as they arrive, and time in s between later parses. The values were
+chosen because a normal client sends its header in one piece, and a parse takes 0.1 ms of the event loop.
 """
 READ = 30.0
-"""s within which a client must read part of a waiting answer. Chosen: a laptop that sleeps longer asks again."""
+"""Time in s within which a client must read part of a waiting answer. The value was chosen because a client that
+does not read for longer, such as a laptop in sleep, can send its request again."""
 _SHARE, _MOST = 4, 8192
-"""One file descriptor of so many may be a connection; and the largest number of connections. Chosen: the remaining
-descriptors are for files."""
+"""One of so many file descriptors may be a connection; and largest number of connections. The values were chosen
+because the remaining descriptors are needed for files."""
 _FILES = 65_536
-"""File descriptors that the server requests from the system. Chosen: more than it uses."""
+"""Number of file descriptors that the server requests from the system. The value was chosen because the server uses
+fewer."""
 _SOME = 64
-"""Number of oldest idle connections among which the one to close is chosen. Chosen: takes 0.1 ms."""
+"""Number of oldest idle connections among which the connection to close is selected. The value was chosen because
+this selection takes 0.1 ms."""
 _ACCEPTED = 4
-"""Connections that asyncio accepts in one turn of the event loop. Chosen: takes 0.5 ms."""
+"""Number of connections that asyncio accepts in one turn of the event loop. The value was chosen because so many
+connections take 0.5 ms."""
 _FULL = b"HTTP/1.1 503 Service Unavailable\r\nRetry-After: 5\r\nContent-Length: 0\r\nConnection: close\r\n\r\n"
 
 
@@ -43,16 +48,16 @@ def raise_limit() -> int:
 
 
 class Connection(H11Protocol):
-    """A connection that is closed when its header is late, when its answers are not read, or when it is idle and the
-    limit of connections is reached.
+    """A connection that the server closes in three cases: its header is late, its answers are not read, or it is
+    idle when the limit of connections is reached.
     """
 
     most = _MOST
-    """Largest number of connections."""
+    """Largest number of open connections."""
     idle: dict["Connection", None] = {}  # noqa: RUF012
     """Connections without a complete request, oldest first."""
     owner = ""
-    """User of the last request's token, or the address."""
+    """User of the last request's token, or the address of the client."""
     _overdue: asyncio.TimerHandle | None = None
     _unread: asyncio.TimerHandle | None = None
     _pieces = 0
@@ -60,10 +65,10 @@ class Connection(H11Protocol):
     _useless = 0
     """Bytes of request bodies that arrived after their answer."""
     _left = 0
-    """Bytes that waited to be sent at the previous check."""
+    """Number of bytes that waited to be sent at the previous check."""
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
-        """Closes an idle connection where the limit is reached."""
+        """Closes an idle connection when the limit of connections is reached."""
         super().connection_made(transport)
         self.app_state = {**self.app_state, "connection": self}
         self.idle[self] = None
@@ -72,11 +77,12 @@ class Connection(H11Protocol):
             self._make_room()
 
     def _make_room(self) -> None:
-        """Of the oldest idle connections, one without a token is closed, else one of the user with most connections."""
+        """Closes one of the oldest idle connections: a connection without a token, else a connection of the user
+        with most connections."""
         some = list(islice(self.idle, _SOME))
         counts = Counter(one.who for one in some)
         oldest = max(some, key=lambda one: (one is not self, not one.owner, counts[one.who]))
-        del self.idle[oldest]  # at once: of many connections that arrive in one turn of the loop, each closes one
+        del self.idle[oldest]  # at once, because each of many connections in one turn of the loop closes another
         if oldest is self:
             self.transport.write(_FULL)
             self.transport.close()
@@ -85,7 +91,7 @@ class Connection(H11Protocol):
 
     @property
     def who(self) -> str:
-        """The user of a connection, or its address."""
+        """Returns the user of a connection, or its address."""
         return self.owner or (self.client[0] if self.client else "")
 
     def connection_lost(self, exc: Exception | None) -> None:
@@ -96,8 +102,9 @@ class Connection(H11Protocol):
         super().connection_lost(exc)
 
     def data_received(self, data: bytes) -> None:
-        """The time limit of a header begins with its first byte; further bytes do not extend it. A header in many
-        pieces is parsed at intervals. After an answer, no more of the request body is read than the largest body.
+        """Handles received bytes. The time limit of a header begins with its first byte, and further bytes do not
+        extend the limit. A header in many pieces is parsed at intervals. After an answer, at most ``BODY`` bytes of
+        the rest of the request body are read.
         """
         if self.conn.our_state is h11.DONE and self.conn.their_state is h11.SEND_BODY:
             self._useless += len(data)
@@ -125,19 +132,20 @@ class Connection(H11Protocol):
             self.transport.resume_reading()
 
     def on_response_complete(self) -> None:
-        """The request is complete: the connection is idle, and may be closed for another one."""
+        """Marks the connection as idle after the request is complete. An idle connection may be closed to make a new
+        one possible."""
         super().on_response_complete()
         if not self.transport.is_closing():
             self.idle[self] = None
 
     def pause_writing(self) -> None:
-        """The client reads slower than the server sends."""
+        """Starts the time limit of an unread answer, when the client reads more slowly than the server sends."""
         super().pause_writing()
         self._left = self.transport.get_write_buffer_size()
         self._unread = self.loop.call_later(READ, self._look)
 
     def resume_writing(self) -> None:
-        """The client has read."""
+        """Ends the time limit of an unread answer, when the client has read it."""
         super().resume_writing()
         self._look_no_more()
 
@@ -170,5 +178,6 @@ def options() -> dict[str, Any]:
 
 
 def queue(listener: socket.socket) -> None:
-    """The backlog of the socket: as many connections as may be open. uvicorn would set ``_ACCEPTED``."""
+    """Sets the backlog of the socket to the largest number of open connections. The default of uvicorn would be
+    ``_ACCEPTED``."""
     listener.listen(_MOST)

@@ -1,17 +1,18 @@
-"""HEAD for every route with GET: the same headers, at once, without a body."""
+"""HEAD requests for every route with GET. The answer has the headers of GET, is sent at once, and has no body."""
 
 import anyio
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 
 class HeadRequests:
-    """Middleware that calls the app with GET and ends the answer after its headers, however long the body would be."""
+    """Middleware that handles HEAD: it calls the app with GET and ends the answer after the headers, whatever the
+    length of the body."""
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Passes other requests on unchanged."""
+        """Handles a HEAD request. Any other request is passed on unchanged."""
         if scope["type"] != "http" or scope["method"] != "HEAD":
             await self._app(scope, receive, send)
             return

@@ -1,5 +1,5 @@
-"""Checks before a request costs anything: unknown parameters, large bodies, cases above the caps, full queues and
-disks.
+"""Checks of a request before it uses resources: unknown parameters, large bodies, cases above the limits, full
+queues and disks.
 """
 
 import asyncio
@@ -28,16 +28,16 @@ from ..settings import Caps, Settings
 from .connections import BODY
 
 _BODY_TIMEOUT = 30.0
-"""s for a whole body: 1 MiB at 35 kB/s. Chosen."""
+"""Time in s for a whole body (chosen value). A body of 1 MiB arrives in this time at 35 kB/s."""
 
 
 _COUNTABLE = 1 << 53
-"""Limit where there is no cap: the largest integer that every JSON reader has (IEEE 754)."""
+"""Number that represents a missing limit: the largest integer that every JSON reader has (IEEE 754)."""
 
 
 async def check_query(request: Request) -> None:
-    """Raises ServiceError 400 for an unknown parameter, since a misspelt one would count as absent, and 422 for a
-    parameter with one value that is given twice.
+    """Raises ServiceError 400 for an unknown parameter, because a misspelt parameter would count as absent, and 422
+    for a parameter that is given twice and can have only one value.
     """
     if not request.query_params:
         return
@@ -59,15 +59,15 @@ def _many(annotation: Any) -> bool:
 
 
 def _query(dependant: Dependant) -> Iterator[Any]:
-    """The parameters of a route, from FastAPI."""
+    """Returns the parameters of a route, from FastAPI."""
     yield from dependant.query_params
     for inner in dependant.dependencies:
         yield from _query(inner)
 
 
 async def read_body(request: Request) -> bytes:
-    """The body, of which at most ``BODY`` is in memory. Raises ServiceError 415 for an encoded one, 413, 408, and
-    400 where it breaks off.
+    """Returns the body of a request; at most ``BODY`` bytes are in memory. Raises ServiceError 415 for an encoded
+    body, 413 for a large one, 408 for a slow one, and 400 for an incomplete one.
     """
     check_encoding(request)
     length = request.headers.get("content-length", "0")
@@ -82,7 +82,7 @@ async def read_body(request: Request) -> bytes:
 
 
 def check_encoding(request: Request) -> None:
-    """Raises ServiceError 415 for an encoded body: its size is not known before it is decoded."""
+    """Raises ServiceError 415 for an encoded body, because its size is not known before it is decoded."""
     encoding = request.headers.get("content-encoding", "identity").strip().lower()
     if encoding not in {"", "identity"}:
         detail = f"Content-Encoding {encoding[:80]!r}: a body is sent as it is"
@@ -104,7 +104,7 @@ def _too_large(length: int) -> ServiceError:
 
 
 class Limits(msgspec.Struct, frozen=True):
-    """Needs of a case and their limits on this server; None: no limit."""
+    """Resources that a case needs, with their limits on this server; None: no limit."""
 
     slots: int
     elements: int | None
@@ -115,7 +115,7 @@ class Limits(msgspec.Struct, frozen=True):
 
 
 def of(settings: Settings) -> Limits:
-    """Returns the limits of a site."""
+    """Returns the resource limits of a site."""
     caps = settings.caps
     memory = min((most for most in (caps.memory, settings.site.queue.memory) if most is not None), default=None)
     return Limits(settings.slots, caps.elements, caps.steps, memory, caps.core_seconds, caps.wall_time)
@@ -127,7 +127,7 @@ def check(case: Case, limits: Limits) -> list[Problem]:
 
 
 def check_size(estimate: Estimate, caps: Limits) -> list[Problem]:
-    """Returns all needs of the case above the limits; an unknown need is not refused."""
+    """Returns all resources of which the case needs more than the limit; an unknown amount is not refused."""
     needs = (
         ("parts", "elements", count, estimate.elements, caps.elements),
         ("run.end_time", "steps", count, estimate.steps, caps.steps),
@@ -151,7 +151,8 @@ def _cores(case: Case, settings: Limits) -> Iterator[Problem]:
 
 
 def _files(case: Case) -> Iterator[Problem]:
-    """Returns problems of files without a hash: their paths are those of the machine on which the case was written."""
+    """Returns problems of files without a hash. Their paths are valid on the machine on which the case was written,
+    not on the server."""
     for file in files_of(case.model_dump(include={"parts"})):
         if file.sha256 is None:
             message = "this key is missing: a server finds a file by its hash; conoid submit and its like fill it in"
@@ -189,20 +190,21 @@ def wall_time(case: Case, caps: Limits) -> float | None:
 
 
 def later(code: str, detail: str, hint: str | None = None) -> ServiceError:
-    """Returns 429: the user has reached a limit that later requests may meet."""
+    """Returns 429: the user has reached a limit. A later request may succeed."""
     return ServiceError(429, code, detail, hint=hint, retryable=True, headers={"Retry-After": "60"})
 
 
 def check_output(kept: int, quota: Quota) -> None:
-    """Raises ServiceError 429 if the folders of the owner's runs, ``kept`` bytes, have reached their limit."""
+    """Raises ServiceError 429 if the folders of the owner's runs have reached their limit. ``kept``: their size in
+    bytes."""
     if quota.output_bytes is not None and kept >= quota.output_bytes:
         detail = f"your runs have {size(kept)} on disk; this server allows {size(quota.output_bytes)}: remove some"
         raise later("output_quota", detail)
 
 
 def check_room(runs: Path, open_runs: int, caps: Caps, more: int = 1) -> None:
-    """Raises ServiceError 429 if the owner would have too many open runs with ``more`` runs, 422 if these alone are
-    too many, 507 if the disk is nearly full.
+    """Raises ServiceError 429 if the owner would have too many open runs with ``more`` new runs, 422 if the new runs
+    alone are too many, 507 if the disk is nearly full.
     """
     if more > max(1, caps.queued):
         raise ServiceError(422, "invalid_sweep", f"{more} points; this server allows {caps.queued} open runs of a user")

@@ -1,15 +1,16 @@
-"""A filter of the log against floods: repeated messages do not fill the disk."""
+"""Filter that limits repeated lines in the log, so that they do not fill the disk."""
 
 import logging
 import threading
 import time
 
 _MOST, _WINDOW = 20, 60.0
-"""Largest number of lines of one kind in so many s. Chosen: enough to see the cause."""
+"""Largest number of log lines of one kind, and the time in s in which they are counted. The values were chosen
+because so many lines are enough to see the cause."""
 
 
 class FloodFilter(logging.Filter):
-    """Filter for a handler of the log. Lines of one kind come from one line of the source."""
+    """Filter for a handler of the log. All lines that one line of the source code writes are of one kind."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -17,7 +18,8 @@ class FloodFilter(logging.Filter):
         self._seen: dict[tuple[str, int], tuple[float, int]] = {}
 
     def filter(self, record: logging.LogRecord) -> bool:
-        """Returns False for a line above the limit. The next line that is written has the number of dropped ones."""
+        """Returns False for a line above the limit. The next line of this kind that is written contains the number
+        of dropped lines."""
         place, now = (record.pathname, record.lineno), time.monotonic()
         with self._lock:
             since, count = self._seen.get(place, (now, 0))

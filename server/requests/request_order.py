@@ -10,11 +10,11 @@ from collections import OrderedDict, deque
 
 
 class RequestOrder:
-    """Queue of requests. Used in the thread of the event loop."""
+    """Queue of requests. The class is used in the thread of the event loop."""
 
     def __init__(self) -> None:
         self._lines: OrderedDict[str, deque[asyncio.Future[None]]] = OrderedDict()
-        """Requests that have not begun, by user; the user whose request begins next is first."""
+        """Requests that have not begun, by user. The first user in this dictionary is the next whose request begins."""
         self._called = False
 
     async def wait(self, who: str) -> None:
@@ -28,7 +28,7 @@ class RequestOrder:
         await turn
 
     def _begin(self, loop: asyncio.AbstractEventLoop) -> None:
-        """Begins one request; schedules itself for the next turn of the loop while others wait."""
+        """Begins one request. While others wait, schedules itself for the next turn of the event loop."""
         while self._lines:
             who, line = self._lines.popitem(last=False)
             turn = line.popleft()

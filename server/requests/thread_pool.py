@@ -1,7 +1,8 @@
-"""Threads for work that may block: disk, database, long computations. The number of threads is limited for each user.
+"""Pool of threads for work that may block: disk, database, long computations.
 
-The event loop never waits for a disk. Work that takes too long is answered with 503; its thread stays in use until
-the work ends, so a disk that hangs cannot take more threads than the limit.
+The number of threads is limited for each user. The event loop never waits for a disk. Work that takes too long is
+answered with 503. Its thread stays in use until the work ends, so a disk that hangs cannot take more threads than
+the limit.
 """
 
 import asyncio
@@ -19,10 +20,10 @@ from ..errors import ServiceError
 P = ParamSpec("P")
 T = TypeVar("T")
 THREADS = 64
-"""Largest number of threads for all users. Chosen: a disk answers some ten requests at a time; a thread takes some
-100 kB."""
+"""Largest number of threads for all users. The value was chosen because a disk answers some ten requests at a time,
+and a thread needs some 100 kB."""
 asking: ContextVar[str] = ContextVar("asking", default="nobody")
-"""The user of the present request: a name, or an address."""
+"""The user of the present request: a user name, or an address."""
 
 
 @dataclass(eq=False)
@@ -35,11 +36,12 @@ class _Job:
 
 
 class ThreadPool:
-    """A pool of threads with a queue for each user. Used in the thread of the event loop."""
+    """A pool of threads with a queue for each user. The class is used in the thread of the event loop."""
 
     def __init__(self, each: int, waiting: int, patience: float, most: int = THREADS) -> None:
-        """``each``: threads of one user, ``waiting``: waiting jobs of one user; ``most``: threads of all users;
-        ``patience``: longest time in s of a job with its waiting.
+        """Creates the pool. ``each``: largest number of threads of one user; ``waiting``: largest number of waiting
+        jobs of one user; ``most``: largest number of threads of all users; ``patience``: longest time in s of a job,
+        including its waiting time.
         """
         self._each, self._waiting, self._patience, self._most = each, waiting, patience, most
         self._jobs: dict[str, deque[_Job]] = {}
@@ -72,14 +74,14 @@ class ThreadPool:
         return ServiceError(503, "unavailable", detail, retryable=True, headers={"Retry-After": "5"})
 
     def _forget(self, job: _Job) -> None:
-        """Removes a job from its queue. A job that has begun continues."""
+        """Removes a job from its queue. A job that has started continues."""
         if not job.begun:
             self._jobs[job.who].remove(job)
             if not self._jobs[job.who]:
                 del self._jobs[job.who]
 
     def _begin(self) -> None:
-        """Starts waiting jobs, users in rotation."""
+        """Starts waiting jobs; the users take turns."""
         while self._busy < self._most:
             who = next((who for who, jobs in self._jobs.items() if jobs and self._taken[who] < self._each), None)
             if who is None:
@@ -97,7 +99,8 @@ class ThreadPool:
             self._handed.put(job)
 
     def _work(self) -> None:
-        """Runs jobs. The thread is a daemon: one that hangs does not keep the server from ending."""
+        """Runs jobs in a thread. The thread is a daemon, so a thread that hangs does not keep the server from
+        ending."""
         while True:
             job = self._handed.get()
             value, error = None, None
@@ -107,7 +110,7 @@ class ThreadPool:
                 error = raised
             try:
                 job.loop.call_soon_threadsafe(self._end, job, value, error)
-            except RuntimeError:  # the loop is closed: the server ends
+            except RuntimeError:  # the event loop is closed because the server ends
                 return
             del job, value, error
 
@@ -118,7 +121,7 @@ class ThreadPool:
             del self._taken[job.who]
         if not job.done.done():
             job.done.set_result(value) if error is None else job.done.set_exception(error)
-            job.done.exception()  # marks the error as read: the caller may have left
+            job.done.exception()  # marks the error as read, because the caller may have disconnected
         self._begin()
 
 
@@ -128,8 +131,8 @@ def busy(detail: str) -> ServiceError:
 
 
 def blocking(route: Callable[P, T]) -> Callable[P, Awaitable[T]]:
-    """Decorator for a route, or a dependency, that may block: it takes ``service`` and runs in a thread of
-    ``service.pool``."""
+    """Decorator for a route or a dependency that may block. The decorated function takes ``service`` and runs in a
+    thread of ``service.pool``."""
 
     @wraps(route)
     async def run(*args: P.args, **words: P.kwargs) -> T:

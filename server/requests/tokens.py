@@ -1,4 +1,4 @@
-"""Bearer tokens: 256 random bits, shown once, kept as a hash, revocable, each with its scopes."""
+"""Bearer tokens of 256 random bits. A token is shown once, stored as a hash, can be revoked, and has scopes."""
 
 import hashlib
 import hmac
@@ -17,17 +17,17 @@ SCOPES = {
 _PREFIX = "conoid"
 _OWNER = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,62}")
 _NOBODY = Token("", "", "0" * 64, frozenset(), 0.0)
-"""No digest is all zeros, so no user has this token; comparing with it takes as long as with any other."""
+"""Token of no user: no digest is all zeros. A comparison with this token takes as long as with any other token."""
 
 
 class TokenError(StartError):
-    """A token that cannot be made or revoked; the text is the reason."""
+    """Error: a token cannot be made or revoked. The text of the error is the reason."""
 
     exit_code = 2
 
 
 def create_token(store: Store, owner: str, scopes: frozenset[str]) -> str:
-    """Makes a token and returns it; it cannot be read again. Raises TokenError."""
+    """Makes a token and returns its text, which cannot be read again. Raises TokenError."""
     if not _OWNER.fullmatch(owner):
         raise TokenError(f"{owner!r}: a name starts with a letter or digit and has up to 63 letters, digits, _ or -")
     if unknown := scopes - SCOPES.keys():
@@ -47,5 +47,6 @@ def check_token(store: Store, text: str) -> Token | None:
 
 
 def _hash(secret: str) -> str:
-    """The secret has 256 random bits, so that a plain hash cannot be searched."""
+    """Returns the hash of a secret. The secret has 256 random bits, so a plain hash is safe against a search of all
+    secrets."""
     return hashlib.sha256(secret.encode()).hexdigest()

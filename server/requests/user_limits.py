@@ -1,6 +1,6 @@
-"""Limits for each user: requests in progress, and long answers.
+"""Limits for each user: number of requests in progress, and number of long answers.
 
-A request is in progress until its answer is sent, so this also limits the bodies and answers in memory.
+A request is in progress until its answer is sent, so the limit also restricts the bodies and answers in memory.
 """
 
 import asyncio
@@ -15,19 +15,19 @@ from conoid.cases.site.policy import Http
 from .thread_pool import busy
 
 PATIENCE = 60.0
-"""s that a request waits for its turn. Chosen: longer than most answers take."""
+"""Longest time in s that a request waits to begin. The value was chosen because most answers take less time."""
 
 
 class Place:
-    """The place of one request among those in progress."""
+    """Entry of one request among the requests in progress."""
 
     def __init__(self, user_limits: "UserLimits", who: str) -> None:
-        """``who``: the user of the request."""
+        """Creates the entry. ``who``: the user of the request."""
         self._user_limits, self._who = user_limits, who
         self.is_long = False
 
     def lengthen(self) -> None:
-        """Counts the answer among the long ones from now on: it takes as long as a run or a download.
+        """Counts the answer as a long answer from now on, because it lasts as long as a run or a download.
 
         Raises ServiceError 429.
         """
@@ -37,22 +37,22 @@ class Place:
 
 
 class UserLimits:
-    """Counts of requests by user. Used in the thread of the event loop."""
+    """Counts of requests by user. The class is used in the thread of the event loop."""
 
     def __init__(self, limits: Http, connections: int) -> None:
-        """``connections``: limit for all users; one user gets at most half of it for waiting requests and long
-        answers."""
+        """Creates the counters. ``connections``: limit for all users. One user gets at most half of this limit for
+        waiting requests and long answers."""
         self._requests = limits.requests
         self._waiting, self._streams = min(limits.waiting, connections // 4), min(limits.streams, connections // 4)
         self._turns: dict[str, asyncio.Semaphore] = {}
         self._asked: Counter[str] = Counter()
-        """Requests that wait or are in progress, by user."""
+        """Number of requests by user that wait or are in progress."""
         self._long: Counter[str] = Counter()
 
     @asynccontextmanager
     async def place(self, who: str) -> AsyncIterator[Place]:
-        """Waits for the turn of a request. Raises ServiceError 429 when too many requests of the user wait, or when
-        it waits too long."""
+        """Waits until the request may begin. Raises ServiceError 429 when too many requests of the user wait, or
+        when the request waits too long."""
         if self._asked[who] >= self._requests + self._waiting:
             raise busy(f"{self._requests} of your requests are in progress and {self._waiting} wait")
         place, turn = Place(self, who), self._turns.setdefault(who, asyncio.Semaphore(self._requests))
@@ -67,13 +67,13 @@ class UserLimits:
         finally:
             if place.is_long:
                 self._long[who] -= 1
-                self._long += Counter()  # keeps counts above 0 only
+                self._long += Counter()  # only counts above 0 are stored
             else:
                 turn.release()
                 self._leave(who)
 
     def lengthen(self, who: str) -> None:
-        """Moves a request in progress to the long answers. Raises ServiceError 429."""
+        """Moves a request from the requests in progress to the long answers. Raises ServiceError 429."""
         if self._long[who] >= self._streams:
             raise busy(
                 f"you have {self._streams} event streams, followed logs, waits or downloads; no more are allowed"
@@ -89,7 +89,7 @@ class UserLimits:
 
 
 def place_of(request: Request) -> Place:
-    """The place of the request that is being answered."""
+    """Returns the entry of the request that is being answered."""
     place: Place = request.scope["state"]["place"]
     return place
 
