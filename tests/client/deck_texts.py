@@ -1,4 +1,4 @@
-"""Small decks of three codes round a material: one tet, a speed, an end."""
+"""Small decks of three codes with one tet, a given material, a velocity and an end time."""
 
 from pathlib import Path
 from typing import Any
@@ -15,17 +15,17 @@ DECKS = (
 
 
 def row(*values: object) -> str:
-    """A card of LS-DYNA, fields of 10 columns."""
+    """Returns a card of LS-DYNA with fields of 10 columns."""
     return "".join(f"{value:>10}" for value in values)
 
 
 def r20(*values: object) -> str:
-    """A line of Radioss, fields of 20 columns."""
+    """Returns a line of Radioss with fields of 20 columns."""
     return "".join(f"{value:>20}" for value in values)
 
 
 def lsdyna(*keywords: str, mid: int = 1, eos: int = 0) -> str:
-    """A deck with one tet of the material ``mid``."""
+    """Returns a deck with one tet of the material ``mid``."""
     nodes = "\n".join(f"{i:8}{x:16.3f}{y:16.3f}{z:16.3f}" for i, (x, y, z) in enumerate(_CORNERS, 1))
     return "\n".join((
         "*KEYWORD", "*CONTROL_TERMINATION", row(0.01), "*PART", "body", row(1, 1, mid, eos), "*SECTION_SOLID",
@@ -35,7 +35,7 @@ def lsdyna(*keywords: str, mid: int = 1, eos: int = 0) -> str:
 
 
 def abaqus(material: str, step: str = "", model: str = "", dynamic: str = "*Dynamic, Explicit") -> str:
-    """An input file with one tet of the material ``M``."""
+    """Returns an input file with one tet of the material ``M``."""
     nodes = "\n".join(f"{i}, {x}, {y}, {z}" for i, (x, y, z) in enumerate(_CORNERS, 1))
     return (
         f"*Heading\nbody\n*Node, nset=all\n{nodes}\n*Element, type=C3D4, elset=body\n1, 1, 2, 3, 4\n"
@@ -45,7 +45,7 @@ def abaqus(material: str, step: str = "", model: str = "", dynamic: str = "*Dyna
 
 
 def radioss(*options: str) -> str:
-    """A starter with one tet of the material 1, in mm, Mg, s."""
+    """Returns a starter with one tet of the material 1, in mm, Mg, s."""
     nodes = "\n".join(f"{i:10}{x:20.3f}{y:20.3f}{z:20.3f}" for i, (x, y, z) in enumerate(_CORNERS, 1))
     units = r20("Mg", "mm", "s")
     return "\n".join((
@@ -58,17 +58,17 @@ _CORNERS = ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
 def read(folder: Path, name: str, text: str, units: str | None = "mm,t,s") -> Imported:
-    """The deck as a case."""
+    """Imports the deck as a case."""
     (folder / name).write_text(text, encoding="utf-8")
     return read_deck(folder / name, units)
 
 
 def material(found: Imported) -> Material:
-    """Its only material, read as a case reads it."""
+    """Returns the only material of the case, parsed."""
     (made,) = found.data["materials"].values()
     return Material.model_validate(bare(made))
 
 
 def part(found: Imported) -> Any:
-    """Its first part, as plain data."""
+    """Returns the first part of the case as plain data."""
     return bare(found.data["parts"][0])

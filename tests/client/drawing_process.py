@@ -1,4 +1,4 @@
-"""A child process that has loaded VTK and draws one picture after the other, as ``render`` draws one."""
+"""A child process that has loaded VTK and draws pictures one after the other with ``render``."""
 
 import subprocess
 import sys
@@ -11,7 +11,7 @@ from conoid.client.drawing.picture import Picture
 from conoid.client.drawing.renderer import _environment
 
 Ended = tuple[int, bytes, str]
-"""Exit code, last line, complaints."""
+"""Exit code, last line of the output, and standard error."""
 
 _LOOP = """
 import sys
@@ -24,7 +24,7 @@ for line in sys.stdin.buffer:
 
 @contextmanager
 def studio() -> Iterator[Callable[[Picture], Ended]]:
-    """What stands in for ``renderer.child``, without 3 s for the start of each."""
+    """Replacement of ``renderer.child`` that avoids 3 s for the start of each child."""
     child = subprocess.Popen(
         [sys.executable, "-c", _LOOP], stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=_environment()
     )

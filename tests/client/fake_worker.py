@@ -1,9 +1,10 @@
-"""A worker that computes nothing: it tells the story of a short run, in its journal and over Zenoh, and leaves files.
+"""A worker that computes nothing. It reports the messages of a short run, in its journal and over Zenoh, and writes
+files.
 
-What it does stands in the case's ``description`` as JSON: ``steps``, ``pace`` (s a step), ``lose`` (every so many-th
-message is not sent over Zenoh), ``fail`` (a cause), ``snapshots`` (one in each of the first steps),
-``warn`` (a warning of the log and of the outcome), ``flaw`` (a file: while it is there what is faster than 300 m/s
-fails). Its probe has the residual velocity of Recht and Ipson with a limit of 250 m/s.
+The case's ``description`` is JSON with ``steps``, ``pace`` (s per step), ``lose`` (every n-th message is not sent
+over Zenoh), ``fail`` (a cause), ``snapshots`` (one in each of the first steps), ``warn`` (a warning of the log and
+of the outcome), ``flaw`` (a file: while it exists, velocities above 300 m/s fail). The probe of the run has the
+residual velocity of Recht and Ipson with a limit of 250 m/s.
 """
 
 import argparse
@@ -27,7 +28,9 @@ stop = False
 
 
 class Voice:
-    """Journal first, then Zenoh; numbers go on from the last line of the journal."""
+    """Writes messages to the journal first, then sends them over Zenoh. Numbers continue from the last line of the
+    journal.
+    """
 
     def __init__(self, options: argparse.Namespace, lose: int) -> None:
         self.run, self.prefix, self.lose = options.run, options.prefix, lose
@@ -46,7 +49,7 @@ class Voice:
             self.session.put(keys.message_key(self.prefix, message.channel), messages.to_msgpack(sent))
 
     def show(self, n: int, folder: Path) -> None:
-        """Leaves a snapshot of one triangle and tells of it."""
+        """Writes a snapshot of one triangle and reports it."""
         self.blob = triangle(n)
         path = layout.snapshot(folder, n)
         path.parent.mkdir(exist_ok=True)
@@ -58,7 +61,7 @@ class Voice:
 
 
 def triangle(n: int) -> bytes:
-    """A snapshot of one fragment."""
+    """Returns a snapshot of one fragment."""
     header = snapshot.Header(
         n=n, step=n, t=0.1 * n, box=((0.0, 0.0, 0.0), (1.0, 2.0, 0.0)), ranks=1, parts=["rod"], tets=5,
         surface_triangles=1, fragments_total=1, fragments_listed=1,
@@ -130,7 +133,7 @@ def main() -> int:
 
 
 def speed_of(case: dict[str, Any]) -> float:
-    """Of the first part along z, m/s."""
+    """Returns the velocity of the first part along z, m/s."""
     velocity = case["parts"][0].get("velocity", [0.0, 0.0, 0.0])
     return abs(float(str(velocity[2]).split()[0]))
 

@@ -24,13 +24,13 @@ class Broker:
     router: Router
 
     def publish(self, message: AnyMessage) -> None:
-        """Sends a message as a worker does."""
+        """Sends a message in the form in which a worker sends it."""
         key = keys.message_key(keys.run_prefix(OWNER, message.run), message.channel)
         self.session.put(key, to_msgpack(message))
 
 
 def free_port() -> int:
-    """A port on the loopback address that nobody listens on."""
+    """Returns a port of the loopback address at which no program listens."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port: int = probe.getsockname()[1]
@@ -41,7 +41,7 @@ FAKE_WORKER = f"{sys.executable} {Path(__file__).with_name('fake_worker.py')}"
 
 
 def case_file(folder: Path, ranks: int = 1, **plan: Any) -> Path:
-    """A small case; ``plan`` is for the fake worker."""
+    """Writes a small case; ``plan`` configures the fake worker."""
     path = folder / "bar.toml"
     path.write_text(f"""
 name = "bar"

@@ -1,4 +1,4 @@
-"""A proxy between a client and a server, in this process: it can be slow, and breaks the connection on request."""
+"""A proxy between a client and a server, in this process. It can be slow, and breaks connections on request."""
 
 import socket
 import threading
@@ -13,21 +13,21 @@ _PIECE = 1 << 16
 
 @dataclass
 class Line:
-    """What it does, and what it has done."""
+    """Settings of the proxy and its counters."""
 
     server: int
-    """The port behind it; may be changed while it is up."""
+    """Port of the server; it may change while the proxy runs."""
     breaks: list[int] = field(default_factory=list)
-    """Bytes to the server after which a connection is cut, one after the other."""
+    """Numbers of bytes to the server after which the first connection is cut, then the second, and further ones."""
     rate: float = 0.0
-    """Bytes a second to the server; 0: as fast as it goes."""
+    """Bytes per second to the server; 0: no limit."""
     url: str = ""
     broken: int = 0
     carried: int = 0
-    """Bytes to the server."""
+    """Number of bytes sent to the server."""
 
     def carry(self, near: socket.socket) -> None:
-        """One connection, to its end."""
+        """Forwards one connection until its end."""
         try:
             far = socket.create_connection(("127.0.0.1", self.server), timeout=10)
         except OSError:
@@ -61,7 +61,7 @@ def _pass_on(source: socket.socket, target: socket.socket) -> None:
 
 @contextmanager
 def line_to(url: str, *breaks: int, rate: float = 0.0) -> Iterator[Line]:
-    """A line to the server at ``url``."""
+    """Starts a proxy in front of the server at ``url``."""
     made = Line(urlsplit(url).port or 0, list(breaks), rate)
     with socket.create_server(("127.0.0.1", 0), backlog=64) as door:
         made.url = f"http://127.0.0.1:{door.getsockname()[1]}"

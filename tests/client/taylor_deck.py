@@ -1,6 +1,7 @@
 """Writes the deck of the shipped case ``imported_taylor``: a quarter of the copper Taylor bar, in mm, t, s.
 
-``python -m tests.client.taylor_deck cases/shipped/imported_taylor.inp`` makes it again; ``.k`` is the same for LS-DYNA.
+``python -m tests.client.taylor_deck cases/shipped/imported_taylor.inp`` writes the file again; a name that ends in
+``.k`` gives the same deck for LS-DYNA.
 """
 
 import sys
@@ -17,31 +18,33 @@ _NEAR = 1e-9
 
 
 def mesh(size: float) -> TetMesh:
-    """The quarter of the bar of taylor_copper, 3.2 mm round and 32.4 mm long; ``size`` in m."""
+    """Returns the mesh of a quarter of the bar of taylor_copper, with radius 3.2 mm and length 32.4 mm; ``size`` in
+    m.
+    """
     return structured(Cylinder(
         shape="cylinder", radius=3.2e-3, length=32.4e-3, sector="quarter", generator="structured", element_size=size
     ))  # fmt: skip
 
 
 def points(made: TetMesh) -> Iterator[tuple[int, float, float, float]]:
-    """Number and coordinates of the nodes, in mm."""
+    """Yields number and coordinates of the nodes, in mm."""
     for number, (x, y, z) in enumerate(made.points.tolist(), 1):
         yield number, 1e3 * x, 1e3 * y, 1e3 * z
 
 
 def plane(made: TetMesh, axis: int) -> list[int]:
-    """Numbers of the nodes on the plane of symmetry across an axis."""
+    """Returns the numbers of the nodes on the plane of symmetry across an axis."""
     return [int(n) + 1 for n in np.flatnonzero(np.abs(made.points[:, axis]) < _NEAR)]
 
 
 def rows(numbers: Iterable[int], width: int, between: str = "") -> str:
-    """Eight numbers a line."""
+    """Returns lines of eight numbers."""
     words = [f"{number:{width}}" for number in numbers]
     return "\n".join(between.join(words[i : i + 8]) for i in range(0, len(words), 8))
 
 
 def lsdyna_text(size: float, end: str = "8.0E-5") -> str:
-    """The deck for LS-DYNA."""
+    """Returns the deck for LS-DYNA."""
     made = mesh(size)
     nodes = "\n".join(f"{n:8}{x:16.9f}{y:16.9f}{z:16.9f}" for n, x, y, z in points(made))
     solids = "\n".join(
@@ -54,7 +57,9 @@ def lsdyna_text(size: float, end: str = "8.0E-5") -> str:
 
 
 def abaqus_text(size: float, end: str = "8.0E-5") -> str:
-    """The input file for Abaqus/Explicit; the end of the bar is held on the plane of the wall."""
+    """Returns the input file for Abaqus/Explicit; the nodes at the end of the bar are fixed to the plane of the
+    wall.
+    """
     made = mesh(size)
     nodes = "\n".join(f"{n}, {x:.9f}, {y:.9f}, {z:.9f}" for n, x, y, z in points(made))
     tets = "\n".join(f"{n}, " + ", ".join(str(c + 1) for c in tet) for n, tet in enumerate(made.tets.tolist(), 1))

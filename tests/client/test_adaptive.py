@@ -1,4 +1,4 @@
-"""Adaptive sweeps of runs whose result is a known function: bracket, curve, rounds, what is kept, what is wrong."""
+"""Adaptive sweeps of runs whose result is a known function: bracket, curve, rounds, the file, errors of users."""
 
 import json
 import math
@@ -42,7 +42,9 @@ def lambert_jonas(limit: float, a: float, p: float) -> Callable[[float], float]:
 
 
 class Firing:
-    """A server that computes ``curve`` of the velocity; a text that it gives is how the run fails."""
+    """A server that computes ``curve`` of the velocity; if the curve returns a text, the run fails with this
+    message.
+    """
 
     def __init__(self, curve: Callable[[float], float | str], slots: int = 1) -> None:
         self.curve, self.slots = curve, slots
@@ -79,7 +81,7 @@ class Firing:
 
 
 class Fired:
-    """Its run."""
+    """Run of the server ``Firing``."""
 
     def __init__(self, at: Firing, info: RunInfo) -> None:
         self.at, self.info, self.id = at, info, info.id

@@ -1,4 +1,4 @@
-"""Answers of any server: one line, in a bounded time, and no file outside the folder."""
+"""Answers of an arbitrary server: an error in one line, in a bounded time, and no file outside the folder."""
 
 import itertools
 import json
@@ -64,7 +64,7 @@ def server(quiet_home: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Hostil
 
 
 class Every(dict[str, Answer]):
-    """The same answer at every path."""
+    """A server with the same answer at every path."""
 
     def __init__(self, answer: Answer) -> None:
         self.answer = answer

@@ -1,4 +1,4 @@
-"""Charts of the ranks: what is drawn, and that it is drawn."""
+"""Data and files of the charts of ranks."""
 
 from pathlib import Path
 
@@ -20,7 +20,9 @@ def cut(t: float) -> Balance:
 
 
 def test_the_course_of_a_run_that_went_on_from_a_checkpoint_is_drawn_once() -> None:
-    """Back from 3 to 1: what was told of 2 and 3 is told again, the time that it took stays."""
+    """The run went back from step 3 to step 1. Its messages about steps 2 and 3 come twice; the CPU time of both is
+    counted.
+    """
     told: list[AnyMessage] = [load(1.0, [5, 5]), load(2.0, [7, 5]), cut(2.0), load(3.0, [6, 6])]
     again: list[AnyMessage] = [load(2.0, [7, 5]), cut(2.5), load(3.0, [6, 7])]
     course = charts.course([*told, *again])
@@ -46,7 +48,7 @@ def test_many_ranks_are_grey_but_for_the_extreme_ones(ranks: int, named: int) ->
 
 @pytest.mark.parametrize("outside", [[4, 9], []])
 def test_a_chart_is_written(outside: list[int], tmp_path: Path) -> None:
-    """Also of a run without contact, which has no outside nodes to tell."""
+    """This also holds for a run without contact, whose messages have no surface nodes."""
     out = tmp_path / "balance.png"
     course = charts.course([load(0.5e-6, outside), load(2e-6, outside)])
     charts.balance(course, "a bar", "glass_steel_bar", out)

@@ -1,4 +1,4 @@
-"""The command line: in this process with a real server, and as processes of their own."""
+"""The command line, in this process with a real server, and in processes of their own."""
 
 import fcntl
 import json
@@ -28,7 +28,7 @@ CONOID = [sys.executable, "-m", "conoid.client.cli"]
 
 @pytest.fixture
 def user(server: LocalServer, quiet_home: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A folder to work in, and a server in the environment."""
+    """A working folder, and an environment with the address of a server."""
     monkeypatch.setenv("CONOID_URL", server.session.url)
     monkeypatch.setenv("CONOID_TOKEN", server.token)
     return quiet_home
@@ -284,7 +284,7 @@ def test_run_does_it_all_and_leaves_no_process(alone: Path) -> None:
 
 
 def test_an_interrupted_run_is_cancelled(alone: Path) -> None:
-    """By SIGINT and by SIGTERM, both at once, each with a server of its own."""
+    """Two processes with a server each are interrupted at the same time, one by SIGINT and one by SIGTERM."""
     numbers = (signal.SIGINT, signal.SIGTERM)
     folders = {number: alone / f"runs-{number.value}" for number in numbers}
     case = str(case_file(alone, steps=2000, pace=0.02))

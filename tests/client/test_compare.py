@@ -1,4 +1,4 @@
-"""Two runs side by side, columns as tables and data frames, and the charts that are drawn from them."""
+"""Comparison of two runs, columns as tables and data frames, and their charts."""
 
 import json
 import math
@@ -24,7 +24,7 @@ TIMES = [0.0, 1e-6, 2e-6]
 
 @pytest.fixture
 def runs(tmp_path: Path) -> tuple[Result, Result]:
-    """Two runs: the second is slower, and breaks into more."""
+    """Two runs; the second is slower and breaks into more fragments."""
     for name, speed, masses in (("a", 10.0, [1.0, 2.0, 4.0, 1e-4]), ("b", 8.0, [1.0, 1.0, 1.0, 1.0, 2.0])):
         folder = write_run(tmp_path / name)
         write_history(

@@ -1,4 +1,4 @@
-"""Decks that no engineer has written: each is refused in one line, or becomes a case with a list, and nothing else."""
+"""Damaged decks: each is refused in one line, or becomes a case with an account of its keywords."""
 
 import random
 import re
@@ -24,7 +24,7 @@ NUMBERS = ("0", "-1", "999999999999", "1e400", "1E-400", "nan", "1.e29", "-1.5-3
 
 
 def spoilt(text: list[str], chance: random.Random) -> list[str]:
-    """A deck with one line less, more, moved, cut or written over."""
+    """Returns a deck with lines removed, added, moved, cut or overwritten at random."""
     at, what = chance.randrange(len(text)), chance.randrange(7)
     if what == 0:
         return text[:at] + text[at + 1 :]
@@ -57,7 +57,7 @@ def test_spoilt_decks_end_in_a_list_or_in_one_line(tmp_path: Path, name: str) ->
 
 
 def told(deck: Path) -> str:
-    """All lines that a deck has people told, or the one that refuses it."""
+    """Returns all lines that the import of a deck prints, or the line with which the deck is refused."""
     try:
         found = read_deck(deck, None if deck.suffix == ".rad" else "mm,t,s")
     except ClientError as error:

@@ -1,8 +1,8 @@
-"""Materials of decks answer as the formulas of the code that they come from say, point by point.
+"""Imported materials give the values of the formulas of their code, point by point.
 
-The formulas are those of the manuals: LS-DYNA Keyword User's Manual II (materials 3, 10, 15, 18, 24, 98, 110; equation
-of state 4), Abaqus Analysis User's Guide ("Johnson-Cook plasticity", "Damage initiation for ductile metals", "Equation
-of state"), Radioss Reference Guide (laws 2, 4, 79, /FAIL/JOHNSON, /EOS/GRUNEISEN).
+The formulas are those of the manuals: LS-DYNA Keyword User's Manual II (materials 3, 10, 15, 18, 24, 98, 110;
+equation of state 4), Abaqus Analysis User's Guide ("Johnson-Cook plasticity", "Damage initiation for ductile
+metals", "Equation of state"), Radioss Reference Guide (laws 2, 4, 79, /FAIL/JOHNSON, /EOS/GRUNEISEN).
 """
 
 import math
@@ -18,12 +18,12 @@ from conoid.worker.materials.law import DENSITY, EQUATION
 from .deck_texts import abaqus, lsdyna, material, part, r20, radioss, read, row
 
 POINTS = [(0.0, 1.0, 300.0), (0.02, 10.0, 400.0), (0.3, 1e4, 900.0), (1.1, 3e5, 1300.0)]
-"""Plastic strain, rate in 1/s, temperature in K."""
+"""Plastic strain, rate in 1/s, and temperature in K of each point."""
 MPA = 1e6
 
 
 def flow(law: JohnsonCook, strain: float, rate: float, temperature: float) -> float:
-    """Conoid's flow stress, Pa (cases/laws/johnson_cook.py)."""
+    """Returns Conoid's flow stress, Pa (cases/laws/johnson_cook.py)."""
     span = law.melt_temperature - law.reference_temperature
     soft = min(max((temperature - law.reference_temperature) / span, 0.0), 1.0)
     fast = 1.0 + law.C * math.log(max(rate / law.reference_rate, 1.0))
@@ -31,7 +31,7 @@ def flow(law: JohnsonCook, strain: float, rate: float, temperature: float) -> fl
 
 
 def fracture(law: JohnsonCook, tension: float, rate: float, temperature: float) -> float:
-    """Conoid's fracture strain (cases/laws/johnson_cook.py)."""
+    """Returns Conoid's fracture strain (cases/laws/johnson_cook.py)."""
     of = law.damage
     assert of is not None
     span = law.melt_temperature - law.reference_temperature
@@ -166,7 +166,7 @@ def test_simplified_johnson_cook_knows_no_heat(tmp_path: Path) -> None:
 
 
 def holmquist(law: JohnsonHolmquist, pressure: float, rate: float) -> tuple[float, float]:
-    """Conoid's intact and fractured strength, Pa (cases/laws/johnson_holmquist.py)."""
+    """Returns Conoid's intact and fractured strength, Pa (cases/laws/johnson_holmquist.py)."""
     p, t = pressure / law.pressure_hel, law.tension / law.pressure_hel
     fast = 1.0 + law.C * math.log(max(rate / law.reference_rate, 1.0))
     broken = law.B * p**law.M * fast
@@ -190,7 +190,9 @@ JH2 = {
 
 @pytest.mark.parametrize("name", JH2)
 def test_johnson_holmquist_of_both_codes(tmp_path: Path, name: str) -> None:
-    """sigma* = a (p* + t*)^n (1 + c ln rate*), b p*^m (1 + c ln rate*) up to SFMAX, on 3/2 (HEL - PHEL)."""
+    """Intact: sigma* = a (p* + t*)^n (1 + c ln rate*). Fractured: b p*^m (1 + c ln rate*), at most SFMAX. Stresses
+    are divided by 3/2 (HEL - PHEL).
+    """
     found = read(tmp_path, name, JH2[name])
     law = material(found).strength
     assert found.refusals == []
@@ -218,7 +220,9 @@ CELSIUS = "*Physical constants, absolute zero=-273.15\n*Initial Conditions, type
 
 
 def test_johnson_cook_of_abaqus(tmp_path: Path) -> None:
-    """Temperatures in degrees; R = 1 + C ln(rate / rate0); exp(-d3 triaxiality)."""
+    """Temperatures are in degrees Celsius; R = 1 + C ln(rate / rate0); the factor of the triaxiality is exp(-d3
+    triaxiality).
+    """
     deck = abaqus(ABAQUS_JC, model=CELSIUS, dynamic="*Dynamic, Explicit, adiabatic")
     found = read(tmp_path, "a.inp", deck)
     law = johnson_cook(material(found))
@@ -269,7 +273,7 @@ def test_usup_of_abaqus(tmp_path: Path) -> None:
 
 
 def test_johnson_cook_of_radioss(tmp_path: Path) -> None:
-    """Law 2: (a + b e^n)(1 + c ln(rate / rate0))(1 - ((T - Tr) / (Tmelt - Tr))^m), heat by rho Cp."""
+    """Law 2: (a + b e^n)(1 + c ln(rate / rate0))(1 - ((T - Tr) / (Tmelt - Tr))^m); the heating uses rho Cp."""
     found = read(tmp_path, "a_0000.rad", radioss(
         "/MAT/PLAS_JOHNS/1", "copper", r20("8.96E-9"), r20(1.24e5, 0.34), r20(90.0, 292.0, 0.31, 0, 0),
         r20(0.025, 1.0), r20(1.09, 1356.0, 3.43168, 298.0), "/FAIL/JOHNSON/1", r20(0.54, 4.89, -3.03, 0.014, 1.12),

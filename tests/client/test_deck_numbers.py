@@ -1,4 +1,4 @@
-"""What decks name by numbers: sets of sets, numbers that two things have, numbers that nothing has."""
+"""Numbers in decks: sets of sets, numbers of two objects, numbers of missing objects."""
 
 from pathlib import Path
 
@@ -16,7 +16,7 @@ OTHER = "".join(f"{n:8}" for n in (2, 7, 1, 2, 3, 4, 4, 4, 4, 4))
 
 
 def test_a_set_of_sets_has_their_nodes(tmp_path: Path) -> None:
-    """Its members are sets: the deck has no nodes 51 and 52."""
+    """The members of the set are sets: the deck has no nodes 51 and 52."""
     sets = ("*SET_NODE_LIST", row(51), row(1, 2), "*SET_NODE", row(52), row(3, 4), "*SET_NODE_ADD", row(9), row(51, 52))
     found = read(tmp_path, "a.k", lsdyna(*STEEL, *sets, HELD, row(9, 0, 1, 1, 1)))
     assert found.refusals == []
@@ -105,7 +105,7 @@ def test_groups_within_themselves_and_that_take_away_refuse(tmp_path: Path) -> N
 
 
 def starter(points: list[str]) -> str:
-    """Two tets of a Radioss deck; the part 1 is called 2, the part 2 is called 1."""
+    """Returns a Radioss deck of two tets; the part 1 has the title 2, and the part 2 has the title 1."""
     units = r20("Mg", "mm", "s")
     return "\n".join((
         "#RADIOSS STARTER", "/BEGIN", "b", row(2021, 0), units, units, "/PART/1", "2", row(1, 1), "/PART/2", "1",
@@ -114,7 +114,7 @@ def starter(points: list[str]) -> str:
 
 
 def keywords(points: list[str]) -> str:
-    """The same as a keyword deck."""
+    """Returns the same model as a keyword deck."""
     first, second = (
         "".join(f"{n:8}" for n in ids) for ids in ((1, 1, 1, 2, 3, 4, *(4,) * 4), (2, 2, 5, 6, 7, 8, *(8,) * 4))
     )

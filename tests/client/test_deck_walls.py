@@ -1,4 +1,4 @@
-"""Walls that move and are round, rigid bodies of nodes, and general contacts in decks of LS-DYNA and Radioss."""
+"""Moving and curved walls, rigid bodies of nodes, and general contacts in decks of LS-DYNA and Radioss."""
 
 from pathlib import Path
 
@@ -77,7 +77,7 @@ def test_walls_that_end_and_rigid_bodies_of_nodes_refuse(tmp_path: Path, cards: 
 
 
 def rbody(mass: float = 0.0) -> tuple[str, ...]:
-    """A body whose main node is 9, and what holds that node."""
+    """Returns a rigid body whose main node is 9, and the restraint of this node."""
     head = f"{row(9, 0, 0, 0)}{mass:>20}{row(5, 0, 0, 0)}"
     return (
         *ELASTIC,

@@ -1,4 +1,4 @@
-"""Decks of three codes in the styles of their pre-processors become cases, and no keyword is passed over in silence."""
+"""Decks of three codes in the styles of their pre-processors become cases; each keyword is in the account."""
 
 import json
 import re
@@ -25,7 +25,7 @@ def imported(name: str) -> Imported:
 
 
 def keyword_lines(path: Path) -> list[tuple[str, int]]:
-    """Lines of a deck that begin a keyword or an option, found without the reader."""
+    """Returns the lines of a deck that begin a keyword or an option, found without the importer."""
     sign = r"/[A-Z]" if path.suffix == ".rad" else r"\*[A-Za-z]"
     text = path.read_text(encoding="utf-8").splitlines()
     return [(line, number) for number, line in enumerate(text, 1) if re.match(sign, line)]
@@ -199,7 +199,7 @@ def test_what_would_answer_wrong_in_silence_refuses_the_import(tmp_path: Path, w
 
 
 def test_walls_and_sliding_nodes_that_are_no_plane_are_told(tmp_path: Path) -> None:
-    """Walls do not hold driven nodes: a set that slides and is no plane of symmetry would pass through the wall."""
+    """Walls do not stop driven nodes: a set of sliding nodes on no plane of symmetry would move through the wall."""
     deck = abaqus("*Density\n7.85e-9,\n*Elastic\n2.1e5, 0.3", model="*Nset, nset=some\n1, 2\n*Boundary\nsome, 1, 1")
     assert read(tmp_path, "a.inp", deck).data["boundaries"][0]["on"] == "some"
     cards = ("*SET_NODE_LIST", row(3), row(1, 2), "*BOUNDARY_SPC_SET", row(3, 0, 1), "*RIGIDWALL_PLANAR", "",

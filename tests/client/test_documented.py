@@ -22,11 +22,11 @@ from conoid.client.cli import app
 ROOT = Path(__file__).parents[2]
 PAGES = sorted([ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "ARCHITECTURE.md", *ROOT.glob("docs/**/*.md")])
 CLASSES = {"session": "Session", "run": "Run", "result": "Result", "sweep": "Sweep", "found": "Found"}
-"""Variables of the examples and the classes of the client that they hold."""
+"""Names of variables in the examples, and the classes of the client to which they belong."""
 
 
 def blocks(path: Path) -> Iterator[tuple[str, str]]:
-    """Language and text of each fenced block."""
+    """Returns language and text of each fenced block."""
     yield from re.findall(r"^```(\w*)\n(.*?)^```", path.read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE)
 
 
@@ -42,7 +42,7 @@ def every(language: str) -> list[Any]:
 
 @cache
 def partial_schema() -> dict[str, Any]:
-    """The schema of cases without required keys: a fragment of a case need not have them."""
+    """Returns the schema of cases without required keys: an excerpt of a case may lack them."""
 
     def relaxed(node: Any) -> Any:
         if isinstance(node, list):
@@ -92,7 +92,9 @@ def test_the_reference_of_the_client_has_every_public_name() -> None:
 
 
 def commands(text: str) -> Iterator[str]:
-    """Lines of a block that begin with a program of the project, without prompt and comment, continued lines joined."""
+    """Yields the lines of a block that begin with a program of the project. Prompts and comments are removed,
+    continued lines are joined.
+    """
     for line in re.sub(r"\\\n\s*", " ", text).splitlines():
         plain = line.strip().removeprefix("$ ")
         if re.match(r"(conoid|make|mpiexec|python -m)\s", plain):
@@ -100,7 +102,7 @@ def commands(text: str) -> Iterator[str]:
 
 
 def written() -> list[Any]:
-    """Commands of blocks without a language, and those in code font in running text."""
+    """Yields the commands in blocks without a language, and the commands in code font in running text."""
     found: dict[str, str] = {}
     for path in PAGES:
         text = path.read_text(encoding="utf-8")
@@ -113,14 +115,18 @@ def written() -> list[Any]:
 
 
 def words(line: str) -> list[str]:
-    """The words of a command up to a pipe or the like; brackets of optional ones, and three dots, are left out."""
+    """Returns the words of a command up to a pipe or another operator, without optional words in brackets and
+    without three dots.
+    """
     plain = re.sub(r"\.\.\.|(?<=\s)\[(?=--)|\](?=[\s.]|$)|[&|;>].*$", " ", line.replace("KEY=VALUE ]", "KEY=VALUE"))
     return shlex.split(plain, comments=True)
 
 
 def refused(given: list[str]) -> str:
-    """The complaint about a command or an option that does not exist; empty for a good one. Runs nothing but help."""
-    if given[:1] == ["serve"]:  # its options belong to the server
+    """Returns the error for a command or an option that does not exist; empty for a valid command. Runs only the
+    help.
+    """
+    if given[:1] == ["serve"]:  # the options of serve belong to the server
         return ""
     ended = CliRunner().invoke(app, [*given, "--help"])
     return "" if ended.exit_code == 0 or "rgument" in ended.stderr else ended.stderr

@@ -1,4 +1,4 @@
-"""The client works where MPI, numba and VTK are not installed, and it starts fast enough to be typed."""
+"""The client works without MPI, numba and VTK, and starts fast enough for interactive use."""
 
 import re
 import subprocess

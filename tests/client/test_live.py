@@ -1,4 +1,4 @@
-"""The picture that follows from the messages, and how it looks in a terminal."""
+"""State of a run from its messages, and its display in a terminal."""
 
 import io
 import threading
@@ -56,7 +56,7 @@ def test_the_other_threads_of_a_rank_are_busy_by_the_time_of_their_tasks() -> No
 
 
 def test_what_a_rank_waits_for_others_is_no_exchange() -> None:
-    """As client/web/live.js has it."""
+    """client/web/live.js has the same rule."""
     phases = {"elements": [1.0, 2.0], "exchange": [0.5, 0.25]}
     assert grouped(phases, interval=3.0, waiting=[0.25, 0.5]) == {
         "compute": [1.0, 2.0], "exchange": [0.25, 0.0], "wait": [0.25, 0.25], "descheduled": [1.5, 0.75],
@@ -199,7 +199,7 @@ def test_the_live_screen_ends_with_the_last_picture() -> None:
 
 
 class Queued:
-    """A run that waits until somebody has been told why."""
+    """A run that waits until its reason has been printed."""
 
     id, title, reason = run_messages.RUN, "A bar", "waiting for 4 of 2 slots; 1 free"
 
@@ -220,7 +220,9 @@ class Queued:
 
 
 class Deserted(Queued):
-    """A run that is silent, since its server is gone, until somebody has been told so."""
+    """A run without messages whose server has stopped; it continues after the message about the server has been
+    printed.
+    """
 
     def status(self) -> "Queued":
         if self.asked:
@@ -237,7 +239,7 @@ class Deserted(Queued):
 
 
 def test_a_server_that_is_gone_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Nobody knows then whether the run still runs."""
+    """The client cannot find out then whether the run still runs."""
     monkeypatch.setattr(progress, "LONGEST", 0.05)
     monkeypatch.setattr("conoid.client.watch.REASON_EVERY", 0.01)
     run, lines = Deserted(), list[str]()
@@ -256,7 +258,7 @@ def test_a_server_that_is_gone_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 class Nothing:
-    """A subscription over which nothing comes."""
+    """A subscription without messages."""
 
     name, trouble = "none", ""
 
@@ -264,7 +266,7 @@ class Nothing:
         return None
 
     def close(self) -> None:
-        """Nothing to let go."""
+        """Does nothing."""
 
 
 def test_what_a_run_in_the_queue_waits_for_is_told(monkeypatch: pytest.MonkeyPatch) -> None:

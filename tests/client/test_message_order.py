@@ -1,4 +1,4 @@
-"""Every message once and in order, whatever the stream does."""
+"""Every message once and in order, for any loss, repetition or order in the stream."""
 
 import random
 
@@ -13,7 +13,7 @@ def message(seq: int) -> Log:
 
 
 class Journal:
-    """A journal that has been written up to ``written``; counts how often it is read."""
+    """A journal of which the lines up to ``written`` exist; it counts its readings."""
 
     def __init__(self, written: int = 0) -> None:
         self.written = written

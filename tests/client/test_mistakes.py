@@ -1,4 +1,4 @@
-"""What a user gets wrong, or finds damaged, is told in one line: never a traceback, a wait without end, or a yes."""
+"""Mistakes of users and damaged files get one line: no traceback, no endless wait, no success."""
 
 from pathlib import Path
 
@@ -26,7 +26,7 @@ def conoid(*words: object) -> Result:
 
 
 def refused(code: int, *words: object) -> str:
-    """The one line that is told."""
+    """Returns the one line of the error."""
     result = conoid(*words)
     assert result.exit_code == code, repr(result.exception)
     (line,) = result.stderr.splitlines()
@@ -36,7 +36,7 @@ def refused(code: int, *words: object) -> str:
 
 @pytest.fixture
 def damaged(quiet_home: Path) -> Path:
-    """A run's folder whose files are damaged; it has ended."""
+    """A finished run's folder whose files are damaged."""
     folder = quiet_home / "damaged"
     folder.mkdir()
     said = [messages.Status(run="r", seq=1, state="running"), messages.Status(run="r", seq=3, state="succeeded")]
@@ -75,7 +75,7 @@ def test_a_case_of_another_shape_is_one_line(command: str, text: str, damaged: P
 
 
 def test_a_link_out_of_a_folder_is_not_read(damaged: Path) -> None:
-    """A report would carry a file of its reader."""
+    """Otherwise a report could contain a private file of the user who makes the report."""
     (damaged / layout.RESOLVED_CASE).unlink()
     (damaged.parent / "secret").write_text("{}")
     (damaged / layout.RESOLVED_CASE).symlink_to(damaged.parent / "secret")
@@ -210,7 +210,7 @@ def test_space_round_a_token_is_no_part_of_it() -> None:
 
 @pytest.mark.parametrize("words", [("show",), ("watch",), ("cancel",), ("get",), ("report",), ("sweep-table",)])
 def test_an_empty_id_is_none(quiet_home: Path, words: tuple[str, ...]) -> None:
-    """A variable of a script that is not set."""
+    """An unset variable of a script gives an empty id."""
     assert "an id, or 'last'" in refused(2, *words, "")
 
 

@@ -1,4 +1,4 @@
-"""The notebook of the tutorial runs: its cells, one after the other, in an empty folder."""
+"""Runs the notebook of the tutorial: all cells, one after the other, in an empty folder."""
 
 import json
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""A keyword deck that includes others is handed in as one file, which says the same."""
+"""A keyword deck with includes is submitted as one file with the same content."""
 
 import hashlib
 import random
@@ -22,7 +22,7 @@ from .deck_texts import abaqus, r20, radioss
 
 
 def said(path: Path) -> list[object]:
-    """All keywords of a deck with their fields, as a reader of decks has them."""
+    """Returns all keywords of a deck with their fields, as the importer reads them."""
     return [
         (block.name, [block.fields(card, *(10,) * 8) for card in block.filled()], block.least)
         for block in Deck(path).blocks()
@@ -31,7 +31,9 @@ def said(path: Path) -> list[object]:
 
 
 def deck(folder: Path, seed: int) -> Path:
-    """A deck of random depth: formats that change, comments, names that go on, folders, ends before the end."""
+    """Writes a deck of random depth, with changing formats, comments, continued names, folders, and *END before the
+    end.
+    """
     dice, count = random.Random(seed), 0
 
     def write(depth: int) -> str:
@@ -58,7 +60,7 @@ def deck(folder: Path, seed: int) -> Path:
 
 @pytest.mark.parametrize("seed", range(12))
 def test_the_one_file_says_what_the_deck_says(tmp_path: Path, seed: int) -> None:
-    """Parts of decks are named from the folder of the deck, which is that of the first file here."""
+    """Names of parts are relative to the folder of the deck, which is that of the first file here."""
     (tmp_path / "in").mkdir()
     top = deck(tmp_path / "in", seed)
     root = tmp_path / "in" / "top.k"
@@ -70,7 +72,7 @@ def test_the_one_file_says_what_the_deck_says(tmp_path: Path, seed: int) -> None
 
 
 def files_of(path: Path) -> list[Path]:
-    """All files that a reader of decks opens."""
+    """Returns all files that the importer opens."""
     made = Deck(path)
     list(made.blocks())
     return made.included.files
@@ -81,7 +83,7 @@ def case(path: str, **more: str) -> dict[str, object]:
 
 
 def test_a_deck_with_includes_is_hashed_and_kept_as_one_file(tmp_path: Path) -> None:
-    """What is included belongs to it: another one makes another file."""
+    """The included file belongs to the deck: another included file gives another file and hash."""
     (tmp_path / "a.k").write_text("*KEYWORD\n*INCLUDE\nnodes.k\n*END\n")
     (tmp_path / "nodes.k").write_text("*NODE\n1,0,0,0\n")
     hashes = Hashes()
@@ -114,7 +116,7 @@ def test_a_deck_that_leads_out_of_its_folder_is_refused_in_a_line(tmp_path: Path
 
 
 def split(folder: Path, name: str, text: str, begin: str, end: str, line: str) -> None:
-    """A deck whose lines from ``begin`` to ``end`` stand in a file of its own, and the same in one file."""
+    """Returns a deck whose lines from ``begin`` to ``end`` are in another file, and the same deck as one file."""
     at, to = text.index(begin), text.index(end)
     (folder / "sub").mkdir()
     (folder / "sub" / "mesh.inc").write_text(text[at:to])

@@ -1,4 +1,4 @@
-"""Waiting for the end of a run, and following it, outlasts a server that is away."""
+"""Waiting for the end of a run, and following a run, continue while a server is not reachable for a while."""
 
 import time
 
@@ -18,7 +18,9 @@ from conoid.client.sweeps.sweep import SweepInfo
 
 
 class Away(httpx2.BaseTransport):
-    """A server that does not answer, or has no time, for so many requests, and then tells that the run has ended."""
+    """A server that does not answer a number of requests, or is too busy for them, and then reports that the run has
+    ended.
+    """
 
     def __init__(self, times: int, status: int | None) -> None:
         self.left, self.status = times, status
@@ -34,7 +36,7 @@ class Away(httpx2.BaseTransport):
 
 
 class Silent:
-    """A subscription over which nothing comes."""
+    """A subscription without messages."""
 
     name, trouble = "none", ""
 
@@ -43,12 +45,12 @@ class Silent:
         return None
 
     def close(self) -> None:
-        """Nothing to let go."""
+        """Does nothing."""
 
 
 @pytest.fixture(autouse=True)
 def clock(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Time passes in sleep only."""
+    """Clock whose time passes only in ``sleep``."""
     now = [1000.0]
     monkeypatch.setattr(time, "monotonic", lambda: now[0])
     monkeypatch.setattr(time, "sleep", lambda seconds: now.__setitem__(0, now[0] + seconds))
@@ -79,7 +81,7 @@ def test_a_refusal_is_no_absence() -> None:
 
 @pytest.mark.parametrize("status", [None, 502, 503])
 def test_who_follows_a_run_outlasts_a_proxy_whose_server_starts_again(status: int | None) -> None:
-    """The shipped nginx answers 502 while the server behind it is away."""
+    """The shipped nginx answers 502 while the server behind it restarts."""
     left = [20]
 
     def refill(after: int) -> list[AnyMessage]:

@@ -1,4 +1,4 @@
-"""The loads of a run under other balance policies, where the answer is known."""
+"""Replay of a run's loads with other balance policies, for loads whose result is known."""
 
 import json
 from collections.abc import Sequence
@@ -18,16 +18,18 @@ from conoid.worker.parallel import decompose
 from conoid.worker.parallel.comm import SerialComm
 
 COST = 12.0
-"""Of a cut, s."""
+"""Cost of a cut, s."""
 
 
 def spot(window: int) -> int:
-    """Where the load is: it stays on each of eight groups in a row for two windows of ten steps."""
+    """Returns the group with the load: eight groups in a row have the load for two windows of ten steps each."""
     return (window - 1) // 2
 
 
 def wandering() -> list[AnyMessage]:
-    """All of the load, 1 s a step, is on one group; those that it has reached have 20 outside nodes, the others 10."""
+    """Returns load messages in which one group has the whole load, 1 s per step. Groups that have had the load have
+    20 surface nodes, others 10.
+    """
     row = [(float(x), 0.0, 0.0) for x in range(8)]
     told: list[AnyMessage] = [
         Groups(run="r", seq=1, load=[0] * 8, outside=[10] * 8, centres=row, tets=[5] * 8, cost=COST)
@@ -45,35 +47,38 @@ def account(words: str, told: Sequence[AnyMessage] | None = None, ranks: int = 2
 
 
 def test_never_loses_half_of_the_load_on_two_ranks() -> None:
-    """One rank has it all, the mean is half of it: 0.5 s in each of 160 steps."""
+    """One rank has the whole load, and the mean is half of the load: 0.5 s are lost in each of 160 steps."""
     never = account("never")
     assert (never.cuts, never.lost, never.work, never.imbalance) == ([], 80.0, 80.0, 2.0)
 
 
 def test_every_ten_steps_halves_the_load_in_the_second_window_of_each_place() -> None:
-    """A cut goes through the group that has the load; nothing is cut after the last step."""
+    """Each cut divides the group that has the load; no cut follows the last step."""
     every = account("every:10")
     assert every.cuts == list(range(10, 160, 10))
     assert (every.lost, every.cost, every.total) == (40.0, 15 * COST, 40.0 + 15 * COST)
 
 
 def test_steps_between_two_moments_are_cut_at_too() -> None:
-    """At 4 and 8 of each ten steps by the load of all ten: it is divided from the fourth on, and 8 changes nothing."""
+    """In each ten steps there are cuts at steps 4 and 8, with the loads of all ten. The group is divided from step 4
+    on; the cut at step 8 changes nothing.
+    """
     every = account("every:4")
     assert every.cuts == list(range(4, 160, 4))
     assert every.lost == pytest.approx(8 * 4 * 0.5)
 
 
 def test_measured_cuts_when_a_cut_has_been_lost() -> None:
-    """5 s a window and more than 12 s to lose: in the third, and in every fourth thereafter, as it halves a group that
-    has the load for a window more."""
+    """A window without a division loses 5 s, and the limit is 12 s. The first cut is in the third window, then there
+    is one in every fourth window, because each cut divides the group with the load for one more window.
+    """
     measured = account("measured")
     assert measured.cuts == [30, 70, 110, 150]
     assert (measured.lost, measured.cost) == (60.0, 4 * COST)
 
 
 def test_outside_cuts_when_a_rank_has_grown() -> None:
-    """By hand: 40 and 40 outside nodes at first, 30 + 10 and 80 - 10 + 10 after the first cut, and so on."""
+    """The surface nodes are 40 and 40 at first, then 30 + 10 and 80 - 10 + 10 after the first cut, and so on."""
     outside = account("outside")
     assert outside.cuts == [10, 50, 90, 110, 130, 150]
     assert outside.lost == 50.0
@@ -136,7 +141,7 @@ def test_alpha_and_every_go_into_the_policy() -> None:
 
 @pytest.mark.parametrize("ranks", [2, 3, 5, 8, 16])
 def test_the_division_is_that_of_the_worker(ranks: int) -> None:
-    """Every cut divides a point here, and moves it whole there; which axis is the longest is never in doubt."""
+    """Each cut of the replay divides a point, and the worker moves it as a whole. The longest axis is unambiguous."""
     random = np.random.default_rng(ranks)
     points = random.uniform(size=(400, 3)) * [16.0, 3.0, 0.5]
     weights = random.uniform(0.1, 1.0, 400)

@@ -1,4 +1,4 @@
-"""What a run leaves, read when it is asked for."""
+"""Results of a run, each read at its first use."""
 
 from array import array
 from pathlib import Path

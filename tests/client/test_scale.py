@@ -1,4 +1,4 @@
-"""The projection against sums by hand, the tables, and the command."""
+"""The projection compared with simple sums, the tables, and the command."""
 
 import json
 import re

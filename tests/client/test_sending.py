@@ -1,4 +1,4 @@
-"""Files on their way from a client to a real server: over slow and broken lines, and when they are none."""
+"""Upload of files from a client to a real server: over slow and broken connections, and of paths that are not files."""
 
 import hashlib
 import os
@@ -56,7 +56,7 @@ def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def file_of(folder: Path, size: int, seed: int = 1) -> Path:
-    """A file of random bytes that no other test has."""
+    """Writes a file of random bytes that differs from the files of all other tests."""
     path = folder / f"{seed}.inp"
     path.write_bytes(random.Random(f"{folder} {seed}").randbytes(size))
     return path
@@ -68,7 +68,7 @@ def case_with(path: Path | str) -> dict[str, object]:
 
 
 def arrived(server: LocalServer, path: Path) -> bool:
-    """Whether the server has the file, as it is here."""
+    """Returns True if the server has a copy of the local file."""
     digest = hashlib.sha256(path.read_bytes()).hexdigest()
     there = server.runs / "uploads" / "local" / digest
     return there.exists() and there.read_bytes() == path.read_bytes()
@@ -95,7 +95,9 @@ def test_a_file_arrives_over_a_line_that_breaks_again_and_again(
 
 @pytest.mark.slow
 def test_a_large_file_arrives_over_a_slow_line_that_breaks(server: LocalServer, tmp_path: Path) -> None:
-    """200 MB at 10 MB/s, cut eleven times: the hash is right, and neither the server nor the client grows."""
+    """A file of 200 MB is sent at 10 MB/s over a connection that is cut eleven times. The hash is right, and neither
+    the server nor the client uses much memory.
+    """
     path, size = tmp_path / "large.inp", 200_000_000
     with path.open("wb") as file:
         made = random.Random(7)
@@ -122,7 +124,7 @@ def sha256sum(path: Path) -> str:
 
 
 def peak(process: int) -> int:
-    """The most memory that a process has had at a time, bytes."""
+    """Returns the largest memory of a process so far, bytes."""
     lines = Path(f"/proc/{process}/status").read_text().splitlines()
     return 1024 * int(next(line for line in lines if line.startswith("VmHWM")).split()[1])
 
@@ -130,7 +132,7 @@ def peak(process: int) -> int:
 def test_a_slow_line_gets_smaller_pieces(
     server: LocalServer, tmp_path: Path, impatient: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """So that no answer is late, and a break costs little."""
+    """With smaller pieces no answer is late, and a broken connection loses little."""
     monkeypatch.setattr(sending, "_WANTED", 0.05)
     sizes: list[int] = []
     path = file_of(tmp_path, 1_500_000)
@@ -196,7 +198,9 @@ def test_a_server_that_is_killed_in_the_middle_goes_on_when_it_is_started_again(
 
 
 def test_a_file_that_changes_after_it_was_hashed_is_refused(server: LocalServer, tmp_path: Path) -> None:
-    """Before it is sent by its state; meanwhile by the server, which has another hash then, and keeps nothing."""
+    """Before sending, the client compares the file's state. During sending, the server finds another hash, refuses
+    the file and stores nothing.
+    """
     path = file_of(tmp_path, 2_500_000)
     (local,) = Hashes().of(case_with(path), Path())
     path.write_bytes(path.read_bytes() + b"x")
@@ -251,7 +255,7 @@ def unusable(folder: Path, kind: str) -> str:
     ],
 )  # fmt: skip
 def test_what_is_no_file_is_refused_in_a_line(folder: Path, kind: str, said: str) -> None:
-    """Before any server is asked; nothing hangs."""
+    """The client refuses it before a request to a server, and does not hang."""
     with Session("http://127.0.0.1:9") as session, pytest.raises(CaseError) as told:
         session.submit(case_with(unusable(folder, kind)))
     (problem,) = told.value.problems
@@ -277,8 +281,10 @@ def conoid(*words: object) -> tuple[int, str, str]:
 
 
 def test_commands_send_what_a_case_names(server: LocalServer, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Paths begin in the folder of the case; a point of a sweep may have a file of its own. A run's folder that was
-    copied here can be handed in again, without the file that it was made of."""
+    """Paths are relative to the folder of the case; a point of a sweep may have a file of its own.
+
+    A copied run's folder can be submitted again without the original file.
+    """
     monkeypatch.setenv("CONOID_URL", server.session.url)
     monkeypatch.setenv("CONOID_TOKEN", server.token)
     (folder / "meshes" / "other.inp").write_text(BAR.replace("10, 0, 0\n", "11, 0, 0\n"))
@@ -302,7 +308,7 @@ def test_commands_send_what_a_case_names(server: LocalServer, folder: Path, monk
 
 
 def test_what_a_server_does_not_take_is_told_in_its_words(server: LocalServer, tmp_path: Path) -> None:
-    """Nothing is tried again."""
+    """A refused file is not sent again."""
     path = tmp_path / "large.inp"
     with path.open("wb") as file:
         file.truncate(5 << 30)  # takes no room

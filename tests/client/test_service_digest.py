@@ -1,4 +1,4 @@
-"""The real worker on a mesh file: through the service it gives the answer that it gives by itself."""
+"""The real worker on a mesh file: a run by the server has the same answer as a run of the worker alone."""
 
 import hashlib
 import json
@@ -34,7 +34,7 @@ BAR = """*NODE
 
 
 def test_a_run_of_a_mesh_file_has_the_digest_of_the_worker_alone(quiet_home: Path) -> None:
-    """``conoid run`` reads the copy in the run's folder; the original may change, and so may the folder's place."""
+    """``conoid run`` reads the copy in the run's folder. The original file may change, and the folder may be moved."""
     for name, text in (("case/bar.toml", CASE), ("meshes/bar.inp", BAR)):
         (quiet_home / name).parent.mkdir()
         (quiet_home / name).write_text(text)

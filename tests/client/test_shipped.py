@@ -1,4 +1,4 @@
-"""What comes with Conoid, from the command line: keys, cases, materials, the version, names for the shell."""
+"""Files of the installation on the command line: keys, cases, materials, the version, completions for the shell."""
 
 import json
 from importlib import metadata

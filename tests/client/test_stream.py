@@ -1,4 +1,4 @@
-"""The native subscription: a real Zenoh router, real samples; the journal stands in for the server."""
+"""Subscription over Zenoh with a real router and real messages; a list replaces the journal of the server."""
 
 import threading
 import time
@@ -22,7 +22,7 @@ PREFIX = keys.run_prefix(OWNER, run_messages.RUN)
 
 
 class Journal:
-    """What has been written so far; ``reads`` counts how often it was asked for."""
+    """Messages that are written so far; ``reads`` counts the readings."""
 
     def __init__(self) -> None:
         self.lines: list[AnyMessage] = []
@@ -41,7 +41,7 @@ def _short_silence(monkeypatch: pytest.MonkeyPatch) -> None:
 def reading(
     link: Link, journal: Journal, ended: Callable[[], bool] = lambda: False
 ) -> tuple[list[int], threading.Thread]:
-    """Follows in a thread; the list fills with the numbers that it told."""
+    """Follows a run in a thread and returns a list that receives the numbers of the messages."""
     told: list[int] = []
 
     def read() -> None:
@@ -54,7 +54,9 @@ def reading(
 
 
 def subscribed(broker: Broker) -> ZenohLink:
-    """A link that the router knows: a declaration takes a moment to arrive. What it heard meanwhile has seq 0."""
+    """Opens a subscription and waits until the router has it: a declaration takes a moment to arrive. Messages of
+    this wait have seq 0.
+    """
     link = ZenohLink(broker.router, PREFIX)
     deadline = time.monotonic() + 10
     broker.publish(run_messages.status(0, "running"))
@@ -77,7 +79,7 @@ def test_a_late_joiner_reads_history_then_stream_without_gap_or_repeat(broker: B
     journal, story = Journal(), run_messages.whole()
     journal.lines = story[:6]
     link = subscribed(broker)
-    broker.publish(story[4])  # It was on its way while the reader subscribed.
+    broker.publish(story[4])  # this message arrived during the subscription
     told, thread = reading(link, journal)
     until(lambda: len(told) == 6)
     for message in story[6:]:

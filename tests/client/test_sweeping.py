@@ -1,4 +1,6 @@
-"""``conoid sweep`` with a real server: progress, the same command again, without a server, the table, a threshold."""
+"""``conoid sweep`` with a real server: progress, a repeated command, a server of its own, the table, an adaptive
+sweep.
+"""
 
 import csv
 import io
@@ -19,7 +21,7 @@ SPEED = "parts[0].velocity[2]"
 
 @pytest.fixture
 def user(server: LocalServer, quiet_home: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A folder to work in, and a server in the environment."""
+    """A working folder, and an environment with the address of a server."""
     monkeypatch.setenv("CONOID_URL", server.session.url)
     monkeypatch.setenv("CONOID_TOKEN", server.token)
     return quiet_home

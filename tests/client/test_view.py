@@ -1,4 +1,4 @@
-"""Pictures of frames: what is drawn, and what is said when nothing can be."""
+"""Pictures of frames: their content, and the errors if no picture can be drawn."""
 
 import itertools
 import os
@@ -34,7 +34,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def body_box(path: Path) -> tuple[float, float, float, float]:
-    """Left, right, top, bottom of what is coloured left of the colour bar, as shares of the picture."""
+    """Returns left, right, top and bottom of the body, left of the colour bar, over the size of the picture."""
     pixels = imread(path)[:, :, :3]
     assert pixels.shape == (SIZE[1], SIZE[0], 3)
     coloured = pixels.max(axis=2) - pixels.min(axis=2) > 0.25
@@ -123,7 +123,7 @@ def test_mirror_planes_are_read() -> None:
 
 
 def test_a_crash_of_the_renderer_names_the_system_package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """VTK without EGL and OSMesa dies of a segmentation fault; here the child is made to die of one."""
+    """VTK without EGL and OSMesa ends with a segmentation fault; the test makes the child end with such a fault."""
     (tmp_path / "sitecustomize.py").write_text("import ctypes; ctypes.string_at(0)")
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     write_frame(tmp_path / "f.vtkhdf")
@@ -227,7 +227,9 @@ def seen(**options: Any) -> Picture:
 
 @pytest.mark.usefixtures("warm")
 def test_the_bar_of_a_length_is_as_long_as_it_says(folder: Path, tmp_path: Path) -> None:
-    """The body is 32.4 mm long, 0.82 of that in the last frame: its pixels and those of the bar have one scale."""
+    """The body is 32.4 mm long at the start and 0.82 of that in the last frame; body and scale bar have the same
+    scale.
+    """
     size = (600, 800)
     drawn = view(folder, "temperature", tmp_path / "s.png", size=size, camera="x", raw=True, captions=False,
                  outlines=False)  # fmt: skip
@@ -246,7 +248,9 @@ def test_the_bar_of_a_length_is_as_long_as_it_says(folder: Path, tmp_path: Path)
 def test_a_long_body_lies_along_the_picture_and_shows_its_planes_of_symmetry(
     along: int, cuts: dict[int, float]
 ) -> None:
-    """Its low end at the left where no plane stands against that; ``up`` alone stands it up again."""
+    """The low end of the body is at the left unless a plane of symmetry requires the other side; with ``up`` the
+    body stands.
+    """
     bounds = np.array([[0.0, 1.0]] * 3)
     bounds[along, 1] = 4.0
     planes = tuple(Mirror(axis, at) for axis, at in cuts.items())
@@ -402,7 +406,7 @@ def empty(path: Path) -> None:
 
 @pytest.mark.parametrize("damage", [cut, torn, astray, short, lacks, other, empty])
 def test_a_damaged_frame_is_named(damage: Any, tmp_path: Path) -> None:
-    """VTK has words of its own for some, and reads beyond the ends of arrays of others."""
+    """VTK prints messages of its own for some damaged frames, and reads beyond the ends of arrays for others."""
     path = tmp_path / "000001.vtkhdf"
     write_frame(path)
     require_whole(str(path))

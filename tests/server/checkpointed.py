@@ -1,4 +1,4 @@
-"""What a worker with checkpoints would have left in the folder of a run."""
+"""Folder of a run with the files that a worker with checkpoints leaves."""
 
 import hashlib
 from pathlib import Path
@@ -10,12 +10,12 @@ from .running import Running
 
 
 def with_checkpoint(server: Running, run: str, step: int) -> Path:
-    """Puts what a worker would have left into the folder of a run."""
+    """Adds the files that a worker with checkpoints leaves to the folder of a run."""
     return with_checkpoint_in(made(server.ann.runs / run, step))
 
 
 def with_checkpoint_in(path: Path) -> Path:
-    """Frames, fragments and a history beside the checkpoints."""
+    """Writes checkpoints, frames, fragments and a history."""
     for place, name in (
         (path / layout.FRAMES, "000000.vtkhdf"),
         (path / layout.FRAMES, layout.FRAME_SERIES), (path / "fragments", "000000.csv"),
@@ -27,7 +27,7 @@ def with_checkpoint_in(path: Path) -> Path:
 
 
 def made(folder: Path, *steps: int) -> Path:
-    """A run's folder with checkpoints."""
+    """Makes a run's folder with checkpoints."""
     for step in steps:
         place = layout.checkpoint(folder, step)
         place.mkdir(parents=True)

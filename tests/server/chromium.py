@@ -1,6 +1,6 @@
-"""A Chromium without a window, driven over a pipe in the words of the DevTools protocol; pictures in software.
+"""A Chromium without a window. The tests send it commands of the DevTools protocol over a pipe; it draws by software.
 
-https://chromedevtools.github.io/devtools-protocol has the methods that are called here.
+https://chromedevtools.github.io/devtools-protocol describes the methods that are called here.
 """
 
 import base64
@@ -24,13 +24,14 @@ _OPTIONS = (
     "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist",
 )  # fmt: skip
 _ONTO_3_AND_4 = "import os, sys; r, w, *a = sys.argv[1:]; os.dup2(int(r), 3); os.dup2(int(w), 4); os.execvp(a[0], a)"
-"""The protocol's pipes have fixed numbers in the browser."""
+"""Program that moves the pipes to descriptors 3 and 4: the browser reads commands from 3 and writes answers to 4."""
 _PATIENCE = 60.0
 _NOTHING = (None, False, 0, "")
-"""What JavaScript takes for false; an element is an empty table here."""
+"""Values that are false in JavaScript. The protocol sends an element of the page as an empty dict, which counts as
+true."""
 _BUTTON = {"button": "left", "clickCount": 1}
 KEYS = {"Enter": 13, "Escape": 27, "Tab": 9, " ": 32, "ArrowLeft": 37, "ArrowUp": 38, "ArrowRight": 39, "ArrowDown": 40}
-"""Keys that can be pressed, with their Windows numbers, which the protocol wants."""
+"""Keys that a test can press, with their Windows key codes, which the protocol requires."""
 
 MEASURES = """
 window.seen = {frames: [], events: []};
@@ -39,23 +40,23 @@ new PerformanceObserver((list) => list.getEntries().forEach(({ name, duration, s
   if (name === "conoid:event") seen.events.push(duration);
 })).observe({ type: "measure" });
 """
-"""Keeps what the page writes into the browser's timeline, in ``window.seen``."""
+"""Script that stores the marks of the browser's timeline in ``window.seen``."""
 
 
 def program() -> str | None:
-    """The browser on this machine, None where there is none."""
+    """Returns the path of the browser on this machine; None if no browser is installed."""
     return next((found for name in PROGRAMS if (found := shutil.which(name))), None)
 
 
 class PageError(Exception):
-    """A script of the page has failed, or what was waited for has not come."""
+    """A script of the page has failed, or a condition did not become true in time."""
 
 
 class Browser:
     """A browser with an empty profile; a context manager."""
 
     def __init__(self, folder: Path) -> None:
-        """``folder`` takes the profile."""
+        """Prepares the browser; ``folder`` is the place of the profile."""
         self._folder = folder
         self._lock = threading.Lock()
         self._answers: dict[int, queue.SimpleQueue[dict[str, Any]]] = {}
@@ -63,7 +64,7 @@ class Browser:
         self._last = 0
 
     def __enter__(self) -> Self:
-        """Starts it."""
+        """Starts the browser."""
         ours, theirs = os.pipe(), os.pipe()
         into, out_of = (fcntl.fcntl(fd, fcntl.F_DUPFD, 10) for fd in (ours[0], theirs[1]))
         launch = [sys.executable, "-c", _ONTO_3_AND_4, str(into), str(out_of), program() or PROGRAMS[0]]
@@ -78,7 +79,7 @@ class Browser:
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Ends it."""
+        """Ends the browser."""
         try:
             self.call("Browser.close")
             self._process.wait(10)
@@ -96,7 +97,7 @@ class Browser:
         phone: bool = False,
         beside: "Page | None" = None,
     ) -> "Page":
-        """An empty page in a profile of its own, or in that of another page."""
+        """Opens an empty page with a profile of its own, or with the profile of another page."""
         context = beside.context if beside else self.call("Target.createBrowserContext")["browserContextId"]
         target = self.call("Target.createTarget", url="about:blank", browserContextId=context)["targetId"]
         session = self.call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
@@ -106,7 +107,7 @@ class Browser:
         return page
 
     def call(self, method: str, session: str = "", /, **params: Any) -> dict[str, Any]:
-        """A method of the protocol, and its answer. Raises PageError."""
+        """Calls a method of the protocol and returns its answer. Raises PageError."""
         answer: queue.SimpleQueue[dict[str, Any]] = queue.SimpleQueue()
         number = self.send(method, session, answer, **params)
         try:
@@ -123,7 +124,7 @@ class Browser:
     def send(
         self, method: str, session: str, answer: "queue.SimpleQueue[dict[str, Any]] | None" = None, **params: Any
     ) -> int:
-        """A method without waiting for its answer; its number."""
+        """Calls a method without waiting for the answer; returns the number of the call."""
         with self._lock:
             self._last += 1
             number = self._last
@@ -147,17 +148,17 @@ class Browser:
 
 
 class Page:
-    """One page: what a person does with it, and what the browser says of it."""
+    """One page of the browser: actions of a user, and events that the browser reports."""
 
     def __init__(self, browser: Browser, session: str, target: str, context: str) -> None:
         self._browser, self._session, self._target, self.context = browser, session, target, context
         self.errors: list[str] = []
-        """What stands in the console as an error, scripts that have failed, and pages of the server that did."""
+        """Errors of the console, scripts that have failed, and requests that the server answered with an error."""
         self.answers: list[tuple[int, str]] = []
-        """Status and address of everything that was asked of a server."""
+        """Status and address of each request to the server."""
 
     def open(self, width: int, height: int, *, dark: bool, phone: bool) -> None:
-        """Sets the size and the theme, and begins to listen."""
+        """Sets size and theme of the window and subscribes to events."""
         for domain in ("Page", "Runtime", "Log", "Network"):
             self.call(f"{domain}.enable")
         self.size(width, height, phone=phone)
@@ -166,15 +167,15 @@ class Page:
         self.call("Page.addScriptToEvaluateOnNewDocument", source=MEASURES)
 
     def size(self, width: int, height: int, *, phone: bool = False) -> None:
-        """The size of the window, px."""
+        """Size of the window, px."""
         self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=phone)
 
     def call(self, method: str, /, **params: Any) -> dict[str, Any]:
-        """A method of the protocol for this page. Raises PageError."""
+        """Calls a method of the protocol for this page. Raises PageError."""
         return self._browser.call(method, self._session, **params)
 
     def heard(self, method: str, told: dict[str, Any]) -> None:
-        """An event of this page; in the thread that listens."""
+        """Handles an event of this page, in the thread that reads the pipe."""
         if method == "Runtime.consoleAPICalled" and told["type"] == "error":
             self.errors.append(" ".join(str(one.get("value", one.get("description"))) for one in told["args"]))
         elif method == "Runtime.exceptionThrown":
@@ -192,7 +193,9 @@ class Page:
         self.wait("document.readyState === 'complete'")
 
     def evaluate(self, script: str) -> Any:
-        """The value of a JavaScript expression, of a promise what it promises. Raises PageError."""
+        """Returns the value of a JavaScript expression; of a promise, the value with which it resolves. Raises
+        PageError.
+        """
         found = self.call(
             "Runtime.evaluate", expression=script, awaitPromise=True, returnByValue=True, userGesture=True
         )
@@ -201,7 +204,7 @@ class Page:
         return found["result"].get("value")
 
     def wait(self, script: str, seconds: float = _PATIENCE) -> Any:
-        """The value of an expression once it is true. Raises PageError."""
+        """Waits until an expression is true and returns its value. Raises PageError."""
         until = time.monotonic() + seconds
         while (value := self.evaluate(script)) in _NOTHING:
             if time.monotonic() > until:
@@ -210,11 +213,13 @@ class Page:
         return value
 
     def text(self, selector: str = "body") -> str:
-        """What is to be read below a selector, blank where there is nothing."""
+        """Returns the visible text of the element with a selector; empty if there is no such element."""
         return str(self.evaluate(f"document.querySelector({json.dumps(selector)})?.innerText ?? ''"))
 
     def place(self, selector: str, right: float = 0.5, down: float = 0.5) -> tuple[float, float]:
-        """A place in an element, as shares of its size, scrolled into view; px in the window."""
+        """Scrolls an element into view and returns the position of a point in it, px. The point is given by
+        fractions of the element's size.
+        """
         box = self.wait(f"""(() => {{
           const element = document.querySelector({json.dumps(selector)});
           element?.scrollIntoView({{ block: "center", behavior: "instant" }});
@@ -224,33 +229,33 @@ class Page:
         return box[0] + right * box[2], box[1] + down * box[3]
 
     def click(self, selector: str, right: float = 0.5, down: float = 0.5) -> None:
-        """A click with the pointer on an element."""
+        """Clicks on an element with the pointer."""
         self.click_at(*self.place(selector, right, down))
 
     def click_at(self, x: float, y: float) -> None:
-        """A click at a place of the window."""
+        """Clicks at a position of the window."""
         self.call("Input.dispatchMouseEvent", type="mouseMoved", x=x, y=y)
         self.call("Input.dispatchMouseEvent", type="mousePressed", x=x, y=y, **_BUTTON)
         self.call("Input.dispatchMouseEvent", type="mouseReleased", x=x, y=y, **_BUTTON)
 
     def press(self, key: str, modifiers: int = 0) -> None:
-        """A key, where the focus is; ``modifiers``: 1 Alt, 2 Ctrl, 8 Shift."""
+        """Presses a key in the element that has the focus; ``modifiers``: 1 Alt, 2 Ctrl, 8 Shift."""
         text = {"Enter": "\r"}.get(key, key if len(key) == 1 else "")
         known = {"key": key, "code": key, "windowsVirtualKeyCode": KEYS.get(key, ord(key[0])), "modifiers": modifiers}
         self.call("Input.dispatchKeyEvent", type="keyDown", **known, **({"text": text} if text else {}))
         self.call("Input.dispatchKeyEvent", type="keyUp", **known)
 
     def write(self, selector: str, text: str) -> None:
-        """Text into a field."""
+        """Types text into a field."""
         self.focus(selector)
         self.call("Input.insertText", text=text)
 
     def focus(self, selector: str) -> None:
-        """Puts the focus on an element."""
+        """Moves the focus to an element."""
         self.wait(f"document.querySelector({json.dumps(selector)})?.focus() === undefined")
 
     def slide(self, selector: str, value: float | str) -> None:
-        """A slider or a list of choices to a value, as a person's hand leaves it."""
+        """Sets a slider or a list of choices to a value, with the events of a user's action."""
         self.wait(f"!!document.querySelector({json.dumps(selector)})")
         self.evaluate(f"""(() => {{
           const element = document.querySelector({json.dumps(selector)});
@@ -260,7 +265,7 @@ class Page:
         }})()""")
 
     def draw(self, path: Path, *, whole: bool = False) -> None:
-        """A picture of the window, or of the whole page."""
+        """Takes a screenshot of the window, or of the whole page."""
         found = self.call("Page.captureScreenshot", format="png", captureBeyondViewport=whole)
         path.write_bytes(base64.b64decode(found["data"]))
 

@@ -1,4 +1,4 @@
-"""Servers to test: one in this process, one of its own, both with a worker that computes nothing."""
+"""Servers for tests, in this process or in a process of their own. Their worker computes nothing."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -18,7 +18,7 @@ from .visitor import Site
 
 
 def settings_in(place: Path) -> Settings:
-    """Of a server whose runs lie below ``place``."""
+    """Returns the settings of a server whose runs are below ``place``."""
     return Settings(
         runs=place / "runs", port=0, zenoh_port=None, slots=2, worker=FAKE, grace=0.5, caps=Caps(free_disk=0)
     )
@@ -37,7 +37,9 @@ def server(settings: Settings) -> Iterator[Running]:
 
 @pytest.fixture(scope="module")
 def ended(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Running, str]]:
-    """A server, and a run of two ranks that has ended; for tests that only read, or put back what they change."""
+    """A server and a finished run of two ranks, shared by tests that only read, or that restore the files that they
+    change.
+    """
     with running(settings_in(tmp_path_factory.mktemp("ended"))) as made:
         run = made.ann.submit(ranks=2)
         made.ann.wait_for(run)
@@ -46,7 +48,7 @@ def ended(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Running, s
 
 @contextmanager
 def running(settings: Settings) -> Iterator[Running]:
-    """A server in this process; no worker outlives it."""
+    """A server in this process. All workers have ended after the test."""
     with opened(settings) as service, TestClient(build_app(service), base_url="http://127.0.0.1") as client:
         users = []
         for name in ("ann", "bob"):
@@ -58,7 +60,7 @@ def running(settings: Settings) -> Iterator[Running]:
 
 
 def _like(client: TestClient, token: str) -> TestClient:
-    """A client of the same server, inside the same event loop, with a token."""
+    """Returns a client of the same server with a token, inside the same event loop."""
     other = TestClient(client.app, base_url="http://127.0.0.1", headers={"Authorization": f"Bearer {token}"})
     other.portal = client.portal
     return other
@@ -72,13 +74,13 @@ def process(tmp_path: Path) -> Iterator[MakeProcess]:
 
 @pytest.fixture(scope="module")
 def ask(tmp_path_factory: pytest.TempPathFactory) -> Ask:
-    """Asks modules of the page by node."""
+    """Function that evaluates expressions with modules of the page in node."""
     return asking(tmp_path_factory.mktemp("web"))
 
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
-    """A server in a process of its own, without runs; tests that need others have a fixture of this name."""
+    """A server without runs in a process of its own. A test file that needs runs defines a fixture with this name."""
     made = Site(tmp_path_factory.mktemp("site") / "runs")
     yield made
     made.process.terminate()

@@ -1,4 +1,4 @@
-"""A program in the place of the one that makes reports; the title of the run's case says what it does."""
+"""Program that replaces the one that makes reports. The title of the run's case selects the behaviour."""
 
 import sys
 import time

@@ -1,4 +1,4 @@
-"""Slurm's commands as scripts: what is queued is a file."""
+"""Slurm's commands as shell scripts. A file contains the queue."""
 
 from pathlib import Path
 
@@ -12,12 +12,12 @@ cd {place}; [ -e away ] && {{ echo "slurm_load_jobs error: Unable to contact slu
 cat queue 2>/dev/null; exit 0
 """
 TELL = {"scancel": "ended", "scontrol": "released"}
-"""Commands that write their words into a file."""
+"""Commands that append their arguments to a file."""
 ACCEPT = 'echo "$((100 + $(wc -l < calls)))|PENDING|N/A|$name|Resources" >> queue'
 
 
 def commands(place: Path, body: str) -> str:
-    """An sbatch that does ``body``, and a squeue that tells what it has queued."""
+    """Writes an sbatch that runs ``body``, and a squeue that prints the queued jobs."""
     told = {name: f"#!/bin/bash\necho $@ >> {{place}}/{file}\n" for name, file in TELL.items()}
     for name, text in {"sbatch": SBATCH, "squeue": SQUEUE, **told}.items():
         path = place / "bin" / name

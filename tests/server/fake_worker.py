@@ -1,7 +1,8 @@
-"""A worker that computes nothing and keeps the contract: command line, journal, outcome, signals, exit codes.
+"""A worker that computes nothing and has the interface of the real one: command line, journal, outcome, signals, exit
+codes.
 
-What it does stands in the case's ``description`` as JSON: ``steps``, ``pace`` (s a step), ``end`` (see the function),
-and ``wait`` (a file whose appearance lets it go on). Rank 0 holds the lock of the folder while it lives.
+The case's ``description`` is JSON with ``steps``, ``pace`` (s per step), ``end`` (see the function), and ``wait``
+(the worker pauses until this file exists). Rank 0 holds the lock of the folder until its end.
 """
 
 import argparse
@@ -123,7 +124,9 @@ def end(how: str, options: argparse.Namespace, say: object, steps: int) -> int:
 
 
 def interrupted(options: argparse.Namespace, steps: int) -> int:
-    """A checkpoint, and what is told of the run so far; who has started it says what the interruption was."""
+    """Writes a checkpoint and the outcome so far; the process that started the worker determines the cause of the
+    interruption.
+    """
     layout.checkpoint(options.out, steps).mkdir(parents=True, exist_ok=True)
     (options.out / layout.INTERRUPTED).write_bytes(outcome.to_json(outcome.Outcome(state="cancelled", steps=steps)))
     return ExitCode.INTERRUPTED

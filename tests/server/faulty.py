@@ -1,8 +1,8 @@
-"""Faults on demand at whatever the supervisor writes, and a launcher whose workers live in this process.
+"""Faults at each place at which the supervisor writes, and a launcher whose workers are objects in this process.
 
-Python tells its audit hooks of every file that is opened, renamed, made or removed before it happens, and passes on
-what a hook raises; ``os.write`` and ``os.fsync`` are replaced. So every place at which a disk can fail is found by
-itself, also one that does not exist yet.
+Python calls audit hooks before a file is opened, renamed, made or removed; an error of a hook becomes the error of
+the call. ``os.write`` and ``os.fsync`` are replaced. A test therefore finds all places at which a disk can fail,
+also those of later code.
 """
 
 import os
@@ -26,30 +26,32 @@ from conoid.server.settings import Settings
 
 
 class CrashError(BaseException):
-    """The server was killed at this place."""
+    """Simulates a kill of the server at this place."""
 
 
 @dataclass
 class Plan:
-    """Fails at the ``place``-th thing that is written below ``root``, ``times`` times from then on."""
+    """Plan of a fault: fails at the ``place``-th write below ``root``, and at the writes after it, ``times`` times
+    in all.
+    """
 
     root: Path
     place: int
     error: BaseException
     times: int = 1
     reads: bool = False
-    """Whether opening a file to read it counts: where no descriptor is left."""
+    """True: opening a file for reading counts as well. A process without free descriptors also fails there."""
     seen: int = 0
     fired: int = 0
 
     def look(self, path: object) -> None:
-        """Raises the error when its time has come."""
+        """Counts an access to a file below the root."""
         if not isinstance(path, str | bytes | Path) or not str(os.fsdecode(path)).startswith(str(self.root)):
             return
         self.touch()
 
     def touch(self) -> None:
-        """Counts one place."""
+        """Counts one place; raises the error at the planned places."""
         self.seen += 1
         if self.place < self.seen <= self.place + self.times:
             self.fired += 1
@@ -82,14 +84,14 @@ sys.addaudithook(_audit)
 
 
 def fsync(descriptor: int) -> None:
-    """In place of ``os.fsync``."""
+    """Replaces ``os.fsync``."""
     if _current.plan is not None and not _current.plan.reads:
         _current.plan.touch()
     _fsync(descriptor)
 
 
 def write(descriptor: int, data: bytes) -> int:
-    """In place of ``os.write``: half of the data are on disk when it fails."""
+    """Replaces ``os.write``. When it fails, half of the data are on disk."""
     if _current.plan is not None and not _current.plan.reads:
         try:
             _current.plan.touch()
@@ -101,7 +103,7 @@ def write(descriptor: int, data: bytes) -> int:
 
 @contextmanager
 def faults(plan: Plan) -> Iterator[None]:
-    """This thread meets the faults of the plan inside the block."""
+    """Context in which this thread gets the faults of the plan."""
     _current.plan = plan
     try:
         yield
@@ -111,7 +113,7 @@ def faults(plan: Plan) -> Iterator[None]:
 
 @dataclass
 class Puppet:
-    """A worker that does what a test says. It writes without faults, as a process of its own would."""
+    """A worker with a planned end. Its own writes do not fail, as if it were another process."""
 
     run: str
     folder: Path
@@ -121,19 +123,21 @@ class Puppet:
     looks: int = 0
 
     def phase(self) -> Phase:
-        """It has its cores from the start."""
+        """Returns "runs": a puppet has its cores from the start."""
         return "runs"
 
     def began(self) -> float:
-        """Nobody asks."""
+        """Returns 0; no test uses the time."""
         return 0.0
 
     def note(self) -> str:
-        """There is nothing to add."""
+        """Returns an empty note."""
         return ""
 
     def exited(self) -> Exit | None:
-        """Runs at the second look, ends at the fourth, or when it is asked to stop."""
+        """Polls the worker. The worker runs from the second poll on; it ends at the fourth poll or after a request
+        to stop.
+        """
         plan, _current.plan = _current.plan, None
         try:
             self.looks += 1
@@ -154,17 +158,17 @@ class Puppet:
             (self.folder / layout.LOGS / layout.LAUNCHER_LOG).write_text("=   EXIT CODE: 9\n")
 
     def stop(self) -> None:
-        """Obeys at the next look."""
+        """Requests an end at the next poll."""
         self.stopped = True
 
     def kill(self) -> None:
-        """Ends at once."""
+        """Ends the worker at once."""
         self.alive = False
 
 
 @dataclass
 class Puppets:
-    """Launches puppets; knows how many live."""
+    """Launcher of puppets, with a list of all puppets that it has started."""
 
     ends: str = "succeeded"
     refuses: bool = False
@@ -172,7 +176,7 @@ class Puppets:
     queues: bool = False
 
     def start(self, job: Job) -> Worker:
-        """Like a real launcher: starts, then records."""
+        """Starts a worker, then records it, in the order of a real launcher."""
         if self.refuses:
             raise LaunchError("no mpiexec")
         puppet = Puppet(job.run, job.folder, self.ends)
@@ -185,16 +189,16 @@ class Puppets:
         return puppet
 
     def find(self, run: str, path: Path) -> Trace:
-        """By the record, or among the living."""
+        """Returns the worker of a run: a living puppet, or the trace of the process record."""
         living = next((puppet for puppet in self.made if puppet.run == run and puppet.alive), None)
         return Trace(living, living is not None or folder.process(path) is not None, False)
 
     def tidy(self) -> None:
-        """Nothing to remove."""
+        """Does nothing: puppets leave no files."""
 
 
 class House:
-    """A server's inside on a folder."""
+    """The server's supervisor, database and launcher on a folder of runs, without HTTP."""
 
     def __init__(self, runs: Path) -> None:
         runs.mkdir(mode=0o700)
@@ -204,13 +208,15 @@ class House:
         self.supervisor = self.begin()
 
     def begin(self) -> Supervisor:
-        """A supervisor that has taken up what is there; its thread does not run."""
+        """Returns a supervisor that has loaded the runs of the folder. Its thread does not run; tests call its
+        turns.
+        """
         made = Supervisor(self.settings, self.store, self.puppets, None, lambda _: None)
         made._take_up()
         return made
 
     def accept(self) -> Run:
-        """A run as the desk accepts it."""
+        """Accepts a run with the steps of a real submission."""
         run_id, now = folder.new_id()
         made = Submission(
             id=run_id, owner="ann", name="bar", title="", ranks=1, submitted=now, case_file="case.toml",

@@ -1,5 +1,6 @@
-"""``flood.py HOST PORT SECONDS THREADS``: sends requests without a token as fast as it can; prints the number of
-answers by status."""
+"""``flood.py HOST PORT SECONDS THREADS`` sends requests without a token as fast as possible, and prints the number
+of answers by status.
+"""
 
 import json
 import socket

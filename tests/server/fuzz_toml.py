@@ -1,4 +1,6 @@
-"""How schemathesis writes a body of TOML: loaded by it (``SCHEMATHESIS_HOOKS``), which knows no such kind."""
+"""Hook of schemathesis (``SCHEMATHESIS_HOOKS``) that writes a body of TOML: schemathesis has no writer for this
+type.
+"""
 
 import json
 
@@ -8,7 +10,7 @@ from schemathesis import SerializationContext
 
 @schemathesis.serializer("application/toml")
 def write_toml(context: SerializationContext, value: object) -> bytes:
-    """Text as it is, lone surrogates too; what is no text, as JSON writes it."""
+    """Writes text unchanged, also lone surrogates, and other data as JSON."""
     if isinstance(value, bytes):
         return value
     text = value if isinstance(value, str) else json.dumps(value, default=str)

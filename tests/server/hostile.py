@@ -1,4 +1,4 @@
-"""Hostile bodies: small ones that cost much, numbers without end, half characters."""
+"""Hostile bodies of requests: small bodies with a high cost, numbers that are not finite, incomplete characters."""
 
 import json
 import random
@@ -10,7 +10,7 @@ from .running import case_text
 
 TOML, JSON = "application/toml", "application/json"
 Body = tuple[str, str, bytes]
-"""Name, content type, bytes."""
+"""Name, content type and bytes."""
 _SEED = 20260
 VALUES: tuple[Any, ...] = (
     None, True, [], {}, "", "x" * 100_000, -1, 0, 2**63, 2**64, 10**400, 1e308, 1e160, 1e-160, 5e-324, "1e160 m",
@@ -19,18 +19,18 @@ VALUES: tuple[Any, ...] = (
 
 
 def good() -> dict[str, Any]:
-    """A case that can be run, as plain data."""
+    """Returns a valid case as plain data."""
     return tomllib.loads(case_text())
 
 
 def corpus() -> list[Body]:
-    """All of them, always the same."""
+    """Returns all hostile bodies; each call returns the same."""
     made = [*_quadratic(), *_deep(), *_numbers(), *_text(), *_large(), *_replaced(), *_mutated()]
     return [(f"{n:03d} {name}", kind, body) for n, (name, kind, body) in enumerate(made)]
 
 
 def quadratic() -> list[Body]:
-    """Those whose cost grows faster than their size."""
+    """Returns the bodies whose cost grows faster than their size."""
     return [*_quadratic(), *_large()]
 
 
@@ -150,7 +150,7 @@ def _large() -> Iterator[Body]:
 
 
 def _replaced() -> Iterator[Body]:
-    """Each key of a good case, with each of the values that do not belong there; every third of them."""
+    """Returns copies of a valid case with one wrong value: every third combination of a key and a value."""
     places = list(_places(good()))
     wrong = [(place, value) for place in places for value in VALUES]
     for place, value in wrong[::3]:
@@ -175,7 +175,7 @@ def _places(data: Any, place: tuple[int | str, ...] = ()) -> Iterator[tuple[int 
 
 
 def _with(place: tuple[int | str, ...], value: Any) -> bytes:
-    """A good case with a value in a place."""
+    """Returns a valid case with a value at a key."""
     case = good()
     inner: Any = case
     for key in place[:-1]:

@@ -21,13 +21,15 @@ ENERGY = {
 
 
 def parts(k: int) -> dict[str, messages.PartEnergy]:
-    """Told of by newer workers alone."""
+    """Returns energies by part, which only newer workers report."""
     made = {"rod": (2.0, 0.5 * k), "ball": (1.0, 0.0)}
     return {name: messages.PartEnergy(kinetic=a, internal=b) for name, (a, b) in made.items()} if k else {}
 
 
 def told(reports: int, ranks: int = 2, every: int = 100) -> Iterator[messages.AnyMessage]:
-    """What a run says that has so many reports, and now and then a cut and a snapshot."""
+    """Yields the messages of a run with ``reports`` reports. After each ``every`` reports come a balance event and a
+    snapshot.
+    """
     yield messages.Status(run="r", wall=1000.0, state=State.ACCEPTED)
     yield messages.Status(run="r", wall=1010.0, state=State.RUNNING)
     for k in range(reports):
@@ -58,7 +60,7 @@ def snapshot(n: int, text: str | bytes, tets: int = 0, **at: Any) -> messages.Sn
 
 
 def write(folder: Path, told: Iterator[messages.AnyMessage], after: int = 0) -> int:
-    """Appends to a journal, and puts snapshots in their places; the last number."""
+    """Appends messages to a journal and writes the files of the snapshots; returns the number of the last message."""
     with (folder / layout.JOURNAL).open("ab" if after else "wb") as file:
         for message in told:
             after += 1

@@ -1,4 +1,4 @@
-"""Modules of the page that are asked by node, without a browser."""
+"""Evaluation of the page's modules in node, without a browser."""
 
 import json
 import shutil
@@ -10,13 +10,13 @@ from typing import Any
 from .visitor import WEB
 
 NODE = shutil.which("node")
-"""The program; None where there is none."""
+"""Path of the program node; None if it is not installed."""
 Ask = Callable[..., Any]
-"""``ask(modules, expression, data)``: the value of an expression in ``page``, what the modules have, and ``data``."""
+"""``ask(modules, expression, data)`` returns the value of an expression; ``page`` has the exports of the modules."""
 
 
 def asking(web: Path) -> Ask:
-    """Asks copies of the page's modules in the folder ``web``."""
+    """Returns a function that evaluates expressions with copies of the page's modules in the folder ``web``."""
     for path in WEB.glob("*.js"):
         shutil.copy(path, web)
     (web / "package.json").write_text('{"type": "module"}')

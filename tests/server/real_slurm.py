@@ -1,4 +1,4 @@
-"""A Slurm of one node on this machine, started for tests: as root, without systemd, cgroups or a database."""
+"""A Slurm of one node on this machine, started for tests by root, without systemd, cgroups or a database."""
 
 import os
 import shutil
@@ -14,7 +14,7 @@ from pathlib import Path
 NEEDED = ("slurmctld", "slurmd", "munged", "sbatch")
 PACKAGES = "slurm-wlm munge"
 CORES = 8
-"""That the node is said to have, whatever it has: so many small runs at a time."""
+"""Number of cores in the node's configuration, whatever the machine has: that many small runs can run at a time."""
 _PATIENCE = 60.0
 
 _CONF = """
@@ -57,7 +57,7 @@ PartitionName=high Nodes={host} MaxTime=INFINITE State=UP PriorityTier=10 Preemp
 
 
 def missing() -> str:
-    """Why there can be no Slurm here; empty when there can."""
+    """Returns the reason why no Slurm can be started on this machine; empty if one can."""
     absent = [name for name in NEEDED if shutil.which(name) is None]
     if absent:
         return f"{', '.join(absent)}: not installed (apt-get install {PACKAGES}; make drill does it)"
@@ -66,14 +66,14 @@ def missing() -> str:
 
 @dataclass
 class Cluster:
-    """A Slurm that is up, and what a test does with it."""
+    """A running Slurm with actions for tests."""
 
     place: Path
     conf: Path
     host: str
 
     def command(self, *words: str) -> str:
-        """What a command of Slurm prints."""
+        """Runs a command of Slurm and returns its output."""
         done = subprocess.run(
             words, env={**os.environ, "SLURM_CONF": str(self.conf)}, capture_output=True, text=True, timeout=60,
             check=False,
@@ -82,7 +82,7 @@ class Cluster:
         return done.stdout.strip()
 
     def jobs(self, name: str) -> list[tuple[str, str]]:
-        """Number and state of all jobs whose names begin with ``name``."""
+        """Returns number and state of all jobs whose names begin with ``name``."""
         rows = [row.split("|") for row in self.command("squeue", "-h", "-t", "all", "-o", "%i|%T|%j").splitlines()]
         return [(row[0], row[1]) for row in rows if len(row) > 2 and row[2].startswith(name)]
 
@@ -91,7 +91,7 @@ class Cluster:
         subprocess.run(["slurmctld", "-f", str(self.conf)], check=True, timeout=60, env=self._env())
 
     def kill(self) -> None:
-        """Kills the controller, as a crash does."""
+        """Kills the controller, which simulates a crash."""
         with suppress(OSError, ValueError):
             os.kill(int((self.place / "slurmctld.pid").read_text()), signal.SIGKILL)
 
@@ -100,7 +100,7 @@ class Cluster:
         os.kill(int((self.place / "slurmctld.pid").read_text()), number)
 
     def await_node(self) -> None:
-        """Returns when the node takes jobs."""
+        """Returns when the node accepts jobs."""
         deadline, state = time.monotonic() + _PATIENCE, "unknown"
         while time.monotonic() < deadline:
             with suppress(AssertionError):
@@ -111,7 +111,7 @@ class Cluster:
         raise AssertionError(f"the node is {state}, not ready: {(self.place / 'slurmctld.log').read_text()[-2000:]}")
 
     def resume(self) -> str:
-        """The state of the node; one that was taken out is let in again, as an operator does."""
+        """Returns the state of the node. A node that is out of service is put into service again."""
         state = self.command("sinfo", "-h", "-o", "%T").splitlines()[0]
         if "drain" in state or "down" in state:
             self.command("scontrol", "update", f"nodename={self.host}", "state=resume")
@@ -123,7 +123,7 @@ class Cluster:
 
 @contextmanager
 def running(place: Path) -> Iterator[Cluster]:
-    """A cluster with its state below ``place``, gone afterwards with all its jobs; SLURM_CONF names it meanwhile."""
+    """Starts a cluster with its state below ``place`` and sets SLURM_CONF; ends it afterwards with all its jobs."""
     for name in ("state", "spool"):
         (place / name).mkdir(parents=True)
     for parent in (place, *place.parents):
@@ -151,7 +151,7 @@ def running(place: Path) -> Iterator[Cluster]:
 
 
 def _munged(place: Path) -> "subprocess.Popen[bytes]":
-    """A munge of its own, with a key of its own."""
+    """Starts a munge with a key of its own."""
     key = place / "munge.key"
     key.write_bytes(os.urandom(128))
     key.chmod(0o600)

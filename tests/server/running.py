@@ -1,4 +1,4 @@
-"""Servers in this process and in one of their own, and those who use them; the workers compute nothing."""
+"""Servers in this process and in processes of their own, and their users. The workers compute nothing."""
 
 import json
 import os
@@ -23,14 +23,14 @@ from conoid.server.settings import Settings
 FAKE = (sys.executable, str(Path(__file__).with_name("fake_worker.py")))
 PATIENCE = 20.0
 START = 180.0
-"""s that a server may take to load on a machine that has much else to do."""
+"""Time limit for the start of a server on a busy machine, s."""
 TOML = {"Content-Type": "application/toml"}
 
 
 def case_text(
     name: str = "bar", ranks: int = 1, end_time: str = "1 us", extra: str = "", threads: int = 1, **plan: Any
 ) -> str:
-    """A small case in TOML; ``plan`` is for the fake worker."""
+    """Returns a small case in TOML; ``plan`` configures the fake worker."""
     return f"""
 name = "{name}"
 title = "A bar"
@@ -60,28 +60,28 @@ threads = {threads}
 
 @dataclass
 class User:
-    """One who talks to a server; ``http`` carries the token."""
+    """A user of a server; ``http`` sends the user's token."""
 
     http: httpx2.Client
     name: str
     runs: Path
-    """The server's folder of runs."""
+    """Folder of the server's runs."""
 
     def submit(self, text: str | None = None, **plan: Any) -> str:
-        """The id of a new run."""
+        """Submits a run and returns its id."""
         answer = self.http.post("/v1/runs", content=text or case_text(**plan), headers=TOML)
         assert answer.status_code == 202, answer.text
         return str(answer.json()["id"])
 
     def show(self, run: str) -> dict[str, Any]:
-        """The run as it is now."""
+        """Returns the present state of the run."""
         answer = self.http.get(f"/v1/runs/{run}")
         assert answer.status_code == 200, answer.text
         found: dict[str, Any] = answer.json()
         return found
 
     def wait_for(self, run: str, *states: State) -> dict[str, Any]:
-        """The run once it is in one of ``states`` (any final one when none is named)."""
+        """Waits until the run is in one of ``states`` (default: any final state) and returns the run."""
         wanted = states or tuple(state for state in State if state.final)
         deadline = time.monotonic() + PATIENCE
         while (seen := self.show(run))["state"] not in wanted:
@@ -90,18 +90,18 @@ class User:
         return seen
 
     def events(self, run: str, **query: int) -> list[dict[str, Any]]:
-        """The journal over REST."""
+        """Returns the journal over REST."""
         found: list[dict[str, Any]] = self.http.get(f"/v1/runs/{run}/events", params=query).json()["events"]
         return found
 
     def states(self, run: str) -> list[str]:
-        """The states that the journal tells, in order."""
+        """Returns the states in the journal, in order."""
         return [event["state"] for event in self.events(run) if event["type"] == "status"]
 
 
 @dataclass
 class Running:
-    """A server in this process and two who use it."""
+    """A server in this process and its two users."""
 
     service: Service
     ann: User
@@ -111,7 +111,7 @@ class Running:
 
 @dataclass
 class Process:
-    """A server of its own process on a folder, and what it needs to be started again."""
+    """A server in a process of its own, on a folder, with the arguments for another start."""
 
     runs: Path
     arguments: tuple[str, ...]
@@ -119,7 +119,7 @@ class Process:
     clients: list[httpx2.Client] = field(default_factory=list)
 
     def start(self) -> dict[str, Any]:
-        """Starts it and returns its server.json."""
+        """Starts the server and returns its server.json."""
         address = self.runs / "server.json"
         address.unlink(missing_ok=True)
         command = [sys.executable, "-m", "conoid.server", "--runs", str(self.runs), "--port", "0", *self.arguments]
@@ -133,7 +133,7 @@ class Process:
         return told
 
     def user(self, url: str, name: str = "ann") -> User:
-        """One with a new token."""
+        """Returns a user with a new token."""
         store = Store(Settings(runs=self.runs).database_url)
         token = create_token(store, name, frozenset({"read", "submit"}))
         store.close()
@@ -142,7 +142,7 @@ class Process:
         return User(client, name, self.runs)
 
     def close(self) -> None:
-        """Kills it and its workers."""
+        """Kills the server and its workers."""
         for client in self.clients:
             client.close()
         if self.child is not None and self.child.poll() is None:
@@ -151,7 +151,7 @@ class Process:
         _end_workers(self.runs)
 
     def end(self, number: signal.Signals) -> int:
-        """Sends a signal and waits for the end."""
+        """Sends a signal and waits for the end of the server."""
         assert self.child is not None
         self.child.send_signal(number)
         return self.child.wait(PATIENCE)
@@ -162,7 +162,9 @@ MakeProcess = Callable[..., Process]
 
 @contextmanager
 def processes(folder: Path) -> Iterator[MakeProcess]:
-    """Makes servers, with arguments of their own, on ``folder``/runs; ends them and their workers."""
+    """Yields a function that makes servers on ``folder``/runs with given arguments; ends all servers and their
+    workers.
+    """
     made: list[Process] = []
 
     def make(*arguments: str) -> Process:
@@ -178,7 +180,7 @@ def processes(folder: Path) -> Iterator[MakeProcess]:
 
 
 def _end_workers(folder: Path) -> None:
-    """Kills what the servers of a test have left running below ``folder``."""
+    """Kills the workers below ``folder`` that the servers of a test have left."""
     for entry in Path("/proc").iterdir():
         if entry.name.isdigit() and int(entry.name) != os.getpid():
             try:

@@ -1,8 +1,8 @@
-"""``sandbox.py UNIT STATE -- COMMAND``: runs a command as systemd would run it in a unit's sandbox. Needs root.
+"""``sandbox.py UNIT STATE -- COMMAND`` runs a command in the sandbox of a systemd unit, without systemd. Needs root.
 
-The mounts, the user, the limits and the filters of system calls are made from the unit's file; a setting that this
-program does not have is an error, so that no restriction is left out unseen. ``STATE`` stands for /var/lib/conoid, the
-environment of this Python for /opt/conoid. The settings are those of systemd.exec(5).
+Mounts, user, limits and filters of system calls are set by the unit's file. A setting that this program does not
+support is an error: no restriction is omitted silently. ``STATE`` replaces /var/lib/conoid, and the environment of
+this Python replaces /opt/conoid. The settings are described in systemd.exec(5).
 """
 
 import ctypes
@@ -25,7 +25,7 @@ _NEW_MOUNTS = 0x00020000
 _READ_ONLY, _NO_SUID, _NO_DEVICES, _REMOUNT, _BIND, _RECURSIVE, _PRIVATE = 1, 2, 4, 32, 4096, 16384, 1 << 18
 """Flags of mount(2)."""
 _BOUNDING_DROP, _NO_NEW_PRIVILEGES = 24, 38
-"""Of prctl(2)."""
+"""Options of prctl(2)."""
 _API = ("/dev", "/proc", "/sys")
 _DEVICES = ("null", "zero", "full", "random", "urandom", "tty")
 _HOMES = ("/home", "/root", "/run/user")
@@ -34,12 +34,12 @@ _PASSED_OVER = {
     "ExecStart", "Restart", "RestartSec", "KillMode", "OOMPolicy", "UMask", "WorkingDirectory", "User", "Environment",
     "LimitNOFILE", "StateDirectory", "StateDirectoryMode", "ReadWritePaths", "SystemCallErrorNumber", "RemoveIPC",
 }  # fmt: skip
-"""What ``enter`` reads itself, and what acts when a service starts or ends."""
+"""Settings that ``enter`` reads, and settings that act only at the start or the end of a service."""
 Unit = dict[str, list[str]]
 
 
 def read(path: Path) -> Unit:
-    """The settings of the section [Service], each with its values in order."""
+    """Returns the settings of the section [Service], each with its values in order."""
     found: Unit = {}
     section = ""
     for line in path.read_text().splitlines():
@@ -52,13 +52,13 @@ def read(path: Path) -> Unit:
 
 
 def enter(unit: Unit, state: Path) -> None:
-    """This process gets the unit's sandbox."""
+    """Puts this process into the sandbox of the unit."""
     unknown = set(unit) - _PASSED_OVER - set(_MOUNTS) - set(_CALLS) - {"NoNewPrivileges", "CapabilityBoundingSet"}
     if unknown:
         raise SystemExit(f"sandbox: settings that it does not have: {', '.join(sorted(unknown))}")
     _check(_LIBC.unshare(_NEW_MOUNTS), "unshare")
     _mount("none", "/", _PRIVATE | _RECURSIVE)
-    os.umask(0o022)  # systemd makes mount points with this one, whatever the caller has
+    os.umask(0o022)  # systemd makes mount points with this mask, whatever the caller's mask is
     _install(state)
     for name, protect in _MOUNTS.items():
         if name in unit:
@@ -75,7 +75,7 @@ def enter(unit: Unit, state: Path) -> None:
 
 
 def environment(unit: Unit) -> dict[str, str]:
-    """What systemd gives to a service of this unit."""
+    """Returns the environment that systemd sets for a service of this unit."""
     own = dict(pair.split("=", 1) for line in unit.get("Environment", ()) for pair in line.split())
     home = "/var/lib/conoid"
     path = "/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin"
@@ -86,7 +86,7 @@ def environment(unit: Unit) -> dict[str, str]:
 
 
 def _install(state: Path) -> None:
-    """/var/lib/conoid and /opt/conoid: where docs/howto/site.md has them."""
+    """Mounts /var/lib/conoid and /opt/conoid, the paths of docs/howto/site.md."""
     for place, source in (("/var/lib/conoid", state), ("/opt/conoid", Path(sys.prefix))):
         held = os.open(source, os.O_PATH)
         _mount("tmpfs", os.path.dirname(place), 0, "tmpfs", "mode=755")
@@ -96,7 +96,9 @@ def _install(state: Path) -> None:
 
 
 def _strict(unit: Unit) -> None:
-    """Read-only but the programming interfaces of the kernel, and what the unit names."""
+    """Makes all file systems read-only, except the programming interfaces of the kernel and the paths that the unit
+    allows.
+    """
     writable = (
         *_API,
         *_words(unit, "ReadWritePaths"),
@@ -114,7 +116,7 @@ def _strict(unit: Unit) -> None:
 
 
 def _no_homes(unit: Unit) -> None:
-    """Empty, but for what an installation has in /opt: this Python and its code."""
+    """Makes the homes empty, except for this Python and its code, which an installation has in /opt."""
     needed = [Path(sys.base_prefix), Path(sys.prefix), Path(__file__).parents[2]]
     hidden = [path for path in needed if _below(str(path), _HOMES)]
     held = [os.open(path, os.O_PATH) for path in hidden]
@@ -134,7 +136,7 @@ def _own_temporary(unit: Unit) -> None:
 
 
 def _own_devices(unit: Unit) -> None:
-    """The devices that are none of hardware; the shared memory of MPI stays that of the machine."""
+    """Mounts /dev without hardware devices; MPI uses the shared memory of the machine."""
     held = {name: os.open(f"/dev/{name}", os.O_PATH) for name in (*_DEVICES, "shm", "mqueue", "pts") if _there(name)}
     _mount("tmpfs", "/dev", _NO_SUID, "tmpfs", "mode=755")
     for name, source in held.items():
@@ -173,7 +175,7 @@ def _below(path: str, places: tuple[str, ...]) -> bool:
 
 
 def _read_only(place: str) -> None:
-    """With the flags that the mount has."""
+    """Makes a mount read-only and keeps its other flags."""
     with suppress(FileNotFoundError, PermissionError):
         flags = os.statvfs(place).f_flag & (_NO_SUID | _NO_DEVICES)
         _mount("none", place, _REMOUNT | _BIND | _READ_ONLY | flags)
@@ -193,12 +195,12 @@ def _check(failed: int, what: str) -> None:
 
 
 def nobody() -> pwd.struct_passwd:
-    """Who the service is here."""
+    """Returns user and group of the service on this machine."""
     return pwd.getpwnam("nobody")
 
 
 def _becomenobody() -> None:
-    """A user without a capability, now and after any exec."""
+    """Changes to a user without a capability, which also holds after an exec."""
     for capability in range(64):
         if _LIBC.prctl(_BOUNDING_DROP, capability, 0, 0, 0):
             break
@@ -221,7 +223,7 @@ def _system_calls(unit: Unit) -> None:
 
 
 def _nothing(unit: Unit) -> None:
-    """Holds already: a user without a capability."""
+    """Does nothing: a user without a capability satisfies this setting."""
 
 
 _MOUNTS: dict[str, Callable[[Unit], None]] = {
@@ -237,7 +239,7 @@ _MOUNTS: dict[str, Callable[[Unit], None]] = {
     "PrivateMounts": _nothing,
     "DevicePolicy": _nothing,
 }
-"""In this order."""
+"""Settings of the unit, in the order in which they are applied."""
 _CALLS: dict[str, Callable[[Unit], None]] = {
     "SystemCallArchitectures": lambda unit: syscalls.native(),
     "RestrictAddressFamilies": lambda unit: syscalls.address_families(_words(unit, "RestrictAddressFamilies")),
@@ -253,7 +255,7 @@ _CALLS: dict[str, Callable[[Unit], None]] = {
 
 
 def main(arguments: list[str]) -> None:
-    """Becomes the command."""
+    """Enters the sandbox and replaces this process by the command."""
     unit, state, command = read(Path(arguments[0])), Path(arguments[1]), arguments[3:]
     enter(unit, state)
     os.execvpe(command[0], command, environment(unit))

@@ -1,6 +1,6 @@
-// Asks modules of the page: { module, script, data } in JSON on standard input, what comes out on standard output.
-// `module` may name several, with spaces between, of one folder.
-// Data with "base64" is handed over as bytes.
+// Evaluates an expression with modules of the page. Standard input is { module, script, data } in JSON; the value of
+// the expression is written to standard output. `module` may name several modules of one folder, separated by spaces.
+// Data with the key "base64" is passed as bytes.
 
 import { readFileSync } from "node:fs";
 import { pathToFileURL } from "node:url";

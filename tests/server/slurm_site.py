@@ -1,4 +1,4 @@
-"""A cluster with a server that hands its runs over to it, for tests with a real Slurm."""
+"""A cluster and a server that submits its runs to the cluster, for tests with a real Slurm."""
 
 import json
 import signal
@@ -40,24 +40,24 @@ notice = "60 s"
 
 @dataclass
 class Site:
-    """A cluster, a server that hands its runs over to it, and one who uses it."""
+    """A cluster, a server that submits its runs to the cluster, and a user of the server."""
 
     cluster: Cluster
     server: Process
     ann: User
 
     def submit(self, text: str, profile: str = "standard") -> str:
-        """The id of a new run."""
+        """Submits a run and returns its id."""
         answer = self.ann.http.post("/v1/runs", params={"profile": profile}, content=text, headers=TOML)
         assert answer.status_code == 202, answer.text
         return str(answer.json()["id"])
 
     def ended(self, run: str, seconds: float = 60.0) -> dict[str, Any]:
-        """The run once it has ended."""
+        """Waits for the end of the run and returns the run."""
         return self.reached(run, seconds, *(state for state in State if state.final))
 
     def reached(self, run: str, seconds: float, *states: State) -> dict[str, Any]:
-        """The run once it is in one of these states."""
+        """Waits until the run is in one of the states and returns the run."""
         deadline = time.monotonic() + seconds
         while (seen := self.ann.show(run))["state"] not in states:
             assert time.monotonic() < deadline, f"{seen['state']} ({seen['reason']}), not {states}: {self.tail(run)}"
@@ -65,22 +65,22 @@ class Site:
         return seen
 
     def tail(self, run: str) -> str:
-        """The end of the launcher's log."""
+        """Returns the last lines of the launcher's log."""
         log = self.server.runs / run / layout.LOGS / layout.LAUNCHER_LOG
         return log.read_text()[-2000:] if log.exists() else "no log"
 
     def jobs(self, run: str) -> list[tuple[str, str]]:
-        """Number and state of every job that was made for the run."""
+        """Returns number and state of all jobs of the run."""
         return self.cluster.jobs(f"conoid-{run}-")
 
     def again(self, number: signal.Signals = signal.SIGKILL) -> None:
-        """Ends the server and starts the next one."""
+        """Ends the server and starts another one."""
         self.server.end(number)
         self.ann = self.server.user(self.server.start()["url"])
 
 
 def sweep_of(site: Site, number: int, **plan: Any) -> list[str]:
-    """The runs of a new sweep, in the order of its points."""
+    """Submits a sweep and returns its runs in the order of its points."""
     points = [{"run.end_time": f"{1 + n} us"} for n in range(number)]
     body = json.dumps({"case": tomllib.loads(case_text(**plan)), "points": points})
     answer = site.ann.http.post("/v1/sweeps", content=body, headers={"Content-Type": "application/json"})
@@ -89,7 +89,7 @@ def sweep_of(site: Site, number: int, **plan: Any) -> list[str]:
 
 
 def job_of(site: Site, run: str) -> Job:
-    """The record of a run, once Slurm has given it a number."""
+    """Waits until Slurm has given the run a job number; returns the record of the job."""
     deadline = time.monotonic() + 30.0
     while (found := read_job(site.server.runs / run)) is None or not found.job:
         assert time.monotonic() < deadline
@@ -98,7 +98,7 @@ def job_of(site: Site, run: str) -> Job:
 
 
 def processes_of(run: str) -> list[int]:
-    """The ranks of a run, of the solver or of the worker that computes nothing."""
+    """Returns the processes of a run's ranks, of the solver or of the fake worker."""
     found = []
     for entry in Path("/proc").iterdir():
         if entry.name.isdigit():

@@ -1,7 +1,8 @@
-// A page without a browser: elements that keep what is put into them, and a server that answers what a test says.
-// { module, script } in JSON on standard input; what the async script returns is written to standard output. It has
-// `load(module)`, `text(element)`, `pause(ms)`, `store()` and `state.served`: a function from a path to what is sent as
-// JSON, or to a number, which is a status; it may throw, and then nobody answers.
+// A page without a browser: elements that store their children, and a server with answers from the test.
+// Standard input is { module, script } in JSON; the result of the async script is written to standard output.
+// The script can use `load(module)`, `text(element)`, `pause(ms)`, `store()` and `state.served`. `state.served` is a
+// function from a path to the data of a JSON answer, or to a number, the status of an answer. If the function throws,
+// the server does not answer.
 
 import { readFileSync } from "node:fs";
 import { pathToFileURL } from "node:url";

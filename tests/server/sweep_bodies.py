@@ -16,13 +16,13 @@ ENDS = [f"{n} us" for n in range(1, 5)]
 
 
 def wish(**extra: Any) -> bytes:
-    """A sweep over four ends."""
+    """Returns the body of a sweep over four end times."""
     points = [{"run.end_time": end} for end in ENDS]
     return json.dumps({"case": tomllib.loads(case_text()), "points": points, **extra}).encode()
 
 
 def handed_in(user: User, body: bytes, key: str | None = None, status: int = 202) -> dict[str, Any]:
-    """The answer to a sweep."""
+    """Submits a sweep and returns the answer."""
     headers = {"Content-Type": "application/json", **({"Idempotency-Key": key} if key else {})}
     answer = user.http.post("/v1/sweeps", content=body, headers=headers)
     assert answer.status_code == status, answer.text
@@ -31,18 +31,18 @@ def handed_in(user: User, body: bytes, key: str | None = None, status: int = 202
 
 
 class Killed(BaseException):
-    """The server is killed."""
+    """Simulates a kill of the server."""
 
 
 class Never(set[str]):
-    """Nothing leaves it: no run starts before the end of the server."""
+    """Set from which nothing is removed: no run starts before the end of the server."""
 
     def discard(self, _: object) -> None:
-        """Stays."""
+        """Does nothing."""
 
 
 def after(service: Service, sweep: str, states: set[State]) -> list[Run]:
-    """The runs of the sweep once all are in one of these states."""
+    """Waits until all runs of the sweep are in one of the states and returns the runs."""
     deadline = time.monotonic() + PATIENCE
     while True:
         runs = [run for run in service.store.all() if folder.submission(service.settings.runs / run.id).labels]

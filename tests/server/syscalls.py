@@ -1,6 +1,6 @@
-"""The system calls that a unit of systemd forbids, as filters of libseccomp in the calling process.
+"""System calls that a unit of systemd forbids, as filters of libseccomp in the calling process.
 
-Each of systemd's settings that acts on system calls is one filter; a call has to pass all of them. The rules are those
+Each of systemd's settings that acts on system calls is one filter; a call must pass all filters. The rules are those
 of systemd.exec(5) and of systemd's ``src/shared/seccomp-util.c``.
 """
 
@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterable, Sequence
 
 _ALLOW, _ERRNO = 0x7FFF0000, 0x00050000
 _NOT_EQUAL, _EQUAL, _ABOVE, _MASKED = 1, 4, 6, 7
-"""Comparisons of libseccomp (seccomp.h): an argument with a number, or its masked bits with a number."""
+"""Comparisons of libseccomp (seccomp.h): an argument with a number, or masked bits of the argument with a number."""
 _NAMESPACES = (0x02000000, 0x00020000, 0x04000000, 0x08000000, 0x10000000, 0x20000000, 0x40000000)
 """CLONE_NEWCGROUP, NEWNS, NEWUTS, NEWIPC, NEWUSER, NEWPID, NEWNET (linux/sched.h)."""
 _REALTIME = (1, 2, 6)
@@ -27,7 +27,7 @@ class _Compare(ctypes.Structure):
 
 
 def library() -> ctypes.CDLL | None:
-    """libseccomp; None where it is not installed."""
+    """Returns libseccomp; None if it is not installed."""
     try:
         found = ctypes.CDLL("libseccomp.so.2", use_errno=True)
     except OSError:
@@ -42,34 +42,36 @@ def library() -> ctypes.CDLL | None:
 
 
 class Filter:
-    """One filter: what is not named passes, or nothing passes but what is named."""
+    """One filter: a list of allowed calls, or a list of forbidden calls."""
 
     def __init__(self, default: int = _ALLOW) -> None:
-        """``default``: what happens to a call that no rule names."""
+        """Makes a filter; ``default``: action for a call without a rule."""
         lib = library()
         assert lib is not None
         self._lib, self._context = lib, lib.seccomp_init(ctypes.c_uint32(default))
 
     def rule(self, action: int, call: str, *where: tuple[int, int, int, int]) -> None:
-        """``where``: argument, comparison, and its two numbers. A call that this machine lacks is passed over."""
+        """Adds a rule; ``where``: argument, comparison and its two numbers. A call that this machine does not have
+        is skipped.
+        """
         number = self._lib.seccomp_syscall_resolve_name(call.encode())
         compare = (_Compare * len(where))(*(_Compare(*each) for each in where))
         failed = number != -1 and self._lib.seccomp_rule_add_array(self._context, action, number, len(where), compare)
         assert failed in (0, -errno.EDOM, -errno.EFAULT), f"{call}: {failed}"
 
     def deny(self, call: str, *where: tuple[int, int, int, int], code: int = errno.EPERM) -> None:
-        """The call fails with ``code``."""
+        """Returns the action by which the call fails with ``code``."""
         self.rule(_ERRNO | code, call, *where)
 
     def load(self) -> None:
-        """From now on, in this process and its children."""
+        """Applies the filter to this process and its children."""
         failed = self._lib.seccomp_load(self._context)
         assert failed == 0, f"seccomp_load: {failed}"
         self._lib.seccomp_release(self._context)
 
 
 def address_families(names: Sequence[str]) -> None:
-    """RestrictAddressFamilies: sockets of the named families alone."""
+    """RestrictAddressFamilies: allows sockets of the named families only."""
     allowed, only = {int(getattr(socket, name)) for name in names}, Filter()
     for family in set(range(_MOST_FAMILIES)) - allowed:
         only.deny("socket", (0, _EQUAL, family, 0), code=errno.EAFNOSUPPORT)
@@ -78,7 +80,7 @@ def address_families(names: Sequence[str]) -> None:
 
 
 def calls(words: Sequence[str], code: int) -> None:
-    """SystemCallFilter: the calls of the groups named, without those of the groups with a ``~``."""
+    """SystemCallFilter: allows the calls of the named groups, without the calls of the groups with a ``~``."""
     allowed: set[str] = set()
     for word in words:
         if word.startswith("~"):
@@ -92,7 +94,7 @@ def calls(words: Sequence[str], code: int) -> None:
 
 
 def _members(word: str) -> set[str]:
-    """The calls of a group, as systemd-analyze lists them."""
+    """Returns the calls of a group, from the output of systemd-analyze."""
     if not word.startswith("@"):
         return {word}
     command = [str(shutil.which("systemd-analyze")), "--no-pager", "syscall-filter", word]
@@ -102,7 +104,7 @@ def _members(word: str) -> set[str]:
 
 
 def namespaces() -> None:
-    """RestrictNamespaces=yes: no new namespace, no other one."""
+    """RestrictNamespaces=yes: forbids to make a namespace and to change to another one."""
     none = Filter()
     none.deny("setns")
     none.deny("clone3", code=errno.ENOSYS)
@@ -113,7 +115,7 @@ def namespaces() -> None:
 
 
 def realtime() -> None:
-    """RestrictRealtime=yes."""
+    """RestrictRealtime=yes: forbids the real-time scheduling policies."""
     none = Filter()
     for policy in _REALTIME:
         none.deny("sched_setscheduler", (1, _EQUAL, policy, 0))
@@ -121,7 +123,7 @@ def realtime() -> None:
 
 
 def set_id_bits() -> None:
-    """RestrictSUIDSGID=yes: no file gets such a bit."""
+    """RestrictSUIDSGID=yes: forbids to set these bits of a file."""
     none = Filter()
     for bit in (stat.S_ISUID, stat.S_ISGID):
         for call, place in (("chmod", 1), ("fchmod", 1), ("fchmodat", 2), ("mkdir", 1), ("mkdirat", 2), ("creat", 1)):
@@ -130,7 +132,9 @@ def set_id_bits() -> None:
 
 
 def write_and_execute() -> None:
-    """MemoryDenyWriteExecute=yes: no memory that can be written and executed, nor one after the other."""
+    """MemoryDenyWriteExecute=yes: forbids memory that is writable and executable, at the same time or one after the
+    other.
+    """
     none = Filter()
     none.deny("mmap", (2, _MASKED, 6, 6))
     none.deny("mprotect", (2, _MASKED, 4, 4))
@@ -139,14 +143,14 @@ def write_and_execute() -> None:
 
 
 def personality() -> None:
-    """LockPersonality=yes: the one that the process has."""
+    """LockPersonality=yes: forbids to change the personality of the process."""
     none = Filter()
     none.deny("personality", (0, _NOT_EQUAL, 0, 0))
     none.load()
 
 
 def denied(names: Iterable[str]) -> Callable[[], None]:
-    """A filter of calls, or of groups of calls, that always fail."""
+    """Returns a filter by which the given calls, or groups of calls, always fail."""
 
     def load() -> None:
         none = Filter()
@@ -158,5 +162,5 @@ def denied(names: Iterable[str]) -> Callable[[], None]:
 
 
 def native() -> None:
-    """SystemCallArchitectures=native: libseccomp ends a process that calls by another architecture's numbers."""
+    """SystemCallArchitectures=native: libseccomp ends a process that uses call numbers of another architecture."""
     Filter().load()

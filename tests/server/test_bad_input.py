@@ -1,4 +1,4 @@
-"""Bad input to a real server: one clear line with the key, the value and what is allowed; and the next run is well."""
+"""Bad input to a real server gets one line with the key, the value and what is allowed; the next run succeeds."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -30,7 +30,7 @@ def users(server: Process) -> tuple[User, User]:
 
 
 def line(answer: httpx2.Response, status: int) -> str:
-    """What the user is told, one line."""
+    """Returns the one line of the error message."""
     assert answer.status_code == status, answer.text
     assert answer.headers["content-type"] == "application/problem+json"
     problem: dict[str, Any] = answer.json()
@@ -40,7 +40,7 @@ def line(answer: httpx2.Response, status: int) -> str:
 
 
 def changed(old: str, new: str) -> str:
-    """The good case with a change."""
+    """Returns the valid case with a change."""
     assert old in case_text()
     return case_text().replace(old, new)
 
@@ -76,7 +76,7 @@ def test_no_token(users: tuple[User, User]) -> None:
 
 
 def test_another_users_run_and_no_run_is_lost(users: tuple[User, User]) -> None:
-    """After all that the server runs a good case, and bob does not see it."""
+    """After all bad inputs the server runs a valid case, and bob does not see this run."""
     ann, bob = users
     run = ann.submit()
     assert ann.wait_for(run)["state"] == "succeeded"

@@ -1,4 +1,4 @@
-"""A run as a job of Slurm without a server: the commands of docs/howto/cluster.md, followed."""
+"""A run as a job of Slurm without a server, by the commands of docs/howto/cluster.md."""
 
 import hashlib
 import json
@@ -140,7 +140,7 @@ def test_what_a_run_is_called_is_no_word_for_a_shell(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("whole", [3, 2])
 def test_following_ends_where_the_outcome_is(tmp_path: Path, whole: int) -> None:
-    """Also where a journal has lost its end."""
+    """The run has an outcome, and its journal has lost its last lines."""
     lines = [
         '{"type":"status","run":"a","seq":1,"state":"queued"}',
         '{"type":"status","run":"a","seq":2,"state":"running"}',
@@ -157,7 +157,9 @@ def test_following_ends_where_the_outcome_is(tmp_path: Path, whole: int) -> None
 
 @pytest.fixture
 def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The settings file of a Slurm whose commands are in no PATH; nothing names it."""
+    """Settings file of a Slurm whose commands are not in PATH; neither an option nor the environment names this
+    file.
+    """
     (tmp_path / "bin").mkdir()
     site = tmp_path / "site.toml"
     profiles = "[slurm.profiles.standard]\n[slurm.profiles.long]\n"
@@ -216,7 +218,7 @@ def test_a_job_has_its_own_copy_of_a_mesh_file(elsewhere: Path, monkeypatch: pyt
 
 
 def evil(folder: Path, **changes: str) -> Path:
-    """A folder that somebody else has made: its record names programs of his, which leave a file."""
+    """A folder that another user has made. Its record names programs that would leave a file if they ran."""
     (folder / "bin").mkdir(parents=True)
     for name in ("squeue", "scancel", "sbatch", "scontrol", "sacct"):
         (folder / "bin" / name).write_text(f"#!/bin/sh\ntouch {folder}/owned\n")
@@ -230,7 +232,9 @@ def evil(folder: Path, **changes: str) -> Path:
 
 
 def test_a_folder_chooses_no_program(elsewhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Not even by a number that is another job's: Slurm is asked by the site's commands for its name."""
+    """The job number in the record belongs to another job. The commands of the site ask Slurm for the name of that
+    job.
+    """
     monkeypatch.setenv("CONOID_SITE", str(elsewhere))
     monkeypatch.setattr(following, "_ASK_EVERY", 0.0)
     monkeypatch.chdir(folder := evil(elsewhere.parent / "theirs"))
@@ -258,7 +262,7 @@ def test_what_stands_in_a_record_is_no_option_of_a_command(changes: dict[str, st
 
 
 def test_a_run_that_goes_on_is_started_by_a_command_of_this_machine(elsewhere: Path) -> None:
-    """The same command again hands a lost run over, whatever its folder says that starts it."""
+    """The same command submits a lost run again. The start command in the run's folder is ignored."""
     words = ["batch", "two_tets", "--ranks", 1, "--site", elsewhere, "--out", "run"]
     assert conoid(*words).exit_code == 0
     folder = elsewhere.parent / "run"
@@ -293,7 +297,9 @@ def test_a_request_to_stop_follows_no_link(tmp_path: Path) -> None:
 def test_a_folder_without_a_worker_is_neither_cancelled_nor_still_running(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A killed worker leaves no word: the request stayed for the next one, and who watched never knew."""
+    """A killed worker writes no last message. A request file would otherwise wait for the next worker, and following
+    the run would not end.
+    """
     monkeypatch.setattr(following, "_ASK_EVERY", 0.0)
     (tmp_path / layout.JOURNAL).write_text('{"type":"status","run":"a","seq":1,"state":"running"}\n')
     assert "no worker writes into it" in conoid("cancel", tmp_path).stdout

@@ -1,4 +1,4 @@
-"""history.csv as columns for charts, and over HTTP."""
+"""Columns of history.csv for charts, read from the file and over HTTP."""
 
 import csv
 import math
@@ -18,7 +18,7 @@ NAMES = {"step": "", "t": "s", "limiter": "", "push": "N"}
 
 
 def write(path: Path, values: list[float], first: int = 0) -> None:
-    """Lines with ``values`` as ``push``, behind those that are there."""
+    """Appends lines with ``values`` in the column ``push``."""
     with path.open("a", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         if not first:
@@ -45,7 +45,7 @@ def test_a_short_file_is_given_as_it_is(tmp_path: Path) -> None:
 
 
 def test_no_peak_is_lost_however_long_the_file_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Spikes of one line at random places, read in pieces of random lengths, kept in few groups."""
+    """Spikes in single lines at random places are read in pieces of random lengths and combined into few groups."""
     monkeypatch.setattr(columns, "_GROUPS", 64)
     lot, path = random.Random(7), tmp_path / layout.HISTORY
     found, told = Columns(path), list[float]()
@@ -76,7 +76,7 @@ def test_extremes_keep_their_order_and_pass_over_what_is_no_number() -> None:
 
 
 def test_a_file_that_was_written_anew_is_read_anew(tmp_path: Path) -> None:
-    """As a run does that goes on from a checkpoint: it takes lines out, and writes them again."""
+    """A run that continues from a checkpoint removes lines of the history and writes them again."""
     path = tmp_path / layout.HISTORY
     write(path, [1.0, 2.0, 9.0])
     found = read(path)

@@ -1,4 +1,4 @@
-"""The server's command line: one clear line for what cannot be, tokens, one server a folder."""
+"""Command line of the server: one line for each error, tokens, one server for each folder."""
 
 import mmap
 import os
@@ -27,7 +27,7 @@ Said = Callable[..., tuple[int, str, str]]
 
 @pytest.fixture
 def say(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Said:
-    """Runs the command on a folder of its own: exit code, output, errors."""
+    """Runs the command on a folder of its own; returns exit code, output and errors."""
 
     def run(*arguments: str) -> tuple[int, str, str]:
         code = main(["--runs", str(tmp_path / "runs"), *arguments])

@@ -1,4 +1,4 @@
-"""Files of a run that somebody has damaged: its end is told, nothing is run that was not accepted, no answer fails."""
+"""Damaged files of a run: the run's end is reported, only accepted cases are run, and no answer fails."""
 
 import errno
 import os
@@ -30,7 +30,7 @@ def folder_in_place(path: Path) -> None:
 
 
 def turned(house: House, run: Run, state: State | None = None) -> Run:
-    """The run once it is in the state, or has ended."""
+    """Calls turns of the supervisor until the run is in the state or has ended; returns the run."""
     deadline = time.monotonic() + 10.0
     while time.monotonic() < deadline:
         house.supervisor._inbox.put(None)
@@ -204,7 +204,7 @@ def test_a_run_whose_folder_was_emptied_is_taken_up_all_the_same(tmp_path: Path,
 def test_an_end_that_the_database_has_missed_twice_is_told_once_it_can_be_written(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """It could not be written when the run ended, nor when the next server started."""
+    """The end could not be written to the database at the end of the run, and not at the start of the next server."""
     house = House(tmp_path / "runs")
     run = house.accept()
 

@@ -1,4 +1,4 @@
-"""Routes of the table, of charts and of snapshots over files that are damaged, and questions that make no sense."""
+"""Damaged files and senseless requests at the routes of the table, of charts and of snapshots."""
 
 from pathlib import Path
 from typing import Any
@@ -27,7 +27,7 @@ SNAPSHOT: dict[str, Any] = {
 
 
 def answers(server: Running, run: str) -> dict[str, Any]:
-    """By route; each is JSON in UTF-8, and none a crash."""
+    """Returns the answers by route. Each answer is JSON in UTF-8 with the status 200 or 404."""
     found = {}
     for route in ROUTES:
         answer = server.ann.http.get(route.format(run))

@@ -1,4 +1,4 @@
-"""What a site copies from deploy/, at work: nginx with TLS in front of a server, a backup and what comes back of it."""
+"""The files of deploy/ in use: nginx with TLS in front of a server, and a backup that is restored."""
 
 import hashlib
 import json
@@ -44,7 +44,7 @@ http {{
 
 
 def certificate(place: Path) -> None:
-    """One that nginx shows for ``NAME``; it vouches for itself."""
+    """A self-signed certificate that nginx uses for ``NAME``."""
     command = [
         "openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-days", "2", "-subj", f"/CN={NAME}",
         "-addext", f"subjectAltName=DNS:{NAME}", "-keyout", str(place / "key.pem"), "-out", str(place / "chain.pem"),
@@ -53,7 +53,7 @@ def certificate(place: Path) -> None:
 
 
 def placed(place: Path, port: int, server: int) -> Path:
-    """The shipped file with the addresses and the certificate of this test, each found where it is expected."""
+    """Writes a shipped file with the addresses and the certificate of this test; each replaced text must exist."""
     text = (DEPLOY / "nginx.conf").read_text()
     for shipped, here in {
         "listen 443 ssl;": f"listen 127.0.0.1:{port} ssl;",
@@ -69,14 +69,14 @@ def placed(place: Path, port: int, server: int) -> Path:
 
 
 def answers(port: int) -> bool:
-    """Whether somebody listens there."""
+    """Returns True if a program listens at the port."""
     with socket.socket() as knock:
         return knock.connect_ex(("127.0.0.1", port)) == 0
 
 
 @contextmanager
 def proxy(place: Path, server: int) -> Iterator[int]:
-    """The port of an nginx in front of the server at that port."""
+    """Starts an nginx in front of the server at a port; yields the port of nginx."""
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port: int = free.getsockname()[1]
@@ -95,7 +95,7 @@ def proxy(place: Path, server: int) -> Iterator[int]:
 
 
 def visitor(place: Path, port: int, token: str) -> httpx2.Client:
-    """One who asks for the site by its name and believes its certificate alone."""
+    """Returns a client that uses the name of the site and trusts only the certificate of the site."""
     trust = ssl.create_default_context(cafile=str(place / "chain.pem"))
     trust.check_hostname = False
     headers = {"Authorization": token, "Host": NAME}
@@ -103,7 +103,7 @@ def visitor(place: Path, port: int, token: str) -> httpx2.Client:
 
 
 def running(process: MakeProcess, place: Path) -> tuple[User, str]:
-    """A user of a new server and a run that waits for the file "go"."""
+    """A user of a new server, and a run that waits for the file "go"."""
     server = process("--no-zenoh")
     ann = server.user(server.start()["url"])
     run = ann.submit(wait=str(place / "go"))
@@ -113,7 +113,7 @@ def running(process: MakeProcess, place: Path) -> tuple[User, str]:
 
 @contextmanager
 def behind(ann: User, place: Path) -> Iterator[httpx2.Client]:
-    """The same user, who comes through nginx."""
+    """Returns the same user with requests through nginx."""
     port = ann.http.base_url.port
     assert port is not None
     with proxy(place, port) as outside, visitor(place, outside, ann.http.headers["authorization"]) as far:
@@ -121,7 +121,7 @@ def behind(ann: User, place: Path) -> Iterator[httpx2.Client]:
 
 
 def backup(*words: Path) -> "subprocess.CompletedProcess[bytes]":
-    """The shipped script, with this Python."""
+    """Runs the shipped script with this Python."""
     command = [str(DEPLOY / "backup.sh"), *map(str, words)]
     return subprocess.run(command, check=False, capture_output=True, env={**os.environ, "PYTHON": sys.executable})
 
@@ -153,7 +153,7 @@ def test_events_pass_through_nginx_when_they_happen(process: MakeProcess, tmp_pa
 @pytest.mark.slow
 @pytest.mark.timeout(300)
 def test_a_silent_log_passes_through_nginx(process: MakeProcess, tmp_path: Path) -> None:
-    """Which cuts an answer of which it gets nothing for 90 s."""
+    """nginx ends an answer from which no bytes arrive for 90 s."""
     ann, run = running(process, tmp_path)
     with (
         behind(ann, tmp_path) as far,

@@ -1,4 +1,4 @@
-"""The end of a run from its files, if its worker wrote no outcome."""
+"""End of a run whose worker wrote no outcome, determined from the files of the run."""
 
 import math
 import os
@@ -28,7 +28,7 @@ COUNTS = Counts(run="a", elements=45, nodes=33, shared=2, fragments=4, elements_
 
 
 def told(folder: Path, *messages: AnyMessage) -> Path:
-    """A folder whose journal has these messages, and half a line."""
+    """Makes a folder whose journal has these messages and an incomplete line."""
     (folder / layout.JOURNAL).write_bytes(b"".join(to_json(each) + b"\n" for each in messages) + b'{"type":"prog')
     return folder
 
@@ -73,7 +73,7 @@ def test_the_end_is_the_last_that_was_heard(tmp_path: Path) -> None:
 
 
 class Gone:
-    """A worker that has ended, unless it lives."""
+    """A worker that has ended; with ``alive`` it still runs."""
 
     def __init__(self, alive: bool) -> None:
         self.alive_now = alive
@@ -90,7 +90,7 @@ class Gone:
 
 @pytest.mark.parametrize(("seen", "at"), [(True, 0.0), (False, 11.0)], ids=["seen alive", "gone when first looked at"])
 def test_an_end_that_nobody_saw_is_when_the_run_was_last_heard_of(seen: bool, at: float, tmp_path: Path) -> None:
-    """Of a job of Slurm that has ended while no server was there."""
+    """The job of Slurm ended while no server was running."""
     worker = Gone(alive=seen)
     watch = Watch(told(tmp_path, STARTED), worker, None)  # type: ignore[arg-type]
     looks = [*watch.look()]

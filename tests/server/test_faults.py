@@ -1,4 +1,4 @@
-"""Faults that are no kills: disks, folders, clocks, files that somebody has damaged. The state stays true."""
+"""Faults other than kills: of disks, folders and clocks, and damaged files. The reported state stays true."""
 
 import errno
 import json
@@ -83,7 +83,7 @@ def test_a_worker_that_complains_of_a_full_disk_failed_for_storage(server: Runni
 
 
 def test_a_worker_whose_file_was_removed_says_which(server: Running) -> None:
-    """MPI has the last word, and says nothing of it."""
+    """The last line on standard error is that of MPI, which does not name the file."""
     ended = server.ann.wait_for(server.ann.submit(end="gone"))
     assert (ended["state"], ended["cause"]) == ("failed", "storage")
     assert ended["message"].endswith("its last words: a file of the run is gone or cannot be written: history.csv")
@@ -141,7 +141,7 @@ def test_who_was_stopped_by_nobody_known_was_not_cancelled(server: Running, tmp_
 
 
 def test_a_rank_that_is_killed_is_a_matter_of_the_node(process: MakeProcess, tmp_path: Path) -> None:
-    """For the server that has started it, and for the next one."""
+    """This holds for the server that started the run, and for the next server."""
     server = process("--no-zenoh", "--slots", "4")
     ann = server.user(server.start()["url"])
     runs = [ann.submit(ranks=2, wait=str(tmp_path / "go")) for _ in range(2)]
@@ -201,7 +201,7 @@ def test_an_adopted_run_has_used_the_time_that_it_ran(tmp_path: Path) -> None:
 
 
 def damaged(server: Running, run: str) -> Path:
-    """The folder of a run."""
+    """Returns the folder of a run."""
     return server.service.settings.runs / run
 
 
@@ -234,7 +234,7 @@ def test_a_file_is_lost_while_no_server_looks(tmp_path: Path, name: str, how: st
 
 
 def until(house: House, run_id: str, state: State | None = None) -> Run:
-    """Turns until the run is in the state, or has ended."""
+    """Calls turns of the supervisor until the run is in the state or has ended."""
     for _ in range(50):
         house.supervisor._inbox.put(None)
         house.supervisor._turn()

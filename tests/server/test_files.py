@@ -1,4 +1,4 @@
-"""A run's files over HTTP: ranges, digests, and nothing from outside the run's folder."""
+"""Files of a run over HTTP: ranges, digests, and no access to files outside the run's folder."""
 
 import asyncio
 import base64
@@ -55,7 +55,7 @@ def run(ended: tuple[Running, str], folder: Path) -> str:
 
 @pytest.fixture
 def folder(ended: tuple[Running, str], tmp_path: Path) -> Iterator[Path]:
-    """Of the run; as it was before, when a test ends."""
+    """The folder of the run. Its content is restored after the test."""
     server, run = ended
     path = server.service.settings.runs / run
     kept = shutil.copytree(path, tmp_path / "kept")
@@ -253,7 +253,7 @@ def test_head_of_what_has_no_end_ends_at_once(server: Running, tmp_path: Path) -
 def test_a_silent_log_that_is_followed_says_that_it_is_there(
     server: Running, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """By bytes 0, which are in no log that is followed."""
+    """The stream sends bytes with value 0 as a sign of life. A followed log does not contain such bytes."""
     monkeypatch.setattr(stream, "KEEP_ALIVE", 0.2)
     run = server.ann.submit(wait=str(tmp_path / "go"))
     server.ann.wait_for(run, State.RUNNING)

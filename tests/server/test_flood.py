@@ -1,4 +1,4 @@
-"""Clients that open silent connections, floods of the log, and tokens that are revoked during an answer."""
+"""Clients that open connections and send nothing, floods of the log, and tokens that are revoked during an answer."""
 
 import logging
 import socket
@@ -29,7 +29,7 @@ HALF = b"GET /healthz HTTP/1.1\r\nHost: x\r\nX-Long: "
 
 @pytest.fixture
 def ann(settings: Settings, monkeypatch: pytest.MonkeyPatch) -> Iterator[User]:
-    """One who talks to a server over real connections, of which 20 are let in at a time."""
+    """A user of a server over real connections; the server accepts 20 connections at a time."""
     monkeypatch.setattr(connections, "HEADER", 1.0)
     monkeypatch.setattr(connections, "raise_limit", lambda: 20)
     with opened(settings) as service, _listening(settings) as listener:
@@ -47,7 +47,7 @@ def ann(settings: Settings, monkeypatch: pytest.MonkeyPatch) -> Iterator[User]:
 
 
 def knock(user: User) -> socket.socket:
-    """Half a request."""
+    """Sends half of a request."""
     made = socket.create_connection((user.http.base_url.host, user.http.base_url.port))
     made.sendall(HALF)
     return made
@@ -146,7 +146,7 @@ def test_a_stream_ends_when_it_was_told_to(ann: User, tmp_path: Path) -> None:
 
 
 def revoke(user: User) -> None:
-    """By the operator, in the database."""
+    """Revokes the token in the database, as the operator does."""
     from conoid.server.database.store import Store
 
     store = Store(f"sqlite:///{user.runs / 'server.sqlite'}")
@@ -170,7 +170,7 @@ def test_a_flood_of_one_line_is_short_in_the_log(monkeypatch: pytest.MonkeyPatch
 
 
 def test_a_body_that_was_refused_is_not_read_to_its_end(ann: User) -> None:
-    """It says that it has a gigabyte."""
+    """The header of the request announces a body of 1 GB."""
     place = ann.http.base_url.host, ann.http.base_url.port
     head = f"POST /v1/runs HTTP/1.1\r\nHost: x\r\nAuthorization: {ann.http.headers['Authorization']}\r\n"
     with socket.create_connection(place, timeout=PATIENCE) as one:
@@ -209,7 +209,7 @@ def test_an_answer_that_nobody_reads_is_cut_off(ann: User, monkeypatch: pytest.M
 
 
 def test_a_user_with_many_idle_connections_keeps_nobody_out(ann: User) -> None:
-    """20 connections are let in at a time."""
+    """The server accepts 20 connections at a time."""
     place = ann.http.base_url.host, ann.http.base_url.port
     request = f"GET /v1/me HTTP/1.1\r\nHost: x\r\nAuthorization: {ann.http.headers['Authorization']}\r\n\r\n".encode()
     idle = [socket.create_connection(place, timeout=PATIENCE) for _ in range(30)]

@@ -1,4 +1,4 @@
-"""A run's folder: ids, a whole appearance, what can be read of it."""
+"""Folder of a run: ids, creation in one step, and the files that can be read."""
 
 import math
 from pathlib import Path

@@ -1,4 +1,6 @@
-"""A full disk when a server starts and under its commands: what is possible is done, the rest is one line."""
+"""A full disk when a server starts and under its commands: possible actions are done, others are refused in one
+line.
+"""
 
 import asyncio
 import errno
@@ -35,14 +37,14 @@ def runs(tmp_path: Path) -> Path:
 
 
 def no_room() -> None:
-    """No file of this process grows."""
+    """Context in which no file of this process can grow."""
     resource.setrlimit(resource.RLIMIT_FSIZE, (0, resource.getrlimit(resource.RLIMIT_FSIZE)[1]))
 
 
 def test_a_server_starts_on_a_full_disk_and_answers(runs: Path) -> None:
     (runs / "server.secret").write_bytes(bytes(range(32)))
     (runs / "server.secret").chmod(0o600)
-    kept = Store(Settings(runs=runs).database_url)  # the database's log is there, as beside another reader
+    kept = Store(Settings(runs=runs).database_url)  # an open database has a log file, as with another reader
     token = create_token(kept, "ann", frozenset({"read", "submit"}))
     command = [sys.executable, "-m", "conoid.server", "--runs", str(runs), "--port", "0", "--zenoh-port", "0"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, preexec_fn=no_room) as child:
@@ -94,7 +96,7 @@ def test_a_token_on_a_full_disk(
 def test_a_command_names_the_file_that_it_cannot_write(
     place: int, named: str, runs: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """fsync(2) names none."""
+    """The error of fsync(2) does not name a file."""
     left = [place]
 
     def fsync(_: int) -> None:

@@ -1,4 +1,6 @@
-"""The REST interface against its own description: schemathesis, where it is installed, seeded with cases and runs."""
+"""The REST interface against its own description, by schemathesis with given cases and runs; skipped without
+schemathesis.
+"""
 
 import json
 import os
@@ -20,7 +22,8 @@ from .journal_lines import told, write
 from .running import Process, User, case_text, processes
 
 REJECTED, ACCEPTED = "ST202", "ST201"
-"""What schemathesis calls a request that suits the schema and is refused, and one that does not and is taken."""
+"""Codes of schemathesis: a request that satisfies the schema is refused; a request that violates the schema is
+accepted."""
 ALLOWED = {
     (REJECTED, "POST /v1/runs"): "a case makes sense beyond its schema; labels have a form",
     (REJECTED, "POST /v1/sweeps"): "as a case, and as many points as are allowed",
@@ -30,13 +33,14 @@ ALLOWED = {
     (ACCEPTED, "GET /v1/runs/{run_id}/stream"): "an empty Last-Event-ID is none, as browsers send it",
     (ACCEPTED, "POST /v1/cases:validate"): "it answers 200 where it finds a case wrong",
 }
-"""Failures that are none, with the reason; a run that was removed answers 410, which schemathesis does not expect."""
+"""Findings that are not faults, with the reason. A run that was removed also answers 410, which schemathesis does
+not expect."""
 EXAMPLES = 30
-"""Of each route in each phase."""
+"""Number of examples for each route in each phase."""
 PHASES = ("examples", "coverage", "fuzzing", "stateful")
 TAKE_CASES = ("POST /v1/runs", "POST /v1/cases:validate", "POST /v1/sweeps")
 ENDED = 12
-"""Runs that may be asked for, and removed."""
+"""Number of finished runs, which requests may read and remove."""
 
 
 @pytest.fixture(scope="module")
@@ -47,7 +51,9 @@ def ann(tmp_path_factory: pytest.TempPathFactory) -> Iterator[User]:
 
 
 def seeds(ann: User, place: Path) -> dict[str, list[Any]]:
-    """Values of the parameters that name something: runs that have ended, one that runs, a sweep, their files."""
+    """Returns values of parameters that are names of things: finished runs, a running one, a sweep, and files of
+    these.
+    """
     runs = [ann.submit() for _ in range(ENDED)]
     for run in runs:
         ann.wait_for(run)
@@ -62,7 +68,7 @@ def seeds(ann: User, place: Path) -> dict[str, list[Any]]:
 
 
 def speak(folder: Path) -> None:
-    """The run has said more than the fake worker does: reports, a cut, a snapshot."""
+    """Adds messages to the journal that the fake worker does not write: reports, a balance event, a snapshot."""
     said = [message for message in told(100) if not isinstance(message, Status)]
     write(folder, iter(said), after=len((folder / layout.JOURNAL).read_bytes().splitlines()))
     layout.snapshot(folder, 0).parent.mkdir()
@@ -70,12 +76,12 @@ def speak(folder: Path) -> None:
 
 
 def wish() -> dict[str, Any]:
-    """A sweep of two points."""
+    """Returns the body of a sweep of two points."""
     return {"case": tomllib.loads(case_text()), "points": [{"run.end_time": "1 us"}, {"run.end_time": "2 us"}]}
 
 
 def seeded(schema: dict[str, Any], known: dict[str, list[Any]]) -> dict[str, Any]:
-    """The description with values that mean something in the places where any text would do."""
+    """Returns the description with useful values in place of arbitrary text."""
     bodies = {
         "application/toml": case_text(), "application/json": tomllib.loads(case_text()), "/v1/sweeps": wish(),
     }  # fmt: skip
@@ -90,12 +96,12 @@ def seeded(schema: dict[str, Any], known: dict[str, list[Any]]) -> dict[str, Any
 
 
 def hooked() -> dict[str, str]:
-    """An environment in which schemathesis can write TOML."""
+    """Returns an environment in which schemathesis can write TOML."""
     return {**os.environ, "PYTHONPATH": str(Path(__file__).parent), "SCHEMATHESIS_HOOKS": "fuzz_toml"}
 
 
 def hold_whole(report: dict[str, Any], said: str) -> None:
-    """Every phase has come to its end on every route, none with an error, and the valid cases were taken."""
+    """Requires that every phase has ended without an error on every route, and that valid cases were accepted."""
     ended = {name: report["phases"][name]["status"] for name in PHASES}
     assert set(ended.values()) <= {"success", "failure"}, f"{ended}\n{said[-6000:]}"
     assert report["complete"]
@@ -107,8 +113,10 @@ def hold_whole(report: dict[str, Any], said: str) -> None:
 
 
 def failures(said: str, paths: Iterable[str]) -> list[tuple[str, str, str]]:
-    """What schemathesis found: the code of its check, the route, the status of the answer. One block a route, and one
-    for all that came of requests in a row, where the last of them is meant; ``paths`` are those of the description.
+    """Returns the findings of schemathesis: the code of the check, the route and the status of the answer.
+
+    The output has a block for each route, and a block for all sequences of requests, where the last request has
+    failed. ``paths`` are the paths of the description.
     """
     text = said.partition("= FAILURES =")[2].rpartition("= SUMMARY =")[0]
     found = []
@@ -123,7 +131,7 @@ def failures(said: str, paths: Iterable[str]) -> list[tuple[str, str, str]]:
 
 
 def last_route(case: str, paths: Iterable[str]) -> str:
-    """Of the last request that it takes to reproduce a case; empty when none is like that."""
+    """Returns the route of the last request that reproduces a finding; empty if the description has no such route."""
     asked = re.findall(r"^ *curl -X ([A-Z]+) .*https?://[^/ ]+(/[^\s?']*)", case, re.MULTILINE)
     if not asked:
         return ""
@@ -133,7 +141,7 @@ def last_route(case: str, paths: Iterable[str]) -> str:
 
 
 def test_what_did_not_run_is_no_success() -> None:
-    """A phase that broke off, an error, a route that was left out, cases of which none was taken."""
+    """The study must fail for a phase that stopped early, an error, a missing route, or cases that were all refused."""
     rates = {route: {"examples": {"accepted": 1}} for route in TAKE_CASES}
     phases = {name: {"status": "success"} for name in PHASES}
     good = {
@@ -176,7 +184,7 @@ def test_no_request_fails_the_server_or_its_schema(ann: User, tmp_path: Path) ->
     pytest.importorskip("schemathesis", reason="pip install schemathesis")
     description = ann.http.get("/openapi.json").json()
     (tmp_path / "openapi.json").write_text(json.dumps(seeded(description, seeds(ann, tmp_path))))
-    # How fast requests are made up says something of the machine, nothing of the server.
+    # The speed of making requests depends on the machine, not on the server.
     command = [
         sys.executable, "-c", "from schemathesis.cli import schemathesis; schemathesis()", "run",
         str(tmp_path / "openapi.json"), "--url", str(ann.http.base_url),

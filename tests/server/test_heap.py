@@ -1,4 +1,4 @@
-"""What the server gives back is used again, by whichever thread."""
+"""Freed memory of the server is used again, by any thread."""
 
 import platform
 import subprocess
@@ -35,7 +35,7 @@ turns[-1].wait()
 print(resident() - before)
 end.set()
 """
-"""Eight threads make an answer of 4 MB, one after the other."""
+"""Program in which eight threads make an answer of 4 MB, one after the other."""
 
 
 @pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="only glibc has a heap a thread")

@@ -1,4 +1,4 @@
-"""The history of a run and its snapshots over HTTP."""
+"""History of a run and its snapshots over HTTP."""
 
 import struct
 import time
@@ -30,7 +30,7 @@ def shown(server: Running, run: str, **query: int) -> dict[str, Any]:
 
 @pytest.fixture
 def run(server: Running) -> str:
-    """A run that has ended, whose journal a test may write anew."""
+    """A finished run whose journal a test may replace."""
     made = server.ann.submit(steps=1)
     server.ann.wait_for(made)
     return made
@@ -212,7 +212,7 @@ def test_the_course_of_a_fragment_is_that_of_the_snapshots_that_have_it(server: 
     made = []
     for n in range(5):
         data = tabled({1: 3.0 + n, 7: 2.0} if n else {7: 2.0})
-        layout.snapshot(folder, n).write_bytes(data if n < 4 else data[:200])  # the last is damaged
+        layout.snapshot(folder, n).write_bytes(data if n < 4 else data[:200])  # the last snapshot is damaged
         made.append(snapshot(n, data, run=run, step=n, t=1e-6 * n, wall=0.0))
     write(folder, iter(made))
     found = server.ann.http.get(f"/v1/runs/{run}/fragments/1")
@@ -228,7 +228,7 @@ def test_the_course_of_a_fragment_is_that_of_the_snapshots_that_have_it(server: 
 
 
 def tabled(masses: dict[int, float]) -> bytes:
-    """A snapshot with fragments of these masses by number, all 5 m/s fast, and nothing to see."""
+    """Returns a snapshot with fragments of these masses by number, all at 5 m/s, and without triangles."""
     n = len(masses)
     header = Header(
         n=0, step=0, t=0.0, box=((0.0,) * 3, (0.0,) * 3), ranks=1, parts=[], tets=0, surface_triangles=0,

@@ -1,4 +1,4 @@
-"""Hostile bodies: each is refused in one line at a small cost, and other users are not delayed."""
+"""Hostile bodies are refused in one line at a small cost, and other users are not delayed."""
 
 import json
 import math
@@ -25,11 +25,11 @@ FLOOD = Path(__file__).with_name("flood.py")
 ALLOWED = {202, 400, 413, 415, 422}
 ALL = corpus()
 STEP = len(ALL) // 20
-"""Every how manieth body is in the sample."""
+"""Step between two bodies of the sample."""
 
 
 def finite(value: Any) -> bool:
-    """Whether nothing in it is NaN or infinite."""
+    """Returns True if no number in the data is NaN or infinite."""
     if isinstance(value, dict):
         return all(map(finite, value.values()))
     if isinstance(value, list):
@@ -38,12 +38,12 @@ def finite(value: Any) -> bool:
 
 
 def send(user: User, body: Body) -> httpx2.Response:
-    """Submits it."""
+    """Submits a body."""
     return user.http.post("/v1/runs", content=body[2], headers={"Content-Type": body[1]})
 
 
 def hold_true(user: User, body: Body) -> None:
-    """What must be so for any body."""
+    """Requires the properties that the answer to any body must have."""
     answer = send(user, body)
     assert answer.status_code in ALLOWED, f"{body[0]}: {answer.status_code} {answer.text[:300]}"
     told = json.loads(answer.content)
@@ -67,7 +67,7 @@ def test_a_sample_of_hostile_bodies_is_answered(server: Running) -> None:
 
 @pytest.mark.parametrize("size", ["1e160", "1e-160", "5e-324"])
 def test_what_cannot_be_counted_is_not_accepted(tmp_path_factory: pytest.TempPathFactory, size: str) -> None:
-    """Also where the site has set no caps at all."""
+    """This also holds for a site without limits."""
     from conoid.cases.load import CaseError
     from conoid.server.intake.reading import Question, read
     from conoid.server.requests import limits
@@ -85,7 +85,7 @@ def test_what_cannot_be_counted_is_not_accepted(tmp_path_factory: pytest.TempPat
 
 @pytest.mark.slow
 def test_a_case_that_takes_too_long_is_given_up(server: Running, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Thousands of bodies in one place, each compared with each."""
+    """Thousands of bodies are at one place, and each is compared with each."""
     from .hostile import good
 
     part = good()["parts"][0]
@@ -155,7 +155,7 @@ def test_a_flood_without_a_token_keeps_nobody_waiting(users: tuple[User, User]) 
 
 
 def half_sent(host: str, port: int, count: int, seconds: float) -> None:
-    """So many begin a request; those that are sent away are replaced, and none is ever finished."""
+    """Keeps ``count`` connections open with half a request each. A connection that the server closes is replaced."""
     open_sockets: list[socket.socket] = []
     deadline = time.monotonic() + seconds
     while time.monotonic() < deadline:
@@ -179,7 +179,7 @@ def half_sent(host: str, port: int, count: int, seconds: float) -> None:
 
 
 def measure(what: str, user: User, run: str, others: list[threading.Thread]) -> None:
-    """The GETs of a user while others do their worst: p99 within 200 ms, none over 5 s."""
+    """Measures the GETs of a user while other clients attack: p99 is at most 200 ms, and each takes at most 5 s."""
     quiet = latencies(user, run, 200)
     for other in others:
         other.start()
@@ -195,7 +195,7 @@ def measure(what: str, user: User, run: str, others: list[threading.Thread]) -> 
 
 
 def latencies(user: User, run: str, count: int) -> list[float]:
-    """s of so many GETs, the shortest first."""
+    """Returns the durations of ``count`` GETs in s, the shortest first."""
     found = []
     for _ in range(count):
         began = time.monotonic()

@@ -1,4 +1,4 @@
-"""One folder of runs, one database, one server: whatever else is served is refused, and changes nothing."""
+"""A server belongs to one folder of runs and one database: any other combination is refused without a change."""
 
 import os
 import shutil
@@ -25,13 +25,13 @@ def opened(url: str) -> Iterator[Store]:
 
 
 def beside(runs: Path) -> str:
-    """The database where no URL names another one."""
+    """Returns the URL of the default database, which is in the folder of runs."""
     return f"sqlite:///{runs / 'server.sqlite'}"
 
 
 @pytest.fixture
 def served(tmp_path: Path) -> Path:
-    """A folder that has a server."""
+    """A folder that belongs to a server."""
     runs = tmp_path / "runs"
     runs.mkdir()
     with opened(beside(runs)) as store:
@@ -41,7 +41,7 @@ def served(tmp_path: Path) -> Path:
 
 
 def refusal(runs: Path, url: str) -> str:
-    """Why it is not served, in one line; nothing has changed."""
+    """Returns the error line with which the folder is refused. Folder and database are unchanged afterwards."""
     before = {path.name: path.read_bytes() for path in runs.iterdir() if path.suffix != ".sqlite"}
     with opened(url) as store:
         bond = store.bond()

@@ -1,7 +1,7 @@
-"""Whatever fails, and wherever: every open run is watched, waits for its turn or has a timer, and ends in a true state.
+"""At any fault, every open run is watched, waits for its turn or has a timer, and ends in a true state.
 
-A supervisor without its thread is turned by hand; a fault strikes at each place at which it writes, one after the
-other, and at each place it is killed as well and another one takes over.
+Tests call the turns of a supervisor without a thread. A fault occurs at each place at which the supervisor writes,
+one after the other. At each place the supervisor is also killed, and another supervisor continues.
 """
 
 import errno
@@ -24,7 +24,7 @@ TURNS = 400
 
 @dataclass(frozen=True)
 class Scenario:
-    """A life: how the worker ends, when the owner cancels it (after so many turns; -1: never), what must come out."""
+    """Course of a run: its end, the turn in which the owner cancels it (-1: never), and the expected state."""
 
     ends: str
     cancel: int
@@ -56,10 +56,10 @@ QUICK = {
 
 
 class Home(House):
-    """One in which runs are lived."""
+    """Server in which the scenarios run."""
 
     def live(self, run: Run, scenario: Scenario, plan: Plan) -> None:
-        """Turns until the run has ended; what must always hold is looked at after each turn."""
+        """Calls turns until the run has ended, and checks after each turn the conditions that must always hold."""
         for turn in range(TURNS):
             self.supervisor._inbox.put(None)
             try:

@@ -1,4 +1,4 @@
-"""Irregular or endless files in place of a run's files: no request hangs, and the memory stays bounded."""
+"""Irregular or endless files in place of a run's files: no request hangs, and the memory is bounded."""
 
 import os
 import signal
@@ -23,7 +23,7 @@ from .running import Running
 
 
 def in_place(path: Path, kind: str) -> None:
-    """Something else where a file should be."""
+    """Replaces a file by a folder, a pipe or another irregular file."""
     path.parent.mkdir(parents=True, exist_ok=True)
     path.unlink(missing_ok=True)
     if kind == "pipe":
@@ -58,7 +58,7 @@ READERS: dict[str, Callable[[Path], Any]] = {
 
 @pytest.fixture(autouse=True)
 def _in_time() -> Iterator[None]:
-    """A test that waits fails at once."""
+    """Makes a test that hangs fail at once."""
     signal.alarm(20)
     yield
     signal.alarm(0)

@@ -1,4 +1,4 @@
-"""The journal's lines are never lost, never doubled, never torn."""
+"""Lines of the journal are never lost, doubled or broken."""
 
 import resource
 import threading
@@ -113,5 +113,5 @@ def test_a_line_without_end_is_never_read_as_a_whole(tmp_path: Path, length: int
 
 
 def _most_memory() -> int:
-    """Bytes that this process has had in memory at most."""
+    """Returns the largest memory of this process so far, bytes."""
     return 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss

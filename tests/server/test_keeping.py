@@ -1,4 +1,4 @@
-"""How long runs are kept: by age, by size, for good; what is told of one that has been removed."""
+"""Rules for the removal of runs, by age and by size, runs that are kept for ever, and answers about removed runs."""
 
 import os
 import shutil
@@ -25,7 +25,7 @@ from .running import PATIENCE, TOML, Running, User, case_text
 
 
 def keeper_of(server: Running, **rules: Any) -> Removal:
-    """One with rules of its own, looked with by hand."""
+    """Returns a keeper with its own rules; the test calls its checks."""
     service = server.service
     settings = replace(service.settings, site=Site(retention=Retention(**rules)))
     return Removal(settings, service.store, service.removed_runs,
@@ -33,7 +33,9 @@ def keeper_of(server: Running, **rules: Any) -> Removal:
 
 
 def ended(server: Running, label: str = "") -> str:
-    """A run of ann that has ended and that the supervisor has closed, which it does after the state is known."""
+    """Returns a run of ann that has ended and that the supervisor has closed, which happens after the state is
+    stored.
+    """
     words = f"?label={label}" if label else ""
     run = str(server.ann.http.post(f"/v1/runs{words}", content=case_text(), headers=TOML).json()["id"])
     assert server.ann.wait_for(run)["state"] == "succeeded"
@@ -88,7 +90,7 @@ def test_who_removes_a_run_is_told_too(server: Running) -> None:
 
 
 def test_what_has_been_removed_is_in_no_list(server: Running) -> None:
-    """It ended as ``succeeded`` and was listed so, the newest of all: nothing could be done with it."""
+    """Before, a removed run was listed as ``succeeded`` and as the newest one, although every request to it fails."""
     runs = [ended(server) for _ in range(4)]
     for gone in (runs[3], runs[1]):
         server.ann.http.delete(f"/v1/runs/{gone}")
@@ -99,7 +101,7 @@ def test_what_has_been_removed_is_in_no_list(server: Running) -> None:
 
 
 def told(user: User, run: str) -> dict[str, bool]:
-    """Where a run that has succeeded is told of."""
+    """Returns in which answers a successful run occurs."""
     text = user.http.get("/metrics").text
     return {
         "list": run in [line["id"] for line in user.http.get("/v1/runs").json()["runs"]],
@@ -179,7 +181,7 @@ def test_lines_survive_a_lost_database_and_a_torn_end(server: Running, tmp_path:
 
 
 def farewell(lines: RemovedRuns, run: str, other: str) -> Any:
-    """The line of a run, for another one."""
+    """Returns the record of a removed run, for another id."""
     line = lines.get(run)
     assert line is not None
     return msgspec.structs.replace(line, id=other)

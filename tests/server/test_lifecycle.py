@@ -1,4 +1,4 @@
-"""The state machine alone: no clock, no file, no process."""
+"""The state machine alone, without a clock, a file or a process."""
 
 from dataclasses import replace
 from itertools import product
@@ -88,7 +88,9 @@ def test_the_straight_way() -> None:
 
 
 def test_the_way_through_a_batch_system() -> None:
-    """The job's own writes the journal; wall time counts from its start, and it may wait more than once."""
+    """The job writes the journal itself. The wall time counts from the job's start, and a job may wait several
+    times.
+    """
     run, actions = advance(replace(RUN, state=State.QUEUED), Granted(batch=True), 2.0)
     assert (run.state, run.started, actions) == (State.QUEUED, 0.0, (Launch(),))
     run, actions = advance(run, WorkerStarts(50.0), 51.0)

@@ -1,4 +1,4 @@
-"""What one user may hold of the server: bytes and processor time of answers, bodies, connections."""
+"""Limits of one user's share of the server: bytes and processor time of answers, bodies, connections."""
 
 import json
 import time
@@ -33,7 +33,7 @@ def run(server: Running) -> str:
 
 
 def labelled(server: Running, *labels: str) -> str:
-    """A run of ann's with labels."""
+    """Adds a run of ann with labels."""
     answer = server.ann.http.post("/v1/runs", params={"label": labels}, content=case_text(), headers=TOML)
     return str(answer.json()["id"])
 
@@ -136,7 +136,7 @@ def test_a_run_that_is_kept_is_found_by_that(server: Running, run: str) -> None:
 
 
 def test_a_database_without_labels_gets_them_from_the_folders(server: Running) -> None:
-    """It is of an earlier version of the server."""
+    """The database is that of an earlier version of the server."""
     red = labelled(server, "colour=red")
     server.ann.wait_for(red)
     settings = server.service.settings
@@ -154,7 +154,7 @@ def test_a_database_without_labels_gets_them_from_the_folders(server: Running) -
 
 
 def test_a_database_without_threads_has_runs_of_one_thread(tmp_path: Path) -> None:
-    """It is of an earlier version of the server."""
+    """The database is that of an earlier version of the server."""
     url = f"sqlite:///{tmp_path / 'old.sqlite'}"
     run = Run("r1", "ann", "bar", 3, 0.0, State.SUCCEEDED, started=10.0, finished=20.0, threads=4)
     store = Store(url)
@@ -170,7 +170,7 @@ def test_a_database_without_threads_has_runs_of_one_thread(tmp_path: Path) -> No
 
 
 def test_three_thousand_runs_are_searched_in_a_moment(tmp_path: Path) -> None:
-    """By their labels; CPU time."""
+    """The runs are searched by their labels; the test limits the CPU time."""
     store = Store(f"sqlite:///{tmp_path / 'many.sqlite'}")
     runs = [folder.first(_made(n)) for n in range(3000)]
     with store._engine.begin() as connection:

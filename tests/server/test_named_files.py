@@ -1,4 +1,4 @@
-"""Cases that name files, handed in: who may use a file, and what a run has of it."""
+"""Submitted cases that name files: which user may use a file, and the copy that a run has."""
 
 import hashlib
 import json
@@ -33,7 +33,7 @@ JSON = {"Content-Type": "application/json"}
 
 @pytest.fixture
 def quick(monkeypatch: pytest.MonkeyPatch) -> list[Path]:
-    """Nobody reads the files; the folders in which somebody would have."""
+    """Replaces the program that reads mesh files; returns the folders for which the program was called."""
     asked = []
 
     def surveyed(case: Any, folder: Path) -> bytes:
@@ -46,7 +46,7 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> list[Path]:
 
 
 def case(path: str = "/etc/passwd", sha256: str | None = HASH, **mesh: Any) -> dict[str, Any]:
-    """A case whose rod is from a file."""
+    """Returns a case whose rod has its mesh in a file."""
     import tomllib
 
     data = tomllib.loads(case_text())
@@ -88,7 +88,7 @@ def test_a_run_has_its_own_copy_and_reads_no_path(server: Running, quick: list[P
 
 
 def test_a_file_is_used_by_those_who_have_sent_it(server: Running, quick: list[Path]) -> None:
-    """For a stranger there is no difference between a file of somebody else and one that nobody has."""
+    """Another user gets the same answer for a file of somebody else and for a file that does not exist."""
     send(server.ann)
     nobodys = hashlib.sha256(b"nobody's").hexdigest()
     for hand in (hand_in, validated):
@@ -214,7 +214,7 @@ def submission_wish() -> Any:
 
 
 def test_the_keeper_removes_what_nobody_needs_without_being_asked(server: Running, quick: list[Path]) -> None:
-    """Also where a site has no rules; a file that a run has stays as long as the run."""
+    """This also holds for a site without rules. A file stays as long as a run needs it."""
     other = send(server.ann, b"nobody's")
     send(server.ann)
     run = hand_in(server.ann, case())["id"]
@@ -231,7 +231,9 @@ def test_the_keeper_removes_what_nobody_needs_without_being_asked(server: Runnin
 
 
 def test_a_file_counts_once_for_each_user(server: Running, quick: list[Path]) -> None:
-    """However many runs have it; and what a run may write does not include it."""
+    """A file counts once, whatever the number of runs with it. The limit of a run's output does not include its
+    files.
+    """
     data = MESH + b"**" + b" " * 100_000
     sha256 = send(server.ann, data)
     runs = [hand_in(server.ann, case(sha256=sha256))["id"] for _ in range(3)]
@@ -262,7 +264,9 @@ def test_a_file_is_gone_with_the_last_run_that_has_it() -> None:
 def test_what_files_hold_is_measured_by_the_caps(
     settings: Settings, server: Running, monkeypatch: pytest.MonkeyPatch, read: bool
 ) -> None:
-    """As the worker has read them; where it has not, as their size tells."""
+    """The content that the worker has read is compared with the limits; without the worker, an estimate by the size
+    of the file.
+    """
     part = Surveyed(
         part=0, elements=5000, nodes=2000, faces=100, step_length=1e-3, altitude=1e-3, mass=1.0, low=(0.0, 0.0, 0.0),
         high=(1.0, 1.0, 1.0), momentum=(0.0, 0.0, 0.0), energy=0.0, speed=0.0, notes=[],
@@ -282,7 +286,9 @@ def test_what_files_hold_is_measured_by_the_caps(
 def test_the_worker_reads_files_before_a_run_is_accepted(
     server: Running, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The real one, in its process: what it finds is estimated, and what it would refuse is refused in its words."""
+    """The real worker reads the files in its process. The estimate uses the content, and a refusal has the worker's
+    message.
+    """
     monkeypatch.setenv("CONOID_CACHE_DIR", str(tmp_path / "cache"))
     send(server.ann)
     told = server.ann.http.post("/v1/cases:validate", content=json.dumps(case("rod.inp", group="All")), headers=JSON)

@@ -1,4 +1,4 @@
-"""The router as the nodes of a cluster reach it: a port of its own, with TLS and the credentials of the run's owner."""
+"""The Zenoh router for the nodes of a cluster: a port of its own, with TLS and the credentials of the run's owner."""
 
 import json
 import shutil
@@ -21,7 +21,7 @@ ANN = Token("tann", "ann", "", frozenset({"read"}), 0.0)
 
 
 def certificates(place: Path) -> tuple[str, str, str]:
-    """An authority, and a certificate and key of a router on this machine."""
+    """A certificate authority, and a certificate and a key of a router on this machine."""
     (place / "san").write_text("subjectAltName=IP:127.0.0.1,DNS:localhost")
     for words in (
         "req -x509 -newkey rsa:2048 -nodes -keyout ca.key -out ca.pem -subj /CN=authority -days 2",

@@ -1,4 +1,4 @@
-"""The page's libraries: the tested files of an installed wheel, or one line that says why not."""
+"""Libraries of the page: the tested files of an installed wheel, or a line with the reason why they are missing."""
 
 import gzip
 import hashlib
@@ -84,7 +84,7 @@ def test_an_odd_address_of_the_page_is_not_there(client: TestClient, address: st
 
 
 def test_a_route_is_there_whatever_is_asked_of_it(client: TestClient) -> None:
-    """Also where the page has all other addresses."""
+    """This also holds if the page answers all other addresses."""
     for method, path, allowed in (
         ("PUT", "/v1/runs", "GET, HEAD, POST"),
         ("DELETE", "/v1/me", "GET, HEAD"),
@@ -124,7 +124,7 @@ def test_a_changed_file_is_not_served(tmp_path: Path, monkeypatch: pytest.Monkey
 
 
 def replace_package(folder: Path, monkeypatch: pytest.MonkeyPatch, version: str | None) -> None:
-    """nicegui of ``version``, without files, takes the place of the installed one; None: none is installed."""
+    """Replaces the installed nicegui by an empty package of ``version``; None: by no package."""
 
     def distribution(name: str) -> metadata.Distribution:
         if version is None:

@@ -1,4 +1,4 @@
-"""The page's own scripts before a server that is away, comes back, refuses, or has more than is shown; by node."""
+"""Scripts of the page in node with a server that is not reachable, comes back, refuses, or sends more than is shown."""
 
 import json
 import shutil
@@ -31,7 +31,7 @@ LIST = """
 
 @pytest.fixture
 def web(tmp_path: Path) -> Path:
-    """The scripts as modules that node takes."""
+    """The scripts as modules that node can import."""
     for path in WEB.glob("*.js"):
         shutil.copy(path, tmp_path)
     (tmp_path / "package.json").write_text('{"type": "module"}')
@@ -39,7 +39,7 @@ def web(tmp_path: Path) -> Path:
 
 
 def played(web: Path, script: str) -> Any:
-    """What the script returns."""
+    """Runs a script and returns its result."""
     told = json.dumps({"module": str(web / "app.js"), "script": script})
     command = [str(NODE), str(Path(__file__).with_name("stage.mjs"))]
     done = subprocess.run(command, input=told, capture_output=True, text=True, timeout=60, check=False)
@@ -59,7 +59,7 @@ def test_libraries_are_asked_for_again_when_nobody_answered(web: Path) -> None:
 
 
 def test_a_page_that_was_left_changes_no_title(web: Path) -> None:
-    """It waits for a server that is away when somebody goes to another page."""
+    """The page waits for a server that is not reachable, and the user opens another page."""
     script = """
         const { RunPage } = await load("run.js");
         const page = new RunPage("a");
@@ -109,7 +109,7 @@ def test_runs_are_compared_when_the_server_comes_back(web: Path) -> None:
 
 
 def told(*runs: str) -> str:
-    """An answer of the table."""
+    """Returns an answer of the table."""
     return f"{{ runs: [{', '.join(runs)}], cases: [], pending: 0, next: null }}"
 
 
@@ -172,7 +172,9 @@ ENDED = {
 
 
 def test_a_run_that_has_ended_says_why_and_what_it_was_warned_of(web: Path) -> None:
-    """Its warnings are those of the whole log and of the outcome, each once, whenever the page is opened."""
+    """The warnings are those of the whole log and of the outcome. Each is shown once, at whatever time the page is
+    opened.
+    """
     log = [{"type": "log", "seq": 1, "level": "warning", "text": each, "wall": 1.0} for each in "aba"]
     history = {"series": {}, "snapshots": [], "log": log, "warnings": log[:2], "last": 3, "state": "failed"}
     script = """
@@ -219,7 +221,7 @@ def test_a_run_that_has_used_up_its_steps_goes_on_with_more(web: Path) -> None:
 
 
 def test_a_page_by_a_short_id_waits_for_the_server_and_claims_nothing(web: Path) -> None:
-    """The server is away as the page is opened by its address; then it knows the run."""
+    """The server is not reachable when the page is opened by its address, and finds the run later."""
     script = """
         const soon = globalThis.setTimeout;
         globalThis.setTimeout = (work, ms) => soon(work, Math.min(ms ?? 0, 40));

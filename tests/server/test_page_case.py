@@ -1,4 +1,4 @@
-"""The case in the page's editor: where its keys stand, what becomes of its text, the hashes of files; by node."""
+"""The case in the page's editor, in node: positions of its keys, changes of its text, and hashes of files."""
 
 import base64
 import hashlib
@@ -23,7 +23,7 @@ HASH = "ab" * 32
 
 
 def asked(tmp_path: Path, module: str, script: str, data: Any) -> Any:
-    """The value of an expression in ``page``, the module, and ``data``."""
+    """Returns the value of an expression with the module as ``page``, and ``data``."""
     for path in WEB.glob("*.js"):
         shutil.copy(path, tmp_path)
     (tmp_path / "package.json").write_text('{"type": "module"}')
@@ -35,7 +35,7 @@ def asked(tmp_path: Path, module: str, script: str, data: Any) -> Any:
 
 
 def keys(value: Any, name: str = "") -> Iterator[str]:
-    """The dotted key of every value of a case."""
+    """Yields the dotted key of each value of a case."""
     if isinstance(value, dict):
         for key, inner in value.items():
             yield from keys(inner, f"{name}.{key}" if name else key)
@@ -119,7 +119,7 @@ def test_values_are_read_as_they_are_written(tmp_path: Path) -> None:
 
 
 def test_any_text_that_is_typed_is_survived(tmp_path: Path) -> None:
-    """Half a case is in the editor most of the time."""
+    """The text of an editor is an incomplete case most of the time."""
     draw = random.Random(5)
     pieces = [*"\"'[]{}=#\n\\. ", '"""', "'''", "[[", "]]", "path", "a.inp", "run", "ranks = 2"]
     texts = ["".join(draw.choices(pieces, k=40)) for _ in range(400)]

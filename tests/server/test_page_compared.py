@@ -1,4 +1,6 @@
-"""Charts and the comparison of runs in a real browser: chosen, read, saved, sorted, hidden, by pointer and by key."""
+"""Charts and the comparison of runs in a real browser: choose, read, save, sort and hide, by pointer and by
+keyboard.
+"""
 
 import csv
 import io
@@ -33,7 +35,7 @@ DRAWN = "[...document.querySelectorAll('.charts .plot')].filter((one) => one.que
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Site, list[str]]]:
-    """A server with runs that no solver has made, and twelve of a sweep among them."""
+    """A server with runs that no solver has computed; twelve of them are a sweep."""
     made = Site(tmp_path_factory.mktemp("site") / "runs")
     made.kill()
     ids = lay(made.runs, 40, 1)

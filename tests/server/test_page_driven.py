@@ -1,4 +1,4 @@
-"""The page in a real browser: a person watches the demo break, takes it apart, stops a run, opens its report."""
+"""The page in a real browser: a user watches the demo, hides its parts, stops a run, and opens its report."""
 
 import csv
 import json
@@ -21,14 +21,14 @@ pytestmark = [
     pytest.mark.skipif(program() is None, reason="no Chromium on this machine"),
 ]
 GRID, END_TIME = (64, 14), 60e-6
-"""px of a chart left and right of its axes (charts.js); s of the demo."""
+"""Margins of a chart left and right of its axes, px (charts.js); end time of the demo, s."""
 DEMO = 1800.0
-"""s that the demo may take: it takes one minute on two free cores."""
+"""Time limit of the demo, s. It takes one minute on two free cores."""
 
 
 @pytest.fixture(scope="module")
 def watched(site: Site, browser: Browser) -> tuple[str, Page]:
-    """The demo, watched to its end: what moved is told by the list of what was seen."""
+    """The demo, watched to its end; returns the list of the changes on the page."""
     page = browser.page()
     page.go(site.url)
     page.wait("document.querySelector('form.sign-in')")
@@ -58,7 +58,7 @@ def watched(site: Site, browser: Browser) -> tuple[str, Page]:
 
 
 def test_events_reach_the_screen_in_time(watched: tuple[str, Page]) -> None:
-    """The time is told, not judged: it is that of the machine, which the run has for itself in no test."""
+    """The delays are printed and not limited: other tests use the same machine."""
     events = watched[1].evaluate("seen.events")
     print(f"\n{len(events)} events, from the journal to the drawn page: median {median(events):.0f} ms")
     assert len(events) > 20
@@ -147,7 +147,7 @@ def test_a_cut_opens_by_pointer_and_by_key_and_logs_by_rank(site: Site, watched:
 
 
 def click_on_last_cut(site: Site, run: str, page: Page, chart: str) -> bool:
-    """The pointer clicks its way down the chart at the time of the last cut, until its pin opens it."""
+    """Clicks down the chart at the time of the last balance event until the marker of the event opens."""
     lines = map(json.loads, (site.runs / run / layout.JOURNAL).read_text().splitlines())
     last = [line["t"] for line in lines if line["type"] == "balance"][-1]
     page.evaluate("document.activeElement.blur()")
@@ -178,7 +178,7 @@ def test_buttons_the_age_of_numbers_and_two_runs(site: Site, watched: tuple[str,
     page.wait("/numbers .* old/.test(document.querySelector('.link').innerText)", 30)
     site.start(port)
     page.wait("document.querySelector('.link').innerText === 'live'", 60)
-    page.errors.clear()  # While the server was away the browser says so.
+    page.errors.clear()  # The browser reports an error for each request while the server was not running.
     page.evaluate("document.querySelector('button.stop').click()")
     page.wait("document.querySelector('.pill.cancelled')", 120)
     page.go(f"{site.url}#/compare/{done}/{run}")

@@ -1,4 +1,4 @@
-"""A fragment is the same one, in the same colour, in all snapshots of a real run, on the page and in pictures."""
+"""A fragment has the same number and the same colour in all snapshots of a real run, on the page and in pictures."""
 
 import json
 import shutil
@@ -20,7 +20,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.timeout(3600)]
 NODE = shutil.which("node")
 WEB = Path(__file__).parents[2] / "client" / "web"
 FOLLOWED = 20
-"""Fragments besides the steel bar and the largest of glass."""
+"""Number of fragments that are followed, in addition to the steel bar and the largest fragment of glass."""
 
 
 OFTEN = """
@@ -38,12 +38,13 @@ def readied(*arguments):
 worker.ready_kernels = readied
 sys.exit(worker.main(sys.argv[1:]))
 """
-"""The worker without the second between two snapshots, which a fast machine would get few in."""
+"""Script that runs the worker without the pause of 1 s between two snapshots: a fast machine would write few
+snapshots."""
 
 
 @pytest.fixture(scope="module")
 def seen(tmp_path_factory: pytest.TempPathFactory) -> list[Snapshot]:
-    """The snapshots of the demo to 200 us, as many as can be made."""
+    """Snapshots of the demo until 200 us, as many as the worker can write."""
     folder = tmp_path_factory.mktemp("demo") / "run"
     command = [sys.executable, "-c", OFTEN, str(DEMO_CASE), "--out", str(folder)]
     for change in ("run.end_time='200 us'", "run.snapshots=400", "run.frames=60", "run.ranks=1", "reference=[]"):
@@ -54,7 +55,7 @@ def seen(tmp_path_factory: pytest.TempPathFactory) -> list[Snapshot]:
 
 
 def parts_of(one: Snapshot) -> dict[int, int]:
-    """The part of each fragment that is drawn."""
+    """Returns the part of each drawn fragment."""
     rows = one.array("vertex_fragment")[one.array("triangles")[:, 0]]
     numbers = one.fragments["id"][rows]
     return dict(zip(numbers.tolist(), one.array("triangle_part").tolist(), strict=True))
@@ -79,7 +80,9 @@ def test_fragments_are_followed_through_fifty_snapshots(seen: list[Snapshot]) ->
 
 
 def course(seen: list[Snapshot], label: int) -> tuple[np.ndarray, ...]:
-    """Times, masses, centres and greatest speeds around of a fragment in the snapshots that have it."""
+    """Returns times, masses, centres, and maxima of the speed near the fragment, in the snapshots that contain the
+    fragment.
+    """
     rows = [(one, np.flatnonzero(one.fragments["id"] == label)) for one in seen]
     found = [(one.header.t, one.fragments, row[0]) for one, row in rows if len(row)]
     times, masses = np.array([t for t, *_ in found]), np.array([table["mass"][row] for _, table, row in found])

@@ -1,4 +1,6 @@
-"""A person hands runs in from the page: a shipped case, a case with files, the case of a run; signs in to stay."""
+"""Submission from the page in a real browser: a shipped case, a case with files, the case of a run; a persistent
+login.
+"""
 
 import json
 from collections.abc import Iterator
@@ -19,12 +21,12 @@ pytestmark = [
 ]
 EDITOR, START = "textarea[aria-label='the case']", "section[aria-label=start] button"
 LONG = 600.0
-"""s that a run of seconds may take where others use the machine."""
+"""Time limit for a short run on a busy machine, s."""
 
 
 @pytest.fixture
 def page(site: Site, browser: Browser) -> Iterator[Page]:
-    """Signed in, at a new run."""
+    """A page with a signed-in user, opened at a new run."""
     made = browser.page()
     sign_in(made, site)
     made.go(f"{site.url}#/new")
@@ -35,14 +37,14 @@ def page(site: Site, browser: Browser) -> Iterator[Page]:
 
 
 def choose(page: Page, *paths: Path) -> None:
-    """Files into the page's choice of files."""
+    """Chooses files in the page's file dialog."""
     root = page.call("DOM.getDocument")["root"]["nodeId"]
     found = page.call("DOM.querySelector", nodeId=root, selector=".new input[type=file]")["nodeId"]
     page.call("DOM.setFileInputFiles", nodeId=found, files=[str(path) for path in paths])
 
 
 def replace(page: Page, old: str, new: str) -> None:
-    """Other words in the editor, as if they were typed."""
+    """Replaces the text of the editor as if a user had typed it."""
     page.evaluate(f"""(() => {{
       const area = document.querySelector("{EDITOR}");
       area.value = area.value.replace({json.dumps(old)}, {json.dumps(new)});
@@ -51,7 +53,7 @@ def replace(page: Page, old: str, new: str) -> None:
 
 
 def started(page: Page) -> str:
-    """The id of the run, once its page is shown."""
+    """Waits for the page of the run and returns the run's id."""
     page.wait(f"!document.querySelector('{START}').disabled", LONG)
     page.focus(EDITOR)
     page.press("Enter", 2)

@@ -1,4 +1,4 @@
-"""What the page computes without a browser, asked by node: snapshots, fits, groups of phases, keys that differ."""
+"""Functions of the page that need no browser, in node: snapshots, fits, groups of phases, keys that differ."""
 
 import base64
 import gzip
@@ -266,7 +266,7 @@ def test_the_page_writes_numbers_as_python_does(ask: Ask) -> None:
 
 
 def test_no_module_of_the_page_writes_numbers_on_its_own() -> None:
-    """A width in a style sheet is not read by anybody."""
+    """A width in a style sheet is excepted: users do not read it."""
     own = re.compile(r"\.(toFixed|toExponential|toPrecision|toLocaleString)\(")
     found = [
         f"{path.name}: {line.strip()}"
@@ -362,7 +362,7 @@ def volumes(corners: np.ndarray) -> np.ndarray:
 
 
 def section_of(corners: np.ndarray, normal: np.ndarray, at: float) -> float:
-    """Area in which a plane cuts tets (n, 4, 3): of the convex hulls of the points on their edges."""
+    """Returns the area in which a plane cuts tets (n, 4, 3), from the convex hulls of the points on their edges."""
     basis, total = np.linalg.svd(normal[None])[2][1:], 0.0
     for tet in corners:
         heights = tet @ normal - at
@@ -378,7 +378,7 @@ def test_debris_does_not_make_the_frame_wider_and_heavy_pieces_do(ask: Ask) -> N
     told = {"n": 0, "step": 0, "t": 0.0, "ranks": 1}
 
     def framed(mass: float) -> tuple[float, float]:
-        """How far the frame reaches along x, m: that of the bodies, and that of all."""
+        """Returns the lengths along x of two frames, m: around the bodies, and around everything."""
         body = shattered(5, 1)
         far = np.argmax(body.x[body.tets].mean(axis=1)[:, 0])
         alone = replace(body, bond=body.bond.copy(), mass=body.mass.copy(), x=body.x.copy())
@@ -404,7 +404,7 @@ def test_debris_does_not_make_the_frame_wider_and_heavy_pieces_do(ask: Ask) -> N
 
 
 def decoded(ask: Ask, data: bytes) -> Any:
-    """With numbers of fragments as node has them again when it has read them from JSON."""
+    """Returns the table with fragment numbers in the type that node reads from JSON."""
     return ask("snapshot.js", "page.decode(data)", sent(data))
 
 

@@ -1,4 +1,4 @@
-"""The table of runs and the page of a sweep, as far as no browser is needed: asked by node."""
+"""The table of runs and the page of a sweep, as far as they need no browser, in node."""
 
 import json
 import random
@@ -22,7 +22,7 @@ TOLD = """
 
 
 def line(run: str, n: int = 0, **more: Any) -> dict[str, Any]:
-    """A run in a list."""
+    """Returns a run of a list."""
     found: dict[str, Any] = {
         "id": run, "short": run[:7], "name": "bar", "title": "A bar", "state": "succeeded", "cause": None,
         "message": "", "reason": "", "ranks": 1, "threads": 1, "submitted": 1000.0 + n,
@@ -32,7 +32,7 @@ def line(run: str, n: int = 0, **more: Any) -> dict[str, Any]:
 
 
 def answer(*runs: tuple[dict[str, Any], card.Card]) -> dict[str, Any]:
-    """What the server sends of them."""
+    """Returns the answer of the server with these runs."""
     made = rows.Table()
     for told, known in runs:
         assert made.add(told, known)
@@ -59,7 +59,7 @@ def _card_of(n: int) -> card.Card:
 
 @pytest.fixture(scope="module")
 def some() -> dict[str, Any]:
-    """Five runs of one case at other speeds and sizes, and one of another case."""
+    """Returns five runs of one case with different speeds and sizes, and a run of another case."""
     bars = [(_line_of(n), _card_of(n)) for n in range(5)]
     other = (line("other", 9, name="plate"), card.Card(values={f"q{i}": i for i in range(9)}, results={}))
     return answer(*bars, other)
@@ -152,7 +152,7 @@ def test_short_ids_are_those_of_the_server(ask: Ask) -> None:
 
 
 def test_a_thousand_rows_are_sorted_in_a_moment(ask: Ask) -> None:
-    """CPU time of the whole, 5,000 rows."""
+    """The test limits the CPU time of the whole for 5,000 rows."""
     known = [
         (line(f"run{n:06d}", n), card.Card(values={"v": float(n % 97)}, results={"probe.x": float(n % 89)}))
         for n in range(5000)

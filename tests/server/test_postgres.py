@@ -1,4 +1,4 @@
-"""The index of runs and the tokens in a real PostgreSQL, which the tests start; skipped where there is none."""
+"""The index of runs and the tokens in a real PostgreSQL, which the tests start; skipped without PostgreSQL."""
 
 import os
 import pwd
@@ -26,7 +26,7 @@ _ANSWERS = 60.0
 
 
 def missing() -> str:
-    """Why there can be no PostgreSQL here; empty when there can."""
+    """Returns the reason why no PostgreSQL can be started on this machine; empty if one can."""
     if shutil.which("initdb") is None or shutil.which("postgres") is None:
         return "initdb, postgres: not installed (apt-get install postgresql, and its bin folder in PATH)"
     try:
@@ -42,7 +42,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.skipif(bool(missing()), reason=missi
 
 @pytest.fixture(scope="module")
 def url() -> Iterator[str]:
-    """Of a database that is gone afterwards; it listens at a socket in its folder alone."""
+    """URL of a database that is removed after the tests. It accepts connections only at a socket in its folder."""
     user = "postgres" if os.geteuid() == 0 else None
     with TemporaryDirectory(prefix="conoid-pg-") as place:
         if user is not None:
@@ -74,7 +74,7 @@ def _await(url: str) -> None:
 
 
 def test_a_run_lives_with_its_index_in_postgresql(url: str, tmp_path: Path) -> None:
-    """It is submitted, ends, is found again by the next server, and by one whose database is empty."""
+    """A run is submitted and ends. The next server finds the run, also with an empty database."""
     settings = Settings(
         runs=tmp_path / "runs", port=0, zenoh_port=None, slots=2, worker=FAKE, grace=0.5, caps=Caps(free_disk=0),
         database=url,

@@ -1,4 +1,4 @@
-"""Shares, priorities and quotas of a site, on a server that runs."""
+"""Shares, priorities and quotas of a site, with a running server."""
 
 import re
 import time
@@ -37,7 +37,7 @@ def settings(tmp_path: Path) -> Settings:
 
 
 def test_one_waits_for_his_quota_while_another_runs(server: Running, tmp_path: Path) -> None:
-    """Over HTTP: reasons, priorities, quotas, and the same order after a restart."""
+    """Reasons, priorities and quotas are the same over HTTP; the order is the same after a restart."""
     ann, bob = server.ann, server.bob
     runs = [ann.submit(wait=str(tmp_path / "go")) for _ in range(3)]
     ann.wait_for(runs[0], State.RUNNING)
@@ -74,7 +74,7 @@ def test_a_run_that_writes_too_much_is_stopped(server: Running, monkeypatch: pyt
 
 
 def test_core_seconds_and_output_are_quotas_too(server: Running) -> None:
-    """Those who have used up theirs wait, and hand in nothing more."""
+    """Runs of a user without quota wait, and the user cannot submit more."""
     quota = Quota(core_seconds=5.0, output_bytes=1000)
     waitlist, desk = server.service.supervisor._waitlist, server.service.desk
     waitlist._quota = quota
@@ -90,7 +90,7 @@ def test_core_seconds_and_output_are_quotas_too(server: Running) -> None:
 
 
 def test_the_order_survives_a_restart_without_the_database(tmp_path: Path) -> None:
-    """What decides it stands in the folders of the runs."""
+    """The data that decide the order are in the folders of the runs."""
     settings = Settings(
         runs=tmp_path / "runs", port=0, zenoh_port=None, slots=1, worker=FAKE, grace=0.5, caps=Caps(free_disk=0),
     )  # fmt: skip
@@ -115,7 +115,7 @@ def test_the_order_survives_a_restart_without_the_database(tmp_path: Path) -> No
 
 
 def reasons(waiting: list[tuple[User, str]]) -> list[str]:
-    """What each run waits for, once the queue has been looked at."""
+    """Returns the reason for which each run waits, after a turn of the queue."""
     deadline = time.monotonic() + PATIENCE
     while not all(found := [user.show(run)["reason"] for user, run in waiting]) or len(set(found)) < len(found):
         assert time.monotonic() < deadline, found
@@ -125,7 +125,7 @@ def reasons(waiting: list[tuple[User, str]]) -> list[str]:
 
 @contextmanager
 def users_of(settings: Settings, children: list[Any]) -> Iterator[tuple[User, User]]:
-    """A server, and two who use it; its workers that go on are among ``children`` in the end."""
+    """Returns a server and two users; workers that still run at the end are in ``children``."""
     with opened(settings) as service, TestClient(build_app(service), base_url="http://127.0.0.1") as client:
         found = []
         for name in ("ann", "bob"):

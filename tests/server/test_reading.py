@@ -1,4 +1,4 @@
-"""What it costs to read a case: each once, in a fork that has everything loaded."""
+"""Cost of reading a case: each case is read once, in a fork of a process that has loaded all modules."""
 
 import os
 import signal
@@ -48,7 +48,7 @@ print(timed(sys.stdin.buffer.read()))
 
 
 def test_a_case_finds_everything_loaded() -> None:
-    """CPU time of the first fork, against that of a first case in a program of its own."""
+    """The CPU time of the first fork is compared with that of a first case in a program of its own."""
     told = msgspec.msgpack.encode(QUESTION)
     alone = subprocess.run([sys.executable, "-c", TIMED], input=told, capture_output=True, check=True)
     control, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
@@ -83,7 +83,7 @@ def test_each_point_of_a_sweep_is_read_once(server: Running, monkeypatch: pytest
 
 @pytest.fixture
 def made(monkeypatch: pytest.MonkeyPatch) -> Iterator[Reader]:
-    """One that waits 0.5 s for its program."""
+    """A reader that waits 0.5 s for its program."""
     monkeypatch.setattr(reader, "_FORK", 0.5)
     one = Reader()
     assert one.read(QUESTION).name == "bar"

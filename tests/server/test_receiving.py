@@ -1,4 +1,6 @@
-"""Bodies of files over real connections: others are answered meanwhile, hostile ones refused, memory stays small."""
+"""Bodies of files over real connections: other requests are answered meanwhile, hostile bodies are refused, memory
+is bounded.
+"""
 
 import hashlib
 import random
@@ -19,7 +21,7 @@ MEGA = 1 << 20
 
 @pytest.fixture(scope="module")
 def up(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Process, User, User]]:
-    """A server of its own process, and two who use it."""
+    """A server in a process of its own, and its two users."""
     with processes(tmp_path_factory.mktemp("files")) as make:
         yield started(make)
 
@@ -36,7 +38,9 @@ def parts_of(user: User) -> list[Path]:
 
 
 def spoken(user: User, head: str, *bodies: bytes) -> bytes:
-    """What the server answers to a request that is written by hand, until it closes or has said all."""
+    """Sends a raw request and returns the bytes of the answer, until the server closes the connection or the answer
+    is complete.
+    """
     url = urlsplit(str(user.http.base_url))
     lines = f"{head}\r\nHost: x\r\nAuthorization: {user.http.headers['Authorization']}\r\n\r\n"
     with socket.create_connection((url.hostname, url.port), timeout=20) as line:
@@ -55,7 +59,7 @@ def spoken(user: User, head: str, *bodies: bytes) -> bytes:
 
 
 def test_others_are_answered_while_a_body_arrives(up: tuple[Process, User, User]) -> None:
-    """Also the one who sends it, and another file of his; the body goes on when they have been."""
+    """The sender's own requests and a second file of the sender are also answered. The upload continues afterwards."""
     _, ann, bob = up
     data = random.Random(1).randbytes(3 * MEGA)
     sha256, asked, answered = hashlib.sha256(data).hexdigest(), threading.Event(), threading.Event()
@@ -106,7 +110,7 @@ def test_more_bytes_than_were_announced_are_no_part_of_the_file(up: tuple[Proces
 def test_a_body_without_end_is_refused_before_it_is_read(
     up: tuple[Process, User, User], head: str, code: bytes
 ) -> None:
-    """And no more of it than of any other body that was answered before its end."""
+    """The server reads at most as many bytes as of another body that is answered before its end."""
     _, ann, _ = up
     before = parts_of(ann)
     answer = spoken(ann, f"PUT /v1/files/{'ab' * 32} HTTP/1.1\r\n{head}", b"10000\r\n")
@@ -116,7 +120,7 @@ def test_a_body_without_end_is_refused_before_it_is_read(
 
 
 def test_a_body_that_breaks_off_leaves_what_has_come(up: tuple[Process, User, User]) -> None:
-    """The rest completes it, over another connection."""
+    """Another connection sends the remaining bytes."""
     _, ann, _ = up
     data = random.Random(2).randbytes(MEGA)
     sha256 = hashlib.sha256(data).hexdigest()
@@ -135,7 +139,7 @@ def test_a_body_that_breaks_off_leaves_what_has_come(up: tuple[Process, User, Us
 
 
 def test_who_comes_again_takes_over_from_a_connection_that_says_nothing_more(up: tuple[Process, User, User]) -> None:
-    """A line that broke without a word looks like one that is slow: for five seconds."""
+    """A broken connection cannot be distinguished from a slow one for five seconds."""
     _, ann, _ = up
     data = random.Random(3).randbytes(MEGA)
     sha256 = hashlib.sha256(data).hexdigest()
@@ -162,7 +166,7 @@ def test_who_comes_again_takes_over_from_a_connection_that_says_nothing_more(up:
 
 
 def peak(server: Process) -> int:
-    """The most memory that a server has had at a time, bytes."""
+    """Returns the largest memory of a server so far, bytes."""
     assert server.child is not None
     text = Path(f"/proc/{server.child.pid}/status").read_text()
     return 1024 * int(next(line for line in text.splitlines() if line.startswith("VmHWM")).split()[1])
@@ -172,7 +176,7 @@ def peak(server: Process) -> int:
 def test_the_memory_of_the_server_does_not_grow_with_a_file(
     up: tuple[Process, User, User], tmp_path: Path, size: int
 ) -> None:
-    """One PUT of it all; every GET of another user meanwhile is answered."""
+    """The file is sent in one PUT; every GET of another user is answered meanwhile."""
     server, ann, bob = up
     path, digest, made = tmp_path / "large", hashlib.sha256(), random.Random(size)
     with path.open("wb") as file:

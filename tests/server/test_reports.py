@@ -1,4 +1,4 @@
-"""Reports that the server has made: once, with limits, for the owner, or a clear line where it cannot."""
+"""Reports that the server makes: once, with limits, for the owner; an error is one line."""
 
 import importlib.util
 import os

@@ -1,4 +1,4 @@
-"""The order in which requests begin: one in each turn of the event loop, the users in rotation."""
+"""Order in which requests begin: one request in each turn of the event loop, users in rotation."""
 
 import asyncio
 from collections.abc import Awaitable, Callable, Iterator
@@ -24,7 +24,9 @@ def service(settings: Settings) -> Iterator[Service]:
 
 
 def begun(*who: str, cancelled: int | None = None) -> list[tuple[str, int]]:
-    """Who began, and in which turn of the loop, where these waited for their turn at once."""
+    """Returns the users of requests that waited at the same time, in the order of their start, each with the turn of
+    the loop.
+    """
     order: list[tuple[str, int]] = []
 
     async def ask(turns: RequestOrder, clock: list[int], one: str) -> None:
@@ -74,7 +76,9 @@ def test_a_request_that_is_gone_takes_no_turn() -> None:
 
 
 def entered(service: Service, flood: dict[str, str], late: dict[str, str]) -> int:
-    """How many requests came in before ``late``, which came after ``FLOOD`` of the others."""
+    """Returns the number of requests that began before ``late``; ``late`` came after ``FLOOD`` requests of another
+    client.
+    """
     order: list[str] = []
 
     async def app(scope: Scope, receive: Receive, send: Send) -> None:
@@ -95,7 +99,7 @@ def entered(service: Service, flood: dict[str, str], late: dict[str, str]) -> in
     async def all_() -> None:
         door = Admission(app, service)
         for one in (flood, late):
-            await ask(door, one)  # from now on the token is known
+            await ask(door, one)  # from now on the server has the token in its cache
         order.clear()
         await asyncio.gather(*(ask(door, one) for one in [*[flood] * FLOOD, late]))
 

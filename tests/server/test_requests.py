@@ -1,4 +1,4 @@
-"""What the server refuses, and how it says so; who may see what."""
+"""Refused requests with their messages, and the access rights of users."""
 
 import asyncio
 import gzip
@@ -41,7 +41,7 @@ ROUTES = [
 
 
 def refusal(answer: Any, status: int, code: str) -> dict[str, Any]:
-    """The problem in an answer, which must have the shape of RFC 9457."""
+    """Returns the problem in an answer; the problem must have the form of RFC 9457."""
     assert answer.status_code == status, answer.text
     assert answer.headers["content-type"] == "application/problem+json"
     problem: dict[str, Any] = answer.json()
@@ -394,7 +394,7 @@ def test_bad_parameters(server: Running, path: str, pointer: str) -> None:
 
 
 def test_an_unknown_parameter_is_told_what_is_known(server: Running) -> None:
-    """A state that is misspelt would else list all runs."""
+    """Otherwise a wrongly spelt state would list all runs."""
     told = refusal(server.ann.http.get("/v1/runs?stat=failed"), 400, "bad_parameter")
     allowed = "case, cursor, label, limit, prefix, since, state, text, until"
     assert told["detail"] == f"stat: /v1/runs has no such parameter; allowed: {allowed}; did you mean 'state'?"
@@ -559,7 +559,7 @@ def test_the_key_of_a_run_that_was_removed_is_answered_as_openapi_says(server: R
 
 
 def test_what_is_known_is_known_in_every_form_of_its_tag(server: Running) -> None:
-    """A proxy that compresses makes a tag weak; a browser may send several (RFC 9110, 13.1.2)."""
+    """A proxy that compresses makes a tag weak; a browser may send several tags (RFC 9110, 13.1.2)."""
     run = server.ann.submit()
     server.ann.wait_for(run)
     for path in (f"/v1/runs/{run}", f"/v1/runs/{run}/files/case.toml", f"/v1/runs/{run}/snapshots"):
@@ -570,7 +570,7 @@ def test_what_is_known_is_known_in_every_form_of_its_tag(server: Running) -> Non
 
 
 def test_a_body_that_breaks_off_is_no_fault_of_the_server() -> None:
-    """It was one in the log, with two tracebacks."""
+    """Before, the log had an error with two tracebacks."""
     said: Iterator[dict[str, Any]] = iter(
         [{"type": "http.request", "body": b"[run]", "more_body": True}, {"type": "http.disconnect"}]
     )
@@ -591,7 +591,7 @@ def test_a_body_that_breaks_off_is_no_fault_of_the_server() -> None:
 
 @pytest.mark.parametrize("path", ["/v1/runs/", "/v1/me/", "/healthz/", "/v1/sweeps/", "/readyz//"])
 def test_no_answer_leads_to_where_the_asker_says(server: Running, path: str) -> None:
-    """A redirect of a trailing slash was made of the header Host."""
+    """Before, the redirect for a trailing slash used the header Host."""
     answer = server.ann.http.get(path, headers={"Host": "evil.test"}, follow_redirects=False)
     assert answer.status_code == 404
     assert "evil.test" not in f"{answer.headers} {answer.text}"

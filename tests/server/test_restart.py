@@ -1,4 +1,4 @@
-"""A server that is killed loses nothing that it has acknowledged, and its workers go on."""
+"""A server that is killed loses no acknowledged run, and its workers continue."""
 
 import json
 import os
@@ -24,7 +24,7 @@ SLOTS = 12
 
 @dataclass
 class Aftermath:
-    """A server that follows one that was killed with runs in every situation."""
+    """State after a kill: a new server continues the runs of a server that was killed with runs in every state."""
 
     ann: User
     runs: Path
@@ -33,15 +33,15 @@ class Aftermath:
     pids: dict[str, int]
 
     def show(self, name: str) -> dict[str, Any]:
-        """The run of that name as the new server tells it."""
+        """Returns the state of the named run from the new server."""
         return self.ann.show(self.names[name])
 
     def last_words(self, name: str) -> float:
-        """When its worker has said the last that it said."""
+        """Returns the time of the last message that the worker of the run wrote."""
         return float(self.ann.events(self.names[name])[-2]["wall"])
 
     def states(self, name: str) -> list[str]:
-        """What its journal tells."""
+        """Returns the states in the run's journal."""
         return self.ann.states(self.names[name])
 
 
@@ -54,7 +54,7 @@ def after(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Aftermath]:
 
 
 def stage(server: Process, folder: Path) -> Aftermath:
-    """Brings runs into every situation, kills the server, lets time pass, and starts the next one."""
+    """Brings runs into every state, kills the server, waits, and starts the next server."""
     ann, go, soon = server.user(server.start()["url"]), folder / "go", folder / "soon"
     names = {
         "lives": ann.submit(ranks=2, wait=str(go)),
@@ -95,7 +95,7 @@ def stage(server: Process, folder: Path) -> Aftermath:
 
 
 def accepted(runs: Path) -> str:
-    """A run whose server died right after it said yes."""
+    """Makes a run whose server was killed directly after it accepted the run."""
     run, now = new_id()
     made = Submission(
         id=run, owner="ann", name="bar", title="", ranks=1, submitted=now, case_file="case.toml", body_sha256="",
@@ -186,7 +186,7 @@ def test_a_server_that_is_told_to_ends_its_runs(process: MakeProcess, tmp_path: 
 
 
 def gone(run: str) -> None:
-    """Returns when no process of the run lives any more."""
+    """Returns when all processes of the run have ended."""
     deadline = time.monotonic() + PATIENCE
     while living(run):
         assert time.monotonic() < deadline
@@ -194,7 +194,7 @@ def gone(run: str) -> None:
 
 
 def living(run: str) -> bool:
-    """True while a process has the run in its command line."""
+    """Returns True while a process has the run in its command line."""
     for entry in Path("/proc").iterdir():
         if entry.name.isdigit():
             try:
@@ -206,7 +206,7 @@ def living(run: str) -> bool:
 
 
 def test_the_folder_of_the_runs_may_have_any_name(tmp_path: Path) -> None:
-    """For the database, the launcher, the log and the backup."""
+    """The name occurs in the database, in the commands of the launcher, in the log and in the backup."""
     name = "100%s a%20b\\c #1?mode=ro&x=y;[z] 'q' \"w\" {v} $u \u00e4"
     place = tmp_path / name
     place.mkdir()
@@ -261,7 +261,7 @@ def children(pid: int) -> list[int]:
 
 
 def command_of(pid: int) -> bytes:
-    """Empty where there is no such process."""
+    """Returns the command line of a process; empty if the process does not exist."""
     try:
         return Path(f"/proc/{pid}/cmdline").read_bytes()
     except OSError:

@@ -1,4 +1,4 @@
-"""``:restart``: a new run goes on from a checkpoint of another one."""
+"""``:restart``: a new run continues from a checkpoint of another run."""
 
 import json
 import os
@@ -83,7 +83,7 @@ def test_a_run_that_has_none_yet_says_how_it_gets_some(server: Running) -> None:
 
 
 def remade(path: Path, kind: str) -> None:
-    """Something else in a file's place."""
+    """Replaces a file by something else."""
     path.unlink()
     if kind == "pipe":
         os.mkfifo(path)
@@ -125,7 +125,7 @@ def test_what_is_no_file_among_the_results_is_left_out(tmp_path: Path) -> None:
 def test_a_checkpoint_that_is_replaced_meanwhile_is_looked_for_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Of a run that goes on: it keeps its newest ones, and may write one at any moment."""
+    """A running run keeps its newest checkpoints only, and may write another one at any time."""
     source, real = made(tmp_path / "a", 10), os.link
 
     def replaced(one: str, other: str) -> None:

@@ -1,4 +1,4 @@
-"""Runs from submit to end, with real processes."""
+"""Runs from submission to end, with real processes."""
 
 import json
 import time

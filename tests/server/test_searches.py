@@ -1,4 +1,4 @@
-"""Adaptive sweeps as the server keeps them: reports, their bounds, whose they are, what a cancel says."""
+"""Adaptive sweeps that the server stores: reports, their limits, their owners, and cancels."""
 
 import json
 from typing import Any

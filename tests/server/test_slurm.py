@@ -1,4 +1,4 @@
-"""Runs as jobs of a real Slurm, which the tests start. Its faults are made with the real thing."""
+"""Runs as jobs of a real Slurm, which the tests start. Faults are made with real commands of Slurm."""
 
 import json
 import os
@@ -28,11 +28,11 @@ pytestmark = pytest.mark.skipif(bool(real_slurm.missing()), reason=real_slurm.mi
 
 BREAKING = Path(__file__).parents[1] / "parallel" / "breaking.toml"
 _DONE_WITH = 3.0
-"""s: a node has done with a job that is put back by then."""
+"""Time after which a node has finished with a requeued job, s."""
 DIGEST = tomllib.loads(BREAKING.with_name("digests.toml").read_text(encoding="utf-8"))["breaking"]
-"""Of that case, on any number of ranks."""
+"""Digest of the breaking case, the same on any number of ranks."""
 LONG = "12 us"
-"""Until which the same case takes some ten seconds: long enough to be interrupted."""
+"""End time with which the same case takes some ten seconds, long enough for an interruption."""
 
 
 @pytest.fixture(scope="module")
@@ -52,7 +52,7 @@ def site(cluster: Cluster, tmp_path: Path) -> Iterator[Site]:
 
 @pytest.fixture
 def solver(cluster: Cluster, tmp_path: Path) -> Iterator[Site]:
-    """The same with the real worker."""
+    """The same site with the real worker."""
     cluster.await_node()
     (tmp_path / "site.toml").write_text(SITE)
     with processes(tmp_path) as make:
@@ -158,7 +158,9 @@ def test_twelve_runs_at_a_time(site: Site) -> None:
 
 @pytest.mark.slow
 def test_a_sweep_is_one_array_with_a_job_for_each_run(site: Site, tmp_path: Path) -> None:
-    """Twelve runs: one sbatch; one is cancelled, one put back by hand, the server killed in between."""
+    """Twelve runs are one sbatch. One run is cancelled, one is requeued by command, and the server is killed
+    meanwhile.
+    """
     runs = sweep_of(site, 12, wait=str(tmp_path / "go"))
     jobs = [job_of(site, run) for run in runs]
     assert len({job.name for job in jobs}) == 1
@@ -193,7 +195,7 @@ def test_a_controller_killed_while_arrays_are_handed_over_makes_one_job_a_run(si
 
 @pytest.mark.slow
 def test_a_controller_killed_while_jobs_are_handed_over_makes_one_of_each(site: Site) -> None:
-    """Twenty times: the controller dies at another moment round sbatch, and comes back."""
+    """Twenty times: the controller is killed at another time before or after sbatch, and starts again."""
     runs = []
     for number in range(20):
         runs.append(site.submit(case_text(steps=2)))
@@ -250,7 +252,7 @@ def test_ranks_and_threads_by_both_launchers(solver: Site, profile: str, ranks: 
 
 
 class Heard:
-    """A link that remembers what has come over it."""
+    """A subscription that stores the messages that have arrived."""
 
     def __init__(self, link: Link) -> None:
         self.name, self.trouble, self._link = link.name, "", link
@@ -268,7 +270,7 @@ class Heard:
 
 @pytest.mark.slow
 def test_a_run_is_watched_live_over_zenoh(solver: Site) -> None:
-    """Its rank 0 publishes with the credentials of a hidden file, for its owner alone."""
+    """Rank 0 of the run publishes with credentials from a hidden file, which only the owner can read."""
     run = solver.submit(with_ranks(2, LONG), "pmi2")
     token = str(solver.ann.http.headers["Authorization"]).removeprefix("Bearer ")
     with connect(str(solver.ann.http.base_url), token) as session:
@@ -289,7 +291,7 @@ def test_a_run_is_watched_live_over_zenoh(solver: Site) -> None:
 
 @pytest.fixture(scope="module")
 def uninterrupted(tmp_path_factory: pytest.TempPathFactory) -> str:
-    """The digest of the long case on one rank, without Slurm."""
+    """Digest of the long case on one rank without Slurm."""
     place = tmp_path_factory.mktemp("alone")
     (place / "case.toml").write_text(with_ranks(1, LONG))
     ended(command(1, str(place / "case.toml"), "--out", str(place / "out")))
@@ -301,7 +303,9 @@ def uninterrupted(tmp_path_factory: pytest.TempPathFactory) -> str:
 @pytest.mark.slow
 @pytest.mark.parametrize(("profile", "jobs"), [("standard", 1), ("pmi2", 1), ("grace", 1), ("gone", 2)])
 def test_a_preempted_run_goes_on_to_the_same_digest(solver: Site, profile: str, jobs: int, uninterrupted: str) -> None:
-    """Put back by Slurm, put back by the job within a grace, or ended for good: then a next job goes on."""
+    """The run is requeued by Slurm, requeued by the job within a grace period, or ended for good; then another job
+    continues the run.
+    """
     run = solver.submit(with_ranks(2, LONG), profile)
     await_progress(solver, run)
     solver.cluster.command("sbatch", "-p", "high", "-n", str(real_slurm.CORES), "-o", "/dev/null", "--wrap", "sleep 5")
@@ -316,8 +320,10 @@ def test_a_preempted_run_goes_on_to_the_same_digest(solver: Site, profile: str, 
 
 
 def hurry(solver: Site, run: str) -> None:
-    """Slurm lets a job that it has put back wait for two minutes, which are not waited for here; but the node must have
-    done with it: it takes one that starts in the second of its end for the one that was ended.
+    """Releases a requeued job.
+
+    Slurm lets a requeued job wait for two minutes, and the test skips this time. The node must have finished with
+    the job: a job that starts in the second of its end is taken for the one that was ended.
     """
     since = dict[str, float]()
     deadline = time.monotonic() + 20.0
@@ -332,7 +338,7 @@ def hurry(solver: Site, run: str) -> None:
 @pytest.mark.slow
 @pytest.mark.timeout(900)
 def test_a_run_that_reaches_the_time_limit_goes_on_to_the_same_digest(solver: Site, uninterrupted: str) -> None:
-    """Its ranks are held up until Slurm has told the job that its time is nearly over."""
+    """The ranks are stopped until Slurm has sent the job the signal before its time limit."""
     run = solver.submit(with_ranks(2, LONG), "brief")
     await_progress(solver, run)
     stopped = processes_of(run)
@@ -350,7 +356,7 @@ def test_a_run_that_reaches_the_time_limit_goes_on_to_the_same_digest(solver: Si
 
 
 def with_ranks(ranks: int, end_time: str = "1.5 us", threads: int = 1) -> str:
-    """The breaking case with so many ranks and threads, to another end."""
+    """Returns the breaking case with numbers of ranks and threads, and another end time."""
     text = BREAKING.read_text()
     assert '[run]\nend_time = "1.5 us"\n' in text
     return text.replace(
@@ -359,7 +365,7 @@ def with_ranks(ranks: int, end_time: str = "1.5 us", threads: int = 1) -> str:
 
 
 def await_progress(solver: Site, run: str) -> None:
-    """Returns when the run has taken some steps."""
+    """Returns when the run has computed some steps."""
     solver.reached(run, 300.0, State.RUNNING)
     deadline = time.monotonic() + 100.0
     while not (solver.ann.show(run)["progress"] or {}).get("step"):

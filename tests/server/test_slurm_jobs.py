@@ -1,4 +1,4 @@
-"""Decisions about jobs without Slurm: lost replies, second jobs, meaning of signals, the lock."""
+"""Decisions about jobs, without Slurm: lost answers, second jobs, meaning of signals, the lock."""
 
 import json
 import os
@@ -63,7 +63,7 @@ def test_nobody_hands_over_while_the_queue_cannot_be_read(place: Path) -> None:
     "said", [b"\xff{|||\n", b"<html>\n", b"7|\n", b"7|RUNNING|0|conoid-a|None\n8|PEND", b"a|b|c|d|e\n"]
 )
 def test_a_list_that_is_none_is_no_empty_list(place: Path, said: bytes) -> None:
-    """A run whose job is not on it would be handed over again."""
+    """Otherwise a run whose job is missing in the list would be submitted again."""
     found = commands(place, "echo 101")
     (place / "queue").write_bytes(said)
     with pytest.raises(slurm_call.AwayError, match="squeue"):
@@ -135,7 +135,7 @@ def test_of_two_jobs_the_one_that_has_begun_stays(place: Path) -> None:
 
 @pytest.mark.parametrize("reason", ["launch failed requeued held", "launch_failed_requeued_held"])
 def test_a_job_that_no_node_starts_is_released_a_few_times_and_then_lost(place: Path, reason: str) -> None:
-    """Slurm holds it until somebody looks at it; a run never waits for that in vain."""
+    """Slurm holds the job until an operator releases it; a run never waits for the operator."""
     worker = SlurmWorker(place / "run", JOB, Slurm(profiles={"a": Profile()}, bin=commands(place, "exit 1")))
     worker.write_down(job="7")
     held, runs = Entry("7", "PENDING", 0.0, JOB.name, reason), Entry("7", "RUNNING", 5.0, JOB.name, "None")
@@ -164,7 +164,7 @@ def test_a_job_that_somebody_holds_stays_held(place: Path, reason: str) -> None:
 def test_a_restarted_server_ends_no_run_that_was_interrupted(
     tmp_path: Path, asked: Cause | None, state: State, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The worker has told that it stops; only the database knows that somebody wanted it."""
+    """The worker has reported its stop. Only the database contains that the stop was requested."""
     monkeypatch.setattr(SlurmLauncher, "_work", lambda launcher: None)
     run, now = new_id()
     made = Submission(
@@ -182,14 +182,14 @@ def test_a_restarted_server_ends_no_run_that_was_interrupted(
 
 
 def commands_of(place: Path) -> str:
-    """A Slurm that does not answer."""
+    """Writes commands of a Slurm that does not answer."""
     (place / "bin").mkdir()
     (place / "away").touch()
     return commands(place, "exit 1")
 
 
 def test_a_job_that_waits_though_its_run_has_ended_is_taken_out(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A controller that crashed has put back what it had started, under the same number."""
+    """A controller that crashed has requeued a started job under the same number."""
     run = place / "run"
     worker = SlurmWorker(run, JOB, Slurm(profiles={"a": Profile()}, bin=commands(place, "exit 1")))
     worker.write_down(job="7", command=["false"])
@@ -292,7 +292,7 @@ def test_one_worker_writes_into_a_folder(tmp_path: Path) -> None:
 
 
 def test_a_world_of_the_wrong_size_is_told(tmp_path: Path) -> None:
-    """As srun without --mpi=pmi2 makes them: every process is a world of one."""
+    """This happens with srun without --mpi=pmi2: each process is a world of one rank."""
     words = [sys.executable, "-m", "conoid.worker", "two_tets", "--out", str(tmp_path / "out"), "--ranks", "2"]
     ended = subprocess.run(words, capture_output=True, text=True, timeout=120, check=False)
     assert ended.returncode == 1
@@ -311,7 +311,7 @@ echo $number
 
 
 def group_of(place: Path, number: int, body: str = "") -> tuple[Arrays, list[SlurmWorker]]:
-    """Runs of one sweep that nobody has handed over yet, and an sbatch that does ``body`` first."""
+    """Returns runs of one sweep that are not submitted yet; sbatch runs ``body`` first."""
     bin_ = commands(place, "exit 1")
     (place / "bin" / "sbatch").write_text(ARRAY.format(place=place, body=body))
     site, made = Slurm(profiles={"a": Profile()}, bin=bin_), []
@@ -342,7 +342,9 @@ def test_what_starts_together_is_one_array(place: Path) -> None:
 
 
 def test_an_array_whose_number_was_lost_is_not_handed_over_again(place: Path) -> None:
-    """Nor is it by the next server, which knows the records alone; a task that is not there is handed over."""
+    """The next server, which has only the records, does not submit the array again either. A task that does not
+    exist is submitted.
+    """
     lost = 'echo "101_0|PENDING|N/A|$name|R" >> queue; echo "sbatch: error: Socket timed out" >&2; exit 1'
     arrays, workers = group_of(place, 2, lost)
     with pytest.raises(slurm_call.AwayError):
@@ -365,7 +367,7 @@ def test_an_array_that_is_refused_goes_one_by_one(place: Path) -> None:
 
 
 def test_a_task_finds_its_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """And runs nothing where another job has the run."""
+    """The task runs nothing if another job has the run."""
     (tmp_path / "run" / layout.LOGS).mkdir(parents=True)
     (tmp_path / layout.ARRAY).write_text(json.dumps([str(tmp_path), str(tmp_path / "run")]))
     monkeypatch.setattr(os, "dup2", lambda log, stream: None)

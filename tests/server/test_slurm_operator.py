@@ -1,4 +1,4 @@
-"""What an operator does to a real Slurm while a server hands its runs over to it."""
+"""Actions of an operator on a real Slurm while a server submits its runs to it."""
 
 import os
 import signal
@@ -30,7 +30,7 @@ def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
 
 @pytest.fixture(params=["runs of a site", "50%j of \\n"])
 def site(cluster: Cluster, tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[Site]:
-    """In folders with odd names."""
+    """A site whose folders have unusual names."""
     cluster.await_node()
     place = tmp_path / request.param
     place.mkdir()
@@ -41,7 +41,7 @@ def site(cluster: Cluster, tmp_path: Path, request: pytest.FixtureRequest) -> It
 
 
 def partition(_: Site) -> str:
-    """Of the profile that runs take."""
+    """Returns the partition of the profile that runs use."""
     return "low"
 
 
@@ -84,7 +84,7 @@ def test_a_task_that_is_cancelled_by_hand_while_it_waits_is_cancelled(site: Site
 
 
 def script_of(run: str) -> list[int]:
-    """The process that the script of the run's job has become."""
+    """Returns the process of the job script of the run."""
     found = subprocess.run(
         ["pgrep", "-f", f"conoid.worker.run.job .*{run}"], capture_output=True, text=True, check=True
     )
@@ -93,7 +93,7 @@ def script_of(run: str) -> list[int]:
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
 def test_a_job_that_was_killed_by_hand_is_not_cancelled(site: Site, number: signal.Signals) -> None:
-    """SIGTERM to its script, SIGKILL to its ranks and its script."""
+    """The script gets SIGTERM; the ranks and the script get SIGKILL."""
     run = site.submit(case_text(steps=100_000, pace=0.02))
     site.reached(run, 30.0, State.RUNNING)
     ranks, script = processes_of(run), script_of(run)
@@ -107,7 +107,7 @@ def test_a_job_that_was_killed_by_hand_is_not_cancelled(site: Site, number: sign
 
 
 def test_a_run_whose_script_alone_was_killed_goes_on_from_its_checkpoint(site: Site) -> None:
-    """Slurm ends the ranks of such a job, and these leave a checkpoint; it ends as it is asked to."""
+    """Slurm ends the ranks of such a job, and the ranks leave a checkpoint. The job ends in the normal way."""
     run = site.submit(case_text(steps=100_000, pace=0.02))
     site.reached(run, 30.0, State.RUNNING)
     for pid in script_of(run):

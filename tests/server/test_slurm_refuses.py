@@ -1,4 +1,4 @@
-"""What Slurm and its operator do to jobs: refusals that pass, odd names, cancels by hand, commands that hang."""
+"""Temporary refusals of Slurm, unusual names, cancels by the operator, and commands that hang."""
 
 import time
 from pathlib import Path
@@ -53,7 +53,7 @@ def place(tmp_path: Path) -> Path:
 
 
 def worker_of(place: Path, name: str = "run", accounting: Accounting | None = None) -> SlurmWorker:
-    """A run that nobody has handed over yet."""
+    """Returns a run that is not submitted yet."""
     folder = place / name
     (folder / layout.LOGS).mkdir(parents=True)
     job = batch.new_job(name, 1, ("a", Profile()), ["true"], 0.0, place=str(place / "bin"))
@@ -63,7 +63,7 @@ def worker_of(place: Path, name: str = "run", accounting: Accounting | None = No
 
 
 def says(place: Path, text: str, code: int = 1) -> None:
-    """What sbatch answers."""
+    """Sets the answer of sbatch."""
     (place / "said").write_text(f"{text}\n")
     commands(place, f"cat said >&2; exit {code}")
 
@@ -143,7 +143,7 @@ def test_words_of_a_path_are_no_state_of_a_job(place: Path) -> None:
 
 
 def array_of(place: Path, size: int) -> list[SlurmWorker]:
-    """Runs that are tasks of the array 101."""
+    """Returns runs that are tasks of the array 101."""
     workers = [worker_of(place, f"run{n}") for n in range(size)]
     folder = place / "array"
     folder.mkdir()

@@ -1,4 +1,4 @@
-"""What the server needs on disk is gone, or is not what it was: it says so, or makes it anew."""
+"""A missing or changed file of the server is reported or made again."""
 
 import os
 import shutil
@@ -74,7 +74,7 @@ def test_a_run_that_was_to_be_cancelled_is_cancelled_where_its_folder_cannot_be_
 
 @pytest.fixture
 def counted(monkeypatch: pytest.MonkeyPatch) -> dict[str, int]:
-    """The kernel's count, as a test sets it."""
+    """Replaces the kernel's counter by a value of the test."""
     told = {"kills": 4}
     monkeypatch.setattr(memory, "kills", lambda: told["kills"])
     return told

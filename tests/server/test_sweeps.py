@@ -1,4 +1,4 @@
-"""Sweeps: all runs or none, each once, as many at a time as was said, a table of what came out."""
+"""Sweeps: all runs or none, each run once, a limited number at a time, and the table of results."""
 
 import asyncio
 import csv
@@ -177,7 +177,7 @@ def test_a_number_that_is_none_is_named(server: Running) -> None:
 
 @pytest.fixture
 def narrow(settings: Settings) -> Iterator[User]:
-    """A user who may have as many open runs as the sweep has points, and has one already."""
+    """A user with one open run, whose limit of open runs is the number of points of the sweep."""
     allowed = replace(settings, caps=Caps(free_disk=0, queued=len(ENDS)))
     with opened(allowed) as service, TestClient(build_app(service), base_url="http://127.0.0.1") as client:
         client.headers["Authorization"] = f"Bearer {create_token(service.store, 'ann', frozenset({'read', 'submit'}))}"
@@ -226,7 +226,7 @@ def test_a_sweep_that_is_refused_in_the_middle_leaves_nothing_that_runs(
 
 
 def broken_off(settings: Settings, monkeypatch: pytest.MonkeyPatch, key: str | None) -> str:
-    """A sweep of four points of which two were accepted when the server died."""
+    """Returns a sweep of four points of which two were accepted before the server was killed."""
     with opened(settings) as service:
         real, left = service.desk.submit, [2]
 
@@ -267,7 +267,7 @@ def test_a_sweep_that_cannot_be_completed_is_cancelled_with_its_runs(
     assert not list((settings.runs / "sweeps").glob("*.json"))
 
 
-# What is told of one --------------------------------------------------------------------------------------------------
+# Answers about a sweep ------------------------------------------------------------------------------------------------
 
 
 def test_a_run_that_is_forgotten_shifts_no_other_to_its_point(server: Running) -> None:
@@ -320,7 +320,7 @@ def test_a_point_that_is_nested_too_deeply_is_refused(server: Running) -> None:
 
 
 def test_nobody_who_hands_in_a_run_waits_for_sweeps(settings: Settings, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Not even who hands in the sweep; and one sweep does not wait for that of somebody else."""
+    """The user of the sweep does not wait either, and a sweep does not wait for that of another user."""
     monkeypatch.setattr(reader, "usable_cores", lambda: 1)
     real, reading, go = Desk.read, {"ann": threading.Event(), "bob": threading.Event()}, threading.Event()
 

@@ -1,4 +1,4 @@
-"""Points of a sweep that have not succeeded are run again; the others stay."""
+"""Points of a sweep without success run again; successful points stay."""
 
 import json
 import shutil
@@ -28,7 +28,7 @@ def again(user: User, sweep: dict[str, Any], body: bytes, status: int = 202) -> 
 
 
 def cancelled_in_part(server: Running, tmp_path: Path) -> tuple[dict[str, Any], bytes, list[str]]:
-    """A sweep whose third run was cancelled, and whose others have succeeded."""
+    """Returns a sweep whose third run was cancelled and whose other runs have succeeded."""
     body = json.dumps({
         "case": tomllib.loads(case_text(wait=str(tmp_path / "go"))), "points": [{"run.end_time": end} for end in ENDS],
     }).encode()  # fmt: skip

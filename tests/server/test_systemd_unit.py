@@ -1,4 +1,6 @@
-"""The shipped unit of systemd: a run of two ranks inside its sandbox, what it leaves open, and when it starts again."""
+"""The shipped unit of systemd: a run of two ranks inside its sandbox, the remaining exposure, and automatic
+restarts.
+"""
 
 import os
 import re
@@ -22,9 +24,9 @@ ROOT = Path(__file__).parents[2]
 UNIT = ROOT / "deploy" / "conoid-server.service"
 ANALYZE = shutil.which("systemd-analyze")
 EXPOSURE = 2.0
-"""That systemd-analyze may find at most; 1.6 with systemd 252."""
+"""Limit of the exposure that systemd-analyze reports; it is 1.6 with systemd 252."""
 END = 240.0
-"""s in which a run ends that compiles every kernel on a machine that has much else to do."""
+"""Time limit of a run that compiles all kernels on a busy machine, s."""
 SANDBOX = pytest.mark.skipif(
     os.geteuid() != 0 or syscalls.library() is None or ANALYZE is None,
     reason="needs root, libseccomp and systemd-analyze (Debian: apt-get install systemd)",
@@ -33,22 +35,22 @@ SANDBOX = pytest.mark.skipif(
 
 @dataclass
 class Place:
-    """A home of the service user, and the unit that runs there."""
+    """A home of the service user, and the unit that runs in this home."""
 
     state: Path
 
     def command(self, *words: str) -> list[str]:
-        """A command inside the unit's sandbox."""
+        """Returns the command line that runs a command inside the unit's sandbox."""
         return [sys.executable, str(ROOT / "tests/server/sandbox.py"), str(UNIT), str(self.state), "--", *words]
 
     def fill_cache(self) -> None:
-        """The kernels that this user has, as if an earlier run had compiled them."""
+        """Copies the compiled kernels of this user, as if an earlier run had compiled them."""
         kept = cache_folder()
         shutil.copytree(kept, self.state / ".cache/conoid/kernels" / kept.name, dirs_exist_ok=True)
         self.own()
 
     def own(self) -> None:
-        """Everything belongs to the user of the service."""
+        """Makes the user of the service the owner of all files."""
         user = sandbox.nobody()
         for place, folders, names in os.walk(self.state):
             for name in (".", *folders, *names):
@@ -65,7 +67,7 @@ def place(tmp_path: Path) -> Place:
 
 @pytest.fixture
 def url(place: Place) -> Iterator[str]:
-    """Of a server that the unit's ExecStart has started, at a free port."""
+    """URL of a server that the unit's ExecStart has started at a free port."""
     start = sandbox.read(UNIT)["ExecStart"][0].split()
     child = subprocess.Popen(place.command(*start, "--port", "0", "--zenoh-port", "0", "--end-runs", "--grace", "1"))
     address = place.state / "runs/server.json"
@@ -82,7 +84,7 @@ def url(place: Place) -> Iterator[str]:
 
 
 def token(place: Place) -> str:
-    """For Ann, made by the command of docs/howto/site.md."""
+    """Token for ann, made by the command of docs/howto/site.md."""
     serve = ["/opt/conoid/bin/python", "-m", "conoid.server", "--runs", "/var/lib/conoid/runs"]
     told = subprocess.run(
         place.command(*serve, "token", "add", "ann"), check=True, capture_output=True, text=True
@@ -91,7 +93,7 @@ def token(place: Place) -> str:
 
 
 def ended(url: str, place: Place, text: str) -> str:
-    """How a run of the case ends."""
+    """Submits the case and returns the final state of the run."""
     headers = {"Authorization": f"Bearer {token(place)}"}
     with httpx2.Client(base_url=url, headers=headers, timeout=40.0) as http:
         run = http.post("/v1/runs", content=text, headers=TOML).json()["id"]

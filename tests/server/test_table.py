@@ -1,4 +1,4 @@
-"""The table of runs: bounded, paged, the runs of who asks alone, results that are read once."""
+"""The table of runs: bounded, paged, limited to the user's own runs; results are read once."""
 
 import json
 import random
@@ -33,7 +33,7 @@ def table(user: User, **query: Any) -> dict[str, Any]:
 
 
 def value(told: dict[str, Any], run: dict[str, Any], key: str) -> Any:
-    """A value of the case of a run."""
+    """Returns a value of the case of a run."""
     return run["values"].get(key, told["cases"][run["case"]]["values"].get(key))
 
 
@@ -236,7 +236,7 @@ def store(tmp_path: Path) -> Iterator[Store]:
 
 
 def laid(runs: Path, store: Store, owners: Sequence[str]) -> list[Run]:
-    """Runs that have ended, a folder each with a small case."""
+    """Makes finished runs, each in a folder with a small case."""
     found = []
     for n, owner in enumerate(owners):
         run_id, now = folder.new_id()

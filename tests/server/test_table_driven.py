@@ -1,4 +1,4 @@
-"""The table of runs and the pages of sweeps in a real browser: 200 runs, 10 sweeps, some that go on."""
+"""The table of runs and the pages of sweeps in a real browser: 200 runs, 10 sweeps, some of them running."""
 
 import json
 import time
@@ -22,7 +22,7 @@ pytestmark = [
 ROWS = "document.querySelectorAll('.runs tbody tr:not(.space)').length"
 FIRST = "document.querySelector('.runs tbody tr:not(.space) td.first').innerText"
 OPENS, SORTS = 1.5, 100.0
-"""s until the table stands, the least of some times, and ms of a sort, the median."""
+"""Limits: s until the table is shown (minimum of several times), ms of a sort (median)."""
 OPENED = 3
 
 
@@ -54,7 +54,7 @@ def plans(site: Site) -> list[dict[str, Any]]:
 
 
 def press(page: Page, words: str) -> None:
-    """A click on the button whose text begins so."""
+    """Clicks on the button whose text begins with the given text."""
     page.evaluate(f"""(() => {{
       const words = {json.dumps(words)};
       [...document.querySelectorAll("button")].find((one) => one.innerText.trim().startsWith(words)).click();
@@ -62,7 +62,7 @@ def press(page: Page, words: str) -> None:
 
 
 def fill(page: Page, text: str) -> None:
-    """Another text in the filter."""
+    """Sets the text of the filter."""
     page.evaluate(f"""(() => {{
       const field = document.querySelector(".search");
       field.value = {json.dumps(text)};
@@ -71,7 +71,7 @@ def fill(page: Page, text: str) -> None:
 
 
 def column(page: Page, title: str) -> list[str]:
-    """The texts of a column of the rows in view."""
+    """Returns the texts of a column in the visible rows."""
     return list(
         page.evaluate(f"""(() => {{
       const heads = [...document.querySelectorAll('.runs thead th')];
@@ -82,7 +82,7 @@ def column(page: Page, title: str) -> list[str]:
 
 
 def opening(site: Site, page: Page, k: int) -> float:
-    """s until the table of a page that is loaded anew stands."""
+    """Returns the time from loading the page until the table is shown, s."""
     began = time.perf_counter()
     page.go(f"{site.url}?again{k}#/")
     page.wait(f"{ROWS} > 5")
@@ -137,7 +137,7 @@ def test_twelve_marked_runs_are_compared_by_keys_alone(site: Site, page: Page) -
     for _ in range(12):
         page.press(" ")
         page.press("Tab")  # the run
-        page.press("Tab")  # the next box
+        page.press("Tab")  # the next checkbox
     press(page, "Compare 12")
     page.wait("location.hash.split('/').length === 14")
     page.go(f"{site.url}?back#/")

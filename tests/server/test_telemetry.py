@@ -1,4 +1,4 @@
-"""The embedded Zenoh router: which client may subscribe to which runs."""
+"""The embedded Zenoh router: the runs to which each client may subscribe."""
 
 import json
 import socket
@@ -39,7 +39,7 @@ def client(port: int, user: str = "", password: str = "") -> Iterator[zenoh.Sess
 
 
 class Ear:
-    """What a session hears under a key."""
+    """A subscription of a session to a key, with the messages that have arrived."""
 
     def __init__(self, session: zenoh.Session, key: str) -> None:
         self.heard: list[tuple[str, bytes]] = []
@@ -51,7 +51,7 @@ class Ear:
         self._news.set()
 
     def hears(self, say: Callable[[], None], patience: float = PATIENCE) -> bool:
-        """Says it until it is heard."""
+        """Calls ``say`` until a message arrives; returns False if no message arrives in time."""
         deadline = time.monotonic() + patience
         while time.monotonic() < deadline:
             say()
@@ -100,8 +100,8 @@ def test_the_history_and_the_life_sign_pass_the_rules(telemetry: Telemetry) -> N
         token.undeclare()  # type: ignore[no-untyped-call]
         publisher = ext.declare_advanced_publisher(workers, f"{worker.prefix}/counts", cache=ext.CacheConfig())
         publisher.put(b"early")
-        # A subscriber asks for the history once. The declaration of the publisher's cache comes over another
-        # connection, and the router may see it later: so ask until the history comes.
+        # A subscriber requests the history once. The declaration of the publisher's cache arrives over another
+        # connection, perhaps later: the subscriber repeats the request until the history arrives.
         heard, deadline = threading.Event(), time.monotonic() + PATIENCE
         while not heard.is_set():
             assert time.monotonic() < deadline
@@ -193,7 +193,7 @@ def test_without_tokens_anybody_on_this_machine_may_listen(tmp_path: Path) -> No
 
 
 def test_silent_connections_close_the_port_to_nobody(telemetry: Telemetry) -> None:
-    """Neither those that are open, nor those that come instead of those that were closed."""
+    """Neither open connections block the port, nor connections that replace closed ones."""
     ann, worker = telemetry.reader("ann", ANN), telemetry.worker("ann", "r1")
     with ExitStack() as stack:
         for _ in range(150):

@@ -1,4 +1,6 @@
-"""Threads for what may block: few for each user, none shared with others, and never one that the server waits for."""
+"""Threads for calls that may block: few for each user, not shared between users; the server never waits for a
+thread.
+"""
 
 import asyncio
 import threading
@@ -28,7 +30,7 @@ HANG = Http(patience="0.4 s")
 
 @pytest.fixture
 def gate() -> Iterator[threading.Event]:
-    """What hangs, hangs until it is set."""
+    """Event for which blocked calls wait."""
     made = threading.Event()
     yield made
     made.set()
@@ -36,7 +38,7 @@ def gate() -> Iterator[threading.Event]:
 
 @pytest.fixture
 def users(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[User, User]]:
-    """Of a server that waits 0.4 s for its disk."""
+    """Users of a server that waits 0.4 s for its disk."""
     monkeypatch.setattr(readiness, "_LIMIT", 0.3)
     settings = Settings(
         runs=tmp_path / "runs", port=0, zenoh_port=None, worker=FAKE, caps=Caps(free_disk=0), site=Site(http=HANG)
@@ -53,7 +55,7 @@ def users(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[Use
 
 
 def together(works: Sequence[Callable[[], Awaitable[Any]]]) -> list[Any]:
-    """What comes of all at once; errors are returned."""
+    """Runs all calls at the same time and returns results and errors."""
 
     async def all_() -> list[Any]:
         return await asyncio.gather(*(work() for work in works), return_exceptions=True)
@@ -92,7 +94,7 @@ def test_a_thread_that_hangs_stays_taken_and_is_free_when_its_work_ends(gate: th
 
 
 def test_users_take_turns(gate: threading.Event) -> None:
-    """One thread for all: who asks for ten things is served once before the next user, not ten times."""
+    """With one thread, a user with ten calls is served once before the next user, not ten times."""
     pool, order = ThreadPool(each=1, waiting=100, patience=PATIENCE, most=1), list[str]()
     together([as_("ann", pool, lambda: order.append("ann"))] * 10 + [as_("bob", pool, lambda: order.append("bob"))])
     assert order.index("bob") <= 2

@@ -1,4 +1,4 @@
-"""Files that users send: taken in whole or in pieces, verified, counted, kept apart, removed."""
+"""Files that users send: received in whole or in pieces, verified, counted, separated by user, removed."""
 
 import errno
 import hashlib
@@ -31,19 +31,19 @@ def settings(settings: Settings) -> Settings:
 
 
 def made(size: int, seed: int = 1) -> tuple[bytes, str]:
-    """A file, and its hash."""
+    """Returns a file and its hash."""
     data = random.Random(seed).randbytes(size)
     return data, hashlib.sha256(data).hexdigest()
 
 
 def put(user: User, sha256: str, data: Any, told: str | None = None, **headers: str) -> Any:
-    """One PUT, of the whole file or of the piece that is ``told``."""
+    """Sends one PUT of the whole file, or of the piece in the header ``told``."""
     piece = {"Content-Range": f"bytes {told}"} if told else {}
     return user.http.put(f"/v1/files/{sha256}", content=data, headers={**piece, **headers})
 
 
 def refused(answer: Any, status: int, code: str) -> str:
-    """The one line of a refusal."""
+    """Returns the one line of a refusal."""
     assert (answer.status_code, answer.json()["code"]) == (status, code), answer.text
     line = str(answer.json()["detail"])
     assert "\n" not in line
@@ -51,7 +51,7 @@ def refused(answer: Any, status: int, code: str) -> str:
 
 
 def files_of(user: User) -> list[str]:
-    """What lies in the folder of a user."""
+    """Returns the files in the folder of a user."""
     folder = user.runs / uploads.FOLDER / user.name
     return sorted(path.name for path in folder.iterdir()) if folder.exists() else []
 
@@ -102,11 +102,13 @@ def test_what_a_killed_server_had_not_verified_is_verified_by_a_word(server: Run
 
 @pytest.mark.parametrize("seed", range(3))
 def test_whatever_comes_in_whatever_order_a_whole_file_is_the_right_one(server: Running, seed: int) -> None:
-    """Random pieces of two files, at right and wrong places, with right and wrong bytes, against a book of them."""
+    """Random pieces of two files are sent, at right and wrong offsets, with right and wrong bytes, and compared with
+    a model.
+    """
     dice = random.Random(seed)
     files = [made(size, seed * 10 + size) for size in (400, 700)]
     book: dict[str, bytes | None] = {}
-    """What has arrived of each; a file that is whole has None."""
+    """Bytes of each file that have arrived; None for a complete file."""
     for _ in range(150):
         data, sha256 = dice.choice(files)
         there = book.get(sha256, b"")
@@ -187,7 +189,7 @@ def test_what_is_no_hash_names_no_file(server: Running, name: str) -> None:
 
 
 def test_bytes_and_number_of_files_are_a_users_quota(server: Running) -> None:
-    """What is on its way counts with all that it will have."""
+    """A file that is being sent counts with its full size."""
     (first, one), (second, two) = made(3000, 1), made(2500, 2)
     assert put(server.ann, one, first[:10], "0-9/3000").status_code == 200
     line = refused(put(server.ann, two, second), 429, "file_quota")
@@ -203,7 +205,7 @@ def test_bytes_and_number_of_files_are_a_users_quota(server: Running) -> None:
 
 
 def test_a_stranger_learns_nothing(server: Running, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Answers for a hash that another user has and for one that nobody has are the same, and so is the work."""
+    """The answers for a hash of another user's file and for an unknown hash are equal and take the same work."""
     (there, none) = made(500, 1), made(500, 2)
     assert put(server.ann, there[1], there[0]).status_code == 201
     assert put(server.bob, made(1)[1], made(1)[0]).status_code == 201
@@ -265,7 +267,7 @@ def test_a_full_disk_refuses_in_one_line_and_keeps_what_has_come(
 
 
 def test_wherever_a_disk_fails_the_same_again_makes_the_file_whole(tmp_path: Path) -> None:
-    """A fault at each call that writes, one after the other: never is there a file under its name that is not whole."""
+    """A fault occurs at each call that writes, one after the other. A file with its final name is always complete."""
     data, sha256 = made(1000)
     store, fired = Uploads(tmp_path, Files(), 0), 0
 
@@ -288,7 +290,7 @@ def test_wherever_a_disk_fails_the_same_again_makes_the_file_whole(tmp_path: Pat
 
 
 def test_another_connection_waits_and_takes_over_from_one_that_is_silent(server: Running) -> None:
-    """By the receiver's own book: a transfer that was heard of lately, and one that was not."""
+    """The receiver's record has a transfer with recent bytes, and a silent one."""
     data, sha256 = made(100)
     transfer = receiving._Transfer()
     book = server.service.receiver._open

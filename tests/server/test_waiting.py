@@ -1,4 +1,4 @@
-"""Scheduling: shares, priorities, backfill with a reservation, memory. Pure functions, no clock."""
+"""Scheduling: shares, priorities, backfill with a reservation, memory. Pure functions without a clock."""
 
 import math
 import random
@@ -20,7 +20,7 @@ def need(run: str, owner: str = "ann", ranks: int = 1, **more: float) -> Need:
 
 
 def free(need: Need, starts: Sequence[Need]) -> str:
-    """Nobody is kept from starting."""
+    """Returns no reason to hold a run."""
     return ""
 
 
@@ -103,7 +103,9 @@ def test_memory_is_summed_over_what_runs() -> None:
     ("dust", "room", "memory"), [(0.0, math.inf, 3e9), (2e9, math.inf, 5e9), (2e9, 4e9, 4e9), (2e9, 1e9, 3e9)]
 )
 def test_what_may_break_takes_memory_for_its_dust_where_there_is_some(dust: float, room: float, memory: float) -> None:
-    """What is too large for the server as dust starts alone there; what is too large as it is does not."""
+    """A run whose memory exceeds that of the server only after all tets separate starts alone. A run whose memory
+    exceeds that of the server from the start does not start.
+    """
     told: dict[str, int | float] = {"memory_bytes": 3e9, **({"dust_bytes": dust} if dust else {})}
     made = Submission(
         id="1", owner="ann", name="", title="", ranks=1, submitted=0.0, case_file="case.toml", body_sha256="",
@@ -121,7 +123,7 @@ def test_who_is_held_holds_nobody_up() -> None:
 
 
 def test_who_can_never_start_holds_nobody_up() -> None:
-    """A server that was started again with fewer slots, or with less memory."""
+    """The server was started again with fewer slots or less memory."""
     made = plan([need("0", ranks=4), need("1", memory=9e9), need("2")], [], Room(2, 4e9), NOW, free)
     assert made.start == ["2"]
     assert made.why == {
@@ -131,8 +133,8 @@ def test_who_can_never_start_holds_nobody_up() -> None:
 
 
 def test_no_backfill_ever_delays_the_first_that_waits() -> None:
-    """Random queues, played to their ends with true run times: the large run starts when it would have without the
-    small ones, although what runs ends in an order that nobody has foreseen.
+    """Random queues are simulated with true run times, which differ from the estimates. The large run starts when it
+    would start without the small runs.
     """
     dice = random.Random(4)
     passed = 0
@@ -156,7 +158,7 @@ def test_no_backfill_ever_delays_the_first_that_waits() -> None:
 
 
 def first_fit(large: Need, ends: list[tuple[int, float]], slots: int) -> float:
-    """When so many ranks are free, with the true ends of what runs."""
+    """Returns the time at which a number of ranks is free, from the true ends of the running runs."""
     left = slots - sum(ranks for ranks, _ in ends)
     if left >= large.cores:
         return 0.0

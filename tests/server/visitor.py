@@ -1,4 +1,4 @@
-"""A person before the page: the server that is visited, and what is done and read there again and again."""
+"""User of the page: the server, and actions and readings that several tests need."""
 
 import json
 import os
@@ -21,11 +21,11 @@ ROOT = Path(__file__).parents[2]
 WEB = ROOT / "client" / "web"
 DEMO_CASE = ROOT / "cases" / "shipped" / "glass_steel_demo.toml"
 CUTS = '\n[balance]\npolicy = "every"\nevery = 150\n'
-"""So that there are markers to open, however evenly the ranks are loaded."""
+"""Balance policy with regular cuts: the charts have markers, however even the loads are."""
 SHOWN = "document.querySelector('section[data-shown]')?.dataset.shown"
-"""The number of the snapshot on the screen."""
+"""Expression for the number of the snapshot on the screen."""
 OWNER = "ann"
-"""Whose token a site has."""
+"""User whose token a site has."""
 STANDARDS = ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa"]
 
 
@@ -33,7 +33,7 @@ class Site:
     """A server in a process of its own, with a token."""
 
     def __init__(self, runs: Path) -> None:
-        """``runs`` is the folder of the runs."""
+        """Prepares a server; ``runs`` is the folder of the runs."""
         self.runs = runs
         runs.mkdir()
         store = Store(f"sqlite:///{runs / 'server.sqlite'}")
@@ -42,7 +42,7 @@ class Site:
         self.start()
 
     def start(self, port: int = 0) -> None:
-        """Starts it; ``url`` is where."""
+        """Starts the server; ``url`` is its address."""
         command = [sys.executable, "-m", "conoid.server", "--runs", str(self.runs), "--port", str(port)]
         self.process = subprocess.Popen([*command, "--no-zenoh", "--web", str(WEB)], start_new_session=True)
         address = self.runs / "server.json"
@@ -53,20 +53,20 @@ class Site:
         self.url = json.loads(address.read_text())["url"] + "/"
 
     def submit(self, text: str, query: str = "") -> str:
-        """The id of a new run."""
+        """Submits a run and returns its id."""
         headers = {"Authorization": f"Bearer {self.token}", "Content-Type": "application/toml"}
         answer = httpx2.post(f"{self.url}v1/runs?{query}", content=text, headers=headers, timeout=60)
         assert answer.status_code == 202, answer.text
         return str(answer.json()["id"])
 
     def kill(self) -> None:
-        """Kills the server; its workers go on."""
+        """Kills the server; its workers continue."""
         os.kill(self.process.pid, signal.SIGKILL)
         self.process.wait()
 
 
 def demo(**changes: str) -> str:
-    """The case of ``make demo``, cut anew now and then, with other values of some lines."""
+    """Returns the case of ``make demo`` with regular cuts and other values of some lines."""
     text = DEMO_CASE.read_text()
     for name, value in changes.items():
         old = next(line for line in text.splitlines() if line.startswith(f"{name} = "))
@@ -83,7 +83,7 @@ def sign_in(page: Page, site: Site) -> None:
 
 
 def facts(page: Page, place: str = ".card .facts") -> dict[str, str]:
-    """Names and values of a list of facts."""
+    """Returns names and values of a list of facts."""
     names = json.dumps(f"{place} dt")
     script = f"[...document.querySelectorAll({names})].map((e) => [e.innerText, e.nextSibling.innerText])"
     return dict(page.evaluate(script))
@@ -94,7 +94,7 @@ def number(text: str) -> int:
 
 
 def violations(page: Page) -> list[str]:
-    """What axe-core finds against the levels A and AA: rule, number of places, the first of them."""
+    """Returns the findings of axe-core for the levels A and AA: rule, number of places, and the first place."""
     source = Path(str(metadata.distribution("axe-playwright-python").locate_file("axe_playwright_python/axe.min.js")))
     page.evaluate(source.read_text(encoding="utf-8") + "; true")
     told: list[dict[str, Any]] = page.evaluate(
