@@ -1,9 +1,9 @@
 """Tables of kernel arguments: 64-bit words at one address, which a kernel takes instead of records of arrays.
 
-A call with records costs 4 us and more, since numba unpacks each of their arrays; a call with an address costs 0.2
-us, and any thread can make it. An array takes 1 + ndim words, its address and its shape, and ndim words more for its
-strides if its layout is not C; a number or a flag takes one word. Arrays that a kernel reads from the table have no
-owner and no reference counts: ``Arguments`` holds references to them.
+A call with records costs 4 us or more, since numba unpacks each of their arrays. A call with an address costs 0.2
+us, and any thread can make it. An array takes 1 + ndim words, its address and its shape. If the layout of the array
+is not C, ndim further words have its strides. A number or a flag takes one word. Arrays that a kernel reads from the
+table have no owner and no reference counts; ``Arguments`` holds references to them.
 """
 
 import ctypes
@@ -27,7 +27,7 @@ _DATA = 40
 
 
 class Arguments:
-    """A table for arguments of the numba types ``kinds``; a record counts as one argument."""
+    """A table for arguments of the numba types ``kinds``. A record counts as one argument."""
 
     def __init__(self, *kinds: Any) -> None:
         self._kinds = list(_leaves(several(*kinds)))
@@ -47,9 +47,11 @@ class Arguments:
         """Address of the table, for kernels."""
 
     def set(self, *values: Any) -> int:
-        """Write the arguments into the table and return its address; only objects that differ from those in the
-        table are written. Records are tuples, at the same positions in every call. Raises ValueError if an array has
-        another type than declared, or is not in C order and is declared so.
+        """Write the arguments into the table and return its address. Arguments that are already in the table are not
+        written again.
+
+        Records are tuples, at the same positions in every call. Raises ValueError if an array has another type than
+        declared, or if it is not in C order although the declared type is in C order.
         """
         if len(values) != len(self._values):
             sizes = [len(value) if isinstance(value, tuple) else 1 for value in values]
@@ -89,8 +91,9 @@ def _dtype(kind: Any) -> np.dtype[Any]:
 
 
 def address_of(array: Any) -> int:
-    """Return the address of the first item: ``array.ctypes.data`` in half the time, by numpy's array interface for
-    C.
+    """Return the address of the first item of an array.
+
+    The result is ``array.ctypes.data``, obtained in half the time, by numpy's array interface for C.
     """
     return int(ctypes.c_int64.from_address(_POINTER(array.__array_struct__, None) + _DATA).value)
 
@@ -114,7 +117,9 @@ def _words(kind: Any) -> int:
 
 
 def reader(*kinds: Any) -> Any:
-    """Return a function for kernels, which reads arguments of these types at an address and returns them as a tuple."""
+    """Return a function for kernels. The function reads arguments of these types at an address and returns them as a
+    tuple.
+    """
     kind = several(*kinds)
 
     def read(_: Any, address: Any) -> Any:
@@ -127,7 +132,9 @@ def reader(*kinds: Any) -> Any:
 
 
 def _read(context: Any, builder: Any, kind: Any, base: Any, at: int) -> tuple[Any, int]:
-    """Return the value of that type at word ``at`` of the table ``base``, and the index of the word behind it."""
+    """Return the value of that type at word ``at`` of the table ``base``, and the index of the next word after the
+    value.
+    """
     if isinstance(kind, types.BaseTuple):
         values = []
         for each in kind.types:  # type: ignore[attr-defined]

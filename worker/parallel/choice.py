@@ -1,8 +1,8 @@
 """Choice of the number of threads that a rank uses: the number with the shortest regions, measured over some steps.
 
-A scene can be too small for threads: it has few tasks, or tasks as short as the time to hand one out. A smaller
-number is measured again from time to time, since contact and cracks add work; the full number is final. The answer
-does not depend on the number of threads.
+A scene can be too small for threads: it has few tasks, or its tasks are as short as the time to hand one out. A
+number of threads below the full number is measured again at intervals, since contact and cracks add work. The full
+number is final. The answer of the run does not depend on the number of threads.
 """
 
 import time
@@ -13,11 +13,14 @@ from .projecting import Projecting
 from .team import Team
 
 _STEPS, _SECONDS = 10, 0.1
-"""Length of a measurement in steps and in s, whichever ends first, at least one step. Chosen."""
+"""Length of a measurement in steps and in s: the measurement ends at the limit that is reached first, after one step
+at least. Chosen values."""
 _AGAIN = 20.0
-"""s between two measurements. Chosen: a measurement takes less than a hundredth of it, except with very long steps."""
+"""Interval between two measurements, s. Chosen value: a measurement takes less than a hundredth of the interval,
+except with very long steps."""
 _WORTH = 0.98
-"""A larger number of threads is chosen if it takes less than this share of the time in regions. Chosen."""
+"""A larger number of threads is chosen if its time in regions is below this share of the time with fewer threads.
+Chosen value."""
 
 
 class Choice:
@@ -29,7 +32,9 @@ class Choice:
         self._costs: Projecting | None = None
 
     def step(self) -> str:
-        """Begin or end a measurement if it is time; return a message, once, if fewer threads than given are used."""
+        """Begin or end a measurement if it is time for it. Return a message, once, if fewer threads than given are
+        used.
+        """
         trial, now = self._team.projecting, time.monotonic()
         if trial is None:
             if now >= self._due:
@@ -65,7 +70,9 @@ class Choice:
 
 
 def best_crew(crews: list[int], spans: list[float]) -> int:
-    """Return the number of threads to use, by the ``spans`` in s that regions take with ``crews`` threads."""
+    """Return the number of threads to use; ``spans``: time in s that regions take with each number of ``crews``
+    threads.
+    """
     best = 0
     for k in range(1, len(crews)):
         if spans[k] < _WORTH * spans[best]:

@@ -1,4 +1,5 @@
-"""Communication between ranks: the operations, and their meaning on one rank. mpi.py implements them with MPI.
+"""Communication between ranks: the operations, and their meaning on one rank. The module mpi.py implements them with
+MPI.
 
 All decisions are maxima over int64 words or sums of integers, which do not depend on the order of the ranks.
 """
@@ -16,9 +17,9 @@ from .tags import Tag
 
 @dataclass
 class Sent:
-    """Counts of what a rank has sent since the last report: messages to single ranks, and collectives.
+    """Counts of the data that a rank has sent since the last report: messages to single ranks, and collectives.
 
-    The bytes of a collective are those that the rank contributes. An object takes two collectives: its length is
+    The bytes of a collective are the bytes that the rank contributes. An object takes two collectives: its length is
     sent first.
     """
 
@@ -28,7 +29,7 @@ class Sent:
     collective_bytes: int = 0
 
     def message(self, number: int, size: int) -> None:
-        """Count ``number`` messages of ``size`` bytes in all."""
+        """Count ``number`` messages with a total of ``size`` bytes."""
         self.messages += number
         self.bytes += size
 
@@ -61,10 +62,14 @@ class Comm(Protocol):
     sent: Sent
 
     def begin_maximum(self, words: Ints, result: Ints) -> Pending:
-        """Start the element-wise maximum of ``words`` over all ranks; it is in ``result`` once finished."""
+        """Start the element-wise maximum of ``words`` over all ranks. The maximum is in ``result`` once the
+        operation has finished.
+        """
 
     def begin_sum(self, words: Ints, result: Ints) -> Pending:
-        """Start the element-wise sum of ``words`` over all ranks; it is in ``result`` once finished."""
+        """Start the element-wise sum of ``words`` over all ranks. The sum is in ``result`` once the operation has
+        finished.
+        """
 
     def sum(self, words: Ints) -> Ints:
         """Return the element-wise sum over all ranks."""
@@ -73,15 +78,17 @@ class Comm(Protocol):
         """Return the element-wise maximum over all ranks."""
 
     def exchange(self, sends: list[tuple[int, Ints]], receives: list[tuple[int, Ints]], tag: Tag) -> "Exchange":
-        """Return a repeatable exchange of fixed buffers with other ranks; sends and receives are (rank, buffer)."""
+        """Return a repeatable exchange of fixed buffers with other ranks. Sends and receives are pairs (rank,
+        buffer).
+        """
 
     def swap(self, sends: dict[int, Ints]) -> dict[int, Ints]:
-        """Send words to each rank that is a key; return the words of each rank for this one, flat, by ascending
-        rank, with those of this rank for itself.
+        """Send words to each rank that is a key. Return the words of each rank for this rank, flat, by ascending
+        rank. Words of this rank for itself are included.
         """
 
     def trade(self, sends: dict[int, Ints], sources: Iterable[int]) -> dict[int, Ints]:
-        """Send words of any length to the ranks in ``sends``; return those of the ranks ``sources``, flat, in their
+        """Send words of any length to the ranks in ``sends``; return the words of the ranks ``sources``, flat, in their
         order.
 
         Only the partners take part: a rank is in the ``sources`` of exactly the ranks to which it sends. An empty
@@ -98,16 +105,16 @@ class Comm(Protocol):
         """Return the items of all ranks on rank 0, in the order of the ranks; None on the others."""
 
     def scatter(self, items: list[Any] | None) -> Any:
-        """Return item ``rank`` of rank 0's list."""
+        """Return item ``rank`` of the list on rank 0."""
 
     def broadcast(self, item: Any) -> Any:
-        """Return rank 0's item."""
+        """Return the item of rank 0 on every rank."""
 
     def barrier(self) -> None:
-        """Return when every rank has called it."""
+        """Return when every rank has made this call."""
 
     def await_all(self) -> None:
-        """The same as ``barrier`` for long waits: it sleeps instead of polling."""
+        """The operation ``barrier`` for long waits: it sleeps instead of polling."""
 
 
 class Exchange(Protocol):

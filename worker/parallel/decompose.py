@@ -20,32 +20,37 @@ from ..model.state import Flags, Floats, Indices, Ints
 from .comm import Comm
 
 _LEVELS = 2.0**31 - 1.0
-"""Distinct positions along a normal; points at one position are ordered by their ids."""
+"""Number of distinct positions along a normal. Points at one position are ordered by their ids."""
 _ID_BITS = 32
-"""Bits below the position in a sorting key of 63 bits, 31 of them for the position: ids are below 2^32."""
+"""Number of bits for the id in a sorting key of 63 bits; 31 higher bits have the position. Ids are below 2^32."""
 _DIGIT = 8
-"""Bits of a sorting key that one sum over the ranks determines: 256 counts a box, eight sums in all. Chosen."""
+"""Number of bits of a sorting key that one sum over the ranks determines: 256 counts per box, eight sums in all.
+Chosen value."""
 _FINEST = 2.0**30
-"""Quanta of the largest weight: sums of four billion weights are exact."""
+"""Value of the largest weight in quanta. With this value sums of four billion weights are exact."""
 _BINS = 128
-"""Slices into which the weights along a direction are binned when directions are compared."""
+"""Number of slices into which the weights along a direction are binned when directions are compared."""
 _SHORT = 0.2
-"""Share of the longest extent of a box: no cut is made across a direction with a shorter extent (as with
+"""Smallest ratio of an extent of a box to its longest extent at which the box is cut across this extent (as with
 ``run.cut_scale``)."""
 _SURFACE = 0.05
-"""Penalty of a cut, as a share of the time, that goes through twice the weight of the best direction."""
+"""Penalty, as a share of the time, of a cut that goes through twice as much weight as the cut of the direction with
+the least weight."""
 _TOGETHER = 8
-"""Boxes whose slices are summed over the ranks in one call: memory does not grow with the number of ranks."""
+"""Number of boxes whose slices are summed over the ranks in one call. With a fixed number the memory does not
+increase with the number of ranks."""
 _THICK = 2
-"""Slices on either side of a cut from which the weight that it goes through is computed."""
+"""Number of slices on either side of a cut from which the weight at the cut is computed."""
 _SAMPLE = 4096
-"""Size of the sample of points of a box, of those with a weight in the first phase only, by which directions are
-compared: with 4,000 points in 128 slices the middle is off by less than a hundredth of the box. Chosen."""
+"""Size of the sample of points in a box by which directions are compared. Only points with a weight in the first
+phase alone are sampled. Chosen value: with 4,000 points in 128 slices the error of the middle is below a hundredth
+of the box."""
 
 
 def _directions() -> Floats:
-    """Return (49, 3) unit normals: the axes first, then all with components in the ratio of 0, 1 and 2; one of each
-    pair of opposites.
+    """Return (49, 3) unit normals, one of each pair of opposite directions.
+
+    The axes come first, then all directions with components in the ratio of 0, 1 and 2.
     """
     found = [v for v in product(range(-2, 3), repeat=3) if v > (0, 0, 0) and np.gcd.reduce(v) == 1]
     found.sort(key=lambda v: (sum(map(abs, v)), [-c for c in v]))
@@ -54,32 +59,32 @@ def _directions() -> Floats:
 
 DIRECTIONS = _directions()
 _AXES = 3
-"""Number of first directions that are x, y and z."""
+"""Number of the first directions that are x, y and z."""
 
 
 @dataclass
 class Cut:
-    """A cut of the ranks ``first`` .. ``first + parts - 1``: points below ``key`` along a normal are on the lower
+    """A cut of the ranks ``first`` .. ``first + parts - 1``. Points below ``key`` along a normal are on the lower
     side.
     """
 
     first: int
     parts: int
     direction: int
-    """Index in DIRECTIONS."""
+    """Index of the normal in DIRECTIONS."""
     low: float
     high: float
     key: int
 
     @property
     def left(self) -> int:
-        """Number of ranks on the lower side."""
+        """Number of ranks on the lower side of the cut."""
         return self.parts // 2
 
     def keys(self, points: Floats, ids: Ints) -> Ints:
         """Return (n,) sorting keys: positions of points (n, 3) along the normal, then their ``ids`` (n,)."""
         (x, y, z), extent = DIRECTIONS[self.direction], self.high - self.low
-        along = points[:, 0] * x + points[:, 1] * y + points[:, 2] * z  # the same bits in whatever company
+        along = points[:, 0] * x + points[:, 1] * y + points[:, 2] * z  # the same bits for any array length
         share = (along - self.low) / (extent if extent > 0.0 else 1.0)
         return np.asarray((np.clip(share, 0.0, 1.0) * _LEVELS).astype(np.int64) << _ID_BITS | ids)
 
@@ -110,7 +115,7 @@ def bisect(
 
 
 def place(cuts: list[Cut], points: Floats) -> Indices:
-    """Return (n,) the parts that contain other points (n, 3)."""
+    """Return (n,) the part of each of other points (n, 3)."""
     owner, none = np.zeros(len(points), np.int32), np.zeros(len(points), np.int64)
     for cut in cuts:
         inside = np.flatnonzero(owner == cut.first)
@@ -123,7 +128,7 @@ def _level(
 ) -> list[Cut]:  # fmt: skip
     """Return the cuts of the ``groups`` (first, parts), each across one of the first ``tried`` directions.
 
-    The points of a group have ``owner`` equal to ``first``; those beyond the cut get the first rank of the upper
+    The points of a group have ``owner`` equal to ``first``. Points beyond the cut get the first rank of the upper
     side.
     """
     members = [np.flatnonzero(owner == first) for first, _ in groups]
@@ -144,8 +149,10 @@ def _level(
 
 
 def _extents(points: Floats, members: list[Ints], directions: list[Floats], comm: Comm) -> Floats:
-    """Return (groups, 2, k) the largest position of the members of each group along each of its ``directions`` (k,
-    3), and minus the smallest; zeros if no rank has members. Collective.
+    """Return (groups, 2, k) the largest position of the members of each group along each of its ``directions`` (k, 3),
+    and the negative of the smallest position. Zeros if no rank has members.
+
+    Collective.
     """
     reach = np.full((len(members), 2, len(directions[0])), -np.inf)
     for own, chosen, normals in zip(reach, members, directions, strict=True):
@@ -183,9 +190,9 @@ def _most_even(
 
 def _unevenness(slices: Floats, parts: int) -> tuple[Floats, Floats]:
     """Return the loss of a cut that halves the sum of ``slices`` (directions, bins, phases) for ``parts`` ranks, and
-    the mean weight of the slices round it, both (directions,).
+    the mean weight of the slices near the cut, both (directions,).
 
-    The loss is the waiting after each phase, as a share of the whole time.
+    The loss is the waiting time after each phase, as a share of the whole time.
     """
     every, bins = np.arange(len(slices)), slices.shape[1]
     left, upto = parts // 2, np.cumsum(slices, axis=1)
@@ -205,9 +212,10 @@ def _unevenness(slices: Floats, parts: int) -> tuple[Floats, Floats]:
 
 @njit("Tuple((int64[::1], int64[:, ::1]))(int64[::1], uint64[::1], int64[:, ::1], int64)", cache=True)
 def _drawn(chosen, luck, quanta, stride):  # type: ignore[no-untyped-def]
-    """Return the indices of a sample of the ``chosen`` points, and their ``quanta`` (n, phases): all with a weight
-    in a later phase, and one in ``stride`` of the others, by the hash ``luck`` (n,), with ``stride`` times its
-    weight.
+    """Return the indices of a sample of the ``chosen`` points, and their ``quanta`` (n, phases).
+
+    The sample has all points with a weight in a later phase. Of the other points one in ``stride`` is chosen by the
+    hash ``luck`` (n,), with ``stride`` times its weight.
     """
     some, weights, n = np.empty(len(chosen), np.int64), np.empty((len(chosen), quanta.shape[1]), np.int64), 0
     for a in chosen:
@@ -225,7 +233,9 @@ def _drawn(chosen, luck, quanta, stride):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[:, ::1], float64[:, ::1], int64[::1], float64[:, ::1])", cache=True)
 def _reach(reach, points, chosen, directions):  # type: ignore[no-untyped-def]
-    """Raise ``reach`` (2, directions) to the largest position of the ``chosen`` points, and to minus the smallest."""
+    """Raise ``reach`` (2, directions) to the largest position of the ``chosen`` points, and to the negative of the
+    smallest position.
+    """
     for a in chosen:
         for k in range(len(directions)):
             along = points[a, 0] * directions[k, 0] + points[a, 1] * directions[k, 1] + points[a, 2] * directions[k, 2]
@@ -237,7 +247,7 @@ def _reach(reach, points, chosen, directions):  # type: ignore[no-untyped-def]
     cache=True,
 )
 def _slice(sums, points, quanta, chosen, directions, low, scale):  # type: ignore[no-untyped-def]
-    """Add the ``quanta`` (m, phases) of the ``chosen`` (m,) points to their slice along each direction."""
+    """Add the ``quanta`` (m, phases) of each of the ``chosen`` (m,) points to its slice along each direction."""
     for k in range(len(directions)):
         x, y, z = directions[k, 0] * scale[k], directions[k, 1] * scale[k], directions[k, 2] * scale[k]
         start, slices = low[k] * scale[k], sums[k]
@@ -250,8 +260,9 @@ def _slice(sums, points, quanta, chosen, directions, low, scale):  # type: ignor
 
 
 def _search(cuts: list[Cut], keys: list[Ints], quanta: list[Ints], comm: Comm) -> None:
-    """Set the key of every cut: the smallest key at which the sum of the weights below exceeds the share of the
-    lower side. Collective.
+    """Set the key of every cut: the smallest key at which the weight below the cut exceeds the share of the lower side.
+
+    Collective.
     """
     alive: list[Flags] = [np.ones(len(k), bool) for k in keys]
     total = comm.sum(np.array([q.sum() for q in quanta], np.int64))

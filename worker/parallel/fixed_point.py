@@ -18,21 +18,21 @@ from ..model.state import Floats, Indices, Ints
 from .comm import Comm
 
 CONTRIBUTION_BITS = 51
-"""A contribution is below 2^51 quanta, where the float64 values round 1.5 times 2^52 are all integers
-(elements/forces.py)."""
+"""Number of bits of a contribution. Contributions are below 2^51 quanta: there all float64 values in the round 1.5
+times 2^52 are integers (elements/forces.py)."""
 HEADROOM_BITS = 5
-"""Contributions may grow 32-fold in a step before the sum has to be repeated."""
+"""Number of bits of headroom: contributions may increase 32-fold in a step before the sum has to be repeated."""
 _NEAREST_BITS = 0x4338000000000000
-"""Bits of NEAREST."""
+"""Bits of the float64 NEAREST."""
 _MAGNITUDE, _INFINITE = 0x7FFFFFFFFFFFFFFF, 0x7FF0000000000000
-"""All bits of a float64 except its sign; the bits of infinity."""
+"""Mask of all bits of a float64 except its sign, and the bits of infinity."""
 _LIMB_BITS = 30
 _LIMB = 2.0**_LIMB_BITS
-"""Ratio of the quanta of the high and the low limb: 60 bits in two limbs, each of which sums 2^32 values in an
+"""Ratio of the quanta of the high and the low limb. Two limbs have 60 bits, and each limb sums 2^32 values in an
 int64."""
 _WORD, _REAL = struct.Struct("=q"), struct.Struct("=d")
 _SMALLEST = -993
-"""Smallest exponent of a column: with a lower one the scale would overflow."""
+"""Smallest exponent of a column. With a smaller exponent the scale would overflow."""
 
 
 def float_of(bits: int) -> float:
@@ -46,25 +46,25 @@ def bits_of(value: float) -> int:
 
 
 def scale_for(largest: float) -> float:
-    """Return the quanta per newton for contributions up to ``largest``, N, with headroom."""
+    """Return the number of quanta per newton for contributions up to ``largest``, N, with headroom."""
     return math.ldexp(1.0, CONTRIBUTION_BITS - HEADROOM_BITS - math.frexp(largest)[1])
 
 
 def outgrown(largest: float, scale: float) -> bool:
-    """Return whether a contribution of ``largest``, N, exceeds the scale."""
+    """Return whether a contribution of ``largest``, N, exceeds the range of the scale."""
     return not largest * scale < 2.0**CONTRIBUTION_BITS
 
 
 @njit("float64(int64)", cache=True)
 def magnitude(bits):  # type: ignore[no-untyped-def]
-    """Return the float of ``most``; infinite if some value is not finite."""
+    """Return the float64 from the bits returned by ``most``; infinite if some value is not finite."""
     return np.int64(bits).view(np.float64) if bits < _INFINITE else math.inf
 
 
 @njit("int64(float64[::1])", cache=True, error_model="numpy")
 def most(values):  # type: ignore[no-untyped-def]
-    """Return the largest magnitude as bits, which have the order of the floats; a value that is not finite is above
-    all finite ones, so that a maximum over ranks keeps it.
+    """Return the largest magnitude as bits. The bits have the order of the floats. The bits of a value that is not
+    finite exceed those of all finite values, so a maximum over ranks keeps this value.
     """
     found = np.int64(0)
     for i in range(len(values)):
@@ -90,22 +90,22 @@ def limbs(values, scale):  # type: ignore[no-untyped-def]
 
 @njit("void(float64[::1], float64[::1], int64[::1])", cache=True, error_model="numpy")
 def _largest(largest, values, starts):  # type: ignore[no-untyped-def]
-    """Set the ``largest`` (k,) magnitude of each column, see ``Columns``."""
+    """Set the ``largest`` (k,) magnitude of each column (``Columns.largest``)."""
     for j in range(len(largest)):
         largest[j] = magnitude(most(values[starts[j] : starts[j + 1]]))
 
 
 @njit("void(int64[:, ::1], float64[::1], int64[::1], float64[::1])", cache=True, error_model="numpy")
 def _limbs(words, values, starts, scale):  # type: ignore[no-untyped-def]
-    """Set the sums of the high and of the low limbs of each column, ``words`` (2, k)."""
+    """Set the sums of the high limbs and of the low limbs of each column, ``words`` (2, k)."""
     for j in range(len(scale)):
         words[0, j], words[1, j] = limbs(values[starts[j] : starts[j + 1]], scale[j])
 
 
 @njit("void(int64[:, :, ::1], float64[:, ::1], int32[::1], float64[::1])", cache=True, error_model="numpy")
 def _limbs_by_group(words, columns, group, scale):  # type: ignore[no-untyped-def]
-    """Add the sums of limbs of each ``group`` (n,) of ``columns`` (k, n) to ``words`` (groups, 2, k), by runs of
-    equal groups.
+    """Add the sums of limbs of each ``group`` (n,) of ``columns`` (k, n) to ``words`` (groups, 2, k). Successive
+    rows of one group are summed together.
     """
     begin = 0
     while begin < len(group):
@@ -123,7 +123,7 @@ def _whole(words: Ints) -> Floats:
     """Return (..., k) the sums of limbs (..., 2, k) in quanta of the low limb, rounded once."""
     high, low = words[..., 0, :], words[..., 1, :]
     over = high + (low >> _LIMB_BITS)
-    if over.size and max(int(over.max()), -int(over.min())) < 2**53:  # exact, so that the sum rounds once
+    if over.size and max(int(over.max()), -int(over.min())) < 2**53:  # both terms are exact, so the sum rounds once
         return np.asarray(over * _LIMB + (low & ((1 << _LIMB_BITS) - 1)))
     pairs = zip(high.reshape(-1).tolist(), low.reshape(-1).tolist(), strict=True)
     return np.array([float((a << _LIMB_BITS) + b) for a, b in pairs]).reshape(high.shape)
@@ -133,11 +133,11 @@ class Tally:
     """Sums that are accumulated over a whole run: integers in two limbs, independent of order and ranks."""
 
     def __init__(self, largest: Floats) -> None:
-        """``largest`` (k,): order of magnitude of the values added to each sum; 2^-60 of it is the quantum."""
+        """``largest`` (k,): order of magnitude of the values added to each sum. The quantum is 2^-60 of ``largest``."""
         self.scale = np.ldexp(1.0, 30 - np.frexp(largest)[1])
-        """(k,) quanta of the high limb per unit."""
+        """(k,) number of quanta of the high limb per unit."""
         self.words = np.zeros((2, len(largest)), np.int64)
-        """(2, k) high and low limbs."""
+        """(2, k) sums of the high limbs and of the low limbs."""
 
     def quanta(self, values: Floats) -> Ints:
         """Return (2, k) the limbs of the sum of the rows of ``values`` (n, k)."""
@@ -152,10 +152,10 @@ class Tally:
         self.carry()
 
     def carry(self) -> None:
-        """Move the overflow of the low limbs to the high ones; the sums are unchanged to the bit.
+        """Move the overflow of the low limbs to the high limbs. The sums are unchanged to the bit.
 
         A low limb gets at most 2^29 quanta from each value, and all quanta of values far below a quantum of the high
-        limb: without carry it would overflow after 2^34 values, as contact may add in a long run.
+        limb. Without carry it would overflow after 2^34 values, a number that contact may add in a long run.
         """
         high, low = self.words
         over = (low + (1 << (_LIMB_BITS - 1))) >> _LIMB_BITS
@@ -163,16 +163,16 @@ class Tally:
         low -= over << _LIMB_BITS
 
     def total(self, comm: Comm) -> Floats:
-        """Return (k,) sums over all ranks. Collective."""
+        """Return (k,) the sums over all ranks. Collective."""
         return self.valued(comm.sum(self.words))
 
     def valued(self, words: Ints) -> Floats:
-        """Return (k,) the values of the ``words`` (2, k) of all ranks together."""
+        """Return (k,) the values from the limbs ``words`` (2, k), summed over all ranks."""
         return np.asarray(_whole(words) / _LIMB / self.scale)
 
 
 class Columns(Protocol):
-    """Columns of values, which need not be contiguous."""
+    """Columns of values. They need not be contiguous in memory."""
 
     def largest(self) -> Floats:
         """Return (k,) the largest magnitude of each column; infinite if a value is not finite."""
@@ -184,8 +184,9 @@ class Columns(Protocol):
 
 
 class Ragged:
-    """Columns of different lengths in one array ``values``; column k begins at ``starts`` (k + 1,). All rows are in
-    the first of the groups.
+    """Columns of different lengths in one array ``values``. Column k begins at ``starts`` (k + 1,).
+
+    All rows are in the first of the groups.
     """
 
     def __init__(self, values: Floats, starts: Ints, groups: int = 1) -> None:
@@ -212,7 +213,9 @@ class Table(Ragged):
 
 
 class Grouped(Table):
-    """The columns of an array whose row i belongs to ``group`` i, (n,); fast if neighbouring rows are in one group."""
+    """The columns of an array whose row i belongs to ``group`` i, (n,). Sums are fast if neighbouring rows are in
+    one group.
+    """
 
     def __init__(self, values: Floats, group: Indices, groups: int) -> None:
         super().__init__(values, groups)
@@ -225,7 +228,7 @@ class Grouped(Table):
 
 
 def exact_sums(comm: Comm, *tables: Floats) -> Floats:
-    """Return (k,) the sums of the columns of ``tables`` (n, .) over all ranks, see ``exact_totals``."""
+    """Return (k,) the sums of the columns of ``tables`` (n, .) over all ranks (``exact_totals``)."""
     return exact_totals(comm, *map(Table, tables))[0] if tables else np.zeros(0)
 
 
@@ -240,7 +243,9 @@ def exact_totals(comm: Comm, *tables: Columns) -> tuple[Floats, Floats]:
 
 
 def totals_and_words(comm: Comm, tables: Sequence[Columns], more: Ints) -> tuple[Floats, Floats, Ints]:
-    """Return ``exact_totals``, and the sums of integers ``more`` (m,) over all ranks from the same reduction.
+    """Return the result of ``exact_totals``, and the sums of integers ``more`` (m,) over all ranks from the same
+    reduction.
+
     Collective.
     """
     mine = [table.largest() for table in tables]

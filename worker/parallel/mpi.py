@@ -15,7 +15,8 @@ from .comm import Comm, Exchange, Pending, Sent, SerialComm
 from .tags import Tag
 
 _NAP = 0.01
-"""s between two tests of a wait that leaves the core to other processes. Chosen: a hundredth of the start of a rank."""
+"""Interval between two tests in a wait that leaves the core to other processes, s. Chosen value: a hundredth of the
+start of a rank."""
 
 
 class MpiComm:
@@ -33,11 +34,11 @@ class MpiComm:
         MPI.pickle.__init__(self._pickled, self._unpickled)  # type: ignore[misc]
 
     def waiting(self, sign: int = 1) -> "_Waiting":
-        """Return a context that adds the CPU time of its block to ``waited``; with -1 it subtracts it."""
+        """Return a context that adds the CPU time of its block to ``waited``; with sign -1 it subtracts this time."""
         return _Waiting(self, sign)
 
     def _pickled(self, item: Any, protocol: int | None = None) -> bytes:
-        """Pickle an item; its time is work, although the call around it waits."""
+        """Pickle an item. The time of pickling counts as work, although the surrounding call counts as waiting."""
         with self.waiting(-1):
             data = pickle.dumps(item, protocol)
         self.sent.collective_bytes += len(data)
@@ -157,7 +158,9 @@ class MpiComm:
 
 
 class _Waiting:
-    """Context of a block that waits; a class, since dozens run in every step and generators take longer."""
+    """Context of a block that waits. It is a class, since every step opens dozens of contexts and generators take
+    longer.
+    """
 
     __slots__ = ("_comm", "_sign", "_start")
 
@@ -183,7 +186,7 @@ class _MpiPending:
 
 class _MpiExchange:
     def __init__(self, comm: MpiComm, kind: Any, requests: list[Any], sends: tuple[int, int]) -> None:
-        """``sends``: number of messages, and their bytes."""
+        """``sends``: number of messages, and number of their bytes."""
         self._comm = comm
         self._kind = kind
         self._requests = requests
@@ -205,7 +208,7 @@ class _MpiExchange:
 def leave(code: int) -> NoReturn:
     """End this rank with an exit code after all ranks have finished; no rank is aborted.
 
-    The process must end normally (no ``os._exit``): otherwise MPICH does not sign off at the launcher, and the
+    The process must end normally (no ``os._exit``). Otherwise MPICH does not deregister from the launcher, and the
     launcher kills the other ranks.
     """
     from mpi4py import MPI
@@ -223,6 +226,6 @@ def abort(code: int) -> NoReturn:
 
 
 def connect() -> Comm:
-    """Return the communicator of MPI's world if it has several ranks, else the serial one."""
+    """Return the communicator of MPI's world if the world has several ranks, else the serial communicator."""
     world = MpiComm()
     return world if world.size > 1 else SerialComm()

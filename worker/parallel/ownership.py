@@ -1,7 +1,8 @@
 """Shared nodes: the ranks that hold them, and the completion of their integer sums.
 
-Each rank sums the contributions of its own tets; one exchange with the neighbours adds theirs. Integer addition does
-not depend on the order, so every holder of a node ends with the same bits and integrates the same motion.
+Each rank sums the contributions of its own tets. One exchange with the neighbours adds the contributions of their
+tets. Integer addition does not depend on the order, so every holder of a node gets the same bits and integrates the
+same motion.
 """
 
 from dataclasses import dataclass
@@ -16,19 +17,21 @@ from .tags import Tag
 
 @dataclass
 class Neighbour:
-    """Another rank, and the local nodes shared with it in the order of their global ids, extended by copies."""
+    """Another rank, and the local nodes shared with this rank. The nodes are in the order of their global ids;
+    copies are appended.
+    """
 
     rank: int
     nodes: Indices
 
 
 def same(some: list[Neighbour], others: list[Neighbour]) -> bool:
-    """Return whether two lists hold the same arrays: no node was added."""
+    """Return whether two lists hold the same array objects: no node was added."""
     return len(some) == len(others) and all(a.nodes is b.nodes for a, b in zip(some, others, strict=True))
 
 
 def ranks(owners: Indices | Ints) -> list[int]:
-    """Return the ranks in ``owners``, ascending."""
+    """Return the distinct ranks in ``owners``, ascending."""
     found: list[int] = np.flatnonzero(np.bincount(owners)).tolist()
     return found
 
@@ -61,7 +64,7 @@ class SharedSum:
     def __init__(
         self, comm: Comm, neighbours: list[Neighbour], columns: int, tag: Tag, *, headed: bool = False
     ) -> None:  # fmt: skip
-        """``headed``: a word for each neighbour is sent with the sums."""
+        """``headed``: whether a word for each neighbour is sent with the sums."""
         self._nodes = [n.nodes for n in neighbours]
         head = np.full(int(headed), -1, np.int32)
         self._every = np.concatenate([head[:0], *(part for nodes in self._nodes for part in (nodes, head))])
@@ -84,8 +87,9 @@ class SharedSum:
         return np.asarray(self._in[self._heads, 0])
 
     def begin(self, sums: Ints, words: Ints | None = None) -> None:
-        """Send the local sums of the shared nodes, which all tets of this rank must have been added to, and
-        ``words`` (neighbours,).
+        """Send the local sums of the shared nodes, and ``words`` (neighbours,).
+
+        All tets of this rank at shared nodes must have been added to the sums.
         """
         if not self._nodes:
             return
@@ -95,7 +99,7 @@ class SharedSum:
         self._exchange.begin()
 
     def finish(self, sums: Ints) -> None:
-        """Add the sums of the neighbours: the sums of the shared nodes are complete."""
+        """Add the sums of the neighbours. The sums of the shared nodes are then complete."""
         if not self._nodes:
             return
         self._exchange.finish()

@@ -1,4 +1,4 @@
-"""Passes over a range, cut into tasks of equal size, which the threads of a rank share."""
+"""Passes over a range, cut into tasks of equal size. The threads of a rank share the tasks."""
 
 from typing import Any
 
@@ -10,16 +10,14 @@ from .arguments import Arguments
 from .team import Stage, Team
 
 NODES_OF_A_TASK = 4096
-"""Nodes of a task. Chosen: 10 us of work, against 2 us for a region of threads."""
+"""Number of nodes in a task. Chosen value: a task is 10 us of work; a region of threads costs 2 us."""
 
 
 class Ranges:
     """Runs kernels of the signature team.TASK over ranges on a team of threads.
 
-    Tasks may run at the same time, so they must not write to the same memory. The task that begins at ``first`` has the
-    number ``first
-
-    size``.
+    Tasks may run at the same time, so they must not write to the same memory. The number of the task that begins at
+    index ``first`` is ``first`` divided by ``size``.
     """
 
     def __init__(self, team: Team, size: int = NODES_OF_A_TASK) -> None:
@@ -34,7 +32,9 @@ class Ranges:
             self._team.run(kernel, table, self._cut(n), self._starts)
 
     def stage(self, kernel: Kernel, table: int, n: int) -> Stage:
-        """The same as a stage of a program, until another range is asked for."""
+        """Return the run over the range from 0 to ``n`` as a stage of a program. The stage is valid until another
+        range is requested.
+        """
         return Stage(kernel, table, self._cut(n), self._starts)
 
     def many(self, n: int) -> int:
@@ -54,7 +54,7 @@ class Ranges:
 
 
 class Pass:
-    """A kernel with its table of arguments, run over ranges."""
+    """A kernel with its table of arguments, to be run over ranges."""
 
     def __init__(self, team: Team, kernel: Kernel, *kinds: Any, size: int = NODES_OF_A_TASK) -> None:
         """``kinds``: numba types of the arguments; ``size``: length of a task."""
@@ -66,7 +66,9 @@ class Pass:
             self._ranges.run(self._kernel, self._arguments.set(*values), n)
 
     def stage(self, n: int, *values: Any) -> Stage:
-        """The same as a stage of a program, until other arguments or another range are asked for."""
+        """Return the run as a stage of a program. The stage is valid until other arguments or another range are
+        requested.
+        """
         return self._ranges.stage(self._kernel, self._arguments.set(*values), n)
 
     def many(self, n: int) -> int:

@@ -1,9 +1,9 @@
 """Estimate of the time that regions would take on more threads than there are cores.
 
-The tasks are timed one after the other and assigned as a team of each size would do it: the next task to the thread
-that is free first, colour by colour. The costs of sharing are measured before, on two threads: the ``turn`` of a
-colour, and after a pause the ``call`` of a sleeping thread, which its caller spends, and its ``wake``, the time
-until it works. Each woken thread wakes two more (team.py). The estimate omits the slow-down of simultaneous tasks by
+The tasks are timed one after the other and assigned as a team of each size would assign them: the next task goes to
+the thread that is free first, colour by colour. The costs of sharing are measured before, on two threads. The cost
+``turn`` is that of a colour. After a pause a sleeping thread costs its caller the time ``call``, and works after the
+time ``wake``. Each woken thread wakes two more (team.py). The estimate omits the slow-down of simultaneous tasks by
 the memory that they share.
 """
 
@@ -19,10 +19,10 @@ from .team import Team
 from .words import TASK, call_task, now
 
 _PAUSE = 100_000
-"""ns after which threads without a task sleep. Chosen: twice the time for which they poll (team.py)."""
+"""Time after which threads without a task sleep, ns. Chosen value: twice the time for which they poll (team.py)."""
 _REPEATS = 50
 _ROUNDS = 100_000
-"""Iterations of a task that lasts longer than a thread takes to wake. Chosen: some 100 us."""
+"""Number of iterations of a task that lasts longer than the waking of a thread. Chosen value: some 100 us."""
 _WORDS = types.int64[::1], types.int64
 _words = reader(*_WORDS)
 
@@ -34,7 +34,7 @@ def crews_of(threads: int) -> list[int]:
 
 @dataclass(frozen=True)
 class Costs:
-    """Costs of sharing, ns; see above."""
+    """Costs of sharing, ns. The docstring of the module defines ``turn``, ``call`` and ``wake``."""
 
     turn: int
     call: int
@@ -43,8 +43,8 @@ class Costs:
 
 @njit("void(boolean, int64[::1], int64[::1], int64[:, ::1])", cache=True)
 def _ready(asleep, costs, crews, free):  # type: ignore[no-untyped-def]
-    """Set the time at which each thread of each crew can begin the first task of a colour; the last column is the
-    end of a crew's last task.
+    """Set the time at which each thread of each crew can begin the first task of a colour. The last column is the
+    time at which the last task of a crew ends.
     """
     for c in range(len(crews)):
         free[c, : crews[c]] = 0
@@ -59,7 +59,7 @@ def _ready(asleep, costs, crews, free):  # type: ignore[no-untyped-def]
 
 @njit("void(int64, int64[::1], int64[:, ::1])", cache=True)
 def _give(took, crews, free):  # type: ignore[no-untyped-def]
-    """Assign a task to the thread of each crew that is free first."""
+    """Assign a task, for each crew, to the thread that is free first."""
     for c in range(len(crews)):
         first = 0
         for k in range(1, crews[c]):
@@ -72,7 +72,7 @@ def _give(took, crews, free):  # type: ignore[no-untyped-def]
 @njit("int64(int64[::1], int64, int64, int64[:, ::1], int64[::1], int64[::1], int64[::1], int64[:, ::1], int64[::1])",
       cache=True)  # fmt: skip
 def _timed(clock, kernel, table, tasks, starts, costs, crews, free, spans):  # type: ignore[no-untyped-def]
-    """Run all tasks; return the time, ns, and set ``spans`` (crews,) to the time that each crew would take, ns."""
+    """Run all tasks and return the time, ns. Set ``spans`` (crews,) to the time that each crew would take, ns."""
     begin = now(clock, 0)
     asleep = begin - clock[2] > _PAUSE
     spans[:] = 0
@@ -94,7 +94,7 @@ class Projecting:
     """Runs the tasks of regions one after the other, and sums up the time that crews of other sizes would take."""
 
     def __init__(self, threads: int, costs: Costs | None = None) -> None:
-        """``threads``: size of the largest crew; ``costs``: measured if not given."""
+        """``threads``: size of the largest crew; ``costs``: costs of sharing, which are measured if not given."""
         self.crews = crews_of(threads)
         self.costs = costs or measured()
         self.regions = self.colours = self.tasks = 0
@@ -112,8 +112,8 @@ class Projecting:
     def run(self, kernel: Kernel, table: int, tasks: Ints, starts: Ints) -> int:
         """Run the tasks as ``Team.run`` does; return the CPU time, ns.
 
-        If another program had the core, the wall times of the tasks are too long; all are scaled by CPU time over
-        wall time.
+        If another program used the core, the wall times of the tasks are too long. All wall times are therefore
+        scaled by the ratio of CPU time to wall time.
         """
         self.regions, self.colours, self.tasks = (
             self.regions + 1,
@@ -131,7 +131,7 @@ class Projecting:
 
 @njit(TASK, cache=True)
 def _spin(table, first, end, thread):  # type: ignore[no-untyped-def]
-    """A loop of some length that the compiler cannot remove."""
+    """A loop of given length that the compiler cannot remove."""
     totals, rounds = _words(table)
     total = totals[thread]
     for k in range(rounds):
@@ -140,8 +140,8 @@ def _spin(table, first, end, thread):  # type: ignore[no-untyped-def]
 
 
 def measured() -> Costs:
-    """Return the costs of sharing on two threads of this process: the tenth percentile of each, since other programs
-    may use the cores.
+    """Return the costs of sharing, measured on two threads of this process. Each cost is the tenth percentile of its
+    measurements, since other programs may use the cores.
     """
     two, totals = Team(2), np.zeros(2, np.int64)
     table, tasks = Arguments(*_WORDS), np.array([[0, 1], [1, 2]])

@@ -33,26 +33,27 @@ __all__ = ["TASK", "Stage", "Team", "team"]
 _NEXT, _DONE, _ASLEEP, _KERNEL, _TABLE, _TASKS, _MOST, _WITHIN, _CLOCK, _SEMAPHORE, _THREADS = (
     0, 8, 16, 24, 25, 26, 27, 28, 29, 32, 40,
 )  # fmt: skip
-"""Offsets in a job's words; words that several threads write have a cache line of their own. _MOST: how many threads
-may work; _WITHIN: time in regions so far, ns; _CLOCK: two words for reading the clock. From _THREADS on a line for
-each thread: its time in tasks, ns, and words for the clock."""
+"""Offsets in the words of a job. Words that several threads write have a cache line of their own. _MOST: number of
+threads that may work; _WITHIN: time in regions so far, ns; _CLOCK: two words for reading the clock. From _THREADS on
+each thread has a line: its time in tasks, ns, and words for the clock."""
 _STAGE = 5
-"""Words of a stage: addresses of its kernel, of the table of arguments, of the tasks and of the starts of colours, and
-the number of colours."""
+"""Number of words of a stage: addresses of its kernel, of the table of arguments, of the tasks and of the starts of
+colours, and the number of colours."""
 _BITS, _MASK = 20, (1 << 20) - 1
-"""Bits of the next task in the word _NEXT; the number of tasks is above them."""
+"""Number of low bits of the word _NEXT, which have the next task, and their mask. The higher bits have the number of
+tasks."""
 _LINE = 8
-"""Words in a cache line."""
+"""Number of words in a cache line."""
 _WAKES = 2
-"""Number of threads that a thread wakes."""
+"""Largest number of threads that a thread wakes."""
 _POLLS = 4000
-"""Number of polls before a helper sleeps, and before the calling thread yields its core. Chosen: some 50 us, longer
-than the gap between two colours, much shorter than a step."""
+"""Number of polls before a helper sleeps, and before the calling thread yields its core. Chosen value: some 50 us,
+longer than the gap between two colours, much shorter than a step."""
 
 
 @njit("boolean(int64[::1], int64)", cache=True)
 def _do_one(job, thread):  # type: ignore[no-untyped-def]
-    """Take one task and run it; return False if none is left."""
+    """Take one task and run it; return False if no task is left."""
     word = load(job, _NEXT)
     if word & _MASK >= word >> _BITS:
         return False
@@ -81,7 +82,7 @@ def _wake(job, semaphore):  # type: ignore[no-untyped-def]
             return
         if add(job, _ASLEEP, -1) > 0:
             sem_post(semaphore)
-        else:  # another thread was faster
+        else:  # another caller has woken the last sleeping thread
             add(job, _ASLEEP, 1)
 
 
@@ -134,7 +135,7 @@ def _ask(job, semaphore, stages, rounds):  # type: ignore[no-untyped-def]
 
 @njit("void(int64[::1], int64[:, ::1], int64)", cache=True)
 def _alone(job, stages, rounds):  # type: ignore[no-untyped-def]
-    """Run the same on one thread."""
+    """Run all stages, ``rounds`` times, on one thread."""
     begin = now(job, _CLOCK)
     for _ in range(rounds):
         for s in range(len(stages)):
@@ -155,7 +156,7 @@ class Stage:
 
 
 class Timed(Protocol):
-    """A replacement for a team: runs tasks one after the other, and sums up the time of teams of the sizes
+    """A replacement for a team. It runs tasks one after the other, and sums up the time of teams of the sizes
     ``crews``.
     """
 
@@ -170,12 +171,12 @@ class Timed(Protocol):
 
 
 class Team:
-    """A number of threads, the calling one among them; they exist until the process ends: see ``team``."""
+    """A number of threads, including the calling thread. They exist until the process ends (``team``)."""
 
     def __init__(self, threads: int) -> None:
         self.threads = threads
         self.projecting: Timed | None = None
-        """Runs all tasks in place of the threads while tasks are timed."""
+        """Object that runs all tasks in place of the threads while tasks are timed."""
         size = _THREADS + _LINE * threads
         room = np.zeros(size + _LINE, np.int64)
         self._job: Ints = room[-(room.ctypes.data // room.itemsize) % _LINE :][:size]
@@ -200,17 +201,19 @@ class Team:
 
     @property
     def within(self) -> float:
-        """Wall time in ``run`` so far, s: the time that more threads could share."""
+        """Wall time in ``run`` so far, s. More threads could share this time."""
         return self._words[_WITHIN] / SECOND
 
     @property
     def helped(self) -> float:
-        """Time in tasks of the threads besides the calling one, all together, s."""
+        """Time of all threads except the calling one in tasks, summed over these threads, s."""
         return float(self._job[_THREADS + _LINE :: _LINE].sum()) / SECOND
 
     def run(self, kernel: Kernel, table: int, tasks: Ints, starts: Ints) -> None:
-        """Run ``tasks`` (k, 2), first and end, with a ``kernel`` of the signature TASK and the arguments at the
-        address ``table``; tasks ``starts[c]`` to ``starts[c + 1]``, at most 2^20, write to no common memory.
+        """Run ``tasks`` (k, 2), first and end, with a ``kernel`` of the signature TASK and the arguments at the address
+        ``table``.
+
+        Tasks ``starts[c]`` to ``starts[c + 1]``, at most 2^20, write to no common memory.
         """
         if self.projecting is not None:
             self._words[_WITHIN] += self.projecting.run(kernel, table, tasks, starts)
@@ -221,8 +224,10 @@ class Team:
         self._do(self._stage, 1)
 
     def repeat(self, stages: Sequence[Stage], rounds: int) -> None:
-        """Run all ``stages``, one after the other, ``rounds`` times, in one call: threads stay awake, and no Python
-        runs in between. A kernel that needs the number of the round keeps it in its table.
+        """Run all ``stages``, one after the other, ``rounds`` times, in one call.
+
+        Threads stay awake between the stages, and no Python code runs between them. A kernel that needs the number
+        of the round stores it in its table.
         """
         if self.projecting is not None:
             for _ in range(rounds):

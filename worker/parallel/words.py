@@ -8,7 +8,7 @@ from ..kernels.jit import intrinsic, types
 
 _WORD = ir.IntType(64)
 _MONOTONIC, SECOND = 1, 1_000_000_000
-"""Number of the clock CLOCK_MONOTONIC, the same for all threads; ns in a second."""
+"""Number of the clock CLOCK_MONOTONIC, which is the same for all threads, and number of ns in a second."""
 TASK = "void(int64, int64, int64, int64)"
 """Signature of a kernel that runs a task: address of its arguments (arguments.py), first, end, number of the thread."""
 
@@ -69,7 +69,7 @@ def _read_clock(_: Any, words: Any, at: Any) -> Any:
 
 
 def _library(name: str, signature: Any) -> Any:
-    """Return a call of a function of the C library whose result is ignored."""
+    """Return a call of a function of the C library. The result of the function is ignored."""
 
     def emit(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         kind = ir.FunctionType(ir.IntType(32), [_WORD] * len(args))
@@ -81,16 +81,16 @@ def _library(name: str, signature: Any) -> Any:
 
 call_task: Any = intrinsic(_call)
 add: Any = intrinsic(_added)
-"""In a kernel: add to a word atomically and return its old value; two threads never get the same."""
+"""Function for kernels: add to a word atomically and return its old value. Two threads never get the same old value."""
 swap: Any = intrinsic(_swapped)
-"""In a kernel: set a word and return its old value; earlier writes of the thread are visible to threads that read
-the new value."""
+"""Function for kernels: set a word and return its old value. Earlier writes of the thread are visible to threads
+that read the new value."""
 load: Any = intrinsic(_loaded)
-"""In a kernel: read a word that other threads write."""
+"""Function for kernels: read a word that other threads write."""
 now: Any = intrinsic(_read_clock)
-"""In a kernel: return the time, ns; two words at ``at`` are scratch."""
+"""Function for kernels: return the time, ns; two words at ``at`` are scratch."""
 word_at: Any = intrinsic(_read)
-"""In a kernel: return word ``k`` at an address."""
+"""Function for kernels: return word ``k`` at an address."""
 sched_yield: Any = intrinsic(lambda _: _library("sched_yield", types.void()))
 sem_wait: Any = intrinsic(lambda _, semaphore: _library("sem_wait", types.void(semaphore)))
 sem_post: Any = intrinsic(lambda _, semaphore: _library("sem_post", types.void(semaphore)))

@@ -1,5 +1,5 @@
-"""The whole mesh of a case, built on rank 0: meshes of all parts, turned, moved apart, loaded, with initial
-velocities.
+"""The whole mesh of a case, built on rank 0: meshes of all parts, rotated, separated where they overlap, with loads
+and initial velocities.
 """
 
 import logging
@@ -51,9 +51,9 @@ class Whole:
     tet_part: Indices
     volumes: Floats
     across: Indices
-    """(tets, 4) neighbours of the faces, see state.Block."""
+    """(tets, 4) neighbours of the faces (state.Block.across)."""
     shares: Shares
-    """Nodes of several parts."""
+    """Masses of the nodes of several parts."""
     node_volume: Floats
     mass: Floats
     velocity: Floats
@@ -63,7 +63,7 @@ class Whole:
     """Pieces of the bonds of meshes that do not match."""
     near: Nearness
     marks: Ints
-    """(nodes,) sets that contain each node, see state.Nodes."""
+    """(nodes,) sets that contain each node (state.Nodes.marks)."""
     warnings: list[str]
     """Warnings about the meshes and about the regions of the boundaries."""
     survey: Survey
@@ -71,7 +71,7 @@ class Whole:
 
 
 def quiet(what: str) -> None:
-    """Report nothing."""
+    """Report no phase."""
 
 
 def assemble(case: schema.Case, folder: Path, say: Say = quiet) -> Whole:
@@ -86,7 +86,7 @@ def assemble(case: schema.Case, folder: Path, say: Say = quiet) -> Whole:
 
 
 def _built(case: schema.Case, folder: Path, say: Say, facts: Facts) -> Iterator[tuple[int, TetMesh]]:
-    """Yield the mesh of each part with its number, and measure those from files."""
+    """Yield the mesh of each part with its number, and measure the meshes from files."""
     joint = dict[int, TetMesh]()
     for index, part in enumerate(case.parts):
         said = partial(say, f"meshing {part.name}, part {index + 1} of {len(case.parts)}")
@@ -102,8 +102,8 @@ def _built(case: schema.Case, folder: Path, say: Say, facts: Facts) -> Iterator[
 def assembled(case: schema.Case, meshes: Iterable[tuple[int, TetMesh]], overlaps: bool = True) -> Whole:
     """Return the whole mesh of the ``meshes`` with their part numbers. Raises MeshError, InputError.
 
-    If some parts are missing, as before a run, only boundaries whose parts are all present select nodes and faces.
-    Overlaps of bodies are searched for if ``overlaps`` is set.
+    Some parts may be missing before a run. In that case only boundaries whose parts are all present select nodes and
+    faces. Overlaps of bodies are searched for if ``overlaps`` is set.
     """
     made = stacked(case, meshes, overlaps)
     x, t, part_of_tet, warnings = made.points, made.tets, made.tet_part, made.warnings

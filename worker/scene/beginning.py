@@ -13,8 +13,8 @@ from .assembly import assembled
 def begun(case: Case, meshes: Mapping[int, TetMesh], compiled: bool) -> list[str]:
     """Return the warnings of a run up to its first step. Raises the InputError or MeshError of its start.
 
-    ``meshes``: by part number, of all parts or of those from files; ``compiled``: whether kernels are compiled,
-    without which overlaps are not searched for.
+    ``meshes``: meshes by part number, of all parts or of the parts from files; ``compiled``: whether kernels are
+    compiled. Overlaps are searched for only with compiled kernels.
     """
     whole, comm = assembled(case, meshes.items(), compiled), SerialComm()
     model, piece = domain.alone(case, whole)

@@ -1,4 +1,4 @@
-"""Boundary conditions of a case: the nodes that each holds, and the objects that apply them."""
+"""Boundary conditions of a case: the nodes on which each condition acts, and the objects that apply the conditions."""
 
 import numpy as np
 
@@ -36,8 +36,8 @@ def loads(parcel: Parcel) -> list[Load | LoadedFaces]:
 def walls_of(case: schema.Case) -> Walls:
     """Return the walls of a case in their initial position.
 
-    If parts are rigid, each plane of symmetry adds two walls, one for bodies above it and one for bodies below:
-    contact of a body beside the plane with its mirror image.
+    If parts are rigid, each plane of symmetry adds two walls, one for bodies above the plane and one for bodies
+    below. A contact with such a wall represents the contact of a body beside the plane with its mirror image.
     """
     planes = case.boundaries_of(schema.Symmetry) if case.rigid else []
     images = [_image(spec, sign) for _, spec in planes for sign in (1.0, -1.0)]
@@ -53,8 +53,10 @@ def _image(plane: schema.Symmetry, sign: float) -> schema.Wall:
 
 
 def bodies_beside(case: schema.Case, model: Model, comm: Comm) -> Ints:
-    """Return (planes, parts) 1 for a rigid part that starts above a plane of symmetry that holds it, without a node
-    on it, -1 for one below, 0 for all others. Collective.
+    """Return (planes, parts) 1 for a rigid part that starts above a plane of symmetry, -1 for a rigid part below, 0 for
+    all others.
+
+    The plane must act on the part, and the part must have no node on the plane. Collective.
     """
     planes, nodes = case.boundaries_of(schema.Symmetry), model.nodes
     found = np.zeros((len(planes), len(model.parts)), np.int64)
@@ -71,9 +73,9 @@ def build(
 ) -> list[Boundary]:  # fmt: skip
     """Return the boundaries of a case on this rank's nodes, in the order in which they act. Collective.
 
-    Gravity and tractions come first, so that constraints correct them; walls come last and omit nodes with a
+    Gravity and tractions come first, so that constraints correct them. Walls come last and omit nodes with a
     prescribed motion. Rigid parts have their own motion (rigid/motion.py) and appear here only in planes of
-    symmetry. ``loads``: of the tractions; ``moving``: the walls of the case in their present position.
+    symmetry. ``loads``: loads of the tractions; ``moving``: the walls of the case in their present position.
     """
     nodes = model.nodes
     loose = of_nodes(case, nodes) < 0
@@ -121,19 +123,24 @@ def of_parts(spec: schema.Boundary, model: Model) -> Flags:
 
 
 def heights(spec: schema.Symmetry, model: Model) -> Floats:
-    """Return (n,) the heights of nodes above a symmetry plane at the start, m; 0 for those within round-off of it."""
+    """Return (n,) the heights of nodes above a symmetry plane at the start, m; 0 for nodes within round-off of the
+    plane.
+    """
     found = model.nodes.x0[:, AXES[spec.axis]] - spec.at
     return np.where(np.abs(found) <= model.rounding[model.nodes.part], 0.0, found)
 
 
 def sides(spec: schema.Symmetry, model: Model) -> Floats:
-    """Return (n,) the side of a symmetry plane on which the nodes that it holds start: 1 above, -1 below, 0 else."""
+    """Return (n,) the side of a symmetry plane on which its nodes start: 1 above, -1 below, 0 for nodes on which the
+    plane does not act and for nodes on the plane.
+    """
     return np.where(of_parts(spec, model), np.sign(heights(spec, model)), 0.0)
 
 
 def part_sides(spec: schema.Symmetry, model: Model, comm: Comm) -> Floats:
-    """Return (parts,) 1 for a part above a symmetry plane that holds it, -1 for one below; 0 for a part that it does
-    not hold or that has nodes on both sides. Collective.
+    """Return (parts,) 1 for a part above a symmetry plane, -1 for a part below.
+
+    The value is 0 for a part on which the plane does not act, and for a part with nodes on both sides. Collective.
     """
     side, found = sides(spec, model), np.zeros((2, len(model.parts)))
     nodes, part = model.nodes.of_parts()

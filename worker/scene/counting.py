@@ -1,4 +1,6 @@
-"""Nodes and faces that tractions and prescribed velocities select in meshes from files, counted before a run."""
+"""Counts of the nodes and faces that tractions and prescribed velocities select in meshes from files. The counts are
+made before a run.
+"""
 
 from collections.abc import Iterator, Mapping
 
@@ -16,11 +18,13 @@ from .marks import marks
 from .setting import turned
 
 Meshes = Mapping[int, TetMesh]
-"""Meshes by part number, before the turn of their part."""
+"""Meshes by part number, before the rotation of their part."""
 
 
 def loads(case: Case, meshes: Meshes) -> Iterator[Load]:
-    """Yield the count of each boundary whose parts all have a mesh in ``meshes``, equal to the count of the run.
+    """Yield the count of each boundary whose parts all have a mesh in ``meshes``. The count is equal to the count in
+    the run.
+
     Raises InputError for bonds without common nodes.
     """
     body = bodies(case)
@@ -55,7 +59,7 @@ def _load(case: Case, number: int, meshes: Meshes) -> Load:
 
 
 def empty(case: Case, found: list[Load]) -> Iterator[str]:
-    """Yield an error message for each boundary that selects nothing."""
+    """Yield an error message for each boundary that selects no node or face."""
     for load in found:
         if not (load.faces or load.nodes):
             what = "face" if isinstance(case.boundaries[load.boundary], Traction) else "node"

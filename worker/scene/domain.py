@@ -32,7 +32,7 @@ from . import assembly
 from .assembly import Say, Whole
 
 GROUPS = 256
-"""Number of groups of tets whose loads are recorded (migration/groups.py). Chosen."""
+"""Number of groups of tets with recorded loads (migration/groups.py). Chosen value."""
 
 
 @dataclass
@@ -48,9 +48,10 @@ class Piece:
     mass: Floats
     node_volume: Floats
     shares: Shares
-    """Nodes of several parts."""
+    """Masses of the nodes of several parts."""
     loads: list[Load | LoadedFaces]
-    """Loads of the tractions on all nodes of this rank; those that follow the surface on the faces of its tets."""
+    """Loads of the tractions on all nodes of this rank. A pressure that follows the surface is given on the faces of
+    the tets of this rank."""
     tied: Pieces
     """Pieces of the bonds of meshes that do not match, of all ranks."""
     tet_ids: Ints
@@ -58,12 +59,12 @@ class Piece:
     tets: Indices
     tet_volume: Floats
     across: Indices
-    """(tets, 4) neighbours of the faces, see state.Block."""
+    """(tets, 4) neighbours of the faces (state.Block.across)."""
     border: Flags
     node_group: Indices
     tet_group: Indices
     groups: Floats
-    """(groups, 4) see state.Model."""
+    """(groups, 4) centre and number of tets of each group (state.Model.groups)."""
     neighbours: list[Neighbour]
     totals: tuple[int, int, int]
     """Numbers of tets, nodes and shared nodes of the whole mesh."""
@@ -75,15 +76,16 @@ class Piece:
     """Largest absolute coordinate of the whole mesh, m."""
     slack: Floats
     rounding: Floats
-    """(parts,) tolerances, see state.Model."""
+    """(parts,) tolerances of regions and of planes of symmetry, m (state.Model)."""
     marks: Ints
-    """(nodes,) sets that contain each node, see state.Nodes."""
+    """(nodes,) sets that contain each node (state.Nodes.marks)."""
     warnings: list[str]
-    """See Whole."""
+    """Warnings about the meshes and the boundaries (assembly.Whole)."""
 
 
 def cut(whole: Whole, ranks: int, scale: tuple[float, float, float] = (1.0, 1.0, 1.0)) -> list[Piece]:
-    """Return the pieces of ``ranks`` ranks: tets by recursive bisection of their centres, with all nodes of the tets.
+    """Return the pieces of ``ranks`` ranks. The centres of the tets are divided by recursive bisection. A rank gets all
+    nodes of its tets.
 
     ``scale`` multiplies the centres first: a direction with a small factor is cut last. Raises InputError if there
     are more ranks than tets.
@@ -118,7 +120,7 @@ def _grouped(whole: Whole, centres: Floats) -> tuple[Indices, Indices, Floats]:
 
 
 def _home(whole: Whole, owner: Indices) -> Indices:
-    """Return (nodes,) the part of a cut that owns each node: the owner of its tet of smallest id."""
+    """Return (nodes,) the part of a cut that owns each node: the part with the tet of smallest id at the node."""
     home = np.zeros(len(whole.points), np.int32)
     home[whole.tets[::-1].reshape(-1)] = np.repeat(owner[::-1], 4)
     return home
@@ -151,9 +153,9 @@ def _piece(
 
 
 def build(case: schema.Case, folder: Path, comm: Comm, say: Say = assembly.quiet) -> tuple[Model, Piece]:
-    """Return this rank's model and piece; rank 0 reports each phase with ``say``. Collective.
+    """Return this rank's model and piece. Rank 0 reports each phase with ``say``.
 
-    Raises MeshError on every rank if rank 0 cannot build a mesh.
+    Collective. Raises MeshError on every rank if rank 0 cannot build a mesh.
     """
     pieces: list[Piece] | None = None
     failure: Exception | None = None
@@ -176,7 +178,7 @@ def _warned(case: schema.Case, folder: Path, survey: Survey) -> list[str]:
     """Return the warnings about the case that ``conoid validate`` gives."""
     try:
         expected = estimate(case, folder, survey)
-    except (ArithmeticError, ValueError):  # too many elements to count: the reader of the case refuses it
+    except (ArithmeticError, ValueError):  # too many elements to count: the reader of the case refuses the case
         return []
     return [str(each) for each in warned(case, expected, survey, [*touching(case), *survey.touching])]
 
@@ -221,7 +223,9 @@ def _block(case: schema.Case, piece: Piece, index: int) -> Block:
 def block(
     case: schema.Case, index: int, ids: Ints, tets: Tets, state: Floats, across: Indices, border: int
 ) -> Block:  # fmt: skip
-    """Return the block of part ``index`` from the arrays of its tets, the ``border`` ones first, and the case."""
+    """Return the block of part ``index``, from the case and from the arrays of its tets. The ``border`` tets come
+    first.
+    """
     part = case.parts[index]
     material = find_material(case, part.material)
     return Block(

@@ -1,4 +1,4 @@
-"""Measurements of meshes from files: size, mass, momentum, energy and contact of their surfaces at the start."""
+"""Measurements of meshes from files at the start: size, mass, momentum, energy, and contact between their surfaces."""
 
 import numpy as np
 
@@ -14,10 +14,10 @@ from .setting import turned, velocities
 
 
 class Facts:
-    """Measurements of the parts of a case; the meshes are added one after the other."""
+    """Measurements of the parts of a case. The meshes are added one after the other."""
 
     def __init__(self, case: Case) -> None:
-        """No part is measured yet."""
+        """Start without any measured part."""
         self._case = case
         self.parts: list[Surveyed] = []
         self._surfaces: dict[int, Surface] = {}
@@ -29,7 +29,7 @@ class Facts:
         self.parts.append(_measured(self._case, index, mesh, self._surfaces[index]))
 
     def survey(self) -> Survey:
-        """Return all measurements, and which parts touch."""
+        """Return all measurements, and the pairs of parts that touch."""
         return Survey(parts=self.parts, touching=list(touches(self._case, self._surfaces)))
 
 
@@ -57,6 +57,8 @@ def _measured(case: Case, index: int, mesh: TetMesh, surface: Surface) -> Survey
 
 
 def _smallest_altitude(mesh: TetMesh, volumes: Floats) -> float:
-    """Return the smallest altitude, m: three times the volume of a tet over its largest face."""
+    """Return the smallest altitude of the tets, m: three times the volume of a tet divided by the area of its
+    largest face.
+    """
     largest = areas(mesh.points, mesh.tets[:, FACES].reshape(-1, 3)).reshape(-1, 4).max(axis=1)
     return float((3.0 * volumes / largest).min())

@@ -21,7 +21,7 @@ def asked(part: Part) -> Mesh:
 
 
 def grouped(case: Case, index: int) -> list[int]:
-    """Return the parts that gmsh meshes together with part ``index``: those of its body that are meshed by gmsh."""
+    """Return the parts that gmsh meshes together with part ``index``: the parts of the same body that gmsh meshes."""
     body = bodies(case)
     made = [isinstance(part.mesh, Primitive | Meshed) and part.mesh.generator == "gmsh" for part in case.parts]
     return [i for i, of in enumerate(body) if of == body[index] and made[i]] if made[index] else []
@@ -30,6 +30,6 @@ def grouped(case: Case, index: int) -> list[int]:
 def built_together(
     case: Case, group: list[int], folder: Path, said: Callable[[], None] = lambda: None
 ) -> dict[int, TetMesh]:
-    """Return the meshes of the parts of a ``group`` by their numbers; ``said`` is called before they are made."""
+    """Return the meshes of the parts of a ``group`` by their numbers. ``said`` is called before the meshes are made."""
     meshes = {f"parts[{i}].mesh": asked(case.parts[i]) for i in group}
     return dict(zip(group, build_together(meshes, folder, made=said), strict=True))

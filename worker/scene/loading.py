@@ -23,11 +23,11 @@ def loads(
     known: list[bool],
     marked: Marks,
 ) -> tuple[list[Load | LoadedFaces], list[Selected], list[str]]:
-    """Return the loads of the tractions of a case, what each selects, and warnings.
+    """Return the loads of the tractions of a case, the selection of each traction, and warnings.
 
-    A traction gives a third of the force on each face to each of its nodes, in the order of the tets; a pressure
-    that follows the surface keeps the faces. ``of_tets``: (m, 4) tets, and (m,) their parts; tractions that are not
-    ``known`` get no face. Raises InputError for a known one that selects no face.
+    A traction gives a third of the force on each face to each node of the face, in the order of the tets. A pressure
+    that follows the surface stores the faces instead. ``of_tets``: (m, 4) tets, and (m,) their parts. A traction
+    that is not ``known`` gets no face. Raises InputError for a known traction that selects no face.
     """
     tractions = case.boundaries_of(schema.Traction)
     loads, found, warnings = list[Load | LoadedFaces](), list[Selected](), list[str]()

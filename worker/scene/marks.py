@@ -20,24 +20,25 @@ Meshes = Mapping[int, tuple[TetMesh, Ints]]
 
 @dataclass
 class Marks:
-    """Membership of nodes and faces in sets."""
+    """Membership of nodes and faces in sets of mesh files."""
 
     nodes: Ints
-    """(n,) bit b of a node: whether it is in set b of ``cases.on.bits``; (0,) if the case refers to no set."""
+    """(n,) bit b of a node: whether the node is in set b of ``cases.on.bits``; (0,) if the case refers to no set."""
     faces: dict[int, Ints] = field(default_factory=dict)
-    """(k, 3) ascending nodes of the faces of surfaces, by bit."""
+    """(k, 3) nodes of the faces of surfaces, ascending in each face, by bit of the surface."""
     surfaces: dict[int, set[int]] = field(default_factory=dict)
-    """The parts in which a set is a surface, by bit."""
+    """The parts in which a set is a surface, by bit of the set."""
     warnings: list[str] = field(default_factory=list)
     """Warnings for the user."""
 
     def holds(self, bit: int) -> Flags:
-        """Return (n,) the nodes that are in a set."""
+        """Return (n,) which nodes are in a set."""
         return held(self.nodes, bit)
 
     def chosen(self, bit: int, faces: Indices, part: Indices) -> Flags:
-        """Return (m,) the exposed faces (m, 3) that a set contains: faces of a surface, or faces with all nodes in a
-        set of nodes. ``part``: (m,) their parts.
+        """Return (m,) which exposed faces (m, 3) a set contains. ``part``: (m,) the parts of the faces.
+
+        A surface contains its faces. A set of nodes contains the faces with all nodes in the set.
         """
         of_surface = np.isin(part, sorted(self.surfaces.get(bit, ())))
         by_nodes = self.holds(bit)[faces].all(axis=1)
@@ -51,7 +52,7 @@ class Marks:
 
 
 def held(marks: Ints, bit: int) -> Flags:
-    """Return (n,) the nodes that have a bit."""
+    """Return (n,) which nodes have a bit."""
     return np.asarray((marks >> bit & 1).astype(bool))
 
 
@@ -82,7 +83,7 @@ def marks(case: Case, meshes: Meshes, n: int, boundary: int | None = None) -> Ma
 
 
 def _found(case: Case, name: str, candidates: Sequence[int], meshes: Meshes, each: bool) -> list[tuple[int, NodeSet]]:
-    """Return the set in each part; ``each``: whether all parts must have it."""
+    """Return the set in each part; ``each``: whether all parts must have the set."""
     if not candidates:
         return []
     found = [(index, meant(meshes[index][0].sets, name)) for index in candidates]

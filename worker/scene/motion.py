@@ -12,16 +12,17 @@ from ..model.state import Floats, Indices
 from .setting import velocities
 
 _JITTER = 0x6A697474
-"""Seed of the random velocities of the start."""
+"""Seed of the random velocities at the start."""
 _ALIKE = 1e-6
-"""Share of the larger of two velocities below which their difference is round-off. Chosen."""
+"""Difference between two velocities, as a share of the larger one, below which it is round-off. Chosen value."""
 
 
 def initial_velocities(case: schema.Case, x: Floats, part: Indices, shares: Shares) -> tuple[Floats, list[str]]:
     """Return the velocities of the nodes (n, 3), m/s, and a warning if parts with a common node have different
-    velocities: the node gets their mean by mass.
+    velocities.
 
-    ``part``: (n,) the representative part of each node.
+    The common node gets the mean of the velocities, weighted by mass. ``part``: (n,) the representative part of each
+    node.
     """
     v = np.zeros_like(x)
     for index, spec in enumerate(case.parts):
@@ -37,7 +38,9 @@ def initial_velocities(case: schema.Case, x: Floats, part: Indices, shares: Shar
 
 
 def _mean_velocities(case: schema.Case, v: Floats, x: Floats, shares: Shares) -> list[str]:
-    """Set the velocities of nodes of several parts with different velocities; return a warning if there are any."""
+    """Set the velocities of nodes of several parts with different velocities. Return a warning if there are such
+    nodes.
+    """
     own = np.zeros((len(shares.node), 3))
     for index, spec in enumerate(case.parts):
         chosen = shares.part == index

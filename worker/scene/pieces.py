@@ -1,4 +1,6 @@
-"""Pieces of a part from a mesh file, which have no node in common: overlaps between them, and their contact."""
+"""Pieces of a part from a mesh file: sets of tets without a common node. The module detects overlaps between pieces,
+and allows contact between them.
+"""
 
 from collections.abc import Iterator
 
@@ -16,18 +18,19 @@ from ..mesh.model import TetMesh
 from ..model.state import Indices
 
 _MANY = 1_000
-"""Number of pieces of a part above which overlaps between them are not searched for. Chosen: the table of pairs
-grows with its square."""
+"""Number of pieces of a part above which overlaps between the pieces are not searched for. Chosen value: the table
+of pairs increases with the square of this number."""
 UNSEEN = "the run checks whether bodies overlap: kernels are not compiled here yet"
 """Warning if overlaps are not searched for."""
 
 
 def pieces(case: Case, index: int, mesh: TetMesh, overlaps: bool) -> tuple[Indices, list[str]]:
-    """Return (nodes,) the piece of each node, if the mesh is from a file and the part has self-contact, else zeros; and
-    warnings: unmerged coincident nodes are a common error of meshes.
+    """Return (nodes,) the piece of each node, and warnings. The pieces are zeros unless the mesh is from a file and the
+    part has self-contact.
 
-    ``overlaps``: whether overlaps of pieces without contact are searched for. Raises InputError if such pieces have
-    volume in common: it would count twice.
+    A warning is given for unmerged coincident nodes, a common error of meshes. ``overlaps``: whether overlaps of
+    pieces without contact are searched for. Raises InputError if such pieces have volume in common, because this
+    volume would count twice.
     """
     whole = np.zeros(len(mesh.points), np.int32)
     if not isinstance(case.parts[index].mesh, Measured):
@@ -50,7 +53,9 @@ def pieces(case: Case, index: int, mesh: TetMesh, overlaps: bool) -> tuple[Indic
 
 
 def _doubled(case: Case, index: int, mesh: TetMesh, piece: Indices) -> Iterator[str]:
-    """Yield a warning if nodes of a piece are inside of another one. Raises InputError if centres of tets are."""
+    """Yield a warning if nodes of a piece are inside of another piece. Raises InputError if centres of tets are
+    inside of another piece.
+    """
     inside, tets = overlap.within(mesh.points, mesh.tets, piece)
     if len(tets):
         volumes, at = mesh.volumes(), mesh.points[mesh.tets[tets[0]]].mean(axis=0)

@@ -1,4 +1,6 @@
-"""Nodes and faces that the regions of a case select, compared with the numbers that ``validate`` expects."""
+"""Nodes and faces that the regions of a case select, and their comparison with the numbers that ``validate``
+expects.
+"""
 
 import logging
 from collections.abc import Container, Iterator, Sequence
@@ -19,31 +21,33 @@ from .marks import Marks
 log = logging.getLogger("conoid.worker")
 
 _CLOSE = 0.5
-"""Distance outside of a border, over the shortest edge, within which nodes are counted to detect a layer. Chosen:
-the next layer of a regular mesh is twice as far."""
+"""Distance outside of a region, divided by the shortest edge, within which nodes are counted to detect a layer.
+Chosen value: the next layer of a regular mesh is at twice this distance."""
 _LAYER, _FEWEST = 0.5, 4
-"""Share of these nodes within region.MOST that is taken as a layer, and the least number of nodes. Chosen: of nodes
-at random a fifth is as near."""
+"""Share of the counted nodes that must be within region.MOST to be taken as a layer, and the smallest number of such
+nodes. Chosen values: of randomly placed nodes a fifth is that near."""
 Members = tuple[Ints, Indices]
 """(m,) nodes and (m,) their parts: a row for each part of each node (state.Nodes.of_parts)."""
 _EDGES = ((0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3))
-"""Corners of the edges of a tet."""
+"""Pairs of corners of a tet that form its edges."""
 
 
 @dataclass(frozen=True)
 class Nearness:
-    """Distances from a border within which nodes of each part count as on it, m; see ``cases/shapes/region.py``."""
+    """Distances from a border, m, within which nodes of each part count as on the border
+    (``cases/shapes/region.py``).
+    """
 
     edge: Floats
-    """(parts,) shortest edge."""
+    """(parts,) shortest edge of each part, m."""
     slack: Floats
-    """(parts,) distance for regions."""
+    """(parts,) distance for regions, m."""
     rounding: Floats
-    """(parts,) distance for planes of symmetry."""
+    """(parts,) distance for planes of symmetry, m."""
 
 
 def nearness(case: schema.Case, x: Floats, members: Members, tets: Indices, tet_part: Indices) -> Nearness:
-    """Return the distances for all parts, from nodes (n, 3), tets (m, 4), and the parts of both."""
+    """Return the distances for all parts. Arguments: nodes (n, 3), tets (m, 4), and the parts of both."""
     nodes, part = members
     n = len(case.parts)
     squared, reach = np.full(n, np.inf), np.zeros(n)
@@ -59,7 +63,7 @@ def nearness(case: schema.Case, x: Floats, members: Members, tets: Indices, tet_
 
 
 def named(spec: schema.Boundary, parts: Sequence[str]) -> Flags:
-    """Return (parts,) the parts that a boundary names; all if it names none."""
+    """Return (parts,) the parts that a boundary names. A boundary without names has all parts."""
     return np.array([not spec.parts or name in spec.parts for name in parts])
 
 
@@ -69,7 +73,9 @@ def settled(case: schema.Case, there: Container[int]) -> list[bool]:
 
 
 def meant(case: schema.Case, spec: schema.Boundary) -> Flags:
-    """Return (parts,) the parts of a boundary: if it is on a set and names no part, those with a mesh from a file."""
+    """Return (parts,) the parts of a boundary. A boundary on a set that names no part has the parts with a mesh from
+    a file.
+    """
     found = named(spec, [part.name for part in case.parts])
     if getattr(spec, "on", None) is not None and not spec.parts:
         found &= np.array([isinstance(part.mesh, MeshFile) for part in case.parts])
@@ -77,15 +83,15 @@ def meant(case: schema.Case, spec: schema.Boundary) -> Flags:
 
 
 def inside(spec: schema.Prescribed | schema.Traction, x: Floats, part: Indices, near: Floats) -> Flags:
-    """Return (n,) the points (n, 3) in the region of a boundary, of any part; ``near``: (parts,) slack, m."""
+    """Return (n,) which points (n, 3) of any part are in the region of a boundary; ``near``: (parts,) tolerance, m."""
     return np.asarray(np.full(len(x), True) & Region.of(spec).holds(x.T, near[part]))
 
 
 def held(
     spec: schema.Prescribed | schema.Traction, names: Sequence[str], x: Floats, members: Members, near: Floats
 ) -> Flags:  # fmt: skip
-    """Return (n,) the nodes (n, 3) of the parts of a boundary that are in its region; ``names``: of the parts;
-    ``near``: (parts,) slack, m.
+    """Return (n,) which nodes (n, 3) are in the region of a boundary and belong to its parts. ``names``: names of
+    the parts; ``near``: (parts,) tolerance, m.
     """
     nodes, part = members
     some = named(spec, names)[part] & inside(spec, x[nodes], part, near)
@@ -96,7 +102,7 @@ def held(
 
 @dataclass(frozen=True)
 class Selected:
-    """Selection of the region of a boundary: faces and their area, m^2, of a traction, nodes of a velocity."""
+    """Selection of the region of a boundary: faces of a traction and their area, m^2, or nodes of a velocity."""
 
     boundary: int
     nodes: int
@@ -105,7 +111,7 @@ class Selected:
 
 
 def compared(case: schema.Case, found: Sequence[Selected]) -> Iterator[str]:
-    """Log what is selected and what ``validate`` expects; yield a warning where they disagree."""
+    """Log the selected numbers and the numbers that ``validate`` expects. Yield a warning for each difference."""
     expected = {load.boundary: load for load in loaded.loads(case)}
     for each in found:
         load = expected[each.boundary]
@@ -127,8 +133,10 @@ def _words(found: Selected) -> str:
 def missed(
     case: schema.Case, number: int, x: Floats, members: Members, near: Nearness, took: Flags
 ) -> Iterator[str]:  # fmt: skip
-    """Yield warnings for the region of a boundary that selects something of the parts ``took`` (parts,): parts that
-    it names and selects nothing of, and layers of nodes so close outside of it that the user may have meant them.
+    """Yield warnings for the region of a boundary that selects something of the parts ``took`` (parts,).
+
+    A warning is given for named parts without selection. Another warning is given for layers of nodes so close
+    outside of the region that the user may have meant them.
     """
     spec = case.boundaries[number]
     assert isinstance(spec, schema.Prescribed | schema.Traction)
@@ -160,7 +168,8 @@ def counted(
     near: Nearness,
     marked: Marks,
 ) -> tuple[Selected, Flags]:
-    """Return what boundary ``number`` selects, and which nodes (n,) of a velocity or faces (m,) of a traction.
+    """Return the selection of boundary ``number``, and which nodes (n,) of a velocity or faces (m,) of a traction it
+    selects.
 
     ``faces``: exposed faces (m, 3) and their parts (m,); ``marked``: sets of the nodes.
     """
@@ -181,7 +190,7 @@ def counted(
 
 
 NO_FACES = np.zeros((0, 3), np.int32), np.zeros(0, np.int32)
-"""Argument ``faces`` of ``counted`` for velocities."""
+"""Value of the argument ``faces`` of ``counted`` for velocities, which have no faces."""
 
 
 def off_planes(

@@ -21,7 +21,9 @@ def turned(points: Floats, turn: Turn | None) -> Floats:
 
 
 def velocities(part: Part, points: Floats) -> Floats:
-    """Return (n, 3) the velocities, m/s, of nodes of ``part`` at ``points``, (n, 3), m, without its jitter."""
+    """Return (n, 3) the velocities, m/s, of nodes of ``part`` at ``points``, (n, 3), m, without the random part of
+    the velocity.
+    """
     found = np.empty_like(points)
     found[:] = part.velocity
     if part.spin is not None:

@@ -1,4 +1,4 @@
-"""One mesh of all parts: nodes and tets in the order of the parts, with common nodes where bonds join parts."""
+"""One mesh of all parts: nodes and tets in the order of the parts. Parts joined by bonds have common nodes."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -21,31 +21,33 @@ from .setting import turned
 
 @dataclass
 class Stacked:
-    """All nodes and tets."""
+    """All nodes and tets of a case."""
 
     points: Floats
     """(n, 3) positions after the rotation of their part, m."""
     tets: Indices
-    """(m, 4) nodes."""
+    """(m, 4) indices of the nodes of each tet."""
     tet_part: Indices
     node_part: Indices
-    """(n,) part; the first part of a node of several."""
+    """(n,) part of each node. A node of several parts has the first of them."""
     body: Indices
-    """(n,) the body of each node: a part, a piece of a part, or several joined by bonds."""
+    """(n,) the body of each node. A body is a part, a piece of a part, or several of these joined by bonds."""
     part_of_body: Ints
-    """(bodies,) the first part of each, also of bodies that were joined to another."""
+    """(bodies,) the first part of each body. The array includes bodies that were joined to another body."""
     stands: Ints
-    """(bodies,) the body that each was joined to."""
+    """(bodies,) the body to which each body was joined."""
     across: Indices
-    """(m, 4) see state.Block; (0, 4) if no stage needs it."""
+    """(m, 4) neighbours of the faces (state.Block.across); (0, 4) if no stage needs them."""
     warnings: list[str]
     read: dict[int, tuple[TetMesh, Ints]]
-    """Meshes from files by part number, with the indices of their nodes; filled if the case refers to sets."""
+    """Meshes from files by part number, with the indices of their nodes. The dictionary is filled if the case refers
+    to sets."""
 
     def any_of_body(self, allowed: Flags) -> Flags:
-        """Return (bodies, bodies) the pairs in contact: a body is in contact with all that one of its parts is.
+        """Return (bodies, bodies) the pairs of bodies in contact.
 
-        ``allowed``: (bodies, bodies) pairs by the part of each body alone.
+        ``allowed``: (bodies, bodies) pairs by the part of each body alone. A joined body is in contact with every
+        body that is in contact with one of its parts.
         """
         met, (one, other) = np.zeros_like(allowed), np.nonzero(allowed)
         met[self.stands[one], self.stands[other]] = True
@@ -53,7 +55,7 @@ class Stacked:
 
 
 def stacked(case: Case, meshes: Iterable[tuple[int, TetMesh]], overlaps: bool) -> Stacked:
-    """Return the mesh of the ``meshes`` with their part numbers, in their order. Raises MeshError, InputError.
+    """Return one mesh of the ``meshes`` with their part numbers, in their order. Raises MeshError, InputError.
 
     ``overlaps``: whether overlaps between pieces of a part are searched for.
     """
@@ -89,7 +91,7 @@ def stacked(case: Case, meshes: Iterable[tuple[int, TetMesh]], overlaps: bool) -
 
 
 def _join(made: Stacked, stands: Ints) -> bool:
-    """Merge nodes: ``stands`` (n,) is the node that represents each. Return whether any node was merged."""
+    """Merge nodes; return whether any node was merged. ``stands`` (n,) is the node that represents each node."""
     kept = np.flatnonzero(stands == np.arange(len(stands)))
     if len(kept) == len(stands):
         return False

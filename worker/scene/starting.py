@@ -1,4 +1,6 @@
-"""Start of the boundary conditions: they set initial velocities, and contradictions between them are refused."""
+"""Start of the boundary conditions: they set initial velocities. Contradictions between boundary conditions are
+refused.
+"""
 
 from collections.abc import Sequence
 
@@ -18,7 +20,7 @@ from . import selection
 from .conditions import AXES, heights, held_by, sides
 
 _ASIDE = 1e-9
-"""Share of the largest speed below which a velocity across a symmetry plane is round-off. Chosen."""
+"""Velocity across a symmetry plane, as a share of the largest speed, below which it is round-off. Chosen value."""
 
 
 def start(
@@ -26,11 +28,10 @@ def start(
 ) -> list[str]:
     """Apply the boundaries to the initial velocities; return warnings. Collective.
 
-    ``known``: for each boundary whether all its parts are in the model; for the others fewer checks are made; None for
-    all.
-
-    Raises InputError, on every rank, for a boundary that holds no node, two that drive a node differently, a body
-    that starts behind a wall or through a symmetry plane, and motion prescribed across one.
+    ``known``: for each boundary whether all its parts are in the model. A boundary that is not known has fewer
+    checks. None: all boundaries are known. Raises InputError, on every rank, for a boundary without a node, for two
+    boundaries that drive a node differently, for a body that starts behind a wall or through a symmetry plane, and
+    for motion prescribed across a symmetry plane.
     """
     held = [held_by(case, spec, model) for spec in case.boundaries]
     known = [True] * len(held) if known is None else known
@@ -54,7 +55,7 @@ def start(
 
 
 def _beside(case: schema.Case, model: Model, comm: Comm) -> list[int]:
-    """Return the symmetry planes that have nodes beside them at the start."""
+    """Return the symmetry planes with nodes near the plane at the start."""
     planes = case.boundaries_of(schema.Symmetry)
     found = comm.sum(np.array([int(np.count_nonzero(sides(spec, model))) for _, spec in planes], np.int64))
     return [index for (index, _), many in zip(planes, found, strict=True) if many]
@@ -85,7 +86,7 @@ def _refuse_overlaps(case: schema.Case, model: Model, boundaries: list[Boundary]
 
 
 def _refuse_crossings(case: schema.Case, model: Model, comm: Comm) -> None:
-    """Raise InputError for a tet through a symmetry plane: it would overlap its own mirror image."""
+    """Raise InputError for a tet on both sides of a symmetry plane: it would overlap its own mirror image."""
     for index, spec in case.boundaries_of(schema.Symmetry):
         named, height, beyond = selection.named(spec, model.parts), heights(spec, model), np.zeros(len(model.parts))
         for block in (block for block in model.blocks if named[block.part]):
@@ -113,8 +114,9 @@ def _refuse_two_drives(specs: Sequence[schema.Boundary], held: list[Flags], comm
 
 
 def _two_drives(specs: Sequence[schema.Boundary], held: list[Flags]) -> int:
-    """Return a pair of boundaries that drive a node of this rank differently, as second * boundaries + first; -1 for
-    none.
+    """Return a pair of boundaries that drive a node of this rank differently; -1 if there is no such pair.
+
+    The pair is encoded as second * boundaries + first.
     """
     drivers = {axis: np.full(len(held[0]) if held else 0, -1) for axis in AXES}
     for second, spec in enumerate(specs):
@@ -130,7 +132,7 @@ def _two_drives(specs: Sequence[schema.Boundary], held: list[Flags]) -> int:
 def _refuse_conflicts(
     specs: Sequence[schema.Boundary], held: list[Flags], boundaries: list[Boundary], nodes: Nodes, comm: Comm
 ) -> None:
-    """Raise InputError for motion prescribed across a symmetry plane at any time: the plane would do work."""
+    """Raise InputError for motion prescribed across a symmetry plane at any time, because the plane would do work."""
     before = nodes.v.copy()
     for boundary in boundaries:
         boundary.start(nodes)

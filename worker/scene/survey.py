@@ -1,7 +1,8 @@
 """Measurements of the mesh files of a case: ``python -m conoid.worker.scene.survey``.
 
-One question on standard input, one answer on standard output (conoid.cases.reading.survey). Child processes read the
-files with the limits and the store of a run: a run that follows does not read them again.
+The process reads one question from standard input and writes one answer to standard output
+(conoid.cases.reading.survey). Child processes read the files with the limits and the store of a run. A run that
+follows does not read the files again.
 """
 
 import sys
@@ -27,8 +28,10 @@ from .setting import turned
 
 
 def surveyed(case: Case, folder: Path, compiled: bool = True) -> Survey:
-    """Read the files of all parts and report the errors of each. If all can be used, start a run with them up to its
-    first step; without ``compiled`` kernels overlaps of bodies are not searched for.
+    """Read the files of all parts and report the errors of each file.
+
+    If all files can be used, start a run with them up to its first step. Without ``compiled`` kernels overlaps of
+    bodies are not searched for.
     """
     facts, refused, placed, meshes = Facts(case), list[str](), list[Placed](), dict[int, TetMesh]()
     for index, part in enumerate(case.parts):
@@ -58,8 +61,8 @@ def surveyed(case: Case, folder: Path, compiled: bool = True) -> Survey:
 
 
 def _made(case: Case, index: int, folder: Path, there: dict[int, TetMesh]) -> dict[int, TetMesh]:
-    """Return the meshes of part ``index`` and of those meshed together with it, by number; none if it is in
-    ``there``.
+    """Return the meshes of part ``index`` and of the parts meshed together with it, by number. No mesh is returned
+    if ``there`` has the part.
     """
     if index in there:
         return {}
@@ -70,7 +73,10 @@ def _made(case: Case, index: int, folder: Path, there: dict[int, TetMesh]) -> di
 
 
 def _begun(case: Case, meshes: dict[int, TetMesh], compiled: bool) -> list[str]:
-    """Return the warnings of the trial start. It is imported here: numba must have its cache folder before."""
+    """Return the warnings of the trial start.
+
+    The module of the trial start is imported here, because numba must have its cache folder before.
+    """
     from .beginning import begun
 
     return begun(case, meshes, compiled) if meshes else []
