@@ -119,10 +119,11 @@ def page(found: Sequence[Row]) -> str:
     left = sorted(set(known) - {r.case for r in found})
     return "\n\n".join([
         "# Energy that lines of the ledger make",
-        "Written by `python -m tests.bench.energy_lines`: every hard and every shipped case, one rank, with the line "
-        "of the ledger that has made most energy at any time, as a share of the largest energy until then, and its "
-        "limit, `run.made_limit`, and the steps beside what `conoid validate` expects. How it is counted: "
-        "[theory/energy.md](../theory/energy.md), \"Energy that a line makes\".",
+        "The table contains every hard and every shipped case, each run on one rank. `python -m "
+        "tests.bench.energy_lines` writes it. \"Worst line\" is the line of the ledger that has created the most "
+        "energy at any time. \"Made\" is this energy as a share of the largest energy until then, \"at\" is its time, "
+        "and \"limit\" is `run.made_limit`. \"Estimated\" is the number of steps that `conoid validate` expects. "
+        "[theory/energy.md](../theory/energy.md), \"Energy that a line makes\", explains how this energy is counted.",
         f"{len(found)} of {len(known)} cases; {sum(r.bad for r in found)} succeeded above the limit."
         + (f" Not measured: {', '.join(left)}." if left else ""),
         *(["\n".join(wrong)] if wrong else []),
