@@ -1,7 +1,8 @@
-"""``make bench``: everything in turn; tables to the terminal and to build/bench/bench.md, numbers to bench.json.
+"""``make bench``: runs all benchmarks one after the other. It prints tables, and writes them to build/bench/bench.md
+and the numbers to bench.json.
 
-``BENCH=quick`` takes some two minutes, the default a quarter of an hour, ``BENCH=long`` an hour. A part can be named:
-``python -m tests.bench speed taylor``.
+``BENCH=quick`` takes about two minutes, the default 15 minutes, ``BENCH=long`` one hour. ``python -m tests.bench
+speed taylor`` runs the named benchmarks only.
 """
 
 import json
@@ -39,7 +40,7 @@ OUT = Path(__file__).parents[2] / "build" / "bench"
 
 @dataclass(frozen=True)
 class Extent:
-    """How much is measured; a part with a count of 0 is left out."""
+    """Amount of work of each benchmark. A benchmark with a count of 0 is left out."""
 
     sizes: tuple[int, ...]
     metals: tuple[speed.Metal, ...]
@@ -77,14 +78,14 @@ LONG = Extent(
 
 @dataclass
 class Book:
-    """Collects what the parts say, and writes it as they go."""
+    """Collects the results of the benchmarks, and writes them after each one."""
 
     text: list[str] = field(default_factory=list)
     data: dict[str, Any] = field(default_factory=dict)
     shown: list[Gate] = field(default_factory=list)
 
     def add(self, title: str, text: str, data: object, shown: Iterator[Gate] | None = None) -> None:
-        """A section, its numbers, and the requirements that it speaks to."""
+        """Adds a section, its numbers, and the requirements that its numbers answer."""
         self.text.append(f"## {title}\n\n{text.rstrip()}\n")
         print(f"\n{self.text[-1]}", flush=True)
         self.data[title] = data
@@ -92,7 +93,7 @@ class Book:
         self.write()
 
     def write(self) -> None:
-        """To build/bench."""
+        """Writes text and numbers to build/bench."""
         OUT.mkdir(parents=True, exist_ok=True)
         (OUT / "bench.md").write_text("\n".join([*self.text, ""]), encoding="utf-8")
         (OUT / "bench.json").write_text(json.dumps(self.data, indent=1), encoding="utf-8")
@@ -230,7 +231,7 @@ PARTS: dict[str, Callable[[Extent, Book], None]] = {
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Runs the named parts, or all."""
+    """Runs the named benchmarks, or all."""
     extents = {"quick": QUICK, "full": FULL, "long": LONG}
     wanted = os.environ.get("BENCH") or "full"
     unknown = [name for name in arguments if name not in PARTS]

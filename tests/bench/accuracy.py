@@ -1,4 +1,4 @@
-"""Speed against error: the Taylor bars with each mesh size, pressure form and share of the stable step."""
+"""Speed against error: the Taylor bars with several mesh sizes, pressure forms and safety factors of the time step."""
 
 import json
 import os
@@ -19,12 +19,13 @@ from .table import Cell, table
 
 BARS = ("taylor_copper", "taylor_42crmo4")
 _PROBE = 0.7
-"""mm: on coarser meshes no tet has its centre in the probes of the steel bar; there they are made larger."""
+"""Element size in mm above which no tet has its centre in the probes of the steel bar; on coarser meshes the boxes
+of the probes are enlarged."""
 
 
 @dataclass(frozen=True)
 class Plan:
-    """One run of a bar; ``size`` in mm."""
+    """One run of a bar; ``size``: element size, mm."""
 
     bar: str
     size: float
@@ -34,7 +35,7 @@ class Plan:
     viscosity: bool = True
 
     def overrides(self) -> list[str]:
-        """Assignments for the worker's command line."""
+        """Returns the assignments for the command line of the worker."""
         more = [] if self.viscosity else ['numerics.viscosity="none"']
         if self.bar == "taylor_42crmo4" and self.size > _PROBE:
             more += [f"probes[{i}].high={[f'{0.85 * self.size:.3g} mm'] * 3}" for i in range(2)]
@@ -47,7 +48,7 @@ class Plan:
 
 @dataclass(frozen=True)
 class Answer:
-    """What came out; wall and CPU time of the step loop, s."""
+    """Result of a run; wall time and CPU time of the step loop, s."""
 
     plan: Plan
     tets: int
@@ -57,28 +58,29 @@ class Answer:
     residual: float
     checks: tuple[Check, ...]
     problem: str = ""
-    """Why the run ended early; empty when it did not."""
+    """Reason of an early end of the run; empty if there was none."""
 
     def value(self, quantity: str) -> float:
-        """A measured quantity by the first word of its name, NaN when the run did not get there."""
+        """Returns a measured quantity by the first word of its name; NaN if the run ended before it was measured."""
         return next((check.value for check in self.checks if check.name.startswith(quantity)), float("nan"))
 
 
 def grid(sizes: Iterable[float], safeties: Iterable[float], forms: Iterable[Form] = FORMS) -> list[Plan]:
-    """Both bars with everything combined, the dearest first."""
+    """Returns the plans of both bars with all combinations, the most expensive one first."""
     plans = [Plan(bar, size, form, safety) for bar, size, form, safety in product(BARS, sizes, forms, safeties)]
     return sorted(plans, key=lambda plan: plan.size)
 
 
 def variants(size: float) -> list[Plan]:
-    """The bars with another kind of mesh, and without viscosity."""
+    """Returns the plans of the bars with another kind of mesh, and without viscosity."""
     averaged: tuple[Form, ...] = ("nodal", "split")
     others = [Plan(bar, size, form, generator="gmsh") for bar, form in product(BARS, averaged)]
     return others + [Plan(bar, size, form, viscosity=False) for bar, form in product(BARS, averaged)]
 
 
 def measure(plans: Sequence[Plan]) -> list[Answer]:
-    """Every plan with the worker's command line, on one rank each, as many at a time as there are cores."""
+    """Runs every plan by the command line of the worker, on one rank each. As many plans as cores run at the same
+    time."""
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         return sorted(pool.map(_run, plans), key=lambda a: (a.plan.bar, FORMS.index(a.plan.form), -a.plan.size))
 
@@ -96,7 +98,7 @@ def _run(plan: Plan) -> Answer:
 
 
 def report(answers: Sequence[Answer]) -> str:
-    """A table a bar: cost, and each reference quantity with its error."""
+    """Returns one table for each bar: cost, and each reference quantity with its error."""
     return "\n\n".join(_bar(bar, [a for a in answers if a.plan.bar == bar]) for bar in BARS)
 
 
@@ -152,7 +154,7 @@ def _measured(answer: Answer, wanted: Check) -> str:
 
 
 def as_data(answers: Sequence[Answer]) -> list[dict[str, object]]:
-    """For JSON."""
+    """Returns the results as data for JSON."""
     import msgspec
 
     return [json.loads(msgspec.json.encode(answer)) for answer in answers]

@@ -1,6 +1,7 @@
-"""Akantu beside Conoid: the same mesh, explicit steps of a linear elastic solid, in a process that takes turns with us.
+"""Comparison with Akantu: explicit steps of a linear elastic solid on the same mesh, in a process that alternates with
+Conoid.
 
-Needs ``pip install akantu``, here or under the interpreter named by BENCH_AKANTU_PYTHON.
+Akantu must be installed (``pip install akantu``), here or for the interpreter that BENCH_AKANTU_PYTHON names.
 """
 
 import os
@@ -11,23 +12,23 @@ from types import TracebackType
 
 _STEPS = Path(__file__).with_name("akantu_steps.py")
 TUNED = {"MALLOC_MMAP_THRESHOLD_": "4294967296", "MALLOC_TRIM_THRESHOLD_": "4294967296", "MALLOC_TOP_PAD_": "268435456"}
-"""glibc keeps freed memory instead of giving it back: Akantu allocates anew in every step."""
+"""Environment that makes glibc keep freed memory: Akantu allocates memory in every step."""
 
 
 def interpreter() -> str:
-    """The Python that has Akantu."""
+    """Returns the Python interpreter that has Akantu."""
     return os.environ.get("BENCH_AKANTU_PYTHON", sys.executable)
 
 
 def version() -> str | None:
-    """Akantu's version, None when it is not installed."""
+    """Returns the version of Akantu; None if it is not installed."""
     ask = "import akantu, importlib.metadata as m; print(m.version('akantu'))"
     answer = subprocess.run([interpreter(), "-c", ask], capture_output=True, text=True, timeout=60)
     return answer.stdout.strip() if answer.returncode == 0 else None
 
 
 class Akantu:
-    """A model in a child process."""
+    """An Akantu model in a child process."""
 
     def __init__(self, mesh: Path, finite: bool, tuned: bool) -> None:
         environment = {**os.environ, "OMP_NUM_THREADS": "1", **(TUNED if tuned else {})}
@@ -38,7 +39,7 @@ class Akantu:
         self._answer("ready")
 
     def steps(self, count: int) -> float:
-        """CPU seconds of ``count`` steps."""
+        """Returns the CPU time of ``count`` steps, s."""
         assert self._child.stdin is not None
         print(count, file=self._child.stdin, flush=True)
         return float(self._answer())

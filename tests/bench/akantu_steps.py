@@ -1,7 +1,8 @@
-"""Akantu on a mesh, in a process of its own: ``python akantu_steps.py MESH.npz true|false``, finite deformation or not.
+"""Akantu on a mesh, in a separate process: ``python akantu_steps.py MESH.npz true|false``; the second argument selects
+finite deformation.
 
-Says "ready", then for each line with a number takes so many explicit steps and says the CPU seconds that they took.
-Imports nothing of Conoid: it may run under another interpreter.
+The process prints "ready". For each line of input with a number it computes that number of explicit steps and prints
+their CPU time in s. It imports no module of Conoid, because it may run under another interpreter.
 """
 
 import sys
@@ -24,7 +25,7 @@ material elastic [
 
 
 def main(mesh_path: str, finite: str) -> None:
-    """Builds the model and answers until standard input ends."""
+    """Creates the model, and answers until standard input ends."""
     with np.load(mesh_path) as stored:
         mesh = _mesh(stored["points"], stored["tets"])
         model = _model(mesh, stored["points"], finite)
@@ -37,7 +38,7 @@ def main(mesh_path: str, finite: str) -> None:
 
 
 def _mesh(points: "np.ndarray", tets: "np.ndarray") -> "akantu.Mesh":
-    """Must outlive its model, which does not hold it."""
+    """This object must exist as long as the model, which has no reference to it."""
     mesh = akantu.Mesh(3)
     access = akantu.MeshAccessor(mesh)
     access.resizeNodes(len(points))

@@ -1,9 +1,10 @@
-"""Ranks one by one: what a run on many ranks would take on as many cores, each rank measured with a core to itself.
+"""Measures each rank of a run with a core of its own, and computes the time of the run on that many cores.
 
-``python -m tests.bench.alone CASE RANKS [KEY=VALUE ...]`` runs the case once on all ranks, however few cores there are,
-with what they tell each other on tapes, then each rank alone from its tape (tape.py), and puts together when each would
-have waited for which (timeline.py). Unlike ``conoid bench scale`` it has no caches that others have emptied, and no
-windows in which ranks make up for each other. The tapes take up to 4 MB a step on 16 ranks of the glass bar.
+``python -m tests.bench.alone CASE RANKS [KEY=VALUE ...]`` first runs the case on all ranks, with any number of
+cores, and records the received data of each rank on a tape. Then each rank runs alone from its tape (tape.py), and
+timeline.py computes the waiting times between the ranks. In contrast to ``conoid bench scale``, no other rank
+empties the caches of the measured rank, and no rank works while another one is measured. A tape takes up to 4 MB per
+step on 16 ranks of the glass bar.
 """
 
 import pickle
@@ -24,7 +25,7 @@ NETWORK = Network(latency=2e-6, bandwidth=5e9)
 
 
 def recorded(case: str, ranks: int, changes: list[str], folder: Path) -> str:
-    """Makes the tapes of a run; its digest. Raises CalledProcessError."""
+    """Records the tapes of a run; returns its digest. Raises CalledProcessError."""
     arguments = [case, "--out", str(folder / "run"), *(word for change in changes for word in ("--set", change))]
     run = [sys.executable, "-m", "mpi4py", "-m", "tests.bench.tape", "record", str(folder), *arguments]
     crowded = ["-genv", "MPIR_CVAR_ENABLE_HEAVY_YIELD", "1"] if ranks > CORES else []
@@ -40,7 +41,7 @@ def recorded(case: str, ranks: int, changes: list[str], folder: Path) -> str:
 
 
 def measured(ranks: int, folder: Path) -> Timeline:
-    """What the ranks have done alone, put together."""
+    """Returns the timeline of the ranks from their calls when they ran alone."""
     timeline = Timeline([pickle.loads(calls(folder, rank).read_bytes()) for rank in range(ranks)], NETWORK)
     timeline.run()
     return timeline

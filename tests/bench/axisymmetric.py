@@ -1,8 +1,9 @@
-"""An answer for the Taylor bars from another element altogether: axisymmetric quadrilaterals.
+"""Solution of the Taylor bars by another method: axisymmetric quadrilaterals.
 
-Four-node quads with 2 x 2 points for the deviator and one pressure for each quad (mean dilatation), which do not lock;
-J2 plasticity, leapfrog, a rigid frictionless wall at z = 0. It shares no code with the worker. Masses, volumes and
-forces are per radian of the circumference.
+The elements are quads of four nodes with 2 x 2 integration points for the deviator and one pressure for each quad
+(mean dilatation); they do not lock. The material is J2-plastic, the time integration is leapfrog, and the bar hits a
+rigid frictionless wall at z = 0. The program shares no code with the worker. Masses, volumes and forces are per
+radian of the circumference.
 """
 
 import math
@@ -20,12 +21,13 @@ Floats = npt.NDArray[np.float64]
 
 LENGTH, RADIUS, END = 32.4e-3, 3.2e-3, 80e-6
 LINEAR, SHOCK, QUADRATIC, HALF = 0.06, 0.4, 1.5, 0.01
-"""Bulk viscosity, as in the shipped cases."""
+"""Coefficients of the bulk viscosity, the same as in the shipped cases."""
 SAFETY = 0.8
 
 
 class Metal(NamedTuple):
-    """Flow stress (A + B e^n) (1 + C ln(rate / 1 s^-1)) (1 - T*^m), T* from ``cold`` to ``melt``; SI."""
+    """Constants of a metal, SI. Flow stress (A + B e^n) (1 + C ln(rate / 1 s^-1)) (1 - T*^m); T* is 0 at ``cold``
+    and 1 at ``melt``."""
 
     speed: float
     density: float
@@ -39,7 +41,7 @@ class Metal(NamedTuple):
     cold: float
     melt: float
     heat: float
-    """K per J/m^3 of plastic work."""
+    """Rise of temperature per plastic work, K per J/m^3."""
 
 
 METALS = {
@@ -62,15 +64,15 @@ METALS = {
 
 _G = 1.0 / math.sqrt(3.0)
 _U, _V = np.array([-1.0, 1.0, 1.0, -1.0]), np.array([-1.0, -1.0, 1.0, 1.0])
-"""Corners of the quad; the points lie at _G times them."""
+"""Natural coordinates of the corners of a quad; the integration points are at _G times the corners."""
 _N = 0.25 * (1.0 + _G * np.outer(_U, _U)) * (1.0 + _G * np.outer(_V, _V))
 _DU, _DV = 0.25 * _U * (1.0 + _G * np.outer(_V, _V)), 0.25 * _V * (1.0 + _G * np.outer(_U, _U))
-"""(point, corner) shape functions and their derivatives."""
+"""Shape functions and their derivatives, (point, corner)."""
 
 
 @njit
 def _gradients(x, v, h, quad, g, hoop, weight):  # type: ignore[no-untyped-def]
-    """Gradients at x - h v, N / r, weights, m^3 per radian; returns the volume, or -1 where the quad is inside out."""
+    """Sets gradients at x - h v, N / r, and weights, m^3 per radian. Returns the volume, or -1 for an inverted quad."""
     volume = 0.0
     for p in range(4):
         a, b, c, d, r = 0.0, 0.0, 0.0, 0.0, 0.0
@@ -105,7 +107,8 @@ def _flow(metal, strain, rate, temperature):  # type: ignore[no-untyped-def]
 
 @njit
 def _growth(metal, mises, strain, temperature, dt):  # type: ignore[no-untyped-def]
-    """Plastic strain of the step: where the flow stress meets what is left of the trial stress (false position)."""
+    """Returns the increment of plastic strain, at which the flow stress equals the relaxed trial stress (method of
+    false position)."""
     low, high = 0.0, mises / (3.0 * metal.shear)
     below, above = mises - _flow(metal, strain, 0.0, temperature), -_flow(metal, strain + high, high / dt, temperature)
     for _ in range(100):
@@ -122,7 +125,8 @@ def _growth(metal, mises, strain, temperature, dt):  # type: ignore[no-untyped-d
 
 @njit
 def _return(metal, s, strain, temperature, p, grad, around, dt):  # type: ignore[no-untyped-def]
-    """Deviator (rr, zz, tt, rz) at a point: rotation by the exact angle, elastic trial, radial return, heat."""
+    """Updates the deviator (rr, zz, tt, rz) at a point: rotation by the exact angle, elastic trial stress, radial
+    return, heating."""
     mean = (grad[0, 0] + grad[1, 1] + around) / 3.0
     angle, twice = (grad[0, 1] - grad[1, 0]) * dt, 2.0 * metal.shear * dt
     half, cos, sin = 0.5 * (s[p, 0] - s[p, 1]), math.cos(angle), math.sin(angle)
@@ -143,7 +147,8 @@ def _return(metal, s, strain, temperature, p, grad, around, dt):  # type: ignore
 
 @njit
 def _forces(metal, x, v, quads, mass, stress, pressure, strain, temperature, force, dt):  # type: ignore[no-untyped-def]
-    """Stress and forces at n+1; returns the largest one-over-stable-step, -1 when a quad is inside out."""
+    """Computes stress and forces at n+1. Returns the largest reciprocal of the stable steps, or -1 for an inverted
+    quad."""
     force[:] = 0.0
     limit = 0.0
     g, hoop, weight, grad = np.empty((4, 4, 2)), np.empty((4, 4)), np.empty(4), np.empty((2, 2))
@@ -187,7 +192,7 @@ def _forces(metal, x, v, quads, mass, stress, pressure, strain, temperature, for
 
 @njit
 def _move(x, v, force, mass, mean_dt, dt):  # type: ignore[no-untyped-def]
-    """Velocities, the axis, the wall, positions."""
+    """Updates velocities and positions; applies the conditions on the axis and on the wall."""
     for i in range(len(x)):
         v[i] += mean_dt / mass[i] * force[i]
         if x[i, 0] == 0.0:
@@ -199,25 +204,25 @@ def _move(x, v, force, mass, mean_dt, dt):  # type: ignore[no-untyped-def]
 
 @dataclass(frozen=True)
 class Bar:
-    """The bar at the end; lengths in m."""
+    """Shape and state of the bar at the end; lengths in m."""
 
     bar: str
     cells: int
-    """Along the radius."""
+    """Number of cells along the radius."""
     quads: int
     steps: int
     length: float
     radius: float
     strain: float
-    """Largest plastic strain at a point."""
+    """Largest plastic strain at an integration point."""
     foot_strain: float
-    """Mean over the quads that start within 0.6 mm of the centre of the foot."""
+    """Mean over the quads that are initially within 0.6 mm of the centre of the foot."""
     foot_temperature: float
-    """K, likewise."""
+    """Mean temperature over the same quads, K."""
 
 
 def run(bar: str, cells: int) -> Bar:
-    """A bar with ``cells`` cells along the radius and cells of the same size along its length."""
+    """Computes a bar with ``cells`` cells along the radius and cells of the same size along its length."""
     metal, layers = METALS[bar], round(cells * LENGTH / RADIUS)
     r, z = np.linspace(0.0, RADIUS, cells + 1), np.linspace(0.0, LENGTH, layers + 1)
     x = np.stack(np.meshgrid(r, z, indexing="xy"), axis=-1).reshape(-1, 2)
@@ -251,7 +256,7 @@ def _mean(values: Floats, mass: Floats, chosen: npt.NDArray[np.bool_]) -> float:
 
 
 def report(bars: Sequence[Bar]) -> str:
-    """One line a mesh."""
+    """Returns a table with one row for each mesh."""
     rows: list[list[Cell]] = [
         [
             b.bar, 1e3 * RADIUS / b.cells, b.quads, b.steps, f"{1e3 * b.length:.3f}", f"{1e3 * b.radius:.3f}",

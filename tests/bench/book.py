@@ -1,8 +1,8 @@
-"""``make accuracy``: writes docs/verification/accuracy.md, every row of the catalogue with what was measured.
+"""``make accuracy``: writes docs/verification/accuracy.md with the measured result of every row of the catalogue.
 
-``ACCURACY=quick`` leaves out studies of minutes, and says so in the book; a part can be named: shipped, tests, hard.
-What each part found is kept in build/accuracy; the book is written anew from all parts there are, and with ``write``
-nothing else is done.
+``ACCURACY=quick`` leaves out studies of minutes, and the page reports this. Single parts can be named: shipped,
+tests, hard. The results of each part are stored in build/accuracy, and the page is written from all stored parts.
+The part ``write`` only writes the page.
 """
 
 import json
@@ -36,21 +36,22 @@ ROOT = Path(__file__).parents[2]
 OUT = ROOT / "build" / "accuracy"
 _QUIET = {"run.ranks": 1, "run.frames": 0, "run.snapshots": 0, "run.checkpoint_every": "none"}
 _COARSE = 2.0
-"""Of the element sizes, for the second, cheaper run of a case. Chosen."""
+"""Factor of the element sizes in the second, cheaper run of a case. Chosen."""
 _RANKS = ("tests/parallel/", "tests/server/", "tests/client/")
-"""Where tests are whose work is done by processes that they start."""
+"""Folders of tests that start processes for their work."""
 _QUICK = 60.0
-"""Estimated CPU s of a case above which ``quick`` leaves it out. Chosen."""
+"""Estimated CPU time of a case, s, above which ``quick`` leaves the case out. Chosen."""
 
 
 def catalogue() -> list[dict[str, Any]]:
-    """The rows, in their order."""
+    """Returns the rows of the catalogue, in their order."""
     text = Path(__file__).with_name("catalogue.toml").read_text(encoding="utf-8")
     return list(tomllib.loads(text)["row"])
 
 
 def shipped_cases(quick: bool) -> dict[str, Any]:
-    """Every shipped case that a row names, as it is and coarser: outcomes by name."""
+    """Runs every shipped case that a row names, with its own and with coarser elements; returns the outcomes by
+    name."""
     plans = {name: row.get("coarse", ()) for row in catalogue() for name in row.get("cases", ())}
     data = {f"{name}|{label}": made for name, coarse in plans.items() for label, made in _costs(name, coarse).items()}
     cases = {key: parse_case(made) for key, made in data.items()}
@@ -63,7 +64,7 @@ def shipped_cases(quick: bool) -> dict[str, Any]:
 
 
 def _costs(name: str, coarse: Sequence[str]) -> dict[str, dict[str, Any]]:
-    """The case as it is, and coarser where it can be."""
+    """Returns the case itself, and the case with coarser elements if this is possible."""
     data = apply_overrides(read_data(shipped()[name]), _QUIET)
     found = {"as it is": data}
     try:
@@ -88,8 +89,8 @@ def _told(key: str, run: Run) -> Any:
 
 
 def tests(quick: bool) -> dict[str, Any]:
-    """Every test that a row names, with what it has asserted: those that start ranks first and alone, since their ranks
-    wait for each other with patience that has an end; then the others, a file on each core.
+    """Runs every test that a row names, and returns their assertions. Tests that start ranks run first and alone,
+    because their ranks wait for each other with a time limit. The other tests run after that, one file on each core.
     """
     nodes = sorted({f"tests/{node}" for row in catalogue() for node in row.get("tests", ())})
     ranked = [node for node in nodes if node.startswith(_RANKS)]
@@ -102,7 +103,7 @@ def tests(quick: bool) -> dict[str, Any]:
 
 
 def _recorded(nodes: list[str], name: object, quick: bool) -> dict[str, Any]:
-    """What these tests have asserted, by node; a process of its own."""
+    """Runs tests in a separate process; returns their assertions by node id."""
     environment = {**os.environ, "PYTHONPYCACHEPREFIX": str(OUT / "bytecode"), "PYTHONPATH": str(ROOT)}
     file = OUT / f"recorded-{name}.json"
     command = [
@@ -115,7 +116,7 @@ def _recorded(nodes: list[str], name: object, quick: bool) -> dict[str, Any]:
 
 
 def hard_cases(_: bool) -> list[Any]:
-    """The suite of hard cases."""
+    """Runs the suite of hard cases."""
     verdicts = []
     with LocalServer(OUT / "runs", CORES) as server:
         for verdict in hard.run_all(server.session, suite(), 1):
@@ -128,7 +129,7 @@ PARTS: dict[str, Callable[[bool], Any]] = {"shipped": shipped_cases, "tests": te
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Runs the named parts, or all, and writes the book."""
+    """Runs the named parts, or all, and writes the page."""
     unknown = [name for name in arguments if name not in (*PARTS, "write")]
     if unknown:
         print(f"{' '.join(unknown)}: parts are {', '.join(PARTS)}; write writes what they have found")

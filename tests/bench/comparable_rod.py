@@ -1,7 +1,9 @@
-"""A long rod that can be compared: tungsten alloy, L/D 10, into a block of 4340 steel at 1.5 km/s.
+"""A long rod that can be compared with published results: tungsten alloy with L/D = 10, into a block of 4340 steel at
+1.5 km/s.
 
-``python -m tests.bench.comparable_rod [NAME...]`` runs the named variants, or all: one thing differs from the first in
-each. The nose is the foremost tet of the rod; speeds are those of the steady stretch, P that of the hole at the end.
+``python -m tests.bench.comparable_rod [NAME...]`` runs the named variants, or all. Each variant differs from the
+first one in one point. The nose is the foremost tet of the rod. Speeds are means over the steady phase, P is the
+depth of the hole at the end.
 """
 
 import json
@@ -27,13 +29,13 @@ from .table import Cell, table
 
 Floats = npt.NDArray[np.float64]
 LENGTH, _RADIUS, _THICKNESS = 70e-3, 3.5e-3, 110e-3
-"""Of the rod and of the block, m."""
+"""Length and radius of the rod, thickness of the block, m."""
 _STEADY = (20e-6, 60e-6)
-"""s between which the nose speed is fitted: behind the entrance, before the rod is short."""
+"""Period in which the nose speed is fitted, s: after the entrance phase, and before the rod is short."""
 _IMPACT = 1500.0
-"""m/s."""
+"""Impact speed, m/s."""
 _PUBLISHED: tuple[Cell, ...] = ("Anderson and Walker 1991", *5 * (None,), "0.77", None, "1.055", "0.215", "1.27")
-"""As remembered."""
+"""Published values, recalled and not checked against the publication."""
 
 CASE = """
 name = "comparable_rod"
@@ -73,14 +75,16 @@ frames = 28
 samples = 140
 snapshots = 0
 """
-"""Only P/L and the ratio of the lengths matter but for the rate: 7 x 70 mm. The block is that of ``long_rod``."""
+"""The rod has 7 x 70 mm. Except for rate effects, P/L depends on the ratio of the lengths only. The block is the one
+of ``long_rod``."""
 DAMAGE_OF_TUNGSTEN = {"D1": 0.0, "D2": 0.33, "D3": -1.5, "D4": 0.0, "D5": 0.0}
-"""Johnson and Cook 1985, as remembered; the library has that of 4340 steel."""
+"""Damage constants by Johnson and Cook 1985, recalled and not checked against the publication; the library has the
+constants of 4340 steel."""
 
 
 @dataclass(frozen=True)
 class Variant:
-    """One run: what differs from the case, and keys of the strength of the library's materials that differ."""
+    """One run: changed keys of the case, and changed constants of the strength of materials of the library."""
 
     name: str
     assignments: tuple[str, ...] = ()
@@ -88,18 +92,18 @@ class Variant:
 
 
 def eroding(parts: Sequence[int], **keys: object) -> tuple[str, ...]:
-    """Assignments that put another erosion in the place of that by strain."""
+    """Returns assignments that replace the erosion by strain by another criterion."""
     inside = ", ".join(f"{key} = {value}" for key, value in keys.items())
     return tuple(f"parts[{k}].erosion={{{inside}}}" for k in parts)
 
 
 def meshed(size: float) -> tuple[str, ...]:
-    """Another element size near the axis, mm."""
+    """Returns assignments of another element size near the axis, mm."""
     return tuple(f"parts[{k}].mesh.element_size={size:g} mm" for k in (0, 1))
 
 
 def scaled(name: str, factor: float) -> tuple[tuple[str, dict[str, Any]], ...]:
-    """A material with A and B times ``factor``."""
+    """Returns the constants A and B of a material, times ``factor``."""
     strength = library()[name].model_dump(exclude_none=True)["strength"]
     return ((name, {key: factor * strength[key] for key in ("A", "B")}),)
 
@@ -134,7 +138,7 @@ VARIANTS = (
 
 @dataclass(frozen=True)
 class Shot:
-    """What came out: the outcome, s of the frames, m of the depth and of the nose in each."""
+    """Result of a run: the outcome, times of the frames, s, depth and position of the nose in each frame, m."""
 
     variant: Variant
     outcome: Outcome
@@ -143,14 +147,14 @@ class Shot:
     nose: Floats
 
     def speed(self, course: Floats) -> float:
-        """Of ``depth`` or ``nose``, m/s: a straight line through the steady stretch."""
+        """Returns the speed of ``depth`` or ``nose``, m/s: slope of a straight line through the steady phase."""
         taken = (self.time >= _STEADY[0]) & (self.time <= _STEADY[1]) & np.isfinite(course)
         since = self.time[taken] - self.time[taken].mean()
         return float(since @ course[taken] / (since @ since))
 
 
 def run(variant: Variant, folder: Path) -> Shot:
-    """The variant in ``folder``, on one rank, with the worker's command line."""
+    """Runs the variant in ``folder``, on one rank, by the command line of the worker."""
     case = folder / "case.json"
     case.write_text(json.dumps(data_of(variant)), encoding="utf-8")
     command = [sys.executable, "-m", "mpi4py", "-m", "conoid.worker", str(case), "--out", str(folder / "run")]
@@ -162,21 +166,21 @@ def run(variant: Variant, folder: Path) -> Shot:
 
 
 def data_of(variant: Variant) -> dict[str, Any]:
-    """The case of a variant as it is written down."""
+    """Returns the case of a variant."""
     data: dict[str, Any] = load.apply_overrides(load.toml_data(CASE), variant.assignments)
     data["materials"] = {name: _changed(name, keys) for name, keys in variant.strengths}
     return data
 
 
 def _changed(name: str, keys: dict[str, Any]) -> dict[str, Any]:
-    """A material of the library with other constants of its strength."""
+    """Returns a material of the library with other constants of its strength."""
     made: dict[str, Any] = library()[name].model_dump(exclude_none=True)
     made["strength"].update(keys)
     return made
 
 
 def _look(frame: Path) -> tuple[float, float, float]:
-    """Time, s, depth and nose, m, of a frame; NaN without a rod."""
+    """Returns time, s, depth and position of the nose, m, of a frame; NaN without a rod."""
     with h5py.File(frame) as file:
         grid = file["VTKHDF"]
         points, part, t = grid["Points"][:], grid["CellData/part"][:], float(grid["FieldData/time"][0])
@@ -190,17 +194,16 @@ def _look(frame: Path) -> tuple[float, float, float]:
 
 
 def measure(variants: Sequence[Variant]) -> Iterator[Shot]:
-    """Every variant in turn."""
+    """Runs every variant, one after the other."""
     for variant in variants:
         with tempfile.TemporaryDirectory(prefix="conoid-bench-") as folder:
             yield run(variant, Path(folder))
 
 
 def report(shots: Sequence[Shot]) -> str:
-    """A table; the first row is what is published.
-
-    U, of the hole, over V - U of its length is what a rod makes as long as it is used up steadily; the rest is the
-    entrance, the end of the rod and what goes on without one.
+    """Returns a table; its first row has the published values. U / (V - U), with U of the hole, is the ratio of
+    depth to consumed length in steady penetration. The rest of P/L is the entrance phase, the end of the rod, and
+    the penetration after the rod is consumed.
     """
     head = [
         "variant",
@@ -229,7 +232,7 @@ def _row(shot: Shot) -> list[Cell]:
 
 
 def main(names: Sequence[str]) -> int:
-    """The named variants, or all; a line of each as it is done, then the table."""
+    """Runs the named variants, or all; prints a line after each run and the table at the end."""
     chosen = [variant for variant in VARIANTS if not names or variant.name in names]
     shots = []
     for shot in measure(chosen):

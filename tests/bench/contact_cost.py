@@ -1,4 +1,5 @@
-"""What contact costs: bodies that meet, with their phases; and what the contact domain sends, box against arbitrary."""
+"""Cost of contact: bodies in contact with the CPU time of each phase, and the data sent by the two kinds of contact
+domain (box and arbitrary)."""
 
 import json
 import os
@@ -40,19 +41,19 @@ SCENES = (
 
 @dataclass(frozen=True)
 class Cost:
-    """How a scene went."""
+    """Result of a scene."""
 
     scene: Scene
     outcome: Outcome
 
     @property
     def contact(self) -> float:
-        """Contact over elements, CPU time."""
+        """CPU time of contact over CPU time of the elements."""
         return self.outcome.phases["contact"][0] / self.outcome.phases["elements"][0]
 
 
 def measure(scenes: Sequence[Scene]) -> Iterator[Cost]:
-    """Every scene by the worker's command line."""
+    """Runs every scene by the command line of the worker."""
     for scene in scenes:
         with tempfile.TemporaryDirectory(prefix="conoid-bench-") as folder:
             words = [sys.executable, "-m", "conoid.worker", scene.case, "--out", folder]
@@ -62,7 +63,7 @@ def measure(scenes: Sequence[Scene]) -> Iterator[Cost]:
 
 
 def report(costs: Sequence[Cost]) -> str:
-    """A table of phases, in CPU seconds."""
+    """Returns a table of the phases, in CPU seconds."""
     names = ("elements", "nodes", "contact", "output")
     head = ["scene", "tets", "steps", *(f"{name} s" for name in names), "contact / elements", "M upd/s", "residual"]
     return table(head, [_row(cost, names) for cost in costs])
@@ -77,19 +78,19 @@ def _row(cost: Cost, names: Sequence[str]) -> list[Cell]:
 
 
 STEPS = {8: 1500, 16: 400}
-"""By ranks; the paper has 8."""
+"""Number of ranks; the paper uses 8."""
 DOMAINS = ("box", "arbitrary")
 PAPER = {
     "faces of a search": "1st: 7,284 / 5,467 = 1.33 (fig. 4)",
     "faces sent, a search": "1st, 6th: > 2 (fig. 6)", "contact, CPU s": "> 2 (fig. 5)",
 }  # fmt: skip
-"""Moon, Kim and Lee, box over arbitrary, of a long body into a steel block on 8 processors."""
+"""Ratio box over arbitrary of Moon, Kim and Lee, for a long body that hits a steel block, on 8 processors."""
 Run = list[dict[str, Any]]
-"""What contact_domain tells, by rank."""
+"""Output of contact_domain, by rank."""
 
 
 def domains(ranks: int, steps: int) -> dict[str, list[Run]]:
-    """Both domains on the long rod, coarse and on its way, each twice."""
+    """Runs both domains on the coarse long rod during penetration, each of them twice."""
     launch = [str(Path(sys.executable).with_name("mpiexec")), "-n", str(ranks), sys.executable, "-m", "mpi4py"]
     words = [*launch, "-m", "tests.bench.contact_domain", str(steps), *DOMAINS]
     crowded = {**os.environ, "MPIR_CVAR_ENABLE_HEAVY_YIELD": "1"}
@@ -99,7 +100,7 @@ def domains(ranks: int, steps: int) -> dict[str, list[Run]]:
 
 
 def kinds(runs: Sequence[Run], steps: int) -> dict[str, list[float]]:
-    """Rank by rank, the mean of the runs with one domain."""
+    """Returns the mean of the runs with one domain, rank by rank."""
 
     def mean(number: Callable[[dict[str, Any]], float]) -> list[float]:
         return [statistics.fmean(map(number, same)) for same in zip(*runs, strict=True)]
@@ -115,7 +116,8 @@ def kinds(runs: Sequence[Run], steps: int) -> dict[str, list[float]]:
 
 
 def domain_report(found: dict[str, list[Run]], steps: int) -> str:
-    """Box / arbitrary: mean over the ranks, worst rank, first and sixth; the ratio of the means; the paper's."""
+    """Returns a table of the ratio box over arbitrary: mean over the ranks, slowest rank, first and sixth rank,
+    ratio of the means, and the value of the paper."""
     box, other = (kinds(found[name], steps) for name in DOMAINS)
     rows: list[list[Cell]] = []
     for kind, one in box.items():

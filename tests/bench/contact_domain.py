@@ -1,7 +1,8 @@
-"""Under mpiexec: steps of the coarse long rod with one contact domain after the other; JSON of what every rank did.
+"""Program under mpiexec: computes steps of the coarse long rod with one kind of contact domain after the other, and
+prints as JSON the work of every rank.
 
-With fewer cores than ranks, wall time says little: CPU time is that of the thread, without what it waits. There and
-back (box, arbitrary, arbitrary, box), so that what drifts disturbs both alike. Nothing is cut anew.
+If there are fewer cores than ranks, wall time is useless; the CPU time is that of the thread, without waiting. The
+order is box, arbitrary, arbitrary, box, so that a drift affects both kinds alike. The partition is not changed.
 """
 
 import json
@@ -26,7 +27,7 @@ from .long_rod import COARSE  # noqa: E402
 
 
 def main(steps: int, names: Sequence[str]) -> None:
-    """Prints the numbers of every rank, for every domain in turn a list of runs, on rank 0."""
+    """Prints the numbers of every rank on rank 0: for each domain a list of runs."""
     world = connect()
     found: dict[str, list[Any]] = {name: [] for name in names}
     for name in (*names, *reversed(names)):
@@ -36,7 +37,8 @@ def main(steps: int, names: Sequence[str]) -> None:
 
 
 def _measured(name: str, steps: int, world: Comm) -> dict[str, Any]:
-    """Of one rank: at each search t in us, its faces and those of other ranks; CPU s, bytes and messages of contact."""
+    """Returns the numbers of one rank: at each search the time, us, its own faces and those of other ranks; CPU
+    time, s, bytes and messages of contact."""
     data = load.apply_overrides(
         load.read_data(load.shipped_path("long_rod")), [*COARSE, "run.frames=0", f'contact.domain="{name}"']
     )
@@ -64,7 +66,8 @@ def _measured(name: str, steps: int, world: Comm) -> dict[str, Any]:
 
 
 def _noted(function: Any, looked: list[tuple[int, int]]) -> Any:
-    """``function`` that notes how many faces a search has, and how many of them come from other ranks."""
+    """Wraps ``function`` so that the number of faces of each search, and the number that came from other ranks, are
+    stored."""
 
     def noted(sides: NearSurface, *rest: Any) -> Any:
         found = function(sides, *rest)

@@ -1,6 +1,7 @@
-"""Cracks that run: when they start and branch, how fast they are, what they take, on one mesh and on others.
+"""Running cracks: time of start and branching, speed, and dissipated work, on several meshes.
 
-A facet counts from when it carries nothing any more, not from when it breaks: between the two lies the cohesive zone.
+A facet counts as open when it carries no traction any more. It breaks earlier; the facets between the two states are
+the cohesive zone.
 """
 
 import time
@@ -37,20 +38,20 @@ from .table import Cell, table
 
 Kind = Literal["structured", "gmsh", "random"]
 _LOOK = 0.25e-6
-"""s between two looks at a crack."""
+"""Time between two measurements of a crack, s."""
 _SPAN = 12.0
-"""Elements that the crack passes while its speed is fitted: where a facet ahead is open first the tip moves on by two,
-a sixth of that."""
+"""Length over which the speed of a crack is fitted, in elements. If a facet ahead of the tip opens first, the tip
+advances by two elements, a sixth of this length."""
 _BIN = 2.0
-"""Elements along x whose open facets are taken together to find the branches."""
+"""Width of the bins along x in which branches are searched, in elements."""
 _THROUGH = 1.5
-"""Elements from the far edge to the tip of a crack that is through."""
+"""Distance from the tip to the far edge, in elements, at which a crack counts as complete."""
 _GAP = 3.0
-"""Elements of solid between two branches, at least."""
+"""Smallest distance between two branches, in elements."""
 _MOVED = 0.2
-"""Of the element: how far each coordinate of a node is moved at most."""
+"""Largest displacement of a node in each coordinate, over the element size."""
 _FLAT = 0.6
-"""Of the mean step length: what a tet keeps when its nodes are moved."""
+"""Smallest height of a tet after its nodes are moved, over the mean height."""
 
 STRIP = """
 name = "strip"
@@ -88,8 +89,8 @@ pressure = "standard"
 end_time = "34 us"
 frames = 0
 """
-"""A strip that is pulled evenly: what a long crack would release, E strain^2 H / 2, passes G_c after 16 us and is four
-times that after 32 us, the strength after 36 us."""
+"""A strip under uniform tension. The energy release rate of a long crack, E strain^2 H / 2, exceeds G_c after 16 us
+and is 4 G_c after 32 us; the stress reaches the strength after 36 us."""
 
 BAR = """
 name = "bar"
@@ -125,12 +126,12 @@ dt_safety = 0.15
 end_time = 3.67e-7
 frames = 0
 """
-"""The ceramic bar of the stretched-bar study, 10 s_0 long and s_0 / 4 wide, at rate_0 for 12 t_0."""
+"""The ceramic bar of the stretched-bar study: length 10 s_0, width s_0 / 4, strain rate rate_0, for 12 t_0."""
 
 
 def rayleigh(made: Material) -> float:
-    """Speed of surface waves, m/s: the root below 1 of z^3 - 8 z^2 + 8 (3 - 2 k) z - 16 (1 - k), z = (c / c_s)^2,
-    k = (c_s / c_p)^2."""
+    """Returns the speed of surface waves, m/s: c from the root z below 1 of z^3 - 8 z^2 + 8 (3 - 2 k) z - 16 (1 -
+    k), z = (c / c_s)^2, k = (c_s / c_p)^2."""
     poisson = made.elastic.poisson
     k = (1.0 - 2.0 * poisson) / (2.0 - 2.0 * poisson)
     roots = np.roots([1.0, -8.0, 8.0 * (3.0 - 2.0 * k), -16.0 * (1.0 - k)])
@@ -139,7 +140,8 @@ def rayleigh(made: Material) -> float:
 
 
 def slit(mesh: TetMesh, length: float) -> TetMesh:
-    """The mesh with a slit along the facets that lie closest to y = 0, up to x = ``length``, m: its tip holds."""
+    """Returns the mesh with a slit along the facets nearest to y = 0, from the edge to x = ``length``, m. The nodes
+    at the tip of the slit are not doubled."""
     behind = mesh.points[mesh.tets, 1].mean(axis=1) > 0.0
     sides = np.zeros((2, len(mesh.points)), bool)
     for side in (0, 1):
@@ -152,7 +154,8 @@ def slit(mesh: TetMesh, length: float) -> TetMesh:
 
 
 def perturbed(mesh: TetMesh, size: float, seed: int) -> TetMesh:
-    """Each coordinate of the nodes inside moved at random by up to _MOVED of ``size``, m; less where tets get flat."""
+    """Moves each coordinate of the interior nodes at random by at most _MOVED of ``size``, m; by less where a tet
+    would become flat."""
     points, low, high = mesh.points, mesh.points.min(axis=0), mesh.points.max(axis=0)
     least = min(_FLAT * float(mesh.step_lengths().mean()), float(mesh.step_lengths().min()))
     move = np.random.default_rng(seed).uniform(-_MOVED * size, _MOVED * size, points.shape)
@@ -164,11 +167,11 @@ def perturbed(mesh: TetMesh, size: float, seed: int) -> TetMesh:
 
 
 def random(body: Box | Plate, seed: int, straight: float = 0.0) -> TetMesh:
-    """One layer of prisms of three tets on a Delaunay triangulation of points without any order.
+    """Returns one layer of prisms of three tets on a Delaunay triangulation of random points.
 
-    The points of a grid are thrown half an element to either side, then moved to the means of their neighbours, ten
-    times. The border keeps its grid, in whose corners no triangle has all its corners on the border. So does the line
-    y = 0 up to x = ``straight``, m: a slit along it is smooth.
+    The points of a grid are moved at random by up to half an element, then ten times to the mean of their
+    neighbours. Points on the border keep their position, and no triangle has all its corners on the border. Points
+    on the line y = 0 up to x = ``straight``, m, keep their position, too, so that a slit along this line is smooth.
     """
     (x_low, y_low, z_low), (x_high, y_high, z_high) = bounds(body) or ((0.0,) * 3, (0.0,) * 3)
     lines = [np.linspace(a, b, divisions(b - a, body.element_size) + 1) for a, b in ((x_low, x_high), (y_low, y_high))]
@@ -197,29 +200,30 @@ def random(body: Box | Plate, seed: int, straight: float = 0.0) -> TetMesh:
 
 @dataclass(frozen=True)
 class Plan:
-    """A case, the element size, m, and the mesh; a ``seed`` moves the nodes, or is that of a ``random`` one."""
+    """A case, the element size, m, and the kind of mesh; ``seed``: of the displacement of the nodes, or of a
+    ``random`` mesh."""
 
     case: str
     size: float
     kind: Kind = "structured"
     seed: int | None = None
     words: tuple[str, ...] = ()
-    """Overrides of the case."""
+    """Assignments to keys of the case."""
     text: str = ""
-    """The case itself, where it is neither shipped nor of this file."""
+    """Text of a case that is neither shipped nor in this file."""
     straight: bool = False
-    """Whether the slit of a ``random`` mesh is smooth: else it follows the facets."""
+    """Whether the slit of a ``random`` mesh is a straight line; False: it is made of facets near that line."""
 
     @property
     def name(self) -> str:
-        """For tables."""
+        """Name of the plan in tables."""
         seeded = f" {self.seed}" if self.kind == "random" else f", moved ({self.seed})"
         kind = self.kind + ("" if self.seed is None else seeded)
         return f"{kind}, {1e3 * self.size:.2g} mm"
 
 
 def prepared(plan: Plan) -> tuple[Case, TetMesh]:
-    """The case, and its mesh with the slit. A plate is one element thick."""
+    """Returns the case, and its mesh with the slit. A plate is one element thick."""
     text = plan.text or {"strip": STRIP, "bar": BAR}.get(plan.case)
     data = load.toml_data(text) if text else load.read_data(load.shipped_path(plan.case))
     words = ["run.frames=0", f"parts[0].mesh.element_size={plan.size}", *plan.words]
@@ -239,7 +243,8 @@ def prepared(plan: Plan) -> tuple[Case, TetMesh]:
 
 
 def open_facets(sim: Simulation) -> tuple[Ints, Floats, Floats]:
-    """(m,) ids, (m, 3) initial centres, m, and (m,) initial areas, m^2, of the facets that carry nothing any more."""
+    """Returns ids (m,), initial centres (m, 3), m, and initial areas (m,), m^2, of the facets that carry no traction
+    any more."""
     assert sim.fracture is not None
     assert sim.fracture.cohesion is not None
     held, x0 = sim.fracture.cohesion.facets.tets, sim.model.nodes.x0
@@ -256,22 +261,22 @@ def open_facets(sim: Simulation) -> tuple[Ints, Floats, Floats]:
 
 @dataclass
 class Crack:
-    """The open facets of a run in the order in which they opened, and the ledger."""
+    """Open facets of a run in the order in which they opened."""
 
     size: float
-    """Of the elements, m."""
+    """Element size, m."""
     begin: float
     end: float
-    """x of the slit's tip and of the far edge, m."""
+    """x of the tip of the slit, and of the far edge, m."""
     id: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
     centre: Floats = field(default_factory=lambda: np.zeros((0, 3)))
     area: Floats = field(default_factory=lambda: np.zeros(0))
     time: Floats = field(default_factory=lambda: np.zeros(0))
     broken: float = np.nan
-    """When the first facet broke, s."""
+    """Time at which the first facet broke, s."""
 
     def look(self, sim: Simulation) -> None:
-        """Takes up the facets that are open since the last look."""
+        """Adds the facets that have opened since the last call."""
         assert sim.fracture is not None
         if not sim.fracture.broken:
             return
@@ -285,23 +290,24 @@ class Crack:
 
     @property
     def start(self) -> float:
-        """When the first facet was open, s; NaN if none is."""
+        """Time at which the first facet was open, s; NaN without an open facet."""
         return float(self.time.min()) if len(self.time) else np.nan
 
     def front(self) -> tuple[Floats, Floats]:
-        """Times, s, and x, m, of the tip whenever it has moved on; it begins at the slit's tip."""
+        """Returns times, s, and x, m, of the tip each time it advances; the tip of the slit is its first position."""
         order = np.lexsort((-self.centre[:, 0], self.time))
         x = self.centre[order, 0]
         ahead = x > np.concatenate([[self.begin], np.maximum.accumulate(x)[:-1]])
         return self.time[order][ahead], x[ahead]
 
     def passed(self, x: float) -> float:
-        """When the tip passed ``x``, s; NaN if it has not."""
+        """Returns the time at which the tip passed ``x``, s; NaN if the tip did not pass it."""
         times, tip = self.front()
         return float(times[tip >= x][0]) if (tip >= x).any() else np.nan
 
     def speeds(self) -> tuple[Floats, Floats]:
-        """x, m, and speed along x, m/s: straight lines through _SPAN elements of the course of the tip."""
+        """Returns x, m, and speed along x, m/s: slopes of straight lines through _SPAN elements of the path of the
+        tip."""
         times, tip = self.front()
         where, speed = [], []
         for first in tip:
@@ -313,7 +319,8 @@ class Crack:
         return np.array(where), np.array(speed)
 
     def branches(self) -> tuple[Floats, list[Floats]]:
-        """(bins,) x, m, and the y of each branch there: open facets with _GAP elements of solid between them."""
+        """Returns x of each bin (bins,), m, and the y of each branch in the bin; two branches are separated by _GAP
+        elements without an open facet."""
         step = _BIN * self.size
         edges = np.arange(self.begin, self.end, step)
         found = []
@@ -325,7 +332,7 @@ class Crack:
 
     @property
     def branched(self) -> float:
-        """x, m, from which on there are two branches for 10 elements; NaN if there are none."""
+        """x, m, from which two branches exist over 10 elements; NaN without branching."""
         x, ways = self.branches()
         two = np.array([len(y) > 1 for y in ways])
         long = [k for k in range(len(two) - 4) if two[k : k + 5].all()]
@@ -333,7 +340,7 @@ class Crack:
 
     @property
     def straight(self) -> float:
-        """Length of the branches, m: lines from bin to bin, across bins in which nothing is open."""
+        """Length of the branches, m: sum of straight lines between bins; bins without an open facet are skipped."""
         x, ways = self.branches()
         total, before, last = 0.0, np.zeros(1), 2.0 * x[0] - x[1]
         for at, y in zip(x, ways, strict=True):
@@ -343,9 +350,10 @@ class Crack:
 
     @property
     def wake(self) -> "Crack":
-        """The part that the tip has left _SPAN elements behind, in whole bins; all of a crack that is at the far edge.
+        """The part of the crack that is at least _SPAN elements behind the tip, in whole bins; the whole crack if the
+        tip is at the far edge.
 
-        Up to the tip facets open in any order, some of them aside and ahead of solid, so that area has no length yet.
+        Nearer to the tip facets open in any order, so the open area there has no defined length.
         """
         tip = float(self.centre[:, 0].max(initial=self.begin))
         if tip > self.end - _THROUGH * self.size:
@@ -358,14 +366,15 @@ class Crack:
 
     @property
     def inflation(self) -> float:
-        """Open area over that of straight lines along the branches, in a plate of one element; NaN where no wake is."""
+        """Open area over the area of straight lines along the branches, in a plate that is one element thick; NaN if
+        the crack is too short."""
         wake = self.wake
         return float(wake.area.sum()) / (self.size * wake.straight) if len(wake.id) else np.nan
 
 
 @dataclass(frozen=True)
 class Run:
-    """What came out."""
+    """Result of a run."""
 
     plan: Plan
     case: Case
@@ -373,53 +382,53 @@ class Run:
     crack: Crack
     energy: Energy
     fragments: int
-    """Of a tenth of a cubic width and more."""
+    """Number of fragments of at least a tenth of the cube of the width."""
     steps: int
     cpu: float
     worst: float
 
     @property
     def made(self) -> Material:
-        """The material of the only part."""
+        """Material of the only part."""
         return self.case.materials[self.case.parts[0].material]
 
     @property
     def toughness(self) -> float:
-        """G_c, J/m^2."""
+        """Critical energy release rate G_c, J/m^2."""
         assert self.made.brittle is not None
         return self.made.brittle.energy
 
     @property
     def taken(self) -> float:
-        """Work done on the cohesive facets, J."""
+        """Work on the cohesive facets, J."""
         return self.energy.fracture + self.energy.cohesive
 
     @property
     def fastest(self) -> tuple[float, float]:
-        """Largest speed along x until the crack branches, and of all, over the Rayleigh speed."""
+        """Largest crack speed along x before branching, and in the whole run, over the Rayleigh speed."""
         x, speed = self.crack.speeds()
         single = x < self.crack.branched if np.isfinite(self.crack.branched) else np.ones(len(x), bool)
         return tuple(float(v.max(initial=0.0)) / rayleigh(self.made) for v in (speed[single], speed))  # type: ignore[return-value]
 
     @property
     def median(self) -> float:
-        """Of the fitted speeds over the Rayleigh speed."""
+        """Median of the fitted speeds over the Rayleigh speed."""
         _, speed = self.crack.speeds()
         return float(np.median(speed)) / rayleigh(self.made) if len(speed) else np.nan
 
     @property
     def inflation(self) -> float:
-        """Open area over that of straight lines; see Crack."""
+        """Open area over the area of straight lines, from ``Crack``."""
         return self.crack.inflation
 
     @property
     def share(self) -> float:
-        """Work of a plate over G_c times the open area."""
+        """Work on the cohesive facets of a plate over G_c times the open area."""
         return self.taken / (self.toughness * float(self.crack.area.sum()))
 
 
 def watch(plan: Plan) -> Run:
-    """Takes the steps of a case and looks at its crack, 20 times for a bar."""
+    """Computes a case and measures its crack every _LOOK s; a bar is measured 20 times."""
     case, mesh = prepared(plan)
     low, high = bounds(case.parts[0].mesh) or ((0.0,) * 3, (0.0,) * 3)
     body = case.parts[0].mesh
@@ -447,7 +456,7 @@ def watch(plan: Plan) -> Run:
 
 
 def _fragments(sim: Simulation, cube: float) -> int:
-    """Those of a tenth of ``cube``, m^3, and more."""
+    """Returns the number of fragments of at least a tenth of ``cube``, m^3."""
     assert sim.fracture is not None
     assert sim.fracture.cohesion is not None
     (labels,) = connectivity.labels(sim.model, sim.fracture.cohesion.facets.tets, sim.comm)
@@ -459,11 +468,11 @@ def _fragments(sim: Simulation, cube: float) -> int:
 FINE = 1e-3 / 1.5
 _KINDS: tuple[tuple[Kind, int | None], ...] = (("structured", None), ("structured", 0), ("gmsh", None), ("random", 0))
 PLATES = tuple(Plan("branching_plate", size, kind, seed) for size in (1e-3, FINE) for kind, seed in _KINDS)
-"""The branching benchmark on four kinds of meshes."""
+"""Plans of the branching benchmark on four kinds of meshes."""
 SIBLINGS = tuple(Plan("branching_plate", FINE, "random", seed) for seed in range(1, 5))
-"""More of the kind of the last of PLATES."""
+"""Further random meshes, like the last one of PLATES."""
 RANDOM = (PLATES[-1], *SIBLINGS)
-"""Five meshes of one kind: without directions, of the finer elements."""
+"""Five random meshes without preferred directions, with the finer elements."""
 _SAFETIES = (0.9, 0.899, 0.898, 0.897, 0.896, 0.895, 0.89)
 
 
@@ -475,27 +484,29 @@ STEPPED = (
     *(_stepped(PLATES[3], safety) for safety in _SAFETIES),
     *(_stepped(plan, safety) for safety in (0.897, 0.893) for plan in RANDOM),
 )
-"""What a step that is hardly another one changes: a coarse mesh with seven of them, and RANDOM with two more."""
+"""Plans with slightly different time steps: a coarse mesh with seven safety factors, and the meshes of RANDOM with
+two more."""
 ROWS = tuple(tuple(_stepped(plan, safety) for safety in _SAFETIES) for plan in (PLATES[0], PLATES[4]))
-"""The meshes whose facets lie in rows along the crack, with seven steps: in which row it runs is chance."""
+"""Plans with seven time steps on the meshes whose facets lie in rows along the crack. The row in which the crack
+runs varies with the time step."""
 SHOWN = (PLATES[0], PLATES[6], PLATES[7], *SIBLINGS[:3])
-"""Meshes whose cracks are drawn."""
+"""Plans whose cracks are drawn."""
 STRIPS = (Plan("strip", 0.5e-3), Plan("strip", 0.5e-3, "random", 0))
 _WIDTH = 7.64e-5
 BARS = tuple(
     Plan("bar", _WIDTH / n, "structured", seed) for seed, finest in ((None, 5), (0, 3)) for n in range(1, finest + 1)
 )
-"""From one element across the bar to five."""
+"""Plans of the bar with one to five elements across its width."""
 
 
 def measure(plans: Iterable[Plan]) -> Iterator[Run]:
-    """One after the other."""
+    """Runs the plans one after the other."""
     for plan in plans:
         yield watch(plan)
 
 
 def as_data(runs: Sequence[Run]) -> dict[str, list[float]]:
-    """Work, J, fragments, CPU-s and, of cracks, the columns of the table."""
+    """Returns work, J, number of fragments, CPU time, s, and for cracks the columns of the table."""
     return {
         ", ".join((r.plan.case, r.plan.name, *r.plan.words)): [
             r.taken,
@@ -508,7 +519,7 @@ def as_data(runs: Sequence[Run]) -> dict[str, list[float]]:
 
 
 def report(runs: Sequence[Run]) -> str:
-    """All tables."""
+    """Returns all tables."""
     of = {name: [r for r in runs if r.plan.case == name] for name in ("branching_plate", "strip", "bar")}
     plates = [r for r in of["branching_plate"] if not r.plan.words]
     random = [r for r in plates if r.plan in RANDOM]
@@ -526,8 +537,8 @@ def _some(value: float, digits: int = 1) -> Cell:
 
 
 def _columns(r: Run) -> list[float]:
-    """us to the first broken and the first open facet, mm and us where and when it branches, us at the edge, speeds,
-    inflation, share of energy."""
+    """Returns the columns of a crack: time of the first broken and the first open facet, us; position, mm, and time,
+    us, of branching; time at the edge, us; speeds; area over straight area; work over G_c times area."""
     c = r.crack
     times = [1e6 * c.broken, 1e6 * c.start, 1e3 * c.branched, 1e6 * c.passed(c.branched)]
     return [*times, 1e6 * c.passed(c.end - _THROUGH * c.size), r.median, *r.fastest, r.inflation, r.share]
@@ -549,7 +560,7 @@ def _cracks(runs: Sequence[Run]) -> str:
 
 
 def scatter(what: str, runs: Sequence[Run]) -> str:
-    """Of the runs that have a value; ``what`` they are."""
+    """Returns a table of mean and scatter of the runs that have a value; ``what``: name of these runs."""
     values = np.array([[*_columns(r), 1e3 * r.energy.contact] for r in runs]).T
     some = [column[np.isfinite(column)] for column in values]
     rows: list[list[Cell]] = [["of", *(len(column) for column in some)]]
@@ -560,7 +571,7 @@ def scatter(what: str, runs: Sequence[Run]) -> str:
 
 
 def _bars(runs: Sequence[Run]) -> str:
-    """Energy of a bar over that of the finest mesh."""
+    """Returns a table of the work of each bar over that of the finest mesh."""
     finest = min(runs, key=lambda r: (r.plan.size, r.plan.seed is not None)).taken
     rows: list[list[Cell]] = []
     for r in runs:

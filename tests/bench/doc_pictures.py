@@ -1,7 +1,7 @@
-"""The pictures of docs that show bodies: ``python -m tests.bench.doc_pictures [NAME ...]`` runs their cases and draws.
+"""Pictures of bodies in the docs: ``python -m tests.bench.doc_pictures [NAME ...]`` runs their cases and draws them.
 
-Without a name all are drawn. Runs are kept in ``build/pictures``, so that a second call only draws; ``--list`` names
-the pictures with what they take.
+Without a name all pictures are drawn. Runs are kept in ``build/pictures``, so that a second call only draws.
+``--list`` prints the names of the pictures and the cost of their runs.
 """
 
 import json
@@ -23,7 +23,7 @@ DOCS, RUNS = ROOT / "docs", ROOT / "build" / "pictures"
 
 @dataclass(frozen=True)
 class Shown:
-    """A picture of docs: the case, what ``view`` is told, and what the run takes."""
+    """A picture of the docs: the case, the arguments of ``conoid view``, and the cost of the run."""
 
     out: str
     case: str
@@ -49,11 +49,11 @@ PICTURES = {
 
 MM = 1e-3
 _APART = 15.0
-"""mm from one shape to the next. Chosen: they do not hide each other."""
+"""Distance between two shapes, mm. Chosen: no shape hides another one."""
 
 
 def shapes() -> dict[str, Any]:
-    """A case with a body of every shape, each as large as a die, side by side."""
+    """Returns a case with a body of every shape, of equal size, side by side."""
     return {
         "name": "shapes", "title": "The shapes of parts",
         "parts": [
@@ -65,7 +65,7 @@ def shapes() -> dict[str, Any]:
 
 
 def _placed(mesh: Mapping[str, Any], k: int) -> dict[str, Any]:
-    """The mesh, and those that it is made of, at the k-th place."""
+    """Returns the mesh at position k, and the meshes that a combination consists of."""
     x, y = _APART * MM * (k % 7), -_APART * MM * (k // 7)
     moved = {name: _moved(value, x, y) if name in _PLACES else value for name, value in mesh.items()}
     if "of" in mesh:
@@ -118,7 +118,7 @@ _BODIES: dict[str, dict[str, Any]] = {
 
 
 def case(shown: Shown) -> Path:
-    """The file of the case, written where docs have it within their text."""
+    """Returns the file of the case; a case in the text of a page is written to a file first."""
     RUNS.mkdir(parents=True, exist_ok=True)
     if shown.case == "shapes":
         (RUNS / "shapes.json").write_text(json.dumps(shapes()), encoding="utf-8")
@@ -131,7 +131,7 @@ def case(shown: Shown) -> Path:
 
 
 def ran(shown: Shown) -> Result:
-    """The run of a picture: the one that is kept, or a new one."""
+    """Returns the run of a picture: the stored run, or a new one."""
     folder = RUNS / Path(shown.case).stem
     try:
         result = Result.open(folder)
@@ -148,7 +148,7 @@ def _run(shown: Shown, folder: Path) -> Result:
 
 
 def main() -> int:
-    """Draws what is asked for."""
+    """Draws the requested pictures."""
     if "--list" in sys.argv:
         print(*(f"{name:16} {shown.takes}" for name, shown in PICTURES.items()), sep="\n")
         return 0

@@ -1,7 +1,8 @@
-"""What has broken under a shock: does contact alone hold its pressure, and with how many sweeps?
+"""Contact between fragments under a shock: does contact alone carry the pressure of broken material, and with how many
+sweeps?
 
-``python -m tests.bench.dust``: a flyer on a target of the same brittle material, between planes of symmetry, so that
-nothing can go aside. Tables are in docs/theory/contact.md, "Dust under pressure".
+``python -m tests.bench.dust``: a flyer hits a target of the same brittle material between planes of symmetry, so
+that the material cannot move sideways. The tables are in docs/theory/contact.md, "Dust under pressure".
 """
 
 import math
@@ -27,15 +28,16 @@ PLANS = (
     *(("alumina", speed) for speed in (1000.0, 500.0, 200.0, 100.0, 50.0)), ("soda_lime", 1200.0), ("soda_lime", 600.0),
 )  # fmt: skip
 SIZE = 0.1e-3
-"""Of the elements, m."""
+"""Element size, m."""
 _WIDE, _FLYER, _TARGET = 0.4e-3, 2e-3, 4e-3
 _FROM, _TO = 0.1e-6, 0.25e-6
-"""s after the impact: between them the pressure is measured, while both bodies know of nothing but it."""
+"""Period in which the pressure is measured, s after the impact. Until then only the wave of the impact has passed
+the bodies."""
 
 
 @dataclass(frozen=True)
 class Impact:
-    """What came out."""
+    """Result of a run."""
 
     pressure: float
     """Mean of the contact force on the target over its area, Pa."""
@@ -45,7 +47,8 @@ class Impact:
 
 
 def flyer(name: str, speed: float, sweeps: int | None, *, wide: float, long: Sequence[float], end: float) -> Case:
-    """A flyer of a material on a target of it, of the two lengths ``long``, m; ``sweeps`` by default where None."""
+    """Returns the case of a flyer and a target of one material, with the two lengths ``long``, m; ``sweeps`` None:
+    default number of sweeps."""
     mesh = {"shape": "box", "element_size": SIZE, "generator": "gmsh"}
     return parse_case(
         {
@@ -64,13 +67,14 @@ def flyer(name: str, speed: float, sweeps: int | None, *, wide: float, long: Seq
 
 
 def expected(name: str, speed: float) -> tuple[float, float]:
-    """Pressures, Pa, of what has no strength any more, and of what has not broken: linear waves, half of the speed."""
+    """Returns the pressures of material without strength and of intact material, Pa: linear waves with half the
+    impact speed."""
     made = library()[name]
     return math.sqrt(made.bulk * made.density) * speed / 2.0, made.density * wave_speed(made) * speed / 2.0
 
 
 def measure(case: Case, begin: float) -> Impact:
-    """Takes all steps; the pressure is that from ``begin``, s, to the end."""
+    """Computes all steps; the pressure is the mean from ``begin``, s, to the end."""
     sim = simulation.build(case, Path(), SerialComm())
     contact, fracture = sim.contact, sim.fracture
     assert contact is not None
@@ -94,7 +98,7 @@ def measure(case: Case, begin: float) -> Impact:
 
 
 def main() -> int:
-    """All of them."""
+    """Runs all variants."""
     rows: list[list[Cell]] = []
     for name, speed in PLANS:
         cases = (flyer(name, speed, k, wide=_WIDE, long=(_FLYER, _TARGET), end=_TO) for k in (*SWEEPS, None))

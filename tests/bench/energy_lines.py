@@ -1,8 +1,8 @@
-"""``python -m tests.bench.energy_lines [NAME]...``: every hard and every shipped case, with the line of the ledger that
-has made most energy, its share and its limit; writes docs/verification/energy_lines.md.
+"""``python -m tests.bench.energy_lines [NAME]...``: runs every hard and every shipped case, and writes for each the
+line of the energy ledger that has created most energy, its share and its limit into docs/verification/energy_lines.md.
 
-Each case is a run of one rank without frames. What has been measured stays in build/energy_lines, a file a case, and is
-not measured again there; the cheap cases come first. ``write`` writes the page of what there is.
+Each case is a run on one rank without frames. Results are stored in build/energy_lines, one file for each case;
+stored cases are not run again, and cheap cases run first. The argument ``write`` only writes the page.
 """
 
 import json
@@ -29,7 +29,7 @@ _COLUMNS = ("case", "state", "worst line", "made", "at, s", "limit", "residual",
 
 @dataclass(frozen=True)
 class Row:
-    """How a case ended, and which line has made most."""
+    """End of a run, and the line of the ledger that has created most energy."""
 
     case: str
     state: str
@@ -51,7 +51,7 @@ class Row:
 
 @dataclass(frozen=True)
 class Plan:
-    """A case with what is changed of it."""
+    """A case with its changed keys."""
 
     name: str
     path: Path
@@ -59,12 +59,12 @@ class Plan:
 
     @property
     def seconds(self) -> float:
-        """What it is expected to take, core s."""
+        """Estimated cost, core s."""
         return self._estimate.core_seconds or 0.0
 
     @property
     def steps(self) -> int | None:
-        """Steps that are expected."""
+        """Estimated number of steps."""
         return self._estimate.steps
 
     @cached_property
@@ -73,7 +73,7 @@ class Plan:
 
 
 def plans() -> list[Plan]:
-    """All, the cheap ones first."""
+    """Returns all cases, the cheapest one first."""
     found = [Plan(f"hard/{each.name}", each.path, (*each.changes, *_QUIET)) for each in suite()]
     found += [Plan(f"shipped/{name}", path, _QUIET) for name, path in sorted(shipped().items())]
     return sorted(found, key=lambda plan: plan.seconds)
@@ -91,7 +91,7 @@ def measured(plan: Plan) -> Row:
 
 
 def row_of(name: str, outcome: Outcome, limit: float) -> Row:
-    """The row of a run that has ended."""
+    """Returns the row of a finished run."""
     worst = outcome.made[0] if outcome.made else None
     return Row(
         name, outcome.state, outcome.message, worst.line if worst else "none", worst.share if worst else 0.0,
@@ -101,13 +101,13 @@ def row_of(name: str, outcome: Outcome, limit: float) -> Row:
 
 
 def rows() -> Iterator[Row]:
-    """Those that have been measured, hard cases first."""
+    """Returns the rows of the finished cases, hard cases first."""
     for path in sorted(OUT.glob("*.json")):
         yield Row(**json.loads(path.read_text(encoding="utf-8")))
 
 
 def page(found: Sequence[Row]) -> str:
-    """The page: a table, and what is wrong."""
+    """Returns the page: a table, and the list of errors."""
     expected = {plan.name: plan.steps for plan in plans()}
     lines: list[list[Cell]] = [
         [r.case, r.state, r.line, r.made, r.at, r.limit, r.residual, r.tets, r.steps, expected[r.case], round(r.cpu, 1)]
@@ -132,7 +132,7 @@ def page(found: Sequence[Row]) -> str:
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Measures the named cases, or all that have not been measured, and writes the page."""
+    """Runs the named cases, or all without a stored result, and writes the page."""
     known = plans()
     unknown = [name for name in arguments if name != "write" and name not in [plan.name for plan in known]]
     if unknown:

@@ -1,6 +1,7 @@
-"""The mean time step of bars that flatten on a wall, beside its estimate (cases/estimates/shrinkage.py).
+"""Mean time step of bars that flatten on a wall, compared with its estimate (cases/estimates/shrinkage.py).
 
-``python -m tests.bench.flattening``: square bars of two metals, one to four times as long as wide, on one rank.
+``python -m tests.bench.flattening`` runs square bars of two metals on one rank. The length is one to four times the
+width.
 """
 
 import json
@@ -21,17 +22,18 @@ from conoid.cases.outcome import from_json
 from .table import Cell, table
 
 WIDTH, SIZE = 3e-3, 0.75e-3
-"""Of a bar and of its tets, m."""
+"""Width of a bar and element size, m."""
 METALS = {150e6: (100.0, 200.0, 300.0), 800e6: (200.0, 400.0)}
-"""Yield stress, Pa, and speeds, m/s; they harden by 300 MPa."""
+"""Yield stress, Pa, and impact speeds, m/s; the hardening modulus is 300 MPa."""
 LENGTHS = (1, 2, 4)
-"""Over the width."""
+"""Length over width."""
 GAP = 1e-5
-"""Between bar and wall at the start, m."""
+"""Initial distance between bar and wall, m."""
 
 
 def data_of(yield_stress: float, length: int, speed: float) -> dict[str, Any]:
-    """A bar that flies against a wall, for 1.5 times what its length takes at that speed: it flies back by then."""
+    """Returns the case of a bar that hits a wall. The end time is 1.5 times length over speed; the bar has rebounded
+    by then."""
     metal = {
         "density": 8900.0, "elastic": {"young": 207e9, "poisson": 0.31},
         "strength": {"model": "linear_hardening", "yield_stress": yield_stress, "hardening": 300e6},
@@ -49,7 +51,8 @@ def data_of(yield_stress: float, length: int, speed: float) -> dict[str, Any]:
 
 
 def measured(data: dict[str, Any]) -> list[Cell]:
-    """The mean step at the start over that of the run, the exponent k that it means, and what is expected."""
+    """Returns the ratio of the initial time step to the mean one, the exponent k that follows from it, and the
+    estimated ratio."""
     case = parse_case(data)
     with tempfile.TemporaryDirectory(prefix="conoid-bench-") as folder:
         place = Path(folder) / "case.json"
@@ -68,7 +71,7 @@ def measured(data: dict[str, Any]) -> list[Cell]:
 
 
 def main() -> int:
-    """All bars, the short ones first."""
+    """Runs all bars, the short ones first."""
     head = ["MPa", "length/width", "m/s", "steps", "step fell by", "k", "expected", "off by", "CPU s"]
     rows: list[list[Cell]] = []
     for length, (stress, speeds) in product(LENGTHS, METALS.items()):

@@ -1,6 +1,7 @@
-"""What fracture costs: armed with nothing breaking, and a glass bar that shatters, on one rank, finer and finer.
+"""Cost of fracture on one rank: a body that may fracture but does not, and a glass bar that shatters, on finer and
+finer meshes.
 
-The second table is speed against error for a body that breaks: what the mesh does to the pieces, beside what they cost.
+The second table is speed against error for a fracturing body: effect of the mesh on the fragments, and the cost.
 """
 
 import statistics
@@ -21,7 +22,7 @@ from conoid.worker.parallel.comm import SerialComm
 from .table import Cell, table
 
 SIZES = ("3.0 mm", "2.4 mm", "1.8 mm", "1.4 mm")
-"""Of the elements of the glass bar, from coarse to fine."""
+"""Element sizes of the glass bar, from coarse to fine."""
 _BOX = (
     'parts[0].mesh={shape="box",low=["0 mm","0 mm","0 mm"],high=["10 mm","10 mm","30 mm"],element_size="0.5 mm",'
     'generator="structured"}',
@@ -29,12 +30,12 @@ _BOX = (
     "reference=[]",
 )  # fmt: skip
 _BLOCK = 10
-"""Steps with the test of the faces, and as many without, in turn."""
+"""Number of steps with the test of the faces, and of steps without it, in alternation."""
 
 
 @dataclass(frozen=True)
 class Armed:
-    """Millions of element updates a CPU-second of a spinning elastic box."""
+    """Speed of a spinning elastic box, in millions of element updates per CPU second."""
 
     tets: int
     without: float
@@ -42,7 +43,7 @@ class Armed:
 
 
 def armed(blocks: int) -> Armed:
-    """Within one run, the test of the faces on and off in turn; nothing breaks."""
+    """Measures within one run with the test of the faces switched on and off in alternation; no facet breaks."""
     data = load.apply_overrides(load.read_data(load.shipped_path("free_spin")), _BOX)
     data["parts"][0]["material"] = "soda_lime"
     case = load.parse_case(data)
@@ -73,7 +74,7 @@ class Shattered:
 
 
 def shatter(sizes: Sequence[str]) -> Iterator[Shattered]:
-    """glass_steel_demo with elements of these sizes, by the worker's command line."""
+    """Runs glass_steel_demo with these element sizes by the command line of the worker."""
     for size in sizes:
         with tempfile.TemporaryDirectory(prefix="conoid-bench-") as folder:
             words = [sys.executable, "-m", "conoid.worker", "glass_steel_demo", "--out", folder]
@@ -88,7 +89,7 @@ def shatter(sizes: Sequence[str]) -> Iterator[Shattered]:
 
 
 def report(cost: Armed | None, bars: Sequence[Shattered]) -> str:
-    """Both tables."""
+    """Returns both tables."""
     texts = []
     if cost is not None:
         row: list[Cell] = [cost.tets, f"{cost.without:.1f}", f"{cost.armed:.1f}", f"{cost.without / cost.armed:.2f}"]

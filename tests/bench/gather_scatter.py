@@ -1,6 +1,8 @@
-"""What no tet code can do without: read the positions and velocities of four nodes, add to the forces of four nodes.
+"""Lower limit of the cost of any tet code: read positions and velocities of four nodes, and add to the forces of four
+nodes.
 
-No mechanics at all, so its speed on a mesh is the limit on this machine for any element loop with one pass over it.
+No mechanics is computed. The speed is an upper limit on this machine for any loop over the elements with one pass
+over the mesh.
 """
 
 import time
@@ -26,7 +28,7 @@ def _sweep(x, v, force, tets):  # type: ignore[no-untyped-def]
 
 
 class GatherScatter:
-    """Sweeps over the mesh of a simulation, in its order, on arrays of its own."""
+    """Loops over the mesh of a simulation, in its order, on separate arrays."""
 
     def __init__(self, sim: Simulation) -> None:
         nodes = sim.model.nodes
@@ -34,7 +36,7 @@ class GatherScatter:
         self._tets = [block.tets for block in sim.model.blocks]
 
     def sweeps(self, count: int) -> float:
-        """CPU seconds of ``count`` sweeps."""
+        """Returns the CPU time of ``count`` loops, s."""
         begin = time.thread_time()
         for _ in range(count):
             for tets in self._tets:

@@ -1,7 +1,8 @@
-"""The paper's glass bar: where the front of failure is, how the glass behind it swells, nodes and pieces, against time.
+"""The glass bar of the paper: position of the failure front, swelling of the glass behind it, number of nodes and
+fragments over time.
 
-``python -m tests.bench glass_bar`` runs the shipped case, coarser; ``python -m tests.bench.glass_bar FOLDER PNG`` reads
-a run that has been done, at the paper's size, and draws it at four times.
+``python -m tests.bench glass_bar`` runs the shipped case with coarser elements. ``python -m tests.bench.glass_bar
+FOLDER PNG`` reads a finished run with the element size of the paper, and draws it at four times.
 """
 
 import csv
@@ -26,21 +27,22 @@ from .table import Cell, table
 
 Floats = npt.NDArray[np.float64]
 SIZES = ("2.4 mm", "1.8 mm", "1.2 mm")
-"""Of the elements; the case has 0.9 mm."""
+"""Element sizes; the case has 0.9 mm."""
 LENGTH, RADIUS, SOUND = 170e-3, 6.35e-3, 5367.0
-"""Of the glass bar, m; its bar wave speed sqrt(E / rho), m/s."""
+"""Length and radius of the glass bar, m; its bar wave speed sqrt(E / rho), m/s."""
 _SLICE = 5e-3
-"""Thickness, m, of the slices in which nodes are counted."""
+"""Thickness of the slices in which nodes are counted, m."""
 _FAILED = 1.1
-"""Nodes over those at the start: a slice with more is behind the front, if all between it and the impact are."""
+"""Ratio of the number of nodes in a slice to the initial one above which the slice has failed. The front is at the
+end of the failed slices that are connected to the impact face."""
 _EVERY = 10e-6
-"""s between two lines of a table."""
+"""Time between two rows of a table, s."""
 _BEHIND = 3e-6
-"""s behind the front, after which means are taken."""
+"""Time after the passage of the front from which means are taken, s."""
 _LOADED = 39e-6
-"""s until which the steel pushes: its own wave is back after 2 * 100 mm / 5048 m/s."""
+"""Time until which the steel bar pushes, s: its own wave returns after 2 * 100 mm / 5048 m/s."""
 _DRAWN = (10e-6, 30e-6, 60e-6, 110e-6)
-"""s."""
+"""Times of the drawn frames, s."""
 
 
 @dataclass(frozen=True)
@@ -49,15 +51,15 @@ class Moment:
 
     time: float
     front: float
-    """How far from the impact the last slice behind the front ends."""
+    """Distance of the failure front from the impact face."""
     nodes: int
-    """Of the glass."""
+    """Number of nodes of the glass."""
     swelling: float
-    """Mean radius of the rim behind the front over the initial one; 1 where there is no front."""
+    """Mean radius of the rim behind the front over the initial one; 1 without a front."""
     outward: float
     """Mean radial velocity of that rim."""
     pieces: fragments.Summary
-    """Of the glass."""
+    """Fragments of the glass."""
 
 
 @dataclass(frozen=True)
@@ -68,11 +70,12 @@ class Bar:
     outcome: Outcome
     course: list[Moment]
     work: list[tuple[float, int, float]]
-    """Between reports: time at the end, s, steps, and CPU seconds of all ranks without waiting."""
+    """Periods between two reports: time at the end of each period, s, number of steps, and CPU time of all ranks without
+    waiting, s."""
 
 
 def measure(sizes: Sequence[str], ranks: int = 2) -> Iterator[Bar]:
-    """The shipped case with elements of these sizes, one after the other."""
+    """Runs the shipped case with these element sizes, one after the other."""
     for size in sizes:
         with tempfile.TemporaryDirectory() as place:
             folder = Path(place) / "run"
@@ -85,7 +88,7 @@ def measure(sizes: Sequence[str], ranks: int = 2) -> Iterator[Bar]:
 
 
 def read(size: str, folder: Path) -> Bar:
-    """What a run's folder says."""
+    """Reads the folder of a run."""
     frames = sorted((folder / layout.FRAMES).glob("*.vtkhdf"))
     with h5py.File(frames[0]) as file:
         start = _glass(file)[0][:, 2]
@@ -103,7 +106,7 @@ def _work(folder: Path) -> list[tuple[float, int, float]]:
 
 
 def _glass(file: h5py.File) -> tuple[Floats, Floats, Floats]:
-    """(n, 3) initial positions, positions and velocities of the nodes of the glass."""
+    """Returns initial positions, positions and velocities of the nodes of the glass, (n, 3)."""
     mesh = file["VTKHDF"]
     glass = np.unique(mesh["Connectivity"][:].reshape(-1, 4)[mesh["CellData/part"][:] == 1])
     x = mesh["Points"][:][glass]
@@ -111,8 +114,8 @@ def _glass(file: h5py.File) -> tuple[Floats, Floats, Floats]:
 
 
 def front_of(z: Floats, start: Floats) -> float:
-    """How far from the impact nodes have separated, m; axial positions of the nodes where they were at first, all that
-    there are and those that there were.
+    """Returns the distance from the impact face up to which nodes have separated, m; arguments: initial axial
+    positions of all present nodes, and of the initial nodes.
     """
     cuts = np.arange(0.0, LENGTH + _SLICE / 2.0, _SLICE)
     cuts[0], cuts[-1] = -np.inf, np.inf
@@ -121,7 +124,7 @@ def front_of(z: Floats, start: Floats) -> float:
 
 
 def moment(folder: Path, index: int, frame: Path, start: Floats) -> Moment:
-    """A frame; ``start``: axial positions of the nodes of the glass at first."""
+    """Reads a frame; ``start``: initial axial positions of the nodes of the glass."""
     with h5py.File(frame) as file:
         x0, x, v = _glass(file)
     time = _time(frame)
@@ -138,14 +141,14 @@ def moment(folder: Path, index: int, frame: Path, start: Floats) -> Moment:
 
 
 def report(bars: Sequence[Bar]) -> str:
-    """A line a run, and the course of the finest."""
+    """Returns a table with one row for each run, and a table over time of the finest run."""
     head = ["size", "tets", "nodes at first", "nodes", "ratio", "front stops at, mm", "its speed to 50 mm, mm/us",
             "rim, m/s", "pieces", "dust, of the mass", "residual", "wall s", "CPU s", "M upd/s"]  # fmt: skip
     return f"{table(head, [_row(bar) for bar in bars])}\n\n{bars[-1].size}:\n\n{course(bars[-1])}"
 
 
 def waves(folder: Path) -> str:
-    """What passes the probes before the release comes back from the far end: peaks, and means behind the front."""
+    """Returns peaks, and means behind the front, at the probes before the release wave arrives from the far end."""
     with (folder / layout.HISTORY).open(encoding="utf-8") as file:
         named = [{history.split(name)[0]: text for name, text in line.items()} for line in csv.DictReader(file)]
     lines = [{name: float(text) for name, text in line.items() if name != "limiter"} for line in named]
@@ -172,12 +175,12 @@ def _row(bar: Bar) -> list[Cell]:
 
 
 def arrested(moments: Sequence[Moment]) -> float:
-    """Where the front was when the wave came back from the far end, m."""
+    """Returns the position of the front when the wave returned from the far end, m."""
     return max((m.front for m in moments if m.time < LENGTH / SOUND), default=0.0)
 
 
 def course(bar: Bar) -> str:
-    """Some moments as a table; M upd/s: updates of a tet in a CPU second of work since the moment before."""
+    """Returns a table over time; M upd/s: element updates per CPU second since the previous row, in millions."""
     head = ["t, us", "front, mm", "speed, mm/us", "rim radius", "rim, m/s", "glass nodes", "pieces", "dust", "largest",
             "M upd/s"]  # fmt: skip
     chosen = [bar.course[0]]
@@ -197,12 +200,12 @@ def course(bar: Bar) -> str:
 
 
 def as_data(bars: Sequence[Bar]) -> list[dict[str, object]]:
-    """For bench.json."""
+    """Returns the results as data for bench.json."""
     return [{"size": bar.size, "course": [asdict(m) for m in bar.course]} for bar in bars]
 
 
 def draw(folder: Path, png: Path) -> None:
-    """The bars at four times, side by side, a colour for every fragment."""
+    """Draws the bars at four times, side by side, coloured by fragment."""
     views = []
     with tempfile.TemporaryDirectory() as place:
         for time in _DRAWN:

@@ -1,6 +1,7 @@
-"""How cost and memory grow with the mesh: an elastic structured box, without viscosity, of 50,000 to 5 million tets.
+"""Growth of cost and memory with the mesh: an elastic structured box without viscosity, of 50,000 to 5 million tets.
 
-``armed``: of glass that may fracture and whose surface may meet itself; it is stretched so little that nothing breaks.
+``armed``: the box is of glass that may fracture and may be in contact with itself; the stretch is so small that no
+facet breaks.
 """
 
 import json
@@ -22,7 +23,7 @@ from .table import Cell, table
 
 @dataclass(frozen=True)
 class Growth:
-    """One size: CPU ns a tet and step, and bytes of the process."""
+    """Result for one size: CPU time per tet and step, ns, and memory of the process, bytes."""
 
     armed: bool
     tets: int
@@ -30,27 +31,29 @@ class Growth:
     median: float
     spread: float
     limit: float
-    """The same for gather and scatter only, best."""
+    """CPU time of gather and scatter alone per tet and step, ns; the fastest measurement."""
     base: int
-    """Resident bytes with every library and kernel loaded, before the mesh."""
+    """Resident memory with all libraries and kernels loaded, before the mesh, bytes."""
     peak: int
-    """Largest resident bytes while the model was set up, its mesh found in the cache."""
+    """Largest resident memory during the setup of the model, with its mesh in the cache, bytes."""
     steady: int
-    """Resident bytes while it steps."""
+    """Resident memory during the steps, bytes."""
 
     def bytes_a_tet(self, smaller: "Growth") -> tuple[float, float]:
-        """Bytes a tet between two sizes: at the peak, and steady."""
+        """Returns the increase of memory per tet between two sizes, bytes: at the peak, and during the steps."""
         more = self.tets - smaller.tets
         return (self.peak - smaller.peak) / more, (self.steady - smaller.steady) / more
 
     @property
     def bytes_each(self) -> tuple[float, float]:
-        """Bytes a tet beyond what the process takes without a mesh: at the peak, and steady."""
+        """Returns the memory per tet without that of a process without a mesh, bytes: at the peak, and during the
+        steps."""
         return (self.peak - self.base) / self.tets, (self.steady - self.base) / self.tets
 
 
 def measure(sizes: Sequence[int], rounds: int = 4) -> list[Growth]:
-    """Elastic, then armed; each in a process of its own, so that its memory is its own; its mesh is in the cache."""
+    """Measures elastic, then armed boxes. Each runs in a new process for a correct measurement of memory; its mesh
+    is in the cache."""
     return [_apart(size, rounds, armed) for armed in (False, True) for size in sizes]
 
 
@@ -64,7 +67,7 @@ def _apart(size: int, rounds: int, armed: bool) -> Growth:
 
 
 def here(size: int, rounds: int, armed: bool) -> Growth:
-    """In this process, which must not have had another mesh. Raises RuntimeError if something breaks."""
+    """Measures in this process, which must not have loaded another mesh. Raises RuntimeError if a facet breaks."""
     base = _resident("VmRSS")
     ride = Ride(scene(size, armed))
     peak = _resident("VmHWM")
@@ -84,20 +87,20 @@ def here(size: int, rounds: int, armed: bool) -> Growth:
 
 
 def scene(size: int, armed: bool) -> schema.Case:
-    """A box that is stretched: of steel, or of glass with fracture and contact."""
+    """Returns the case of a stretched box: of steel, or of glass with fracture and contact."""
     plain = case("soda_lime" if armed else "steel", "standard", box(size, "structured"), viscosity=False)
     parts = tuple(part.model_copy(update={"fracture": schema.Fracture()}) for part in plain.parts)
     return plain.model_copy(update={"parts": parts}) if armed else plain
 
 
 def _resident(name: str) -> int:
-    """A line of /proc/self/status, bytes."""
+    """Returns the value of a line of /proc/self/status, bytes."""
     found = re.search(rf"{name}:\s+(\d+) kB", Path("/proc/self/status").read_text(encoding="utf-8"))
     return int(found[1]) * 1024 if found else 0
 
 
 def report(sizes: Sequence[Growth]) -> str:
-    """Cost and memory of each size; bytes a tet against the size before."""
+    """Returns a table of cost and memory for each size; the memory per tet is the increase from the previous size."""
     rows: list[list[Cell]] = []
     for before, now in zip([None, *sizes], sizes, strict=False):
         first = next(s for s in sizes if s.armed == now.armed)

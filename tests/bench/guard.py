@@ -1,10 +1,10 @@
-"""What a change costs: six scenes at this commit and at an earlier one, in turn, in one run.
+"""Cost of a change: six scenes, computed in alternation with the sources of this commit and of an earlier one.
 
-``python -m tests.bench.guard [COMMIT] [--only SCENE ...]``; the commit is ``BASE`` where none is given. The earlier
-sources are checked out below build/guard and run by the same Python with the same libraries, one rank each, first the
-one and then the other. A ratio is the median over the rounds of CPU seconds here over CPU seconds there: above 1 this
-commit is slower. Where both have one digest they have computed the same to the last bit; else the worst residual of
-energy of both stands beside it.
+``python -m tests.bench.guard [COMMIT] [--only SCENE ...]``; the default commit is ``BASE``. The earlier sources are
+checked out below build/guard and use the same Python and libraries; each run has one rank. The printed ratio is the
+median over the rounds of CPU time of this commit over CPU time of the earlier one: above 1 this commit is slower. If
+both digests are equal, the results are bit-identical; otherwise the table has the largest residual of the energy of
+both.
 """
 
 import argparse
@@ -24,7 +24,7 @@ from conoid.cases.output import layout
 from .table import Cell, table
 
 BASE = "c1ab530"
-"""The commit before the layout of the step was changed."""
+"""The last commit before the memory layout of the step was changed."""
 ROOT = Path(__file__).parents[2]
 HOUSES = "cases", "client", "server", "worker"
 PHASES = "elements", "nodes", "contact", "fracture"
@@ -32,7 +32,7 @@ PHASES = "elements", "nodes", "contact", "fracture"
 
 @dataclass(frozen=True)
 class Scene:
-    """A case, a shipped one or a file of this folder, with assignments."""
+    """A scene: a shipped case or a file of this folder, with assignments."""
 
     name: str
     case: str
@@ -56,30 +56,30 @@ QUICK = SCENES[0], SCENES[3]
 
 @dataclass(frozen=True)
 class Paid:
-    """What one run took."""
+    """Cost of one run."""
 
     outcome: dict[str, Any]
 
     @property
     def digest(self) -> str:
-        """Of the last state."""
+        """Digest of the last state."""
         return str(self.outcome["digest"])
 
     def cpu(self, *phases: str) -> float:
-        """CPU seconds of these phases, of all where none is named."""
+        """Returns the CPU time of these phases, s; of all phases without names."""
         spent = {name: float(each[0]) for name, each in self.outcome["phases"].items()}
         return sum(spent.get(name, 0.0) for name in phases or spent)
 
 
 @dataclass(frozen=True)
 class Compared:
-    """A scene in its rounds, (there, here) each."""
+    """Rounds of a scene: pairs of the runs of the earlier and of this commit."""
 
     scene: Scene
     rounds: list[tuple[Paid, Paid]]
 
     def ratio(self, *phases: str) -> float:
-        """The median over the rounds; 1 where neither takes a hundredth of the whole."""
+        """Returns the median ratio over the rounds; 1 if the phases take less than a hundredth of the whole in both."""
         pairs = [(there.cpu(*phases), here.cpu(*phases), 0.01 * there.cpu()) for there, here in self.rounds]
         return statistics.median(1.0 if max(there, here) < least else here / there for there, here, least in pairs)
 
@@ -89,7 +89,7 @@ class NoCommitError(Exception):
 
 
 def sources(commit: str) -> Path:
-    """The folder that a Python with it in PYTHONPATH imports that commit's packages from. Raises NoCommitError."""
+    """Returns the folder for PYTHONPATH from which the packages of that commit are imported. Raises NoCommitError."""
     place = ROOT / "build" / "guard" / commit
     if not (place / "conoid").is_dir():
         made = subprocess.run(["git", "archive", commit, *HOUSES], cwd=ROOT, capture_output=True)
@@ -101,8 +101,8 @@ def sources(commit: str) -> Path:
 
 
 def run(scene: Scene, place: Path | None) -> Paid:
-    """One run of the scene by the sources in ``place``, by these here where there is none. Raises RuntimeError where it
-    does not succeed.
+    """Runs the scene once with the sources in ``place``, or with the present sources if it is None. Raises
+    RuntimeError if the run does not succeed.
     """
     file = Path(__file__).with_name(scene.case)
     environment = os.environ | ({"PYTHONPATH": str(place)} if place else {})
@@ -117,13 +117,13 @@ def run(scene: Scene, place: Path | None) -> Paid:
 
 
 def measure(scenes: Sequence[Scene], place: Path) -> Iterator[Compared]:
-    """Every scene by the sources in ``place`` and by these here, in turn."""
+    """Runs every scene with the sources in ``place`` and with the present sources, in alternation."""
     for scene in scenes:
         yield Compared(scene, [(run(scene, place), run(scene, None)) for _ in range(scene.rounds)])
 
 
 def report(found: Sequence[Compared], commit: str) -> str:
-    """A table; the last column says whether both have computed the same."""
+    """Returns a table; its last column reports whether both results are equal."""
     head = ["scene", "tets", "steps", f"CPU s at {commit}", "here", "ratio", *PHASES, "answer"]
     return table(head, [_row(each) for each in found])
 
@@ -144,7 +144,7 @@ def _answer(there: Paid, here: Paid) -> str:
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Prints the table; 2 where the commit or a scene is not known."""
+    """Prints the table; returns 2 for an unknown commit or scene."""
     parser = argparse.ArgumentParser(prog="tests.bench.guard", description="CPU time of six scenes here and there.")
     parser.add_argument("commit", nargs="?", default=BASE)
     parser.add_argument("--only", action="append", metavar="SCENE", help="a scene by how its name begins")

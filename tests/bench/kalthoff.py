@@ -1,7 +1,9 @@
-"""Kalthoff's and Winkler's plate: edge cracks sheared by an impact between them. Where the crack goes, when, how fast.
+"""Plate of Kalthoff and Winkler: edge cracks under shear by an impact between them. The study measures direction, time
+and speed of the crack.
 
-``python -m tests.bench.kalthoff`` takes every mesh in turn. Half of the plate is modelled, one layer of tets between
-two planes of symmetry (plane strain); the meshes, the slit and the look at the crack are those of cracks.py.
+``python -m tests.bench.kalthoff`` runs all meshes, one after the other. The model is half of the plate, one layer of
+tets between two planes of symmetry (plane strain). Meshes, the slit and the measurement of the crack are those of
+cracks.py.
 """
 
 import pathlib as files
@@ -58,12 +60,13 @@ pressure = "standard"
 end_time = "90 us"
 frames = 0
 """
-"""18Ni1900, the constants that computations of this test use, as remembered. The projectile is as wide as what lies
-between the slits and of the same steel: half of its 33 m/s is the speed of the face that it hits."""
+"""Steel 18Ni1900 with the constants of published computations of this test, recalled and not checked. The projectile
+is of the same steel and as wide as the distance between the slits; hence the speed of the impact face is half of 33
+m/s."""
 TIP = 50e-3
 """x of the tip of the slit, m; its y is 0."""
 _NEAR = 20e-3
-"""m from the tip: how far the first part of the crack reaches."""
+"""Distance from the tip to which the first part of the crack extends, m."""
 _PUBLISHED: tuple[Cell, ...] = (
     "published",
     None,
@@ -78,37 +81,40 @@ _PUBLISHED: tuple[Cell, ...] = (
     None,
     None,
 )
-"""Of the test and of computations with extended elements, cohesive zones and phase fields, as remembered."""
+"""Results of the test and of computations with extended elements, cohesive zones and phase fields, recalled and not
+checked."""
 
 
 @dataclass(frozen=True)
 class Path:
-    """The crack of a run, seen from the tip of the slit: only what opens ahead of the slit, above it, is taken."""
+    """The crack of a run, relative to the tip of the slit. Only facets that open ahead of the slit and above it are
+    included."""
 
     run: Run
 
     @property
     def crack(self) -> Crack:
-        """Its open facets."""
+        """Open facets of the crack."""
         return self.run.crack
 
     @cached_property
     def away(self) -> Floats:
-        """(m, 2) of the open facets from the tip, m."""
+        """Positions (m, 2) of the open facets relative to the tip, m."""
         return np.asarray(self.crack.centre[:, :2] - np.array([TIP, 0.0]))
 
     @cached_property
     def distance(self) -> Floats:
-        """(m,) of the open facets from the tip, m."""
+        """Distances (m,) of the open facets from the tip, m."""
         return np.asarray(np.hypot(*self.away.T))
 
     @cached_property
     def upwards(self) -> "np.ndarray":
-        """(m,) whether a facet is of the crack that was looked for, not of one that begins at another border."""
+        """Whether each facet (m,) belongs to the crack from the slit, not to a crack from another border."""
         return np.asarray((self.away[:, 1] > -2.0 * self.run.plan.size) & (self.away[:, 0] > -0.5 * TIP))
 
     def angle(self, most: float) -> float:
-        """Degrees from the direction of the slit: the area's principal axis through the tip, up to ``most``, m."""
+        """Returns the angle to the direction of the slit, degrees: principal axis of the area through the tip, up to
+        the distance ``most``, m."""
         taken = self.upwards & (self.distance <= most)
         if not taken.any():
             return float("nan")
@@ -118,12 +124,12 @@ class Path:
 
     @cached_property
     def reach(self) -> float:
-        """How far the crack is from the tip at the end, m."""
+        """Distance of the crack from the tip at the end, m."""
         return float(self.distance[self.upwards].max(initial=0.0))
 
     @cached_property
     def speed(self) -> float:
-        """m/s: a straight line through the course of the front from 5 mm to 0.9 of its way."""
+        """Crack speed, m/s: slope of a straight line through the path of the front from 5 mm to 0.9 of its length."""
         order = np.lexsort((-self.distance, self.crack.time))
         order = order[self.upwards[order]]
         r, t = self.distance[order], self.crack.time[order]
@@ -136,14 +142,16 @@ class Path:
 
     @cached_property
     def share(self) -> float:
-        """Of the open area what lies within 10 degrees of the angle: the rest is branches and what shatters beside."""
+        """Share of the open area that lies within 10 degrees of the angle; the rest is branches and fragments beside
+        the crack."""
         turned = np.degrees(np.arctan2(self.away[:, 1], self.away[:, 0]))
         near = self.upwards & (np.abs(turned - self.angle(1.0)) < 10.0)
         return float(self.crack.area[near].sum() / self.crack.area.sum()) if len(self.distance) else float("nan")
 
     @property
     def columns(self) -> tuple[float, ...]:
-        """us of the first broken and the first open facet, degrees, degrees near the slit, mm, m/s over c_R, share."""
+        """Returns the columns of the table: time of the first broken and the first open facet, us; angle, and angle
+        near the slit, degrees; length, mm; speed over c_R; share."""
         c = self.crack
         relative = self.speed / rayleigh(self.run.made)
         return (
@@ -152,7 +160,7 @@ class Path:
 
 
 def plan(kind: Kind, size: float, seed: int | None = None, *words: str, straight: bool = True) -> Plan:
-    """A mesh of the plate, one element thick, ``size`` in m; further assignments; whether the slit is smooth."""
+    """A mesh of the plate, one element thick; ``size``, m; further assignments; whether the slit is smooth."""
     return Plan("kalthoff", size, kind, seed, (f"boundaries[2].at={size}", *words), CASE, straight)
 
 
@@ -168,28 +176,28 @@ OTHERS = (
     plan("random", FINE, 0, straight=False),
 )  # fmt: skip
 SHOWN = (RANDOM[0], RANDOM[3], OTHERS[4], LATTICES[0], LATTICES[1], LATTICES[3])
-"""Meshes whose cracks are drawn."""
+"""Plans whose cracks are drawn."""
 _SAID = {"split=5": "5 tets a cell", "shear_weight": "shear counts a tenth", "contact": "sides do not meet"}
-"""What assignments are called in the table."""
+"""Names of assignments in the table."""
 _DIGITS = (1, 1, 1, 1, 1, 2, 2)
 _HEAD = ("breaks, us", "opens, us", "angle, deg", "to 20 mm", "reach, mm", "c / c_R", "within 10 deg")
 
 
 def measure(plans: Iterable[Plan]) -> Iterator[Path]:
-    """One after the other."""
+    """Runs the plans one after the other."""
     for some in plans:
         yield Path(watch(some))
 
 
 def name(some: Plan) -> str:
-    """For tables."""
+    """Returns the name in tables."""
     said = [text for key, text in _SAID.items() if any(key in word for word in some.words)]
     rough = some.kind == "gmsh" or not some.straight
     return ", ".join([some.name, *said, *(["rough slit"] if rough else [])])
 
 
 def report(paths: Sequence[Path]) -> str:
-    """What came out beside what is published, and the scatter of the random meshes of one size."""
+    """Returns tables of the results beside the published ones, and of the scatter of the random meshes of one size."""
     rows: list[list[Cell]] = [list(_PUBLISHED)] + [
         [name(p.run.plan), p.run.tets, *_texts(p.columns), p.run.steps, round(p.run.cpu), p.run.worst] for p in paths
     ]
@@ -201,7 +209,7 @@ def report(paths: Sequence[Path]) -> str:
 
 
 def _deviation(values: Floats, axis: int) -> Floats:
-    """Of a sample."""
+    """Returns the scatter of a sample."""
     return np.asarray(np.std(values, axis=axis, ddof=1))
 
 
@@ -210,14 +218,14 @@ def _texts(values: Iterable[float]) -> list[Cell]:
 
 
 def draw(paths: Sequence[Path], out: files.Path) -> None:
-    """The open facets of SHOWN, as a PNG."""
+    """Draws the open facets of SHOWN as a PNG."""
     from . import plot
 
     plot.paths([p.run for p in paths if p.run.plan in SHOWN], out, (-25.0, 75.0))
 
 
 def main() -> int:
-    """Every mesh; a line of each as it is done, then the tables, and a picture in build/bench."""
+    """Runs every mesh; prints a line after each run, then the tables, and draws a picture in build/bench."""
     paths = []
     for path in measure((*RANDOM, *LATTICES, *OTHERS)):
         paths.append(path)

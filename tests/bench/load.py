@@ -1,9 +1,9 @@
 """A server under load: ``python -m tests.bench.load [SECONDS]``.
 
-A thousand runs wait while one of 64 ranks speaks ten times a second and shows a snapshot every two seconds to 20
-watchers, ten over Zenoh and ten over SSE; meanwhile GETs are asked twenty times a second. Then the server is killed
-and started again. Watchers are processes of their own; nothing is computed. The server's memory is printed every
-minute: an hour, ``3600``, shows whether it is flat.
+A thousand runs wait while a run with 64 ranks sends messages ten times per second and a snapshot every two seconds.
+20 clients watch this run, ten over Zenoh and ten over SSE. Meanwhile GET requests are sent 20 times per second. Then
+the server is killed and started again. Each client is a process; no physics is computed. The memory of the server is
+printed every minute: with 3600 s it shows whether the memory grows.
 """
 
 import json
@@ -37,7 +37,7 @@ from .table import table
 ROOT = Path(__file__).parents[2]
 WORKER = f"{sys.executable} {Path(__file__).with_name('load_worker.py')}"
 RANKS, QUEUED, WATCHERS, ASKS = 64, 1000, 20, 20.0
-"""Of the run; runs that wait; readers of the stream; GETs a second."""
+"""Ranks of the run; number of waiting runs; number of readers of the stream; GET requests per second."""
 _STARTS = 120.0
 _CASE = {
     "name": "load",
@@ -52,12 +52,12 @@ _CASE = {
 
 @dataclass
 class Seen:
-    """What was measured; times in s, memory in bytes."""
+    """Results; times in s, memory in bytes."""
 
     answers: dict[str, list[float]] = field(default_factory=dict)
     stream: dict[str, list[float]] = field(default_factory=dict)
     cpu: float = 0.0
-    """Cores that the server took."""
+    """Mean number of cores that the server used."""
     memory: list[tuple[float, int]] = field(default_factory=list)
     restart: float = 0.0
     restart_cpu: float = 0.0
@@ -66,7 +66,7 @@ class Seen:
 
 
 def measure(seconds: float) -> Seen:
-    """One server, loaded for so long."""
+    """Measures one server under load for this time."""
     seen = Seen()
     with TemporaryDirectory(prefix="conoid-load-") as place:
         runs = Path(place) / "runs"
@@ -94,7 +94,7 @@ def measure(seconds: float) -> Seen:
 
 
 def _fill(runs: Path, seconds: float) -> str:
-    """The folders of all runs, as a server writes them; a token."""
+    """Creates the folders of all runs as a server does; returns a token."""
     store = Store(f"sqlite:///{runs / 'server.sqlite'}")
     token = create_token(store, "ann", frozenset({"read", "submit"}))
     for n in range(QUEUED + 1):
@@ -113,7 +113,7 @@ def _fill(runs: Path, seconds: float) -> str:
 
 @contextmanager
 def _served(runs: Path) -> Iterator[tuple["subprocess.Popen[bytes]", str]]:
-    """A server on the folder, once it answers."""
+    """Yields a server on the folder when it answers."""
     address = runs / "server.json"
     address.unlink(missing_ok=True)
     words = [sys.executable, "-m", "conoid.server", "--runs", str(runs), "--port", "0", "--zenoh-port", "0"]
@@ -137,7 +137,7 @@ def _bearer(token: str) -> dict[str, str]:
 
 
 def _first(http: httpx2.Client) -> str:
-    """The run that has its cores."""
+    """Returns the run that uses the cores."""
     deadline = time.monotonic() + _STARTS
     while True:
         found = http.get("/v1/runs", params={"state": "running,starting"}).json()["runs"]
@@ -163,7 +163,7 @@ def _watchers(url: str, token: str, run: str, kind: str, seconds: float) -> "sub
 
 
 def _ask(http: httpx2.Client, run: str, pid: int, seconds: float, seen: Seen) -> None:
-    """GETs of all kinds in turn, at their times; the server's processor time and memory meanwhile."""
+    """Sends GET requests of all kinds at their times; measures CPU time and memory of the server meanwhile."""
     began, cpu = time.monotonic(), _cpu(pid)
     kinds = {
         "a run": f"/v1/runs/{run}",
@@ -188,7 +188,7 @@ def _ask(http: httpx2.Client, run: str, pid: int, seconds: float, seen: Seen) ->
 
 
 def _cpu(pid: int) -> float:
-    """s of processor time, of all threads."""
+    """Returns the CPU time of all threads, s."""
     fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
@@ -198,7 +198,7 @@ def _memory(pid: int) -> int:
 
 
 def watch(url: str, token: str, run: str, kind: str, seconds: float) -> None:
-    """Half of the watchers: says when all follow, then prints how late each message has come, s."""
+    """Runs half of the clients: prints when all of them follow, then the delay of each message, s."""
     late: list[float] = []
     with Session(url, token) as session:
         told = session.run(run).status()
@@ -233,7 +233,7 @@ def _by_zenoh(
 
 
 def _by_sse(session: Session, run: str, last: int, seconds: float, late: list[float], ready: threading.Barrier) -> None:
-    """What was said before it followed is not counted."""
+    """Messages from before the subscription are not counted."""
     began, deadline = 0.0, math.inf
     for message in session.stream(f"/v1/runs/{run}/stream", last):
         if not began:
@@ -250,14 +250,14 @@ def _at(values: Sequence[float], share: float) -> float:
 
 
 def _growth(seen: Seen) -> str:
-    """How fast memory grew in the second half, by a line through it."""
+    """Returns the growth of memory in the second half, from a fitted straight line."""
     half = seen.memory[len(seen.memory) // 2 :]
     slope = statistics.linear_regression(*zip(*half, strict=True)).slope if len(half) > 1 else 0.0
     return f"in the end {slope * 60 / 1e6:+.2f} MB a minute"
 
 
 def told(seen: Seen) -> str:
-    """The tables."""
+    """Returns the tables."""
     every = [value for values in seen.answers.values() for value in values]
     streams = [value for values in seen.stream.values() for value in values]
     rows = {**seen.answers, "all GETs": every, **{f"stream, {k}": v for k, v in seen.stream.items()}}

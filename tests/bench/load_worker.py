@@ -1,6 +1,7 @@
-"""A worker that computes nothing and says what 64 ranks say: ten times a second, and a snapshot every two seconds.
+"""A worker that computes no physics, and sends the messages of 64 ranks: reports ten times per second, a snapshot every
+two seconds.
 
-It is its own launcher as well: called as ``mpiexec -n N COMMAND`` it becomes the command, once.
+The program is its own launcher, too: called as ``mpiexec -n N COMMAND`` it executes the command once.
 """
 
 import argparse
@@ -19,16 +20,16 @@ from conoid.worker.output.journal import Journal
 from conoid.worker.output.telemetry import Telemetry
 
 RATE = 10.0
-"""Hz."""
+"""Reports per second."""
 SNAPSHOT = 2.0
-"""s"""
+"""Time between two snapshots, s."""
 BLOB = 1_000_000
-"""Bytes of a snapshot."""
+"""Size of a snapshot, bytes."""
 PHASES = ("elements", "contact", "fracture", "exchange", "output")
 
 
 def main(words: list[str]) -> int:
-    """Becomes the command after ``-n N``, or runs."""
+    """Executes the command after ``-n N``, or runs as a worker."""
     if words[0] == "-n":
         os.execv(words[2], words[2:])
     parser = argparse.ArgumentParser()
@@ -52,7 +53,7 @@ def main(words: list[str]) -> int:
 
 
 def _talk(journal: Journal, folder: Path, ranks: int, seconds: float) -> None:
-    """Says what there is to say, in time, for so many seconds."""
+    """Sends the messages at their times, for this number of seconds."""
     began = time.monotonic()
     (folder / layout.SNAPSHOTS).mkdir(exist_ok=True)
     step, shots, dice = 0, 0, random.Random(1)

@@ -1,6 +1,6 @@
-"""The long rod through six plates: penetration against mesh, speed, erosion, pressure form, friction and strength.
+"""Long rod through six plates: penetration over mesh, speed, erosion, pressure form, friction and strength.
 
-Every run is the shipped case with a few assignments, on two ranks, one run after the other.
+Every run is the shipped case with a few assignments, on two ranks. The runs follow one after the other.
 """
 
 import json
@@ -29,39 +29,39 @@ from .table import Cell, table
 Floats = npt.NDArray[np.float64]
 PARTS = range(7)
 LENGTH = 75.0
-"""Of the rod, mm."""
+"""Length of the rod, mm."""
 BANDS = {"1057 m/s": (0.60, 0.80), "1301 m/s": (0.85, 1.05), "1566.4 m/s": (1.00, 1.20)}
-"""P/L of a tungsten rod in mild steel by Alekseevskii's and Tate's theory, with a rod strength of 1.5 to 2 GPa and a
-target resistance of 3 to 3.5 GPa that are assumed, not derived from the constants of the case."""
+"""P/L of a tungsten rod in mild steel by the theory of Alekseevskii and Tate. The rod strength of 1.5 to 2 GPa and
+the target resistance of 3 to 3.5 GPa are assumptions, not derived from the constants of the case."""
 _RADIUS, _THICKNESS = 3.5e-3, 22e-3
-"""Of the rod, and of a plate, m."""
+"""Radius of the rod, and thickness of a plate, m."""
 _CRATER = (6.0, 40.0)
-"""Depths between which the diameter of the crater is measured, mm."""
+"""Range of depths in which the diameter of the crater is measured, mm."""
 
 
 @dataclass(frozen=True)
 class Variant:
-    """One run: what differs from the shipped case."""
+    """One run: changed keys of the shipped case."""
 
     name: str
     assignments: tuple[str, ...] = ()
     yields: tuple[tuple[str, float], ...] = ()
-    """Materials and their constant A, GPa, where it differs from the library's."""
+    """Materials and their constant A, GPa, if it differs from the library."""
 
 
 def eroding(key: str, value: object) -> tuple[str, ...]:
-    """An assignment to the erosion of every part."""
+    """Returns an assignment to the erosion of every part."""
     return tuple(f"parts[{k}].erosion.{key}={value}" for k in PARTS)
 
 
 def meshed(size: float, **grading: float) -> tuple[str, ...]:
-    """Another mesh: element size near the axis, mm."""
+    """Returns assignments of another element size near the axis, mm."""
     sizes = [f"parts[{k}].mesh.element_size={size:g} mm" for k in PARTS]
     return *sizes, *(f"parts[{k}].mesh.grading.{key}={v:g} mm" for k in PARTS[1:] for key, v in grading.items())
 
 
 def sector(name: str, *planes: str) -> tuple[str, ...]:
-    """Another sector of every part, and symmetry at the planes across these axes."""
+    """Returns assignments of another sector of every part, with planes of symmetry across these axes."""
     bounds = ", ".join(f'{{kind="symmetry", axis="{axis}"}}' for axis in planes)
     return *(f"parts[{k}].mesh.sector={name}" for k in PARTS), f"boundaries=[{bounds}]"
 
@@ -97,7 +97,7 @@ OTHERS = (
 
 @dataclass(frozen=True)
 class Moment:
-    """A frame: time, s; depth, ends of the rod, m; speed of its last 8 mm, m/s. NaN without a rod."""
+    """Values of a frame: time, s; depth and ends of the rod, m; speed of its last 8 mm, m/s. NaN without a rod."""
 
     t: float
     depth: float
@@ -108,26 +108,26 @@ class Moment:
 
 @dataclass(frozen=True)
 class Shot:
-    """What came out of a variant; lengths in mm."""
+    """Results of a variant; lengths in mm."""
 
     variant: Variant
     outcome: Outcome
     depth: float
     crater: float
-    """Mean diameter between the depths of _CRATER."""
+    """Mean diameter in the depths of _CRATER."""
     course: tuple[Moment, ...]
-    """Frame by frame."""
+    """Values of each frame."""
 
 
 def measure(variants: Sequence[Variant], ranks: int = 2) -> Iterator[Shot]:
-    """Every variant in turn."""
+    """Runs every variant, one after the other."""
     for variant in variants:
         with tempfile.TemporaryDirectory(prefix="conoid-bench-") as folder:
             yield run(variant, Path(folder), ranks)
 
 
 def run(variant: Variant, folder: Path, ranks: int) -> Shot:
-    """The variant in ``folder``, with the worker's command line."""
+    """Runs the variant in ``folder``, by the command line of the worker."""
     data = load.apply_overrides(load.read_data(load.shipped_path("long_rod")), variant.assignments)
     data["materials"] = {name: _stronger(name, strength) for name, strength in variant.yields}
     case = folder / "case.json"
@@ -142,17 +142,17 @@ def run(variant: Variant, folder: Path, ranks: int) -> Shot:
 
 
 def _stronger(name: str, strength: float) -> dict[str, Any]:
-    """A material of the library with another A, GPa."""
+    """Returns a material of the library with another A, GPa."""
     table: dict[str, Any] = library()[name].model_dump(exclude_none=True)
     table["strength"]["A"] = 1e9 * strength
     return table
 
 
 def crater(frame: Path) -> float:
-    """Mean diameter, m, of the hole in the plates of a frame, from the outward faces of what is left.
+    """Returns the mean diameter of the hole in the plates of a frame, m, from the outward faces of the remaining tets.
 
-    The wall is where the innermost faces are, in each of nine sectors and slices; the median of all is taken, so that
-    a flake in the hole does not count.
+    In each of nine sectors and slices the innermost faces are the wall of the hole. The result is the median over
+    all, so that a flake in the hole has no effect.
     """
     with h5py.File(frame) as file:
         grid = file["VTKHDF"]
@@ -172,7 +172,7 @@ def crater(frame: Path) -> float:
 
 
 def moment(frame: Path) -> Moment:
-    """What a frame says of rod and plates; depth as the reference ``penetration`` has it."""
+    """Returns the values of rod and plates in a frame; the depth is that of the reference ``penetration``."""
     with h5py.File(frame) as file:
         grid = file["VTKHDF"]
         points, part, t = grid["Points"][:], grid["CellData/part"][:], float(grid["FieldData/time"][0])
@@ -190,10 +190,9 @@ def moment(frame: Path) -> Moment:
 
 
 def course(moments: Sequence[Moment]) -> str:
-    """Depth and rod over time; the strength that slows the tail down, and the resistance that the nose then meets.
-
-    Alekseevskii's and Tate's equations, over 30 us about each line: Y = -rho L dV/dt, R = rho (V - U)^2 / 2 + Y -
-    rho_t U^2 / 2.
+    """Returns a table of depth and speed of the rod over time, with the rod strength from the deceleration of its
+    tail and the resistance at its nose. The equations of Alekseevskii and Tate are applied to 30 us around each row:
+    Y = -rho L dV/dt, R = rho (V - U)^2 / 2 + Y - rho_t U^2 / 2.
     """
     rows: list[list[Cell]] = []
     for before, now, after in zip(moments, moments[3:], moments[6:], strict=False):
@@ -209,7 +208,7 @@ def course(moments: Sequence[Moment]) -> str:
 
 
 def report(shots: Sequence[Shot]) -> str:
-    """A table."""
+    """Returns a table."""
     head = ["variant", "tets", "eroded", "steps", "wall s", "CPU s", "contact / elements", "residual", "P mm", "P/L",
             "crater mm"]  # fmt: skip
     return table(head, [_row(shot) for shot in shots])
@@ -225,7 +224,7 @@ def _row(shot: Shot) -> list[Cell]:
 
 
 def as_data(shots: Sequence[Shot]) -> list[dict[str, object]]:
-    """For JSON."""
+    """Returns the results as data for JSON."""
     return [
         {"variant": s.variant.name, "depth": s.depth, "crater": s.crater, "wall": s.outcome.elapsed - s.outcome.setup,
          "cpu": s.outcome.cpu, "steps": s.outcome.steps, "tets": s.outcome.elements, "digest": s.outcome.digest}

@@ -1,4 +1,4 @@
-"""On what, and with what, a number was measured."""
+"""Description of the machine and software of a measurement."""
 
 import os
 import platform
@@ -8,7 +8,7 @@ from pathlib import Path
 
 
 def describe() -> dict[str, str]:
-    """Processor, cores, load, versions and commit, as text."""
+    """Returns processor, cores, load, versions and commit, as text."""
     return {
         "processor": f"{_processor()}, {os.cpu_count()} cores",
         "load": load(),
@@ -20,7 +20,8 @@ def describe() -> dict[str, str]:
 
 
 def load() -> str:
-    """Runnable processes, mean over 1, 5 and 15 minutes: more than the cores means that others computed too."""
+    """Returns the number of runnable processes, mean over 1, 5 and 15 minutes. A mean above the number of cores
+    shows that other programs ran, too."""
     return " ".join(f"{mean:.1f}" for mean in os.getloadavg())
 
 

@@ -1,8 +1,9 @@
-"""A folder of runs that no solver has made: ``python -m tests.bench.many FOLDER --runs 200 --sweeps 10``.
+"""A folder of runs without a solver: ``python -m tests.bench.many FOLDER --runs 200 --sweeps 10``.
 
-Runs of three shipped cases over two months, most of them points of sweeps, with the files that a server and the page
-read: submission, case, journal, history.csv, one snapshot, outcome. Some have failed. The numbers follow simple laws of
-what was changed, so that plots show something; the same arguments make the same folder but for the time of day.
+The runs are of three shipped cases and spread over two months; most of them are points of sweeps, and some have
+failed. Each has the files that a server and the page read: submission, case, journal, history.csv, one snapshot,
+outcome. The numbers follow simple laws of the changed keys, so that plots show a trend. The same arguments make the
+same folder, except for the time of day.
 """
 
 import argparse
@@ -29,12 +30,12 @@ from .story import Story
 Changes = dict[str, Any]
 _BATCHES = ("first", "second", "paper")
 _DAYS = 60
-"""Over which the runs were handed in. Chosen."""
+"""Period in which the runs were submitted. Chosen."""
 
 
 @dataclass(frozen=True)
 class Planned:
-    """Some points of a case, one after the other."""
+    """Points of a sweep of a case."""
 
     case: str
     label: str
@@ -43,7 +44,7 @@ class Planned:
 
 @dataclass(frozen=True)
 class Place:
-    """Where a run stands: its id, owner, the Unix time at which it was handed in, its labels."""
+    """Identity of a run: id, owner, Unix time of its submission, labels."""
 
     run: str
     owner: str
@@ -52,12 +53,12 @@ class Place:
 
 
 def grid(keys: dict[str, Sequence[Any]]) -> list[Changes]:
-    """Each value of a key with each of the others."""
+    """Returns each value of a key combined with each value of the other keys."""
     return [dict(zip(keys, row, strict=True)) for row in product(*keys.values())]
 
 
 def plans(sweeps: int) -> list[Planned]:
-    """So many sweeps; the first ones of each kind are the most telling."""
+    """Yields this number of sweeps; the first ones of each kind show the clearest trend."""
     speed, wide = "parts[0].velocity[2]", "parts[1].mesh.element_size"
     kinds = [
         Planned("glass_steel_demo", "speed", [{speed: f"{v} m/s"} for v in range(60, 301, 20)]),
@@ -73,7 +74,7 @@ def plans(sweeps: int) -> list[Planned]:
 
 
 def lay(runs: Path, number: int = 200, sweeps: int = 10, owner: str = OWNER, seed: int = 1) -> list[str]:
-    """Makes the folders of ``number`` runs of an owner; the ids, oldest first."""
+    """Creates the folders of ``number`` runs of an owner; returns the ids, oldest first."""
     draw = random.Random(seed)
     runs.mkdir(exist_ok=True, mode=0o700)
     jobs = list(_jobs(plans(sweeps), number, draw))
@@ -91,7 +92,7 @@ def lay(runs: Path, number: int = 200, sweeps: int = 10, owner: str = OWNER, see
 
 
 def _jobs(planned: Sequence[Planned], number: int, draw: random.Random) -> Iterator[Planned]:
-    """The sweeps, and runs by themselves between them until there are as many as wanted."""
+    """Yields the sweeps and single runs between them, up to the requested number of runs."""
     alone = number - sum(len(each.points) for each in planned)
     left, rest = list(planned), max(0, alone)
     while left or rest > 0:
@@ -104,7 +105,7 @@ def _jobs(planned: Sequence[Planned], number: int, draw: random.Random) -> Itera
 
 
 def _id(at: float, draw: random.Random) -> str:
-    """As ``folder.new_id`` makes it, at another time."""
+    """Returns an id as ``folder.new_id`` does, for another time."""
     return folder._letters(int(1e6 * at), 11) + folder._letters(draw.getrandbits(55), 11)
 
 
@@ -132,7 +133,7 @@ def _run(runs: Path, place: Place, name: str, changes: Changes, draw: random.Ran
 
 
 def main(arguments: list[str]) -> None:
-    """Lays them."""
+    """Creates the runs."""
     words = argparse.ArgumentParser(description=__doc__)
     words.add_argument("folder", type=Path)
     words.add_argument("--runs", type=int, default=200)

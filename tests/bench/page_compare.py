@@ -1,8 +1,8 @@
-"""How fast runs are compared: ``python -m tests.bench.page_compare``.
+"""Speed of the comparison of runs: ``python -m tests.bench.page_compare``.
 
-A server with 200 runs that no solver has made (``many``); a browser with pictures in software opens the comparison of
-twelve of a sweep: until the charts stand, until the table of values and results does, and what a run that is hidden
-takes. Each is told twice: for a page whose scripts are loaded the first time, and again.
+The server has 200 runs without a solver (``many``). A browser with software rendering compares twelve runs of a
+sweep. Measured are the times until the charts and the table of values and results are complete, and the time to hide
+a run. Each is measured twice: at the first load of the scripts, and again.
 """
 
 import argparse
@@ -33,7 +33,7 @@ _HIDDEN = """(async () => {
 
 
 def main(arguments: list[str]) -> None:
-    """Lays the runs, compares some, prints a line for each number."""
+    """Creates the runs, compares some of them, and prints a line for each number."""
     words = argparse.ArgumentParser(description=__doc__)
     words.add_argument("--runs", type=int, default=200)
     words.add_argument("--compared", type=int, default=_COMPARED)
@@ -60,7 +60,7 @@ def main(arguments: list[str]) -> None:
 
 
 def alike(runs: Path, ids: list[str], number: int) -> list[str]:
-    """So many runs that follow each other, with the same case where there are as many."""
+    """Returns consecutive runs, of the same case if there are enough."""
     sizes = {run: (runs / run / "case.resolved.json").stat().st_size for run in ids}
     starts = range(len(ids) - number + 1)
     first = min(starts, key=lambda k: len({sizes[run] // 64 for run in ids[k : k + number]}))

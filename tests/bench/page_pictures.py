@@ -1,7 +1,8 @@
-"""Pictures of the page: ``python -m tests.bench.page_pictures RUN``, where RUN is the folder of a run that has ended.
+"""Pictures of the page: ``python -m tests.bench.page_pictures RUN``; RUN is the folder of a finished run.
 
-docs/pictures/page.png is the page of a run. ``--all FOLDER`` makes others to be looked at: whole pages, light and
-dark, wide, on a phone, at 200 %, with 16 ranks (a run that no solver has made), the list of runs, a case in the editor.
+docs/pictures/page.png is the page of a run. ``--all FOLDER`` makes further pictures for inspection: whole pages,
+light and dark, wide, on a phone, at 200 %, with 16 ranks (a run without a solver), the list of runs, a case in the
+editor.
 """
 
 import argparse
@@ -24,11 +25,11 @@ _LOOKS = (
 )  # fmt: skip
 _DRAWN = "[...document.querySelectorAll('.plot')].every((plot) => plot.querySelector('canvas'))"
 _SETTLED = 2.0
-"""s after which nothing moves any more. Chosen."""
+"""Time in s after which the page does not change any more. Chosen."""
 
 
 def main(arguments: list[str]) -> None:
-    """Draws what is asked for."""
+    """Draws the requested pictures."""
     words = argparse.ArgumentParser(description=__doc__)
     words.add_argument("run", type=Path)
     words.add_argument("--out", type=Path, default=OUT)
@@ -61,7 +62,7 @@ def _opened(page: Page, site: Site, run: str) -> Page:
 
 
 def _draw(browser: Browser, site: Site, run: str, out: Path) -> None:
-    """The body pulled apart a little, beside the numbers and a chart."""
+    """Draws the exploded body beside the numbers and a chart."""
     page = _opened(browser.page(1440, 810), site, run)
     page.slide("input[aria-label=explode]", 0.06)
     page.evaluate("scrollTo(0, 0)")
@@ -86,7 +87,7 @@ def _draw_all(browser: Browser, site: Site, run: str, folder: Path) -> None:
 
 
 def _draw_whole(page: Page, out: Path) -> None:
-    """With every chart, also those out of view; a heat map of many ranks is drawn in pieces."""
+    """Draws the page with all charts, also those outside of the window; a heat map of many ranks is drawn in pieces."""
     page.wait(_DRAWN)
     time.sleep(_SETTLED)
     page.draw(out, whole=True)

@@ -1,4 +1,4 @@
-"""A run that no solver has made: a snapshot of as many triangles as wanted, and a journal of as many events."""
+"""A run without a solver: a snapshot with a given number of triangles, and a journal with a given number of events."""
 
 import hashlib
 import itertools
@@ -17,16 +17,16 @@ from conoid.cases.run import State
 from tests.server.visitor import OWNER
 
 _AROUND = 20
-"""Triangles of a fragment, an icosahedron."""
+"""Triangles of a fragment; each fragment is an icosahedron."""
 _GOLDEN = (1.0 + 5.0**0.5) / 2.0
 _SPAN = 0.1
-"""m; edge of the box."""
+"""Edge of the box, m."""
 _END = 1e-3
-"""s."""
+"""End time of the run, s."""
 
 
 def blob(n: int, triangles: int, t: float) -> bytes:
-    """Icosahedra on a grid, each a fragment."""
+    """Returns a snapshot of icosahedra on a grid; each is a fragment."""
     fragments = triangles // _AROUND
     points, faces = _icosahedron()
     side = int(np.ceil(fragments ** (1.0 / 3.0)))
@@ -60,7 +60,7 @@ def _column(values: "np.ndarray[Any, Any]") -> Column:
 
 
 def _icosahedron() -> tuple["np.ndarray[Any, Any]", "np.ndarray[Any, Any]"]:
-    """(12, 3) points on the unit sphere and (20, 3) faces, each three points that are next to each other."""
+    """Returns points on the unit sphere (12, 3), and faces (20, 3) of three neighbouring points each."""
     signs = itertools.product((-1.0, 1.0), (-_GOLDEN, _GOLDEN))
     points = np.array([np.roll((0.0, a, b), turn) for a, b in signs for turn in range(3)])
     near = np.linalg.norm(points[:, None] - points, axis=2) < 2.1
@@ -71,12 +71,12 @@ def _icosahedron() -> tuple["np.ndarray[Any, Any]", "np.ndarray[Any, Any]"]:
 
 
 def take(made: Path, runs: Path) -> None:
-    """A copy of a run that has ended, without its frames, among others."""
+    """Copies a finished run without its frames into a folder of runs."""
     shutil.copytree(made, runs / made.name, ignore=shutil.ignore_patterns("frames", "checkpoints"))
 
 
 def lay(folder: Path, made_of: Path, events: int, triangles: int, ranks: int = 2) -> None:
-    """Makes the folder of a finished run like that of ``made_of``, with other events and one snapshot."""
+    """Creates the folder of a finished run like that of ``made_of``, with other events and one snapshot."""
     shutil.copytree(
         made_of, folder, ignore=shutil.ignore_patterns("frames", "checkpoints", "snapshots", layout.JOURNAL)
     )

@@ -1,9 +1,10 @@
-"""How fast the page is: ``python -m tests.bench.page_speed RUN``, where RUN is the folder of a run that has ended.
+"""Speed of the page: ``python -m tests.bench.page_speed RUN``; RUN is the folder of a finished run.
 
-A browser with pictures in software opens two runs that no solver has made: one with a snapshot of 50,000 triangles and
-a few events, one with 200,000 triangles and a million events. Told are the first paint, the history of a million
-events (cold, and once more), the page with it, script time and draw calls of a frame, frames a second, and the CPU time
-of a frame in all processes of the browser, which other work on the machine lengthens less.
+A browser with software rendering opens two runs without a solver: one with a snapshot of 50,000 triangles and a few
+events, one with 200,000 triangles and a million events. Printed are the time of the first paint, the time of the
+history of a million events (first and second request), the time of its page, script time and draw calls per frame,
+frames per second, and CPU time per frame of all processes of the browser. Other load on the machine affects the CPU
+time less than the other numbers.
 """
 
 import argparse
@@ -22,9 +23,9 @@ from tests.server.visitor import SHOWN, Site, sign_in
 from .page_scene import lay
 
 _FRAMES = 5.0
-"""s for which the body is turned. Chosen."""
+"""Time for which the body is rotated, s. Chosen."""
 _LEAST = 5
-"""Frames, however long they take. Chosen."""
+"""Number of frames, however long they take. Chosen."""
 _TURN = f"""(async () => {{
   const canvas = document.querySelector(".view3d canvas");
   canvas.scrollIntoView({{ block: "center" }});
@@ -42,11 +43,11 @@ _TURN = f"""(async () => {{
   while (seen.frames.length < drawn - 1) await new Promise((done) => setTimeout(done, 100));
   return [seconds, drawn];
 }})()"""
-"""A pixel is read so that a frame is counted when it is drawn, not when it is asked for."""
+"""A pixel is read, so that a frame counts when it is drawn, not when it is requested."""
 
 
 def main(arguments: list[str]) -> None:
-    """Lays the runs, opens them, prints a line for each number."""
+    """Creates the runs, opens them, and prints a line for each number."""
     words = argparse.ArgumentParser(description=__doc__)
     words.add_argument("run", type=Path)
     words.add_argument("--events", type=int, default=1_000_000)
@@ -79,7 +80,7 @@ def _history(site: Site, run: str, events: int) -> None:
 
 
 def _cpu(browser: Browser) -> float:
-    """s of all its processes."""
+    """Returns the CPU time of all processes of the browser, s."""
     return float(sum(one["cpuTime"] for one in browser.call("SystemInfo.getProcessInfo")["processInfo"]))
 
 

@@ -1,4 +1,4 @@
-"""The accuracy book as a page: a line a row, then what stands behind each row; rows that fail are red."""
+"""The page of the verification catalogue: one line for each row, then the details of each row; failed rows are red."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -8,14 +8,14 @@ from .table import Cell, table
 
 RED, GREEN, GREY = "🔴", "🟢", "⚪"
 _HELD = 3
-"""Assertions that are shown of a test. Chosen."""
+"""Number of assertions of a test that are shown. Chosen."""
 _WIDE = 96
-"""Characters of an assertion. Chosen."""
+"""Number of characters of an assertion that are shown. Chosen."""
 
 
 @dataclass
 class Line:
-    """What was found for one row of the catalogue."""
+    """Results for one row of the catalogue."""
 
     row: Mapping[str, Any]
     checks: list[list[Cell]] = field(default_factory=list)
@@ -28,14 +28,14 @@ class Line:
 
     @property
     def mark(self) -> str:
-        """Red where anything fails, grey where nothing was run."""
+        """Colour of the row: red if a check fails, grey if no check was run."""
         if self.faults:
             return RED
         return GREEN if self.held else GREY
 
 
 def book(rows: Sequence[Mapping[str, Any]], parts: Mapping[str, Any]) -> tuple[str, int]:
-    """The page, and how many rows fail."""
+    """Returns the page, and the number of failed rows."""
     lines = [_line(row, parts) for row in rows]
     known = {row["id"] for row in rows}
     stray = sorted({r for v in _found(parts, "hard", []) for r in v["hard"]["rows"]} - known)
@@ -92,7 +92,7 @@ def _line(row: Mapping[str, Any], parts: Mapping[str, Any]) -> Line:
 
 
 def _add_case(line: Line, name: str, runs: Mapping[str, Any]) -> None:
-    """References as they are; those of the coarser run are shown and fail nothing."""
+    """Returns the lines of the references. References of the coarser run are shown, but do not make a row fail."""
     for label in ("as it is", "coarser"):
         outcome = runs.get(f"{name}|{label}")
         if outcome is None:

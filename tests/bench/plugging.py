@@ -1,4 +1,5 @@
-"""The plate of ``plugging_weldox`` at three speeds, over meshes, beside the published test; and what causes count for.
+"""The plate of ``plugging_weldox`` at three speeds, on several meshes, compared with the published test; also the
+effect of single model choices.
 
 ``python -m tests.bench.plugging [NAME...]`` runs the named variants, or all, on one rank, one after the other.
 """
@@ -22,16 +23,18 @@ from conoid.cases.reading.library import library
 from .table import Cell, table
 
 PUBLISHED = {399.6: 291.3, 285.4: 181.1, 244.2: 132.6}
-"""Speeds of the projectile before and behind the plate, m/s: Borvik and others 1999, as remembered."""
+"""Speeds of the projectile before and after the plate, m/s: Borvik and others 1999, recalled and not checked against
+the publication."""
 ENDS = {399.6: "60 us", 285.4: "90 us", 244.2: "110 us"}
-"""When the projectile is through, or is given up."""
+"""End time of a run; by then the projectile is through the plate, or counts as stopped."""
 FINE = 0.4
-"""mm: tets of this size and less fill a band of 0.45 mm to either side of the rim, larger ones 0.7 mm."""
+"""Element size, mm, up to which fine tets fill a band of 0.45 mm on either side of the rim; for larger tets the band
+has 0.7 mm."""
 
 
 @dataclass(frozen=True)
 class Variant:
-    """One run: the speed, m/s, what differs from the case, and constants of the plate's strength that differ."""
+    """One run: the speed, m/s, changed keys of the case, and changed constants of the plate's strength."""
 
     name: str
     speed: float
@@ -41,8 +44,8 @@ class Variant:
 
 
 def meshed(size: float) -> tuple[str, ...]:
-    """Another element size below the rim of the projectile, mm; fine tets reach less far, so that there are half as
-    many.
+    """Returns assignments of another element size below the rim of the projectile, mm. The band of fine tets is
+    narrower, so that their number halves.
     """
     band = ("parts[1].mesh.grading.near=0.45 mm",) if size <= FINE else ()
     return (f"parts[1].mesh.element_size={size:g} mm", *band)
@@ -71,12 +74,12 @@ CAUSES = (
     Variant("1 mm, D2 30 % lower", 285.4, _COARSE, (("D2", 1.212),)),
     Variant("1 mm, projectile elastic", 285.4, (*_COARSE, "materials.arne.strength.yield_stress=20 GPa")),
 )
-"""One thing differs from the first in each."""
+"""Variants; each differs from the first one in one point."""
 
 
 @dataclass(frozen=True)
 class Shot:
-    """What came of it; the speed of the projectile at the end, m/s."""
+    """Results of a variant, with the final speed of the projectile, m/s."""
 
     variant: Variant
     outcome: Outcome
@@ -84,7 +87,7 @@ class Shot:
 
 
 def data_of(variant: Variant) -> dict[str, Any]:
-    """The case of a variant as it is written down."""
+    """Returns the case of a variant."""
     given = (
         f"parts[0].velocity=['0 m/s', '0 m/s', '-{variant.speed:g} m/s']", f"run.end_time={ENDS[variant.speed]}",
         "run.ranks=1", "run.frames=0", "run.snapshots=0", *variant.assignments,
@@ -98,7 +101,7 @@ def data_of(variant: Variant) -> dict[str, Any]:
 
 
 def run(variant: Variant, folder: Path) -> Shot:
-    """The variant in ``folder``, with the worker's command line."""
+    """Runs the variant in ``folder``, by the command line of the worker."""
     case = folder / "case.json"
     case.write_text(json.dumps(data_of(variant)), encoding="utf-8")
     launch = [str(Path(sys.executable).with_name("mpiexec")), "-n", "1", sys.executable, "-m", "mpi4py"]
@@ -109,16 +112,16 @@ def run(variant: Variant, folder: Path) -> Shot:
 
 
 def measure(variants: Sequence[Variant]) -> Iterator[Shot]:
-    """Every variant in turn."""
+    """Runs every variant, one after the other."""
     for variant in variants:
         with tempfile.TemporaryDirectory(prefix="conoid-bench-") as folder:
             yield run(variant, Path(folder))
 
 
 def extrapolated(speed: float, coarse: tuple[float, float], fine: tuple[float, float]) -> float:
-    """Speed behind the plate, m/s, for tets of no size, from two pairs of a size and the speed that it gives.
-
-    What the projectile loses of its energy is taken as linear in the size: the work of a band as wide as its tets is.
+    """Returns the speed behind the plate, m/s, extrapolated to element size 0 from two pairs of element size and
+    speed. The energy loss of the projectile is assumed to be linear in the element size, because the work of a shear
+    band of one tet width is.
     """
     (large, one), (small, two) = ((size, speed**2 - left**2) for size, left in (coarse, fine))
     lost = two - small * (one - two) / (large - small)
@@ -126,7 +129,7 @@ def extrapolated(speed: float, coarse: tuple[float, float], fine: tuple[float, f
 
 
 def report(shots: Sequence[Shot]) -> str:
-    """A table; plastic work is that of plate and projectile, all four quarters."""
+    """Returns a table; plastic work is that of plate and projectile, for all four quarters."""
     head = ["variant", "m/s", "tets", "eroded", "steps", "CPU s", "plastic kJ", "left m/s", "published", "off"]
     return table(head, [_row(shot) for shot in shots])
 
@@ -142,7 +145,7 @@ def _row(shot: Shot) -> list[Cell]:
 
 
 def main(names: Sequence[str]) -> int:
-    """The named variants, or all; a line of each as it is done, then the table."""
+    """Runs the named variants, or all; prints a line after each run and the table at the end."""
     shots = []
     for shot in measure([variant for variant in (*CURVE, *CAUSES) if not names or variant.name in names]):
         shots.append(shot)

@@ -1,9 +1,9 @@
-"""Rubble under pressure: how stiff is it, and with how many sweeps?
+"""Stiffness of fragmented material under pressure, for several numbers of contact sweeps.
 
-``python -m tests.bench.press [SWEEPS ...]``: a quarter of a glass cylinder in a bore of steel is pressed by a ram
-through a hole of half its width. What it breaks into is held by contact alone, in chains from the ram to the walls: for
-as long as the ram moves, where it is driven at 60 m/s, and until it has stopped, where it flies at 200 m/s; that with
-tets of half the size as well. The tables are in docs/theory/contact.md, "Driven rubble" and "Sweeps by need".
+``python -m tests.bench.press [SWEEPS ...]``: a ram presses a quarter of a glass cylinder in a steel bore through a
+hole of half its width. The fragments are supported by contact alone, in chains from the ram to the walls. A driven
+ram has a constant 60 m/s. A free ram starts with 200 m/s, and the run ends after it has stopped; this case is also
+run with half the element size. The tables are in docs/theory/contact.md, "Driven rubble" and "Sweeps by need".
 """
 
 import sys
@@ -32,19 +32,19 @@ GLASS = {
 
 @dataclass(frozen=True)
 class Ram:
-    """What presses the plug."""
+    """The ram."""
 
     name: str
     length: float
-    """mm."""
+    """Length of the ram, mm."""
     speed: float
-    """m/s."""
+    """Speed, m/s."""
     end: float
-    """Of the run, s."""
+    """End time of the run, s."""
     driven: bool
-    """Whether it keeps its speed."""
+    """Whether the speed of the ram is prescribed."""
     fine: float = 1.0
-    """Size of the tets of all parts, of that of the others."""
+    """Element size of all parts, relative to the default."""
 
 
 DRIVEN = Ram("driven", 1.5, 60.0, 16e-6, driven=True)
@@ -54,22 +54,22 @@ FINE = Ram("flying, half the size of tets", 5.0, 200.0, 10e-6, driven=False, fin
 
 @dataclass(frozen=True)
 class Pressed:
-    """What came out."""
+    """Result of a run."""
 
     work: float
-    """Of the ram, J: the kinetic energy that it has lost, and what drives it has given."""
+    """Work of the ram, J: its loss of kinetic energy, and the external work on it."""
     speed: float
-    """Of the ram at the end, towards the plug, m/s."""
+    """Final speed of the ram towards the glass, m/s."""
     overlapping: int
-    """Tets at surfaces with more than a tenth of their volume in others."""
+    """Number of surface tets with more than a tenth of their volume inside other bodies."""
     overlap: float
-    """Of the volume of all of them."""
+    """Penetrated volume over the volume of all tets."""
     cpu: float
-    """s."""
+    """CPU time, s."""
 
 
 def _round(name: str, low: float, length: float, size: float, **radii: float) -> dict[str, Any]:
-    """A quarter of a cylinder or, with an inner radius, of a tube; lengths in mm."""
+    """Returns the mesh of a quarter of a cylinder or, with an inner radius, of a tube; lengths in mm."""
     shape = {"shape": "tube" if "inner_radius" in radii else "cylinder", "axis": "z", "sector": "quarter"}
     sizes = {"length": length, "element_size": size, **radii}
     mesh = {**shape, "base": [0.0, 0.0, 1e-3 * low], **{key: 1e-3 * value for key, value in sizes.items()}}
@@ -77,7 +77,7 @@ def _round(name: str, low: float, length: float, size: float, **radii: float) ->
 
 
 def press(sweeps: int | None = None, ram: Ram = DRIVEN) -> Case:
-    """The scene; without ``sweeps`` with those that it gets by default."""
+    """Returns the case; without ``sweeps`` it has the default number of sweeps."""
     size = 0.8 * ram.fine
     plug, rod = _round("plug", 0.0, 4.0, size, radius=3.0), _round("ram", 4.0, ram.length, size, radius=2.95)
     fracture = {"model": "cohesive", "delay": 0, "traction": "nodes", "friction": 0.3}
@@ -103,7 +103,7 @@ def press(sweeps: int | None = None, ram: Ram = DRIVEN) -> Case:
 
 
 def measure(case: Case) -> Pressed:
-    """Runs it."""
+    """Runs the case."""
     began, sim = time.process_time(), simulation.build(case, Path(), SerialComm())
     ram = np.flatnonzero(sim.model.nodes.part == [part.name for part in case.parts].index("ram"))
     mass, start = sim.model.nodes.mass[ram], sim.model.nodes.v[ram]
@@ -125,7 +125,7 @@ def measure(case: Case) -> Pressed:
 
 
 def main(arguments: Sequence[str]) -> None:
-    """Prints the tables, by default sweeps last."""
+    """Prints the tables; the row with the default number of sweeps is the last one."""
     head = ["sweeps", "work of the ram, J", "its speed, m/s", "tets in others", "overlap", "CPU s"]
     for ram in (DRIVEN, FLYING, FINE):
         rows: list[list[Cell]] = []

@@ -1,6 +1,6 @@
-"""The speed-ups that Moon, Kim and Lee measured, beside those of ``conoid bench scale --out FOLDER``.
+"""Speed-ups measured by Moon, Kim and Lee, compared with those of ``conoid bench scale --out FOLDER``.
 
-``python -m tests.bench.published FOLDER`` prints them as a table and draws FOLDER/published.svg.
+``python -m tests.bench.published FOLDER`` prints a table and draws FOLDER/published.svg.
 """
 
 import sys
@@ -13,16 +13,16 @@ from conoid.client.studies.study import Study, from_json, table
 
 @dataclass(frozen=True)
 class Published:
-    """What Moon, Kim and Lee have measured of a case."""
+    """Measurements of Moon, Kim and Lee for a case."""
 
     figure: str
     speed_up: dict[int, float]
-    """By processors, as far as their text has it in numbers."""
+    """Speed-up by number of processors, as far as the text of the paper has numbers."""
     rebalances: str
 
     @property
     def source(self) -> str:
-        """Where it stands."""
+        """Place in the paper."""
         return f"Moon, Kim and Lee, {self.figure}"
 
 
@@ -30,11 +30,13 @@ PAPER = {
     "long_rod": Published("fig. 14", {32: 23.79}, "no rebalances"),
     "glass_steel_bar": Published("fig. 19", {16: 0.77 * 16, 32: 18.74}, "18 rebalances on 16"),
 }
-"""By case; the 58 % that the text has for fig. 19 on 32 processors are the 18.74 of its conclusion."""
+"""Published measurements by case. The text has 58 % for fig. 19 on 32 processors, which is the speed-up of 18.74 in
+its conclusion."""
 
 
 def compared(study: Study) -> str:
-    """The published speed-ups beside the projected ones, as Markdown. Raises KeyError for a case that has none."""
+    """Returns the published speed-ups beside the projected ones, as Markdown. Raises KeyError for a case without
+    published ones."""
     paper = PAPER[study.case]
     projected = {run.ranks: study.speed_up(run) for run in study.runs if run.threads == 1 and not run.by_tasks}
     rows = []
@@ -47,13 +49,13 @@ def compared(study: Study) -> str:
 
 
 def drawn(study: Study) -> str:
-    """The chart of the study, as SVG, with the published points where there are any."""
+    """Returns the chart of the study as SVG, with the published points if there are any."""
     paper = PAPER.get(study.case)
     return chart.speed_up(study, paper.speed_up, paper.source) if paper else chart.speed_up(study)
 
 
 def main(folder: Path) -> None:
-    """Compares the study that lies in ``folder``."""
+    """Compares the study in ``folder``."""
     study = from_json((folder / "scale.json").read_bytes())
     print(compared(study), end="")
     (folder / "published.svg").write_text(drawn(study), encoding="utf-8")

@@ -1,7 +1,7 @@
-"""A pytest plugin: what every test has asserted, with the numbers, its outcome and its CPU time, as JSON.
+"""A pytest plugin that stores as JSON the assertions of every test with their numbers, its outcome and its CPU time.
 
-``pytest -p tests.bench.recorder -o enable_assertion_pass_hook=true --recorded FILE``. Nothing is written into the
-tests: pytest hands over each assertion that holds with the values of its terms.
+``pytest -p tests.bench.recorder -o enable_assertion_pass_hook=true --recorded FILE``. The tests need no change:
+pytest calls a hook for each assertion that holds, with the values of its terms.
 """
 
 import json
@@ -17,16 +17,16 @@ _SIGN = re.compile(r"<|>|==|\bin\b")
 
 
 class Recorder:
-    """Collects by node id."""
+    """Collects the results by node id."""
 
     def __init__(self, path: Path) -> None:
-        """Writes to ``path`` at the end of the session."""
+        """Sets the file that is written at the end of the session."""
         self.path = path
         self.tests: dict[str, dict[str, Any]] = {}
 
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_call(self, item: pytest.Item) -> Any:
-        """Clocks the test and the processes that it waits for."""
+        """Measures the CPU time of the test and of the processes that it waits for."""
         began = _cpu()
         try:
             return (yield)
@@ -35,13 +35,13 @@ class Recorder:
             self._entry(item.nodeid)["says"] = (getattr(item.obj, "__doc__", "") or "") if hasattr(item, "obj") else ""
 
     def pytest_assertion_pass(self, item: pytest.Item, lineno: int, orig: str, expl: str) -> None:
-        """Keeps the last values of each assertion that compares numbers."""
+        """Stores the last values of each assertion that compares numbers."""
         if _NUMBER.search(expl) and _SIGN.search(orig):
             line = " ".join(expl.split("\n", 1)[0].split())
             self._entry(item.nodeid)["held"][str(lineno)] = [" ".join(orig.split()), line]
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        """Notes how it ended; what failed before or after it counts, too."""
+        """Stores the outcome of the test; a failure of its setup or teardown counts, too."""
         entry = self._entry(report.nodeid)
         if report.when == "call" or report.outcome != "passed":
             xfailed = hasattr(report, "wasxfail")
@@ -52,7 +52,7 @@ class Recorder:
                 entry["why"] = str(report.longrepr).strip().rsplit("\n", 1)[-1]
 
     def pytest_runtest_logfinish(self) -> None:
-        """Writes the file after every test: a session that is cut short has told what it saw."""
+        """Writes the file after every test, so that an interrupted session has the results of the finished tests."""
         self.path.write_text(json.dumps(self.tests, indent=1), encoding="utf-8")
 
     def _entry(self, node: str) -> dict[str, Any]:
@@ -68,12 +68,12 @@ def _cpu() -> float:
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """Adds ``--recorded``."""
+    """Adds the option ``--recorded``."""
     parser.addoption("--recorded", type=Path, default=None)
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Starts it where it is asked for."""
+    """Starts the recorder if the option is given."""
     path = config.getoption("--recorded")
     if path is not None:
         config.pluginmanager.register(Recorder(path), "recorder")

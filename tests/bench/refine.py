@@ -1,4 +1,5 @@
-"""A tet mesh with every tet cut into eight at its corners and edge midpoints, and how nodal values follow."""
+"""Refinement of a tet mesh: each tet is cut into eight at its corners and edge midpoints; nodal values are
+interpolated."""
 
 from dataclasses import dataclass
 
@@ -14,27 +15,28 @@ _EDGES = ((0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3))
 _CHILDREN = np.array([
     (0, 4, 5, 6), (1, 7, 4, 8), (2, 5, 7, 9), (3, 8, 6, 9), (4, 7, 5, 9), (4, 8, 7, 9), (4, 6, 8, 9), (4, 5, 6, 9),
 ])  # fmt: skip
-"""Corners 0-3, midpoints 4-9 in the order of _EDGES; the inner octahedron is cut along 4-9."""
+"""Corners of the eight tets: 0-3 are the corners of the old tet, 4-9 its midpoints in the order of _EDGES. The inner
+octahedron is cut along 4-9."""
 
 
 @dataclass(frozen=True)
 class Refined:
-    """A finer mesh, and where it came from."""
+    """A refined mesh, and its relation to the old mesh."""
 
     mesh: TetMesh
     ends: Ints
-    """(nodes, 2) the two old nodes that each new node lies between, the same one twice for an old node."""
+    """Ends (nodes, 2) of the edge of the old mesh on which each new node lies; twice the same node for an old node."""
     parent: Ints
-    """(tets,) the old tet of each new one."""
+    """Old tet (tets,) of each new tet."""
 
     def nodal(self, values: Floats) -> Floats:
-        """Values at the old nodes, (old, ...), at the new ones."""
+        """Returns values at the new nodes, interpolated from values (old, ...) at the old nodes."""
         mean: Floats = 0.5 * (values[self.ends[:, 0]] + values[self.ends[:, 1]])
         return mean
 
 
 def refined(mesh: TetMesh) -> Refined:
-    """Cuts every tet into eight of equal volume; nodes are numbered as the tets come to them."""
+    """Cuts every tet into eight of equal volume. Nodes are numbered in the order in which the tets use them."""
     n, tets = len(mesh.points), mesh.tets.astype(np.int64)
     pairs = np.sort(np.stack([tets[:, list(edge)] for edge in _EDGES], axis=1), axis=2).reshape(-1, 2)
     edges, number = np.unique(pairs, axis=0, return_inverse=True)

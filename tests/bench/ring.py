@@ -1,7 +1,9 @@
-"""A ring that is stretched until it breaks, and a bar in one dimension: fragments beside the two published fits.
+"""A ring that is stretched until it breaks, and a bar in one dimension: number of fragments, compared with two
+published fits.
 
-``python -m tests.bench.ring`` prints two tables: bars of the plain program of ``tests/fracture/bar_1d.py``, and rings
-in tets. Rings are quarters between two planes of symmetry; numbers of fragments are those of the whole ring.
+``python -m tests.bench.ring`` prints two tables: bars of the program in ``tests/fracture/bar_1d.py``, and rings of
+tets. A ring is modelled by a quarter between two planes of symmetry; numbers of fragments are those of the whole
+ring.
 """
 
 import sys
@@ -24,15 +26,15 @@ from .table import Cell, table
 RADIUS = 20e-3
 """Mean radius of the ring, m."""
 AROUND = 2.0 * np.pi * RADIUS / Bar().s_0
-"""Length of the ring, s_0: 411."""
+"""Circumference of the ring over s_0: 411."""
 THICK = 0.1e-3
-"""Sides of its square cross-section, m: 0.33 s_0."""
+"""Side of the square cross-section, m: 0.33 s_0."""
 _END = {0.1: 35.0, 0.3: 20.0, 1.0: 15.0}
-"""t_0 after which hardly a fragment is added; the strength is reached after 1 / x."""
+"""End time over t_0, after which hardly any fragment is added. The strength is reached after 1 / x."""
 _LEAST = 0.02
-"""Pieces below this share of a fragment of the mean published size are crumbs."""
+"""Mass, relative to the mean published fragment mass, below which a fragment counts as a crumb."""
 FINE = (12, 24, 48)
-"""Elements of a bar in s_0."""
+"""Numbers of elements of a bar per s_0."""
 BARS = {
     "even to 1e-5": Bar(scatter=1e-5), "even to 1e-4": Bar(scatter=1e-4), "even to 1e-3": Bar(scatter=1e-3),
     "uniform over 1 %": Bar(scatter=1e-2), "Weibull, modulus 100": Bar(modulus=100.0),
@@ -71,12 +73,12 @@ dt_safety = 0.3
 end_time = {end}
 frames = 0
 """
-"""The ceramic of ``tests/fracture/bar_1d.py``, which has no lateral contraction."""
+"""The ceramic of ``tests/fracture/bar_1d.py``, with Poisson's ratio 0."""
 
 
 @dataclass(frozen=True)
 class Plan:
-    """A ring: rate over rate_0, size of its tets, m, Weibull's modulus of the strengths of its facets."""
+    """A ring: rate over rate_0, element size, m, Weibull modulus of the strengths of its facets."""
 
     x: float
     size: float
@@ -86,7 +88,7 @@ class Plan:
 
 @dataclass(frozen=True)
 class Broken:
-    """What came of it: fragments of the whole ring without crumbs, tets, CPU seconds."""
+    """Result of a ring: number of fragments of the whole ring without crumbs, number of tets, CPU time, s."""
 
     plan: Plan
     fragments: float
@@ -117,7 +119,8 @@ def broken(plan: Plan) -> Broken:
 
 
 def bars() -> str:
-    """A table of bars: fragments in the length of the ring, for laws of scatter and sizes of elements."""
+    """Returns a table of bars: number of fragments per length of the ring, for several distributions of strength and
+    element sizes."""
     rows: list[list[Cell]] = []
     for x in (0.1, 0.3, 1.0):
         for name, bar in BARS.items():
@@ -127,7 +130,8 @@ def bars() -> str:
 
 
 def bar_size(x: float, bar: Bar, elements: int, length: float = 100.0) -> float:
-    """Mean size of the fragments, s_0, over three bars of ``length`` s_0 with ``elements`` in s_0."""
+    """Returns the mean size of the fragments over s_0, for three bars of the length ``length`` s_0 with ``elements``
+    elements per s_0."""
     cracks = 0
     for seed in range(3):
         made = replace(bar, length=length * bar.s_0, elements=round(length * elements), seed=seed)
@@ -140,7 +144,7 @@ def bar_size(x: float, bar: Bar, elements: int, length: float = 100.0) -> float:
 
 
 def report(rings: Sequence[Broken]) -> str:
-    """A table of rings."""
+    """Returns a table of rings."""
     rows: list[list[Cell]] = [
         [
             f"{ring.plan.x:g}", f"{ring.plan.modulus:g}", f"{ring.plan.size / Bar().s_0:.2f}", ring.tets,
@@ -152,12 +156,12 @@ def report(rings: Sequence[Broken]) -> str:
 
 
 def _published(x: float) -> list[Cell]:
-    """Fragments of the ring by the two fits."""
+    """Returns the number of fragments of the ring by the two fits."""
     return [round(AROUND / even(x)), round(AROUND / scattered(x))]
 
 
 def main() -> int:
-    """Both tables; a line of each ring as it is done."""
+    """Prints both tables, and a line after each ring."""
     print(bars(), flush=True)
     rings = []
     for plan in RINGS:

@@ -1,4 +1,4 @@
-"""A Zenoh router in a process of its own, with a subscriber to everything: ``python -m tests.bench.router PORT``."""
+"""A Zenoh router in a separate process, with a subscriber to all keys: ``python -m tests.bench.router PORT``."""
 
 import json
 import socket
@@ -16,7 +16,7 @@ Router = subprocess.Popen[bytes]
 
 @contextmanager
 def started() -> Iterator[tuple[Router, str]]:
-    """A router that listens, and its endpoint; it is killed when the block is left."""
+    """Yields a router that listens, and its endpoint; the router is killed at the end of the block."""
     port = _free_port()
     words = [sys.executable, "-m", "tests.bench.router", str(port)]
     with subprocess.Popen(words, cwd=Path(__file__).parents[2], stdout=subprocess.PIPE) as router:
@@ -36,7 +36,7 @@ def _free_port() -> int:
 
 
 def main(port: str) -> None:
-    """Listens, says "ready", and stays until it is killed."""
+    """Listens, prints "ready", and runs until the process is killed."""
     config = zenoh.Config()
     for key, value in {
         "mode": "router",

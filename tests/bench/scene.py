@@ -1,7 +1,7 @@
-"""Bodies to time: a box of about so many tets, of one material, that is stretched as a whole.
+"""Bodies for timing: a box of about a given number of tets, of one material, under uniform stretch.
 
-The stretch keeps the volume and is the same everywhere, so every tet of a plastic material yields within some ten steps
-and goes on yielding; of an elastic one it stays small.
+The stretch keeps the volume and is the same everywhere. So every tet of a plastic material yields within about ten
+steps and continues to yield; in an elastic material the strain stays small.
 """
 
 import time
@@ -23,15 +23,15 @@ Form = Literal["standard", "nodal", "split"]
 Generator = Literal["gmsh", "structured"]
 FORMS: tuple[Form, ...] = ("standard", "nodal", "split")
 SAMPLE_EVERY = 20
-"""Steps between two lines of the ledger: the default 500 samples in a run of 10,000 steps."""
+"""Number of steps between two samples of the ledger: the default of 500 samples in a run of 10,000 steps."""
 
 _EDGE = 0.01
 _GMSH_TETS = 5.9
-"""Tets of gmsh in the cube of ``element_size``, of which the structured generator makes 6."""
+"""Number of tets of gmsh in a cube of the size ``element_size``; the structured generator makes 6."""
 
 
 def box(tets: int, generator: Generator = "gmsh") -> bodies.Box:
-    """A cube of 10 mm in about ``tets`` tets."""
+    """Returns a cube of 10 mm with about ``tets`` tets."""
     size = _EDGE / round((tets / 6) ** (1 / 3)) if generator == "structured" else _EDGE * (_GMSH_TETS / tets) ** (1 / 3)
     return bodies.Box(
         shape="box", low=(0.0, 0.0, 0.0), high=(_EDGE,) * 3, element_size=float(f"{size:.4g}"), generator=generator
@@ -39,7 +39,7 @@ def box(tets: int, generator: Generator = "gmsh") -> bodies.Box:
 
 
 def case(material: str, form: Form, mesh: bodies.Box, viscosity: bool = True) -> schema.Case:
-    """One part of ``material``, a name of the library."""
+    """Returns a case with one part of ``material``, a name of the library."""
     return schema.Case(
         name="bench", parts=(schema.Part(name="body", material=material, mesh=mesh),),
         numerics=schema.Numerics(pressure=form, viscosity=schema.Viscosity() if viscosity else None),
@@ -48,10 +48,10 @@ def case(material: str, form: Form, mesh: bodies.Box, viscosity: bool = True) ->
 
 
 class Ride:
-    """A simulation that takes whole steps as the worker does, ledger, probes and limiter every SAMPLE_EVERY steps."""
+    """A simulation that computes whole steps as the worker does, with ledger and probes every SAMPLE_EVERY steps."""
 
     def __init__(self, scene: schema.Case, mesh: TetMesh | None = None) -> None:
-        """``mesh``: of the only part, instead of the one that the case asks for."""
+        """``mesh``: mesh of the only part, in place of the mesh of the case."""
         ready: AbstractContextManager[object] = nullcontext()
         if mesh is not None:
             ready = patch.object(assembly, "build_mesh", lambda *_, **__: mesh)
@@ -65,13 +65,14 @@ class Ride:
         return self.sim.model.elements_global
 
     def stretch(self, strain: float) -> None:
-        """Sets the body in motion: ``strain`` a step along z, minus half of it across."""
+        """Sets the velocities: a strain of ``strain`` per step along z, and minus half of it in the other
+        directions."""
         nodes = self.sim.model.nodes
         rate = strain * self.sim.reduction.limit / self.sim.case.numerics.dt_safety
         nodes.v[:] = (nodes.x - nodes.x.mean(axis=0)) * rate * np.array([-0.5, -0.5, 1.0])
 
     def steps(self, count: int) -> float:
-        """CPU seconds of ``count`` steps."""
+        """Returns the CPU time of ``count`` steps, s."""
         begin = time.thread_time()
         for _ in range(count):
             self._step()
@@ -89,7 +90,7 @@ class Ride:
         step.second_half(sim)
 
     def yielding(self) -> float:
-        """Share of the tets that yield in the next step, which it takes."""
+        """Computes one step; returns the share of the tets that yield in it."""
         before = self._plastic_strain()
         self._step()
         return float((self._plastic_strain() > before).mean()) if len(before) else 0.0

@@ -1,13 +1,18 @@
-"""A quarter, a half and the whole of a rod that erodes in a target: ``python -m tests.bench.sectors [SIZE] [RUNS]``.
+"""Comparison of a quarter, a half and the whole of a rod that erodes in a target: ``python -m tests.bench.sectors
+[SIZE] [RUNS]``.
 
-A rod of tungsten alloy, 5 x 20 mm, hits a cylinder of 4340 steel, 40 x 45 mm, at 1.5 km/s; both erode at a strain of
-1.5; ``SIZE`` of the tets in mm, 1 if not given. gmsh makes each mesh anew, of the half and the whole (``full``) aligned
-with the quarter (``mesh.aligned``) and not; ``mirrored`` is the whole whose mesh is that of the quarter and its images.
-Each is run ``RUNS`` times, 3 if not given, with steps that differ by 1 %, once with nodes that strike and then leave,
-and once with particles that fly on for ever. After 60 us: mean and standard error of the depth of the hole; and in the
-last run, of the nodes without tets within the radius of the rod (those that have left are where they struck), the share
-of the mass within a quarter of SIZE of the axis; what a uniform spread over the rod's radius would have there; momentum
-along the axis that the rod still has.
+A rod of tungsten alloy, 5 x 20 mm, hits a cylinder of 4340 steel, 40 x 45 mm, at 1.5 km/s. Both erode at a strain of
+1.5. ``SIZE``: element size, mm, default 1.
+
+gmsh makes each mesh. The meshes of the half and of the whole (``full``) are made both aligned with the quarter
+(``mesh.aligned``) and not aligned. The mesh of ``mirrored``, a whole, consists of the quarter and its images. Each is
+run ``RUNS`` times, default 3, with time steps that differ by 1 %. In one series nodes without tets leave after a
+contact, in the other they remain as particles.
+
+The table has, after 60 us, mean and standard error of the depth of the hole. From the last run it has, of the mass
+of nodes without tets within the radius of the rod, the share within a quarter of SIZE of the axis; removed nodes
+count at the place of their contact. Beside that share are the share of a uniform distribution over the radius, and
+the remaining momentum of the rod along the axis.
 """
 
 import math
@@ -41,8 +46,8 @@ def case_of(
     target: tuple[float, float] = (20 * MM, 45 * MM), strain: float = 1.5, nodes: str = "strike", safety: float = 0.9,
     **keys: Any,
 ) -> schema.Case:  # fmt: skip
-    """The scene: length of the ``rod``, radius and length of the ``target``, m, the ``strain`` at which tets leave,
-    what becomes of ``nodes``, the ``safety`` of the time step; ``keys`` of both meshes besides.
+    """Returns the case: length of the ``rod``, radius and length of the ``target``, m; ``strain`` of erosion;
+    treatment of free ``nodes``; ``safety`` of the time step; further ``keys`` of both meshes.
     """
 
     def part(name: str, material: str, speed: float, low: float, radius: float, length: float) -> dict[str, Any]:
@@ -72,7 +77,7 @@ def case_of(
 
 
 def images(mesh: TetMesh, axes: tuple[int, ...]) -> TetMesh:
-    """The mesh and its images at the planes across these axes, which have their nodes in common."""
+    """Returns the mesh and its images at the planes across these axes; nodes on the planes are shared."""
     x, tets = mesh.points.copy(), mesh.tets
     for axis in axes:
         on = np.abs(x[:, axis]) < 1e-9
@@ -86,7 +91,7 @@ def images(mesh: TetMesh, axes: tuple[int, ...]) -> TetMesh:
 
 
 def mirrored(case: schema.Case) -> Simulation:
-    """The whole, whose mesh is that of the quarter and its images."""
+    """Returns a simulation of the whole, whose mesh consists of the quarter and its images."""
 
     def images_of(mesh: Any, *args: Any, **keys: Any) -> TetMesh:
         return images(build(mesh.model_copy(update={"sector": "quarter"}), *args, **keys), (0, 1))
@@ -97,22 +102,22 @@ def mirrored(case: schema.Case) -> Simulation:
 
 @dataclass(frozen=True)
 class End:
-    """What is left of a run; masses and momenta of the whole body."""
+    """State at the end of a run; masses and momenta of the whole body."""
 
     depth: float
-    """m."""
+    """Depth of the hole, m."""
     rod: float
-    """Momentum of the rod and its debris along the axis, without what has left, kg m/s."""
+    """Momentum of the rod and its debris along the axis, without removed nodes, kg m/s."""
     target: float
-    """The same of the target."""
+    """Momentum of the target, kg m/s."""
     near: tuple[float, float]
     """Mass of nodes without tets within a quarter of an element of the axis, and within the radius of the rod, kg."""
     kinetic: float
-    """J."""
+    """Energy, J."""
 
 
 def run(sim: Simulation) -> End:
-    """To the end time."""
+    """Computes all steps to the end time."""
     step.prepare(sim)
     thick = reference.thicknesses(sim)
     while True:
@@ -142,7 +147,7 @@ def _end(sim: Simulation, thick: Any) -> End:
 
 
 def ensemble(name: str, size: float, runs: int, nodes: str) -> str:
-    """A row of the table."""
+    """Returns a row of the table."""
     ends, began = [], time.process_time()
     sector, _, apart = ("full" if name == "mirrored" else name).partition(", ")
     for k in range(runs):

@@ -1,8 +1,8 @@
-"""What snapshots of the fragments cost a step: ``python -m tests.bench.snapshots --ranks 4 --readers 20 --frozen``.
+"""Cost of snapshots of the fragments per step: ``python -m tests.bench.snapshots --ranks 4 --readers 20 --frozen``.
 
-As in ``switch`` within one run, since two processes differ by more: blocks of steps come in pairs, one with snapshots
-as often as they may be and one without, in a random order. Counted is the CPU time of the solver's threads without
-their waiting, of all ranks; readers subscribe to everything over Zenoh.
+The comparison is made within one run, as in ``switch``, because two processes differ by more than the cost. Blocks
+of steps come in pairs: one with snapshots as often as allowed, one without, in random order. The CPU time of the
+solver threads of all ranks is measured, without waiting. Readers subscribe to all keys over Zenoh.
 """
 
 import argparse
@@ -30,7 +30,7 @@ _ROOT = Path(__file__).parents[2]
 
 
 def measure(options: argparse.Namespace, folder: Path) -> tuple[Pairs, float]:
-    """The pairs of a run, and the share of the CPU time that the solver spends in the calls for snapshots."""
+    """Pairs of blocks of a run, and the share of the CPU time that the solver spends in calls for snapshots."""
     with ExitStack() as stack:
         _, endpoint = stack.enter_context(router.started())
         for frozen in [False] * bool(options.readers) + [True] * options.frozen:
@@ -57,7 +57,8 @@ def measure(options: argparse.Namespace, folder: Path) -> tuple[Pairs, float]:
 
 
 def _blocks(marks: list[list[list[float]]], pairs: int, steps: int) -> list[Block]:
-    """From the marks of each rank at the borders of the blocks: worked, beside, wall, within the calls."""
+    """Returns CPU times of solver and other threads, wall time, and time within the calls, from the marks of each
+    rank at the ends of the blocks."""
     blocks = []
     for k, told in zip(range(min(map(len, marks)) - 1), switch.turns(pairs), strict=False):
         spent = [[(b - a) / steps for a, b in zip(rank[k], rank[k + 1], strict=True)] for rank in marks]
@@ -80,7 +81,7 @@ def _readers(endpoint: str, number: int, frozen: bool) -> Iterator[None]:
 
 
 def _read(endpoint: str, number: int) -> None:
-    """Some readers in this process, until it is killed."""
+    """Runs some readers in this process, until it is killed."""
     import zenoh
 
     config = zenoh.Config()
@@ -96,7 +97,8 @@ def _read(endpoint: str, number: int) -> None:
 
 
 def _work(steps: int, arguments: list[str]) -> int:
-    """The worker, whose snapshots are switched on and off every so many ``steps``; leaves marks at the borders."""
+    """Runs the worker; snapshots are switched on and off every ``steps`` steps. The worker writes marks at the ends
+    of the blocks."""
     from conoid.worker.accounts.timers import worked
     from conoid.worker.run import main
 
@@ -141,7 +143,7 @@ def _work(steps: int, arguments: list[str]) -> int:
 
 
 def main() -> None:
-    """Prints the medians, the ratio with its interval, and what was made."""
+    """Prints the medians, the ratio with its interval, and the number of snapshots."""
     if "--worker" in sys.argv:
         sys.exit(_work(int(sys.argv[2]), sys.argv[3:]))
     if "--reader" in sys.argv:

@@ -1,4 +1,5 @@
-"""Element-updates per CPU-second of whole steps, for each material and pressure form, and the gather-scatter limit."""
+"""Element updates per CPU second of whole steps for each material and pressure form, and the limit by gather and
+scatter."""
 
 import tempfile
 from collections.abc import Iterator, Sequence
@@ -20,7 +21,7 @@ from .table import Cell, table
 
 @dataclass(frozen=True)
 class Metal:
-    """A material of the library to time; ``strain`` is what a tet takes in a step."""
+    """A material of the library; ``strain``: strain of a tet per step."""
 
     title: str
     name: str
@@ -39,7 +40,7 @@ METALS = (
 
 @dataclass(frozen=True)
 class Speed:
-    """Millions of element-updates per CPU-second, best and median, of one body; ``limit`` is gather-scatter."""
+    """Millions of element updates per CPU second of one body, best and median; ``limit``: gather and scatter only."""
 
     material: str
     form: str
@@ -55,12 +56,12 @@ class Speed:
 
     @property
     def share(self) -> float:
-        """Of the gather-scatter limit, best over best."""
+        """Best speed over the best speed of gather and scatter."""
         return self.best / self.limit_best
 
 
 def measure(bodies: Sequence[Box], metals: Sequence[Metal] = METALS, rounds: int = 5) -> Iterator[Speed]:
-    """Every material in every pressure form on every body."""
+    """Measures every material in every pressure form on every body."""
     for body in bodies:
         for metal in metals:
             for form in FORMS:
@@ -92,7 +93,7 @@ def _limit(ride: Ride, sweeps: int) -> Work:
 
 
 def _burst(tets: int) -> int:
-    """Steps of one turn: whole rounds of the ledger, some 3 million updates."""
+    """Returns the number of steps of one measurement: whole periods of the ledger, about 3 million element updates."""
     return SAMPLE_EVERY * min(3, max(1, round(3e6 / SAMPLE_EVERY / tets)))
 
 
@@ -101,7 +102,7 @@ def _rates(times: Times, prefix: str, updates: int) -> dict[str, float]:
 
 
 def tables(speeds: Sequence[Speed]) -> str:
-    """One table a size: best (median) of each pressure form, and what the forms reach of the limit."""
+    """Returns one table for each size: best (median) speed of each pressure form, and its share of the limit."""
     head = ["material", "yielding", *FORMS, *(f"{form} / limit" for form in FORMS), "gather-scatter"]
     parts = []
     for tets in dict.fromkeys(speed.tets for speed in speeds):
@@ -123,7 +124,7 @@ def _row(speeds: Sequence[Speed]) -> list[Cell]:
 
 @dataclass(frozen=True)
 class Peer:
-    """One code on the mesh of the comparison."""
+    """Speed of one program on the mesh of the comparison."""
 
     code: str
     milliseconds: float
@@ -133,7 +134,7 @@ class Peer:
 
 
 def beside_akantu(body: Box, rounds: int = 4, steps: int = SAMPLE_EVERY) -> list[Peer]:
-    """Conoid and Akantu in turns on one mesh; Akantu is left out where it is not installed."""
+    """Measures Conoid and Akantu in alternation on one mesh; Akantu is left out if it is not installed."""
     ride = _moving(METALS[0], "standard", body)
     work: dict[str, Work] = {
         "gather and scatter only": _limit(ride, steps),
@@ -157,7 +158,7 @@ def beside_akantu(body: Box, rounds: int = 4, steps: int = SAMPLE_EVERY) -> list
 
 
 def peer_table(peers: Sequence[Peer]) -> str:
-    """ms a step and millions of element-updates per CPU-second."""
+    """Returns a table: time per step, ms, and millions of element updates per CPU second."""
     rows: list[list[Cell]] = [
         [p.code, round(p.milliseconds, 1), f"{p.best:.2f} ({p.median:.2f})", f"{p.spread:.0%}"] for p in peers
     ]
@@ -166,5 +167,5 @@ def peer_table(peers: Sequence[Peer]) -> str:
 
 
 def as_data(results: Sequence[Speed] | Sequence[Peer]) -> list[dict[str, object]]:
-    """For JSON."""
+    """Returns the results as data for JSON."""
     return [asdict(result) for result in results]

@@ -1,4 +1,5 @@
-"""From launch to first step: the phases, cold and warm; what is compiled and loaded; from the submission over HTTP."""
+"""Time from launch to the first step: phases with empty and full caches, number of compiled and loaded kernels, and
+time from the submission over HTTP."""
 
 import json
 import os
@@ -29,28 +30,29 @@ _CACHED = re.compile(r"^\[(\d+)\].*\[cache\] data (saved to|loaded from)", re.MU
 
 @dataclass(frozen=True)
 class Startup:
-    """Seconds to the first step of a Taylor bar, 12,960 tets; of each phase wall and CPU time."""
+    """Time to the first step of a Taylor bar with 12,960 tets, s; for each phase wall time and CPU time."""
 
     cold: Phases
-    """One rank, no kernel, no mesh in the cache."""
+    """Time on one rank, without kernels and mesh in the cache."""
     warm: Phases
-    """The same with everything in the cache, median of several."""
+    """Time on one rank with kernels and mesh in the cache; median."""
     ranks: int
     cold_ranks: float
-    """``mpiexec`` on so many ranks to the first step, no kernel in the cache, mesh in it."""
+    """Time from ``mpiexec`` with this number of ranks to the first step, without kernels in the cache, with the
+    mesh."""
     warm_ranks: float
     submitted: float
-    """From the submission over HTTP to the first step, everything in the cache."""
+    """Time from the submission over HTTP to the first step, with kernels and mesh in the cache."""
     ahead: int
-    """Kernels in the cache after a cold start."""
+    """Number of kernels in the cache after a start without kernels in the cache."""
     compiled: dict[int, int]
-    """Kernels that each rank compiled itself, cold."""
+    """Number of kernels that each rank compiled itself, without kernels in the cache."""
     loaded: dict[int, int] = field(default_factory=dict)
-    """Kernels that each rank loaded, cold."""
+    """Number of kernels that each rank loaded, without kernels in the cache."""
 
 
 def measure(rounds: int = 3, ranks: int = 2) -> Startup:
-    """Compiles every kernel twice, in caches of its own."""
+    """Compiles every kernel twice, in separate caches."""
     with tempfile.TemporaryDirectory(prefix="conoid-bench-") as folder:
         cache = {**os.environ, "CONOID_CACHE_DIR": folder}
         del cache["NUMBA_CACHE_DIR"]
@@ -84,7 +86,7 @@ def _phases(environment: Mapping[str, str]) -> Phases:
 
 
 def _launch(ranks: int, environment: Mapping[str, str]) -> tuple[float, str]:
-    """Seconds from ``mpiexec`` to the first step, and what the ranks said, each line with its rank."""
+    """Returns the time from ``mpiexec`` to the first step, s, and the output of the ranks; each line has its rank."""
     with tempfile.TemporaryDirectory(prefix="conoid-bench-") as folder:
         command = [str(Path(sys.executable).with_name("mpiexec")), "-prepend-rank", "-n", str(ranks), sys.executable]
         command += ["-m", "mpi4py", "-m", "conoid.worker", CASE, "--out", folder]
@@ -115,13 +117,13 @@ def _submitted(rounds: int, ranks: int, environment: Mapping[str, str]) -> float
 
 
 def _first_step(folder: Path) -> float:
-    """Unix time at which the worker was about to take its first step."""
+    """Returns the Unix time at which the worker began its first step."""
     lines = (folder / layout.JOURNAL).read_bytes().splitlines()
     return next(m.wall for m in map(messages.from_json, lines) if isinstance(m, messages.Started))
 
 
 def report(startup: Startup) -> str:
-    """The phases, cold and warm, the totals, and the evidence that kernels are compiled once."""
+    """Returns tables of the phases with empty and full caches, of the totals, and of the numbers of compilations."""
     columns = {name: [*startup.cold[name], *startup.warm[name]] for name in PHASES}
     columns["all"] = [sum(column) for column in zip(*columns.values(), strict=True)]
     rows: list[list[Cell]] = [[name, *(f"{value:.2f}" for value in values)] for name, values in columns.items()]

@@ -1,8 +1,8 @@
-"""One worker's way to its first step, timed: ``python -m tests.bench.startup_phases LAUNCHED CASE``, seconds as JSON.
+"""Times the start of one worker: ``python -m tests.bench.startup_phases LAUNCHED CASE``; prints seconds as JSON.
 
-``LAUNCHED`` is the Unix time at which the process was launched. The order is that of the worker's own start. Each phase
-has two numbers, seconds of wall time and of CPU time, that of child processes with it. Kernels are loaded where they
-are called first: in the first pass, most of them.
+``LAUNCHED``: Unix time of the launch of the process. The order of the phases is that of the worker. Each phase has
+wall time and CPU time, with the CPU time of child processes. A kernel is loaded at its first call, most of them in
+the first pass.
 """
 
 import json
@@ -27,21 +27,22 @@ PHASES = (
 
 
 class Stamps:
-    """Wall and CPU seconds between one stamp and the next, by name."""
+    """Wall time and CPU time of each phase, s, by name."""
 
     def __init__(self, start: float) -> None:
         self._last = (start, 0.0)
         self.seconds = {name: [0.0, 0.0] for name in PHASES}
 
     def stamp(self, name: str) -> None:
-        """Books the time since the last stamp."""
+        """Adds the time since the last call to a phase."""
         now = (time.time(), sum(os.times()[:4]))
         for clock in range(2):
             self.seconds[name][clock] += now[clock] - self._last[clock]
         self._last = now
 
     def around(self, work: Callable[..., Any], before: str, name: str) -> Callable[..., Any]:
-        """``work``, whose time is booked to ``name``, and the time until it begins to ``before``."""
+        """Returns ``work`` with timing: its time is added to the phase ``name``, the time before it to the phase
+        ``before``."""
 
         def timed(*arguments: Any) -> Any:
             self.stamp(before)
@@ -53,7 +54,7 @@ class Stamps:
 
 
 def main(launched: float, case: str) -> None:
-    """Goes the way and prints the seconds of each phase."""
+    """Runs all phases of a start, and prints their times."""
     stamps = Stamps(launched)
     from conoid.cases import load
     from conoid.worker.parallel.mpi import connect

@@ -1,27 +1,27 @@
-"""CPU seconds of things that take turns: A B A B, so that a noisy neighbour disturbs them alike."""
+"""CPU times of programs that run in alternation, A B A B, so that other load affects them alike."""
 
 import statistics
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 Work = Callable[[], float]
-"""Does a fixed amount of work and returns the CPU seconds that it took, by the clock of whoever did it."""
+"""Function with a fixed amount of work; returns its CPU time, s."""
 
 
 @dataclass(frozen=True)
 class Times:
-    """CPU seconds of the same work, repeated."""
+    """CPU times of repetitions of the same work, s."""
 
     seconds: tuple[float, ...]
 
     @property
     def best(self) -> float:
-        """The fastest: what the machine can do when nobody disturbs."""
+        """Shortest time: least affected by other load."""
         return min(self.seconds)
 
     @property
     def median(self) -> float:
-        """The middle one."""
+        """Median time."""
         return statistics.median(self.seconds)
 
     @property
@@ -31,7 +31,7 @@ class Times:
 
 
 def take_turns(work: Mapping[str, Work], rounds: int) -> dict[str, Times]:
-    """Every work ``rounds`` times, in turns; the first round warms caches and is not counted."""
+    """Runs each function ``rounds`` times in alternation. A round before that fills the caches and is not counted."""
     seconds: dict[str, list[float]] = {name: [] for name in work}
     for turn in range(rounds + 1):
         for name, do in work.items():

@@ -1,4 +1,4 @@
-"""What a run says and leaves that no solver has made: messages, history.csv, a snapshot, an outcome, by simple laws."""
+"""Messages and files of a run without a solver: journal, history.csv, a snapshot, an outcome, by simple laws."""
 
 import csv
 import hashlib
@@ -19,9 +19,9 @@ from conoid.cases.run import State
 from .page_scene import blob
 
 _POINTS = 60
-"""Lines of a history. Chosen: a chart shows a curve."""
+"""Number of lines of a history. Chosen: a chart shows a curve."""
 _TRIANGLES = 400
-"""Of a snapshot. Chosen: twenty fragments."""
+"""Size of a snapshot. Chosen: twenty fragments."""
 _ENDS: Sequence[tuple[State, str | None, str]] = (
     [(State.SUCCEEDED, None, "")] * 17
     + [(State.FAILED, "diverged", "the time step fell to 1.2e-14 s: tet 4711 of glass, held by its shape")]
@@ -30,14 +30,14 @@ _ENDS: Sequence[tuple[State, str | None, str]] = (
 )  # fmt: skip
 _LIMITER = "stability: tet 12 of part 0"
 _BALLISTIC = 160.0
-"""m/s, from which on something gets through in these laws. Chosen."""
+"""Impact speed above which these laws let a projectile through, m/s. Chosen."""
 
 
 class Story:
-    """Of one run."""
+    """Numbers of one run."""
 
     def __init__(self, path: Path, run: str, case: Case, began: float, draw: random.Random) -> None:
-        """Draws how it ends, and what it measures; ``began`` in Unix s."""
+        """Chooses the end of the run and its measured values; ``began``: Unix time, s."""
         self.path, self.run, self.case, self.began = path, run, case, began
         self.state, self.cause, self.message = draw.choice(_ENDS)
         self.friction = case.contact.friction if case.contact is not None else 0.0
@@ -50,22 +50,22 @@ class Story:
         self.values = [self._probe(k) for k in range(len(case.probes))]
 
     def _probe(self, k: int) -> list[float]:
-        """A wave that arrives the later the farther the probe is, and grows with the speed."""
+        """Returns a wave at a probe: it arrives later at a greater distance, and its amplitude grows with the speed."""
         unit = FIELD_UNITS[self.case.probes[k].field]
         size = self.speed * (1e7 if unit == "Pa" else 0.5) * (-1.0 if unit == "Pa" else 1.0) * (1.0 + self.noise[1])
         return [size * _front(n / _POINTS - 0.1 * (k // 2), 9.0) for n in range(1, self.last + 1)]
 
     @property
     def last(self) -> int:
-        """Lines of the history."""
+        """Number of lines of the history."""
         return max(2, round(self.share * _POINTS))
 
     def time(self, n: int) -> float:
-        """Simulated, at line ``n``, s."""
+        """Simulated time at line ``n``, s."""
         return self.case.run.end_time * n / _POINTS
 
     def energy(self, n: int) -> messages.Energy:
-        """At line ``n``."""
+        """Returns the values of line ``n``."""
         whole, spent = 1e-2 * self.speed**2, 0.4 * (1.0 - math.exp(-3.0 * n / _POINTS))
         return messages.Energy(
             kinetic=whole * (1.0 - spent), elastic=0.1 * whole * spent, plastic=0.6 * whole * spent,
@@ -75,7 +75,7 @@ class Story:
         )  # fmt: skip
 
     def tell(self) -> None:
-        """Writes everything."""
+        """Writes all files."""
         self._write_history()
         snapshot = self._write_snapshot()
         with (self.path / layout.JOURNAL).open("ab") as file:
@@ -167,5 +167,5 @@ class Story:
 
 
 def _front(x: float, steep: float) -> float:
-    """0 before, 1 behind a front at 0, which rings."""
+    """Returns a step with oscillations: 0 for negative arguments, a front at 0."""
     return 0.0 if x <= 0.0 else 1.0 - math.exp(-steep * x) * math.cos(40.0 * x)

@@ -1,8 +1,9 @@
-"""What telemetry costs a step, within one run: it is switched on and off every quarter of a second.
+"""Cost of telemetry per step, measured within one run: telemetry is switched on and off every quarter of a second.
 
-Two processes that do the same differ by more than telemetry costs (where their memory happens to lie decides), so the
-comparison is made inside one: each Progress message ends a block and begins the next, with telemetry or without. Blocks
-come in pairs, in a random order within the pair; what drifts slowly or lies in the process is the same for both.
+Two processes with the same work differ by more than the cost of telemetry, for example by the addresses of their
+memory. So both states are compared within one process: each Progress message ends a block of steps and begins the
+next one, with or without telemetry. Blocks come in pairs, in random order within a pair; a slow drift and the
+properties of the process affect both blocks alike.
 """
 
 import math
@@ -22,14 +23,16 @@ from conoid.worker.run.compute import compute
 from conoid.worker.run.signals import Signals
 
 _WARM = 4
-"""Blocks with telemetry before the first that counts."""
+"""Number of blocks with telemetry before the first measured block."""
 _HALF_WIDTH = 0.98
-"""Half of 1.96: the ranks of a sample of n between which the median lies at 95 % are n / 2 -+ this times sqrt(n)."""
+"""Half of 1.96. In a sorted sample of n values, the 95 % interval of the median lies between the ranks n / 2 - and +
+this times sqrt(n)."""
 
 
 @dataclass(frozen=True)
 class Block:
-    """Seconds a step between two Progress messages: CPU of the solver's thread, CPU of all others, wall time."""
+    """Time per step between two Progress messages, s: CPU time of the solver thread, CPU time of all other threads,
+    wall time."""
 
     told: bool
     cpu: float
@@ -39,17 +42,18 @@ class Block:
 
 @dataclass(frozen=True)
 class Pairs:
-    """A run with a router in some state."""
+    """A run with a router in one state."""
 
     way: str
     blocks: list[Block]
 
     def median(self, told: bool, what: str) -> float:
-        """s a step in the blocks with, or without telemetry."""
+        """Returns the times per step of the blocks with or without telemetry, s."""
         return float(statistics.median(getattr(block, what) for block in self.blocks if block.told is told))
 
     def ratio(self, what: str) -> tuple[float, float, float]:
-        """With over without, a pair at a time: the median, and the interval that holds it at 95 % (sign test)."""
+        """Returns the ratio of each pair of blocks, with over without telemetry: the median, and its 95 % interval
+        (sign test)."""
         pairs = zip(self.blocks[::2], self.blocks[1::2], strict=True)
         ratios = sorted((getattr(a, what) / getattr(b, what)) ** (1 if a.told else -1) for a, b in pairs)
         n = len(ratios)
@@ -58,17 +62,17 @@ class Pairs:
 
 
 class End(Signals):
-    """A request to stop that comes from the switch, not from outside."""
+    """A stop that the switch requests, not a user."""
 
     def __init__(self) -> None:
         self.raised = False
 
 
 class Switch:
-    """A journal's listener that passes messages on in every block whose turn it is, and notes what each block cost."""
+    """A listener of the journal that passes messages on in blocks with telemetry, and stores the cost of each block."""
 
     def __init__(self, telemetry: Telemetry, turns: Sequence[bool], ready: Callable[[], None], end: End) -> None:
-        """``ready`` is called once, when telemetry has run for a while; ``end`` is raised after the last turn."""
+        """``ready``: called once, after some blocks with telemetry; ``end``: raised after the last block."""
         self.blocks: list[Block] = []
         self._telemetry = telemetry
         self._turns = iter(turns)
@@ -79,7 +83,7 @@ class Switch:
         self._mark = (0.0, 0.0, 0.0, 0)
 
     def tell(self, message: messages.AnyMessage, blob: bytes = b"") -> None:
-        """Takes a message from the solver."""
+        """Handles a message from the solver."""
         if isinstance(message, messages.Progress):
             self._next_block(message.step)
         if self._told:
@@ -107,7 +111,7 @@ def _now(step: int) -> tuple[float, float, float, int]:
 
 
 def turns(pairs: int, seed: int = 1) -> list[bool]:
-    """One with and one without telemetry in each pair, whichever first."""
+    """Returns the order of the blocks: pairs of one with and one without telemetry, in random order."""
     coin = random.Random(seed)
     firsts = [True, False] * ((pairs + 1) // 2)
     coin.shuffle(firsts)
@@ -115,7 +119,8 @@ def turns(pairs: int, seed: int = 1) -> list[bool]:
 
 
 def measure(way: str, endpoint: str, prefix: str, pairs: int, ready: Callable[[], None]) -> Pairs:
-    """A long flight of a few elastic tets, to the router at ``endpoint``; ``ready`` does to it what ``way`` says."""
+    """Runs a few elastic tets for many steps, with the router at ``endpoint``; ``ready`` applies ``way`` to the
+    router."""
     overrides = ["run.end_time=10 s", "run.frames=0", "reference=[]"]
     case = load.parse_case(load.apply_overrides(load.read_data(load.shipped_path("free_spin")), overrides))
     telemetry, end = Telemetry(endpoint, prefix), End()

@@ -1,4 +1,4 @@
-"""Tables as people read them: plain text that is Markdown too."""
+"""Tables as plain text in Markdown."""
 
 from collections.abc import Sequence
 
@@ -6,7 +6,7 @@ Cell = str | int | float | None
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[Cell]]) -> str:
-    """A Markdown table with aligned columns; numbers to the right, None as a dash."""
+    """Returns a Markdown table with aligned columns; numbers are right-aligned, None becomes a dash."""
     texts = [list(head), *([_text(cell) for cell in row] for row in rows)]
     widths = [max(len(line[i]) for line in texts) for i in range(len(head))]
     right = [all(isinstance(row[i], int | float | None) for row in rows) for i in range(len(head))]

@@ -1,9 +1,10 @@
-"""A rank by itself: what the others have told it in a run is written to a tape, from which it can run again alone.
+"""Replay of one rank alone: the data that a rank receives in a run is recorded on a tape, and the rank runs again from
+its tape.
 
-``mpiexec -n P python -m mpi4py -m tests.bench.tape record FOLDER <arguments of the worker>`` makes the tapes,
-``python -m tests.bench.tape replay FOLDER RANK <arguments of the worker>`` runs a rank from its tape and leaves its
-calls (timeline.Call) in FOLDER. Alone, a rank finds the caches as it has left them, as it does on a core of its own,
-and nobody's turn comes between. It does what it did in the run: all that depends on others, and on the clock, is told.
+``mpiexec -n P python -m mpi4py -m tests.bench.tape record FOLDER <arguments of the worker>`` records the tapes.
+``python -m tests.bench.tape replay FOLDER RANK <arguments of the worker>`` runs one rank from its tape, and writes
+its calls (timeline.Call) into FOLDER. During a replay the rank has a core and its caches to itself. It computes the
+same as in the recorded run, because all data of other ranks and of the clock is on the tape.
 """
 
 import pickle
@@ -24,21 +25,21 @@ from conoid.worker.run import main as worker
 from .timeline import Call
 
 _TWICE = ("join", "share", "gather", "scatter", "broadcast")
-"""Calls that are two collectives: a length goes ahead."""
+"""Methods with two collectives each: the first one sends the length."""
 
 
 def tape(folder: Path, rank: int) -> Path:
-    """What the others have told a rank."""
+    """Returns the tape of a rank."""
     return folder / f"tape-{rank}"
 
 
 def calls(folder: Path, rank: int) -> Path:
-    """What a rank has done alone."""
+    """Returns the file of the calls of a rank in its replay."""
     return folder / f"calls-{rank}"
 
 
 class Recorder:
-    """A communicator that writes down all that it is told."""
+    """A communicator that records all received data."""
 
     def __init__(self, comm: Comm, folder: Path) -> None:
         self._comm, self.rank, self.size, self.sent = comm, comm.rank, comm.size, comm.sent
@@ -47,17 +48,18 @@ class Recorder:
 
     @property
     def waited(self) -> float:
-        """See Comm."""
+        """Seconds of waiting, as in ``Comm``."""
         return self._comm.waited
 
     def note(self, told: Any) -> Any:
-        """Writes down what has been told."""
+        """Records received data, and returns it."""
         pickle.dump(told, self._file)
         return told
 
     def begin_maximum(self, words: Ints, result: Ints) -> Pending:
-        """See Comm. Where ranks take turns, reports come as many steps apart as with a core for each."""
-        from conoid.worker.run import loop  # numba, see Player.begin
+        """Same as in ``Comm``. If ranks share cores, reports are further apart in time, so that the number of steps
+        between them is that of ranks with a core each."""
+        from conoid.worker.run import loop  # imported here because it imports numba, see Player.begin
 
         if self._crowd > 1.0:
             vars(loop)["_REPORT_EVERY"] *= self._crowd
@@ -65,41 +67,41 @@ class Recorder:
         return _Noted(self, self._comm.begin_maximum(words, result), [result])
 
     def begin_sum(self, words: Ints, result: Ints) -> Pending:
-        """See Comm."""
+        """Same as in ``Comm``."""
         return _Noted(self, self._comm.begin_sum(words, result), [result])
 
     def exchange(self, sends: list[tuple[int, Ints]], receives: list[tuple[int, Ints]], tag: Tag) -> Exchange:
-        """See Comm."""
+        """Same as in ``Comm``."""
         return _Noted(self, self._comm.exchange(sends, receives, tag), [words for _, words in receives])
 
     def __getattr__(self, name: str) -> Any:
-        """Every other verb: what it returns is noted."""
+        """Any other method of the communicator; its result is recorded."""
         verb = getattr(self._comm, name)
         return lambda *items: self.note(verb(*items))
 
 
 class _Noted:
-    """An exchange, or a collective under way, whose results are noted."""
+    """An exchange or a pending collective whose results are recorded."""
 
     def __init__(self, comm: Recorder, inner: Any, results: list[Ints]) -> None:
         self._comm, self._inner, self._results = comm, inner, results
 
     def begin(self) -> None:
-        """See Exchange."""
+        """Same as in ``Exchange``."""
         self._inner.begin()
 
     def free(self) -> None:
-        """See Exchange."""
+        """Same as in ``Exchange``."""
         self._inner.free()
 
     def finish(self) -> None:
-        """See Comm."""
+        """Same as in ``Comm``."""
         self._inner.finish()
         self._comm.note([words.copy() for words in self._results])
 
 
 class Player:
-    """A communicator that tells what is on a tape, and notes what a rank does in between."""
+    """A communicator that returns the data of a tape, and stores the work of the rank between two calls."""
 
     waited = 0.0
 
@@ -112,7 +114,7 @@ class Player:
         self._last = 0.0
 
     def begin(self) -> None:
-        """The first step begins: calls count from here on."""
+        """Starts the storage of calls, at the first step."""
         from conoid.worker.kernels.jit import (
             cpu_time,  # numba, which must not be there before the worker has named its cache
         )
@@ -120,28 +122,28 @@ class Player:
         self._clock, self._last = cpu_time, cpu_time()
 
     def note(self, **parts: Any) -> None:
-        """A call begins."""
+        """Stores a call at its begin."""
         if self._clock is not None:
             self.calls.append(Call(self._clock() - self._last, **parts))
 
     def told(self) -> Any:
-        """What comes next on the tape; with it the call ends."""
+        """Returns the next data of the tape, at the end of a call."""
         item = pickle.load(self._file)
         if self._clock is not None:
             self._last = self._clock()
         return item
 
     def close(self) -> None:
-        """The run has ended."""
+        """Closes the tape at the end of the run."""
         self._file.close()
 
     def posted(self) -> None:
-        """A call ends that waits for nothing."""
+        """Ends a call that waits for no other rank."""
         if self._clock is not None:
             self._last = self._clock()
 
     def begin_maximum(self, words: Ints, result: Ints) -> Pending:
-        """See Comm."""
+        """Same as in ``Comm``."""
         self.note(enters=True)
         self.posted()
         return _Played(self, {"leaves": 1, "size": words.nbytes * self.size}, [], [result])
@@ -149,13 +151,13 @@ class Player:
     begin_sum = begin_maximum
 
     def exchange(self, sends: list[tuple[int, Ints]], receives: list[tuple[int, Ints]], tag: Tag) -> Exchange:
-        """See Comm."""
+        """Same as in ``Comm``."""
         out = [(rank, int(tag), words.nbytes) for rank, words in sends]
         awaited = {"receives": [(rank, int(tag)) for rank, _ in receives]}
         return _Played(self, awaited, out, [words for _, words in receives])
 
     def swap(self, sends: dict[int, Ints]) -> dict[int, Ints]:
-        """See Comm."""
+        """Same as in ``Comm``."""
         began = len(self.calls)
         self.note(enters=True, leaves=1, size=8 * self.size)
         told: dict[int, Ints] = self.told()
@@ -165,14 +167,14 @@ class Player:
         return told
 
     def trade(self, sends: dict[int, Ints], sources: Iterable[int]) -> dict[int, Ints]:
-        """See Comm."""
+        """Same as in ``Comm``."""
         out = [(rank, int(Tag.TRADE), words.nbytes) for rank, words in sends.items()]
         self.note(sends=out, receives=[(rank, int(Tag.TRADE)) for rank in sources])
         told: dict[int, Ints] = self.told()
         return told
 
     def __getattr__(self, name: str) -> Any:
-        """Every other verb is a collective, or two."""
+        """Any other method of the communicator: one collective, or two."""
         return lambda *_: self._collective(2 if name in _TWICE else 1)
 
     def _collective(self, many: int) -> Any:
@@ -185,7 +187,7 @@ class Player:
 
 
 class _Played:
-    """An exchange, or a collective under way, that is finished from the tape."""
+    """An exchange or a pending collective that gets its results from the tape."""
 
     def __init__(
         self, comm: Player, awaited: dict[str, Any], sends: list[tuple[int, int, int]], results: list[Ints]
@@ -193,30 +195,30 @@ class _Played:
         self._comm, self._awaited, self._sends, self._results = comm, awaited, sends, results
 
     def begin(self) -> None:
-        """See Exchange."""
+        """Same as in ``Exchange``."""
         self._comm.note(sends=self._sends)
         self._comm.posted()
 
     def finish(self) -> None:
-        """See Exchange."""
+        """Same as in ``Exchange``."""
         self._comm.note(**self._awaited)
         for words, told in zip(self._results, self._comm.told(), strict=True):
             words[...] = told
         self._comm.posted()
 
     def free(self) -> None:
-        """See Exchange."""
+        """Same as in ``Exchange``."""
 
 
 class _Sent(Sent):
-    """Is asked for the first time as the first step begins (Loop.run)."""
+    """Counter of sent data. Its first use is at the first step (Loop.run), and starts the storage of calls."""
 
     def __init__(self, comm: Player) -> None:
         super().__init__()
         self._comm: Player | None = comm
 
     def since_last(self) -> dict[str, int]:
-        """See Sent."""
+        """Same as in ``Sent``."""
         if self._comm is not None:
             self._comm.begin()
             self._comm = None
@@ -224,7 +226,7 @@ class _Sent(Sent):
 
 
 def main(mode: str, folder: Path, *words: str) -> int:
-    """Runs the worker on all ranks, or one rank of it alone; its exit code."""
+    """Runs the worker on all ranks, or one rank alone; returns the exit code."""
     if mode == "record":
         vars(worker)["connect"] = lambda: Recorder(connect(), folder)
         return worker.main(list(words))

@@ -1,7 +1,8 @@
-"""What a Johnson-Cook tet costs on average over a Taylor bar of some 140,000 tets, without running the whole of it.
+"""Mean cost of a Johnson-Cook tet over a Taylor bar of about 140,000 tets, without a run of the whole fine bar.
 
-A coarse bar runs to its end. At stages with equal numbers of steps between them its mesh, with motion and state, is
-cut twice into eight; the fine bar goes on from there, and is timed. The mean speed is the harmonic mean over stages.
+A coarse bar runs to its end. At several stages, with equal numbers of steps between them, its mesh is refined twice,
+with velocities and state, and some steps of this fine bar are timed. The mean speed is the harmonic mean over the
+stages.
 """
 
 from collections.abc import Sequence
@@ -30,11 +31,11 @@ _KEEP_EVERY = 100
 
 @dataclass(frozen=True)
 class Stage:
-    """The fine bar at some point of the run; speeds in millions of element-updates per CPU-second."""
+    """The fine bar at one stage of the run; speeds in millions of element updates per CPU second."""
 
     form: str
     share: float
-    """Of the steps of the run."""
+    """Share of the steps of the run."""
     time: float
     tets: int
     yielding: float
@@ -55,7 +56,7 @@ class Moment:
 
 
 def measure(form: Form = "nodal", stages: int = 10, rounds: int = 2) -> list[Stage]:
-    """The bar in a pressure form, at ``stages`` points of its run."""
+    """Measures the bar in a pressure form at ``stages`` stages of its run."""
     case = _case(form)
     coarse = build_mesh(case.parts[0].mesh, Path())
     moments = _history(case, coarse)
@@ -98,7 +99,7 @@ def _stage(case: schema.Case, share: float, moment: Moment, once: Refined, twice
 
 
 def _put(ride: Ride, moment: Moment, once: Refined, twice: Refined) -> None:
-    """Motion and state of the coarse bar on the fine one, and the forces that belong to them."""
+    """Copies velocities and state of the coarse bar to the fine one, and computes the forces."""
     nodes, block = ride.sim.model.nodes, ride.sim.model.blocks[0]
     nodes.x[:] = twice.nodal(once.nodal(moment.x))
     nodes.v[:] = twice.nodal(once.nodal(moment.v))
@@ -110,7 +111,7 @@ def _put(ride: Ride, moment: Moment, once: Refined, twice: Refined) -> None:
 
 
 def mean_speed(stages: Sequence[Stage]) -> tuple[float, float]:
-    """Best and median, millions of element-updates per CPU-second, averaged over the run."""
+    """Returns best and median speed, millions of element updates per CPU second, averaged over the run."""
     best, median = (len(stages) / sum(1.0 / rate for rate in rates) for rates in _rates(stages))
     return best, median
 
@@ -120,7 +121,7 @@ def _rates(stages: Sequence[Stage]) -> tuple[list[float], list[float]]:
 
 
 def report(stages: Sequence[Stage]) -> str:
-    """The stages, and their mean."""
+    """Returns a table of the stages, and their mean."""
     rows: list[list[Cell]] = [
         [
             f"{s.share:.0%}", f"{s.time * 1e6:.1f}", f"{s.yielding:.0%}", f"{s.best:.2f} ({s.median:.2f})",

@@ -1,7 +1,7 @@
-"""What telemetry costs a run: to a live router, to one that freezes and to one that dies.
+"""Cost of telemetry of a run with a working router, a router that freezes, and a router that dies.
 
-The cost of a step, with and without (``switch``). Single messages: how long the solver waits to hand one over. And the
-answer of a whole run each way, which has to be the same.
+Measured are the cost per step with and without telemetry (``switch``), and the time for which the solver waits at a
+single message. The digest of a whole run must be the same for each state of the router.
 """
 
 import os
@@ -32,7 +32,7 @@ _PATIENCE = 120.0
 
 
 def _harm(process: router.Router, way: str) -> Callable[[], None]:
-    """Does to a router what ``way`` says."""
+    """Applies ``way`` to a router: freezes it, kills it, or does nothing."""
 
     def harm() -> None:
         if way in _SIGNALS:
@@ -42,7 +42,7 @@ def _harm(process: router.Router, way: str) -> Callable[[], None]:
 
 
 def measure(pairs: int) -> list[Pairs]:
-    """The cost of a step each way, from ``pairs`` pairs of blocks."""
+    """Measures the cost per step for each state of the router, from ``pairs`` pairs of blocks."""
     found = []
     for way in WAYS:
         with router.started() as (process, endpoint):
@@ -51,7 +51,7 @@ def measure(pairs: int) -> list[Pairs]:
 
 
 def digests(end_time: str = "5 us") -> dict[str, str]:
-    """What a short Taylor bar answers without telemetry and each way."""
+    """Returns the digests of a short Taylor bar without telemetry and for each state of the router."""
     return {way: _digest(way, end_time) for way in ("off", *WAYS)}
 
 
@@ -87,7 +87,7 @@ def _await_first_step(folder: Path, worker: "subprocess.Popen[bytes]") -> None:
 
 @dataclass(frozen=True)
 class Message:
-    """us a message: the longest and the median wait of the solver's thread, and the CPU time of all other threads."""
+    """Times per message, us: longest and median wait of the solver thread, and CPU time of all other threads."""
 
     way: str
     median: float
@@ -96,7 +96,7 @@ class Message:
 
 
 def hand_over(count: int = 500, pause: float = 0.002) -> list[Message]:
-    """Hands over ``count`` messages, one every ``pause`` s; the worker sends some eight a second."""
+    """Sends ``count`` messages, one every ``pause`` s; the worker sends about eight per second."""
     return [_hand_over(way, count, pause) for way in WAYS]
 
 
@@ -113,7 +113,7 @@ def _hand_over(way: str, count: int, pause: float) -> Message:
 
 
 def _wait(telemetry: Telemetry, number: int, pause: float) -> float:
-    """s to hand over a message, and then a pause."""
+    """Returns the time to send one message, s; pauses after it."""
     message = messages.Log(run="run", seq=number, level="info", text="x" * 200)
     begin = time.perf_counter()
     telemetry.tell(message)
@@ -123,13 +123,14 @@ def _wait(telemetry: Telemetry, number: int, pause: float) -> float:
 
 
 def message_table(handed: Sequence[Message]) -> str:
-    """us a message, each way."""
+    """Returns a table of the times per message, us, for each state of the router."""
     rows: list[list[Cell]] = [[m.way, *(f"{us:.0f}" for us in (m.median, m.longest, m.beside))] for m in handed]
     return table(["router", "solver waits, us a message, median", "longest", "other threads, CPU us a message"], rows)
 
 
 def report(costs: Sequence[Pairs], answers: dict[str, str]) -> str:
-    """us a step with and without, and the median ratio of a pair with its interval."""
+    """Returns a table of the times per step with and without telemetry, us, and the median ratio of a pair with its
+    interval."""
     rows = [[c.way, *_medians(c, "cpu"), _change(c, "cpu"), _change(c, "wall"), *_medians(c, "beside")] for c in costs]
     head = [
         "router", "CPU us a step, with", "without", "change, %", "change of wall time, %", "other threads, with",

@@ -1,4 +1,4 @@
-"""The bench still runs: each of its instruments on something small."""
+"""Tests of the benchmarks: each of them runs on a small case."""
 
 import time
 from unittest.mock import Mock
@@ -78,7 +78,7 @@ def test_a_coarse_bar_answers_every_reference() -> None:
 
 
 def spin(seconds: float) -> None:
-    """Burns CPU time."""
+    """Uses CPU time."""
     end = time.thread_time() + seconds
     while time.thread_time() < end:
         pass
@@ -94,7 +94,7 @@ def progress(step: int) -> messages.Progress:
 
 @pytest.mark.parametrize("cost", [0.0, 1e-3])
 def test_the_switch_finds_what_telling_costs(cost: float) -> None:
-    """Blocks of ten steps and 5 ms; a message that costs the solver 1 ms is a fifth, whoever of a pair is first."""
+    """Blocks of ten steps and 5 ms. A message costs the solver 1 ms, a fifth of a block, in either order of a pair."""
     slow, end, ready = Mock(), switch.End(), Mock()
     slow.tell = lambda message, blob: spin(cost)
     listener = switch.Switch(slow, switch.turns(20), ready, end)

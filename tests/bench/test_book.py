@@ -1,4 +1,4 @@
-"""The accuracy book: its catalogue names what exists, and what fails is red."""
+"""Tests of the verification catalogue: its rows name cases and tests that exist, and failures are red."""
 
 import ast
 from pathlib import Path

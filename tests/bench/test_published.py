@@ -1,4 +1,4 @@
-"""The paper's numbers beside ours: the table and the chart."""
+"""Tests of the comparison with the paper: table and chart."""
 
 import re
 import xml.etree.ElementTree as ElementTree
@@ -13,7 +13,7 @@ from .published import compared, drawn, main
 
 
 def run(ranks: int, time: float) -> Projection:
-    """One that took ``time`` s, all of it work."""
+    """Returns a run of ``time`` s without waiting."""
     return Projection(
         ranks=ranks, steps=1, windows=1, wall=time, work=time, longest=time, longest_coarse=time, messages=0.0,
         collectives=0.0, phases={}, messages_sent=0.0, bytes_sent=0.0, collectives_made=0.0, bytes_shared=0.0,

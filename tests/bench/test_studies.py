@@ -1,4 +1,5 @@
-"""The studies of single scenes: their cases are read, their meshes are what their tables say."""
+"""Tests of the studies of single scenes: their cases are valid, and their meshes have the properties that the tables
+give."""
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from .cracks import Crack, Run, prepared
 
 @pytest.mark.parametrize("variant", comparable_rod.VARIANTS, ids=lambda variant: variant.name)
 def test_a_variant_of_the_rod_is_a_case(variant: comparable_rod.Variant) -> None:
-    """Whole, and each with something of its own."""
+    """Checks the case without changes, and each variant."""
     load.parse_case(comparable_rod.data_of(variant))
     alike = [
         other.name
@@ -23,7 +24,7 @@ def test_a_variant_of_the_rod_is_a_case(variant: comparable_rod.Variant) -> None
 
 @pytest.mark.parametrize("variant", [*plugging.CURVE, *plugging.CAUSES], ids=lambda variant: variant.name)
 def test_a_variant_of_the_plate_is_a_case(variant: plugging.Variant) -> None:
-    """Whole, and each with something of its own."""
+    """Checks the case without changes, and each variant."""
     data = plugging.data_of(variant)
     load.parse_case(data)
     alike = [other.name for other in (*plugging.CURVE, *plugging.CAUSES) if plugging.data_of(other) == data]
@@ -31,7 +32,8 @@ def test_a_variant_of_the_plate_is_a_case(variant: plugging.Variant) -> None:
 
 
 def test_a_random_plate_has_a_smooth_slit_of_the_length_that_is_asked_for() -> None:
-    """Its sides are doubled nodes, all on y = 0, which the tets nowhere cross; the tip holds."""
+    """The sides of the slit are doubled nodes on y = 0, no tet crosses the slit, and the nodes at the tip are not
+    doubled."""
     plan = kalthoff.plan("random", 2.5e-3, 1)
     _, mesh = prepared(plan)
     _, where, count = np.unique(mesh.points.round(9), axis=0, return_index=True, return_counts=True)
@@ -45,7 +47,8 @@ def test_a_random_plate_has_a_smooth_slit_of_the_length_that_is_asked_for() -> N
 
 
 def test_the_angle_and_the_speed_of_a_crack_that_is_known() -> None:
-    """Facets along 65 degrees from the tip of the slit, at 1.5 km/s from 20 us on, and some from the far side."""
+    """Open facets along 65 degrees from the tip of the slit, at 1.5 km/s from 20 us on, and further ones from the
+    other side."""
     r, turned = np.linspace(0.5e-3, 60e-3, 60), np.radians(65.0)
     centre = np.column_stack([kalthoff.TIP + r * np.cos(turned), r * np.sin(turned), 0.0 * r])
     far = np.array([[90e-3, -20e-3, 0.0]] * 5)

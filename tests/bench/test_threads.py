@@ -1,4 +1,4 @@
-"""The bench of ranks times threads goes on from what is there, and stops when its time is used up."""
+"""Tests of the benchmark of ranks times threads: it continues from stored runs, and stops when its time is used up."""
 
 from pathlib import Path
 
@@ -22,7 +22,7 @@ def test_a_scene_is_a_case(name: str) -> None:
 
 
 def made(folder: Path, trial: Trial, state: str = "succeeded") -> None:
-    """A run that is over."""
+    """Returns a finished run."""
     place = folder / trial.folder
     place.mkdir(parents=True)
     ended = Outcome(state=state, steps=4, elapsed=9.0, setup=0.0, digest="abc", threads=trial.threads)

@@ -1,4 +1,4 @@
-"""Ranks that wait for each other, with calls whose times are known."""
+"""Tests of the waiting times between ranks, with calls whose times are known."""
 
 import pickle
 from pathlib import Path

@@ -1,10 +1,13 @@
-"""Ranks times threads on three scenes, in a given time: the glass bar, a bar of eight times its tets, the long rod.
+"""Combinations of ranks and threads on three scenes, in a given time: the glass bar, a bar with eight times its tets,
+the long rod.
 
 ``python -m tests.bench.threads FOLDER [--minutes 10] [--scenes bar,rod,large] [--ranks 1,1x16,...]`` makes one run
-after the other, those that say most first, as long as there is time; the last one is stopped when there is none. Each
-call goes on from what lies in FOLDER, and prints and writes there, for each scene, the tables of ``conoid bench scale``
-from the runs that there are. On 16 cores all layouts are measured in some ten minutes. Where there are fewer, threads
-without a core are projected from timed tasks, and two threads show how right that is.
+after the other, the most important ones first, until the time is used up; a run that is still going on then is stopped.
+A later call continues from the runs in FOLDER. Each call prints, and writes to FOLDER, the tables of ``conoid bench
+scale`` of each scene.
+
+On 16 cores all combinations take about ten minutes. On fewer cores, the times of threads without a core are
+projected from timed tasks; runs with two threads show the error of this projection.
 """
 
 import argparse
@@ -28,16 +31,16 @@ from conoid.client.studies.projection import Network
 from conoid.client.studies.scaling import CORES, Layout, Trial, found, run, trials
 
 RANKS = "1,1x16,16,4x4,1x4,2x8,1x8,1x2"
-"""Those that say most first."""
+"""Combinations of ranks and threads, the most important ones first."""
 NETWORK = Network(latency=2e-6, bandwidth=5e9)
 _QUIET = ["run.frames=0", "run.snapshots=0", "reference=[]"]
 _LEAST = 10.0
-"""s without which no run is begun. Chosen: it takes some five to its first step."""
+"""Time in s that must remain for a run to start. Chosen: a run takes about five to its first step."""
 
 
 @dataclass(frozen=True)
 class Scene:
-    """A case and its changes."""
+    """A case with its changed keys."""
 
     case: str
     changes: tuple[str, ...]
@@ -55,7 +58,8 @@ SCENES: Mapping[str, Scene] = {
 
 
 def main(words: Sequence[str]) -> int:
-    """0 when all runs are there, 3 when time was short, 1 when answers differ or a run failed."""
+    """Runs the benchmark; returns 0 if all runs are complete, 3 if the time was too short, 1 if digests differ or a
+    run failed."""
     options = _parse(words)
     layouts, deadline = layouts_of(options.ranks), time.monotonic() + 60.0 * options.minutes
     names = options.scenes.split(",")
@@ -79,14 +83,14 @@ def _parse(words: Sequence[str]) -> argparse.Namespace:
 
 
 def _in_order(names: Sequence[str], layouts: Sequence[Layout]) -> Iterator[tuple[str, Trial]]:
-    """Scene after scene of each layout, the layouts as they are named; one rank is the first."""
+    """Yields the runs: all scenes of each combination, in the given order; a single rank comes first."""
     place = {each: number for number, each in enumerate([(1, 1), *layouts][::-1])}
     some = sorted(trials(layouts, CORES), key=lambda trial: -place.get((trial.ranks, trial.threads), 0))
     return ((name, trial) for trial in some for name in names)
 
 
 def _made(scene: Scene, trial: Trial, folder: Path, deadline: float) -> bool:
-    """Whether the run is there; one that an earlier call has left unfinished is made anew."""
+    """Returns whether the run is complete; an unfinished run of an earlier call is repeated."""
     place = folder / trial.folder
     if place.exists() and not _succeeded(place):
         shutil.rmtree(place)
@@ -108,7 +112,7 @@ def _succeeded(place: Path) -> bool:
 
 
 def _told(name: str, folder: Path, layouts: Sequence[Layout]) -> bool:
-    """Prints the tables of a scene, of the runs that are there; whether their answers are equal."""
+    """Prints the tables of the finished runs of a scene; returns whether their digests are equal."""
     scene = SCENES[name]
     there = [trial for trial in trials(layouts, CORES) if _succeeded(folder / trial.folder)]
     if not there or (there[0].ranks, there[0].threads) != (1, 1):

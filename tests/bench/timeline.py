@@ -1,9 +1,10 @@
-"""When ranks with a core each would be done: what every rank works between two calls of its communicator, in order, and
-whom it waits for.
+"""Computes the end of a run with a core for each rank, from the work of every rank between two calls of its
+communicator.
 
-A message arrives a latency and its bytes over the bandwidth after it was sent; a collective ends for all when the last
-rank has come, after two passes through a binary tree. Each call, and each message at either end, keeps the rank busy
-for a while. Nothing is averaged over steps: a rank that is late in one step makes the others wait in that step.
+A message arrives one latency, plus its bytes over the bandwidth, after it was sent. A collective ends for all ranks
+when the last rank has entered it, after two passes through a binary tree. Each call, and each message at both of its
+ends, costs CPU time of the rank. The computation does not average over steps: a rank that is late in one step delays
+the others in that step.
 """
 
 from collections import defaultdict, deque
@@ -13,43 +14,44 @@ from dataclasses import dataclass, field
 from conoid.client.studies.projection import Network
 
 CALL = 3e-6
-"""s: of a call of the communicator, from Python to MPI and back. Chosen: what a call from Python to a kernel takes."""
+"""CPU time of a call of the communicator, from Python to MPI and back, s. Chosen: time of a call of a kernel from
+Python."""
 MESSAGE = 0.5e-6
-"""s: of a message, at each of its ends. Chosen: what MPI takes to post one in shared memory."""
+"""CPU time of a message at each of its ends, s. Chosen: time in which MPI posts a message in shared memory."""
 
 
 @dataclass
 class Call:
-    """A call of the communicator, in the order in which its parts happen."""
+    """A call of the communicator; the fields are in the order of its parts."""
 
     work: float
-    """CPU time of the rank since the call before, s."""
+    """CPU time of the rank since the previous call, s."""
     enters: bool = False
-    """Whether it comes to a collective."""
+    """Whether the rank enters a collective."""
     leaves: int = 0
-    """So many collectives in one it waits for, and takes home ``size`` bytes."""
+    """Number of collectives for which the rank waits; the result has ``size`` bytes."""
     size: int = 0
     sends: list[tuple[int, int, int]] = field(default_factory=list)
-    """Messages: to whom, tag, bytes."""
+    """Sent messages: receiver, tag, bytes."""
     receives: list[tuple[int, int]] = field(default_factory=list)
-    """Messages that it waits for: from whom, tag."""
+    """Received messages, for which the rank waits: sender, tag."""
 
 
 class DeadlockError(Exception):
-    """Ranks wait for each other: the calls do not belong to one run."""
+    """Ranks wait for each other without end: the calls are not of one run."""
 
 
 @dataclass
 class Timeline:
-    """All ranks, as far as they have come."""
+    """Times of all ranks up to their present calls."""
 
     calls: Sequence[Sequence[Call]]
-    """Of each rank."""
+    """Calls of each rank."""
     network: Network
     now: list[float] = field(init=False)
-    """Of each rank, s."""
+    """Present time of each rank, s."""
     waited: list[float] = field(init=False)
-    """s."""
+    """Waiting time of each rank, s."""
 
     def __post_init__(self) -> None:
         ranks = len(self.calls)
@@ -60,7 +62,7 @@ class Timeline:
         self._levels = (ranks - 1).bit_length()
 
     def run(self) -> float:
-        """Time of the last rank, s. Raises DeadlockError."""
+        """Returns the time of the last rank, s. Raises DeadlockError."""
         under_way = {rank: self._steps(rank) for rank in range(len(self.calls))}
         while under_way:
             before = len(under_way), self._progress()
@@ -75,7 +77,7 @@ class Timeline:
         return sum(self.now), sum(map(len, self._mail.values())) + sum(map(len, self._come))
 
     def _steps(self, rank: int) -> Iterator[int]:
-        """Goes through the calls of a rank, and stops wherever it has to wait."""
+        """Processes the calls of a rank up to the first one for which it must wait."""
         for call in self.calls[rank]:
             self.now[rank] += call.work + CALL
             if call.enters:
