@@ -70,8 +70,7 @@ class Bar:
     outcome: Outcome
     course: list[Moment]
     work: list[tuple[float, int, float]]
-    """Periods between two reports: time at the end of each period, s, number of steps, and CPU time of all ranks without
-    waiting, s."""
+    """Periods between two reports: time at the end, s, number of steps, CPU time of all ranks without waiting, s."""
 
 
 def measure(sizes: Sequence[str], ranks: int = 2) -> Iterator[Bar]:
